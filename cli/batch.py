@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from cli.flags import add_option_flags, options_from_flags, switch, whole_number
+from cli.flags import Hair, HairColor, add_option_flags, options_from_flags, switch, whole_number
 from cli.process import write_message
 from cli.progress import progress_bar
 from lexicon.errors import DataError, InputError
@@ -35,6 +35,8 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     talker: Annotated[str, Parameter(help="Talker whose articulation is used.")] = "grid_s1",
     face: Annotated[str, Parameter(help="Face to show: head, cartoon, a .face file, or self.")] = "head",
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
+    hair: Hair = None,
+    hair_color: HairColor = None,
     palette: Annotated[str, Parameter(help="Palette of gesture styles.")] = "starter",
     audio: Annotated[
         Path | None,
@@ -86,7 +88,7 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         options_from_flags(BatchOptions, options, audio=audio, exports=tuple(export or ())),
         request=options_from_flags(Request, options),
         picture=options_from_flags(Picture, options),
-        models=Models(talker, face, identity, palette),
+        models=Models(talker, face, identity, palette, hair, hair_color),
         cast=read_cast(cast) if cast is not None else Cast(),
     )
     if not quiet:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from cli.flags import switch
+from cli.flags import Hair, HairColor, switch
 from cli.process import write_message
 
 
@@ -19,6 +19,8 @@ def convert(  # noqa: PLR0913 - one parameter a flag
     *,
     face: Annotated[str, Parameter(help="Face of the track: a shipped face or a .face file.")] = "head",
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
+    hair: Hair = None,
+    hair_color: HairColor = None,
     palette: Annotated[str, Parameter(help="Palette of the track: a shipped palette or a .palette file.")] = "starter",
     fps: Annotated[
         float | None, Parameter(help="Frames per second of formats with frames; by default those of the track.")
@@ -29,7 +31,9 @@ def convert(  # noqa: PLR0913 - one parameter a flag
     from tts2face.api import convert as convert_track
 
     began = time.perf_counter()
-    written = convert_track(track, outs, face=face, identity=identity, palette=palette, fps=fps)
+    written = convert_track(
+        track, outs, face=face, identity=identity, hair=hair, hair_color=hair_color, palette=palette, fps=fps
+    )
     if not quiet:
         names = ", ".join(str(path) for path in written)
         write_message(f"wrote {names} in {time.perf_counter() - began:.1f} s")

@@ -104,7 +104,7 @@ def show(
     check_file_name(out, "a picture", (".png",))
     refuse_overwriting({"--out": out}, {"the face": name})
     from tts2face.characters.pictures import draw_contact_sheet, draw_preview, png_bytes
-    from tts2face.models.face_file import load_face
+    from tts2face.models.face_loading import load_face
     from tts2face.storage.files import write_atomically
 
     loaded = load_face(name)

@@ -23,6 +23,8 @@ Out = Annotated[
         alias="-o",
     ),
 ]
+Hair = Annotated[str | None, Parameter(help="Haircut: bald, one of `tts2face haircuts`, or a .hair file.")]
+HairColor = Annotated[str | None, Parameter(help="Hair colour: one of `tts2face hair-colors`, or #rrggbb.")]
 Exports = Annotated[
     list[str] | None,
     Parameter(

@@ -1,4 +1,4 @@
-"""``tts2face voices | languages | faces | identities | styles | talkers | formats``: lists of the available choices."""
+"""Lists of the available choices: ``tts2face voices | languages | faces | identities | haircuts | ...``."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -53,6 +53,22 @@ def identities(
     _print(entries, ("identity", "summary"), ((one.name, one.summary) for one in entries), as_json)
 
 
+def haircuts(*, as_json: AsJson = False) -> None:
+    """List the haircuts (`--hair`)."""
+    from tts2face.catalogue import haircuts
+
+    entries = haircuts()
+    _print(entries, ("haircut", "summary"), ((one.name, one.summary) for one in entries), as_json)
+
+
+def hair_colors(*, as_json: AsJson = False) -> None:
+    """List the hair colours (`--hair-color`) that have a name."""
+    from tts2face.catalogue import hair_colors
+
+    entries = hair_colors()
+    _print(entries, ("color", "sRGB"), ((one.name, one.color) for one in entries), as_json)
+
+
 def styles(
     *,
     palette: Annotated[str, Parameter(help="Shipped palette or .palette file.")] = "starter",
@@ -94,7 +110,7 @@ def formats(*, as_json: AsJson = False) -> None:
     _print(entries, ("format", "suffixes", "installed", "summary"), rows, as_json)
 
 
-LISTS = (voices, languages, faces, identities, styles, talkers, formats)
+LISTS = (voices, languages, faces, identities, haircuts, hair_colors, styles, talkers, formats)
 
 
 def _languages_text(codes: Sequence[str]) -> str:

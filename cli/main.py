@@ -12,7 +12,7 @@ from cli.batch import batch
 from cli.convert import convert
 from cli.corpus import corpus
 from cli.face import face as face_commands
-from cli.flags import Exports, Out, add_option_flags, check_options, options_from_flags, switch
+from cli.flags import Exports, Hair, HairColor, Out, add_option_flags, check_options, options_from_flags, switch
 from cli.jobs import jobs, worker
 from cli.lists import LISTS
 from cli.mimic import mimic
@@ -34,6 +34,7 @@ from lexicon.inputs import LARGEST_TEXT_BYTES, decode_utf8, read_bounded, read_t
 from tts2face import __version__
 from tts2face.render.picture import Picture
 from tts2face.request import GESTURES, Request
+from tts2face.session_cache import Models
 
 Shell = Literal["bash", "zsh", "fish", "powershell"]
 
@@ -114,6 +115,8 @@ def speak(  # noqa: PLR0913 - one parameter a flag
         str, Parameter(help="Face to show: head, cartoon, a .face file, or self (the talker's own face).")
     ] = "head",
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
+    hair: Hair = None,
+    hair_color: HairColor = None,
     palette: Annotated[
         str, Parameter(help="Palette of gesture styles: a shipped palette or a .palette file.")
     ] = "starter",
@@ -137,7 +140,13 @@ def speak(  # noqa: PLR0913 - one parameter a flag
         Request, options, text=_read_text(text if text_option is None else text_option, file, is_needed=needs_text)
     )
     speak_options = SpeakOptions(
-        out, talker, face, identity, palette, explain, view, quiet, file, tuple(export or ())
+        out,
+        Models(talker, face, identity, palette, hair, hair_color),
+        explain,
+        view,
+        quiet,
+        file,
+        tuple(export or ()),
     ).with_export_of_out()
     run_request(request, options_from_flags(Picture, options), speak_options)
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from cli.flags import Exports, Out, switch
+from cli.flags import Exports, Hair, HairColor, Out, switch
 from cli.process import write_message
 from cli.progress import stage_bar
 from lexicon.errors import InputError
@@ -16,6 +16,7 @@ from tts2face.storage.overwrite import refuse_overwriting
 
 if TYPE_CHECKING:
     from tts2face.render.picture import Picture
+    from tts2face.session_cache import Models
 
 
 def mimic(  # noqa: PLR0913 - one parameter a flag
@@ -32,6 +33,8 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
         str, Parameter(help="Face to show: head, cartoon, a .face file, or self (with --talker).")
     ] = "head",
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
+    hair: Hair = None,
+    hair_color: HairColor = None,
     talker: Annotated[Path | None, Parameter(help="With --face self: talker whose own face is shown.")] = None,
     gain: Annotated[float, Parameter(help="Factor on the motion of lips and brows.")] = 1.0,
     append_missing: Annotated[
@@ -51,11 +54,13 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     """Transfer recorded motion of lips, eyes, brows and head to a face; the sound is copied."""
     began = time.perf_counter()
     from tts2face.render.picture import Picture
+    from tts2face.session_cache import Models
 
+    models = Models(str(talker or "grid_s1"), face, identity, None, hair, hair_color)
     if camera is not None:
         if take is not None or out is not None or export or face == OWN_FACE:
             raise InputError("--camera cannot be combined with a take, --out, --export or --face self; remove them")
-        return _run_live_window(camera, face, identity, Picture(size=size, background=background), model)
+        return _run_live_window(camera, models, Picture(size=size, background=background), model)
     out, exports = _divide_outputs(out, export)
     if take is None or (out is None and not exports):
         raise InputError("there is no input or no output; add a take and --out, or use --camera")
@@ -66,11 +71,10 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
         raise InputError("--face self and --talker need each other; add the missing one, or remove both")
     if append_missing and talker is None:
         raise InputError("--append-missing needs --face self: a mesh face has a fixed set of shapes; remove it")
-    from tts2face.session import Session
     from tts2face.synthesis.performance import Performance
 
     performance = Performance(take=take, gain=gain, fps=fps, audio=audio, append_missing=append_missing, model=model)
-    session = Session(talker or "grid_s1", face, identity=identity, palette=None)
+    session = models.open_session()
     picture = Picture(size=size, background=background)
     with stage_bar(quiet) as stages:
         written = session.write_performance(performance, out, picture=picture, exports=exports, stages=stages)
@@ -91,15 +95,15 @@ def _divide_outputs(out: Path | None, export: list[str] | None) -> tuple[Path | 
     return (None, [str(out), *exports]) if out is not None and is_export(out) else (out, exports)
 
 
-def _run_live_window(source: str, face: str, identity: str | None, picture: "Picture", model: Path | None) -> None:
+def _run_live_window(source: str, models: "Models", picture: "Picture", model: Path | None) -> None:
     """Show a head that follows the person in front of a camera, until the window is closed."""
-    from tts2face.models.face_file import load_face
+    from tts2face.models.face_loading import load_face
     from tts2face.render.window import LiveWindow, require_display
     from tts2face.synthesis.live_capture import CALIBRATION_S, LiveCapture
     from tts2face.video.camera import CaptureDevice
 
     require_display("--camera")
-    head = load_face(face, identity)
+    head = load_face(models.face, models.identity, hair=models.hair, hair_color=models.hair_color)
     with CaptureDevice(source) as camera:
         write_message(
             f"calibration, {CALIBRATION_S:.0f} s: look into the camera, close your lips, speak, blink; "

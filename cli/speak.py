@@ -12,6 +12,7 @@ from cli.progress import progress_bar
 from lexicon.errors import InputError
 from tts2face.render.picture import Picture
 from tts2face.request import OWN_FACE, Request
+from tts2face.session_cache import Models
 from tts2face.storage.files import write_atomically
 from tts2face.storage.output_names import check_file_name
 
@@ -30,10 +31,7 @@ class SpeakOptions:
     """The flags that belong neither to the request nor to the picture."""
 
     out: Path | None
-    talker: str
-    face: str
-    identity: str | None
-    palette: str
+    models: Models
     explain: Path | None
     view: bool
     quiet: bool
@@ -89,7 +87,7 @@ def _check_options(request: Request, picture: Picture, options: SpeakOptions) ->
     if not request.text.strip() and (not is_silent or options.explain is not None):
         raise InputError("the text is empty; add words to speak, or the words of --audio")
     if options.view:
-        if options.face == OWN_FACE:
+        if options.models.face == OWN_FACE:
             raise InputError("--view cannot show the talker's own face; remove it, or use --face head")
         from tts2face.render.window import require_display
 
@@ -101,7 +99,7 @@ def _check_overwriting(request: Request, picture: Picture, options: SpeakOptions
     from tts2face.synthesis.prepared_request import input_paths
 
     inputs = {f"--{name}": path for name, path in input_paths(request, picture).items()}
-    models = {"--talker": options.talker, "--face": options.face, "--palette": options.palette}
+    models = {"--talker": options.models.talker, "--face": options.models.face, "--palette": options.models.palette}
     from tts2face.exports.formats import split_format
 
     outputs = {"--out": options.out, "--explain": options.explain}
@@ -159,12 +157,11 @@ def _warn_mismatches(mismatches: "Sequence[TextMismatch]") -> None:
 
 def _open_session(options: SpeakOptions) -> "Session":
     from tts2face.render.output_path import check_output
-    from tts2face.session import Session
     from tts2face.synthesis.warm_up import compile_kernels, kernels_are_compiled
 
     if options.out is not None:
         check_output(options.out)
-    session = Session(options.talker, options.face, identity=options.identity, palette=options.palette)
+    session = options.models.open_session()
     if not kernels_are_compiled():
         if not options.quiet:
             write_message("first run on this machine: compiling kernels (about ten seconds, once)")

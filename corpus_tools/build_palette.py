@@ -35,7 +35,7 @@ from lexicon.errors import DataError, InputError
 from tts2face.face.expressions import expression_landmarks
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import inner_lip_gaps
 from tts2face.models.palette import Palette, write_palette
 from tts2face.retargeting.performer import CLOSED_FRAME_SHARE, eye_aperture

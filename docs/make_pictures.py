@@ -14,7 +14,7 @@ from corpus_tools.similarity.write import write_similarity
 from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE
 from tts2face.catalogue import identities
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.talker import load_talker
 from tts2face.render.draw import draw
 from tts2face.render.picture import Picture

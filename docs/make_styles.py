@@ -9,7 +9,7 @@ import av
 import numpy as np
 from PIL import Image, ImageDraw
 
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
 from tts2face.render.picture import Picture

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from tts2face.batch.run import run_batch as run_batch
     from tts2face.catalogue import faces as faces
     from tts2face.catalogue import formats as formats
+    from tts2face.catalogue import hair_colors as hair_colors
+    from tts2face.catalogue import haircuts as haircuts
     from tts2face.catalogue import identities as identities
     from tts2face.catalogue import languages as languages
     from tts2face.catalogue import styles as styles
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
     from tts2face.characters.importing import import_face as import_face
     from tts2face.characters.saving import save_face as save_face
     from tts2face.models.face import Face as Face
-    from tts2face.models.face_file import load_face as load_face
+    from tts2face.models.face_loading import load_face as load_face
     from tts2face.models.palette import Palette as Palette
     from tts2face.models.palette import load_palette as load_palette
     from tts2face.models.talker import Talker as Talker
@@ -100,6 +102,8 @@ __all__ = [
     "export",
     "faces",
     "formats",
+    "hair_colors",
+    "haircuts",
     "identities",
     "import_face",
     "languages",
@@ -128,12 +132,22 @@ _MODULES = {
     "tts2face.batch.output": ("Plan",),
     "tts2face.batch.plan": ("plan_batch",),
     "tts2face.batch.run": ("BatchResult", "run_batch"),
-    "tts2face.catalogue": ("faces", "formats", "identities", "languages", "styles", "talkers", "voices"),
+    "tts2face.catalogue": (
+        "faces",
+        "formats",
+        "hair_colors",
+        "haircuts",
+        "identities",
+        "languages",
+        "styles",
+        "talkers",
+        "voices",
+    ),
     "tts2face.characters.animation": ("WrittenCharacter", "write_character"),
     "tts2face.characters.importing": ("ImportReport", "ImportedFace", "import_face"),
     "tts2face.characters.saving": ("save_face",),
     "tts2face.models.face": ("Face",),
-    "tts2face.models.face_file": ("load_face",),
+    "tts2face.models.face_loading": ("load_face",),
     "tts2face.models.palette": ("Palette", "load_palette"),
     "tts2face.models.talker": ("Talker", "load_talker"),
     "tts2face.render.picture": ("Picture",),

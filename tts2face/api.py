@@ -9,7 +9,7 @@ from tts2face.exports.track_json import read_track
 from tts2face.exports.writer import ExportWriter, mesh_of, plan_exports
 from tts2face.face.gesture_transfer import gesture_face
 from tts2face.models.face import Face
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.palette import load_palette
 from tts2face.render.encode import write_clips
 from tts2face.render.picture import Picture
@@ -111,12 +111,14 @@ def load_clip(path: str | Path) -> Clip:
     return concatenate_clips([piece.clip for piece in read_track(Path(path))])
 
 
-def convert(
+def convert(  # noqa: PLR0913 - one parameter a model
     track: str | Path,
     path: str | Path | Iterable[str | Path],
     *,
     face: str = "head",
     identity: str | None = None,
+    hair: str | None = None,
+    hair_color: str | None = None,
     palette: str = "starter",
     fps: float | None = None,
 ) -> tuple[Path, ...]:
@@ -128,9 +130,9 @@ def convert(
         Track that `export` wrote, ``clip.track.json``.
     path, fps
         As for `export`.
-    face, identity, palette
-        Names or paths of the face, its identity preset, and the palette that made the clip; loaded if a format uses
-        the face's shapes.
+    face, identity, hair, hair_color, palette
+        Names or paths of the face, its identity preset and hair, and the palette that made the clip; loaded if a format
+        uses the face's shapes.
 
     Returns
     -------
@@ -153,16 +155,18 @@ def convert(
     channels = first.clip.motion.channels
     mesh = None
     if any(file.format.uses_face for file in files):
-        mesh = _mesh_with_channels(channels, face, identity, palette)
+        mesh = _mesh_with_channels(
+            channels, load_face(face, identity, hair=hair, hair_color=hair_color), (face, palette)
+        )
     with ExportWriter(files, face=mesh, fps=fps) as writer:
         for piece in chain([first], pieces):
             writer.add(piece.clip, piece.text)
     return tuple(file.path for file in files)
 
 
-def _mesh_with_channels(channels: tuple[str, ...], face: str, identity: str | None, palette: str) -> Face:
-    """Mesh of a face whose first shapes are the channels of a track, with the gestures of a palette if it has them."""
-    mesh = load_face(face, identity)
+def _mesh_with_channels(channels: tuple[str, ...], mesh: Face, names: tuple[str, str]) -> Face:
+    """Face whose first shapes are the channels of a track, with the gestures of a palette if it has them."""
+    face, palette = names
     if len(channels) > len(mesh.shape_names):
         mesh = gesture_face(mesh, load_palette(palette)).face
     if mesh.shape_names[: len(channels)] != channels:

@@ -1,4 +1,4 @@
-"""Lists of the available voices, languages, faces, identity presets, styles, talkers and export formats."""
+"""Lists of the available voices, languages, faces, identity presets, haircuts, styles, talkers and export formats."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -50,6 +50,22 @@ class IdentityEntry:
     name: str
     face: str
     summary: str
+
+
+@dataclass(frozen=True, slots=True)
+class HaircutEntry:
+    """A haircut of the shipped heads."""
+
+    name: str
+    summary: str
+
+
+@dataclass(frozen=True, slots=True)
+class HairColorEntry:
+    """A hair colour, sRGB as #rrggbb."""
+
+    name: str
+    color: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +171,25 @@ def identities(face: str = "head") -> tuple[IdentityEntry, ...]:
         return tuple(IdentityEntry(name, face, summary) for name, _, summary in header["identities"])
     except (KeyError, TypeError, ValueError) as broken:
         raise DataError(f"{path} lacks its list of identities; build or copy it again") from broken
+
+
+def haircuts() -> tuple[HaircutEntry, ...]:
+    """The shipped haircuts, and ``bald``."""
+    from tts2face.models.hair import BALD
+    from tts2face.models.hair_file import KIND
+
+    found = [
+        HaircutEntry(path.stem, str(_read(path, KIND)[1]["metadata"].get("summary", "")))
+        for path in _shipped_files(KIND)
+    ]
+    return (HaircutEntry(BALD, "no hair"), *found)
+
+
+def hair_colors() -> tuple[HairColorEntry, ...]:
+    """The hair colours that have a name."""
+    from tts2face.models.hair import HAIR_COLOURS
+
+    return tuple(HairColorEntry(name, f"#{digits}") for name, digits in HAIR_COLOURS.items())
 
 
 def styles(palette: str = "starter") -> tuple[StyleEntry, ...]:

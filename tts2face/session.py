@@ -21,7 +21,7 @@ from tts2face.synthesis.output_files import OutputFiles, plan_outputs
 from tts2face.synthesis.performance import Performance
 from tts2face.synthesis.performance_output import write_take
 from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare_request, split_picture
-from tts2face.synthesis.session_models import SessionModels
+from tts2face.synthesis.session_models import SessionModels, shown_face
 from tts2face.synthesis.written_clip import RequestSteps, WrittenClip, write_pieces
 from tts2face.types import Chunk, Clip, Progress, concatenate_clips
 from tts2face.voice.pool import VoicePool
@@ -42,6 +42,8 @@ class Session:
         Name of a shipped face, path of a .face file, a `Face`, or ``"self"`` for the talker's own face.
     identity
         Name of a preset of the face's age, sex and ancestry.
+    hair, hair_color
+        Haircut and colour of the hair, as for `tts2face.load_face`; None for the face's own.
     palette
         Name of a shipped palette, path of a .palette file, or a `Palette`; None for clips without gestures.
     voices
@@ -50,7 +52,7 @@ class Session:
     Raises
     ------
     InputError
-        A model or identity preset does not exist, or the talker has no face of its own.
+        A model, identity preset or haircut does not exist, or the talker has no face of its own.
     DataError
         A file is damaged, or the face lacks landmarks or shapes that speech needs.
 
@@ -60,16 +62,18 @@ class Session:
     >>> session.write("Hello there.", "hello.mp4", style="delighted")  # doctest: +SKIP
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - one parameter a model
         self,
         talker: str | Path | Talker = "grid_s1",
         face: str | Path | Face = "head",
         *,
         identity: str | None = None,
         palette: str | Path | Palette | None = "starter",
+        hair: str | None = None,
+        hair_color: str | None = None,
         voices: VoicePool | None = None,
     ) -> None:
-        self._models = SessionModels(talker, face, identity, palette, voices)
+        self._models = SessionModels(talker, shown_face(face, identity, hair, hair_color), palette, voices)
 
     @property
     def talker(self) -> Talker:

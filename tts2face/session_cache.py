@@ -20,7 +20,18 @@ class Models:
     talker: str = "grid_s1"
     face: str = "head"
     identity: str | None = None
-    palette: str = "starter"
+    palette: str | None = "starter"
+    hair: str | None = None
+    hair_color: str | None = None
+
+    def open_session(self, voices: "VoicePool | None" = None) -> "Session":
+        """Session of these models; raises as `Session`."""
+        from tts2face.session import Session  # a second of imports
+
+        return Session(
+            self.talker, self.face, identity=self.identity, palette=self.palette, hair=self.hair,
+            hair_color=self.hair_color, voices=voices,
+        )  # fmt: skip
 
 
 class SessionCache:
@@ -42,17 +53,13 @@ class SessionCache:
 
     def get(self, models: Models) -> "Session":
         """Session of these models; raises as `Session`."""
-        from tts2face.session import Session  # a second of imports
-
         if models in self._sessions:
             self._sessions.move_to_end(models)
         else:
             while len(self._sessions) >= self._n_sessions:
                 self._sessions.popitem(last=False)
             gc.collect()  # sessions hold themselves in circles
-            self._sessions[models] = Session(
-                models.talker, models.face, identity=models.identity, palette=models.palette, voices=self._voices
-            )
+            self._sessions[models] = models.open_session(self._voices)
         while self._max_bytes is not None and len(self._sessions) > 1 and resident_bytes() > self._max_bytes:
             self._sessions.popitem(last=False)
             gc.collect()

@@ -9,7 +9,7 @@ from corpus_tools.dense.mesh_fit import face_landmarks
 from corpus_tools.dense.skin_colour import SkinColours, vertex_normals
 from corpus_tools.dense.texels import Texels
 from corpus_tools.dense.visible_texels import SkinCanvas, soften_edges
-from tts2face.models.face import Face
+from tts2face.models.face import Face, Texture
 from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
@@ -51,7 +51,7 @@ def paint_skin(face: Face, canvas: SkinCanvas, skin: SkinColours) -> Face:
             colours[rows] *= strands
     return replace(
         face,
-        texture=_fill_texture(canvas.texture, texels, colour),
+        textures=(Texture(_fill_texture(canvas.texture, texels, colour)), *face.textures[1:]),
         colours=np.rint(np.clip(colours, 0, 255)).astype(np.uint8),
     )
 

@@ -56,11 +56,12 @@ def build_canvas(face: Face) -> SkinCanvas:
     DataError
         The head has no texture.
     """
-    if face.uv is None or face.texture is None:
+    if face.uv is None or not face.textures:
         raise DataError("the head has no texture to paint a talker's skin on; build the shipped faces again")
-    spans = [face.triangles[part.first : part.first + part.count] for part in face.parts if part.textured]
+    spans = [face.triangles[part.first : part.first + part.count] for part in face.parts if part.texture == 0]
     triangles = np.concatenate(spans).astype(np.int64)
-    side = len(face.texture)
+    skin = face.textures[0].pixels
+    side = len(skin)
     texels = find_texels(face.uv.astype(np.float64), triangles, side)
     jaw = face.shapes[face.shape_names.index("jawOpen")]
     opened = face.vertices.astype(np.float64) + OPEN_JAW_WEIGHT * jaw
@@ -68,7 +69,7 @@ def build_canvas(face: Face) -> SkinCanvas:
     share = _front_share(face, texels, opened)
     share[island] = 0.0
     in_mouth = island & (texels.columns < 0.24 * side)
-    return SkinCanvas(face.texture, texels, opened, soften_edges(share, texels, side), in_mouth)
+    return SkinCanvas(skin, texels, opened, soften_edges(share, texels, side), in_mouth)
 
 
 def _front_share(face: Face, texels: Texels, opened: Floats) -> Floats:

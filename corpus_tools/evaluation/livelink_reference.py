@@ -11,7 +11,7 @@ from corpus_tools.recordings.corpus_audio import CachedAligner
 from corpus_tools.recordings.observation import Observation, Quality, trim_to_picture
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.retargeting.performer import match_shapes
 from tts2face.speech.loudness import intensity
 from tts2face.speech.pauses import cut_at_pauses

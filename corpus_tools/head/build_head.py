@@ -36,7 +36,7 @@ CARTOON_STYLE = HeadStyle(
     cut=Haircut(top=30.0, side=15.0, nape=8.0, n_locks=300),
     eyes=EyeStyle(iris=0.47, pupil=0.22, colour=(0.28, 0.62, 0.50)),
     shirt=(0.95, 0.70, 0.18),
-    skin_material={"specular": 0.10, "shininess": 10.0, "wrap": 0.55, "textured": True},
+    skin_material={"specular": 0.10, "shininess": 10.0, "wrap": 0.55, "texture": 0},
 )  # fmt: skip
 EYE_GAIN, EYE_REACH_MM = 0.56, 31.0  # gain at an eye's centre; a third of it at this distance
 NOSE, NOSE_GAIN, NOSE_REACH_MM = np.array([0.0, -38.0, 34.0]), -0.36, 19.0

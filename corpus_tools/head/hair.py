@@ -18,7 +18,7 @@ LINE_DEG = np.array([0, 18, 34, 48, 58, 66, 74, 84, 98, 108, 122, 140, 160, 180]
 LINE_Y = np.array([64, 62, 60, 55, 44, 26, 2, -6, 14, -6, -42, -60, -70, -72])
 EAR = (np.array([80.0, -8.0, -72.0]), np.array([26.0, 30.0, 17.0]))  # |x|, y, z: no hair grows there
 SOFT_MM = 7.0  # width of the hairline
-MATERIAL = {"specular": 0.06, "shininess": 9.0, "wrap": 0.2, "textured": True}
+MATERIAL = {"specular": 0.06, "shininess": 9.0, "wrap": 0.2, "texture": 0}
 LOCK_MATERIAL = {"specular": 0.08, "shininess": 9.0, "wrap": 0.2}
 
 

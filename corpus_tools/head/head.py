@@ -24,7 +24,7 @@ from corpus_tools.head.texture import HeadColours
 
 Floats = NDArray[np.float64]
 
-SKIN_MATERIAL = {"specular": 0.16, "shininess": 14.0, "wrap": 0.35, "textured": True}
+SKIN_MATERIAL = {"specular": 0.16, "shininess": 14.0, "wrap": 0.35, "texture": 0}
 HAIR_PART_SHARE = 0.66  # of a quad that counts as hair; below it hair is only in the texture
 PIVOT = np.array([0.0, -75.0, -95.0])  # where the skull meets the neck
 ADULT = {

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.models.face import Eye, Face, Part
+from tts2face.models.face import Eye, Face, Part, Texture
 
 Floats = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ def assemble_face(
         eyes=tuple(_eyes(built, firsts)),
         colours=np.rint(np.clip(colours, 0, 1) * 255).astype(np.uint8),
         uv=uv,
-        texture=texture,
+        textures=(Texture(texture),),
         landmarks=np.zeros(0, np.int32),
         landmark_vertices=np.zeros((0, 3), np.int32),
         landmark_weights=np.zeros((0, 3), np.float32),

@@ -15,7 +15,7 @@ from corpus_tools.evaluation.reference import ReferenceUtterance
 from corpus_tools.report.page import note_paragraph
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.talker import speech_channels
 from tts2face.render.draw import MeshRenderer, mesh_renderer
 from tts2face.render.picture import Picture

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from sentences import sentences
 
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.talker import load_talker
 from tts2face.render.encode import ClipWriter
 from tts2face.render.picture import Picture

@@ -23,7 +23,7 @@ from corpus_tools.training.train_talker import CLOSED_GAP, learn_shapes
 from tests.bench.bench_retarget import bilabial_frames, landmarks_of, opening
 from tts2face.cloning.lip_gaps import facing_gaps
 from tts2face.cloning.parameter_transfer import ParameterTransfer, append_missing_components, build_parameter_transfer
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import MOUTH_REGION, lip_opening
 from tts2face.models.talker import ShapeModel, Talker, load_talker
 from tts2face.retargeting.to_face import build_retargeter

@@ -22,7 +22,7 @@ from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.run_options import RunOptions
 from corpus_tools.training.pose_correction import fit_pose_correction
 from tests.corpus_tools.decomposition.weight_errors import approximation_error
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.video.landmark_models import find_bundle

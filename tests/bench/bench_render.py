@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from bench_renderers import clip_of
 
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.render.draw import available_cores, mesh_renderer
 from tts2face.render.encode import write_clips
 from tts2face.render.picture import Picture

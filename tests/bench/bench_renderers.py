@@ -8,7 +8,7 @@ import numpy as np
 
 from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import RENDERERS, Picture
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform

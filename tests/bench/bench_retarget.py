@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.face import Face
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,

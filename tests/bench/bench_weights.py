@@ -29,7 +29,7 @@ from corpus_tools.recordings.observe import observe
 from corpus_tools.training.pose_correction import correct_pose
 from tests.corpus_tools.decomposition.weight_errors import approximation_error
 from tts2face.face.expressions import expression_landmarks
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.models.palette import EXPRESSIONS, GESTURE_FPS
 

@@ -15,7 +15,7 @@ from PIL import Image
 
 from tts2face.face.landmark_fit import landmark_positions
 from tts2face.models.face import Face
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 
 METRES = 0.001
 EYES = ("LeftEye", "RightEye")
@@ -156,15 +156,15 @@ QUANTUM = 0.5 / 32767  # metres of an integer step of quantised positions
 
 
 def _add_materials(maker: GltfMaker, face: Face) -> None:
-    if face.texture is not None:
+    if face.textures:
         content = io.BytesIO()
-        Image.fromarray(face.texture).save(content, "PNG", compress_level=1)
+        Image.fromarray(face.textures[0].pixels).save(content, "PNG", compress_level=1)
         view = maker.view(content.getvalue())
         maker.add("images", {"bufferView": view, "mimeType": "image/png"})
         maker.add("textures", {"source": 0})
     for part in face.parts:
         rough: dict[str, Any] = {"roughnessFactor": 0.6, "metallicFactor": 0.0}
-        if part.textured:
+        if part.is_textured:
             rough["baseColorTexture"] = {"index": 0}
         maker.add("materials", {"name": part.name, "pbrMetallicRoughness": rough})
 

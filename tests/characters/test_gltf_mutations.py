@@ -12,7 +12,7 @@ from lexicon.errors import DataError, InputError
 from tests.characters.made import Variant, glb, shipped_head, split_glb, write_character_file, write_landmarks
 from tts2face.characters.gltf_character import read_gltf_character
 from tts2face.characters.importing import import_face
-from tts2face.models.face import Face
+from tts2face.models.face import Face, Texture
 
 N_MUTATIONS = 70  # of each of three files
 WRONG_VALUES: tuple[Any, ...] = (
@@ -34,7 +34,7 @@ def small_head() -> Face:
         first += len(corners)
     names = ("eyeBlinkLeft", "eyeBlinkRight", "jawOpen", "mouthPucker", "mouthSmileLeft")
     rows = [head.shape_names.index(name) for name in names]
-    texture = head.texture[::16, ::16].copy() if head.texture is not None else None
+    textures = tuple(Texture(texture.pixels[::16, ::16].copy()) for texture in head.textures)
     used, corners = np.unique(np.concatenate(triangles), return_inverse=True)
     bounds = [np.searchsorted(used, [eye.first, eye.first + eye.count]).tolist() for eye in head.eyes]
     eyes = tuple(replace(eye, first=low, count=high - low) for eye, (low, high) in zip(head.eyes, bounds, strict=True))
@@ -52,7 +52,7 @@ def small_head() -> Face:
         shape_names=names,
         shapes=head.shapes[rows][:, used],
         limits=head.limits[rows],
-        texture=texture,
+        textures=textures,
     )
 
 

@@ -89,9 +89,9 @@ def test_a_skinned_head_turns_about_its_bone(tmp_path: Path) -> None:
 
 def test_texture_and_colours_come_along(plain: ImportedFace) -> None:
     face, head = plain.face, shipped_head()
-    assert face.texture is not None
+    assert face.textures
     skin = next(part for part in face.parts if part.name == "skin:skin")
-    assert skin.textured
+    assert skin.is_textured
     own = face.colours[face.eyes[0].first : face.eyes[0].first + face.eyes[0].count].astype(int)
     there = head.colours[head.eyes[0].first : head.eyes[0].first + head.eyes[0].count].astype(int)
     assert np.abs(own.mean(axis=0) - there.mean(axis=0)).max() < 3  # of 255: the file's gamma is 2.2, not sRGB

@@ -20,6 +20,7 @@ from tts2face.characters.bone_tracks import NECK_SHARE, share_of_rotation
 from tts2face.characters.importing import import_face
 from tts2face.characters.nodes import quaternion_matrix
 from tts2face.face.deformation import head_rotation, rotation_matrix
+from tts2face.models.face import VERTEX_COLOURS
 
 POSE = (0.25, -0.4, 0.1)  # pitch, yaw, roll of the last frame, rad
 NECK = np.array([0.0, -0.12, -0.09])  # of the made character, metres
@@ -31,8 +32,8 @@ WITHIN = 2e-5  # metres
 def spoken(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("neck")
     head = shipped_head()
-    parts = tuple(replace(part, textured=False) for part in head.parts)
-    plain = replace(head, parts=parts, uv=None, texture=None)  # the browser waits long for pictures
+    parts = tuple(replace(part, texture=VERTEX_COLOURS) for part in head.parts)
+    plain = replace(head, parts=parts, uv=None, textures=())  # the browser waits long for pictures
     character = write_character_file(folder / "character.glb", Variant(is_skinned=True, turn_deg=180.0), plain)
     table = write_landmarks(folder / "landmarks.tsv", 180.0)
     face = import_face(character, landmarks=table, front="-z").face

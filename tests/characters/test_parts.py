@@ -14,7 +14,7 @@ from tts2face.characters.nodes import quaternion_matrix
 from tts2face.characters.shape_mapping import ShapeSource
 from tts2face.characters.shape_names import ARKIT_SHAPES, guess_mapping
 from tts2face.characters.surface_points import _barycentric, _Projection, nearest_points, points_under_pixels
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.render.camera import CameraMatrices
 
 

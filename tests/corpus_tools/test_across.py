@@ -17,7 +17,7 @@ from corpus_tools.report.evaluation import evaluation_page
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tests.corpus_tools.speaking import observation
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.types import Trajectory
 
 

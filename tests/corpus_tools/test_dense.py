@@ -136,7 +136,7 @@ def test_depth_inside_a_square() -> None:
 
 def test_a_head_without_texture_is_refused(head: Face) -> None:
     with pytest.raises(DataError, match="has no texture"):
-        build_canvas(replace(head, texture=None))
+        build_canvas(replace(head, textures=(), parts=(), triangles=head.triangles[:0]))
 
 
 def test_only_videos_are_looked_at(tmp_path: Path) -> None:
@@ -167,12 +167,12 @@ def test_a_talkers_head(few_takes: Path, face_model: Path, tmp_path: Path, head:
     assert face.metadata["licence"] == "mesh: CC0-1.0; likeness of the person: not stated"
     assert len(face.landmarks) == N_LANDMARKS
     assert face.shape_names == head.shape_names
-    assert face.texture is not None
-    assert head.texture is not None
+    assert face.textures
+    assert head.textures
     inside = build_canvas(face).in_mouth
     texels = build_canvas(face).texels
     rows, columns = texels.rows[inside], texels.columns[inside]
-    difference = face.texture[rows, columns].astype(int) - head.texture[rows, columns]
+    difference = face.textures[0].pixels[rows, columns].astype(int) - head.textures[0].pixels[rows, columns]
     assert np.abs(difference).mean() < 3  # JPEG's, no pixels of the talker's mouth
 
 

@@ -27,7 +27,8 @@ from lexicon.errors import InputError
 from tests.face.posing import posed_vertices
 from tests.rendered_takes import ONLY_RENDERED
 from tts2face.models.face import Face
-from tts2face.models.face_file import load_face, read_face, write_face
+from tts2face.models.face_file import read_face, write_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
 from tts2face.render.draw import draw
 from tts2face.render.picture import Picture

@@ -8,7 +8,7 @@ import pytest
 import soxr
 
 from lexicon.sequence import SILENCE
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.models.talker import load_talker
 from tts2face.session import Session

@@ -13,7 +13,7 @@ from cli.main import run
 from lexicon.errors import InputError
 from lexicon.languages import language_code
 from tts2face import __version__, catalogue
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
 from tts2face.request import OWN_FACE

@@ -8,7 +8,7 @@ import pytest
 from cli.main import run
 from lexicon.errors import BackendError
 from tests.corpus_tools.films import join_clips
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.retargeting.performer import build_performer_retargeter
 from tts2face.synthesis.live_capture import CALIBRATION_S, LiveCapture, LivePose, track_poses
 from tts2face.video.blendshapes import BlendshapeReader

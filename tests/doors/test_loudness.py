@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.oracles.loudness_meter import measure_loudness, true_peak
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.talker import load_talker
 from tts2face.render.picture import Picture
 from tts2face.request import Request

@@ -14,7 +14,7 @@ from tts2face.exports.arkit import ARKIT_SHAPES, build_arkit_projection
 from tts2face.exports.livelink_csv import eye_angles, timecode
 from tts2face.exports.parts import Target
 from tts2face.face.shape_transfer import append_shapes
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.types import Clip, Trajectory
 from tts2face.video.livelink import read_livelink
 

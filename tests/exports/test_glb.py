@@ -234,7 +234,7 @@ def test_parts_with_holes_are_masked_by_the_alpha_of_the_texture(tmp_path):
     view = file.bufferViews[file.images[0].bufferView]
     content = file.binary_blob()[view.byteOffset : view.byteOffset + view.byteLength]
     pixels = np.array(Image.open(io.BytesIO(content)))
-    assert np.array_equal(pixels, np.dstack([face.texture, alpha]))
+    assert np.array_equal(pixels, np.dstack([face.textures[0].pixels, alpha]))
 
 
 PAGE = """<html><body><script type="importmap">{"imports": {"three": "/three/build/three.module.js",

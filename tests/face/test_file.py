@@ -9,8 +9,9 @@ import pytest
 from lexicon.errors import DataError, InputError
 from tests.face.posing import posed_vertices
 from tts2face.catalogue import IdentityEntry, identities
-from tts2face.models.face import Eye, Face, Part
-from tts2face.models.face_file import Identity, load_face, read_face, write_face
+from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Part, Texture
+from tts2face.models.face_file import Identity, read_face, write_face
+from tts2face.models.face_loading import load_face
 from tts2face.storage.files import find_file
 from tts2face.storage.tensors import write_tensors
 
@@ -27,14 +28,17 @@ def small_face(with_texture: bool = True) -> Face:
     return Face(
         vertices=rng.uniform(-90, 90, (N, 3)).astype(np.float32),
         triangles=rng.integers(0, N, (20, 3)).astype(np.int32),
-        parts=(Part("skin", 0, 12, specular=0.2, textured=with_texture), Part("iris", 12, 8, opacity=0.5)),
+        parts=(
+            Part("skin", 0, 12, specular=0.2, texture=0 if with_texture else VERTEX_COLOURS),
+            Part("iris", 12, 8, opacity=0.5),
+        ),
         shape_names=("jawOpen", "eyeLookUpLeft"),
         shapes=shapes,
         limits=np.array([[0, 1], [-0.5, 1.5]], np.float32),
         eyes=(Eye(30, 10, np.array([30, 0, 5], np.float32), {"eyeLookUpLeft": np.array([-0.4, 0, 0], np.float32)}),),
         colours=rng.integers(0, 255, (N, 3)).astype(np.uint8),
         uv=rng.uniform(0, 1, (N, 2)).astype(np.float32) if with_texture else None,
-        texture=grey if with_texture else None,
+        textures=(Texture(grey),) if with_texture else (),
         landmarks=np.array([13, 14], np.int32),
         landmark_vertices=np.array([[0, 1, 2], [3, 4, 5]], np.int32),
         landmark_weights=np.array([[0.2, 0.3, 0.5], [1, 0, 0]], np.float32),
@@ -68,7 +72,7 @@ def test_a_face_round_trips(written: tuple[Face, Path]) -> None:
     assert (read.parts, read.shape_names, dict(read.metadata)) == (face.parts, face.shape_names, dict(face.metadata))
     assert np.abs(read.shapes - face.shapes).max() < 0.005  # mm: finer than a tenth of a pixel
     assert np.abs(read.uv - face.uv).max() < 1e-5
-    assert np.abs(read.texture.astype(int) - face.texture).max() <= 2
+    assert np.abs(read.textures[0].pixels.astype(int) - face.textures[0].pixels).max() <= 2
     assert np.array_equal(read.eyes[0].centre, face.eyes[0].centre)
     assert np.array_equal(read.eyes[0].turns["eyeLookUpLeft"], face.eyes[0].turns["eyeLookUpLeft"])
     weights = np.array([0.7, 1.0])
@@ -79,18 +83,22 @@ def test_a_face_without_texture_round_trips(tmp_path: Path) -> None:
     write_face(tmp_path / "plain.face", small_face(with_texture=False))
     read = read_face(tmp_path / "plain.face")
     assert read.uv is None
-    assert read.texture is None
+    assert read.textures == ()
 
 
 def test_a_face_with_holes_round_trips(tmp_path: Path) -> None:
     face, holes = small_face(), np.arange(256, dtype=np.uint8).reshape(16, 16)
-    face = replace(face, alpha=holes, parts=(replace(face.parts[0], cutout=True), face.parts[1]))
+    face = replace(
+        face,
+        textures=(replace(face.textures[0], alpha=holes),),
+        parts=(replace(face.parts[0], cutout=True), face.parts[1]),
+    )
     write_face(tmp_path / "holes.face", face)
     read = read_face(tmp_path / "holes.face")
-    assert np.array_equal(read.alpha, holes)
+    assert np.array_equal(read.textures[0].alpha, holes)
     assert read.parts == face.parts
-    with pytest.raises(DataError, match="do not fit each other"):
-        replace(face, alpha=holes[:8])
+    with pytest.raises(DataError, match="differ in size"):
+        replace(face.textures[0], alpha=holes[:8])
 
 
 def test_holes_without_alpha_are_refused(tmp_path: Path) -> None:

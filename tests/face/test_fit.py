@@ -12,7 +12,7 @@ from tts2face.face.landmark_fit import (
     procrustes_rotation,
     scatter_landmarks,
 )
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 
 
 @pytest.mark.parametrize("seed", range(5))

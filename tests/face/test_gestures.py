@@ -15,7 +15,7 @@ from tts2face.face.gesture_transfer import LID_LANDMARKS, LIP_LANDMARKS, Gesture
 from tts2face.face.landmark_fit import landmark_positions
 from tts2face.face.shape_transfer import eye_distance
 from tts2face.models.face import Face
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
 from tts2face.models.palette import EXPRESSIONS
 from tts2face.models.talker import load_talker

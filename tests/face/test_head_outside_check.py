@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import Tts2faceError
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import Picture
 from tts2face.video.blendshapes import BLENDSHAPES

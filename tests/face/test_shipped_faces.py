@@ -5,7 +5,8 @@ import pytest
 
 from tests.face.posing import posed_vertices
 from tts2face.catalogue import identities
-from tts2face.models.face_file import load_face, read_face
+from tts2face.models.face_file import read_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
 from tts2face.storage.files import find_file
 

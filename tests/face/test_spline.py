@@ -8,7 +8,7 @@ from lexicon.errors import DataError, InputError
 from tts2face.face.compact_spline import cubic_bspline, fit_local_interpolant
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions
 from tts2face.face.rbf import CHUNK_SIZE
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 
 SUPPORT = 30.0  # mm
 

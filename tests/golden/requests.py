@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from tests.render.tiny_talker import own_talker
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.talker import Talker, load_talker
 from tts2face.render.picture import Picture
 from tts2face.request import Request

@@ -26,7 +26,8 @@ from tts2face.exemplar.synthesis import blend_trajectory, build_exemplar_model, 
 from tts2face.gesture.gesture_stream import GestureFields, GestureStream
 from tts2face.gesture.perlin_noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
-from tts2face.models.face_file import load_face, read_face
+from tts2face.models.face_file import read_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.palette import read_palette
 from tts2face.models.talker import load_talker, read_talker, speech_channels
 from tts2face.render.draw import mesh_renderer

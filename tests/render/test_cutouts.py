@@ -20,8 +20,8 @@ def face_with_sheet(alpha: np.ndarray | None) -> Face:
     face = tiny_face(textured=True)
     uv = np.array(face.uv)
     uv[-4:] = [[0, 1], [1, 1], [1, 0], [0, 0]]
-    sheet = replace(face.parts[-1], opacity=1.0, textured=True, cutout=alpha is not None)
-    return replace(face, uv=uv, parts=(*face.parts[:-1], sheet), alpha=alpha)
+    sheet = replace(face.parts[-1], opacity=1.0, texture=0, cutout=alpha is not None)
+    return replace(face, uv=uv, parts=(*face.parts[:-1], sheet), textures=(replace(face.textures[0], alpha=alpha),))
 
 
 def without_sheet(face: Face) -> Face:

@@ -9,7 +9,7 @@ from PIL import Image
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_face import tiny_face
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.render.draw import draw, mesh_renderer
 from tts2face.render.picture import Picture
 from tts2face.render.surface import linear_table

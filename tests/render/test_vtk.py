@@ -10,7 +10,7 @@ from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.test_cutouts import face_with_sheet, without_sheet
 from tests.render.tiny_face import tiny_face
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.render import vtk_renderer as vtk
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import NUMBA, PYVISTA, Picture

@@ -1,10 +1,13 @@
 """A small synthetic face: a ball of skin with two eyeballs, a tongue and a sheet of lashes."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from tts2face.models.face import Eye, Face, Part
+from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Part, Texture
 
 SKIN, EYE, TONGUE, LASH = (206, 150, 124), (240, 240, 240), (190, 70, 80), (30, 20, 15)
+FLESH = Part("skin", 0, 0, specular=0.2, shininess=20.0, wrap=0.4)
 RADIUS = 90.0  # mm
 
 
@@ -57,19 +60,19 @@ def tiny_face(textured=False, n_rings=14):
     still = np.zeros_like(vertices)
     counts = [len(face) for face in faces]
     firsts = np.cumsum([0, *counts])
-    rest = {"uv": None, "texture": None}
+    rest = {"uv": None, "textures": ()}
     if textured:
         unit = (skin - (0, -20, -60)) / RADIUS
         uv = np.full((len(vertices), 2), 0.5, np.float32)
         uv[: len(skin)] = np.column_stack([0.5 + 0.5 * unit[:, 0], 0.5 - 0.5 * unit[:, 1]])
         chequers = np.indices((64, 64)).sum(axis=0) // 8 % 2
         texture = np.where(chequers[..., None] == 0, (230, 60, 40), (40, 80, 230)).astype(np.uint8)
-        rest = {"uv": uv, "texture": texture}
+        rest = {"uv": uv, "textures": (Texture(texture),)}
     return Face(
         vertices=vertices,
         triangles=triangles,
         parts=(
-            Part("skin", int(firsts[0]), counts[0], specular=0.2, shininess=20.0, wrap=0.4, textured=textured),
+            replace(FLESH, first=int(firsts[0]), count=counts[0], texture=0 if textured else VERTEX_COLOURS),
             Part("eye_left", int(firsts[1]), counts[1], specular=0.8, shininess=200.0),
             Part("eye_right", int(firsts[2]), counts[2], specular=0.8, shininess=200.0),
             Part("tongue", int(firsts[3]), counts[3], specular=0.3, shininess=30.0, wrap=0.2),

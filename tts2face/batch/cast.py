@@ -24,7 +24,7 @@ from lexicon.inputs import read_text
 from tts2face.request import Request
 from tts2face.subtitles.cue import Cue
 
-MODEL_NAMES = ("talker", "face", "identity", "palette")
+MODEL_NAMES = ("talker", "face", "identity", "palette", "hair", "hair_color")
 PATTERN_NAMES = ("speaker", "subtitle_style", "file")
 NOT_IN_CAST = frozenset({"text", "audio", "audio_map", "idle", "fps", "timeline", "expression"})
 REQUEST_NAMES = tuple(option.name for option in fields(Request) if option.name not in NOT_IN_CAST)

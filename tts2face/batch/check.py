@@ -1,4 +1,4 @@
-"""Checks of names that a renderer would refuse segment by segment: voices, identities and styles."""
+"""Checks of names that a renderer would refuse segment by segment: voices, identities, haircuts and styles."""
 
 from collections.abc import Mapping
 from functools import lru_cache
@@ -6,18 +6,21 @@ from typing import Any
 
 from lexicon.errors import InputError
 from tts2face.catalogue import identities
+from tts2face.models.face_loading import load_face
+from tts2face.models.hair import BALD
 from tts2face.models.palette import Palette, load_palette
+from tts2face.request import OWN_FACE
 from tts2face.session_cache import Models
 from tts2face.voice.engine import VOICE_NAMES
 
 
 def check_names(models: Models, request: Mapping[str, Any]) -> None:
-    """Refuse a voice, an identity or a style that does not exist.
+    """Refuse a voice, an identity, a haircut or a style that does not exist.
 
     Raises
     ------
     InputError
-        There is no such voice, identity or style, or no such model.
+        There is no such voice, identity, haircut or style, or no such model.
     DataError
         A model is damaged.
     """
@@ -29,13 +32,22 @@ def check_names(models: Models, request: Mapping[str, Any]) -> None:
         if models.identity not in known:
             offered = ", ".join(known) or "none"
             raise InputError(f"the face {models.face} has no identity {models.identity!r}; it has {offered}")
-    if request.get("style") is not None:
+    if models.hair not in (None, BALD) or models.hair_color is not None:
+        _check_hair(models.face, models.hair, models.hair_color)
+    if request.get("style") is not None and models.palette is not None:
         _palette(models.palette).require(str(request["style"]))
 
 
 @lru_cache(maxsize=64)
+def _check_hair(face: str, hair: str | None, colour: str | None) -> None:
+    if face == OWN_FACE:
+        raise InputError("a talker's own face has no haircuts; remove hair and hair_color, or choose another face")
+    load_face(face, hair=hair, hair_color=colour)
+
+
+@lru_cache(maxsize=64)
 def _identities(face: str) -> tuple[str, ...]:
-    return () if face == "self" else tuple(one.name for one in identities(face))
+    return () if face == OWN_FACE else tuple(one.name for one in identities(face))
 
 
 @lru_cache(maxsize=8)

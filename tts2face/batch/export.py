@@ -18,6 +18,7 @@ from tts2face.exports.track_json import read_track
 from tts2face.exports.writer import ExportWriter, mesh_of, plan_exports
 from tts2face.render.movie import SOUND_RATE
 from tts2face.request import OWN_FACE, Request
+from tts2face.session_cache import Models
 from tts2face.types import Clip, Speech, Waveform
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def check_faces(output: Output) -> None:
         shown = ", ".join(" ".join(str(part) for part in face if part) for face in list(faces)[:MAX_SHOWN])
         raise InputError(
             f"{output.stem} shows {len(faces)} faces ({shown}), which one export cannot hold; choose --per cue, or one "
-            "face, identity and palette for all speakers"
+            "face, identity, hair and palette for all speakers"
         )
 
 
@@ -52,7 +53,7 @@ class Exporter:
     """Writes the exports of outputs; the session whose face they show is kept."""
 
     def __init__(self) -> None:
-        self._key: tuple[str, ...] | None = None
+        self._shown: Models | None = None
         self._session: Session | None = None
 
     def write(self, output: Output, tracks: Sequence[Path], folder: Path) -> list[Path]:
@@ -77,15 +78,9 @@ class Exporter:
         return [file.path for file in files]
 
     def _session_of(self, output: Output) -> "Session":
-        from tts2face.session import Session
-
         models = output.segments[0].models
-        key = (models.talker, models.face, str(models.identity), models.palette)
-        if self._session is None or key != self._key:
-            self._key, self._session = (
-                key,
-                Session(models.talker, models.face, identity=models.identity, palette=models.palette),
-            )
+        if self._session is None or models != self._shown:
+            self._shown, self._session = models, models.open_session()
         return self._session
 
 
@@ -139,4 +134,5 @@ def _with_samples(clip: Clip, samples: NDArray[np.float32]) -> Clip:
 
 def _face_of(segment: Segment) -> tuple[str, ...]:
     models, gestures = segment.models, str(segment.request.get("gestures", ""))
-    return models.face, str(models.identity or ""), models.palette, "without gestures" if gestures == "none" else ""
+    names = (models.face, models.identity, models.palette, models.hair, models.hair_color)
+    return (*(name or "" for name in names), "without gestures" if gestures == "none" else "")

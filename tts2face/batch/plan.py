@@ -272,7 +272,7 @@ class _FilePlan:
         role = self.base.cast.role_of(window.cue, self.path.name)
         for settings in (self.base.cast.default, role.settings if role else {}):
             if settings.get("face", chosen["face"]) != chosen["face"]:
-                chosen["identity"] = None  # presets belong to a face
+                chosen |= dict.fromkeys(("identity", "hair", "hair_color"))  # they belong to a face
             chosen |= {name: settings[name] for name in MODEL_NAMES if name in settings}
         return Models(**chosen)
 

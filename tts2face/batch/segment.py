@@ -8,6 +8,7 @@ from typing import Any
 
 from tts2face.batch.address import content_address, file_hash, model_hash, program_version
 from tts2face.clock import exact_rate, first_sample
+from tts2face.models.hair import BALD
 from tts2face.render.movie import SOUND_RATE
 from tts2face.request import OWN_FACE, Request
 from tts2face.session_cache import Models
@@ -15,6 +16,7 @@ from tts2face.session_cache import Models
 MOVIE, ALPHA_MOVIE, TRACK = "movie", "vp9", "track"  # what a segment is stored as: H.264, VP9, or motion for exports
 FILE_PREFIX = "file."  # of the medium of a whole clip in a format of `Session.stream_file`
 REQUEST_FILES = ("audio", "dictionary", "voice", "timeline")
+HAIR = ("hair", "hair_color")  # of models; not part of the addresses of segments without them
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,7 @@ class Segment:
         content["request"] = {name: self.file_hashes.get(name, value) for name, value in self.request.items()}
         content["picture"] = {name: self.file_hashes.get(name, value) for name, value in self.picture.items()}
         content["identity"] = self.models.identity
+        content |= {name: value for name in HAIR if (value := getattr(self.models, name)) is not None}
         return content_address(content | {"versions": program_version()})
 
     def as_json(self) -> dict[str, Any]:
@@ -123,8 +126,10 @@ def input_hashes(models: Models, request: Mapping[str, Any], picture: Mapping[st
     InputError
         A model or file does not exist.
     """
-    hashes = {"talker": model_hash(models.talker, "talker"), "palette": model_hash(models.palette, "palette")}
+    hashes = {"talker": model_hash(models.talker, "talker"), "palette": model_hash(str(models.palette), "palette")}
     hashes["face"] = OWN_FACE if models.face == OWN_FACE else model_hash(models.face, "face")
+    if models.hair not in (None, BALD):
+        hashes["hair"] = model_hash(str(models.hair), "hair")
     for name in REQUEST_FILES:
         value = request.get(name)
         if value is not None and (name != "voice" or Path(str(value)).suffix):

@@ -12,7 +12,7 @@ from tts2face.characters.character import OPAQUE, Character, Material
 from tts2face.characters.eyeballs import eyeball_centres, fit_sphere, gaze_turns
 from tts2face.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadMesh
 from tts2face.face.mouth_model import SPEECH_SHAPE_PREFIXES
-from tts2face.models.face import Eye, Face, Part
+from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Part, Texture
 
 # Highlights and softness of materials by kind, as on the default head: specular, shininess, wrap.
 SHADING = {
@@ -119,13 +119,16 @@ def build_face(head: HeadMesh, character: Character, placement: Placement) -> Fa
         eyes=_eyes(head, character, placement, names),
         colours=colours,
         uv=None if atlas.texture is None else uv.astype(np.float32),
-        texture=atlas.texture,
-        alpha=atlas.alpha if has_holes else None,
+        textures=_textures(atlas, has_holes),
         landmarks=np.zeros(0, np.int32),
         landmark_vertices=np.zeros((0, 3), np.int32),
         landmark_weights=np.zeros((0, 3), np.float32),
         pivot=np.zeros(3, np.float32),
     )
+
+
+def _textures(atlas: Atlas, has_holes: bool) -> tuple[Texture, ...]:
+    return () if atlas.texture is None else (Texture(atlas.texture, atlas.alpha if has_holes else None),)
 
 
 def _parts(keys: list[tuple[str, int, float]], character: Character, atlas: Atlas) -> tuple[Part, ...]:
@@ -136,10 +139,10 @@ def _parts(keys: list[tuple[str, int, float]], character: Character, atlas: Atla
         end = next((at for at in range(first, len(keys)) if keys[at] != keys[first]), len(keys))
         specular, shininess, wrap = SHADING[kind]
         name = f"{kind}:{character.materials[material].name}"[:80]
-        is_textured = material in atlas.places
+        texture = 0 if material in atlas.places else VERTEX_COLOURS
         is_cut = opacity == CUTOUT
         opacity = 1.0 if is_cut else opacity
-        parts.append(Part(name, first, end - first, specular, shininess, wrap, opacity, is_textured, is_cut))
+        parts.append(Part(name, first, end - first, specular, shininess, wrap, opacity, texture, is_cut))
         first = end
     return tuple(parts)
 

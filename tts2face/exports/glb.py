@@ -109,15 +109,10 @@ def _asset(target: Target, face: Face) -> dict[str, Any]:
 def _materials(face: Face, buffer: GltfBuffer) -> dict[str, Any]:
     """Textures and one material for each surface."""
     content: dict[str, Any] = {"materials": []}
-    has_texture = face.texture is not None and face.uv is not None
-    if has_texture and face.texture is not None:
-        if face.alpha is None:
-            image = {"bufferView": buffer.add_view(texture_jpeg(face.texture)), "mimeType": "image/jpeg"}
-        else:
-            image = {"bufferView": buffer.add_view(texture_png(face.texture, face.alpha)), "mimeType": "image/png"}
-        content["images"] = [image | {"name": "skin"}]
+    if face.textures:
+        content["images"] = [_image(face, number, buffer) for number in range(len(face.textures))]
         content["samplers"] = [{}]
-        content["textures"] = [{"source": 0, "sampler": 0}]
+        content["textures"] = [{"source": number, "sampler": 0} for number in range(len(face.textures))]
     for surface in divide_surface(face):
         part = surface.part
         shading: dict[str, Any] = {
@@ -125,8 +120,8 @@ def _materials(face: Face, buffer: GltfBuffer) -> dict[str, Any]:
             "metallicFactor": 0,
             "roughnessFactor": round(roughness(part), 4),
         }
-        if part.textured and has_texture:
-            shading["baseColorTexture"] = {"index": 0}
+        if part.is_textured:
+            shading["baseColorTexture"] = {"index": part.texture}
         material: dict[str, Any] = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": shading}
         if part.opacity < 1:
             material["alphaMode"] = "BLEND"
@@ -136,11 +131,19 @@ def _materials(face: Face, buffer: GltfBuffer) -> dict[str, Any]:
     return content
 
 
+def _image(face: Face, number: int, buffer: GltfBuffer) -> dict[str, Any]:
+    texture = face.textures[number]
+    name = next((part.name for part in face.parts if part.texture == number), f"texture{number}")
+    if texture.alpha is None:
+        return {"bufferView": buffer.add_view(texture_jpeg(texture.pixels)), "mimeType": "image/jpeg", "name": name}
+    content = texture_png(texture.pixels, texture.alpha)
+    return {"bufferView": buffer.add_view(content), "mimeType": "image/png", "name": name}
+
+
 def _mesh(
     face: Face, surfaces: list[ExportSurface], targets: MorphTargets, skeleton: Skeleton, buffer: GltfBuffer
 ) -> dict[str, Any]:
     normals, colours = vertex_normals(face), linear_colours(face)
-    has_texture = face.texture is not None
     primitives = []
     for number, surface in enumerate(surfaces):
         own = surface.vertices
@@ -152,7 +155,7 @@ def _mesh(
             "JOINTS_0": buffer.add_accessor(_four(skeleton.joints[own]), VERTICES),
             "WEIGHTS_0": buffer.add_accessor(_four(skeleton.weights[own]), VERTICES),
         }
-        if surface.part.textured and has_texture and face.uv is not None:
+        if surface.part.is_textured and face.uv is not None:
             attributes["TEXCOORD_0"] = buffer.add_accessor(face.uv[own].astype("<f4"), VERTICES)
         else:
             opaque = np.column_stack([colours[own], np.ones(len(own))])

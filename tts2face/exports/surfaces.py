@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.colour import decode_srgb
 from tts2face.models.face import Face, Part
 
 MM_PER_M = 1000.0
@@ -36,7 +37,7 @@ def divide_surface(face: Face) -> list[ExportSurface]:
     """Surfaces of a face, those of equal names and materials merged."""
     spans: dict[tuple[object, ...], list[Part]] = {}
     for part in face.parts:
-        material = (part.name, part.specular, part.shininess, part.wrap, part.opacity, part.textured)
+        material = (part.name, part.specular, part.shininess, part.wrap, part.opacity, part.texture, part.cutout)
         spans.setdefault(material, []).append(part)
     surfaces = []
     for parts in spans.values():
@@ -117,9 +118,7 @@ def vertex_normals(face: Face) -> NDArray[np.float32]:
 
 def linear_colours(face: Face) -> NDArray[np.float64]:
     """Linear light (V, 3) in [0, 1] of the vertex colours (IEC 61966-2-1)."""
-    value = np.arange(256) / 255.0
-    table = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-    colours: NDArray[np.float64] = table[face.colours]
+    colours: NDArray[np.float64] = decode_srgb(np.arange(256) / 255.0)[face.colours]
     return colours
 
 

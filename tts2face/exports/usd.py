@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, InputError
+from tts2face.colour import decode_srgb
 from tts2face.exports.parts import Part, Target
 from tts2face.exports.skeleton import HEAD, Skeleton, build_skeleton
 from tts2face.exports.spool import Spool
@@ -175,11 +176,10 @@ def _vectors(usd: Any, values: NDArray[Any]) -> Any:
 def _display_colours(face: Face, surface: ExportSurface) -> NDArray[np.float64]:
     """Linear colours (n, 3) of the vertices; those of textured parts from the texture."""
     own = surface.vertices
-    if not surface.part.textured or face.texture is None or face.uv is None:
+    if not surface.part.is_textured or face.uv is None:
         return linear_colours(face)[own]
-    height, width = face.texture.shape[:2]
+    pixels = face.textures[surface.part.texture].pixels
+    height, width = pixels.shape[:2]
     column = np.clip((face.uv[own, 0] * width).astype(int), 0, width - 1)
     row = np.clip((face.uv[own, 1] * height).astype(int), 0, height - 1)
-    srgb = face.texture[row, column] / 255.0
-    linear: NDArray[np.float64] = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-    return linear
+    return decode_srgb(pixels[row, column] / 255.0)

@@ -11,7 +11,7 @@ from lexicon.errors import DataError
 from tts2face.face.compact_spline import fit_local_interpolant
 from tts2face.face.landmark_fit import axis_scales, landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Eye, Face
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS, N_MESH_LANDMARKS
 
 DEFAULT_FACE = "head"

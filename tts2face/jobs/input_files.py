@@ -16,7 +16,7 @@ from tts2face.batch.segment import Segment
 from tts2face.jobs.blobs import HASH, BlobStore, MissingBlobError
 from tts2face.session_cache import Models
 
-MODEL_PATHS = ("talker", "face", "palette", "dictionary")
+MODEL_PATHS = ("talker", "face", "palette", "hair", "dictionary")
 REQUEST_PATHS = ("audio", "timeline", "dictionary", "voice")
 
 

@@ -1,6 +1,5 @@
 """Reading and writing of ``.face`` files: a face in compact form, with identity presets."""
 
-import io
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -10,16 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.models.face import Eye, Face, Part
-from tts2face.models.face_layout import check_face
-from tts2face.storage.files import find_file
+from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Hairdo, Part, Texture
+from tts2face.models.face_layout import MAX_TEXTURES, check_face, texture_number
+from tts2face.models.picture_coding import decode_colours, decode_coverage, encode_colours, encode_coverage
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 KIND = "face"
 FORMAT_VERSION = 1
+TANGENT_STEPS = 127.0
 STEPS_PER_SHAPE = 32000.0  # 16-bit steps of a shape's largest displacement: below 0.002 mm for 60 mm
-JPEG_QUALITY = 92
-MAX_TEXTURE_SIDE_PX = 8192  # pixels per side: 200 MB when decoded
 MAX_BRIGHTENED_LEVEL = 150  # upper limit of texels brightened by a tint: keeps skin colours at the edge of dark hair
 
 
@@ -35,11 +33,14 @@ class Identity:
         Part name -> three factors of its sRGB colours, vertex colours and texture alike.
     summary
         One-line description.
+    hairdo
+        Haircut and hair colour; None for those of the default identity.
     """
 
     displacement: NDArray[np.float32]
     tints: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
     summary: str = ""
+    hairdo: Hairdo | None = None
 
 
 def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None = None) -> None:
@@ -55,11 +56,14 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
         "pivot": face.pivot.astype(np.float32),
     }
     arrays |= _pack_shapes(face.shapes)
-    if face.uv is not None and face.texture is not None:
+    if face.uv is not None and face.textures:
         arrays["uv"] = np.rint(np.clip(face.uv, 0, 1) * 65535).astype(np.uint16)
-        arrays["texture"] = _encode_picture(face.texture, "JPEG", quality=JPEG_QUALITY, subsampling=0)
-        if face.alpha is not None:
-            arrays["alpha"] = _encode_picture(face.alpha, "PNG")
+    for number, texture in enumerate(face.textures):
+        arrays[f"texture{number or ''}"] = encode_colours(texture.pixels)
+        if texture.alpha is not None:
+            arrays[f"alpha{number or ''}"] = encode_coverage(texture.alpha)
+    if face.tangents is not None:
+        arrays["tangents"] = np.rint(face.tangents * TANGENT_STEPS).astype(np.int8)
     presets = dict(identities or {})
     for number, preset in enumerate(presets.values()):
         steps, step = _quantise(preset.displacement)
@@ -78,6 +82,7 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
             for eye in face.eyes
         ],
         "identities": [[name, dict(preset.tints), preset.summary] for name, preset in presets.items()],
+        "hairdos": _hairdos(face, presets),
         "metadata": dict(face.metadata),
     }
     write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
@@ -101,11 +106,6 @@ def read_face(path: Path, identity: str | None = None) -> Face:
         raise InputError(f"the face {path.stem} has no identity {identity!r}; it has: {offered}")
     face = _face_from_arrays(arrays, header, path)
     return face if identity is None else _apply_identity(face, arrays, header, names.index(identity))
-
-
-def load_face(name: str, identity: str | None = None) -> Face:
-    """Load a shipped face by name (head, cartoon), or one from a file; errors as `find_file` and `read_face`."""
-    return read_face(find_file(name, KIND), identity)
 
 
 def _quantise(values: NDArray[np.floating]) -> tuple[NDArray[np.int16], float]:
@@ -140,32 +140,36 @@ def _unpack_shapes(arrays: Mapping[str, NDArray[Any]], n_vertices: int) -> NDArr
 
 
 def _part_fields(part: Part) -> dict[str, Any]:
-    """Fields of a part; ``cutout`` only where it is set, as older files have it."""
-    fields = asdict(part)
-    return fields if part.cutout else {key: value for key, value in fields.items() if key != "cutout"}
+    """Fields of a part; those that not every part has only where they are set."""
+    usual = {"cutout": False, "kind": "plain", "texture": VERTEX_COLOURS}
+    return {key: value for key, value in asdict(part).items() if key not in usual or value != usual[key]}
 
 
-def _encode_picture(pixels: NDArray[np.uint8], kind: str, **options: Any) -> NDArray[np.uint8]:
-    from PIL import Image
+def _hairdos(face: Face, presets: Mapping[str, Identity]) -> dict[str, list[str]]:
+    """Haircut and colour by identity; that of the face itself is named by the empty text."""
+    own = {} if face.hairdo is None else {"": face.hairdo}
+    of_presets = {name: preset.hairdo for name, preset in presets.items() if preset.hairdo is not None}
+    return {name: [hairdo.haircut, hairdo.colour] for name, hairdo in (own | of_presets).items()}
 
-    content = io.BytesIO()
-    Image.fromarray(pixels).save(content, kind, **options)
-    return np.frombuffer(content.getvalue(), np.uint8)
+
+def _read_part(fields: Mapping[str, Any], n_textures: int) -> Part:
+    number = texture_number(fields)
+    known = {key: value for key, value in fields.items() if key != "textured"}
+    return Part(**known | {"texture": number if number < n_textures else VERTEX_COLOURS})
 
 
-def _decode_picture(content: NDArray[np.uint8], kind: str, mode: str, path: Path) -> NDArray[np.uint8]:
-    """Pixels of an image of one kind of file, in a mode of Pillow (RGB or L)."""
-    from PIL import Image
-
-    try:
-        with Image.open(io.BytesIO(content.tobytes()), formats=[kind]) as image:
-            if max(image.size) > MAX_TEXTURE_SIDE_PX:
-                raise DataError(
-                    f"{path}: the texture has {image.size} pixels; reduce it to at most {MAX_TEXTURE_SIDE_PX} per side"
-                )
-            return np.array(image.convert(mode))
-    except (OSError, SyntaxError) as error:
-        raise DataError(f"{path}: the texture cannot be decoded ({error}); build or copy the face again") from error
+def _read_textures(arrays: Mapping[str, NDArray[Any]], path: Path) -> tuple[Texture, ...]:
+    textures = []
+    for number in range(MAX_TEXTURES):
+        name, coverage = f"texture{number or ''}", f"alpha{number or ''}"
+        if name not in arrays:
+            break
+        pixels = decode_colours(arrays[name], path)
+        alpha = decode_coverage(arrays[coverage], path) if coverage in arrays else None
+        if alpha is not None and alpha.shape != pixels.shape[:2]:
+            raise DataError(f"{path}: a texture and its alpha differ in size; build or copy the face again")
+        textures.append(Texture(pixels, alpha))
+    return tuple(textures)
 
 
 def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Face:
@@ -178,22 +182,21 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
         )
         for eye in header["eyes"]
     ]
-    texture = _decode_picture(arrays["texture"], "JPEG", "RGB", path) if "texture" in arrays else None
-    alpha = _decode_picture(arrays["alpha"], "PNG", "L", path) if "alpha" in arrays else None
-    if alpha is not None and (texture is None or alpha.shape != texture.shape[:2]):
-        raise DataError(f"{path}: texture and alpha differ in size; build or copy the face again")
+    textures = _read_textures(arrays, path)
+    hairdo = header.get("hairdos", {}).get("")
     return Face(
         vertices=arrays["vertices"],
         triangles=arrays["triangles"],
-        parts=tuple(Part(**part) for part in header["parts"]),
+        parts=tuple(_read_part(part, len(textures)) for part in header["parts"]),
         shape_names=tuple(header["shape_names"]),
         shapes=_unpack_shapes(arrays, len(arrays["vertices"])),
         limits=arrays["limits"],
         eyes=tuple(eyes),
         colours=arrays["colours"],
         uv=(arrays["uv"] / 65535).astype(np.float32) if "uv" in arrays else None,
-        texture=texture,
-        alpha=alpha,
+        textures=textures,
+        tangents=(arrays["tangents"] / TANGENT_STEPS).astype(np.float32) if "tangents" in arrays else None,
+        hairdo=None if hairdo is None else Hairdo(*hairdo),
         landmarks=arrays["landmarks"],
         landmark_vertices=arrays["landmark_vertices"],
         landmark_weights=arrays["landmark_weights"],
@@ -219,15 +222,17 @@ def _part_texel_weights(face: Face, part: Part, shape: tuple[int, ...]) -> NDArr
 def _apply_identity(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], number: int) -> Face:
     displacement = arrays[f"identity{number}"] * arrays[f"identity{number}_step"][0]
     name, tints, _ = header["identities"][number]
-    colours, texture = face.colours.copy(), None if face.texture is None else face.texture.copy()
+    hairdo = header.get("hairdos", {}).get(name)
+    colours, textures = face.colours.copy(), [texture.pixels.copy() for texture in face.textures]
     for part in face.parts:
         tint = np.array(tints.get(part.name, (1.0, 1.0, 1.0)), np.float32)
         used = np.unique(face.triangles[part.first : part.first + part.count])
         colours[used] = np.clip(face.colours[used] * tint, 0, 255).astype(np.uint8)
-        if part.textured and texture is not None and not np.all(tint == 1):
+        if part.is_textured and not np.all(tint == 1):
+            texture = textures[part.texture]
             share = _part_texel_weights(face, part, texture.shape)[:, :, None]
             tinted = texture * (1 + share * (tint - 1))
-            texture = np.clip(tinted, 0, np.maximum(texture, MAX_BRIGHTENED_LEVEL)).astype(np.uint8)
+            textures[part.texture] = np.clip(tinted, 0, np.maximum(texture, MAX_BRIGHTENED_LEVEL)).astype(np.uint8)
     eyes = [
         replace(
             eye, centre=eye.centre + displacement[eye.first : eye.first + eye.count].mean(axis=0).astype(np.float32)
@@ -239,6 +244,7 @@ def _apply_identity(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapp
         vertices=(face.vertices + displacement).astype(np.float32),
         eyes=tuple(eyes),
         colours=colours,
-        texture=texture,
+        textures=tuple(Texture(pixels, old.alpha) for pixels, old in zip(textures, face.textures, strict=True)),
+        hairdo=face.hairdo if hairdo is None else Hairdo(*hairdo),
         metadata={**face.metadata, "identity": name},
     )

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.models.face import PART_KINDS
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.storage.schema import (
     MAX_MM,
     Check,
     Contents,
     Tensor,
+    choice,
     flag,
     free,
     list_of,
@@ -26,6 +28,7 @@ from tts2face.storage.schema import (
     whole,
 )
 
+MAX_TEXTURES = 16
 MAX_WEIGHT = 100.0  # of a shape; common shapes have 0 to 1, gesture modes up to about 30
 MAX_STEP_MM = 0.1  # 16 bits of it are 3 m
 MAX_CELLS = 100_000_000  # shapes x vertices: 1.2 GB when read; a head has 1.4 million
@@ -45,8 +48,10 @@ _PART = record(
         "shininess": number(0.0, 1e4),
         "wrap": number(0.0, 10.0),
         "opacity": number(1e-3, 1.0),
-        "textured": flag,
+        "texture": whole(-1, MAX_TEXTURES - 1),
         "cutout": flag,
+        "kind": choice(*PART_KINDS),
+        "textured": flag,  # of files of earlier versions, which have one texture
     },
 )
 _EYE = record(
@@ -70,8 +75,7 @@ TENSORS: Mapping[str, Tensor] = {
     "limits": Tensor("float32", ("shapes", 2), -MAX_WEIGHT, MAX_WEIGHT, may_be_empty=True),
     "colours": Tensor("uint8", ("vertices", 3)),
     "uv": Tensor("uint16", ("vertices", 2), is_optional=True),
-    "texture": Tensor("uint8", ("bytes",), is_optional=True),
-    "alpha": Tensor("uint8", ("alpha bytes",), is_optional=True),
+    "tangents": Tensor("int8", ("vertices", 3), is_optional=True),
     "landmarks": Tensor("int32", ("landmarks",), may_be_empty=True),
     "landmark_vertices": Tensor("int32", ("landmarks", N_CORNERS), may_be_empty=True),
     "landmark_weights": Tensor("float32", ("landmarks", N_CORNERS), -SUM_WITHIN, 1 + SUM_WITHIN, may_be_empty=True),
@@ -89,24 +93,49 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
     """
     contents = Contents(path, "face", arrays, header)
     contents.metadata(METADATA)
+    table(row(text, text))(header.get("hairdos", {}), f"{path}: metadata: hairdos")
     contents.tensors(TENSORS)
     presets = range(len(header["identities"]))
     contents.tensors({f"identity{n}": Tensor("int16", ("vertices", 3)) for n in presets})
     contents.tensors({f"identity{n}_step": Tensor("float32", (1,), 0.0, MAX_STEP_MM) for n in presets})
+    contents.tensors(
+        {
+            f"{kind}{at or ''}": Tensor("uint8", (f"bytes of {kind} {at}",), is_optional=True)
+            for at in range(MAX_TEXTURES)
+            for kind in ("texture", "alpha")
+        }
+    )
     contents.only_known()
     n_vertices = contents.sizes["vertices"]
     for name in ("triangles", "shape_vertices", "landmark_vertices"):
         contents.indices(name, n_vertices, "vertices")
     contents.indices("landmarks", N_LANDMARKS, "landmarks of the face mesh")
     contents.distinct("landmarks")
-    contents.require(("uv" in arrays) == ("texture" in arrays), "has only one of uv and texture")
-    has_cutouts = any(part.get("cutout", False) for part in header["parts"])
-    contents.require("alpha" in arrays or not has_cutouts, "has a part with cutout, but no alpha")
-    contents.require("texture" in arrays or "alpha" not in arrays, "has alpha, but no texture")
+    _check_textures(contents)
     _check_places(contents)
     _check_shapes(contents, n_vertices)
     _check_parts(contents, n_vertices)
     _check_area(contents)
+
+
+def _check_textures(contents: Contents) -> None:
+    arrays = contents.arrays
+    n_textures = sum(f"texture{at or ''}" in arrays for at in range(MAX_TEXTURES))
+    contents.require(("uv" in arrays) == (n_textures > 0), "has only one of uv and texture")
+    for at in range(MAX_TEXTURES):
+        has_texture, has_alpha = f"texture{at or ''}" in arrays, f"alpha{at or ''}" in arrays
+        contents.require(has_texture == (at < n_textures), f"lacks the texture before texture{at}")
+        contents.require(has_texture or not has_alpha, "has alpha, but no texture")
+    for part in contents.header["parts"]:
+        own = texture_number(part)
+        contents.require(own < n_textures or own <= 0, f"the part {part['name']!r} has no texture {own}")
+        has_alpha = own >= 0 and f"alpha{own or ''}" in arrays
+        contents.require(has_alpha or not part.get("cutout", False), "has a part with cutout, but no alpha")
+
+
+def texture_number(part: Mapping[str, Any]) -> int:
+    """Number of the texture of a part in a file; earlier versions say whether it has the only one."""
+    return int(part.get("texture", 0 if part.get("textured") else -1))
 
 
 def _check_places(contents: Contents) -> None:

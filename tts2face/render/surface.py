@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.colour import decode_srgb, encode_srgb
 from tts2face.face.deformation import FaceRig, build_rig
-from tts2face.models.face import Face
+from tts2face.models.face import Face, Texture
 
 OPEN_SHARE = 0.05  # parts with a larger share of boundary edges are open sheets, lit from both sides
 
@@ -39,7 +40,7 @@ class Surface:
 
 def build_surface(face: Face) -> Surface:
     """Surface of a face."""
-    parts = face.parts
+    parts, (uv, texture) = face.parts, pack_textures(face)
     counts = [part.count for part in parts]
     part_of = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
     translucent = np.repeat([part.opacity < 1 for part in parts], counts)
@@ -49,16 +50,38 @@ def build_surface(face: Face) -> Surface:
         rig=build_rig(face),
         triangles=triangles,
         colours=linear_light(face.colours),
-        uv=np.array(face.uv, np.float32) if face.uv is not None else np.zeros((1, 2), np.float32),
-        texture=np.array(face.texture) if face.texture is not None else np.zeros((1, 1, 3), np.uint8),
+        uv=uv,
+        texture=np.array(texture.pixels),
         part_of=part_of,
         translucent=translucent.astype(np.int8),
-        cut_out=np.repeat([part.cutout and face.alpha is not None for part in parts], counts),
-        alpha=np.zeros((1, 1), np.uint8) if face.alpha is None else np.array(face.alpha),
+        cut_out=np.repeat([part.cutout and texture.alpha is not None for part in parts], counts),
+        alpha=np.zeros((1, 1), np.uint8) if texture.alpha is None else np.array(texture.alpha),
         materials=_materials(face, triangles, part_of),
         starts=starts,
         members=members,
     )
+
+
+def pack_textures(face: Face) -> tuple[NDArray[np.float32], Texture]:
+    """Texture coordinates (V, 2) in one texture that holds all of a face's, one below the other, and that texture."""
+    if face.uv is None or not face.textures:
+        return np.zeros((1, 2), np.float32), Texture(np.zeros((1, 1, 3), np.uint8))
+    if len(face.textures) == 1:
+        return np.array(face.uv, np.float32), face.textures[0]
+    heights = [texture.pixels.shape[0] for texture in face.textures]
+    width, tops = max(texture.pixels.shape[1] for texture in face.textures), np.cumsum([0, *heights])
+    pixels, alpha = np.zeros((tops[-1], width, 3), np.uint8), np.full((tops[-1], width), 255, np.uint8)
+    uv = np.array(face.uv, np.float32)
+    for number, (texture, top) in enumerate(zip(face.textures, tops, strict=False)):
+        height, across = texture.pixels.shape[:2]
+        pixels[top : top + height, :across] = texture.pixels
+        if texture.alpha is not None:
+            alpha[top : top + height, :across] = texture.alpha
+        spans = [face.triangles[part.first : part.first + part.count] for part in face.parts if part.texture == number]
+        used = np.unique(np.concatenate([np.zeros((0, 3), np.int32), *spans]))
+        inside = np.clip(face.uv[used], [0.5 / across, 0.5 / height], [1 - 0.5 / across, 1 - 0.5 / height])
+        uv[used] = (inside * [across, height] + [0, top]) / [width, tops[-1]]
+    return uv, Texture(pixels, alpha if any(texture.alpha is not None for texture in face.textures) else None)
 
 
 def linear_light(srgb: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -68,26 +91,19 @@ def linear_light(srgb: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 def linear_table() -> NDArray[np.float32]:
     """Linear light (256,) of each 8-bit sRGB value."""
-    value = np.arange(256) / 255.0
-    table: NDArray[np.float32] = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4).astype(
-        np.float32
-    )
-    return table
+    return decode_srgb(np.arange(256) / 255.0).astype(np.float32)
 
 
 def encoding_table(n_steps: int) -> NDArray[np.uint8]:
     """8-bit sRGB values (n_steps,) of linear light from 0 to 1 in equal steps."""
-    light = np.linspace(0.0, 1.0, n_steps)
-    srgb = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    return np.rint(255.0 * srgb).astype(np.uint8)
+    return encode_srgb(np.linspace(0.0, 1.0, n_steps))
 
 
 def _materials(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> NDArray[np.float32]:
-    has_texture = face.uv is not None and face.texture is not None
     rows = []
     for number, part in enumerate(face.parts):
         sheet = _free_edge_share(triangles[part_of == number]) > OPEN_SHARE
-        rows.append((part.specular, part.shininess, part.wrap, part.opacity, part.textured and has_texture, sheet))
+        rows.append((part.specular, part.shininess, part.wrap, part.opacity, part.is_textured, sheet))
     return np.array(rows, np.float32).reshape(-1, 6)
 
 

@@ -179,6 +179,16 @@ def number(low: float, high: float) -> Check:
     return check
 
 
+def choice(*values: str) -> Check:
+    """Check for one of some texts."""
+
+    def check(value: Any, where: str) -> None:
+        if type(value) is not str or value not in values:
+            refuse(f"{where} is {_abbreviate(value)}, not {', '.join(values[:-1])} or {values[-1]}")
+
+    return check
+
+
 def list_of(item: Check, length: int | None = None) -> Check:
     """Check for a list, of a given length if any, whose items all pass `item`."""
 

@@ -12,7 +12,7 @@ from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model
 from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.gesture.ju2008 import FIELD_OPTIONS
 from tts2face.models.face import Face
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.palette import Palette, load_palette
 from tts2face.models.talker import Talker, load_talker
 from tts2face.render.picture import Picture
@@ -31,6 +31,30 @@ MAX_RENDERERS = 2  # renderers in memory, one for each picture; about 30 MB each
 Value = TypeVar("Value")
 
 
+def shown_face(face: str | Path | Face, identity: str | None, hair: str | None, hair_color: str | None) -> Face | None:
+    """Face that a session shows; None for the talker's own face.
+
+    Raises
+    ------
+    InputError
+        There is no such face, identity, haircut or colour, or they exclude each other.
+    DataError
+        A file is damaged.
+    """
+    has_hair = hair is not None or hair_color is not None
+    if isinstance(face, Face):
+        if has_hair or identity is not None:
+            raise InputError("identity and hair belong to a face given by name; remove them, or load it with them")
+        return face
+    if face != OWN_FACE:
+        return load_face(str(face), identity, hair=hair, hair_color=hair_color)
+    if identity is not None:
+        raise InputError("a talker's own face has no identity presets; remove the identity, or choose another face")
+    if has_hair:
+        raise InputError("a talker's own face has the hair of its video; remove --hair and --hair-color")
+    return None
+
+
 class SessionModels:
     """Talker, faces, palette, exemplars, gesture fields, renderers and voices of a session.
 
@@ -38,8 +62,10 @@ class SessionModels:
 
     Parameters
     ----------
-    talker, face, identity, palette, voices
+    talker, palette, voices
         As for `tts2face.Session`.
+    mesh
+        Face to show; None for the talker's own face.
 
     Raises
     ------
@@ -50,17 +76,12 @@ class SessionModels:
     def __init__(
         self,
         talker: str | Path | Talker,
-        face: str | Path | Face,
-        identity: str | None,
+        mesh: Face | None,
         palette: str | Path | Palette | None,
         voices: VoicePool | None = None,
     ) -> None:
         self.talker: Talker = talker if isinstance(talker, Talker) else load_talker(str(talker))
-        if face == OWN_FACE and identity is not None:
-            raise InputError("a talker's own face has no identity presets; remove the identity, or choose another face")
-        self._mesh: Face | None = None
-        if face != OWN_FACE:
-            self._mesh = face if isinstance(face, Face) else load_face(str(face), identity)
+        self._mesh = mesh
         self._palette = palette
         self._lock = threading.RLock()
         self._cache: dict[Hashable, Any] = {}

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.talker import Talker
 from tts2face.render import raster
 from tts2face.render.draw import draw

@@ -7,7 +7,7 @@ from corpus_tools.decomposition.face_motion import moved_landmarks
 from corpus_tools.decomposition.marker_set import MarkerSet, read_marker_set
 from tests.corpus_tools.decomposition.made_markers import FPS, Made, made_take
 from tts2face.models.face import Face
-from tts2face.models.face_file import load_face
+from tts2face.models.face_loading import load_face
 from tts2face.types import Trajectory
 
 N_FRAMES = 480  # 4 s at 120 frames a second

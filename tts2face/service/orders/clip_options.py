@@ -44,6 +44,10 @@ class ClipOptions(BaseModel):
     talker: Annotated[str | None, Field(description="A talker of GET /v1/talkers.", examples=["grid_s1"])] = None
     face: Annotated[str | None, Field(description="A face of GET /v1/faces, or self.", examples=["head"])] = None
     identity: Annotated[str | None, Field(description="Identity preset of the face.", examples=["kofi"])] = None
+    hair: Annotated[str | None, Field(description="Haircut of the face, or bald.", examples=["long01"])] = None
+    hair_color: Annotated[
+        str | None, Field(description="Colour of the hair: a name or #rrggbb.", examples=["brown"])
+    ] = None
     palette: Annotated[str | None, Field(description="A palette of GET /v1/palettes.", examples=["starter"])] = None
     dictionary: Annotated[str | None, Field(description="A dictionary of GET /v1/dictionaries.", examples=[None])] = (
         None

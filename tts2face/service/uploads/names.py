@@ -5,8 +5,11 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from lexicon.errors import InputError
 from tts2face import catalogue
 from tts2face.jobs.resource_check import DICTIONARY, FACE
+from tts2face.models.hair import BALD, parse_hair_colour
+from tts2face.models.hair_file import haircut_names
 from tts2face.render.picture import COLOURS, STUDIO, TRANSPARENT
 from tts2face.request import OWN_FACE
 from tts2face.service.access.keys import ApiKey
@@ -15,7 +18,12 @@ from tts2face.service.uploads.library import Library, shipped_names
 
 COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
 MODEL_KINDS = ("talker", "face", "palette")
-MODEL_FIELDS = (*MODEL_KINDS, "identity")  # of a request; those of `tts2face.session_cache.Models`
+MODEL_FIELDS = (
+    *MODEL_KINDS,
+    "identity",
+    "hair",
+    "hair_color",
+)  # of a request; those of `tts2face.session_cache.Models`
 
 
 async def resolve_models(library: Library, key: ApiKey, models: Mapping[str, Any]) -> dict[str, Any]:
@@ -24,9 +32,10 @@ async def resolve_models(library: Library, key: ApiKey, models: Mapping[str, Any
     Raises
     ------
     RefusedError
-        There is no such talker, face or palette for this key, or an uploaded face has no such identity.
+        There is no such talker, face, palette or haircut for this key, or an uploaded face has no such identity.
     """
     resolved = dict(models)
+    _check_hair(models.get("hair"), models.get("hair_color"))
     for kind in MODEL_KINDS:
         name = models.get(kind)
         if name is None or name in _served_names(kind):
@@ -39,6 +48,19 @@ async def resolve_models(library: Library, key: ApiKey, models: Mapping[str, Any
                 400, "invalid_request", f"the face {name} has no identity {str(identity)[:60]!r}; it has: {offered}"
             )
     return resolved
+
+
+def _check_hair(haircut: str | None, colour: str | None) -> None:
+    known = (BALD, *haircut_names())
+    if haircut is not None and haircut not in known:
+        raise RefusedError(
+            400, "invalid_request", f"there is no haircut {haircut[:60]!r}; the haircuts are {', '.join(known)}"
+        )
+    if colour is not None:
+        try:
+            parse_hair_colour(colour[:60])
+        except InputError as wrong:
+            raise RefusedError(400, "invalid_request", str(wrong)) from wrong
 
 
 async def resolve_dictionary(library: Library, key: ApiKey, fields: Mapping[str, Any]) -> dict[str, Any]:

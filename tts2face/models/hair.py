@@ -1,0 +1,142 @@
+"""Haircuts: hair cards that are fitted to a head and drawn in any colour."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError, InputError
+from tts2face.colour import decode_srgb, encode_srgb
+from tts2face.models.face import Face, Hairdo, Part, Texture
+
+HAIR_PART = "hair"
+BALD = "bald"  # haircut without hair
+MEAN_RELIEF = 128.0  # relief at which a strand has the colour of the hair
+HAIR_COLOURS: Mapping[str, str] = {
+    "black": "14100e", "dark-brown": "2b1d14", "brown": "463326", "light-brown": "6b4f38", "auburn": "5a2a1a",
+    "red": "8a3f1d", "dark-blond": "8a6a45", "blond": "b8935f", "grey": "8f8c89", "white": "d8d5d0",
+}  # fmt: skip  # sRGB
+MATERIAL = Part(HAIR_PART, 0, 0, specular=0.3, shininess=24.0, wrap=0.3, cutout=True, kind="strands")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hair:
+    """A haircut for heads of one layout, those whose vertices correspond to the shipped head's.
+
+    Parameters
+    ----------
+    vertices, triangles : (V, 3), (F, 3)
+        Cards on the default head, mm.
+    uv : (V, 2)
+        Texture coordinates in [0, 1] from the top left corner.
+    tangents : (V, 3)
+        Unit vectors along the strands, from root to tip.
+    relief, alpha : (H, W), (H, W)
+        Linear light of the strands relative to the colour of the hair (128 = 1), and coverage, 0-255.
+    anchors, anchor_places : (A,), (A, 3)
+        Vertices of the head that carry the hair, and their places on the default head, mm: another head moves the hair
+        as it moves these.
+    n_face_vertices
+        Number of vertices of heads of the layout.
+    scalp : (h, w)
+        Coverage of the skin's texture by hair, 0-255, painted in the hair's colour under the cards; None: none.
+    metadata
+        Name, summary, licence, attribution, and the command that built it.
+    """
+
+    vertices: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+    uv: NDArray[np.float32]
+    tangents: NDArray[np.float32]
+    relief: NDArray[np.uint8]
+    alpha: NDArray[np.uint8]
+    anchors: NDArray[np.int32]
+    anchor_places: NDArray[np.float32]
+    n_face_vertices: int
+    scalp: NDArray[np.uint8] | None = None
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+
+def parse_hair_colour(colour: str) -> NDArray[np.float64]:
+    """Hair colour (3,), sRGB in [0, 1], of a name of `HAIR_COLOURS` or #rrggbb.
+
+    Raises
+    ------
+    InputError
+        There is no such colour.
+    """
+    digits = HAIR_COLOURS.get(colour, colour.removeprefix("#"))
+    if not re.fullmatch(r"[0-9a-fA-F]{6}", digits):
+        raise InputError(f"there is no hair colour {colour!r}; give #rrggbb or one of {', '.join(HAIR_COLOURS)}")
+    return np.array([int(digits[at : at + 2], 16) for at in (0, 2, 4)]) / 255.0
+
+
+def attach_hair(face: Face, hair: Hair, colour: str) -> Face:
+    """A face with a haircut, which moves with the head.
+
+    Raises
+    ------
+    InputError
+        There is no such hair colour.
+    DataError
+        The haircut belongs to heads of another layout.
+    """
+    if len(face.vertices) != hair.n_face_vertices:
+        raise DataError(
+            f"the haircut {hair.metadata.get('name', '')} fits heads of {hair.n_face_vertices} vertices, but the face "
+            f"has {len(face.vertices)}; choose another face or no hair"
+        )
+    srgb = parse_hair_colour(colour)
+    painted = _paint_scalp(face, hair, srgb)
+    n_old, n_new = len(face.vertices), len(hair.vertices)
+    uv = np.zeros((n_old, 2), np.float32) if face.uv is None else face.uv
+    tangents = np.zeros((n_old, 3), np.float32) if face.tangents is None else face.tangents
+    part = replace(MATERIAL, first=len(face.triangles), count=len(hair.triangles), texture=len(painted))
+    return replace(
+        face,
+        vertices=np.concatenate([face.vertices, fit_hair(face, hair)]),
+        triangles=np.concatenate([face.triangles, hair.triangles + np.int32(n_old)]),
+        parts=(*face.parts, part),
+        shapes=np.pad(face.shapes, ((0, 0), (0, n_new), (0, 0))),
+        colours=np.concatenate([face.colours, np.tile(np.rint(255 * srgb).astype(np.uint8), (n_new, 1))]),
+        uv=np.concatenate([uv, hair.uv]),
+        textures=(*painted, Texture(colour_relief(hair.relief, srgb), hair.alpha)),
+        tangents=np.concatenate([tangents, hair.tangents]),
+        hairdo=Hairdo(str(hair.metadata.get("name", "")), colour),
+    )
+
+
+def fit_hair(face: Face, hair: Hair) -> NDArray[np.float32]:
+    """Vertices (V, 3) of a haircut on a face: it moves as its anchors do (biharmonic interpolation in space)."""
+    from scipy.interpolate import RBFInterpolator
+
+    moved = face.vertices[hair.anchors].astype(np.float64) - hair.anchor_places
+    if not np.abs(moved).max(initial=0.0) > 0:
+        return hair.vertices.astype(np.float32)
+    field_of = RBFInterpolator(hair.anchor_places.astype(np.float64), moved, kernel="linear", degree=1)
+    fitted: NDArray[np.float32] = (hair.vertices + field_of(hair.vertices.astype(np.float64))).astype(np.float32)
+    return fitted
+
+
+def colour_relief(relief: NDArray[np.uint8], srgb: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Pixels (H, W, 3), sRGB, of strands with a relief (H, W) in a colour (3,)."""
+    pixels: NDArray[np.uint8] = encode_srgb(np.arange(256)[:, None] / MEAN_RELIEF * decode_srgb(srgb))[relief]
+    return pixels
+
+
+def _paint_scalp(face: Face, hair: Hair, srgb: NDArray[np.float64]) -> tuple[Texture, ...]:
+    """The face's textures with the scalp in the colour of the hair."""
+    if hair.scalp is None or not face.textures:
+        return face.textures
+    from PIL import Image
+
+    skin = face.textures[0]
+    size = skin.pixels.shape[1::-1]
+    cover = (
+        np.asarray(Image.fromarray(hair.scalp).resize(size, Image.Resampling.BILINEAR), np.float32)[:, :, None] / 255
+    )
+    mixed = decode_srgb(skin.pixels / 255.0) * (1 - cover) + decode_srgb(srgb) * cover
+    return (Texture(encode_srgb(mixed), skin.alpha), *face.textures[1:])

@@ -1,0 +1,117 @@
+"""Reading and writing of ``.hair`` files (docs/file-formats.md)."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError, InputError
+from tts2face.models.hair import BALD, Hair
+from tts2face.models.picture_coding import decode_colours, decode_coverage, encode_colours, encode_coverage
+from tts2face.storage.files import SHIPPED_FOLDER, find_file
+from tts2face.storage.schema import Check, Contents, Tensor, free, millimetres, whole
+from tts2face.storage.tensors import read_tensors, write_tensors
+
+KIND = "hair"
+FORMAT_VERSION = 1
+UNIT_STEPS = 127.0
+UV_STEPS = 65535.0
+
+METADATA: Mapping[str, Check] = {"n_face_vertices": whole(1, 2**31 - 1), "metadata": free}
+TENSORS: Mapping[str, Tensor] = {
+    "vertices": millimetres("vertices", 3),
+    "triangles": Tensor("int32", ("triangles", 3)),
+    "uv": Tensor("uint16", ("vertices", 2)),
+    "tangents": Tensor("int8", ("vertices", 3)),
+    "relief": Tensor("uint8", ("bytes of relief",)),
+    "alpha": Tensor("uint8", ("bytes of alpha",)),
+    "anchors": Tensor("int32", ("anchors",)),
+    "anchor_places": millimetres("anchors", 3),
+    "scalp": Tensor("uint8", ("bytes of scalp",), is_optional=True),
+}
+MIN_ANCHORS = 4  # that are not in one plane: fewer do not determine the fit
+
+
+def write_hair(path: Path, hair: Hair) -> None:
+    """Write a ``.hair`` file."""
+    arrays: dict[str, NDArray[Any]] = {
+        "vertices": hair.vertices.astype(np.float32),
+        "triangles": hair.triangles.astype(np.int32),
+        "uv": np.rint(np.clip(hair.uv, 0, 1) * UV_STEPS).astype(np.uint16),
+        "tangents": np.rint(hair.tangents * UNIT_STEPS).astype(np.int8),
+        "relief": encode_colours(hair.relief),
+        "alpha": encode_coverage(hair.alpha),
+        "anchors": hair.anchors.astype(np.int32),
+        "anchor_places": hair.anchor_places.astype(np.float32),
+    }
+    if hair.scalp is not None:
+        arrays["scalp"] = encode_coverage(hair.scalp)
+    header = {"n_face_vertices": hair.n_face_vertices, "metadata": dict(hair.metadata)}
+    write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
+
+
+def read_hair(path: Path) -> Hair:
+    """Read a ``.hair`` file.
+
+    Raises
+    ------
+    InputError
+        The file does not exist.
+    DataError
+        The file is damaged, of another kind or version, or invalid.
+    """
+    arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
+    _check_hair(path, arrays, header)
+    relief, alpha = decode_colours(arrays["relief"], path, "L"), decode_coverage(arrays["alpha"], path)
+    if relief.shape != alpha.shape:
+        raise DataError(f"{path}: relief and alpha differ in size; build or copy the file again")
+    return Hair(
+        vertices=arrays["vertices"],
+        triangles=arrays["triangles"],
+        uv=(arrays["uv"] / np.float32(UV_STEPS)).astype(np.float32),
+        tangents=(arrays["tangents"] / np.float32(UNIT_STEPS)).astype(np.float32),
+        relief=relief,
+        alpha=alpha,
+        anchors=arrays["anchors"],
+        anchor_places=arrays["anchor_places"],
+        n_face_vertices=header["n_face_vertices"],
+        scalp=decode_coverage(arrays["scalp"], path) if "scalp" in arrays else None,
+        metadata=header["metadata"],
+    )
+
+
+def load_hair(name: str) -> Hair:
+    """Load a shipped haircut by name, or one from a file.
+
+    Raises
+    ------
+    InputError
+        There is no such haircut.
+    DataError
+        As `read_hair`.
+    """
+    if not Path(name).suffix and name not in haircut_names():
+        raise InputError(f"there is no haircut {name!r}; give {', '.join((BALD, *haircut_names()))}, or a .hair file")
+    return read_hair(find_file(name, KIND))
+
+
+def haircut_names() -> tuple[str, ...]:
+    """Names of the shipped haircuts, without `BALD`."""
+    return tuple(sorted(path.stem for path in SHIPPED_FOLDER.glob(f"*.{KIND}")))
+
+
+def _check_hair(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> None:
+    contents = Contents(path, "haircut", arrays, header)
+    contents.metadata(METADATA)
+    contents.tensors(TENSORS)
+    contents.only_known()
+    contents.indices("triangles", contents.sizes["vertices"], "vertices")
+    contents.indices("anchors", header["n_face_vertices"], "vertices of the head")
+    contents.distinct("anchors")
+    places = arrays["anchor_places"].astype(np.float64)
+    spread = np.linalg.matrix_rank(places - places.mean(axis=0), tol=1.0)
+    contents.require(
+        len(places) >= MIN_ANCHORS and spread == 3, f"has {len(places)} anchors, which do not surround the head"
+    )
