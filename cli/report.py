@@ -68,6 +68,32 @@ def gestures(
     write_message(f"wrote {out}: {len(study.styles)} styles, {n_met} of {n_targets} targets met")
 
 
+@report.command
+def moods(
+    palette: Annotated[str, Parameter(help="Shipped palette or .palette file.")] = "starter",
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="Output: .csv, .json or .png (contact sheet).", alias="-o")],
+    face: Annotated[str, Parameter(help="Shipped face or .face file that shows the moods.")] = "head",
+    seeds: Annotated[int, whole_number("Number of clips of each mood; the first half trains the classifier.")] = 8,
+    seed: Annotated[int, whole_number("Seed of the first clip.")] = 0,
+    size: Annotated[int, whole_number("Width and height of the rendered pictures in pixels.")] = 256,
+) -> None:
+    """Render the derived styles of a palette and tell them apart by the face tracker's scores."""
+    refuse_overwriting({"--out": out}, {"the palette": palette, "--face": face})
+    from corpus_tools.gesture_study.moods import MoodOptions
+    from corpus_tools.gesture_study.write_moods import write_moods
+    from tts2face.session import Session
+
+    options = MoodOptions(seeds=seeds, first_seed=seed, size=size)
+    with progress_bar("rendering moods") as on_progress:
+        study = write_moods(Session(face=face, palette=palette), out, options, on_progress=on_progress)
+    write_message(
+        f"wrote {out}: of {int(study.confusion.sum())} clips of {len(study.moods)} moods {study.accuracy:.0%} are "
+        f"recognised, of their single frames {study.frame_accuracy:.0%}"
+    )
+
+
 def _parse_numbers(classes: str | None) -> tuple[int, ...] | None:
     if classes is None:
         return None

@@ -194,7 +194,7 @@ def hair_colors() -> tuple[HairColorEntry, ...]:
 
 def styles(palette: str = "starter") -> tuple[StyleEntry, ...]:
     """The styles of a palette, given by name or as the path of a ``.palette`` file; raises as `load_palette`."""
-    from tts2face.models.palette import load_palette
+    from tts2face.models.palette import MEASURED_STYLE, load_palette
 
     found = load_palette(palette)
     derived = (
@@ -207,7 +207,12 @@ def styles(palette: str = "starter") -> tuple[StyleEntry, ...]:
         StyleEntry(name, palette, None, f"recorded, {style.seconds / 60:.1f} minutes")
         for name, style in found.styles.items()
     )
-    return (*derived, *recorded)
+    listed = (*derived, *recorded)
+    if any(entry.name == MEASURED_STYLE for entry in listed):
+        return listed
+    source = found.source(MEASURED_STYLE)
+    summary = f"{source} as recorded: the person's own blinks and head motion"
+    return (*listed, StyleEntry(MEASURED_STYLE, palette, source, summary))
 
 
 def talkers() -> tuple[TalkerEntry, ...]:

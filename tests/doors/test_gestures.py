@@ -57,7 +57,7 @@ def test_a_layer_of_its_own_changes_no_other(with_gestures: Clip, session: Sessi
 def test_the_starter_palette_has_the_moods_of_the_paper_and_its_provenance() -> None:
     palette = load_palette("starter")
     moods = ("neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperated")
-    assert palette.names == (*moods, "grid_s1")
+    assert palette.names == (*moods, "grid_s1", "measured")
     measured = palette.styles["grid_s1"]
     assert measured.seconds == pytest.approx(40 * 60, rel=0.02)
     assert set(measured.motion) == set(FEATURES)
@@ -78,10 +78,28 @@ def test_lips_that_meet_still_meet_in_every_mood(
     assert after.min() > -0.1
 
 
-def test_neutral_gestures_leave_lips_as_they_are(with_gestures: Clip, without_gestures: Clip, face: Face) -> None:
+def test_measured_gestures_leave_lips_as_they_are(without_gestures: Clip, session: Session, face: Face) -> None:
+    measured = session.clip(Request(text=TEXT, style="measured"))
     shown = gesture_face(face, load_palette("starter")).face
-    assert np.corrcoef(lip_gap(face, without_gestures), lip_gap(shown, with_gestures))[0, 1] > 0.995
-    assert np.corrcoef(lip_width(face, without_gestures), lip_width(shown, with_gestures))[0, 1] > 0.99
+    assert np.corrcoef(lip_gap(face, without_gestures), lip_gap(shown, measured))[0, 1] > 0.995
+    assert np.corrcoef(lip_width(face, without_gestures), lip_width(shown, measured))[0, 1] > 0.99
+
+
+@pytest.mark.parametrize(("style", "least"), [("neutral", 0.95), ("delighted", 0.85)])
+def test_a_smile_keeps_the_articulation(
+    style: str, least: float, without_gestures: Clip, session: Session, face: Face
+) -> None:
+    smiling = session.clip(Request(text=TEXT, style=style))
+    shown = gesture_face(face, load_palette("starter")).face
+    assert np.corrcoef(lip_gap(face, without_gestures), lip_gap(shown, smiling))[0, 1] > 0.995
+    before, after = (without_slow_part(lip_width(*pair)) for pair in ((face, without_gestures), (shown, smiling)))
+    assert np.corrcoef(before, after)[0, 1] > least
+    assert after.std() > before.std()
+
+
+def without_slow_part(values: np.ndarray) -> np.ndarray:
+    """Values less their mean of 41 frames, which changes with the mood."""
+    return values - np.convolve(np.pad(values, 20, mode="edge"), np.ones(41) / 41, "valid")
 
 
 def lip_gap(face: Face, clip: Clip) -> np.ndarray:
@@ -124,7 +142,7 @@ def test_another_palette_gives_other_motion(with_gestures: Clip, talker: Talker,
     write_palette(tmp_path / "few.palette", replace(starter, styles={"few": part}, derivations={}))
     clip = Session(talker, face, palette=tmp_path / "few.palette").clip(Request(text=TEXT))
     assert not np.array_equal(clip.head.values, with_gestures.head.values)
-    with pytest.raises(InputError, match="no style 'delighted' in the palette; it has few"):
+    with pytest.raises(InputError, match="no style 'delighted' in the palette; it has few, measured"):
         Session(talker, face, palette=tmp_path / "few.palette").clip(Request(text=TEXT, style="delighted"))
 
 
@@ -176,13 +194,13 @@ def test_a_capture_becomes_a_style_of_the_starter_palette(
         r"wrote live\.palette: style live from 1 recordings, 0\.[23] minutes; modes keep", capsys.readouterr().err
     )
     palette = load_palette("live.palette")
-    assert palette.names[-2:] == ("grid_s1", "live")
+    assert palette.names[-3:] == ("grid_s1", "live", "measured")
     assert palette.styles["live"].intensity.max() > 0  # its sound is in the same folder
     assert run(["Hello.", "--palette", "live.palette", "--style", "live", "--out", "x.mp4", *SMALL]) == 0
     alone = ["--alone", "--estimator", "samples"]
     assert run(["corpus", "gestures", str(capture), "--style", "live", "--out", "a.palette", *alone, *cache]) == 0
     made = load_palette("a.palette")
-    assert made.names[-1] == "live"
+    assert made.names[-2:] == ("live", "measured")
     assert "exasperated" in made.derivations
     assert not np.array_equal(made.styles["live"].motion["expression"], palette.styles["live"].motion["expression"])
 

@@ -87,6 +87,7 @@ def test_a_layer_changes_no_other(fields):
 
 
 def test_a_derived_style_is_its_source_changed_as_stated(fields, palette):
+    fields = GestureFields(palette, fields.options, has_presentation=False)
     plain, double = _made(fields), _made(fields, style="double")
     middle = style_median(palette.styles["calm"], "head")
     np.testing.assert_allclose(double["head"] - middle, 2 * (plain["head"] - middle), atol=1e-5)

@@ -14,7 +14,7 @@ def test_what_is_written_is_read(palette, tmp_path):
     file = tmp_path / "my.palette"
     write_palette(file, palette)
     read = read_palette(file)
-    assert read.names == palette.names == ("double", "calm", "wild")
+    assert read.names == palette.names == ("double", "calm", "wild", "measured")
     assert read.derivations == palette.derivations
     np.testing.assert_array_equal(read.neutral, palette.neutral)
     for name, style in palette.styles.items():
@@ -48,7 +48,7 @@ def test_a_part_is_missing(palette, tmp_path):
 
 
 def test_an_unknown_style(palette):
-    with pytest.raises(InputError, match="no style 'angry' in the palette; it has double, calm, wild"):
+    with pytest.raises(InputError, match="no style 'angry' in the palette; it has double, calm, wild, measured"):
         palette.require("angry")
 
 

@@ -11,7 +11,10 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.gesture.blink_presentation import BlinkPresentation, blink_profiles, lids_without_blinks
 from tts2face.gesture.field import Field, FieldOptions, build_field, initial_state, sample_field, transfer_state
+from tts2face.gesture.head_presentation import HeadPresentation, find_accents, slow_scales
+from tts2face.gesture.presentation import Emphasis, FrameContext, Presentation
 from tts2face.gesture.prosody import prosody_features
 from tts2face.gesture.timeline import Timeline
 from tts2face.interpolation import interpolate_cubic
@@ -43,26 +46,52 @@ GestureValues = Mapping[str, Float32Array]  # (T, k) values of each feature
 
 @dataclass(slots=True, eq=False)
 class GestureFields:
-    """Fields of a palette, built at their first use; for any number of clips."""
+    """Fields of a palette, built at their first use; for any number of clips.
+
+    ``has_presentation`` is False for motion as published, where derived styles blink and move as their sources.
+    """
 
     palette: Palette
     options: Mapping[str, FieldOptions] = field(default_factory=lambda: OPTIONS)
     with_pitch: bool = False
-    _made: dict[tuple[str, str], Field] = field(default_factory=dict)
+    has_presentation: bool = True
+    _made: dict[tuple[str, str, bool], Field] = field(default_factory=dict)
+    _profiles: dict[str, tuple[NDArray[np.float64], ...]] = field(default_factory=dict)
+    _scales: dict[str, NDArray[np.float64]] = field(default_factory=dict)
 
-    def of(self, source: str, feature: str) -> Field:
-        """Field of a feature of a recorded style."""
-        if (source, feature) not in self._made:
+    def of(self, source: str, feature: str, *, has_blinks: bool = True) -> Field:
+        """Field of a feature of a recorded style; without ``has_blinks``, of its lids between blinks."""
+        key = (source, feature, has_blinks)
+        if key not in self._made:
             style = self.palette.styles[source]
             prosody = np.stack([style.intensity, style.pitch], axis=1)[:, : 2 if self.with_pitch else 1]
             options = self.options.get(feature, FieldOptions())
-            self._made[source, feature] = build_field(style.motion[feature], prosody, style.lengths, options)
-        return self._made[source, feature]
+            motion = style.motion[feature] if has_blinks else lids_without_blinks(style)
+            self._made[key] = build_field(motion, prosody, style.lengths, options)
+        return self._made[key]
+
+    def presents(self, style: str) -> bool:
+        """Whether a style is shown retimed and scaled for viewers: a derived one, unless motion is as published."""
+        return self.has_presentation and style in self.palette.derivations
+
+    def presentation(self, source: str, feature: str, seed: int) -> Presentation | None:
+        """Presentation of a feature of a recorded style for one clip; None for features that are not changed."""
+        if not self.has_presentation:
+            return None
+        style, key = self.palette.styles[source], [seed, crc32(f"presented {feature}".encode())]
+        if feature == "blink":
+            if source not in self._profiles:
+                self._profiles[source] = blink_profiles(style)
+            return BlinkPresentation(self._profiles[source], key)
+        if feature == "head":
+            if source not in self._scales:
+                self._scales[source] = slow_scales(style)
+            return HeadPresentation(style_median(style, feature), self._scales[source], key)
+        return None
 
     def source(self, style: str, feature: str) -> str:
         """Recorded style from which a style's feature is sampled; another one if that style lacks the feature."""
-        styles, derived = self.palette.styles, self.palette.derivations
-        name = derived[style].source if style in derived else self.palette.require(style)
+        styles, name = self.palette.styles, self.palette.source(style)
         if feature in styles[name].motion:
             return name
         return next(other for other, recorded in styles.items() if feature in recorded.motion)
@@ -72,12 +101,15 @@ class GestureFields:
         derived = self.palette.derivations.get(style)
         return NO_CHANGE if derived is None else derived.changes.get(feature, NO_CHANGE)
 
-    def apply_change(self, style: str, feature: str, values: Float32Array) -> Float32Array:
-        """Apply the gain and offset of a style to values (T, k) of its source."""
+    def apply_change(
+        self, style: str, feature: str, values: Float32Array, emphasis: NDArray[np.float64] | None = None
+    ) -> Float32Array:
+        """Apply the gain of a style, and its offset times `emphasis` (T,), to values (T, k) of its source."""
         change = self.change(style, feature)
         middle = style_median(self.palette.styles[self.source(style, feature)], feature)
         offset = np.array([change.offset.get(channel, 0.0) for channel in self.palette.channels(feature)], np.float32)
-        return np.asarray(middle + np.float32(change.gain) * (values - middle) + offset, np.float32)
+        offsets = offset if emphasis is None else emphasis[:, None] * offset
+        return np.asarray(middle + np.float32(change.gain) * (values - middle) + offsets, np.float32)
 
     @property
     def features(self) -> tuple[str, ...]:
@@ -143,6 +175,14 @@ class _SoundFeatures:
     def __init__(self, sound: Waveform, begin: float, *, with_pitch: bool) -> None:
         self._sound, self._begin, self._with_pitch = sound, begin, with_pitch
         self._found: dict[bytes, Float32Array] = {}
+        self._accents: NDArray[np.float64] | None = None
+
+    @property
+    def accents(self) -> NDArray[np.float64]:
+        """Seconds of the whole clip and strength of the accents (m, 2)."""
+        if self._accents is None:
+            self._accents = find_accents(self._sound) + np.array([self._begin, 0.0])
+        return self._accents
 
     def at(self, times: NDArray[np.float64]) -> Float32Array:
         """(T, 1 or 2) as `prosody_features`."""
@@ -158,11 +198,14 @@ class _FeatureTrack:
     def __init__(self, fields: GestureFields, feature: str, style: str, seed: int) -> None:
         self._fields, self._feature, self._style = fields, feature, style
         self._generator = np.random.default_rng([seed, crc32(feature.encode())])
-        self._source = fields.source(style, feature)
-        field = fields.of(self._source, feature)
+        self._source = self._source_of(style)
+        field = self._field(self._source)
         self._state = initial_state(field, self._generator.random())
         self._times: list[float] = []
         self._values = np.zeros((0, field.values.shape[1]), np.float32)
+        self._presentation = fields.presentation(self._source[0], feature, seed)
+        self._emphasis = Emphasis([seed, crc32(b"emphasis")]) if feature == "expression" else None
+        self._emphases = np.zeros(0)
 
     def copy(self) -> "_FeatureTrack":
         """A track that continues as this one, independently of it."""
@@ -182,20 +225,34 @@ class _FeatureTrack:
         new = np.array(self._times[first:])
         if not len(new):
             return
-        styles = [
-            self._fields.source(style, self._feature)
-            for style in timeline.style_at(self._feature, new, default=self._style)
-        ]
+        styles = timeline.style_at(self._feature, new, default=self._style)
+        sources = [self._source_of(style) for style in styles]
         prosody = sound.at(new)
         chances = self._generator.random(len(new))
-        borders = [0, *(i for i in range(1, len(new)) if styles[i] != styles[i - 1]), len(new)]
-        parts = [self._sample(styles[low], prosody[low:high], chances[low:high]) for low, high in pairwise(borders)]
-        self._values = np.concatenate([self._values, *parts])
+        borders = [0, *(i for i in range(1, len(new)) if sources[i] != sources[i - 1]), len(new)]
+        parts = [self._sample(sources[low], prosody[low:high], chances[low:high]) for low, high in pairwise(borders)]
+        values, is_presented = np.concatenate(parts), np.array([self._fields.presents(style) for style in styles])
+        if self._presentation is not None:
+            frames = FrameContext(new, prosody[:, 0], sound.accents, is_presented)
+            values = self._presentation.apply(values, frames)
+        if self._emphasis is not None:
+            emphases = self._emphasis.next(FrameContext(new, prosody[:, 0], sound.accents, is_presented))
+            self._emphases = np.concatenate([self._emphases, emphases])
+        self._values = np.concatenate([self._values, values])
 
-    def _sample(self, source: str, prosody: Float32Array, chances: NDArray[np.float64]) -> Float32Array:
-        field = self._fields.of(source, self._feature)
+    def _source_of(self, style: str) -> tuple[str, bool]:
+        """Recorded style of which the field is sampled, and whether with its blinks."""
+        has_blinks = self._feature != "blink" or not self._fields.presents(style)
+        return self._fields.source(style, self._feature), has_blinks
+
+    def _field(self, source: tuple[str, bool]) -> Field:
+        name, has_blinks = source
+        return self._fields.of(name, self._feature, has_blinks=has_blinks)
+
+    def _sample(self, source: tuple[str, bool], prosody: Float32Array, chances: NDArray[np.float64]) -> Float32Array:
+        field = self._field(source)
         if source != self._source:
-            self._state = transfer_state(self._state, self._fields.of(self._source, self._feature), field)
+            self._state = transfer_state(self._state, self._field(self._source), field)
             self._source = source
         values, self._state = sample_field(field, self._state, prosody, chances)
         return values
@@ -204,12 +261,16 @@ class _FeatureTrack:
         """(T, k) values at T times with the changes of the styles; frames before the last time are discarded."""
         clock = np.array(self._times)
         values = interpolate_cubic(self._values, np.interp(times, clock, np.arange(len(clock))))
+        emphasis = np.interp(times, clock, self._emphases) if len(self._emphases) else None
         shares = timeline.style_shares(self._feature, times, default=self._style)
         changed = np.zeros_like(values)
         for style, share in shares.items():
-            changed += share.astype(np.float32)[:, None] * self._fields.apply_change(style, self._feature, values)
+            changed += share.astype(np.float32)[:, None] * self._fields.apply_change(
+                style, self._feature, values, emphasis
+            )
         passed = max(0, bisect_right(self._times, times[-1]) - 1 - N_LOOKAHEAD_FRAMES)
         self._times, self._values = self._times[passed:], self._values[passed:]
+        self._emphases = self._emphases[passed:]
         return changed
 
 

@@ -33,6 +33,7 @@ FIXED_CHANNELS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {"expression": EXPRESSIONS, "blink": EYE_CHANNELS, "gaze": ("pitch", "yaw"), "head": HEAD_CHANNELS}
 )
 REGION_FEATURES = ("brows", "cheeks")
+MEASURED_STYLE = "measured"  # the recorded motion from which the default style is derived, unchanged
 FEATURES = ("expression", "brows", "blink", "cheeks", "gaze", "head")
 
 Float32Array = NDArray[np.float32]
@@ -149,8 +150,24 @@ class Palette:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of all styles, the derived ones first."""
-        return (*self.derivations, *self.styles)
+        """Names of all styles, the derived ones first, `MEASURED_STYLE` last."""
+        return tuple(dict.fromkeys([*self.derivations, *self.styles, MEASURED_STYLE]))
+
+    def source(self, name: str) -> str:
+        """Recorded style that a style is or is derived from; for `MEASURED_STYLE` that of the first derived style.
+
+        Raises
+        ------
+        InputError
+            The palette has no style of this name.
+        """
+        if name in self.styles:
+            return name
+        if name in self.derivations:
+            return self.derivations[name].source
+        self.require(name)
+        first = next(iter(self.derivations.values()), None)
+        return next(iter(self.styles)) if first is None else first.source
 
     def channels(self, feature: str) -> tuple[str, ...]:
         """Names of a feature's channels."""

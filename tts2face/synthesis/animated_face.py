@@ -6,7 +6,8 @@ creates the renderer of its frames. Code outside this module depends on the prot
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol
+from types import MappingProxyType
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from tts2face.exemplar.appearance_trajectory import (
 from tts2face.exemplar.synthesis import ExemplarModel, TokenSelection, blend_trajectory
 from tts2face.face.gesture_transfer import SPEECH_GAINS, GestureFace, gesture_face
 from tts2face.models.face import Face
-from tts2face.models.palette import Palette
+from tts2face.models.palette import MEASURED_STYLE, Palette
 from tts2face.models.talker import Talker
 from tts2face.own_face.appearance_regression import AppearanceRegression, fit_appearance_regression
 from tts2face.own_face.gestures import OwnFaceGestures, build_own_face_gestures
@@ -35,6 +36,7 @@ from tts2face.types import HEAD_CHANNELS, GiveWay, Trajectory, keep_on
 from tts2face.video.livelink import FaceCapture
 from tts2face.video.take import Take
 
+NO_PALETTE = "this face was prepared without a palette and has no gestures; prepare it with a palette"
 FIXED_FEATURES = ("gaze", "head", *SPEECH_GAINS)  # features that a talker's own video fixes
 
 Gestures = Mapping[str, NDArray[np.float32]]
@@ -50,6 +52,8 @@ class FaceMotion:
 
 class AnimatedFace(Protocol):
     """A face prepared for one talker; immutable, for any number of clips and threads."""
+
+    default_styles: ClassVar[Mapping[str, str]]  # of features that do not have the palette's default style
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -141,6 +145,7 @@ class AnimatedFace(Protocol):
 class MeshFace:
     """A mesh to whose shapes the talker's motion is retargeted; `gestures` is None without a palette."""
 
+    default_styles: ClassVar[Mapping[str, str]] = MappingProxyType({})
     face: Face
     exemplars: ExemplarModel
     retargeter: Retargeter
@@ -187,7 +192,7 @@ class MeshFace:
     def add_gestures(self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float]) -> FaceMotion:
         """Add gestures to speech motion; closed lips stay closed."""
         if self.gestures is None:
-            raise InputError("this face was prepared without a palette and has no gestures; prepare it with a palette")
+            raise InputError(NO_PALETTE)
         performance = self.gestures.perform(speech, gestures, gains)
         return FaceMotion(performance.motion, performance.head)
 
@@ -200,6 +205,7 @@ class MeshFace:
 class OwnAppearanceFace:
     """A talker's own face, drawn over the talker's video, which fixes the gaze and the head pose."""
 
+    default_styles: ClassVar[Mapping[str, str]] = MappingProxyType({"expression": MEASURED_STYLE})  # its video's
     talker: Talker
     exemplars: ExemplarModel
     appearance: AppearanceExemplars
@@ -263,7 +269,7 @@ class OwnAppearanceFace:
     def add_gestures(self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float]) -> FaceMotion:
         """Add gestures of lids, brows, cheeks and expression; all head channels are 0."""
         if self.gestures is None:
-            raise InputError("this face was prepared without a palette and has no gestures; prepare it with a palette")
+            raise InputError(NO_PALETTE)
         return FaceMotion(self.gestures.motion(speech, gestures, gains), resting_head(len(speech), speech.fps))
 
     def renderer(self, picture: Picture) -> FrameRenderer:

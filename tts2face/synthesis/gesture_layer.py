@@ -43,7 +43,8 @@ class GestureLayer:
         face: AnimatedFace,
         give_way: GiveWay = keep_on,
     ) -> None:
-        self._requested, self._face, self._give_way = prepared.timeline, face, give_way
+        self._requested = Timeline(style=face.default_styles).merge(prepared.timeline)
+        self._face, self._give_way = face, give_way
         palette, request = fields.palette, prepared.request
         self._requested.check_styles(palette)
         for style in marked_styles(prepared.text):

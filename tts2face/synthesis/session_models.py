@@ -152,7 +152,10 @@ class SessionModels:
     def _fields(self, palette: Palette, request: Request) -> GestureFields:
         method = request.gestures if request.gestures in FIELD_OPTIONS else DEFAULT_FIELDS  # noise has no options
         key = ("fields", method, request.pitch)
-        return self._once(key, lambda: GestureFields(palette, FIELD_OPTIONS[method], with_pitch=request.pitch))
+        is_published = method == "ju2008"
+        return self._once(
+            key, lambda: GestureFields(palette, FIELD_OPTIONS[method], request.pitch, has_presentation=not is_published)
+        )
 
     def _prepare_face(self, palette: Palette | None) -> AnimatedFace:
         if self._mesh is None:

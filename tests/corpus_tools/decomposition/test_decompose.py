@@ -203,7 +203,7 @@ def test_the_paper_s_six_moods_are_derived() -> None:
     made = read_derived_styles("someone")
     assert list(made) == ["neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperated"]
     assert all(derived.source == "someone" and derived.summary for derived in made.values())
-    assert made["depressed"].changes["expression"].offset == {"sad": 0.5}
+    assert made["depressed"].changes["expression"].offset == {"sad": 0.9}
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,99 @@
+"""Moods are told apart by an independent network; mouths of moods keep closures."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from cli.main import run
+from corpus_tools.gesture_study.moods import MoodOptions, MoodStudy, confusion_matrix, study_moods
+from corpus_tools.gesture_study.write_moods import mood_rows, moods_csv, moods_json, moods_png
+from lexicon.errors import BackendError, InputError
+from tts2face.session import Session
+
+SIX = ("neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperated")
+
+
+@pytest.fixture(scope="module")
+def study() -> MoodStudy:
+    try:
+        return study_moods(Session("grid_s1", "head"), MoodOptions(seeds=4, first_seed=40, frames=6))
+    except BackendError as missing:
+        pytest.skip(f"the outside check cannot run: {missing}")
+
+
+def test_the_classifier_recognises_classes_of_known_means() -> None:
+    generator = np.random.default_rng(0)
+    means = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    training, testing = ([mean + generator.normal(0, 0.1, (20, 3)) for mean in means] for _ in range(2))
+    np.testing.assert_array_equal(confusion_matrix(training, testing), 20 * np.eye(3))
+
+
+def test_the_classifier_counts_mistakes_in_the_column_of_its_answer() -> None:
+    training = [np.array([[0.0], [0.2]]), np.array([[1.0], [1.2]])]
+    assert confusion_matrix(training, [np.array([[0.1], [1.1]]), np.array([[1.0]])]).tolist() == [[1, 1], [0, 1]]
+
+
+def test_the_tracker_tells_the_six_moods_apart(study: MoodStudy) -> None:
+    assert study.moods == SIX
+    assert study.accuracy >= 0.8
+    assert study.frame_accuracy >= 0.6
+    assert study.confusion.sum() == 12
+
+
+def test_a_delighted_smile_is_seen_and_varies(study: MoodStudy) -> None:
+    low, mean, high = study.smile_range("delighted")
+    assert 0.45 < low < mean < high < 0.9
+    assert high - low > 0.1
+    assert study.mean_score("delighted", "mouthSmileLeft") > study.mean_score("neutral", "mouthSmileLeft") + 0.4
+
+
+def test_annoyed_and_exasperated_differ_in_the_brows(study: MoodStudy) -> None:
+    assert study.mean_score("annoyed", "browDownLeft") > study.mean_score("exasperated", "browDownLeft") + 0.2
+    assert study.mean_score("exasperated", "browInnerUp") > study.mean_score("annoyed", "browInnerUp") + 0.05
+
+
+def test_neutral_is_not_sullen(study: MoodStudy) -> None:
+    assert study.mean_score("neutral", "mouthFrownLeft", "mouthFrownRight") < 0.05
+    assert study.mean_score("neutral", "browDownLeft", "browDownRight") < 0.25
+    assert 0.03 < study.smile_range("neutral")[1] < 0.25
+
+
+def test_every_file_holds_every_mood(study: MoodStudy) -> None:
+    rows = list(csv.DictReader(moods_csv(study).splitlines()))
+    assert [row["mood"] for row in rows] == list(SIX)
+    content = json.loads(moods_json(study))
+    assert content["moods"] == mood_rows(study)
+    assert np.trace(content["confusion"]) == sum(row["recognised"] for row in content["moods"])
+    assert moods_png(study).startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"seeds": 5}, "must be an even number of 4 or more, not 5"),
+        ({"first_seed": -1}, "a whole number from 0, not -1"),
+        ({"size": 64}, "at least 2 frames of 160 pixels, not 12 of 64"),
+        ({"sentences": ()}, "at least one sentence"),
+    ],
+)
+def test_invalid_options(options: dict, reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        MoodOptions(**options)
+
+
+def test_one_mood_cannot_be_told_apart() -> None:
+    with pytest.raises(InputError, match="at least two moods can be told apart, not 1"):
+        study_moods(Session("grid_s1", "head"), MoodOptions(), ["neutral"])
+
+
+def test_the_command_writes_a_contact_sheet(tmp_path: Path, capsys: pytest.CaptureFixture[str], study) -> None:
+    out = tmp_path / "moods.png"
+    assert run(["report", "moods", "--out", str(out), "--seeds", "4", "--size", "160"]) == 0
+    with Image.open(out) as sheet:
+        assert sheet.size == (6 * 160, 6 * 160)
+    assert "of 12 clips of 6 moods" in capsys.readouterr().err
+    assert run(["report", "moods", "--out", str(tmp_path / "moods.txt")]) == 2

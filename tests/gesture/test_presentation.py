@@ -1,0 +1,190 @@
+"""Derived styles blink and move for viewers; recorded styles and ``measured`` as the recorded person does."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from corpus_tools.gesture_study.blinks import find_blinks
+from corpus_tools.gesture_study.measures import wasserstein
+from tts2face.gesture.blink_presentation import PAUSE_DB
+from tts2face.gesture.gesture_stream import GestureFields, GestureStream
+from tts2face.gesture.head_presentation import find_accents, slow_scales
+from tts2face.gesture.presentation import LowPass, filtered_spread
+from tts2face.gesture.prosody import prosody_features
+from tts2face.gesture.spans import Gains, StyleSpan
+from tts2face.gesture.timeline import Timeline
+from tts2face.models.palette import FEATURES, GESTURE_FPS, Palette, load_palette
+from tts2face.types import Waveform
+
+RATE = 8_000
+FPS = 30.0
+PHRASE_S, PAUSE_S = 2.4, 0.5
+SECONDS = 10 * (PHRASE_S + PAUSE_S)
+SEEDS = range(4)
+
+
+@pytest.fixture(scope="module")
+def starter() -> Palette:
+    return load_palette("starter")
+
+
+@pytest.fixture(scope="module")
+def fields(starter: Palette) -> GestureFields:
+    return GestureFields(starter)
+
+
+def phrases(seconds: float = SECONDS, seed: int = 0) -> Waveform:
+    """Noise in syllables, every sixth of which is loud, with pauses between phrases."""
+    times = np.arange(round(seconds * RATE)) / RATE
+    in_phrase = times % (PHRASE_S + PAUSE_S) < PHRASE_S
+    syllable = np.floor(times * 4)
+    loud = np.abs(np.sin(np.pi * times * 4)) ** 0.5 * np.where(syllable % 6 == 3, 1.0, 0.5)
+    noise = np.random.default_rng(seed).uniform(-1, 1, len(times))
+    return Waveform(0.4 * np.where(in_phrase, loud, 0.0) * noise, RATE)
+
+
+def gestures(fields: GestureFields, style: str = "neutral", seed: int = 0, timeline: Timeline | None = None):
+    return GestureStream(fields, style=style, seed=seed, fps=FPS).next(
+        phrases(), round(SECONDS * FPS), timeline or Timeline()
+    )
+
+
+@pytest.fixture(scope="module")
+def neutral(fields: GestureFields):
+    return [gestures(fields, seed=seed) for seed in SEEDS]
+
+
+@pytest.fixture(scope="module")
+def measured(fields: GestureFields):
+    return [gestures(fields, "measured", seed=seed) for seed in SEEDS]
+
+
+def blinks_of(clips, index=slice(None)):
+    lids = np.concatenate([clip["blink"][index] for clip in clips])
+    return find_blinks(lids, np.full(len(clips), len(lids) // len(clips), np.int32), FPS)
+
+
+def test_derived_styles_blink_as_in_conversation_and_measured_as_recorded(neutral, measured) -> None:
+    for clip in neutral:
+        assert 12 <= blinks_of([clip]).per_minute <= 22
+    assert blinks_of(measured).per_minute > 35
+
+
+def test_an_idle_face_blinks(fields: GestureFields) -> None:
+    n_frames = round(120 * FPS)
+    silence = Waveform(np.zeros(120 * RATE), RATE)
+    clip = GestureStream(fields, style="neutral", seed=0, fps=FPS).next(silence, n_frames, Timeline())
+    assert 10 <= blinks_of([clip]).per_minute <= 20
+
+
+def test_most_blinks_begin_at_pauses(neutral) -> None:
+    times = np.arange(len(neutral[0]["blink"])) / FPS
+    is_paused = prosody_features(phrases(), times, with_pitch=False)[:, 0] < PAUSE_DB
+    onsets = [np.flatnonzero(np.diff((clip["blink"].mean(axis=1) > 0.5).astype(int)) > 0) for clip in neutral]
+    within = np.concatenate([is_paused[at] for at in onsets])
+    assert is_paused.mean() < 0.25
+    assert within.mean() > 0.6
+
+
+@pytest.mark.parametrize("phase", ["closing", "opening", "closing_speeds", "opening_speeds"])
+def test_presented_blinks_have_the_recorded_form(phase: str, neutral, starter: Palette) -> None:
+    style = starter.styles["grid_s1"]
+    recorded = getattr(find_blinks(style.motion["blink"], style.lengths, GESTURE_FPS), phase)
+    presented = getattr(blinks_of(neutral), phase)
+    assert len(presented) > 20
+    assert np.median(presented) == pytest.approx(np.median(recorded), rel=0.15)
+    assert wasserstein(presented, recorded) < 0.6 * recorded.std()
+
+
+def test_blink_gain_scales(fields: GestureFields, neutral) -> None:
+    half = gestures(fields, timeline=Timeline(gains=Gains({"blink": 0.5})))
+    np.testing.assert_allclose(half["blink"], 0.5 * neutral[0]["blink"], atol=1e-6)
+
+
+def test_measured_is_the_recorded_style(fields: GestureFields, measured) -> None:
+    recorded = gestures(fields, "grid_s1")
+    for name in FEATURES:
+        np.testing.assert_array_equal(measured[0][name], recorded[name])
+
+
+def test_measured_applies_to_one_feature_and_one_span(fields: GestureFields, neutral, measured) -> None:
+    mixed = gestures(fields, timeline=Timeline(style={"blink": "measured"}))
+    np.testing.assert_allclose(mixed["blink"], measured[0]["blink"], atol=1e-6)
+    np.testing.assert_array_equal(mixed["head"], neutral[0]["head"])
+    span = Timeline(spans=(StyleSpan("blink", "measured", 10.0, SECONDS),))
+    clips = [gestures(fields, seed=seed, timeline=span) for seed in SEEDS]
+    assert blinks_of(clips, slice(360, None)).per_minute > 35
+    assert blinks_of(clips, slice(0, 300)).per_minute < 25
+
+
+def yaw_spread(clip) -> float:
+    return float(np.degrees(clip["head"][:, 1].std()))
+
+
+def test_heads_turn_visibly_and_return_to_the_viewer(neutral, measured) -> None:
+    spreads = [yaw_spread(clip) for clip in neutral]
+    assert 2.0 <= np.mean(spreads) <= 4.0
+    assert min(spreads) > 1.2
+    assert np.mean([yaw_spread(clip) for clip in measured]) < 0.6
+    for clip in neutral:
+        yaw = np.degrees(clip["head"][:, 1])
+        assert abs(yaw.mean()) < 1.5
+        assert np.abs(yaw).max() < 16
+
+
+def fast_power(head: np.ndarray) -> np.ndarray:
+    """(3,) power above 6 Hz of the rotations, square degrees."""
+    angles = np.degrees(head[:, :3]) - np.degrees(head[:, :3]).mean(axis=0)
+    window = np.hanning(len(angles))[:, None]
+    spectrum = np.square(np.abs(np.fft.rfft(angles * window, axis=0))) * 2 / len(angles) / np.square(window).sum()
+    return np.asarray(spectrum[np.fft.rfftfreq(len(angles), 1 / FPS) > 6].sum(axis=0))
+
+
+def test_presented_heads_have_no_more_jitter_than_recordings(neutral, starter: Palette) -> None:
+    style = starter.styles["grid_s1"]
+    borders = [0, *np.cumsum(style.lengths).tolist()]
+    recorded = np.mean([fast_power(style.motion["head"][a:b]) for a, b in pairwise(borders)], axis=0)
+    presented = np.mean([fast_power(clip["head"]) for clip in neutral], axis=0)
+    assert (presented <= recorded).all()
+
+
+def test_nods_follow_loud_syllables(fields: GestureFields, neutral, measured) -> None:
+    accents = find_accents(phrases())
+    loud = (np.floor(accents[:, 0] * 4) % 6 == 3) & (accents[:, 1] >= 0.5)
+    assert loud.sum() >= 8
+    frames = np.round(accents[loud, 0] * FPS).astype(int)
+    frames = frames[(frames > 15) & (frames < len(neutral[0]["head"]) - 15)]
+
+    def depth(clips) -> float:  # pitch at the accent above that 0.3 s before and after
+        pitch = np.degrees(np.mean([clip["head"][:, 0] for clip in clips], axis=0))
+        return float(np.mean(pitch[frames] - (pitch[frames - 9] + pitch[frames + 9]) / 2))
+
+    assert depth(neutral) > 1.0
+    assert depth(measured) < 0.5
+
+
+def test_head_gain_scales_and_pieces_are_continuous(fields: GestureFields, neutral) -> None:
+    still = gestures(fields, timeline=Timeline(gains=Gains({"head": 0.5})))
+    np.testing.assert_allclose(still["head"], 0.5 * neutral[0]["head"], atol=1e-6)
+    stream = GestureStream(fields, style="neutral", seed=3, fps=FPS)
+    parts = [stream.next(phrases(2.9, seed), 87, Timeline()) for seed in range(6)]
+    steps = np.abs(np.diff(np.concatenate([part["head"][:, :3] for part in parts]), axis=0)).max(axis=1)
+    joins = 87 * np.arange(1, 6) - 1
+    assert steps[joins].max() <= np.delete(steps, joins).max()
+
+
+def test_a_lively_recording_is_not_scaled_down(starter: Palette) -> None:
+    style = starter.styles["grid_s1"]
+    lively = type(style)(
+        style.lengths, style.intensity, style.pitch, {"head": 40 * style.motion["head"]}, style.metadata
+    )
+    np.testing.assert_array_equal(slow_scales(lively), 1.0)
+    assert (slow_scales(style)[:3] > 1.5).all()
+    np.testing.assert_array_equal(slow_scales(style)[3:], 1.0)
+
+
+def test_spread_from_the_spectrum_is_that_of_the_filter() -> None:
+    noise = np.random.default_rng(0).normal(size=(20_000, 2))
+    filtered = LowPass(0.7, np.zeros(2)).filter(noise)
+    np.testing.assert_allclose(filtered_spread(noise - noise.mean(axis=0), 0.7), filtered.std(axis=0), rtol=0.02)
