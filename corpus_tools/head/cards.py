@@ -18,7 +18,7 @@ LASHES = ("eyelashes02", "eyelashes01")
 BROW_ROWS = {"eyebrow001": (140, 400), "eyebrow010": (252, 512), "eyebrow008": (200, 460), "eyebrow012": (240, 500)}
 BROW_HEIGHT = 252
 LASH_LEFT = 512
-BROW_COLOUR, LASH_COLOUR = (0.215, 0.155, 0.118), (0.115, 0.080, 0.065)  # sRGB
+BROW_COLOUR, LASH_COLOUR = (0.185, 0.133, 0.102), (0.115, 0.080, 0.065)  # sRGB
 HAZE = 40.0  # coverage between the hairs of the pictures, of 255
 CARDS_TEXTURE, EYE_TEXTURE = 1, 2  # numbers of the face's textures
 HIDDEN = np.array([0.0, 10.0, -85.0])  # inside the skull: cards that a person does not show
@@ -45,7 +45,7 @@ def cards_texture(folder: Path, brow_colour: tuple[float, float, float] = BROW_C
         alpha[number * 512 : number * 512 + 512, LASH_LEFT:] = picture[:, :, 3]
     pixels = np.zeros((SIDE, SIDE, 3))
     pixels[:], pixels[:, :LASH_LEFT] = LASH_COLOUR, brow_colour
-    cover = np.clip((alpha - HAZE) * 255 / (250 - HAZE), 0, 255)
+    cover = np.clip((alpha - HAZE) * 255 / (225 - HAZE), 0, 255)
     return Texture(np.rint(255 * pixels).astype(np.uint8), np.rint(cover).astype(np.uint8))
 
 
