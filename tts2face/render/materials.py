@@ -38,6 +38,9 @@ class Skin:
     triangles: NDArray[np.int32]
 
 
+NO_SKIN = Skin(np.zeros(0, np.int32), np.zeros((0, 3), np.float32), np.zeros(0, np.int32))
+
+
 def material_table(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> NDArray[np.float32]:
     """Materials (P, 9) of the parts, with the columns of `tts2face.render.fragment_rows`."""
     rows = np.zeros((len(face.parts), N_MATERIAL_COLUMNS), np.float32)
@@ -68,7 +71,7 @@ def find_skin(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int3
     of_skin = np.flatnonzero(np.array([part.kind == SKIN for part in face.parts], bool)[part_of]).astype(np.int32)
     used = np.unique(triangles[of_skin]).astype(np.int32)
     if not len(used):
-        return Skin(used, np.zeros((0, 3), np.float32), of_skin)
+        return NO_SKIN
     corners = face.vertices[triangles].astype(np.float64)
     edges = ((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=2)  # of corner k to its predecessor
     sums = np.zeros((len(face.vertices), 2))

@@ -45,12 +45,14 @@ EVERY_TILE = np.zeros((0, 0), np.uint8)
 class DrawingBuffers:
     """Buffers for drawing one picture at a time; `tts2face.render.raster` and `fragments` describe the arrays.
 
-    ``side`` is the number of samples along a pixel's side; ``vertex`` is initialised with colours and uv, ``strands``
+    ``side`` is the number of samples along a pixel's side; with ``samples_all`` every pixel has them, else those at
+    edges; ``vertex`` is initialised with colours and uv, ``strands``
     with uv. ``near`` and ``centre`` are depth and owner at the centres of pixels, with a row of pixels above and below
     the band. ``through`` and ``strand_colour`` are of size 0 for a face without strands.
     """
 
     side: int
+    samples_all: bool
     vertex: NDArray[np.float32]
     grid: NDArray[np.int32]
     flat: NDArray[np.float32]
@@ -93,8 +95,10 @@ class Pose:
     turn: NDArray[np.float32]
 
 
-def allocate_buffers(surface: Surface, size: tuple[int, int], side: int) -> DrawingBuffers:
-    """Buffers for a surface, pictures of `size` (width, height) px, and side x side samples per pixel."""
+def allocate_buffers(
+    surface: Surface, size: tuple[int, int], side: int, *, samples_all: bool = False
+) -> DrawingBuffers:
+    """Buffers for a surface, pictures of `size` (width, height) px, and side x side samples in pixels at edges, or all."""
     n_vertices, n_triangles = len(surface.rig.rest), len(surface.triangles)
     width, height = size[0] * side, size[1] * side
     rows = side * max(1, BAND_SAMPLES // (width * side))
@@ -108,6 +112,7 @@ def allocate_buffers(surface: Surface, size: tuple[int, int], side: int) -> Draw
     covered = pixels if len(strands) else (0, 0)
     return DrawingBuffers(
         side=side,
+        samples_all=samples_all or side == 1,
         vertex=vertex,
         grid=np.zeros((n_vertices, 2), np.int32),
         flat=np.zeros((n_triangles, 3), np.float32),
@@ -193,7 +198,7 @@ def draw_samples(
     layers = N_LAYERS if bounds[TRANSLUCENT] < bounds[TRANSLUCENT + 1] else 1
     wanted = EVERY_TILE
     buffers.edges[:] = 1
-    if side > 1 and not has_holes:
+    if not buffers.samples_all and not has_holes:
         draw_band(geometry, batch, (first_row // side - 1, side), EVERY_TILE, buffers.near, buffers.centre)
         buffers.edges[:] = 0
         find_edges((buffers.near, buffers.centre), layers, surface.part_of, EDGE_STEP_MM, buffers.edges)

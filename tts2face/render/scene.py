@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tts2face.face.deformation import head_transform
 from tts2face.models.face import Face
 from tts2face.render.camera import CameraMatrices, camera_matrices
-from tts2face.render.picture import STUDIO, Picture, parse_background
+from tts2face.render.picture import DRAFT, STUDIO, Picture, parse_background
 from tts2face.render.picture_kernels import Pose
 from tts2face.render.soft_shadows import Exposure, compute_exposure
 from tts2face.render.studio_light import FIRST_LIGHT_ROW, lamp_directions, light_table
@@ -44,15 +44,16 @@ class Scene:
 
 
 def build_scene(face: Face, picture: Picture) -> Scene:
-    """Scene of a face and a picture; computing the soft shadows takes almost a second.
+    """Scene of a face and a picture; computing the soft shadows of a face without
+    occlusion takes a second.
 
     Raises
     ------
     DataError
         The background image cannot be read.
     """
-    side = picture.supersampling
-    surface, towards = build_surface(face), lamp_directions(picture.view)
+    side = picture.samples_per_side
+    surface, towards = build_surface(face, scatters=picture.quality != DRAFT), lamp_directions(picture.view)
     camera = camera_matrices(picture.view, face, (picture.width * side, picture.height * side))
     exposure = compute_exposure(face, surface, towards, available_cores())
     return Scene(face, picture, surface, camera, light_table(towards, camera), exposure, draw_background(picture))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tts2face.face.deformation import FaceRig, build_rig
 from tts2face.models.face import Face, Part, Texture
 from tts2face.render.eyes import EyeGeometry, eye_geometry
-from tts2face.render.materials import STRANDS, Skin, find_skin, material_table, vertex_wrap
+from tts2face.render.materials import NO_SKIN, STRANDS, Skin, find_skin, material_table, vertex_wrap
 from tts2face.render.raster import FIRST, HOLES, LATER, NOT_DRAWN, TRANSLUCENT
 from tts2face.render.strand_cards import Strands, find_strands
 from tts2face.render.textures import pack_textures
@@ -46,8 +46,8 @@ class Surface:
     eyes: EyeGeometry
 
 
-def build_surface(face: Face) -> Surface:
-    """Surface of a face."""
+def build_surface(face: Face, *, scatters: bool = True) -> Surface:
+    """Surface of a face; `scatters` is whether light spreads under its skin."""
     parts = face.parts
     counts = [part.count for part in parts]
     part_of = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
@@ -72,7 +72,7 @@ def build_surface(face: Face) -> Surface:
         wrap=vertex_wrap(face, every, part_of, materials),
         starts=starts,
         members=members,
-        skin=find_skin(face, every, part_of),
+        skin=find_skin(face, every, part_of) if scatters else NO_SKIN,
         strands=find_strands(face, every, is_strand, (texels, levels)),
         eyes=eye_geometry(face, rig),
     )

@@ -122,7 +122,7 @@ def render_frames(
     """
     require_gl()
     picture = scene.picture
-    side = picture.supersampling
+    side = picture.samples_per_side
     plotter = _plotter((picture.width * side, picture.height * side), scene)
     try:
         actors = PlottedFace(scene.surface, plotter)
