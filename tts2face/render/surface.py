@@ -21,7 +21,7 @@ class Surface:
     """Constant arrays for drawing a face.
 
     ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2); ``textures`` their pixels and
-    coverage, ``texels`` and ``levels`` as `tts2face.render.textures` packs them; ``part_of``, ``texture_of`` and ``phase`` (F,) as
+    coverage, ``texels`` and ``levels`` as `tts2face.render.textures` packs them; ``part_of``, ``texture_of`` and ``phase`` as
     `tts2face.render.raster` names the phases; ``materials`` (P, 9) as `tts2face.render.fragment_rows` names its columns; ``wrap`` (V,); the
     triangles around vertex v are ``members[starts[v]:starts[v + 1]]``, those of vertices at the same place and of the
     same part included, so that a seam of the texture does not show.
@@ -83,7 +83,7 @@ def _is_cut_out(face: Face, part: Part) -> bool:
 
 
 def _phases(face: Face, part_of: NDArray[np.int32]) -> NDArray[np.int8]:
-    """Phase (F,) of each triangle: the largest opaque part is drawn first and hides much of the others."""
+    """Phase (F, 2) of the front and back of each triangle: the largest opaque part is drawn first and hides much of the others."""
     sizes = [-1 if part.opacity < 1 or _is_cut_out(face, part) else part.count for part in face.parts]
     phases = np.full(len(face.parts), LATER, np.int8)
     if sizes:
@@ -95,7 +95,8 @@ def _phases(face: Face, part_of: NDArray[np.int32]) -> NDArray[np.int8]:
             phases[number] = HOLES
         elif part.opacity < 1:
             phases[number] = TRANSLUCENT
-    return phases[part_of]
+    backs = np.where(phases == FIRST, LATER, phases).astype(np.int8)
+    return np.stack([phases, backs], axis=1)[part_of]
 
 
 def _triangles_by_vertex(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> tuple[Any, Any]:
