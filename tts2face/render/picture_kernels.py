@@ -31,7 +31,18 @@ from tts2face.render.raster import (
 )
 from tts2face.render.resolve import compose_band
 from tts2face.render.shade import N_SCRATCH_ROWS, light_vertices, scatter_light, shade_fragments
-from tts2face.render.strands import AT_NEAR, AT_U, N_STRAND_COLUMNS, draw_strands, light_strands
+from tts2face.render.strand_cards import Strands
+from tts2face.render.strands import (
+    AT_NEAR,
+    AT_U,
+    AT_X,
+    AT_Y,
+    FRAGMENTS_AT_ONCE,
+    N_FRAGMENT_ROWS,
+    N_STRAND_COLUMNS,
+    draw_strands,
+    light_strands,
+)
 from tts2face.render.surface import Surface
 from tts2face.render.tone_tables import TONE_TABLES
 
@@ -75,6 +86,7 @@ class DrawingBuffers:
     strands: NDArray[np.float32]
     through: NDArray[np.float32]
     strand_colour: NDArray[np.float32]
+    strand_fragments: tuple[NDArray[np.int32], NDArray[np.float32]]
 
     @property
     def band_rows(self) -> int:
@@ -135,6 +147,10 @@ def allocate_buffers(
         strands=strands,
         through=np.zeros((*covered, side * side), np.float32),
         strand_colour=np.zeros((*covered, 3), np.float32),
+        strand_fragments=(
+            np.zeros((3, FRAGMENTS_AT_ONCE), np.int32),
+            np.zeros((N_FRAGMENT_ROWS, FRAGMENTS_AT_ONCE), np.float32),
+        ),
     )
 
 
@@ -146,14 +162,14 @@ def draw_surface(
     height, width = picture.shape[0] * side, picture.shape[1] * side
     batch = project_surface(pose.points, surface, (optics.view, lens), buffers, (width, height))
     light_surface(pose, surface, lens, buffers)
-    order = np.argsort(-buffers.strands[:, AT_NEAR][surface.strands.triangles].mean(axis=1), kind="stable")
+    cards = arrange_cards(surface.strands, buffers.strands)
     facets = (buffers.flat, surface.part_of)
     textures = (surface.texels, surface.levels)
     scene = (surface.triangles, surface.part_of, surface.materials, textures, TONE_TABLES[0], side, pose.eyes)
     for band in range(len(buffers.band_starts) // N_PHASES):
         place = (band * buffers.band_rows, min(buffers.band_rows, height - band * buffers.band_rows), side)
         layers = draw_samples(surface, lens, batch, place[0], buffers)
-        blend_strands(surface, order, place[0], pose.lights, buffers)
+        blend_strands(surface, cards, place[0], pose.lights, buffers)
         owners = (buffers.owner, buffers.centre, buffers.edges)
         n_pixels = find_fragments(owners, layers, place, facets, buffers.found, buffers.through, buffers.pixels)
         if n_pixels == 0:
@@ -218,22 +234,34 @@ def draw_samples(
     return layers
 
 
+def arrange_cards(cards: Strands, table: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Order (F,) of the triangles of cards from front to back, and which of their edges (F, 3) end what is seen.
+
+    These are the borders of cards, and edges where a card turns away.
+    """
+    order = np.argsort(-table[:, AT_NEAR][cards.triangles].mean(axis=1), kind="stable")
+    x, y = table[:, AT_X][cards.triangles], table[:, AT_Y][cards.triangles]
+    faces = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) > (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
+    ends = (cards.neighbours < 0) | (faces[cards.neighbours] != faces[:, None]) if len(order) else cards.neighbours < 0
+    return order, ends
+
+
 def blend_strands(
-    surface: Surface, order: NDArray[np.intp], first_row: int, lights: NDArray[np.float32], buffers: DrawingBuffers
+    surface: Surface, arranged: tuple[Any, Any], first_row: int, lights: NDArray[np.float32], buffers: DrawingBuffers
 ) -> None:
-    """Write the passing light and the colour of strands of a band."""
+    """Write the passing light and the colour of strands of a band; `arranged` as `arrange_cards` returns it."""
+    order, ends = arranged
     if not len(order):
         return
     cards = surface.strands
     buffers.through[:], buffers.strand_colour[:] = 1, 0
-    strands = (buffers.strands, cards.triangles, cards.texture, cards.gloss, cards.mean_light)
     draw_strands(
-        strands,
+        (buffers.strands, cards.triangles, ends, cards.texture, cards.gloss, cards.mean_light),
         order,
         (surface.texels, surface.levels, TONE_TABLES[0], lights),
         (first_row, buffers.side, buffers.depth[0], buffers.near[0], buffers.edges),
-        buffers.through,
-        buffers.strand_colour,
+        buffers.strand_fragments,
+        (buffers.through, buffers.strand_colour),
     )
 
 
