@@ -15,11 +15,13 @@ from tts2face.render.fragments import (
     face_normals,
     find_edges,
     find_fragments,
+    mark_thin,
     mark_tiles,
     vertex_normals,
 )
 from tts2face.render.raster import (
     HOLES,
+    LATER,
     N_LAYERS,
     N_PHASES,
     TILE_SAMPLES,
@@ -218,6 +220,8 @@ def draw_samples(
         draw_band(geometry, batch, (first_row // side - 1, side), EVERY_TILE, buffers.near, buffers.centre)
         buffers.edges[:] = 0
         find_edges((buffers.near, buffers.centre), layers, surface.part_of, EDGE_STEP_MM, buffers.edges)
+        later = members[bounds[LATER] : bounds[LATER + 1]]
+        mark_thin(buffers.boxes, buffers.source, later, surface.thin, (first_row, side), buffers.edges)
         mark_tiles(buffers.edges, side, buffers.tiles)
         wanted = buffers.tiles
     draw_band(geometry, batch, (first_row, 1), wanted, buffers.depth, buffers.owner)

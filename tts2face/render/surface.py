@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tts2face.face.deformation import FaceRig, build_rig
 from tts2face.models.face import Face, Part, Texture
 from tts2face.render.eyes import EyeGeometry, eye_geometry
-from tts2face.render.materials import NO_SKIN, STRANDS, Skin, find_skin, material_table, vertex_wrap
+from tts2face.render.materials import NO_SKIN, STRANDS, Skin, find_skin, material_table, thin_triangles, vertex_wrap
 from tts2face.render.raster import FIRST, HOLES, LATER, NOT_DRAWN, TRANSLUCENT
 from tts2face.render.strand_cards import Strands, find_strands
 from tts2face.render.textures import pack_textures
@@ -22,7 +22,7 @@ class Surface:
 
     ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2); ``textures`` their pixels and
     coverage, ``texels`` and ``levels`` as `tts2face.render.textures` packs them; ``part_of``, ``texture_of`` and ``phase`` as
-    `tts2face.render.raster` names the phases; ``materials`` (P, 9) as `tts2face.render.fragment_rows` names its columns; ``wrap`` (V,); the
+    `tts2face.render.raster` names the phases; ``materials`` (P, 9) as `tts2face.render.fragment_rows` names its columns; ``wrap`` (V,); ``thin`` (F,) marks triangles of thin parts; the
     triangles around vertex v are ``members[starts[v]:starts[v + 1]]``, those of vertices at the same place and of the
     same part included, so that a seam of the texture does not show.
     """
@@ -37,6 +37,7 @@ class Surface:
     part_of: NDArray[np.int32]
     texture_of: NDArray[np.int32]
     phase: NDArray[np.int8]
+    thin: NDArray[np.bool_]
     materials: NDArray[np.float32]
     wrap: NDArray[np.float32]
     starts: NDArray[np.int64]
@@ -68,6 +69,7 @@ def build_surface(face: Face, *, scatters: bool = True) -> Surface:
         part_of=part_of,
         texture_of=np.repeat([max(part.texture, 0) for part in parts], counts).astype(np.int32),
         phase=_phases(face, part_of),
+        thin=thin_triangles(face, every, part_of),
         materials=materials,
         wrap=vertex_wrap(face, every, part_of, materials),
         starts=starts,
