@@ -8,8 +8,12 @@ from scipy.spatial import Delaunay
 
 from tts2face.render.raster import (
     BACK_BIAS,
+    FIRST,
     GRID,
+    LATER,
+    N_PHASES,
     NO_TRIANGLE,
+    TRANSLUCENT,
     draw_band,
     gather_triangles,
     sort_into_bands,
@@ -28,19 +32,22 @@ def rasterised(points, triangles, translucent=None, band_rows=SIZE[1]):
     transform_to_camera(points, VIEW, LENS, camera, grid)
     triangles = np.asarray(triangles, np.int32)
     corners, source = np.zeros((2 * len(triangles), 6), np.int32), np.zeros(2 * len(triangles), np.int32)
-    count = gather_triangles(camera, grid, triangles, (LENS, SIZE), corners, source)
+    boxes = np.zeros((2 * len(triangles), 5), np.int32)
+    count = gather_triangles(camera, grid, triangles, (LENS, SIZE), (corners, boxes, source))
     n_bands = -(-SIZE[1] // band_rows)
-    starts, members = np.zeros(n_bands + 1, np.int64), np.zeros(n_bands * 2 * len(triangles), np.int32)
-    sort_into_bands(corners, count, band_rows, starts, members)
-    marks = np.zeros(len(triangles), np.int8) if translucent is None else np.asarray(translucent, np.int8)
+    starts, members = np.zeros(n_bands * N_PHASES + 1, np.int64), np.zeros(n_bands * 2 * len(triangles), np.int32)
+    marks = np.zeros(len(triangles), bool) if translucent is None else np.asarray(translucent, bool)
+    phase = np.where(marks[:, None], TRANSLUCENT, np.array([FIRST, LATER])).astype(np.int8)
+    sort_into_bands((boxes, source, phase), count, (band_rows, 0), starts, members)
     owner, depth = [], []
     for band in range(n_bands):
         near, who = (
             np.zeros((3, band_rows, SIZE[0]), np.float32),
             np.full((3, band_rows, SIZE[0]), NO_TRIANGLE, np.int32),
         )
-        batch = (corners, source, members[starts[band] : starts[band + 1]])
-        draw_band((camera, triangles, marks, LENS), batch, band * band_rows, near, who)
+        bounds = starts[N_PHASES * band : N_PHASES * (band + 1) + 1]
+        batch = (corners, boxes, source, members, bounds)
+        draw_band((camera, triangles, LENS), batch, (band * band_rows, 1), np.zeros((0, 0), np.uint8), near, who)
         owner.append(who)
         depth.append(near)
     return np.concatenate(owner, axis=1)[:, : SIZE[1]], np.concatenate(depth, axis=1)[:, : SIZE[1]]

@@ -7,7 +7,8 @@ import pytest
 
 from tests.render.tiny_face import ball, tiny_face
 from tts2face.models.face import Part
-from tts2face.render.soft_shadows import compute_exposure, cone_directions, sphere_directions
+from tts2face.render.occlusion import bake_occlusion, sphere_directions
+from tts2face.render.soft_shadows import compute_exposure, lamp_weights
 from tts2face.render.surface import build_surface
 
 LAMPS = np.array([[0, 0, 1.0], [1.0, 0, 0], [0, 1.0, 0]])
@@ -35,7 +36,7 @@ def face_of_bodies(*bodies):
 
 
 def rest(*bodies):
-    face = face_of_bodies(*bodies)
+    face = bake_occlusion(face_of_bodies(*bodies))
     return compute_exposure(face, build_surface(face), LAMPS, threads=1).rest
 
 
@@ -61,14 +62,19 @@ def test_a_ball_in_front_hides_one_lamp_and_not_the_others():
 def test_directions_are_unit_vectors_spread_evenly():
     np.testing.assert_allclose(np.linalg.norm(sphere_directions(40), axis=1), 1)
     np.testing.assert_allclose(sphere_directions(40).mean(axis=0), 0, atol=0.02)
-    around = cone_directions(np.array([0.6, 0.0, 0.8]), 12, 0.2)
-    assert np.arccos(np.clip(around @ [0.6, 0.0, 0.8], -1, 1)).max() <= 0.2 + 1e-9
-    np.testing.assert_allclose(np.linalg.norm(around, axis=1), 1)
+
+
+def test_a_lamp_is_a_soft_lobe_of_directions_around_it():
+    directions, lamp = sphere_directions(512), np.array([[0.6, 0.0, 0.8]])
+    weights = lamp_weights(directions, lamp)[:, 0]
+    assert weights.sum() == pytest.approx(1, abs=1e-5)
+    assert np.arccos(directions[np.argmax(weights)] @ lamp[0]) < 0.15
+    angles = np.arccos(np.clip(directions @ lamp[0], -1, 1))
+    assert (weights * angles).sum() == pytest.approx(0.35, abs=0.05)  # 1.25 x the radius for a lobe on a sphere
 
 
 @pytest.mark.parametrize("threads", [2, 3])
-def test_exposure_does_not_depend_on_the_number_of_threads(threads):
+def test_occlusion_does_not_depend_on_the_number_of_threads(threads):
     face = tiny_face()
-    one, many = (compute_exposure(face, build_surface(face), LAMPS, n) for n in (1, threads))
-    np.testing.assert_array_equal(one.rest, many.rest)
-    np.testing.assert_array_equal(one.gain, many.gain)
+    one, many = (bake_occlusion(face, n).occlusion for n in (1, threads))
+    np.testing.assert_array_equal(one, many)

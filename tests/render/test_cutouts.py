@@ -1,6 +1,7 @@
 """Parts with holes: samples are drawn where the alpha of the texture is."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,9 +10,10 @@ from tests.render.tiny_face import tiny_face
 from tts2face.models.face import Face
 from tts2face.render.draw import draw
 from tts2face.render.picture import Picture
-from tts2face.render.surface import linear_table
+from tts2face.render.tone_tables import linear_table
 
 PICTURE = Picture(size="160x160", background="#808080")
+EVERY_SAMPLE = replace(PICTURE, quality="high")
 N_SHEET = 2  # triangles of the sheet of lashes, the last of the face
 
 
@@ -36,9 +38,10 @@ def full(value: int) -> np.ndarray:
     return np.full((64, 64), value, np.uint8)
 
 
-@pytest.mark.parametrize("supersampling", [1, 2, 3])
-def test_full_coverage_is_an_opaque_part_and_none_is_no_part(supersampling: int) -> None:
-    picture = replace(PICTURE, supersampling=supersampling)
+@pytest.mark.parametrize("options", [{"supersampling": 1}, {"quality": "high"}])
+def test_full_coverage_is_an_opaque_part_and_none_is_no_part(options: dict[str, Any]) -> None:
+    """Every pixel has the same samples with and without holes, unlike with samples at edges only."""
+    picture = replace(PICTURE, **options)
     opaque = face_with_sheet(None)
     np.testing.assert_array_equal(drawn(face_with_sheet(full(255)), picture), drawn(opaque, picture))
     np.testing.assert_array_equal(drawn(face_with_sheet(full(0)), picture), drawn(without_sheet(opaque), picture))
@@ -63,7 +66,8 @@ def test_an_edge_in_the_texture_is_an_edge_of_the_sheet() -> None:
     vertices[[-3, -2], 0] = vertices[[-4, -1], 0] * 0.5 + vertices[[-3, -2], 0] * 0.5
     uv = np.array(halved.uv)
     uv[[-3, -2], 0] = 0.5
-    cut, true = drawn(face_with_sheet(alpha)), drawn(replace(halved, vertices=vertices, uv=uv))
+    cut = drawn(face_with_sheet(alpha), EVERY_SAMPLE)
+    true = drawn(replace(halved, vertices=vertices, uv=uv), EVERY_SAMPLE)
     off = np.abs(cut - true).max(axis=2)
     assert np.abs(true - drawn(without_sheet(halved))).max(axis=2).max() > 100
     assert (off > 30).sum() <= 12  # pixels along the edge
@@ -87,7 +91,7 @@ def test_a_translucent_part_before_and_behind_a_sheet_with_holes(step: float) ->
             uv=np.concatenate([face.uv, face.uv[-4:]]),
         )
 
-    np.testing.assert_array_equal(drawn(layered(full(255))), drawn(layered(None)))
+    np.testing.assert_array_equal(drawn(layered(full(255)), EVERY_SAMPLE), drawn(layered(None), EVERY_SAMPLE))
 
 
 def test_the_order_of_triangles_does_not_matter() -> None:

@@ -12,12 +12,12 @@ from tests.render.tiny_face import tiny_face
 from tts2face.models.face_loading import load_face
 from tts2face.render.draw import draw, mesh_renderer
 from tts2face.render.picture import Picture
-from tts2face.render.surface import linear_table
+from tts2face.render.tone_tables import linear_table
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 REST = np.zeros(4)
 SMALL = Picture(size="96x80", background="#204060")
-OTHERS = {"size": "80x96", "camera": "three-quarter", "background": "white", "supersampling": 1}
+OTHERS = {"size": "80x96", "camera": "three-quarter", "background": "white", "supersampling": 1, "quality": "draft"}
 
 
 def clip_of(face, n_frames, fps=25.0, rate=8000):

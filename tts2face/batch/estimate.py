@@ -61,7 +61,7 @@ def _core_seconds(segment: Segment, fps: float) -> float:
     if segment.medium == TRACK:
         return synthesis
     picture = Picture(**segment.picture)
-    samples = min(picture.width, picture.height) ** 2 * picture.supersampling**2
+    samples = min(picture.width, picture.height) ** 2 * picture.samples_per_side**2
     return synthesis + n_frames * (FRAME_S + samples * SAMPLE_S + picture.width * picture.height * PIXEL_S)
 
 

@@ -75,7 +75,7 @@ class CharacterViews:
 
     def _scene(self, view: tuple[float, float]) -> Scene:
         picture = _picture(*view)
-        side = SIDE_PX * picture.supersampling
+        side = SIDE_PX * picture.samples_per_side
         optics = camera_matrices(picture.view, self.face, (side, side))
         lights = light_table(lamp_directions(picture.view), optics)
         return replace(self._renderer.scene, picture=picture, optics=optics, lights=lights)

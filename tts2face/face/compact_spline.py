@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from tts2face.compilation import kernel
 from tts2face.face.rbf import Interpolant, check_centres
 
 FloatArray = NDArray[np.float64]
@@ -67,7 +68,22 @@ def cubic_bspline(share: NDArray[np.floating]) -> FloatArray:
 
 def bspline_values(points: NDArray[np.floating], centres: FloatArray, support: float) -> FloatArray:
     """Values (P, N) of every centre's basis function at points (P, D)."""
-    values: FloatArray = np.ones((len(points), len(centres)))
-    for axis in range(centres.shape[1]):
-        values *= cubic_bspline(np.abs(np.subtract.outer(points[:, axis], centres[:, axis])) / support)
+    values: FloatArray = np.zeros((len(points), len(centres)))
+    _write_products(np.asarray(points, np.float64), np.asarray(centres, np.float64), float(support), values)
     return values
+
+
+@kernel
+def _write_products(points, centres, support, values):  # type: ignore[no-untyped-def]
+    """Write the product of `cubic_bspline` along the axes; most points are beyond the support of most centres."""
+    for p in range(len(points)):
+        for n in range(len(centres)):
+            product = 1.0
+            for axis in range(points.shape[1]):
+                twice = 2.0 * (abs(points[p, axis] - centres[n, axis]) / support)
+                if twice >= 2.0:
+                    product = 0.0
+                    break
+                outer, inner = 2.0 - twice, max(1.0 - twice, 0.0)
+                product *= outer * outer * outer / 4.0 - inner * inner * inner
+            values[p, n] = product

@@ -12,7 +12,7 @@ from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face import Face
 from tts2face.prefetch import map_in_order
 from tts2face.render import vtk_renderer
-from tts2face.render.picture import PYVISTA, Picture
+from tts2face.render.picture import HIGH, PYVISTA, Picture
 from tts2face.render.picture_kernels import DrawingBuffers, allocate_buffers, draw_surface
 from tts2face.render.scene import Scene, available_cores, build_scene
 from tts2face.types import Clip
@@ -96,7 +96,8 @@ class MeshRenderer:
 
     def _allocate_buffers(self) -> DrawingBuffers:
         picture = self.picture
-        return allocate_buffers(self.scene.surface, (picture.width, picture.height), picture.supersampling)
+        size, side = (picture.width, picture.height), picture.samples_per_side
+        return allocate_buffers(self.scene.surface, size, side, samples_all=picture.quality == HIGH)
 
     def _draw(
         self, weights: NDArray[np.float32], head: NDArray[np.float32], buffers: DrawingBuffers

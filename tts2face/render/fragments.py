@@ -29,7 +29,7 @@ from tts2face.render.fragment_rows import (
     TEXTURE,
     UV,
 )
-from tts2face.render.raster import NO_TRIANGLE, TILE_SAMPLES
+from tts2face.render.raster import GRID_SHIFT, NO_TRIANGLE, TILE_SAMPLES
 from tts2face.render.textures import mip_level, read_texel
 
 Array = NDArray[Any]
@@ -109,6 +109,11 @@ def find_edges(centres: tuple[Any, Any], n_layers: int, part_of: Array, mm: floa
                 limit = value * value * np.float32(mm)
                 if x + 1 < width:
                     beside = owner[layer, r, x + 1]
+                    corner = owner[layer, r + 1, x + 1]
+                    if number != corner and not is_same_part(number, corner, part_of):
+                        edges[r - 1, x] = edges[min(r, n_rows - 1), x + 1] = 1
+                    if below != beside and not is_same_part(below, beside, part_of):
+                        edges[min(r, n_rows - 1), x] = edges[r - 1, x + 1] = 1
                     if number != beside and not is_same_part(number, beside, part_of):
                         edges[r - 1, x] = edges[r - 1, x + 1] = 1
                     if x > 0:
@@ -126,6 +131,30 @@ def is_same_part(number: int, other: int, part_of: Array) -> bool:
     if number == NO_TRIANGLE or other == NO_TRIANGLE or (number < 0) != (other < 0):
         return False
     return bool(part_of[number if number >= 0 else ~number] == part_of[other if other >= 0 else ~other])
+
+
+@kernel
+def mark_thin(boxes: Array, source: Array, members: Array, thin: Array, place: tuple[int, int], edges: Array) -> None:
+    """Mark the pixels under triangles of thin parts, which would fall between the centres of pixels.
+
+    Parameters
+    ----------
+    boxes, source, members
+        As for `tts2face.render.raster.draw_band`, of the band and phase.
+    thin : (F,)
+        Whether a triangle belongs to a thin part.
+    place
+        The band's first row of samples, samples along a pixel's side.
+    """
+    first_row, side = place
+    step = side << GRID_SHIFT
+    for i in members:
+        t = source[i] if source[i] >= 0 else ~source[i]
+        if thin[t]:
+            low, high = boxes[i, 2] // step - first_row // side, boxes[i, 3] // step - first_row // side
+            for r in range(max(low, 0), min(high, edges.shape[0] - 1) + 1):
+                for x in range(max(boxes[i, 0] // step, 0), min(boxes[i, 1] // step, edges.shape[1] - 1) + 1):
+                    edges[r, x] = 1
 
 
 @kernel

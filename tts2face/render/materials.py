@@ -21,6 +21,7 @@ from tts2face.render.fragment_rows import (
 from tts2face.render.shade import N_SCATTER_PASSES, SCATTER_MM
 
 SKIN, EYE_KIND, STRANDS = "skin", "eye", "strands"  # kinds of parts
+THIN_MM = 0.4  # median height of the triangles of parts that are thinner than a pixel
 OPEN_SHARE = 0.05  # parts with a larger share of boundary edges are open sheets, lit from both sides
 SKIN_ROUGHNESS = 0.0448  # squared width of the wide lobe of skin: a roughness of 0.46
 SKIN_GLOSS = 0.6  # wide lobe of skin, as a share of the part's specular
@@ -36,6 +37,9 @@ class Skin:
     vertices: NDArray[np.int32]
     share: NDArray[np.float32]
     triangles: NDArray[np.int32]
+
+
+NO_SKIN = Skin(np.zeros(0, np.int32), np.zeros((0, 3), np.float32), np.zeros(0, np.int32))
 
 
 def material_table(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> NDArray[np.float32]:
@@ -68,7 +72,7 @@ def find_skin(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int3
     of_skin = np.flatnonzero(np.array([part.kind == SKIN for part in face.parts], bool)[part_of]).astype(np.int32)
     used = np.unique(triangles[of_skin]).astype(np.int32)
     if not len(used):
-        return Skin(used, np.zeros((0, 3), np.float32), of_skin)
+        return NO_SKIN
     corners = face.vertices[triangles].astype(np.float64)
     edges = ((corners - np.roll(corners, 1, axis=1)) ** 2).sum(axis=2)  # of corner k to its predecessor
     sums = np.zeros((len(face.vertices), 2))
@@ -88,3 +92,15 @@ def _free_edge_share(triangles: NDArray[np.int32]) -> float:
     return float((uses == 1).mean())
 
 
+def thin_triangles(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Whether each triangle (F,) belongs to a thin part, such as modelled lashes."""
+    corners = face.vertices[triangles].astype(np.float64)
+    sides = corners - np.roll(corners, 1, axis=1)
+    longest = np.linalg.norm(sides, axis=2).max(axis=1, initial=0.0)
+    height = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / np.maximum(longest, 1e-9)
+    thin = [
+        bool(np.any(part_of == at)) and float(np.median(height[part_of == at])) < THIN_MM
+        for at in range(len(face.parts))
+    ]
+    chosen: NDArray[np.bool_] = np.array(thin, bool)[part_of]
+    return chosen

@@ -11,6 +11,8 @@ from tts2face.request import option
 SIDE_LIMITS_PX = (16, 4096)  # px
 AUTO_SIZE, DEFAULT_SIZE = "auto", (512, 512)
 SUPERSAMPLING_FACTORS = (1, 2, 3)
+DRAFT, STANDARD, HIGH = QUALITIES = ("draft", "standard", "high")
+HIGH_SUPERSAMPLING = 3
 NUMBA, PYVISTA = RENDERERS = ("numba", "pyvista")
 STUDIO, TRANSPARENT = "studio", "transparent"
 COLOURS = {
@@ -38,6 +40,10 @@ class Picture:
     camera: str = option("front", "front, three-quarter, profile, close, or yaw,pitch[,distance] in degrees and mm.")
     background: str = option("studio", "studio, transparent, a colour (name or #rrggbb), or an image file.")
     supersampling: int = option(2, "Samples along each side of a pixel: 1, 2 or 3.")
+    quality: str = option(
+        "standard",
+        "draft (one sample a pixel, no light under the skin), standard, or high (3 x 3 samples in every pixel).",
+    )
     renderer: str = option("numba", "numba (any machine) or pyvista (VTK, with a GPU or software GL).")
 
     def __post_init__(self) -> None:
@@ -47,6 +53,8 @@ class Picture:
         parse_background(self.background)
         if self.supersampling not in SUPERSAMPLING_FACTORS:
             raise InputError(f"supersampling must be 1, 2 or 3, not {self.supersampling}")
+        if self.quality not in QUALITIES:
+            raise InputError(f"there is no quality {self.quality!r}; choose {', '.join(QUALITIES)}")
         if self.renderer not in RENDERERS:
             raise InputError(f"there is no renderer {self.renderer!r}; choose numba or pyvista")
 
@@ -59,6 +67,11 @@ class Picture:
     def height(self) -> int:
         """Pixels down."""
         return parse_size(self.size)[1]
+
+    @property
+    def samples_per_side(self) -> int:
+        """Samples along each side of a pixel, by quality and supersampling."""
+        return {DRAFT: 1, HIGH: HIGH_SUPERSAMPLING}.get(self.quality, self.supersampling)
 
     @property
     def view(self) -> CameraView:

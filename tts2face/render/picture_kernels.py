@@ -15,11 +15,13 @@ from tts2face.render.fragments import (
     face_normals,
     find_edges,
     find_fragments,
+    mark_thin,
     mark_tiles,
     vertex_normals,
 )
 from tts2face.render.raster import (
     HOLES,
+    LATER,
     N_LAYERS,
     N_PHASES,
     TILE_SAMPLES,
@@ -31,7 +33,18 @@ from tts2face.render.raster import (
 )
 from tts2face.render.resolve import compose_band
 from tts2face.render.shade import N_SCRATCH_ROWS, light_vertices, scatter_light, shade_fragments
-from tts2face.render.strands import AT_NEAR, AT_U, N_STRAND_COLUMNS, draw_strands, light_strands
+from tts2face.render.strand_cards import Strands
+from tts2face.render.strands import (
+    AT_NEAR,
+    AT_U,
+    AT_X,
+    AT_Y,
+    FRAGMENTS_AT_ONCE,
+    N_FRAGMENT_ROWS,
+    N_STRAND_COLUMNS,
+    draw_strands,
+    light_strands,
+)
 from tts2face.render.surface import Surface
 from tts2face.render.tone_tables import TONE_TABLES
 
@@ -45,12 +58,14 @@ EVERY_TILE = np.zeros((0, 0), np.uint8)
 class DrawingBuffers:
     """Buffers for drawing one picture at a time; `tts2face.render.raster` and `fragments` describe the arrays.
 
-    ``side`` is the number of samples along a pixel's side; ``vertex`` is initialised with colours and uv, ``strands``
+    ``side`` is the number of samples along a pixel's side; with ``samples_all`` every pixel has them, else those at
+    edges; ``vertex`` is initialised with colours and uv, ``strands``
     with uv. ``near`` and ``centre`` are depth and owner at the centres of pixels, with a row of pixels above and below
     the band. ``through`` and ``strand_colour`` are of size 0 for a face without strands.
     """
 
     side: int
+    samples_all: bool
     vertex: NDArray[np.float32]
     grid: NDArray[np.int32]
     flat: NDArray[np.float32]
@@ -73,6 +88,7 @@ class DrawingBuffers:
     strands: NDArray[np.float32]
     through: NDArray[np.float32]
     strand_colour: NDArray[np.float32]
+    strand_fragments: tuple[NDArray[np.int32], NDArray[np.float32]]
 
     @property
     def band_rows(self) -> int:
@@ -93,8 +109,10 @@ class Pose:
     turn: NDArray[np.float32]
 
 
-def allocate_buffers(surface: Surface, size: tuple[int, int], side: int) -> DrawingBuffers:
-    """Buffers for a surface, pictures of `size` (width, height) px, and side x side samples per pixel."""
+def allocate_buffers(
+    surface: Surface, size: tuple[int, int], side: int, *, samples_all: bool = False
+) -> DrawingBuffers:
+    """Buffers for a surface, pictures of `size` (width, height) px, and side x side samples in pixels at edges, or all."""
     n_vertices, n_triangles = len(surface.rig.rest), len(surface.triangles)
     width, height = size[0] * side, size[1] * side
     rows = side * max(1, BAND_SAMPLES // (width * side))
@@ -108,6 +126,7 @@ def allocate_buffers(surface: Surface, size: tuple[int, int], side: int) -> Draw
     covered = pixels if len(strands) else (0, 0)
     return DrawingBuffers(
         side=side,
+        samples_all=samples_all or side == 1,
         vertex=vertex,
         grid=np.zeros((n_vertices, 2), np.int32),
         flat=np.zeros((n_triangles, 3), np.float32),
@@ -130,6 +149,10 @@ def allocate_buffers(surface: Surface, size: tuple[int, int], side: int) -> Draw
         strands=strands,
         through=np.zeros((*covered, side * side), np.float32),
         strand_colour=np.zeros((*covered, 3), np.float32),
+        strand_fragments=(
+            np.zeros((3, FRAGMENTS_AT_ONCE), np.int32),
+            np.zeros((N_FRAGMENT_ROWS, FRAGMENTS_AT_ONCE), np.float32),
+        ),
     )
 
 
@@ -141,14 +164,14 @@ def draw_surface(
     height, width = picture.shape[0] * side, picture.shape[1] * side
     batch = project_surface(pose.points, surface, (optics.view, lens), buffers, (width, height))
     light_surface(pose, surface, lens, buffers)
-    order = np.argsort(-buffers.strands[:, AT_NEAR][surface.strands.triangles].mean(axis=1), kind="stable")
+    cards = arrange_cards(surface.strands, buffers.strands)
     facets = (buffers.flat, surface.part_of)
     textures = (surface.texels, surface.levels)
     scene = (surface.triangles, surface.part_of, surface.materials, textures, TONE_TABLES[0], side, pose.eyes)
     for band in range(len(buffers.band_starts) // N_PHASES):
         place = (band * buffers.band_rows, min(buffers.band_rows, height - band * buffers.band_rows), side)
         layers = draw_samples(surface, lens, batch, place[0], buffers)
-        blend_strands(surface, order, place[0], pose.lights, buffers)
+        blend_strands(surface, cards, place[0], pose.lights, buffers)
         owners = (buffers.owner, buffers.centre, buffers.edges)
         n_pixels = find_fragments(owners, layers, place, facets, buffers.found, buffers.through, buffers.pixels)
         if n_pixels == 0:
@@ -193,10 +216,12 @@ def draw_samples(
     layers = N_LAYERS if bounds[TRANSLUCENT] < bounds[TRANSLUCENT + 1] else 1
     wanted = EVERY_TILE
     buffers.edges[:] = 1
-    if side > 1 and not has_holes:
+    if not buffers.samples_all and not has_holes:
         draw_band(geometry, batch, (first_row // side - 1, side), EVERY_TILE, buffers.near, buffers.centre)
         buffers.edges[:] = 0
         find_edges((buffers.near, buffers.centre), layers, surface.part_of, EDGE_STEP_MM, buffers.edges)
+        later = members[bounds[LATER] : bounds[LATER + 1]]
+        mark_thin(buffers.boxes, buffers.source, later, surface.thin, (first_row, side), buffers.edges)
         mark_tiles(buffers.edges, side, buffers.tiles)
         wanted = buffers.tiles
     draw_band(geometry, batch, (first_row, 1), wanted, buffers.depth, buffers.owner)
@@ -213,22 +238,34 @@ def draw_samples(
     return layers
 
 
+def arrange_cards(cards: Strands, table: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Order (F,) of the triangles of cards from front to back, and which of their edges (F, 3) end what is seen.
+
+    These are the borders of cards, and edges where a card turns away.
+    """
+    order = np.argsort(-table[:, AT_NEAR][cards.triangles].mean(axis=1), kind="stable")
+    x, y = table[:, AT_X][cards.triangles], table[:, AT_Y][cards.triangles]
+    faces = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) > (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
+    ends = (cards.neighbours < 0) | (faces[cards.neighbours] != faces[:, None]) if len(order) else cards.neighbours < 0
+    return order, ends
+
+
 def blend_strands(
-    surface: Surface, order: NDArray[np.intp], first_row: int, lights: NDArray[np.float32], buffers: DrawingBuffers
+    surface: Surface, arranged: tuple[Any, Any], first_row: int, lights: NDArray[np.float32], buffers: DrawingBuffers
 ) -> None:
-    """Write the passing light and the colour of strands of a band."""
+    """Write the passing light and the colour of strands of a band; `arranged` as `arrange_cards` returns it."""
+    order, ends = arranged
     if not len(order):
         return
     cards = surface.strands
     buffers.through[:], buffers.strand_colour[:] = 1, 0
-    strands = (buffers.strands, cards.triangles, cards.texture, cards.gloss, cards.mean_light)
     draw_strands(
-        strands,
+        (buffers.strands, cards.triangles, ends, cards.texture, cards.gloss, cards.mean_light),
         order,
         (surface.texels, surface.levels, TONE_TABLES[0], lights),
         (first_row, buffers.side, buffers.depth[0], buffers.near[0], buffers.edges),
-        buffers.through,
-        buffers.strand_colour,
+        buffers.strand_fragments,
+        (buffers.through, buffers.strand_colour),
     )
 
 

@@ -137,8 +137,7 @@ def sort_into_bands(batch: Any, count: int, rows: tuple[int, int], starts: Array
     Parameters
     ----------
     batch
-        Boxes and source of `gather_triangles`, and the phase of each triangle (F,); back faces of the first phase
-        belong to the second.
+        Boxes and source of `gather_triangles`, and the phase of the front and the back of each triangle (F, 2).
     rows
         Rows of a band, and the rows beyond it that it draws as well, on either side.
     """
@@ -149,7 +148,7 @@ def sort_into_bands(batch: Any, count: int, rows: tuple[int, int], starts: Array
         starts[bucket] = 0
     for turn in range(2):
         for i in range(count):
-            own = phase[source[i]] if source[i] >= 0 else max(phase[~source[i]], LATER)
+            own = phase[source[i], 0] if source[i] >= 0 else phase[~source[i], 1]
             if own == NOT_DRAWN:
                 continue
             low = (np.int64(boxes[i, 2]) >> GRID_SHIFT) - beyond

@@ -1,7 +1,7 @@
 """Scene of a mesh face: everything that is constant over the frames of a clip, including the background."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +10,18 @@ from numpy.typing import NDArray
 from tts2face.face.deformation import head_transform
 from tts2face.models.face import Face
 from tts2face.render.camera import CameraMatrices, camera_matrices
-from tts2face.render.picture import STUDIO, Picture, parse_background
-from tts2face.render.picture_kernels import Pose
+from tts2face.render.picture import DRAFT, STUDIO, Picture, parse_background
+from tts2face.render.camera_views import CameraView
+from tts2face.render.fragment_rows import OPEN_SURFACE
+from tts2face.render.occlusion import occlusion_poses
+from tts2face.render.picture_kernels import Pose, allocate_buffers, draw_samples, project_surface
+from tts2face.render.raster import NOT_DRAWN
 from tts2face.render.soft_shadows import Exposure, compute_exposure
 from tts2face.render.studio_light import FIRST_LIGHT_ROW, lamp_directions, light_table
 from tts2face.render.surface import Surface, build_surface
 from tts2face.storage.picture_files import open_picture
 
+BACKS_SIDE_PX = 192  # pictures in which visible back faces are looked for; one band of rows
 STUDIO_BRIGHT, STUDIO_DARK = (112.0, 110.0, 108.0), (36.0, 37.0, 40.0)  # sRGB at the centre of the wall and far from it
 STUDIO_CENTRE = (0.5, 0.42)  # of the bright area, as shares of width and height
 
@@ -44,18 +49,40 @@ class Scene:
 
 
 def build_scene(face: Face, picture: Picture) -> Scene:
-    """Scene of a face and a picture; computing the soft shadows takes almost a second.
+    """Scene of a face and a picture; computing the soft shadows of a face without
+    occlusion takes a second.
 
     Raises
     ------
     DataError
         The background image cannot be read.
     """
-    side = picture.supersampling
-    surface, towards = build_surface(face), lamp_directions(picture.view)
+    side = picture.samples_per_side
+    surface, towards = build_surface(face, scatters=picture.quality != DRAFT), lamp_directions(picture.view)
     camera = camera_matrices(picture.view, face, (picture.width * side, picture.height * side))
     exposure = compute_exposure(face, surface, towards, available_cores())
+    surface = without_hidden_backs(face, surface, picture.view)
     return Scene(face, picture, surface, camera, light_table(towards, camera), exposure, draw_background(picture))
+
+
+def without_hidden_backs(face: Face, surface: Surface, view: CameraView) -> Surface:
+    """Surface without the back faces of closed parts, which are a third of the work, unless the camera sees some.
+
+    It sees them through the neck from below, or through the mouth of a character without a mouth cavity.
+    """
+    size = (BACKS_SIDE_PX, BACKS_SIDE_PX)
+    camera, buffers = camera_matrices(view, face, size), allocate_buffers(surface, size, 1)
+    is_closed = surface.materials[surface.part_of, OPEN_SURFACE] == 0
+    for weights in occlusion_poses(face):
+        optics = (camera.view, camera.lens)
+        members = project_surface(surface.rig.pose(weights), surface, optics, buffers, size)
+        draw_samples(surface, camera.lens, members, 0, buffers)
+        backs = ~buffers.owner[0][buffers.owner[0] < 0]
+        if is_closed[backs].any():
+            return surface
+    phase = surface.phase.copy()
+    phase[is_closed, 1] = NOT_DRAWN
+    return replace(surface, phase=phase)
 
 
 def available_cores() -> int:

@@ -17,12 +17,14 @@ STRAND_GLOSS = 0.25  # specular of a part of strands at which its highlights are
 class Strands:
     """Hair, lashes and brows.
 
-    ``vertices`` (S,) of the face; ``triangles`` (F, 3) as rows of them; ``texture`` and ``gloss`` (F,); ``tangents``
+    ``vertices`` (S,) of the face; ``triangles`` (F, 3) as rows of them; ``neighbours`` (F, 3)
+    the triangle across the edge opposite to each corner, -1 at borders; ``texture`` and ``gloss`` (F,); ``tangents``
     and ``uv`` (S, 3), (S, 2); ``outward`` (S, 3) from the middle of the skull; ``mean_light`` (T,) of the textures.
     """
 
     vertices: NDArray[np.int32]
     triangles: NDArray[np.int32]
+    neighbours: NDArray[np.int32]
     texture: NDArray[np.int32]
     gloss: NDArray[np.float32]
     tangents: NDArray[np.float32]
@@ -57,6 +59,7 @@ def find_strands(
     return Strands(
         vertices=used.astype(np.int32),
         triangles=rows,
+        neighbours=card_neighbours(points, rows),
         texture=texture.astype(np.int32),
         gloss=gloss.astype(np.float32),
         tangents=_unit(along),
@@ -64,6 +67,21 @@ def find_strands(
         outward=_unit(outward),
         mean_light=means,
     )
+
+
+def card_neighbours(points: NDArray[np.floating], triangles: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Triangle across the edge opposite to each corner (F, 3); -1 at borders. Coincident points are welded."""
+    if not len(triangles):
+        return np.zeros((0, 3), np.int32)
+    keys = np.rint(points * 100).astype(np.int64) + (1 << 20)
+    _, weld = np.unique((keys[:, 0] << 42) | (keys[:, 1] << 21) | keys[:, 2], return_inverse=True)
+    edges = np.sort(weld.ravel()[triangles][:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+    codes = edges[:, 0] * len(points) + edges[:, 1]
+    order = np.argsort(codes, kind="stable")
+    pairs = np.flatnonzero(codes[order[1:]] == codes[order[:-1]])
+    across = np.full(len(codes), -1, np.int32)
+    across[order[pairs]], across[order[pairs + 1]] = order[pairs + 1] // 3, order[pairs] // 3
+    return across.reshape(-1, 3)
 
 
 def card_tangents(points: NDArray[np.floating], triangles: NDArray[np.int32], uv: Any) -> NDArray[np.float64]:

@@ -22,6 +22,7 @@ Array = NDArray[Any]
 # light and the first rim light: tangent and normal along the half vector, and how much of the light arrives.
 AT_X, AT_Y, AT_NEAR, AT_U, AT_V, AT_LIGHT, AT_LOBES = 0, 1, 2, 3, 4, 5, 8
 N_STRAND_COLUMNS = 14
+N_FRAGMENT_ROWS, FRAGMENTS_AT_ONCE = 16, 2048 + 80  # the table stays in the cache; rows do not start in one set of it
 SHINING_LAMPS = (0, 2)  # lamps with highlights on hair: key, first rim
 FIRST_SHIFT, SECOND_SHIFT = np.float32(-0.08), np.float32(0.14)  # of the highlights along the normal
 TEXTURE_SHIFT = np.float32(0.12)  # further shift by the brightness of the texture: highlights follow the strands
@@ -89,41 +90,62 @@ def light_strands(vertices: Array, normals: Array, tangents: Array, light: Any, 
                 column += 3
 
 
-@inlined_kernel
-def power_8(value: float) -> Any:
-    """Eighth power."""
-    value *= value
-    value *= value
-    return value * value
-
-
 @vectorized_kernel
-def strand_light(weights: tuple[float, float, float], rows: Any, albedo: Array, lights: Array, gloss: tuple[float, float],
-                 light: Array) -> None:
-    """Write the display light (3,) of strands at a point between three rows of the strand table.
+def shade_strands(fragments: Any, n: int, strands: Any, lights: Array, colour: Array) -> None:
+    """Add the display light of n fragments of strands to the pixels (R, W, 3).
 
-    `gloss` is the shift of the highlights by the texture, and their strength.
+    Parameters
+    ----------
+    fragments
+        Triangle, row and column of the pixel of each (3, H); rows of numbers (N_FRAGMENT_ROWS, H): albedo, shift of the
+        highlights, weights of the second and third corner, and share of the pixel; the others are buffers.
+    strands
+        Strand table (S, N_STRAND_COLUMNS), triangles (F, 3) and the strength of their highlights (F,).
     """
-    wa, wb, wc = weights
-    a, b, c = rows
-    zero, one = np.float32(0), np.float32(1)
+    which, rows = fragments
+    table, triangles, gloss = strands
+    one, zero = np.float32(1), np.float32(0)
+    for i in range(n):
+        t = which[0, i]
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        wb, wc = rows[4, i], rows[5, i]
+        wa = one - wb - wc
+        for k in range(AT_LIGHT, N_STRAND_COLUMNS):
+            rows[7 + k - AT_LIGHT, i] = wa * table[a, k] + wb * table[b, k] + wc * table[c, k]
+        rows[12, i] *= gloss[t]
+        rows[15, i] *= gloss[t]
     for k in range(3):
-        light[k] = albedo[k] * (wa * a[AT_LIGHT + k] + wb * b[AT_LIGHT + k] + wc * c[AT_LIGHT + k])
+        light, albedo = rows[7 + k], rows[k]
+        for i in range(n):
+            light[i] *= albedo[i]
+    shift = rows[3]
     for lamp in range(2):
-        o = AT_LOBES + 3 * lamp
-        tangent, normal = wa * a[o] + wb * b[o] + wc * c[o], wa * a[o + 1] + wb * b[o + 1] + wc * c[o + 1]
-        arrives = (wa * a[o + 2] + wb * b[o + 2] + wc * c[o + 2]) * gloss[1]
-        first = tangent + (gloss[0] + FIRST_SHIFT) * normal
-        second = tangent + (gloss[0] + SECOND_SHIFT) * normal
-        narrow = power_8(max(one - first * first, zero))
-        narrow *= narrow
-        narrow *= narrow * FIRST_STRENGTH * arrives
-        wide = power_8(max(one - second * second, zero)) * SECOND_STRENGTH * arrives
-        row = FIRST_LIGHT_ROW + SHINING_LAMPS[lamp]
+        tangent, normal, arrives = rows[10 + 3 * lamp], rows[11 + 3 * lamp], rows[12 + 3 * lamp]
+        lamp_row = FIRST_LIGHT_ROW + SHINING_LAMPS[lamp]
+        for i in range(n):
+            first = tangent[i] + (shift[i] + FIRST_SHIFT) * normal[i]
+            second = tangent[i] + (shift[i] + SECOND_SHIFT) * normal[i]
+            narrow, wide = max(one - first * first, zero), max(one - second * second, zero)
+            narrow *= narrow
+            narrow *= narrow
+            narrow *= narrow
+            narrow *= narrow
+            narrow *= narrow
+            wide *= wide
+            wide *= wide
+            wide *= wide
+            tangent[i] = narrow * FIRST_STRENGTH * arrives[i]
+            normal[i] = wide * SECOND_STRENGTH * arrives[i]
         for k in range(3):
-            light[k] += lights[row, 3 + k] * (narrow + wide * albedo[k])
+            light, albedo, strength = rows[7 + k], rows[k], lights[lamp_row, 3 + k]
+            for i in range(n):
+                light[i] += strength * (tangent[i] + normal[i] * albedo[i])
     for k in range(3):
-        light[k] = tone_curve(light[k])
+        light, share = rows[7 + k], rows[6]
+        for i in range(n):
+            light[i] = tone_curve(light[i]) * share[i]
+        for i in range(n):
+            colour[which[1, i], which[2, i], k] += light[i]
 
 
 @vectorized_kernel
@@ -142,6 +164,13 @@ def row_range(plane: Array, low: float, high: float, limits: tuple[float, float]
 
 
 @inlined_kernel
+def border_cover(weight: float, slope: float) -> Any:
+    """Share of a pixel within a half plane with a barycentric weight at its centre, by the slope of `widen_planes`."""
+    inside = np.float32(1) if weight >= np.float32(0) else np.float32(0)
+    return inside if slope == np.float32(0) else min(max(weight * slope + np.float32(0.5), np.float32(0)), np.float32(1))
+
+
+@inlined_kernel
 def fade_in(near: float, behind: float) -> Any:
     """Visible share of a card with 1/z `near` before a surface with 1/z `behind`, 0 without a surface."""
     fade = np.float32(1)
@@ -150,39 +179,42 @@ def fade_in(near: float, behind: float) -> Any:
     return fade
 
 
-@vectorized_kernel
-def visible_share(place: tuple[int, int, int, int], planes: Array, depth: Any, through: Array, passing: Array) -> Any:
-    """Write how much of each sample of a pixel shows a triangle (S,), and return the mean.
+@kernel
+def visible_share(place: tuple[int, int, int, int], plane: Array, depth: Array, through: Array, passing: Array) -> Any:
+    """Write how much of each sample of a pixel shows a card (S,), and return the mean.
 
     Parameters
     ----------
     place
         Row and column of the pixel in the band, the band's first row of samples, samples along a pixel's side.
-    planes : (4, 3)
-        The half planes of the triangle, and its 1/z, as functions of the place in the picture in samples.
-    depth
-        1/z of the samples (R, W), or one value for all.
+    plane : (3,)
+        1/z of the card as a function of the place in the picture in samples.
+    depth : (R, W)
+        1/z of the samples.
     """
     r, x, first_row, side = place
-    zero = np.float32(0)
-    total = zero
+    total = np.float32(0)
     for s in range(side * side):
         row, column = r * side + s // side, x * side + s % side
         px, py = np.float32(column + 0.5), np.float32(row + first_row + 0.5)
-        passing[s] = zero
-        if through[s] < SOLID:
-            continue
-        if (
-            planes[0, 0] * px + planes[0, 1] * py + planes[0, 2] < zero
-            or planes[1, 0] * px + planes[1, 1] * py + planes[1, 2] < zero
-            or planes[2, 0] * px + planes[2, 1] * py + planes[2, 2] < zero
-        ):
-            continue
-        near = planes[3, 0] * px + planes[3, 1] * py + planes[3, 2]
-        behind = depth[1] if depth[1] >= zero else depth[0][row, column]
-        passing[s] = fade_in(near, behind) * through[s]
+        passing[s] = fade_in(plane[0] * px + plane[1] * py + plane[2], depth[row, column]) * through[s]
         total += passing[s]
     return total / np.float32(side * side)
+
+
+@kernel
+def widen_planes(planes: Array, borders: Array, side: int, wide: Array, slopes: Array) -> None:
+    """Write the half planes (3, 3) moved out by half a pixel at borders of cards, and the slopes (3,) of coverage.
+
+    The coverage of a pixel at a border is a half plus its distance in pixels from it; `slopes` is 0 elsewhere.
+    """
+    for e in range(3):
+        length = np.sqrt(planes[e, 0] * planes[e, 0] + planes[e, 1] * planes[e, 1]) * np.float32(side)
+        slopes[e] = np.float32(1) / max(length, np.float32(1e-9)) if borders[e] else np.float32(0)
+        for k in range(3):
+            wide[e, k] = planes[e, k]
+        if borders[e]:
+            wide[e, 2] += np.float32(0.5) * length
 
 
 @kernel
@@ -207,16 +239,6 @@ def is_behind(box: tuple[int, int, int, int], nearest: float, tiles: Array, n_op
     return True
 
 
-@inlined_kernel
-def plane_margins(planes: Array, reach: float) -> tuple[float, float, float]:
-    """How far the half planes change within `reach` samples along both axes."""
-    return (
-        (abs(planes[0, 0]) + abs(planes[0, 1])) * reach,
-        (abs(planes[1, 0]) + abs(planes[1, 1])) * reach,
-        (abs(planes[2, 0]) + abs(planes[2, 1])) * reach,
-    )
-
-
 @kernel
 def set_planes(a: Array, b: Array, c: Array, planes: Array) -> float:
     """Write the half planes of a triangle and its 1/z; returns twice its area, 0 if it is not drawn."""
@@ -238,14 +260,14 @@ def set_planes(a: Array, b: Array, c: Array, planes: Array) -> float:
 
 
 @vectorized_kernel
-def draw_strands(strands: Any, order: Array, scene: Any, band: Any, through: Array, colour: Array) -> None:
+def draw_strands(strands: Any, order: Array, scene: Any, band: Any, fragments: Any, out: tuple[Any, Any]) -> None:
     """Blend the cards of a band of pixels.
 
     Parameters
     ----------
     strands
-        Strand table (S, N_STRAND_COLUMNS), triangles (F, 3) as rows of it, texture and gloss of each triangle (F,) and
-        (F,), mean light of the textures (T,).
+        Strand table (S, N_STRAND_COLUMNS), triangles (F, 3) as rows of it, whether the edge opposite to each corner is
+        a card's border (F, 3), texture and gloss of each triangle (F,) and (F,), mean light of the textures (T,).
     order : (F,)
         Triangles from front to back.
     scene
@@ -253,19 +275,24 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, through: Arr
     band
         First row of samples, samples along a pixel's side, 1/z of the samples (R, W) and of the centres of pixels
         (R / side + 2, W / side), and the marks of pixels whose samples are valid.
-    through : (R, W, side * side)
-        Out: share of light that passes before each sample.
-    colour : (R, W, 3)
-        Out: display light of the strands, as a share of the pixel.
+    fragments
+        Buffers of `shade_strands`.
+    out
+        Share of light that passes before each sample (R, W, side * side), set to 1, and the display light of the
+        strands as a share of the pixel (R, W, 3), set to 0.
     """
-    table, triangles, texture, gloss, mean_light = strands
+    through, colour = out
+    table, triangles, borders, texture, gloss, mean_light = strands
     texels, levels, linear, lights = scene
     first_row, side, depth, centres, edges = band
     one, zero = np.float32(1), np.float32(0)
     n_rows, width, n_samples = through.shape
     each = one / np.float32(n_samples)
     planes, passing = np.zeros((4, 3), np.float32), np.zeros(n_samples, np.float32)
-    sample, light = np.zeros(4, np.float32), np.zeros(3, np.float32)
+    wide, slopes = np.zeros((3, 3), np.float32), np.zeros(3, np.float32)
+    reach = np.float32(0.5 * side)
+    sample, n = np.zeros(3, np.float32), 0
+    which, rows = fragments
     is_open = np.ones((n_rows, width), np.uint8)
     tiles = np.zeros(((n_rows + TILE_PX - 1) // TILE_PX, (width + TILE_PX - 1) // TILE_PX), np.float32)
     n_open = np.zeros(tiles.shape, np.int32)
@@ -273,10 +300,10 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, through: Arr
     top_px = first_row // side
     for t in order:
         a, b, c = table[triangles[t, 0]], table[triangles[t, 1]], table[triangles[t, 2]]
-        first = max(int(np.floor(min(a[AT_Y], b[AT_Y], c[AT_Y]) / side)) - top_px, 0)
-        last = min(int(np.floor(max(a[AT_Y], b[AT_Y], c[AT_Y]) / side)) - top_px, n_rows - 1)
-        left = max(int(np.floor(min(a[AT_X], b[AT_X], c[AT_X]) / side)), 0)
-        right = min(int(np.floor(max(a[AT_X], b[AT_X], c[AT_X]) / side)), width - 1)
+        first = max(int(np.floor((min(a[AT_Y], b[AT_Y], c[AT_Y]) - reach) / side)) - top_px, 0)
+        last = min(int(np.floor((max(a[AT_Y], b[AT_Y], c[AT_Y]) + reach) / side)) - top_px, n_rows - 1)
+        left = max(int(np.floor((min(a[AT_X], b[AT_X], c[AT_X]) - reach) / side)), 0)
+        right = min(int(np.floor((max(a[AT_X], b[AT_X], c[AT_X]) + reach) / side)), width - 1)
         if first > last or left > right:
             continue
         if is_behind((first, last, left, right), max(a[AT_NEAR], b[AT_NEAR], c[AT_NEAR]), tiles, n_open):
@@ -284,38 +311,35 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, through: Arr
         area = set_planes(a, b, c, planes)
         if area == 0.0:
             continue
-        margins = plane_margins(planes, np.float32(0.5 * (side - 1)))
+        widen_planes(planes, borders[t], side, wide, slopes)
+        b_x, b_y, b_0, c_x, c_y, c_0 = planes[1, 0], planes[1, 1], planes[1, 2], planes[2, 0], planes[2, 1], planes[2, 2]
+        near_x, near_y, near_0 = planes[3, 0], planes[3, 1], planes[3, 2]
         u1, v1, u2, v2 = b[AT_U] - a[AT_U], b[AT_V] - a[AT_V], c[AT_U] - a[AT_U], c[AT_V] - a[AT_V]
         number = texture[t]
         size = np.float32(levels[number, 0, 1] * levels[number, 0, 2] * side * side)
         place = levels[number, mip_level(abs((u1 * v2 - u2 * v1) / area) * size, levels.shape[1])]
         for r in range(first, last + 1):
-            low = np.float32((r + top_px) * side) + np.float32(0.5)
-            least, most = row_range(planes, low, low + np.float32(side - 1), (zero, np.float32(width * side)))
             py = np.float32((r + top_px + 0.5) * side)
+            least, most = row_range(wide, py, py, (zero, np.float32(width * side)))
             for x in range(int(least) // side, min(int(most) // side, width - 1) + 1):
                 if is_open[r, x] == 0:
                     continue
                 px = np.float32((x + 0.5) * side)
-                wb = planes[1, 0] * px + planes[1, 1] * py + planes[1, 2]
-                wc = planes[2, 0] * px + planes[2, 1] * py + planes[2, 2]
+                wb = b_0 + b_x * px + b_y * py
+                wc = c_0 + c_x * px + c_y * py
                 wa = one - wb - wc
-                is_whole = edges[r, x] == 0 and wa >= margins[0] and wb >= margins[1] and wc >= margins[2]
-                if is_whole:
-                    fade = fade_in(planes[3, 0] * px + planes[3, 1] * py + planes[3, 2], centres[r + 1, x])
-                    if fade <= zero:
-                        continue
-                    seen = zero
+                cover = border_cover(wa, slopes[0]) * border_cover(wb, slopes[1]) * border_cover(wc, slopes[2])
+                if cover <= zero:
+                    continue
+                if edges[r, x] == 0:
+                    seen = fade_in(near_0 + near_x * px + near_y * py, centres[r + 1, x]) * through[r, x, 0]
                     for s in range(n_samples):
-                        passing[s] = fade * through[r, x, s]
-                        seen += passing[s]
-                    seen *= each
+                        passing[s] = seen
                 else:
-                    behind = centres[r + 1, x] if edges[r, x] == 0 else -one
-                    seen = visible_share((r, x, first_row, side), planes, (depth, behind), through[r, x], passing)
-                    wb = min(max(wb, zero), one)
-                    wc = min(max(wc, zero), one - wb)
-                    wa = one - wb - wc
+                    seen = visible_share((r, x, first_row, side), planes[3], depth, through[r, x], passing)
+                seen *= cover
+                wb = min(max(wb, zero), one)
+                wc = min(max(wc, zero), one - wb)
                 if seen <= np.float32(2e-3):
                     continue
                 uv = (a[AT_U] + wb * u1 + wc * u2, a[AT_V] + wb * v1 + wc * v2)
@@ -324,13 +348,20 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, through: Arr
                     continue
                 shift = (sample[0] + sample[1] + sample[2]) * np.float32(1 / 3) / mean_light[number] - one
                 shift = min(max(shift, -one), one) * TEXTURE_SHIFT
-                strand_light((wa, wb, wc), (a, b, c), sample, lights, (shift, gloss[t]), light)
+                if n == which.shape[1]:
+                    shade_strands(fragments, n, (table, triangles, gloss), lights, colour)
+                    n = 0
+                which[0, n], which[1, n], which[2, n] = t, r, x
                 for k in range(3):
-                    colour[r, x, k] += light[k] * seen * coverage
+                    rows[k, n] = sample[k]
+                rows[3, n], rows[4, n], rows[5, n], rows[6, n] = shift, wb, wc, seen * coverage
+                n += 1
                 rest = zero
                 for s in range(n_samples):
-                    through[r, x, s] -= passing[s] * coverage
+                    through[r, x, s] -= passing[s] * coverage * cover
                     rest = max(rest, through[r, x, s])
                 if rest < SOLID:
                     is_open[r, x] = 0
                     n_open[r // TILE_PX, x // TILE_PX] -= 1
+    if n:
+        shade_strands(fragments, n, (table, triangles, gloss), lights, colour)

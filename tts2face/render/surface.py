@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tts2face.face.deformation import FaceRig, build_rig
 from tts2face.models.face import Face, Part, Texture
 from tts2face.render.eyes import EyeGeometry, eye_geometry
-from tts2face.render.materials import STRANDS, Skin, find_skin, material_table, vertex_wrap
+from tts2face.render.materials import NO_SKIN, STRANDS, Skin, find_skin, material_table, thin_triangles, vertex_wrap
 from tts2face.render.raster import FIRST, HOLES, LATER, NOT_DRAWN, TRANSLUCENT
 from tts2face.render.strand_cards import Strands, find_strands
 from tts2face.render.textures import pack_textures
@@ -21,8 +21,8 @@ class Surface:
     """Constant arrays for drawing a face.
 
     ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2); ``textures`` their pixels and
-    coverage, ``texels`` and ``levels`` as `tts2face.render.textures` packs them; ``part_of``, ``texture_of`` and ``phase`` (F,) as
-    `tts2face.render.raster` names the phases; ``materials`` (P, 9) as `tts2face.render.fragment_rows` names its columns; ``wrap`` (V,); the
+    coverage, ``texels`` and ``levels`` as `tts2face.render.textures` packs them; ``part_of``, ``texture_of`` and ``phase`` as
+    `tts2face.render.raster` names the phases; ``materials`` (P, 9) as `tts2face.render.fragment_rows` names its columns; ``wrap`` (V,); ``thin`` (F,) marks triangles of thin parts; the
     triangles around vertex v are ``members[starts[v]:starts[v + 1]]``, those of vertices at the same place and of the
     same part included, so that a seam of the texture does not show.
     """
@@ -37,6 +37,7 @@ class Surface:
     part_of: NDArray[np.int32]
     texture_of: NDArray[np.int32]
     phase: NDArray[np.int8]
+    thin: NDArray[np.bool_]
     materials: NDArray[np.float32]
     wrap: NDArray[np.float32]
     starts: NDArray[np.int64]
@@ -46,8 +47,8 @@ class Surface:
     eyes: EyeGeometry
 
 
-def build_surface(face: Face) -> Surface:
-    """Surface of a face."""
+def build_surface(face: Face, *, scatters: bool = True) -> Surface:
+    """Surface of a face; `scatters` is whether light spreads under its skin."""
     parts = face.parts
     counts = [part.count for part in parts]
     part_of = np.repeat(np.arange(len(parts), dtype=np.int32), counts)
@@ -68,11 +69,12 @@ def build_surface(face: Face) -> Surface:
         part_of=part_of,
         texture_of=np.repeat([max(part.texture, 0) for part in parts], counts).astype(np.int32),
         phase=_phases(face, part_of),
+        thin=thin_triangles(face, every, part_of),
         materials=materials,
         wrap=vertex_wrap(face, every, part_of, materials),
         starts=starts,
         members=members,
-        skin=find_skin(face, every, part_of),
+        skin=find_skin(face, every, part_of) if scatters else NO_SKIN,
         strands=find_strands(face, every, is_strand, (texels, levels)),
         eyes=eye_geometry(face, rig),
     )
@@ -83,7 +85,7 @@ def _is_cut_out(face: Face, part: Part) -> bool:
 
 
 def _phases(face: Face, part_of: NDArray[np.int32]) -> NDArray[np.int8]:
-    """Phase (F,) of each triangle: the largest opaque part is drawn first and hides much of the others."""
+    """Phase (F, 2) of the front and back of each triangle: the largest opaque part is drawn first and hides much of the others."""
     sizes = [-1 if part.opacity < 1 or _is_cut_out(face, part) else part.count for part in face.parts]
     phases = np.full(len(face.parts), LATER, np.int8)
     if sizes:
@@ -95,7 +97,8 @@ def _phases(face: Face, part_of: NDArray[np.int32]) -> NDArray[np.int8]:
             phases[number] = HOLES
         elif part.opacity < 1:
             phases[number] = TRANSLUCENT
-    return phases[part_of]
+    backs = np.where(phases == FIRST, LATER, phases).astype(np.int8)
+    return np.stack([phases, backs], axis=1)[part_of]
 
 
 def _triangles_by_vertex(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32]) -> tuple[Any, Any]:

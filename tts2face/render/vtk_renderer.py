@@ -122,7 +122,7 @@ def render_frames(
     """
     require_gl()
     picture = scene.picture
-    side = picture.supersampling
+    side = picture.samples_per_side
     plotter = _plotter((picture.width * side, picture.height * side), scene)
     try:
         actors = PlottedFace(scene.surface, plotter)
@@ -168,7 +168,7 @@ class PlottedFace:
         self._meshes: list[PlottedMesh] = []
         shade = triangle_shades(self._light)
         opacity = surface.materials[surface.part_of, OPACITY]
-        has_holes = surface.phase >= HOLES  # cards of strands are drawn as parts with holes
+        has_holes = surface.phase[:, 0] >= HOLES  # cards of strands are drawn as parts with holes
         groups = np.column_stack([-opacity, shade, np.where(shade >= 0, surface.texture_of, -1), has_holes])
         for group in np.unique(groups, axis=0):
             self._add((groups == group).all(axis=1), -float(group[0]), (int(group[2]), bool(group[3])))

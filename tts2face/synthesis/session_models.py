@@ -3,6 +3,7 @@
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -87,6 +88,7 @@ class SessionModels:
         self._cache: dict[Hashable, Any] = {}
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
         self._voices = voices or VoicePool()
+        self._voice_loading: Future[Voice] | None = None
         self.speech_face: AnimatedFace = self._prepare_face(None)
 
     @property
@@ -136,10 +138,22 @@ class SessionModels:
         dictionary = read_dictionary(request.dictionary).entries if request.dictionary else {}
 
         def load_voice(name: str | None, language: str) -> Voice:
+            if self._voice_loading is not None:
+                wait([self._voice_loading])  # an error of it is raised by the next line
             return self._voices.voice(name, language, dictionary, keeps_utterances=keeps_utterances)
 
         face = self.face(has_gestures=request.has_gestures)
         return SynthesisModels(self.talker, self._exemplars, face, load_voice, self._voices.give_way)
+
+    def preload_voice(self, prepared: PreparedRequest) -> None:
+        """Load the voice of a request's text in a thread, while the face is prepared."""
+        request = prepared.request
+        if request.audio or not request.text:
+            return
+        dictionary = read_dictionary(request.dictionary).entries if request.dictionary else {}
+        pool = ThreadPoolExecutor(1, "voice")
+        self._voice_loading = pool.submit(self._voices.voice, request.voice, request.language, dictionary)
+        pool.shutdown(wait=False)
 
     def pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
         """Synthesise the clip of a request piece by piece."""

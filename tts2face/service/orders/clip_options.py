@@ -21,7 +21,7 @@ from tts2face.service.uploads.names import (
 Format = Literal[
     "mp4", "webm", "mp3", "opus", "aac", "flac", "wav", "pcm", "curves", "oculus", "azure", "livelink", "glb"
 ]
-PICTURE_FIELDS = ("size", "camera", "background", "supersampling")
+PICTURE_FIELDS = ("size", "camera", "background", "supersampling", "quality")
 
 
 class ClipOptions(BaseModel):
@@ -56,6 +56,7 @@ class ClipOptions(BaseModel):
     camera: Annotated[str, Field(description="front, three-quarter, profile, close, or yaw,pitch.")] = "front"
     background: Annotated[str, Field(description="studio, transparent, or a colour.", examples=["#204060"])] = "studio"
     supersampling: Annotated[int, Field(ge=1, le=3, description="Samples along each side of a pixel.")] = 2
+    quality: Annotated[str, Field(description="draft, standard or high.", examples=["draft"])] = "standard"
 
 
 class ClipRequest(ClipOptions):
