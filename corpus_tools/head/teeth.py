@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.head.cage import SCALE
 from corpus_tools.head.piece import MaterialSpan, Piece
+from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
 
@@ -35,13 +36,14 @@ class Arch:
     depths: Floats
 
 
-# Sizes after Wheeler, Dental Anatomy; outer curves after MakeHuman's strip, in units of the source.
-UPPER_CURVE = SCALE * np.array(
-    [(0, 0.196), (0.080, 0.184), (0.150, 0.140), (0.197, 0.080), (0.230, 0.010), (0.258, -0.070), (0.278, -0.170)]
-)
-LOWER_CURVE = SCALE * np.array(
-    [(0, 0.166), (0.072, 0.156), (0.138, 0.114), (0.186, 0.056), (0.222, -0.012), (0.254, -0.090), (0.276, -0.190)]
-)
+# Sizes after Wheeler, Dental Anatomy. The incisors stand 3.5 mm (upper) and 6.5 mm (lower) behind the line between the
+# lips; from there the curves run to the molars of MakeHuman's strip.
+UPPER_CURVE = np.array(
+    [(0, 25.4), (8.4, 23.9), (15.4, 18.9), (20.2, 12.0), (23.6, 4.0), (26.4, -5.0), (28.4, -16.0)]
+)  # fmt: skip
+LOWER_CURVE = np.array(
+    [(0, 22.3), (7.4, 21.0), (14.0, 16.4), (18.9, 9.8), (22.6, 1.8), (25.9, -7.0), (28.1, -18.0)]
+)  # fmt: skip
 UPPER = Arch(
     UPPER_CURVE, -0.636 * SCALE, 1.0,
     np.array([8.6, 6.7, 7.7, 7.0, 6.8, 9.8]),
@@ -49,14 +51,15 @@ UPPER = Arch(
     np.array([5.0, 4.6, 6.0, 8.0, 8.4, 9.6]),
 )  # fmt: skip
 LOWER = Arch(
-    LOWER_CURVE, -0.615 * SCALE, -1.0,
+    LOWER_CURVE, -0.632 * SCALE, -1.0,
     np.array([5.6, 6.1, 7.0, 7.0, 7.1, 10.4]),
     np.array([9.0, 9.2, 10.0, 8.6, 8.0, 7.4]),
     np.array([4.6, 4.8, 6.0, 7.2, 8.0, 9.4]),
 )  # fmt: skip
 SHADE = np.array([1.0, 1.0, 0.95, 0.84, 0.70, 0.56])  # brightness of the crowns; cheeks shade the back ones
-TOOTH, TOOTH_DARK = np.array([0.985, 0.965, 0.915]), np.array([0.90, 0.84, 0.74])
+TOOTH, TOOTH_DARK = np.array([0.955, 0.93, 0.875]), np.array([0.88, 0.82, 0.72])
 GUM = np.array([0.68, 0.36, 0.36])
+BACK_Z, FRONT_Z, MOST_SHIFT_MM = -16.0, 14.0, 5.0  # molars stay; front teeth follow the lips
 N_AROUND, LEVELS = 12, np.array([0.0, 0.04, 0.13, 0.45, 1.0])
 MATERIALS = {
     "teeth": {"specular": 0.5, "shininess": 60.0, "wrap": 0.3},
@@ -95,6 +98,18 @@ def fit_teeth(points: Floats, before: Floats, after: Floats) -> Floats:
     """Points scaled and shifted per axis as the strip of teeth `before` (N, 3) is to `after` (N, 3)."""
     scale = after.std(axis=0) / before.std(axis=0)
     moved: Floats = after.mean(axis=0) + scale * (points - before.mean(axis=0))
+    return moved
+
+
+def follow_lips(points: Floats, default: Floats, ahead: float) -> Floats:
+    """Points (N, 3) whose front teeth follow lips that lie `ahead` mm further forward than the default person's.
+
+    `default` holds the same points on the default person.
+    """
+    own = float(points[:, 2].max() - default[:, 2].max())
+    share = smoothstep(default[:, 2], BACK_Z, FRONT_Z)
+    moved = points.copy()
+    moved[:, 2] += share * np.clip(ahead - own, -MOST_SHIFT_MM, MOST_SHIFT_MM)
     return moved
 
 
@@ -181,7 +196,7 @@ def _gum(path: ArchPath, arch: Arch) -> Floats:
     line = height * (0.80 + 0.20 * np.abs(np.sin(np.pi * within)) ** 0.8)
     one = np.ones_like(line)
     ring = [  # height, outwards
-        (line, -0.5 * one), (line + 0.8, 0.45 * one), (height + 3.0, 1.0 * one), (height + 6.5, 0.3 * one),
+        (line, -0.5 * one), (line + 0.8, 0.45 * one), (height + 3.0, 0.5 * one), (height + 6.5, -1.8 * one),
         (height + 7.0, -depth - 1), (height + 3.0, -depth - 2.5), (line + 0.8, -depth - 1.0), (line, -depth + 0.3),
     ]  # fmt: skip
     place, normal = path.at(along)

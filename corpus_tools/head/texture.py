@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates
 
 from corpus_tools.dense.texels import find_texels
-from corpus_tools.head.hair import hair_share, strand_colour, strand_field
+from corpus_tools.head.cards import BROW_COLOUR
 from corpus_tools.head.layout import SIDE, layout_coordinates
-from corpus_tools.head.noise import gaussian_bump, stroke_cover, value_noise
+from corpus_tools.head.noise import gaussian_bump, value_noise
 from corpus_tools.head.skin import Skin
 from corpus_tools.head.source import SourceMesh
 from corpus_tools.head.subdivide import triangulate
@@ -19,62 +19,15 @@ from tts2face.numeric import smoothstep
 Floats = NDArray[np.float64]
 
 
-N_HAIRS = 330  # each side
-ARCH = np.array([(10.5, 10.4), (18, 13.2), (28, 16.0), (37, 17.3), (45, 15.6), (52, 11.6)])  # middle line: |x|, y in mm
-THICK_MM = np.array([5.6, 6.6, 5.8, 4.6, 3.2, 1.4])  # across the line, at the points of ARCH
-
-
-def brow_cover(places: Floats, generator: np.random.Generator, thickness: float = 1.0) -> Floats:
-    """(P,) coverage by brow hairs at positions (P, 3), mm; the two sides are drawn independently."""
-    cover = np.zeros(len(places))
-    in_front = places[:, 2] > 0
-    for side in (1.0, -1.0):
-        near = in_front & (side * places[:, 0] > 5) & (np.abs(places[:, 1] - 14) < 14)
-        flat = places[near, :2] * [side, 1]
-        starts, ends, widths = _hairs(generator, thickness)
-        soft = _shadow(flat, thickness)
-        cover[near] = np.maximum(0.42 * soft, 0.92 * stroke_cover(flat, starts, ends, widths) * (0.25 + 0.75 * soft))
-    return cover
-
-
-def _hairs(generator: np.random.Generator, thickness: float) -> tuple[Floats, Floats, Floats]:
-    """Roots (H, 2), tips (H, 2) and widths (H,) of the hairs of the left brow."""
-    along = generator.beta(1.0, 1.15, N_HAIRS)
-    across = np.clip(generator.normal(0, 0.42, N_HAIRS), -1, 1)
-    x = ARCH[0, 0] + along * (ARCH[-1, 0] - ARCH[0, 0])
-    slope = np.gradient(np.interp(ARCH[:, 0], ARCH[:, 0], ARCH[:, 1]), ARCH[:, 0])
-    thick = thickness * np.interp(x, ARCH[:, 0], THICK_MM)
-    roots = np.column_stack([x, np.interp(x, ARCH[:, 0], ARCH[:, 1]) + across * thick / 2])
-    lift = np.interp(
-        along, [0, 0.12, 0.4, 1], [1.35, 1.0, 0.45, -0.05]
-    )  # hairs stand up at the nose and lie down outside
-    turn = np.arctan(np.interp(x, ARCH[:, 0], slope)) + lift - 0.55 * across * np.clip(along + 0.3, 0, 1)
-    turn += generator.normal(0, 0.13, N_HAIRS)
-    length = np.interp(along, [0, 0.3, 1], [4.2, 6.2, 4.6]) * generator.uniform(0.75, 1.15, N_HAIRS)
-    tips = roots + length[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
-    return roots, tips, generator.uniform(0.22, 0.40, N_HAIRS)
-
-
-def _shadow(flat: Floats, thickness: float) -> Floats:
-    """(P,) soft shading of the brow under the hairs."""
-    x = flat[:, 0]
-    off = np.abs(flat[:, 1] - np.interp(x, ARCH[:, 0], ARCH[:, 1]) - 0.6)
-    thick = thickness * np.interp(x, ARCH[:, 0], THICK_MM) / 2
-    ends = np.clip((x - ARCH[0, 0] + 2.5) / 6, 0, 1) * np.clip((ARCH[-1, 0] + 3 - x) / 7, 0, 1)
-    body: Floats = np.exp(-((off / (thick + 0.4)) ** 2)) * ends
-    return body
-
-
 @dataclass(frozen=True, slots=True)
 class HeadColours:
     """Colours, sRGB 0..1, and the strength of the skin's variation (1 natural, 0 flat)."""
 
-    skin: tuple[float, float, float] = (0.815, 0.625, 0.535)
-    lips: tuple[float, float, float] = (0.70, 0.40, 0.375)
+    skin: tuple[float, float, float] = (0.81, 0.615, 0.52)
+    lips: tuple[float, float, float] = (0.695, 0.385, 0.36)
     cavity: tuple[float, float, float] = (0.40, 0.16, 0.155)
-    hair: tuple[float, float, float] = (0.205, 0.135, 0.095)
+    brows: tuple[float, float, float] = BROW_COLOUR
     variation: float = 1.0
-    brow_thickness: float = 1.0
 
 
 # Positions (|x|, y, z) and radii in mm, then the colour factor at full strength: blood and shadows of a face.
@@ -105,14 +58,6 @@ def paint_texture(
     colour += _lip_share(lips)[:, None] * (_lip_colour(place, palette, generator) - colour)
     inside = np.maximum(_sample_mask(gaussian_filter(source.mask("inside-mouth"), 2.0), where), _in_mouth(where))
     colour += smoothstep(inside, 0.15, 0.95)[:, None] * (np.array(palette.cavity) - colour)
-    brows = brow_cover(place, generator, palette.brow_thickness)
-    colour += brows[:, None] * (np.array(palette.hair) * 0.9 - colour)
-    hair = hair_share(place)
-    strands = strand_colour(place, np.array(palette.hair), generator)
-    ragged = np.clip(
-        hair * 1.6 - 0.3 + 0.45 * value_noise(strand_field(place, 1.4, 16.0), 1.0, generator) * (hair < 0.97), 0, 1
-    )
-    colour += (ragged * (hair > 0.02))[:, None] * (strands - colour)
     return _fill_gaps(texels.rows, texels.columns, colour)
 
 

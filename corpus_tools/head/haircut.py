@@ -1,0 +1,205 @@
+"""Haircuts: MakeHuman's hair cards on the default head, as `Hair`."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.head.assets import PACKAGE, Asset, read_asset
+from corpus_tools.head.cage import Cage
+from corpus_tools.head.hairline import MIDDLE, covered_share, hair_share, paint_scalp, paint_stubble
+from corpus_tools.head.skin import Skin, vertex_normals
+from corpus_tools.head.strands import Cards, StrandStyle, bake_strands, strand_tangents
+from corpus_tools.head.subdivide import triangulate
+from tts2face.models.hair import Hair
+from tts2face.numeric import smoothstep
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+Edit = Callable[[Cards], Cards]
+AXIS_Z, FRONT_DEG = -60.0, (36.0, 60.0)  # the vertical axis of the head; a fringe lies in front of these angles
+FRINGE_TOP, BROW_Y = 62.0, 25.0  # heights between which a fringe ends up
+HALF_WIDTH = 88.0  # mm, of hair at the sides
+N_BINS, BIN_RAD = 25, 0.09  # of the inner edge of a half
+FOREHEAD_Y, CURTAIN_X = 84.0, 22.0  # below this height no mirrored hair hangs nearer to the middle
+
+
+def trim_fringe(cards: Cards) -> Cards:
+    """Cards whose fringe ends above the brows."""
+    x, y, z = cards.vertices.T
+    angle = np.degrees(np.arctan2(np.abs(x), z - AXIS_Z))
+    share = 1 - smoothstep(angle, *FRONT_DEG)
+    low = y[angle < FRONT_DEG[0]].min()
+    raised = BROW_Y + (FRINGE_TOP - BROW_Y) * np.clip((y - low) / (FRINGE_TOP - low), 0, None)
+    moved = cards.vertices.copy()
+    moved[:, 1] = np.where(y < FRINGE_TOP, y + share * (raised - y), y)
+    return Cards(moved, cards.triangles, cards.uv, cards.weld)
+
+
+def mirror_half(parting: float) -> Edit:
+    """Edit that keeps the cards to the left of a parting at x = `parting` mm, and mirrors them to the right."""
+
+    def mirror(cards: Cards) -> Cards:
+        kept = cards.triangles[(cards.vertices[cards.triangles, 0] > parting - 4).all(axis=1)]
+        used, packed = np.unique(kept, return_inverse=True)
+        half = cards.vertices[used]
+        turn = np.arctan2(
+            half[:, 1], half[:, 2] - AXIS_Z
+        )  # about the axis through the ears, from the front to the nape
+        bins = np.linspace(0.0, np.pi, N_BINS)
+        inner = [half[np.abs(turn - at) < BIN_RAD, 0].min(initial=HALF_WIDTH) for at in bins]
+        edge = np.where(np.array(inner) < 1.25 * parting, inner, parting)
+        start = np.interp(turn, bins, edge)
+        half[:, 0] = (half[:, 0] - start) * HALF_WIDTH / (HALF_WIDTH - start)
+        n, triangles = len(used), packed.reshape(-1, 3)
+        hangs = (half[:, 1] < FOREHEAD_Y) & (half[:, 0] < CURTAIN_X) & (half[:, 2] > 0)
+        triangles = triangles[~hangs[triangles].any(axis=1)]
+        return Cards(
+            np.concatenate([half, half * [-1, 1, 1]]),
+            np.concatenate([triangles, triangles[:, ::-1] + n]),
+            np.tile(cards.uv[used], (2, 1)),
+            np.concatenate([cards.weld[used], cards.weld[used] + cards.weld.max() + 1]),
+        )
+
+    return mirror
+
+
+@dataclass(frozen=True, slots=True)
+class Haircut:
+    """A haircut of the package, by the asset's name: summary, side of the texture in pixels, strands and edits."""
+
+    summary: str
+    side: int = 896
+    style: StrandStyle = field(default_factory=StrandStyle)
+    edits: tuple[Edit, ...] = ()
+
+
+HAIRCUTS: Mapping[str, Haircut] = {
+    "long01": Haircut("long, straight, parted in the middle", 896, StrandStyle(14.0, 3.0, matte=True)),
+    "bob01": Haircut("chin-length bob with a fringe", 704, edits=(trim_fringe,)),
+    "bob02": Haircut("chin-length bob, parted in the middle", 896, StrandStyle(10.0, 0.6), (mirror_half(22.0),)),
+    "ponytail01": Haircut("combed back into a ponytail", 768, StrandStyle(9.0)),
+    "braid01": Haircut("side fringe and a braid at the back", 640, StrandStyle(contrast=0.3), (trim_fringe,)),
+    "afro01": Haircut("rounded afro", 640),
+    "short01": Haircut("short, tousled on top", 640),
+    "short02": Haircut("short with a full fringe"),
+    "short03": Haircut("short bob with a side fringe", edits=(trim_fringe,)),
+    "short04": Haircut("short, combed back", 768),
+}
+CROPPED = "cropped"
+N_ANCHORS = 180
+N_SAMPLES = 60_000  # points on the cards
+SOLID = 0.4  # coverage of a card from which it hides the scalp
+SCALP_SIDE, STUBBLE_SIDE = 512, 768
+FUZZ_MM = 0.9
+SEED = 11
+
+
+def build_haircuts(folder: Path, cage: Cage, skin: Skin, head: Floats) -> Iterator[tuple[str, Hair]]:
+    """Each haircut by name, on the default head with vertices (V, 3), whose first ones are the skin's."""
+    for name in HAIRCUTS:
+        asset = read_asset(folder, f"hair/{name}", cage.source.vertices)
+        yield name, build_hair(name, asset, cage, skin, head)
+    yield CROPPED, build_cropped(skin, head)
+
+
+def build_hair(name: str, asset: Asset, cage: Cage, skin: Skin, head: Floats) -> Hair:
+    """A haircut of the package."""
+    cut = HAIRCUTS[name]
+    cards = split_seams(asset, asset.fit(cage.vertices, cage.source.vertices))
+    for edit in cut.edits:
+        cards = edit(cards)
+    relief, alpha, angles = bake_strands(asset.picture, cut.style, cut.side, np.random.default_rng(SEED))
+    share = covered_share(skin, solid_points(cards, alpha, np.random.default_rng(SEED)))
+    anchors = choose_anchors(head)
+    return Hair(
+        vertices=cards.vertices.astype(np.float32),
+        triangles=cards.triangles.astype(np.int32),
+        uv=cards.uv.astype(np.float32),
+        tangents=strand_tangents(cards, angles).astype(np.float32),
+        relief=relief,
+        alpha=alpha,
+        anchors=anchors.astype(np.int32),
+        anchor_places=head[anchors].astype(np.float32),
+        n_face_vertices=len(head),
+        scalp=paint_scalp(skin, share, SCALP_SIDE, np.random.default_rng(SEED)),
+        metadata=_metadata(name, cut.summary) | {"data": PACKAGE},
+    )
+
+
+def build_cropped(skin: Skin, head: Floats) -> Hair:
+    """Hair of a few millimetres: painted, with a layer of fuzz above the scalp."""
+    generator = np.random.default_rng(SEED)
+    normals = vertex_normals(skin.vertices, skin.quads, skin.base)
+    full = hair_share(skin.vertices)[skin.quads].min(axis=1) > 0.9
+    used, quads = np.unique(skin.quads[full], return_inverse=True)
+    vertices = skin.vertices[used] + FUZZ_MM * normals[used]
+    side = 512
+    grain = generator.uniform(0, 1, (side, side))
+    anchors = choose_anchors(head)
+    return Hair(
+        vertices=vertices.astype(np.float32),
+        triangles=triangulate(quads.reshape(-1, 4)).astype(np.int32),
+        uv=flatten_skull(vertices).astype(np.float32),
+        tangents=normals[used].astype(np.float32),
+        relief=np.full((side, side), 128, np.uint8),
+        alpha=np.where(grain > 0.62, 160, 0).astype(np.uint8),
+        anchors=anchors.astype(np.int32),
+        anchor_places=head[anchors].astype(np.float32),
+        n_face_vertices=len(head),
+        scalp=paint_stubble(skin, STUBBLE_SIDE, generator),
+        metadata=_metadata(CROPPED, "cropped to a few millimetres"),
+    )
+
+
+def flatten_skull(places: Floats) -> Floats:
+    """(N, 2) texture coordinates by the direction about the crown and the angle from it, of places (N, 3)."""
+    off = places - MIDDLE
+    angle = np.arccos(off[:, 1] / np.linalg.norm(off, axis=1)) / np.pi
+    across = off[:, [0, 2]] / np.maximum(np.linalg.norm(off[:, [0, 2]], axis=1, keepdims=True), 1e-9)
+    flat: Floats = 0.5 + 0.5 * angle[:, None] * across
+    return flat
+
+
+def _metadata(name: str, summary: str) -> dict[str, str]:
+    return {
+        "name": name,
+        "summary": summary,
+        "licence": "CC0-1.0",
+        "attribution": "MakeHuman team: Data Collection AB, Joel Palmius, Jonas Hauquier",
+        "made_by": "python -m corpus_tools.head.build_head",
+    }
+
+
+def split_seams(asset: Asset, places: Floats) -> Cards:
+    """Cards of an asset at places (N, 3), with a vertex for each pair of place and texture coordinates."""
+    pairs = np.stack([asset.triangles.ravel(), asset.uv_triangles.ravel()], axis=1)
+    unique, corners = np.unique(pairs, axis=0, return_inverse=True)
+    return Cards(places[unique[:, 0]], corners.reshape(-1, 3), asset.uv[unique[:, 1]], unique[:, 0])
+
+
+def solid_points(cards: Cards, alpha: NDArray[np.uint8], generator: np.random.Generator) -> Floats:
+    """(S, 3) random points on the cards, spread by area, where the strands are dense."""
+    corners = cards.vertices[cards.triangles]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    chosen = generator.choice(len(area), N_SAMPLES, p=area / area.sum())
+    weights = generator.dirichlet(np.ones(3), N_SAMPLES)
+    points = np.einsum("sk,skd->sd", weights, corners[chosen])
+    where = np.einsum("sk,skd->sd", weights, cards.uv[cards.triangles[chosen]])
+    texel = np.clip((where * len(alpha)).astype(np.int64), 0, len(alpha) - 1)
+    solid: Floats = points[alpha[texel[:, 1], texel[:, 0]] > 255 * SOLID]
+    return solid
+
+
+def choose_anchors(head: Floats) -> Ints:
+    """(A,) vertices spread over a head (V, 3): each is the farthest from those before it."""
+    chosen = [int(head[:, 1].argmax())]
+    distance = np.linalg.norm(head - head[chosen[0]], axis=1)
+    while len(chosen) < N_ANCHORS:
+        chosen.append(int(distance.argmax()))
+        distance = np.minimum(distance, np.linalg.norm(head - head[chosen[-1]], axis=1))
+    return np.array(sorted(chosen), np.int64)
