@@ -14,6 +14,7 @@ _PROTRUDED_VOWEL_ROUNDING = 0.3  # r-coloured vowels
 _SPREADING = MappingProxyType(
     {"close": 1.0, "near-close": 0.7, "close-mid": 0.6, "mid": 0.4, "open-mid": 0.2, "near-open": 0.1}
 )
+_ROUNDING_OF_PROTRUDED_APPROXIMANT = 0.7
 _SPREADING_OF_SIBILANT = 0.45
 _SPREADING_OF_PALATAL_APPROXIMANT = 0.7
 _OPENING_FROM, _OPENING_OF_ROUNDED_VOWEL = 0.4, 0.5  # height above which a vowel is open; factor of rounded vowels
@@ -102,20 +103,32 @@ def _vowel_target(phone: Phone) -> VisibleTarget:
 
 
 def _consonant_target(phone: Phone) -> VisibleTarget:
-    tip = _tongue_tip(phone)
-    if phone.rounding == "rounded":
-        return VisibleTarget(1.0, 0.0, 0.0, 0.0)
-    if phone.rounding == "protruded":
-        return VisibleTarget(1.0 if phone.manner in {"sibilant", "affricate"} else 0.7, 1.0, 0.0, 0.0, 0.0, 0.0, *tip)
-    if phone.manner == "sibilant" or (phone.manner == "affricate" and phone.place in _SIBILANT_PLACES):
-        return VisibleTarget(0.0, 0.0, _SPREADING_OF_SIBILANT, 0.0, 0.0, 0.0, *tip)
-    if phone.place == "palatal" and phone.manner == "approximant":
-        return VisibleTarget(0.0, 0.0, _SPREADING_OF_PALATAL_APPROXIMANT, 0.0)
-    if phone.place == "labiodental":
-        return VisibleTarget(0.0, 0.0, 0.0, 0.0, incisor_contact=0.0 if phone.manner == "approximant" else 1.0)
     if phone.place == "bilabial":
         return VisibleTarget(opening=0.0, lip_contact=1.0)
-    return VisibleTarget(None, None, None, None, 0.0, 0.0, *tip)
+    out, up = _tongue_tip(phone)
+    rounding, spreading = _consonant_lips(phone)
+    is_free = rounding is None  # the lips are those of the neighbouring phones
+    return VisibleTarget(
+        rounding=rounding,
+        flare=None if is_free else float(phone.rounding == "protruded"),
+        spreading=spreading,
+        opening=None if is_free else 0.0,
+        incisor_contact=float(phone.place == "labiodental" and phone.manner != "approximant"),
+        tongue_out=out,
+        tongue_up=up,
+    )
+
+
+def _consonant_lips(phone: Phone) -> tuple[float | None, float | None]:
+    """Rounding and spreading of a consonant's own lip shape; None without one."""
+    if phone.rounding:
+        is_full = phone.rounding == "rounded" or phone.manner in {"sibilant", "affricate"}
+        return (1.0 if is_full else _ROUNDING_OF_PROTRUDED_APPROXIMANT), 0.0
+    if phone.manner == "sibilant" or (phone.manner == "affricate" and phone.place in _SIBILANT_PLACES):
+        return 0.0, _SPREADING_OF_SIBILANT
+    if phone.place == "palatal" and phone.manner == "approximant":
+        return 0.0, _SPREADING_OF_PALATAL_APPROXIMANT
+    return (0.0, 0.0) if phone.place == "labiodental" else (None, None)
 
 
 def _tongue_tip(phone: Phone) -> tuple[float, float]:

@@ -71,8 +71,8 @@ class Request:
     exemplars: int | None = option(None, "Number of exemplars averaged for each phone; default: the method's.")
     articulation: str | None = option(
         None,
-        "Rounding, spreading and opening of the mouth: natural (as the talker, 1), clear (1.5), or a factor from 0.5 to "
-        "2; default: clear on a mesh, natural on a talker's own face.",
+        "Rounding, spreading and opening of the mouth: natural (as the talker; 1), clear (1.5), or a factor, 0.5 to 2; "
+        "default: clear on a mesh, natural on a talker's own face.",
     )
     fps: float = option(30.0, "Frames per second, 1 to 120.")
     gestures: str = option(
@@ -118,8 +118,6 @@ class Request:
         for name in ("audio", "dictionary", "timeline"):
             if isinstance(getattr(self, name), str):
                 object.__setattr__(self, name, Path(getattr(self, name)))
-        if self.articulation is not None and not isinstance(self.articulation, str):
-            object.__setattr__(self, "articulation", f"{self.articulation:g}")
         check_limits("rate", self.rate, RATE_LIMITS)
         check_limits("volume", self.volume, VOLUME_LIMITS)
         check_limits("fps", self.fps, FPS_LIMITS)
@@ -159,6 +157,8 @@ def parse_articulation(given: str) -> float:
 def _check_articulation(request: Request) -> None:
     if request.articulation is None:
         return
+    if not isinstance(request.articulation, str):
+        object.__setattr__(request, "articulation", f"{request.articulation:g}")
     parse_articulation(request.articulation)
     if request.idle is not None:
         raise InputError("--articulation has no effect with --idle; remove one of them")

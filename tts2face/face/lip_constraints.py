@@ -82,8 +82,8 @@ class LipConstraints:
             remaining, opened
         )
         curvature = self.curvature + GAP_CONSTRAINT_WEIGHT * ordered_product(opened.T, opened)
-        changed = added.any(axis=1) if changed is None else changed
-        total[np.ix_(changed, moving)] = bounded_least_squares(curvature, linear[changed], self.limits)
+        rows = np.flatnonzero(added.any(axis=1) if changed is None else changed)
+        total[np.ix_(rows, np.flatnonzero(moving))] = bounded_least_squares(curvature, linear[rows], self.limits)
         return np.asarray(total, np.float64)
 
     def amplify(self, speech: FloatArray, jaw: FloatArray, lips: FloatArray) -> FloatArray:

@@ -34,11 +34,12 @@ OPENING_GAIN = 0.22  # growth of the gap of an open vowel, by the jaw
 MIN_GAP_SHARE = 0.6  # of a gap that rounding leaves open
 FOLLOW_GAPS_MM = (0.2, 2.5)  # gap of the lips up to which they keep it, and from which they follow in full
 LARGEST_ADDED_WEIGHT = 1.2
+LEAST_MOTION_MM = 0.5  # per weight of a shape: shapes that move less, as on a face without them, are not used
 ROUND_SHAPES = {"mouthPucker": 1.0}
 FLARED_SHAPES = {"mouthPucker": 0.85, "mouthFunnel": 0.3}
 SPREAD_SHAPES = {"mouthStretchLeft": 0.5, "mouthStretchRight": 0.5, "mouthSmileLeft": 0.5, "mouthSmileRight": 0.5}
 DENTAL_SHAPES = {"jawOpen": 0.15, "mouthLowerDownLeft": 0.4, "mouthLowerDownRight": 0.4}
-DENTAL_DROP_MM = 6.2  # drop of the jaw at which the tip of the tongue is seen between the teeth
+DENTAL_DROP_MM = 5.6  # drop of the jaw at which the tip of the tongue is seen between the teeth
 JAW = "jawOpen"
 OUTER_UPPER_MID, OUTER_LOWER_MID = OUTER_LIP_UPPER[5], OUTER_LIP_LOWER[5]
 
@@ -63,7 +64,6 @@ class Articulator:
         Contact of the lower lip with the upper incisors.
     """
 
-    shape_names: tuple[str, ...]
     mouth: LipConstraints
     protrusion: FloatArray
     rest_width: float
@@ -96,29 +96,38 @@ class Articulator:
 
     def _add_by_class(self, speech: FloatArray, tracks: Mapping[str, FloatArray], strength: float) -> FloatArray:
         """Speech (T, K) with rounding, spreading and opening added, up to the targets of the phone classes."""
-        size = self.rest_width / HEAD_MOUTH_MM
-        widened, protruded = ordered_product(speech, self.mouth.width), ordered_product(speech, self.protrusion)
+        added = strength * (self._rounding(speech, tracks) + self._spreading(speech, tracks["spreading"]))
+        dental = tracks["tongue_out"] * (1.0 - tracks["lip_contact"])
+        added += min(strength, 1.0) * self._parting(speech, dental)
+        return self._combine(speech, added, tracks["opening"] * OPENING_GAIN * strength, dental)
+
+    def _rounding(self, speech: FloatArray, tracks: Mapping[str, FloatArray]) -> FloatArray:
+        """Weights (T, K) that narrow and protrude the lips by what speech lacks to a round mouth."""
         flare = tracks["flare"][:, None]
         rounded = (1.0 - flare) * self.directions["round"] + flare * self.directions["flared"]
-        narrowing = np.maximum(-ordered_product(rounded, self.mouth.width), 1e-6)
-        forward = np.maximum(ordered_product(rounded, self.protrusion), 1e-6)
-        lacking = np.maximum(
-            (widened + ROUND_WIDTH_SHARE * self.rest_width) / narrowing,
-            (PROTRUSION_MM * size - protruded) / forward,
-        )
-        rounding = tracks["rounding"] * np.clip(lacking, 0.0, LARGEST_ADDED_WEIGHT)
+        narrowing = np.maximum(-ordered_product(rounded, self.mouth.width), LEAST_MOTION_MM)
+        forward = np.maximum(ordered_product(rounded, self.protrusion), LEAST_MOTION_MM)
+        excess_width = ordered_product(speech, self.mouth.width) + ROUND_WIDTH_SHARE * self.rest_width
+        missing_depth = PROTRUSION_MM * self.rest_width / HEAD_MOUTH_MM - ordered_product(speech, self.protrusion)
+        weight = np.clip(np.maximum(excess_width / narrowing, missing_depth / forward), 0.0, LARGEST_ADDED_WEIGHT)
+        return np.asarray((tracks["rounding"] * weight)[:, None] * rounded, np.float64)
+
+    def _spreading(self, speech: FloatArray, share: FloatArray) -> FloatArray:
+        """Weights (T, K) that widen the mouth by what speech lacks to a spread mouth, times shares (T,)."""
         spread = self.directions["spread"]
-        widening = max(float(ordered_product(spread, self.mouth.width)), 1e-6)
-        spreading = np.clip((SPREAD_WIDTH_SHARE * self.rest_width - widened) / widening, 0.0, 1.0) * tracks["spreading"]
-        opening = tracks["opening"] * OPENING_GAIN * strength
-        dental, jaw = self.directions["dental"], self.directions["open"]
-        dropped = max(float(ordered_product(jaw, self.mouth.gaps[MIDDLE_PAIR])), 1e-6) * ordered_product(speech, jaw)
-        parted = np.clip(1.0 - dropped / (DENTAL_DROP_MM * size), 0.0, 1.0) * tracks["tongue_out"]
-        parted *= 1.0 - tracks["lip_contact"]
-        added = strength * (rounding[:, None] * rounded + spreading[:, None] * spread)
-        added += min(strength, 1.0) * parted[:, None] * dental
-        free = tracks["tongue_out"] * (1.0 - tracks["lip_contact"])
-        return self._combine(speech, added, tracks["opening"] * OPENING_GAIN * strength, free)
+        widening = max(float(ordered_product(spread, self.mouth.width)), LEAST_MOTION_MM)
+        missing = SPREAD_WIDTH_SHARE * self.rest_width - ordered_product(speech, self.mouth.width)
+        return (share * np.clip(missing / widening, 0.0, 1.0))[:, None] * spread
+
+    def _parting(self, speech: FloatArray, share: FloatArray) -> FloatArray:
+        """Weights (T, K) that part the teeth for the tip of the tongue, times shares (T,)."""
+        dropped = ordered_product(speech, self.directions["open"]) * self._gap_by_jaw()
+        missing = 1.0 - dropped / (DENTAL_DROP_MM * self.rest_width / HEAD_MOUTH_MM)
+        return (share * np.clip(missing, 0.0, 1.0))[:, None] * self.directions["dental"]
+
+    def _gap_by_jaw(self) -> float:
+        """Gap of the lips per weight of the jaw, mm."""
+        return max(float(ordered_product(self.directions["open"], self.mouth.gaps[MIDDLE_PAIR])), LEAST_MOTION_MM)
 
     def _combine(self, speech: FloatArray, added: FloatArray, opening: FloatArray, free: FloatArray) -> FloatArray:
         """Speech (T, K) with added weights (T, K), and gaps that grow by shares (T,) through the jaw.
@@ -128,12 +137,10 @@ class Articulator:
         """
         gaps = ordered_product(speech, self.mouth.gaps.T)
         gap = np.maximum(gaps[:, MIDDLE_PAIR], 0.0)
-        jaw = self.directions["open"]
-        by_jaw = max(float(ordered_product(jaw, self.mouth.gaps[MIDDLE_PAIR])), 1e-6)
         narrowed = gap + ordered_product(added, self.mouth.gaps[MIDDLE_PAIR])
         missing = np.maximum(MIN_GAP_SHARE * gap - narrowed, 0.0) + opening * gap
         lips, (low, high) = self.mouth.moving, self.mouth.limits.T
-        opened = speech + added + (missing / by_jaw)[:, None] * jaw
+        opened = speech + added + (missing / self._gap_by_jaw())[:, None] * self.directions["open"]
         opened[:, lips] = np.clip(opened[:, lips], low, high)
         follow = smoothstep(gap * HEAD_MOUTH_MM / self.rest_width, *FOLLOW_GAPS_MM)
         follow = np.maximum(follow, free)[:, None]
@@ -174,7 +181,6 @@ def build_articulator(face: Face) -> Articulator:
     if not {*ROUND_SHAPES, *FLARED_SHAPES} <= {*face.shape_names}:
         tables["flared"] = ROUND_SHAPES
     return Articulator(
-        shape_names=face.shape_names,
         mouth=mouth,
         protrusion=(motion[OUTER_UPPER_MID, 2] + motion[OUTER_LOWER_MID, 2]) / 2,
         rest_width=rest_width,

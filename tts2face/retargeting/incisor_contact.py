@@ -30,7 +30,7 @@ FRONT_SHARE, EDGE_SHARE = 0.06, 0.01  # of the mouth's width: depth of the front
 # mouth's width: as on the default head.
 EDGE_BELOW_LIP, EDGE_BEHIND_LIP = 0.055, 0.085
 PLAUSIBLE_BELOW, PLAUSIBLE_BEHIND = (-0.02, 0.14), (-0.02, 0.22)
-COVER_SHARE, AHEAD_SHARE = 0.02, 0.03  # of the mouth's width, by which the lip covers the edge and lies before it
+COVER_SHARE, AHEAD_SHARE = 0.03, 0.012  # of the mouth's width, by which the lip covers the edge and lies before it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,4 +109,4 @@ def upper_teeth(face: Face) -> FloatArray:
     if JAW in face.shape_names and len(numbers):
         jaw = np.linalg.norm(face.shapes[face.shape_names.index(JAW)], axis=1)
         numbers = numbers[jaw[numbers] < STILL_SHARE * jaw.max()]
-    return face.vertices[numbers].astype(np.float64)
+    return np.asarray(face.vertices[numbers], np.float64)

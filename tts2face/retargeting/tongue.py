@@ -48,7 +48,7 @@ class TongueTip:
         others = self.motion.copy()
         others[self.shape] = 0.0
         missing = self.missing - ordered_product(speech, others)
-        return np.clip(missing / self.motion[self.shape], 0.0, self.largest)
+        return np.asarray(np.clip(missing / self.motion[self.shape], 0.0, self.largest), np.float64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

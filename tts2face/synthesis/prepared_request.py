@@ -146,9 +146,7 @@ def build_request_timeline(request: Request) -> Timeline:
 
 
 def synthesis_options(request: Request) -> SynthesisOptions:
-    """Synthesis options of the request's method, with the request's own `context`, `exemplars` and
-    `articulation`.
-    """
+    """Synthesis options of the request's method, with the request's own context, exemplars and articulation."""
     options = METHOD_OPTIONS[request.synthesis]
     if request.context is not None:
         options = replace(options, context=request.context)
