@@ -17,6 +17,9 @@ AUDIO_MAP_NAMES = ("linear", "network")
 SYNTHESIS_METHODS = ("exemplar", "theobald2007")
 GESTURES = ("fields", "ju2008", "noise", "none")
 IDLE_LIMITS_S = (0.1, 3600.0)
+NATURAL, CLEAR = 1.0, 1.5  # factors of articulation
+ARTICULATIONS = {"natural": NATURAL, "clear": CLEAR}
+ARTICULATION_LIMITS = (0.5, 2.0)
 OWN_FACE = "self"  # name of the talker's own face
 
 
@@ -66,6 +69,11 @@ class Request:
         None, "Number of phones on either side that are compared when exemplars are chosen; default: the method's."
     )
     exemplars: int | None = option(None, "Number of exemplars averaged for each phone; default: the method's.")
+    articulation: str | None = option(
+        None,
+        "Rounding, spreading and opening of the mouth: natural (as the talker; 1), clear (1.5), or a factor, 0.5 to 2; "
+        "default: clear on a mesh, natural on a talker's own face.",
+    )
     fps: float = option(30.0, "Frames per second, 1 to 120.")
     gestures: str = option(
         "fields",
@@ -86,6 +94,11 @@ class Request:
     timeline: Path | None = option(None, "JSON file with styles, expressions, nods and gains over time.")
     pitch: bool = option(False, "Gestures follow the pitch of the voice in addition to its loudness.")
     idle: float | None = option(None, "Seconds of idle animation instead of speech.")
+
+    @property
+    def articulation_factor(self) -> float | None:
+        """Factor of rounding, spreading and opening; None for the default of the face."""
+        return None if self.articulation is None else parse_articulation(self.articulation)
 
     @property
     def has_gestures(self) -> bool:
@@ -110,6 +123,7 @@ class Request:
         check_limits("fps", self.fps, FPS_LIMITS)
         if self.synthesis not in SYNTHESIS_METHODS:
             raise InputError(f"there is no synthesis {self.synthesis!r}; choose {' or '.join(SYNTHESIS_METHODS)}")
+        _check_articulation(self)
         if self.seed < 0:
             raise InputError(f"seed must be 0 or more, not {self.seed}")
         if self.audio_map is not None:
@@ -120,6 +134,36 @@ class Request:
             check_limits("idle", self.idle, IDLE_LIMITS_S)
             _check_idle(self)
         _check_gestures(self)
+
+
+def parse_articulation(given: str) -> float:
+    """Factor of an articulation: natural, clear, or a number.
+
+    Raises
+    ------
+    InputError
+        It is neither a name nor a number from 0.5 to 2.
+    """
+    if given in ARTICULATIONS:
+        return ARTICULATIONS[given]
+    try:
+        factor = float(given)
+    except ValueError:
+        raise InputError(f"articulation must be natural, clear or a factor from 0.5 to 2, not {given!r}") from None
+    check_limits("articulation", factor, ARTICULATION_LIMITS)
+    return factor
+
+
+def _check_articulation(request: Request) -> None:
+    if request.articulation is None:
+        return
+    if not isinstance(request.articulation, str):
+        object.__setattr__(request, "articulation", f"{request.articulation:g}")
+    parse_articulation(request.articulation)
+    if request.idle is not None:
+        raise InputError("--articulation has no effect with --idle; remove one of them")
+    if request.audio is not None and not request.text.strip():
+        raise InputError("--articulation needs the phones of a recording; give its words as text, or remove it")
 
 
 def _check_audio_map(request: Request) -> None:

@@ -136,7 +136,7 @@ def test_a_recorded_sentence_finds_itself_first(voice: ExemplarModel, talker: Ta
 
 def test_one_exemplar_of_a_recorded_sentence_gives_the_recording_back(voice: ExemplarModel, talker: Talker):
     phone_sequences = talker.utterances[7]
-    options = SynthesisOptions(context=4, k=1, smoothing_s=0.0, contacts=False, articulation=1.0)
+    options = SynthesisOptions(context=4, k=1, smoothing_s=0.0, contacts=False, amplitude=1.0)
     made = speech_trajectory(
         phone_sequences.phones, voice, fps=25.0, n_frames=len(phone_sequences.shape), options=options
     ).values
@@ -149,7 +149,7 @@ def test_one_exemplar_of_a_recorded_sentence_gives_the_recording_back(voice: Exe
 def test_every_option_matters(voice: ExemplarModel, name):
     changed = {
         "context": 1, "k": 1, "duration": 0.0, "sharpness": 0.0, "overlap": False, "precision": 0.0, "align": False,
-        "articulation": 1.2, "smoothing_s": 0.04, "contacts": False,
+        "amplitude": 1.2, "smoothing_s": 0.04, "contacts": False,
     }  # fmt: skip
     assert (moved(voice, SENTENCE).values != moved(voice, SENTENCE, **{name: changed[name]}).values).any()
 
@@ -198,9 +198,9 @@ def test_explains_which_tokens_were_used(voice: ExemplarModel):
     assert json.loads(json.dumps(explanation_json(shown)))[1]["tokens"][0]["utterance"] == first.utterance
 
 
-def test_articulation_is_counted_from_the_mean_speaking_pose(voice: ExemplarModel, talker: Talker):
-    plain = SynthesisOptions(contacts=False, articulation=1.0)
-    more = replace(plain, articulation=1.5)
+def test_the_amplitude_is_counted_from_the_mean_speaking_pose(voice: ExemplarModel, talker: Talker):
+    plain = SynthesisOptions(contacts=False, amplitude=1.0)
+    more = replace(plain, amplitude=1.5)
     phones = sequence([SILENCE, "b", "i", "p", "ɑ", "b", SILENCE], [0.4, *[0.1] * 5, 0.4])
     one, other = (
         speech_trajectory(phones, voice, fps=100.0, n_frames=130, options=options).values for options in (plain, more)

@@ -92,7 +92,7 @@ def test_a_talker_keeps_its_networks(talker: Talker, tmp_path) -> None:
 
 def test_the_share_of_the_networks_equals_its_parameter(voice: ExemplarModel) -> None:
     knowing = replace(voice, network=random_network(len(voice.spread)))
-    plain = SynthesisOptions(network=0.0, articulation=1.0, smoothing_s=0.0, contacts=False)
+    plain = SynthesisOptions(network=0.0, amplitude=1.0, smoothing_s=0.0, contacts=False)
 
     def moved(which: ExemplarModel, share: float) -> np.ndarray:
         options = replace(plain, network=share)

@@ -9,7 +9,7 @@ from tts2face.catalogue import identities
 from tts2face.models.face_loading import load_face
 from tts2face.models.hair import BALD
 from tts2face.models.palette import Palette, load_palette
-from tts2face.request import OWN_FACE
+from tts2face.request import NATURAL, OWN_FACE, parse_articulation
 from tts2face.session_cache import Models
 from tts2face.voice.engine import VOICE_NAMES
 
@@ -34,6 +34,10 @@ def check_names(models: Models, request: Mapping[str, Any]) -> None:
             raise InputError(f"the face {models.face} has no identity {models.identity!r}; it has {offered}")
     if models.hair not in (None, BALD) or models.hair_color is not None:
         _check_hair(models.face, models.hair, models.hair_color)
+    if request.get("articulation") is not None:
+        factor = parse_articulation(str(request["articulation"]))
+        if models.face == OWN_FACE and factor != NATURAL:
+            raise InputError("a talker's own face articulates as recorded; remove articulation, or choose another face")
     if request.get("style") is not None and models.palette is not None:
         _palette(models.palette).require(str(request["style"]))
 

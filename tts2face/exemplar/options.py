@@ -27,12 +27,16 @@ class SynthesisOptions:
         Whether exemplars are time-warped to the best one before they are averaged.
     network
         Weight of the talker's phone network, if it has one, against the exemplars; 0 for exemplars only.
-    articulation
+    amplitude
         Factor of the motion relative to the talker's mean speaking pose, which compensates the shrinkage by averaging.
     smoothing_s
         Standard deviation in seconds of the final Gaussian smoothing; 0 for none.
     contacts
-        Whether lip contacts of the exemplars are enforced in the result.
+        Whether lip contacts of the exemplars are enforced in the result, and further visible articulation on a mesh:
+        contact of the lower lip with the teeth, the tongue, and lips that meet in pauses.
+    articulation
+        Factor of rounding, spreading and opening by phone class; None for the face's own. Other than `amplitude`, it
+        does not change the talker's parameters.
 
     Raises
     ------
@@ -48,13 +52,14 @@ class SynthesisOptions:
     precision: float = 1.5
     align: bool = True
     network: float = 0.5
-    articulation: float = 1.14
+    amplitude: float = 1.14
     smoothing_s: float = 0.01
     contacts: bool = True
+    articulation: float | None = None
 
     def __post_init__(self) -> None:
         """Reject numbers outside their range; `context` and `k` are checked by the search."""
-        for name in ("duration", "sharpness", "precision", "articulation", "smoothing_s"):
+        for name in ("duration", "sharpness", "precision", "amplitude", "smoothing_s"):
             value = getattr(self, name)
             if not 0 <= value < 100:
                 raise InputError(f"{name} must be 0 or more and below 100, not {value}")
@@ -64,6 +69,6 @@ class SynthesisOptions:
 
 THEOBALD_2007 = SynthesisOptions(
     context=4, k=10, duration=0.0, sharpness=0.0, overlap=False, precision=0.0, align=True, network=0.0,
-    articulation=1.0, smoothing_s=0.02, contacts=False,
+    amplitude=1.0, smoothing_s=0.02, contacts=False,
 )  # fmt: skip
 METHOD_OPTIONS = {"exemplar": SynthesisOptions(), "theobald2007": THEOBALD_2007}

@@ -193,7 +193,7 @@ def _blend_motion(
         predicted = exemplars.network.parameters(target_phones(targets), instants)
         speech = (1 - options.network) * speech + options.network * predicted
         give_way()
-    speech = exemplars.mean_speaking_pose + options.articulation * (speech - exemplars.mean_speaking_pose)
+    speech = exemplars.mean_speaking_pose + options.amplitude * (speech - exemplars.mean_speaking_pose)
     motion = np.where(is_covered[:, None], speech, exemplars.rest).astype(np.float32)
     motion = blending.gaussian_smooth(motion, options.smoothing_s, blending.CLOCK_HZ)
     if not options.contacts:

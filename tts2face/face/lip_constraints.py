@@ -65,10 +65,15 @@ class LipConstraints:
         """
         gaps, widened = ordered_product(speech, self.gaps.T), ordered_product(added, self.gaps.T)
         target_gaps = gaps + smoothstep(gaps / FULL_EXPRESSION_GAP_MM) * widened
-        return self._solve(speech, added, np.maximum(target_gaps, np.where(gaps > 0, MIN_GAP_SHARE * gaps, gaps)))
+        return self.solve(speech, added, np.maximum(target_gaps, np.where(gaps > 0, MIN_GAP_SHARE * gaps, gaps)))
 
-    def _solve(self, speech: FloatArray, added: FloatArray, target_gaps: FloatArray) -> FloatArray:
-        """Weights (T, K) nearest to the sum whose gaps beyond rest are `target_gaps` (T, P), mm."""
+    def solve(
+        self, speech: FloatArray, added: FloatArray, target_gaps: FloatArray, changed: NDArray[np.bool_] | None = None
+    ) -> FloatArray:
+        """Weights (T, K) nearest to the sum whose gaps beyond rest are `target_gaps` (T, P), mm.
+
+        Frames that are not `changed` (T,), by default those without added weights, are those of the sum.
+        """
         total = speech + added
         moving = np.isin(np.arange(total.shape[1]), self.moving)
         remaining = target_gaps - ordered_product(np.where(moving, 0.0, total), self.gaps.T)
@@ -77,8 +82,8 @@ class LipConstraints:
             remaining, opened
         )
         curvature = self.curvature + GAP_CONSTRAINT_WEIGHT * ordered_product(opened.T, opened)
-        changed = added.any(axis=1)
-        total[np.ix_(changed, moving)] = bounded_least_squares(curvature, linear[changed], self.limits)
+        rows = np.flatnonzero(added.any(axis=1) if changed is None else changed)
+        total[np.ix_(rows, np.flatnonzero(moving))] = bounded_least_squares(curvature, linear[rows], self.limits)
         return np.asarray(total, np.float64)
 
     def amplify(self, speech: FloatArray, jaw: FloatArray, lips: FloatArray) -> FloatArray:
@@ -97,7 +102,7 @@ class LipConstraints:
             ordered_product(added, self.gaps[MIDDLE_PAIR]) / np.maximum(gap, GAP_TOLERANCE_MM), -1.0, largest_gain - 1.0
         )
         gaps = ordered_product(speech, self.gaps.T)
-        return self._solve(
+        return self.solve(
             speech, added, gaps + grown[:, None] * smoothstep(gaps / FULL_GROWTH_GAP_MM) * np.maximum(gaps, 0.0)
         )
 

@@ -30,6 +30,8 @@ from tts2face.render.draw import mesh_renderer
 from tts2face.render.own_face import own_face_renderer
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
+from tts2face.request import NATURAL
+from tts2face.retargeting.articulation import DEFAULT_ARTICULATION, Articulator, build_articulator
 from tts2face.retargeting.performer import build_performer_retargeter, lip_model, match_shapes
 from tts2face.retargeting.to_face import Retargeter, build_retargeter
 from tts2face.types import HEAD_CHANNELS, GiveWay, Trajectory, keep_on
@@ -104,6 +106,15 @@ class AnimatedFace(Protocol):
             The face cannot be extended.
         """
 
+    def check_articulation(self, factor: float | None) -> None:
+        """Reject a factor of articulation that this face cannot show; None is its own.
+
+        Raises
+        ------
+        InputError
+            The face has no other articulation than the recorded one.
+        """
+
     def check_gains(self, gains: Mapping[str, float]) -> None:
         """Reject gains of features that this face cannot move.
 
@@ -149,6 +160,7 @@ class MeshFace:
     face: Face
     exemplars: ExemplarModel
     retargeter: Retargeter
+    articulator: Articulator
     gestures: GestureFace | None
 
     @property
@@ -166,7 +178,12 @@ class MeshFace:
     ) -> Trajectory:
         """Shape weights (`n_frames`, K) from selected tokens of the talker."""
         lips = blend_trajectory(selection, self.exemplars, fps=fps, n_frames=n_frames, give_way=give_way)
-        return self.retargeter.retarget(lips)
+        weights, options = self.retargeter.retarget(lips), selection.options
+        if not options.contacts and options.articulation is None:
+            return weights
+        give_way()
+        factor = DEFAULT_ARTICULATION if options.articulation is None else options.articulation
+        return self.articulator.articulate(weights, selection.phones, factor)
 
     def motion_of_parameters(self, speech: Trajectory) -> Trajectory:
         """Shape weights (T, K) from the talker's speech parameters (T, S)."""
@@ -185,6 +202,9 @@ class MeshFace:
         """Raise InputError: the shapes of a mesh are fixed."""
         del take
         raise InputError("missing motion can be appended to a talker's own face only; choose --face self")
+
+    def check_articulation(self, factor: float | None) -> None:
+        """Accept all factors: a mesh can round and spread further than the talker."""
 
     def check_gains(self, gains: Mapping[str, float]) -> None:
         """Accept all gains: a mesh can move every feature."""
@@ -257,6 +277,14 @@ class OwnAppearanceFace:
         talker = extend_talker(lip_model(take.landmarks), self.talker)
         return replace(self, talker=talker, regression=fit_appearance_regression(talker))
 
+    def check_articulation(self, factor: float | None) -> None:
+        """Reject factors other than natural (InputError): there are pictures of recorded mouths only."""
+        if factor not in (None, NATURAL):
+            raise InputError(
+                "a talker's own face is made of recorded pictures and articulates as recorded; choose --articulation "
+                "natural, or another face"
+            )
+
     def check_gains(self, gains: Mapping[str, float]) -> None:
         """Reject gains of the features that the talker's video fixes (InputError)."""
         for name in gains:
@@ -286,7 +314,7 @@ def mesh_face(talker: Talker, exemplars: ExemplarModel, face: Face, palette: Pal
         The face lacks landmarks of the lips or eyes, or shapes that speech can move.
     """
     gestures = None if palette is None else gesture_face(face, palette)
-    return MeshFace(face, exemplars, build_retargeter(talker, face), gestures)
+    return MeshFace(face, exemplars, build_retargeter(talker, face), build_articulator(face), gestures)
 
 
 def own_appearance_face(talker: Talker, exemplars: ExemplarModel, palette: Palette | None) -> OwnAppearanceFace:

@@ -146,13 +146,13 @@ def build_request_timeline(request: Request) -> Timeline:
 
 
 def synthesis_options(request: Request) -> SynthesisOptions:
-    """Synthesis options of the request's method, with the request's own `context` and `exemplars`."""
+    """Synthesis options of the request's method, with the request's own context, exemplars and articulation."""
     options = METHOD_OPTIONS[request.synthesis]
     if request.context is not None:
         options = replace(options, context=request.context)
     if request.exemplars is not None:
         options = replace(options, k=request.exemplars)
-    return options
+    return replace(options, articulation=request.articulation_factor)
 
 
 def input_paths(request: Request, picture: Picture) -> dict[str, AnyPath]:

@@ -134,6 +134,11 @@ class SessionModels:
         ----------
         keeps_utterances
             As for `VoicePool.voice`.
+
+        Raises
+        ------
+        InputError
+            The face does not have the articulation of the request.
         """
         dictionary = read_dictionary(request.dictionary).entries if request.dictionary else {}
 
@@ -143,6 +148,7 @@ class SessionModels:
             return self._voices.voice(name, language, dictionary, keeps_utterances=keeps_utterances)
 
         face = self.face(has_gestures=request.has_gestures)
+        face.check_articulation(request.articulation_factor)
         return SynthesisModels(self.talker, self._exemplars, face, load_voice, self._voices.give_way)
 
     def preload_voice(self, prepared: PreparedRequest) -> None:

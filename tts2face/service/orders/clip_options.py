@@ -35,6 +35,9 @@ class ClipOptions(BaseModel):
     volume: Annotated[float, Field(ge=0.0, le=2.0, description="Factor of the loudness.")] = 1.0
     seed: Annotated[int, Field(ge=0, le=2**31 - 1, description="Seed of gestures and voice.")] = 0
     synthesis: Annotated[Literal["exemplar", "theobald2007"], Field(description="Method of lip motion.")] = "exemplar"
+    articulation: Annotated[
+        str | None, Field(description="Rounding, spreading, opening: natural, clear, or 0.5-2.", examples=["clear"])
+    ] = None
     fps: Annotated[float, Field(ge=1, le=120, description="Frames per second.")] = 30.0
     gestures: Annotated[Literal["fields", "ju2008", "noise", "none"], Field(description="Method of gestures.")] = (
         "fields"

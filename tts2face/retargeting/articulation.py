@@ -1,0 +1,192 @@
+"""Visible articulation on a face: rounding, spreading and opening by phone class, the tongue, and lip contacts.
+
+The steps follow retargeting and change the shape weights where the phones of the clip demand it. They use the face's
+own geometry, so that they are the same for every talker and language.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.sequence import PhoneSequence
+from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.lip_constraints import LipConstraints, build_lip_constraints
+from tts2face.face.mouth_model import MIDDLE_PAIR
+from tts2face.models.face import Face
+from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, OUTER_LIP_LOWER, OUTER_LIP_UPPER
+from tts2face.numeric import ordered_product, smoothstep
+from tts2face.request import CLEAR, NATURAL
+from tts2face.retargeting.incisor_contact import IncisorContact, build_incisor_contact, incisor_edge
+from tts2face.retargeting.phone_tracks import articulation_tracks, pause_closure
+from tts2face.retargeting.tongue import Tongue, build_tongue
+from tts2face.types import Trajectory
+
+FloatArray = NDArray[np.float64]
+
+DEFAULT_ARTICULATION = CLEAR  # of a mesh: rounding is not seen otherwise (docs/decisions/102-articulation.md)
+# Targets of clear articulation on a mouth of `HEAD_MOUTH_MM`; sizes on other faces are in proportion to the mouth.
+HEAD_MOUTH_MM = 50.0
+ROUND_WIDTH_SHARE, SPREAD_WIDTH_SHARE = 0.165, 0.08  # of the width at rest, by which a mouth is narrower or wider
+PROTRUSION_MM = 3.7  # of the lips' outer edges in rounding, forward
+OPENING_GAIN = 0.22  # growth of the gap of an open vowel, by the jaw
+MIN_GAP_SHARE = 0.6  # of a gap that rounding leaves open
+FOLLOW_GAPS_MM = (0.2, 2.5)  # gap of the lips up to which they keep it, and from which they follow in full
+LARGEST_ADDED_WEIGHT = 1.2
+LEAST_MOTION_MM = 0.5  # per weight of a shape: shapes that move less, as on a face without them, are not used
+ROUND_SHAPES = {"mouthPucker": 1.0}
+FLARED_SHAPES = {"mouthPucker": 0.85, "mouthFunnel": 0.3}
+SPREAD_SHAPES = {"mouthStretchLeft": 0.5, "mouthStretchRight": 0.5, "mouthSmileLeft": 0.5, "mouthSmileRight": 0.5}
+DENTAL_SHAPES = {"jawOpen": 0.15, "mouthLowerDownLeft": 0.4, "mouthLowerDownRight": 0.4}
+DENTAL_DROP_MM = 5.6  # drop of the jaw at which the tip of the tongue is seen between the teeth
+JAW = "jawOpen"
+OUTER_UPPER_MID, OUTER_LOWER_MID = OUTER_LIP_UPPER[5], OUTER_LIP_LOWER[5]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Articulator:
+    """Steps of visible articulation for a face; built by `build_articulator`.
+
+    Parameters
+    ----------
+    mouth
+        Lip gaps, mouth width and cost of a change.
+    protrusion : (K,)
+        Forward motion of the lips' outer edges per weight, mm.
+    rest_width
+        Width of the mouth at rest, mm.
+    directions
+        Weights (K,) of ``round``, ``flared``, ``spread``, ``dental`` and ``open`` mouths; zero without such shapes.
+    tongue
+        Shapes of the tongue.
+    incisors
+        Contact of the lower lip with the upper incisors.
+    """
+
+    mouth: LipConstraints
+    protrusion: FloatArray
+    rest_width: float
+    directions: Mapping[str, FloatArray]
+    tongue: Tongue
+    incisors: IncisorContact
+
+    def articulate(self, weights: Trajectory, phones: PhoneSequence, factor: float) -> Trajectory:
+        """Shape weights (T, K) with the visible articulation of phones.
+
+        Parameters
+        ----------
+        weights
+            Retargeted speech.
+        factor
+            Of rounding, spreading and opening, `NATURAL` for the talker's own.
+        """
+        times = np.arange(len(weights)) / weights.fps
+        tracks, closure = articulation_tracks(phones, times), pause_closure(phones, times)
+        values = weights.values.astype(np.float64)
+        if factor > NATURAL:
+            values = self._add_by_class(values, tracks, (factor - NATURAL) / (CLEAR - NATURAL))
+        elif factor < NATURAL:
+            values = self._reduce_by_class(values, tracks, 1.0 - factor)
+        values = self.incisors.enforce(values, tracks["incisor_contact"])
+        values = self._close_pauses(values, closure)
+        gap = ordered_product(values, self.mouth.gaps[MIDDLE_PAIR])
+        values = self.tongue.move(values, gap, tracks)
+        return Trajectory(weights.channels, values.astype(np.float32), weights.fps)
+
+    def _add_by_class(self, speech: FloatArray, tracks: Mapping[str, FloatArray], strength: float) -> FloatArray:
+        """Speech (T, K) with rounding, spreading and opening added, up to the targets of the phone classes."""
+        added = strength * (self._rounding(speech, tracks) + self._spreading(speech, tracks["spreading"]))
+        dental = tracks["tongue_out"] * (1.0 - tracks["lip_contact"])
+        added += min(strength, 1.0) * self._parting(speech, dental)
+        return self._combine(speech, added, tracks["opening"] * OPENING_GAIN * strength, dental)
+
+    def _rounding(self, speech: FloatArray, tracks: Mapping[str, FloatArray]) -> FloatArray:
+        """Weights (T, K) that narrow and protrude the lips by what speech lacks to a round mouth."""
+        flare = tracks["flare"][:, None]
+        rounded = (1.0 - flare) * self.directions["round"] + flare * self.directions["flared"]
+        narrowing = np.maximum(-ordered_product(rounded, self.mouth.width), LEAST_MOTION_MM)
+        forward = np.maximum(ordered_product(rounded, self.protrusion), LEAST_MOTION_MM)
+        excess_width = ordered_product(speech, self.mouth.width) + ROUND_WIDTH_SHARE * self.rest_width
+        missing_depth = PROTRUSION_MM * self.rest_width / HEAD_MOUTH_MM - ordered_product(speech, self.protrusion)
+        weight = np.clip(np.maximum(excess_width / narrowing, missing_depth / forward), 0.0, LARGEST_ADDED_WEIGHT)
+        return np.asarray((tracks["rounding"] * weight)[:, None] * rounded, np.float64)
+
+    def _spreading(self, speech: FloatArray, share: FloatArray) -> FloatArray:
+        """Weights (T, K) that widen the mouth by what speech lacks to a spread mouth, times shares (T,)."""
+        spread = self.directions["spread"]
+        widening = max(float(ordered_product(spread, self.mouth.width)), LEAST_MOTION_MM)
+        missing = SPREAD_WIDTH_SHARE * self.rest_width - ordered_product(speech, self.mouth.width)
+        return (share * np.clip(missing / widening, 0.0, 1.0))[:, None] * spread
+
+    def _parting(self, speech: FloatArray, share: FloatArray) -> FloatArray:
+        """Weights (T, K) that part the teeth for the tip of the tongue, times shares (T,)."""
+        dropped = ordered_product(speech, self.directions["open"]) * self._gap_by_jaw()
+        missing = 1.0 - dropped / (DENTAL_DROP_MM * self.rest_width / HEAD_MOUTH_MM)
+        return (share * np.clip(missing, 0.0, 1.0))[:, None] * self.directions["dental"]
+
+    def _gap_by_jaw(self) -> float:
+        """Gap of the lips per weight of the jaw, mm."""
+        return max(float(ordered_product(self.directions["open"], self.mouth.gaps[MIDDLE_PAIR])), LEAST_MOTION_MM)
+
+    def _combine(self, speech: FloatArray, added: FloatArray, opening: FloatArray, free: FloatArray) -> FloatArray:
+        """Speech (T, K) with added weights (T, K), and gaps that grow by shares (T,) through the jaw.
+
+        Open lips follow in full, and the jaw keeps a share of their gap; touching lips keep their gaps except by
+        shares `free` (T,).
+        """
+        gaps = ordered_product(speech, self.mouth.gaps.T)
+        gap = np.maximum(gaps[:, MIDDLE_PAIR], 0.0)
+        narrowed = gap + ordered_product(added, self.mouth.gaps[MIDDLE_PAIR])
+        missing = np.maximum(MIN_GAP_SHARE * gap - narrowed, 0.0) + opening * gap
+        lips, (low, high) = self.mouth.moving, self.mouth.limits.T
+        opened = speech + added + (missing / self._gap_by_jaw())[:, None] * self.directions["open"]
+        opened[:, lips] = np.clip(opened[:, lips], low, high)
+        follow = smoothstep(gap * HEAD_MOUTH_MM / self.rest_width, *FOLLOW_GAPS_MM)
+        follow = np.maximum(follow, free)[:, None]
+        closed = self.mouth.solve(speech, added, gaps, (follow[:, 0] < 1) & added.any(axis=1))
+        return follow * opened + (1.0 - follow) * closed
+
+    def _reduce_by_class(self, speech: FloatArray, tracks: Mapping[str, FloatArray], share: float) -> FloatArray:
+        """Speech (T, K) whose motion from rest is smaller by `share` where a class is in full; gaps shrink alike."""
+        of_class = share * np.maximum.reduce([tracks[name] for name in ("rounding", "spreading", "opening")])
+        added = np.zeros_like(speech)
+        added[:, self.mouth.moving] = -of_class[:, None] * speech[:, self.mouth.moving]
+        gaps = ordered_product(speech, self.mouth.gaps.T)
+        return self.mouth.solve(speech, added, gaps - of_class[:, None] * np.maximum(gaps, 0.0))
+
+    def _close_pauses(self, speech: FloatArray, closure: FloatArray) -> FloatArray:
+        """Speech (T, K) with the lips closed by shares (T,)."""
+        gaps = ordered_product(speech, self.mouth.gaps.T)
+        closing = closure * (gaps > 0).any(axis=1)
+        target_gaps = gaps - closing[:, None] * np.maximum(gaps, 0.0)
+        return self.mouth.solve(speech, np.zeros_like(speech), target_gaps, closing > 0)
+
+
+def build_articulator(face: Face) -> Articulator:
+    """Articulator of a face.
+
+    Raises
+    ------
+    DataError
+        The face lacks landmarks of the lips, or has no shape that speech moves.
+    """
+    mouth = build_lip_constraints(face)
+    places = scatter_landmarks(face, landmark_positions(face))
+    motion = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))
+    rest_width = float(np.linalg.norm(places[MOUTH_CORNER_LEFT] - places[MOUTH_CORNER_RIGHT]))
+    edge = incisor_edge(face, places, rest_width)
+    tables = {"round": ROUND_SHAPES, "flared": FLARED_SHAPES, "spread": SPREAD_SHAPES, "dental": DENTAL_SHAPES}
+    tables["open"] = {JAW: 1.0}
+    if not {*ROUND_SHAPES, *FLARED_SHAPES} <= {*face.shape_names}:
+        tables["flared"] = ROUND_SHAPES
+    return Articulator(
+        mouth=mouth,
+        protrusion=(motion[OUTER_UPPER_MID, 2] + motion[OUTER_LOWER_MID, 2]) / 2,
+        rest_width=rest_width,
+        directions={
+            kind: np.array([table.get(name, 0.0) for name in face.shape_names]) for kind, table in tables.items()
+        },
+        tongue=build_tongue(face, edge, rest_width),
+        incisors=build_incisor_contact(face, mouth, edge),
+    )

@@ -1,0 +1,112 @@
+"""Contact of the lower lip with the upper incisors in labiodentals."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.face.bounded_least_squares import bounded_least_squares
+from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.lip_constraints import LipConstraints
+from tts2face.models.face import Face
+from tts2face.models.landmarks import (
+    INNER_LIP_LOWER,
+    MOUTH_CORNER_LEFT,
+    MOUTH_CORNER_RIGHT,
+    UPPER_LIP_INNER_MID,
+)
+from tts2face.numeric import ordered_product
+
+FloatArray = NDArray[np.float64]
+
+TOUCHING_LANDMARKS = INNER_LIP_LOWER[4:7]  # of the lower lip, about the middle
+CONTACT_WEIGHT = 1e4  # of a coordinate of these landmarks, relative to a landmark of the cheek
+TEETH_NAMES = ("teeth", "tooth")  # in the names of parts
+JAW = "jawOpen"
+INCISOR_SHARE = 0.08  # of the mouth's width: half the width of the middle incisors
+STILL_SHARE = 0.1  # of the largest motion of the jaw: upper teeth move less
+FRONT_SHARE, EDGE_SHARE = 0.06, 0.01  # of the mouth's width: depth of the front teeth, and height of their edge
+# Incisors of a face without teeth, or whose teeth are elsewhere, relative to the middle of the upper lip and to the
+# mouth's width: as on the default head.
+EDGE_BELOW_LIP, EDGE_BEHIND_LIP = 0.055, 0.085
+PLAUSIBLE_BELOW, PLAUSIBLE_BEHIND = (-0.02, 0.14), (-0.02, 0.22)
+COVER_SHARE, AHEAD_SHARE = 0.03, 0.012  # of the mouth's width, by which the lip covers the edge and lies before it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IncisorContact:
+    """Linear motion of the lower lip, and where it touches the upper incisors; built by `build_incisor_contact`.
+
+    Parameters
+    ----------
+    mouth
+        Shapes that move the lip, their limits, and the cost of changes.
+    motion : (r, K)
+        Height and depth of the touching landmarks per weight, mm.
+    target : (r,)
+        Their displacement from rest in contact, mm.
+    """
+
+    mouth: LipConstraints
+    motion: FloatArray
+    target: FloatArray
+
+    def enforce(self, speech: FloatArray, contact: FloatArray) -> FloatArray:
+        """Weights (T, K) whose lower lip is in contact by shares (T,): 0 as in speech, 1 at the incisors."""
+        changed = contact > 0
+        if not changed.any():
+            return speech
+        mouth, moved = self.mouth, self.motion[:, self.mouth.moving]
+        now = ordered_product(speech[changed], self.motion.T)
+        shift = contact[changed, None] * (self.target - now)
+        current = speech[np.ix_(changed, mouth.moving)]
+        wanted = ordered_product(current, moved.T) + shift
+        curvature = mouth.curvature + CONTACT_WEIGHT * ordered_product(moved.T, moved)
+        linear = ordered_product(current, mouth.curvature) + CONTACT_WEIGHT * ordered_product(wanted, moved)
+        values = speech.copy()
+        values[np.ix_(changed, mouth.moving)] = bounded_least_squares(curvature, linear, mouth.limits)
+        return values
+
+
+def build_incisor_contact(face: Face, mouth: LipConstraints, edge: tuple[float, float]) -> IncisorContact:
+    """Contact of a face's lower lip with its upper incisors, whose `edge` has a height and a depth, mm."""
+    places = scatter_landmarks(face, landmark_positions(face))
+    motion = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))
+    width = float(np.linalg.norm(places[MOUTH_CORNER_LEFT] - places[MOUTH_CORNER_RIGHT]))
+    lips = list(TOUCHING_LANDMARKS)
+    target = np.array([edge[0] + COVER_SHARE * width, edge[1] + AHEAD_SHARE * width]) - places[lips, 1:]
+    return IncisorContact(mouth, motion[lips, 1:].reshape(2 * len(lips), -1), target.ravel())
+
+
+def incisor_edge(face: Face, places: FloatArray, width: float) -> tuple[float, float]:
+    """Height and depth of the upper incisors' edge, mm: that of its teeth, or where the default head has them.
+
+    Parameters
+    ----------
+    places : (478, 3)
+        Landmarks of the face; NaN for missing ones.
+    width
+        Width of the mouth, mm.
+    """
+    lip = places[UPPER_LIP_INNER_MID]
+    points = upper_teeth(face)
+    front = points[np.abs(points[:, 0] - lip[0]) < INCISOR_SHARE * width]
+    if len(front):
+        front = front[front[:, 2] > front[:, 2].max() - FRONT_SHARE * width]
+        low = float(front[:, 1].min())
+        ahead = float(front[front[:, 1] < low + EDGE_SHARE * width, 2].max())
+        below, behind = (lip[1] - low) / width, (lip[2] - ahead) / width
+        if PLAUSIBLE_BELOW[0] < below < PLAUSIBLE_BELOW[1] and PLAUSIBLE_BEHIND[0] < behind < PLAUSIBLE_BEHIND[1]:
+            return low, ahead
+    return float(lip[1] - EDGE_BELOW_LIP * width), float(lip[2] - EDGE_BEHIND_LIP * width)
+
+
+def upper_teeth(face: Face) -> FloatArray:
+    """Vertices (N, 3) of the parts named as teeth that the jaw does not move; none on a face without teeth."""
+    parts = [part for part in face.parts if any(name in part.name.lower() for name in TEETH_NAMES)]
+    used = [face.triangles[part.first : part.first + part.count].ravel() for part in parts]
+    numbers = np.unique(np.concatenate([np.zeros(0, np.int32), *used]))
+    if JAW in face.shape_names and len(numbers):
+        jaw = np.linalg.norm(face.shapes[face.shape_names.index(JAW)], axis=1)
+        numbers = numbers[jaw[numbers] < STILL_SHARE * jaw.max()]
+    return np.asarray(face.vertices[numbers], np.float64)
