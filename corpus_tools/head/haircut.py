@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from corpus_tools.head.assets import PACKAGE, Asset, read_asset
 from corpus_tools.head.cage import Cage
 from corpus_tools.head.hairline import MIDDLE, covered_share, hair_share, paint_scalp, paint_stubble
 from corpus_tools.head.skin import Skin, vertex_normals
-from corpus_tools.head.strands import Cards, StrandStyle, bake_strands, strand_tangents
+from corpus_tools.head.strands import Cards, StrandStyle, bake_strands, edge_graph, number_islands, strand_tangents
 from corpus_tools.head.subdivide import triangulate
 from tts2face.models.hair import Hair
 from tts2face.numeric import smoothstep
@@ -23,9 +24,9 @@ Ints = NDArray[np.int64]
 Edit = Callable[[Cards], Cards]
 AXIS_Z, FRONT_DEG = -60.0, (36.0, 60.0)  # the vertical axis of the head; a fringe lies in front of these angles
 FRINGE_TOP, BROW_Y = 62.0, 25.0  # heights between which a fringe ends up
-HALF_WIDTH = 88.0  # mm, of hair at the sides
-N_BINS, BIN_RAD = 25, 0.09  # of the inner edge of a half
-FOREHEAD_Y, CURTAIN_X = 84.0, 22.0  # below this height no mirrored hair hangs nearer to the middle
+BUST_Y = -335.0
+CROWN_Y, N_CROWN_MEANS = (40.0, 80.0), 12  # heights between which the crown begins
+SINK_MM = 6.0  # of the sheets below
 
 
 def trim_fringe(cards: Cards) -> Cards:
@@ -40,32 +41,31 @@ def trim_fringe(cards: Cards) -> Cards:
     return Cards(moved, cards.triangles, cards.uv, cards.weld)
 
 
-def mirror_half(parting: float) -> Edit:
-    """Edit that keeps the cards to the left of a parting at x = `parting` mm, and mirrors them to the right."""
+def smooth_crown(cards: Cards) -> Cards:
+    """Cards whose largest sheet is smooth on the crown, with the others below it there."""
+    welded = cards.weld[cards.triangles]
+    n = int(cards.weld.max()) + 1
+    islands = number_islands(n, welded)[cards.weld]
+    is_main = islands == np.bincount(islands).argmax()
+    share = smoothstep(cards.vertices[:, 1], *CROWN_Y)[:, None]
+    graph = edge_graph(n, welded)
+    mean = sparse.diags_array(1.0 / np.maximum(graph.sum(axis=1), 1.0)) @ graph
+    places = np.zeros((n, 3))
+    places[cards.weld] = cards.vertices
+    for _ in range(N_CROWN_MEANS):  # without shrinking: Taubin 1995
+        for step in (0.5, -0.53):
+            places = places + step * (mean @ places - places)
+    inwards = MIDDLE - cards.vertices
+    inwards /= np.linalg.norm(inwards, axis=1, keepdims=True)
+    moved = np.where(is_main[:, None], places[cards.weld] - cards.vertices, SINK_MM * inwards)
+    return Cards(cards.vertices + share * moved, cards.triangles, cards.uv, cards.weld)
 
-    def mirror(cards: Cards) -> Cards:
-        kept = cards.triangles[(cards.vertices[cards.triangles, 0] > parting - 4).all(axis=1)]
-        used, packed = np.unique(kept, return_inverse=True)
-        half = cards.vertices[used]
-        turn = np.arctan2(
-            half[:, 1], half[:, 2] - AXIS_Z
-        )  # about the axis through the ears, from the front to the nape
-        bins = np.linspace(0.0, np.pi, N_BINS)
-        inner = [half[np.abs(turn - at) < BIN_RAD, 0].min(initial=HALF_WIDTH) for at in bins]
-        edge = np.where(np.array(inner) < 1.25 * parting, inner, parting)
-        start = np.interp(turn, bins, edge)
-        half[:, 0] = (half[:, 0] - start) * HALF_WIDTH / (HALF_WIDTH - start)
-        n, triangles = len(used), packed.reshape(-1, 3)
-        hangs = (half[:, 1] < FOREHEAD_Y) & (half[:, 0] < CURTAIN_X) & (half[:, 2] > 0)
-        triangles = triangles[~hangs[triangles].any(axis=1)]
-        return Cards(
-            np.concatenate([half, half * [-1, 1, 1]]),
-            np.concatenate([triangles, triangles[:, ::-1] + n]),
-            np.tile(cards.uv[used], (2, 1)),
-            np.concatenate([cards.weld[used], cards.weld[used] + cards.weld.max() + 1]),
-        )
 
-    return mirror
+def cut_at_bust(cards: Cards) -> Cards:
+    """Cards without what hangs below the bust."""
+    kept = cards.triangles[(cards.vertices[cards.triangles, 1] > BUST_Y).any(axis=1)]
+    used, packed = np.unique(kept, return_inverse=True)
+    return Cards(cards.vertices[used], packed.reshape(-1, 3), cards.uv[used], cards.weld[used])
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +79,11 @@ class Haircut:
 
 
 HAIRCUTS: Mapping[str, Haircut] = {
-    "long01": Haircut("long, straight, parted in the middle", 896, StrandStyle(14.0, 3.0, matte=True)),
+    "long01": Haircut(
+        "long, straight, parted in the middle", 896, StrandStyle(14.0, 3.0, matte=True), (smooth_crown, cut_at_bust)
+    ),
     "bob01": Haircut("chin-length bob with a fringe", 704, edits=(trim_fringe,)),
-    "bob02": Haircut("chin-length bob, parted in the middle", 896, StrandStyle(10.0, 0.6), (mirror_half(22.0),)),
+    "bob02": Haircut("chin-length bob with a long side fringe", 896, StrandStyle(10.0, 0.6), (trim_fringe,)),
     "ponytail01": Haircut("combed back into a ponytail", 768, StrandStyle(9.0)),
     "braid01": Haircut("side fringe and a braid at the back", 640, StrandStyle(contrast=0.3), (trim_fringe,)),
     "afro01": Haircut("rounded afro", 640),

@@ -15,6 +15,7 @@ from corpus_tools.head.haircut import split_seams
 from corpus_tools.head.lids import LidEdge
 from corpus_tools.head.piece import MaterialSpan, Piece
 from corpus_tools.head.skin import Skin
+from corpus_tools.head.strands import number_islands
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -48,7 +49,7 @@ def bind_lashes(folder: Path, cage: Cage, skin: Skin, edges: tuple[LidEdge, LidE
         cards = split_seams(asset, asset.fit(cage.vertices, cage.source.vertices))
         roots, weights = np.zeros((len(cards.vertices), N_ROOTS), np.int64), np.zeros((len(cards.vertices), N_ROOTS))
         is_upper = np.zeros(len(cards.vertices), bool)
-        islands = _islands(len(cards.vertices), cards.triangles)
+        islands = number_islands(len(cards.vertices), cards.triangles)
         for island in np.unique(islands):
             rows = np.flatnonzero(islands == island)
             middle = cards.vertices[rows].mean(axis=0)
@@ -104,13 +105,3 @@ def _turn(off: Floats, shape: str, turns: NDArray[np.bool_]) -> Floats:
     turned = np.column_stack([off[:, 0], -SHUT_DOWN * length, SHUT_AHEAD * length])
     moved: Floats = np.where(turns[:, None], share * (turned - off), 0.0)
     return moved
-
-
-def _islands(n: int, triangles: Ints) -> Ints:
-    """(N,) number of the connected component of each vertex."""
-    from scipy import sparse
-    from scipy.sparse.csgraph import connected_components
-
-    ends = np.concatenate([triangles[:, :2], triangles[:, 1:]])
-    graph = sparse.coo_array((np.ones(len(ends)), ends.T), shape=(n, n))
-    return np.asarray(connected_components(graph, directed=False)[1], np.int64)

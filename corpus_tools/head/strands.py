@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.ndimage import gaussian_filter, zoom
+from scipy.sparse.csgraph import connected_components
 
 from tts2face.colour import decode_srgb
 
@@ -155,3 +157,15 @@ def _weld_mean(vectors: Floats, weld: Ints) -> Floats:
 def _unit(vectors: Floats) -> Floats:
     unit: Floats = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9)
     return unit
+
+
+def number_islands(n: int, triangles: Ints) -> Ints:
+    """(n,) number of the connected component of each vertex."""
+    return np.asarray(connected_components(edge_graph(n, triangles), directed=False)[1], np.int64)
+
+
+def edge_graph(n: int, triangles: Ints) -> sparse.csr_array:
+    """(n, n) matrix that is 1 for vertices that share an edge."""
+    ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    pairs = np.unique(np.concatenate([ends, ends[:, ::-1]]), axis=0)
+    return sparse.csr_array((np.ones(len(pairs)), pairs.T), shape=(n, n))

@@ -11,7 +11,16 @@ from scipy.ndimage import gaussian_filter1d
 
 from corpus_tools.head import assets
 from corpus_tools.head.assets import Asset, asset_files, parse_asset, unpack_assets
-from corpus_tools.head.haircut import AXIS_Z, BROW_Y, choose_anchors, mirror_half, split_seams, trim_fringe
+from corpus_tools.head.haircut import (
+    AXIS_Z,
+    BROW_Y,
+    BUST_Y,
+    choose_anchors,
+    cut_at_bust,
+    smooth_crown,
+    split_seams,
+    trim_fringe,
+)
 from corpus_tools.head.lids import strip_triangles
 from corpus_tools.head.strands import Cards, StrandStyle, bake_strands, strand_angles, strand_tangents
 from corpus_tools.head.teeth import LOWER, UPPER, follow_lips
@@ -135,14 +144,25 @@ def test_a_trimmed_fringe_ends_above_the_brows():
     assert np.array_equal(trim_fringe(both).vertices[32:], both.vertices[32:])  # hair at the sides keeps its length
 
 
-def test_a_mirrored_half_is_symmetric():
-    whole = strip(60.0)
-    mirrored = mirror_half(20.0)(whole)
-    n = len(mirrored.vertices) // 2
-    assert np.array_equal(mirrored.vertices[n:], mirrored.vertices[:n] * [-1, 1, 1])
-    a, b, c = (mirrored.vertices[mirrored.triangles[:, k]] for k in range(3))
-    facing = np.cross(b - a, c - a)[:, 2]
-    assert (np.sign(facing) == np.sign(facing[0])).all()
+def test_hair_is_cut_at_the_bust() -> None:
+    long = strip(0.0)
+    long = Cards(long.vertices * [1, 5, 1], long.triangles, long.uv, long.weld)
+    cut = cut_at_bust(long)
+    assert cut.vertices[:, 1].min() > BUST_Y - 55  # a row of the strip
+    assert cut.vertices[:, 1].max() == long.vertices[:, 1].max()
+
+
+def test_the_crown_gets_smooth_and_keeps_its_height() -> None:
+    x, z = (grid.ravel() for grid in np.meshgrid(np.arange(-50, 51, 10.0), np.arange(-120, -19, 10.0)))
+    waves = 2.0 * np.where((np.arange(len(x)) % 2) == 0, 1.0, -1.0)
+    vertices = np.column_stack([x, 120 + waves, z])
+    row, column = (grid.ravel() for grid in np.meshgrid(np.arange(10), np.arange(10), indexing="ij"))
+    a = row * 11 + column
+    triangles = np.concatenate([np.stack([a, a + 1, a + 12], 1), np.stack([a, a + 12, a + 11], 1)])
+    smooth = smooth_crown(Cards(vertices, triangles, np.zeros((121, 2)), np.arange(121))).vertices
+    inner = (np.abs(x) < 35) & (np.abs(z + 70) < 35)
+    assert np.ptp(smooth[inner, 1]) < 0.3 * np.ptp(vertices[inner, 1])
+    assert smooth[inner, 1].mean() == pytest.approx(120, abs=0.5)
 
 
 def test_strands_run_along_the_streaks_of_a_picture():
