@@ -35,8 +35,8 @@ def sort_into_bands(batch: Any, count: int, rows: tuple[int, int], starts: Array
             own = phase[source[i], 0] if source[i] >= 0 else phase[~source[i], 1]
             if own == NOT_DRAWN:
                 continue
-            low: int = (np.int64(boxes[i, 2]) >> GRID_SHIFT) - beyond
-            high: int = (np.int64(boxes[i, 3]) >> GRID_SHIFT) + beyond
+            low: Any = (np.int64(boxes[i, 2]) >> GRID_SHIFT) - beyond
+            high: Any = (np.int64(boxes[i, 3]) >> GRID_SHIFT) + beyond
             for band in range(max(low // band_rows, 0), min(high // band_rows, n_bands - 1) + 1):
                 bucket = band * N_PHASES + own
                 if turn == 0:
