@@ -26,6 +26,8 @@ from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
+from tts2face.render.occlusion import bake_occlusion
+from tts2face.render.scene import available_cores
 from tts2face.storage.files import find_file
 from tts2face.types import Progress
 from tts2face.video.landmark_models import find_bundle
@@ -116,7 +118,7 @@ def build_face(
     }
     if model is not None:
         face, metadata = add_modes(face, model), {**metadata, "dense": model.summary()}
-    write_face(out, replace(face, metadata=metadata))
+    write_face(out, bake_occlusion(replace(face, metadata=metadata), available_cores()))
     reached = face_landmarks(shaped, shaped.vertices)[:N_MESH_LANDMARKS]
     again = align_to_head(talker, reached)
     return BuiltFace(len(landmarks), len(videos), float(np.linalg.norm(again - reached, axis=1)[used].mean()), model)

@@ -32,7 +32,8 @@ def stability(face: Face) -> None:
     change = flicker(np.array(frames))
     for name, mask in part_masks(renderer.scene, weights).items():
         if mask.any():
-            print(f"  {name}: 99th percentile {np.percentile(change[mask], 99):.1f}, mean {change[mask].mean():.2f} levels")
+            most = np.percentile(change[mask], 99)
+            print(f"  {name}: 99th percentile {most:.1f}, mean {change[mask].mean():.2f} levels")
 
 
 def frame_ms(renderer: MeshRenderer, n: int = 25, **options: bool) -> float:

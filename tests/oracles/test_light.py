@@ -1,4 +1,4 @@
-"""The shading kernels against their formulas written out plainly, one fragment or vertex at a time, in double precision."""
+"""The shading kernels against their formulas, one fragment or vertex at a time, in double precision."""
 
 import numpy as np
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
+from tts2face.render.bands import sort_into_bands
 from tts2face.render.raster import (
     BACK_BIAS,
     FIRST,
@@ -16,7 +17,6 @@ from tts2face.render.raster import (
     TRANSLUCENT,
     draw_band,
     gather_triangles,
-    sort_into_bands,
     transform_to_camera,
 )
 

@@ -32,6 +32,8 @@ from tts2face.characters.shape_names import guess_mapping
 from tts2face.characters.surface_points import nearest_points
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
+from tts2face.render.occlusion import bake_occlusion
+from tts2face.render.scene import available_cores
 from tts2face.video.track import MIN_SCORE
 
 FRONTS = {"+z": 0.0, "-z": 180.0, "+x": -90.0, "-x": 90.0}  # axis that a character looks along -> turn, degrees
@@ -161,6 +163,7 @@ def import_face(
     face = place_face(_with_landmarks(drawn, located), character, head, provisional)
     face, notes = drop_unsuited_shapes(face)
     face = replace(face, metadata=_metadata(path, character, chosen, head, face))
+    face = bake_occlusion(face, available_cores())
     positions = located.points.places(drawn.vertices) / provisional.scale + provisional.origin
     places = dict(zip(located.numbers.tolist(), positions @ head.turn, strict=True))
     report = ImportReport(

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Hairdo, Part, Texture
-from tts2face.models.face_layout import MAX_TEXTURES, check_face, texture_number
+from tts2face.models.face_layout import MAX_TEXTURES, WIDE_OPEN, check_face, texture_number
+from tts2face.models.occlusion_coding import decode_occlusion, encode_occlusion
 from tts2face.models.picture_coding import decode_colours, decode_coverage, encode_colours, encode_coverage
 from tts2face.storage.tensors import read_tensors, write_tensors
 

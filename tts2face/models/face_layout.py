@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.face import PART_KINDS
-from tts2face.models.occlusion_coding import MAX_OCCLUSION_BYTES
 from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.models.occlusion_coding import MAX_OCCLUSION_BYTES
 from tts2face.storage.schema import (
     MAX_MM,
     Check,

@@ -118,7 +118,13 @@ def attach_hair(face: Face, hair: Hair, colour: str) -> Face:
 def _join_occlusion(face: Face, hair: Hair) -> NDArray[np.uint8] | None:
     """Occlusion (P, V, D / 8) of a face with a haircut; None if either has none, or of other directions."""
     own, cards, shadow = face.occlusion, hair.occlusion, hair.skin_occlusion
-    if own is None or cards is None or shadow is None or own.shape[2] != cards.shape[1] or cards.shape[1] != shadow.shape[1]:
+    if (
+        own is None
+        or cards is None
+        or shadow is None
+        or own.shape[2] != cards.shape[1]
+        or cards.shape[1] != shadow.shape[1]
+    ):
         return None
     return np.concatenate([own | shadow, np.broadcast_to(cards, (len(own), *cards.shape))], axis=1)
 

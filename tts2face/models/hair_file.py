@@ -97,7 +97,8 @@ def _read_occlusion(name: str, n_vertices: int, file: tuple[Any, Any, Path]) -> 
     arrays, header, path = file
     if name not in arrays:
         return None
-    return decode_occlusion(arrays[name], (1, n_vertices, header.get("occlusion_bytes", 0)), path)[0]
+    bits: NDArray[np.uint8] = decode_occlusion(arrays[name], (1, n_vertices, header.get("occlusion_bytes", 0)), path)[0]
+    return bits
 
 
 def load_hair(name: str) -> Hair:

@@ -18,7 +18,7 @@ Array = NDArray[Any]
 
 @kernel
 def texel_alpha(texels: Array, place: Array, u: float, v: float) -> float:
-    """Bilinear coverage, 0 to 255, at (u, v) of the texture that begins at ``place[0]`` and has ``place[1:]`` texels."""
+    """Bilinear coverage, 0 to 255, at (u, v) of a level of `tts2face.render.textures`."""
     begin, width, height = place[0], place[1], place[2]
     x = min(max(u * width - 0.5, 0.0), width - 1.0)
     y = min(max(v * height - 0.5, 0.0), height - 1.0)
@@ -100,9 +100,9 @@ def draw_cutouts(
                 if near <= depth[0, r, x]:
                     continue
                 rank = ((row % side) * side + x % side + t) % n_samples
-                if sample_alpha((texels, levels[texture_of[t], 0]), vertex, which, (x + 0.5 - lens[1]) / lens[0], dy) * n_samples < 255.0 * (
-                    rank + 0.5
-                ):
+                if sample_alpha(
+                    (texels, levels[texture_of[t], 0]), vertex, which, (x + 0.5 - lens[1]) / lens[0], dy
+                ) * n_samples < 255.0 * (rank + 0.5):
                     continue
                 depth[0, r, x], owner[0, r, x] = near, number
                 for layer in range(1, n_layers):

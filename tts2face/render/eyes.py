@@ -28,6 +28,7 @@ N_EYE_COLUMNS = 57
 SOFTBOX = (0.17, 0.22)  # half width and height of the key lamp's reflection, as components of the reflected ray
 LID_SHADOW, LID_SHADOW_MM = np.float32(0.55), np.float32(1.5)  # share of light at the upper lid's margin, its fade
 WET_LINE, WET_LINE_MM = np.float32(0.30), np.float32(0.22)  # brightness and half width of the tear line
+SCLERA = np.float32(0.82)  # of its colour: the white of the eye lies in the lids' shade
 CATCHLIGHT, FILL_LIGHT = np.float32(1.2), np.float32(0.16)  # brightness of the reflections of key and fill light
 
 
@@ -79,7 +80,7 @@ def eye_geometry(face: Face, rig: FaceRig) -> EyeGeometry:
             lids[number] = [[rows[name] for name in lid] for lid in names]
         for part in face.parts:
             used = np.unique(face.triangles[part.first : part.first + part.count]) - eye.first
-            if "iris" in part.name and len(used) and 0 <= used[0] and used[-1] < eye.count:
+            if "iris" in part.name and len(used) and used[0] >= 0 and used[-1] < eye.count:
                 iris[number] = float((ball[used, 2] / np.maximum(length[used], 1e-3)).min())
     return EyeGeometry(
         rig, np.array(face.landmark_vertices), np.array(face.landmark_weights, np.float32), lids, iris, radius
@@ -107,7 +108,7 @@ def soft_edge(distance: float, half: float, slope: float) -> Any:
 def reflected_lamps(eye: Array, normal: tuple[float, float, float], view: tuple[float, float, float]) -> Any:
     """Brightness of the lamps in the mirror direction, as two rectangles."""
     nx, ny, nz = normal
-    facing = max(nx * view[0] + ny * view[1] + nz * view[2], np.float32(0))
+    facing: Any = max(nx * view[0] + ny * view[1] + nz * view[2], np.float32(0))
     x, y, z = 2 * facing * nx - view[0], 2 * facing * ny - view[1], 2 * facing * nz - view[2]
     total = np.float32(0)
     if x * eye[KEY] + y * eye[KEY + 1] + z * eye[KEY + 2] > 0:
@@ -160,7 +161,8 @@ def light_eye(eyes: Array, point: tuple[float, float, float], g: int, table: Arr
     table[AT_GLOW, g] = glow * shade
     for k in range(3):
         redness = np.float32(0.05) + np.float32(0.06) * np.float32(k)
-        table[AT_ALBEDO + k, g] *= ring * focus * (one - corner * redness)
+        white = one if inside else SCLERA
+        table[AT_ALBEDO + k, g] *= ring * focus * white * (one - corner * redness)
         table[AT_DIFFUSE + k, g] *= shade
     for k in range(N_EXPOSURES):
         table[AT_EXPOSURE + k, g] *= shade

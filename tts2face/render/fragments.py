@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.compilation import inlined_kernel, kernel
+from tts2face.compilation import kernel
 from tts2face.render.eyes import light_eye
 from tts2face.render.fragment_rows import (
     AT_ALBEDO,
@@ -29,7 +29,7 @@ from tts2face.render.fragment_rows import (
     TEXTURE,
     UV,
 )
-from tts2face.render.raster import GRID_SHIFT, NO_TRIANGLE, TILE_SAMPLES
+from tts2face.render.raster import NO_TRIANGLE
 from tts2face.render.textures import mip_level, read_texel
 
 Array = NDArray[Any]
@@ -78,103 +78,13 @@ def is_same_surface(number: int, other: int, flat: Array, part_of: Array) -> boo
 
 
 @kernel
-def find_edges(centres: tuple[Any, Any], n_layers: int, part_of: Array, mm: float, edges: Array) -> None:
-    """Mark the pixels that need more than one sample.
-
-    These are pixels beside one of another part, of the other side of a part, or beyond a step in depth.
-
-    Parameters
-    ----------
-    centres
-        1/z and visible triangle at the centre of each pixel (3, R + 2, W), with one row of pixels above and below the
-        band.
-    part_of : (F,)
-        Part of each triangle.
-    mm
-        Depth beyond which a step that does not continue the slope of the surface is an edge.
-    edges : (R, W)
-        Set to 1; pixels that are marked already stay so.
-    """
-    near, owner = centres
-    n_rows, width = edges.shape
-    for layer in range(n_layers):
-        for r in range(n_rows + 1):
-            for x in range(width):
-                number, below = owner[layer, r, x], owner[layer, r + 1, x]
-                if number != below and not is_same_part(number, below, part_of):
-                    edges[max(r - 1, 0), x] = edges[min(r, n_rows - 1), x] = 1
-                if r == 0:
-                    continue
-                value = near[layer, r, x]
-                limit = value * value * np.float32(mm)
-                if x + 1 < width:
-                    beside = owner[layer, r, x + 1]
-                    corner = owner[layer, r + 1, x + 1]
-                    if number != corner and not is_same_part(number, corner, part_of):
-                        edges[r - 1, x] = edges[min(r, n_rows - 1), x + 1] = 1
-                    if below != beside and not is_same_part(below, beside, part_of):
-                        edges[min(r, n_rows - 1), x] = edges[r - 1, x + 1] = 1
-                    if number != beside and not is_same_part(number, beside, part_of):
-                        edges[r - 1, x] = edges[r - 1, x + 1] = 1
-                    if x > 0:
-                        bend = near[layer, r, x - 1] - value - value + near[layer, r, x + 1]
-                        if abs(bend) > limit:
-                            edges[r - 1, x - 1] = edges[r - 1, x] = edges[r - 1, x + 1] = 1
-                bend = near[layer, r - 1, x] - value - value + near[layer, r + 1, x]
-                if abs(bend) > limit:
-                    edges[r - 1, x] = edges[max(r - 2, 0), x] = edges[min(r, n_rows - 1), x] = 1
-
-
-@inlined_kernel
-def is_same_part(number: int, other: int, part_of: Array) -> bool:
-    """Whether two visible triangles show the same side of the same part; not for samples without a triangle."""
-    if number == NO_TRIANGLE or other == NO_TRIANGLE or (number < 0) != (other < 0):
-        return False
-    return bool(part_of[number if number >= 0 else ~number] == part_of[other if other >= 0 else ~other])
-
-
-@kernel
-def mark_thin(boxes: Array, source: Array, members: Array, thin: Array, place: tuple[int, int], edges: Array) -> None:
-    """Mark the pixels under triangles of thin parts, which would fall between the centres of pixels.
-
-    Parameters
-    ----------
-    boxes, source, members
-        As for `tts2face.render.raster.draw_band`, of the band and phase.
-    thin : (F,)
-        Whether a triangle belongs to a thin part.
-    place
-        The band's first row of samples, samples along a pixel's side.
-    """
-    first_row, side = place
-    step = side << GRID_SHIFT
-    for i in members:
-        t = source[i] if source[i] >= 0 else ~source[i]
-        if thin[t]:
-            low, high = boxes[i, 2] // step - first_row // side, boxes[i, 3] // step - first_row // side
-            for r in range(max(low, 0), min(high, edges.shape[0] - 1) + 1):
-                for x in range(max(boxes[i, 0] // step, 0), min(boxes[i, 1] // step, edges.shape[1] - 1) + 1):
-                    edges[r, x] = 1
-
-
-@kernel
-def mark_tiles(edges: Array, side: int, wanted: Array) -> None:
-    """Mark the tiles of samples that hold a pixel which needs them."""
-    for r in range(wanted.shape[0]):
-        for x in range(wanted.shape[1]):
-            wanted[r, x] = 0
-    for r in range(edges.shape[0]):
-        for x in range(edges.shape[1]):
-            if edges[r, x]:
-                for row in (r * side, r * side + side - 1):
-                    for column in (x * side, x * side + side - 1):
-                        wanted[row // TILE_SAMPLES, column // TILE_SAMPLES] = 1
-
-
-@kernel
 def find_fragments(
-    owners: tuple[Any, Any, Any], n_layers: int, place: tuple[int, int, int], facets: tuple[Any, Any], found: Any,
-    through: Array, pixels: Array,
+    owners: tuple[Any, Any, Any, Any],
+    n_layers: int,
+    place: tuple[int, int, int],
+    facets: tuple[Any, Any],
+    found: Any,
+    pixels: Array,
 ) -> int:
     """Find the fragments of each pixel of a band; returns the number of pixels that are not empty.
 
@@ -182,20 +92,19 @@ def find_fragments(
     ----------
     owners
         Visible triangles of the samples (3, R, W) and at the centres of pixels (3, R / side + 2, W / side), as
-        `draw_band` writes them, and the marks of `find_edges`: samples are valid in marked pixels only.
+        `draw_band` writes them, the marks of `find_edges` (samples are valid in marked pixels only), and the share of
+        light that passes strands before each sample (R / side, W / side, side * side), of size 0 without strands.
     place
         The band's first row of samples, its number of rows, samples along a pixel's side.
     facets
         Normals of the triangles (F, 3) and part of each (F,).
     found
         Out, for each fragment: its first triangle (G,); sums over its samples of column, row and 1 (G, 3).
-    through : (R / side, W / side, side * side)
-        Share of light that passes strands of hair before each sample; of size 0 without strands.
     pixels : (P, 6)
         Out: x, y, first fragment, end of the fragments of each layer.
     """
     first_row, n_rows, side = place
-    owner, centres, edges = owners
+    owner, centres, edges, through = owners
     number_of, spread = found
     flat, part_of = facets
     n_fragments = n_pixels = 0

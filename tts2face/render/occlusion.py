@@ -27,7 +27,7 @@ from tts2face.render.surface import Surface, build_surface
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.storage.user_folders import user_cache
 
-N_DIRECTIONS = 128  # docs/decisions/103-occlusion.md: more change the light by less than its smoothing
+N_DIRECTIONS = 128  # docs/decisions/112-occlusion.md: more change the light by less than its smoothing
 VIEW_SAMPLES = 192  # samples along a side of the views: 1.5 mm each on a head
 LIFT_MM, SLACK_MM = 1.2, 1.2  # offset of a vertex along its normal, and depth tolerance of occlusion
 VIEW_DISTANCE_MM = 20_000.0  # distance of the cameras: almost parallel light

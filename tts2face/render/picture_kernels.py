@@ -6,17 +6,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.render.bands import sort_into_bands
 from tts2face.render.camera import CameraMatrices
 from tts2face.render.cutouts import draw_cutouts
+from tts2face.render.edges import find_edges, mark_thin, mark_tiles
 from tts2face.render.fragment_rows import COLOUR, N_ROWS, N_VERTEX_COLUMNS, UV
 from tts2face.render.fragments import (
     PIXEL_ENDS,
     evaluate_fragments,
     face_normals,
-    find_edges,
     find_fragments,
-    mark_thin,
-    mark_tiles,
     vertex_normals,
 )
 from tts2face.render.raster import (
@@ -28,13 +27,12 @@ from tts2face.render.raster import (
     TRANSLUCENT,
     draw_band,
     gather_triangles,
-    sort_into_bands,
     transform_to_camera,
 )
 from tts2face.render.resolve import compose_band
 from tts2face.render.shade import N_SCRATCH_ROWS, light_vertices, scatter_light, shade_fragments
 from tts2face.render.strand_cards import Strands
-from tts2face.render.strands import (
+from tts2face.render.strand_light import (
     AT_NEAR,
     AT_U,
     AT_X,
@@ -42,9 +40,9 @@ from tts2face.render.strands import (
     FRAGMENTS_AT_ONCE,
     N_FRAGMENT_ROWS,
     N_STRAND_COLUMNS,
-    draw_strands,
     light_strands,
 )
+from tts2face.render.strands import draw_strands
 from tts2face.render.surface import Surface
 from tts2face.render.tone_tables import TONE_TABLES
 
@@ -98,8 +96,10 @@ class DrawingBuffers:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """A face in one pose: positions ``points`` (V, 3), mm, light table (7, 6), exposure (V, 5), eye table, and the
-    rotation (3, 3) of the strands into camera space.
+    """A face in one pose.
+
+    Positions ``points`` (V, 3), mm, light table (7, 6), exposure (V, 5), eye table, and the rotation (3, 3) of the
+    strands into camera space.
     """
 
     points: NDArray[np.float32]
@@ -112,7 +112,7 @@ class Pose:
 def allocate_buffers(
     surface: Surface, size: tuple[int, int], side: int, *, samples_all: bool = False
 ) -> DrawingBuffers:
-    """Buffers for a surface, pictures of `size` (width, height) px, and side x side samples in pixels at edges, or all."""
+    """Buffers for a surface and pictures of `size` (width, height) px, with side x side samples at edges, or in all."""
     n_vertices, n_triangles = len(surface.rig.rest), len(surface.triangles)
     width, height = size[0] * side, size[1] * side
     rows = side * max(1, BAND_SAMPLES // (width * side))
@@ -172,8 +172,9 @@ def draw_surface(
         place = (band * buffers.band_rows, min(buffers.band_rows, height - band * buffers.band_rows), side)
         layers = draw_samples(surface, lens, batch, place[0], buffers)
         blend_strands(surface, cards, place[0], pose.lights, buffers)
-        owners = (buffers.owner, buffers.centre, buffers.edges)
-        n_pixels = find_fragments(owners, layers, place, facets, buffers.found, buffers.through, buffers.pixels)
+        samples = (buffers.owner, buffers.centre, buffers.edges)
+        owners = (*samples, buffers.through)
+        n_pixels = find_fragments(owners, layers, place, facets, buffers.found, buffers.pixels)
         if n_pixels == 0:
             continue
         n_fragments = int(buffers.pixels[n_pixels - 1, PIXEL_ENDS + N_LAYERS])
@@ -181,7 +182,7 @@ def draw_surface(
         shade_fragments(buffers.fragments, n_fragments, pose.lights, buffers.scratch, buffers.colour)
         shading = (buffers.fragments, buffers.colour, buffers.through, buffers.strand_colour)
         which = (buffers.found[0], *facets)
-        compose_band(owners, place, (buffers.pixels, n_pixels), which, shading, (picture, TONE_TABLES))
+        compose_band(samples, place, (buffers.pixels, n_pixels), which, shading, (picture, TONE_TABLES))
 
 
 def light_surface(pose: Pose, surface: Surface, lens: NDArray[np.float64], buffers: DrawingBuffers) -> None:

@@ -80,7 +80,7 @@ def mix_samples(
 
 
 @inlined_kernel
-def mean_and_least(values: Array) -> tuple[float, float]:
+def mean_and_least(values: Array) -> tuple[Any, Any]:
     """Mean and least of a few values."""
     total, least = np.float32(0), values[0]
     for s in range(len(values)):

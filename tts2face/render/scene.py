@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from tts2face.face.deformation import head_transform
 from tts2face.models.face import Face
 from tts2face.render.camera import CameraMatrices, camera_matrices
-from tts2face.render.picture import DRAFT, STUDIO, Picture, parse_background
 from tts2face.render.camera_views import CameraView
 from tts2face.render.fragment_rows import OPEN_SURFACE
 from tts2face.render.occlusion import occlusion_poses
+from tts2face.render.picture import DRAFT, STUDIO, Picture, parse_background
 from tts2face.render.picture_kernels import Pose, allocate_buffers, draw_samples, project_surface
 from tts2face.render.raster import NOT_DRAWN
 from tts2face.render.soft_shadows import Exposure, compute_exposure
@@ -49,8 +49,7 @@ class Scene:
 
 
 def build_scene(face: Face, picture: Picture) -> Scene:
-    """Scene of a face and a picture; computing the soft shadows of a face without
-    occlusion takes a second.
+    """Scene of a face and a picture; tracing the shadows of a face without occlusion takes a second.
 
     Raises
     ------

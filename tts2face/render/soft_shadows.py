@@ -118,7 +118,9 @@ def sum_directions(hidden: Any, directions: Any, normals: Any, weights: Any, exp
         for k in range(n_lamps):
             exposure[v, 1 + k] = zero
         for d in range(len(directions)):
-            facing = directions[d, 0] * normals[v, 0] + directions[d, 1] * normals[v, 1] + directions[d, 2] * normals[v, 2]
+            facing = (
+                directions[d, 0] * normals[v, 0] + directions[d, 1] * normals[v, 1] + directions[d, 2] * normals[v, 2]
+            )
             facing = max(facing, np.float32(0.02))
             whole += facing
             if hidden[v, d >> 3] & (128 >> (d & 7)):

@@ -28,10 +28,14 @@ def part_masks(scene: Scene, weights: NDArray[np.floating]) -> Masks:
     Parts without kind whose names begin with lashes or brows count as strands.
     """
     face, picture = scene.face, scene.picture
-    names = sorted({part.name for part in face.parts if part.kind == "strands" or part.name.startswith(("lash", "brow"))})
+    names = sorted(
+        {part.name for part in face.parts if part.kind == "strands" or part.name.startswith(("lash", "brow"))}
+    )
     owner = _owners(scene, weights)
     masks = {name: _projected(scene, weights, face, name) for name in names}
-    part_of = np.append(scene.surface.part_of, -1)[np.where(owner == NO_TRIANGLE, -1, np.where(owner < 0, ~owner, owner))]
+    part_of = np.append(scene.surface.part_of, -1)[
+        np.where(owner == NO_TRIANGLE, -1, np.where(owner < 0, ~owner, owner))
+    ]
     is_skin = np.isin(part_of, [at for at, part in enumerate(face.parts) if part.name.startswith("skin")])
     edge = np.zeros((picture.height, picture.width), bool)
     for axis in (0, 1):

@@ -37,11 +37,11 @@ def find_strands(
     face: Face, triangles: NDArray[np.int32], is_strand: NDArray[np.bool_], packed: tuple[Any, Any]
 ) -> Strands:
     """Strands of a face; `packed` holds texels and levels of `tts2face.render.textures.pack_textures`."""
-    used, rows = np.unique(triangles[is_strand], return_inverse=True)
+    used, places = np.unique(triangles[is_strand], return_inverse=True)
     counts = [part.count for part in face.parts]
     texture = np.repeat([max(part.texture, 0) for part in face.parts], counts)[is_strand]
     gloss = np.repeat([min(part.specular / STRAND_GLOSS, 1.5) for part in face.parts], counts)[is_strand]
-    rows = rows.reshape(-1, 3).astype(np.int32)
+    rows: NDArray[np.int32] = places.reshape(-1, 3).astype(np.int32)
     points = face.vertices[used].astype(np.float64)
     uv = face.uv[used] if face.uv is not None and len(used) else np.zeros((len(used), 2), np.float32)
     along = card_tangents(points, rows, uv)
@@ -101,5 +101,3 @@ def _unit(vectors: NDArray[np.floating]) -> NDArray[np.float32]:
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
     unit: NDArray[np.float32] = (vectors / np.maximum(length, 1e-9)).astype(np.float32)
     return unit
-
-

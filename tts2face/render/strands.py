@@ -1,8 +1,7 @@
 """Hair, lashes and brows: textured cards, blended from front to back before the surface behind them is shaded.
 
 Each sample of a pixel has the share of light that still passes; a card in front of the sample's surface takes its part
-of it. Where nothing passes, cards and surfaces behind are not drawn. Light is computed at the vertices, highlights for
-each pixel (Kajiya and Kay 1989, with the two shifted highlights of Marschner et al. 2003 as in Scheuermann 2004).
+of it. Where nothing passes, cards and surfaces behind are not drawn.
 """
 
 from typing import Any
@@ -11,145 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.compilation import inlined_kernel, kernel, vectorized_kernel
-from tts2face.render.fragment_rows import NORMAL
-from tts2face.render.shade import tone_curve
-from tts2face.render.studio_light import FIRST_LIGHT_ROW, FLOOR_ROW, SKY_ROW, UP_ROW
+from tts2face.render.strand_light import AT_NEAR, AT_U, AT_V, AT_X, AT_Y, TEXTURE_SHIFT, shade_strands
 from tts2face.render.textures import mip_level, read_texel
 
 Array = NDArray[Any]
 
-# Columns of the strand table: place in the picture in samples, 1/z, texture coordinates, diffuse light, and for the key
-# light and the first rim light: tangent and normal along the half vector, and how much of the light arrives.
-AT_X, AT_Y, AT_NEAR, AT_U, AT_V, AT_LIGHT, AT_LOBES = 0, 1, 2, 3, 4, 5, 8
-N_STRAND_COLUMNS = 14
-N_FRAGMENT_ROWS, FRAGMENTS_AT_ONCE = 16, 2048 + 80  # the table stays in the cache; rows do not start in one set of it
-SHINING_LAMPS = (0, 2)  # lamps with highlights on hair: key, first rim
-FIRST_SHIFT, SECOND_SHIFT = np.float32(-0.08), np.float32(0.14)  # of the highlights along the normal
-TEXTURE_SHIFT = np.float32(0.12)  # further shift by the brightness of the texture: highlights follow the strands
-FIRST_STRENGTH, SECOND_STRENGTH = np.float32(0.055), np.float32(0.80)  # colourless, and of the hair's own colour
 FADE_BEHIND, FADE_SCALE = np.float32(0.9996), np.float32(1200.0)  # cards fade over 0.6 mm where they enter a surface
 LEAST_COVERAGE = np.float32(0.03)
 SOLID = np.float32(1 / 40)  # passing light below which a sample is full
 TILE_PX = 8  # pixels along a side of the tiles in which cards behind everything are skipped
-CARD_NORMAL = np.float32(0.55)  # share of the card's normal; the rest points away from the middle of the skull
 
 
 @vectorized_kernel
-def light_strands(vertices: Array, normals: Array, tangents: Array, light: Any, vertex: Array, table: Array) -> None:
-    """Write the light of the vertices of strands.
-
-    Parameters
-    ----------
-    vertices : (S,)
-        Their rows in the vertex table.
-    normals, tangents : (S, 3)
-        In camera space, unit length; normals point away from the skull.
-    light
-        Exposure (V, 5), light table (7, 6) of `tts2face.render.shade`, lens.
-    table : (S, N_STRAND_COLUMNS)
-        Out: all columns but the texture coordinates.
-    """
-    exposure, lights, lens = light
-    zero, one, half = np.float32(0), np.float32(1), np.float32(0.5)
-    for i in range(len(vertices)):
-        v = vertices[i]
-        px, py, pz = vertex[v, 0], vertex[v, 1], vertex[v, 2]
-        depth = max(pz, np.float32(lens[3]))
-        table[i, AT_X], table[i, AT_Y] = lens[1] + lens[0] * px / depth, lens[2] + lens[0] * py / depth
-        table[i, AT_NEAR] = one / depth if pz >= lens[3] else zero
-        nx, ny, nz = vertex[v, NORMAL], vertex[v, NORMAL + 1], vertex[v, NORMAL + 2]
-        ox, oy, oz = normals[i, 0], normals[i, 1], normals[i, 2]
-        turn = CARD_NORMAL if nx * ox + ny * oy + nz * oz > zero else -CARD_NORMAL
-        nx, ny, nz = turn * nx + half * ox, turn * ny + half * oy, turn * nz + half * oz
-        scale = one / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-9))
-        nx, ny, nz = nx * scale, ny * scale, nz * scale
-        tx, ty, tz = tangents[i, 0], tangents[i, 1], tangents[i, 2]
-        scale = -one / np.sqrt(px * px + py * py + pz * pz + np.float32(1e-9))
-        wx, wy, wz = px * scale, py * scale, pz * scale
-        up = nx * lights[UP_ROW, 0] + ny * lights[UP_ROW, 1] + nz * lights[UP_ROW, 2]
-        for c in range(3):
-            middle = half * (lights[SKY_ROW, c] + lights[FLOOR_ROW, c])
-            swing = half * (lights[SKY_ROW, c] - lights[FLOOR_ROW, c])
-            table[i, AT_LIGHT + c] = np.float32(1.4) * (middle + swing * up) * exposure[v, 0]
-        column = AT_LOBES
-        for k in range(len(lights) - FIRST_LIGHT_ROW):
-            lx, ly, lz = lights[FIRST_LIGHT_ROW + k, 0], lights[FIRST_LIGHT_ROW + k, 1], lights[FIRST_LIGHT_ROW + k, 2]
-            seen = exposure[v, 1 + k]
-            facing, along = nx * lx + ny * ly + nz * lz, tx * lx + ty * ly + tz * lz
-            sine = np.sqrt(max(one - along * along, zero))
-            matt = np.float32(0.55) * sine * max(np.float32(0.25) + np.float32(0.75) * facing, zero)
-            matt = (matt + np.float32(0.45) * max(facing, zero)) * seen
-            for c in range(3):
-                table[i, AT_LIGHT + c] += matt * lights[FIRST_LIGHT_ROW + k, 3 + c]
-            if k == SHINING_LAMPS[0] or k == SHINING_LAMPS[1]:
-                hx, hy, hz = lx + wx, ly + wy, lz + wz
-                scale = one / np.sqrt(hx * hx + hy * hy + hz * hz + np.float32(1e-9))
-                table[i, column] = (tx * hx + ty * hy + tz * hz) * scale
-                table[i, column + 1] = (nx * hx + ny * hy + nz * hz) * scale
-                table[i, column + 2] = min(max(np.float32(1.6) * facing + np.float32(0.35), zero), one) * seen
-                column += 3
-
-
-@vectorized_kernel
-def shade_strands(fragments: Any, n: int, strands: Any, lights: Array, colour: Array) -> None:
-    """Add the display light of n fragments of strands to the pixels (R, W, 3).
-
-    Parameters
-    ----------
-    fragments
-        Triangle, row and column of the pixel of each (3, H); rows of numbers (N_FRAGMENT_ROWS, H): albedo, shift of the
-        highlights, weights of the second and third corner, and share of the pixel; the others are buffers.
-    strands
-        Strand table (S, N_STRAND_COLUMNS), triangles (F, 3) and the strength of their highlights (F,).
-    """
-    which, rows = fragments
-    table, triangles, gloss = strands
-    one, zero = np.float32(1), np.float32(0)
-    for i in range(n):
-        t = which[0, i]
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        wb, wc = rows[4, i], rows[5, i]
-        wa = one - wb - wc
-        for k in range(AT_LIGHT, N_STRAND_COLUMNS):
-            rows[7 + k - AT_LIGHT, i] = wa * table[a, k] + wb * table[b, k] + wc * table[c, k]
-        rows[12, i] *= gloss[t]
-        rows[15, i] *= gloss[t]
-    for k in range(3):
-        light, albedo = rows[7 + k], rows[k]
-        for i in range(n):
-            light[i] *= albedo[i]
-    shift = rows[3]
-    for lamp in range(2):
-        tangent, normal, arrives = rows[10 + 3 * lamp], rows[11 + 3 * lamp], rows[12 + 3 * lamp]
-        lamp_row = FIRST_LIGHT_ROW + SHINING_LAMPS[lamp]
-        for i in range(n):
-            first = tangent[i] + (shift[i] + FIRST_SHIFT) * normal[i]
-            second = tangent[i] + (shift[i] + SECOND_SHIFT) * normal[i]
-            narrow, wide = max(one - first * first, zero), max(one - second * second, zero)
-            narrow *= narrow
-            narrow *= narrow
-            narrow *= narrow
-            narrow *= narrow
-            narrow *= narrow
-            wide *= wide
-            wide *= wide
-            wide *= wide
-            tangent[i] = narrow * FIRST_STRENGTH * arrives[i]
-            normal[i] = wide * SECOND_STRENGTH * arrives[i]
-        for k in range(3):
-            light, albedo, strength = rows[7 + k], rows[k], lights[lamp_row, 3 + k]
-            for i in range(n):
-                light[i] += strength * (tangent[i] + normal[i] * albedo[i])
-    for k in range(3):
-        light, share = rows[7 + k], rows[6]
-        for i in range(n):
-            light[i] = tone_curve(light[i]) * share[i]
-        for i in range(n):
-            colour[which[1, i], which[2, i], k] += light[i]
-
-
-@vectorized_kernel
-def row_range(plane: Array, low: float, high: float, limits: tuple[float, float]) -> tuple[float, float]:
+def row_range(plane: Array, low: Any, high: Any, limits: tuple[Any, Any]) -> tuple[Any, Any]:
     """Range of x within `limits` where three half planes (3, 3), a x + b y + c >= 0, hold for some y in a range."""
     least, most = limits
     for e in range(3):
@@ -167,7 +40,9 @@ def row_range(plane: Array, low: float, high: float, limits: tuple[float, float]
 def border_cover(weight: float, slope: float) -> Any:
     """Share of a pixel within a half plane with a barycentric weight at its centre, by the slope of `widen_planes`."""
     inside = np.float32(1) if weight >= np.float32(0) else np.float32(0)
-    return inside if slope == np.float32(0) else min(max(weight * slope + np.float32(0.5), np.float32(0)), np.float32(1))
+    return (
+        inside if slope == np.float32(0) else min(max(weight * slope + np.float32(0.5), np.float32(0)), np.float32(1))
+    )
 
 
 @inlined_kernel
@@ -219,7 +94,7 @@ def widen_planes(planes: Array, borders: Array, side: int, wide: Array, slopes: 
 
 @kernel
 def find_open_tiles(near: Array, tiles: Array, n_open: Array) -> None:
-    """Write for each tile of pixels the least 1/z of its surface, 0 where a pixel shows none, and its number of pixels."""
+    """Write for each tile the least 1/z of its pixels' surface, 0 where one shows none, and its number of pixels."""
     for r in range(tiles.shape[0]):
         for x in range(tiles.shape[1]):
             least, count = np.float32(np.inf), 0
@@ -287,7 +162,6 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, fragments: A
     first_row, side, depth, centres, edges = band
     one, zero = np.float32(1), np.float32(0)
     n_rows, width, n_samples = through.shape
-    each = one / np.float32(n_samples)
     planes, passing = np.zeros((4, 3), np.float32), np.zeros(n_samples, np.float32)
     wide, slopes = np.zeros((3, 3), np.float32), np.zeros(3, np.float32)
     reach = np.float32(0.5 * side)
@@ -312,7 +186,14 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, fragments: A
         if area == 0.0:
             continue
         widen_planes(planes, borders[t], side, wide, slopes)
-        b_x, b_y, b_0, c_x, c_y, c_0 = planes[1, 0], planes[1, 1], planes[1, 2], planes[2, 0], planes[2, 1], planes[2, 2]
+        b_x, b_y, b_0, c_x, c_y, c_0 = (
+            planes[1, 0],
+            planes[1, 1],
+            planes[1, 2],
+            planes[2, 0],
+            planes[2, 1],
+            planes[2, 2],
+        )
         near_x, near_y, near_0 = planes[3, 0], planes[3, 1], planes[3, 2]
         u1, v1, u2, v2 = b[AT_U] - a[AT_U], b[AT_V] - a[AT_V], c[AT_U] - a[AT_U], c[AT_V] - a[AT_V]
         number = texture[t]

@@ -17,7 +17,7 @@ LAMPS = (KEY_LIGHT, FILL_LIGHT, *RIM_LIGHTS)
 LAMP_RADIUS_RAD = math.radians(16.0)  # angular radius: large lamps cast soft shadows
 # Rows of the light table; a lamp has direction and colour.
 SKY_ROW, FLOOR_ROW, UP_ROW, FIRST_LIGHT_ROW = range(4)
-BRIGHTNESS = 0.86  # of the picture, before the tone curve
+BRIGHTNESS = 0.8  # of the picture, before the tone curve
 
 
 def lamp_direction(yaw_deg: float, pitch_deg: float) -> NDArray[np.float64]:

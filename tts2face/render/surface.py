@@ -20,9 +20,10 @@ from tts2face.render.tone_tables import TONE_TABLES, linear_light
 class Surface:
     """Constant arrays for drawing a face.
 
-    ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2); ``textures`` their pixels and
-    coverage, ``texels`` and ``levels`` as `tts2face.render.textures` packs them; ``part_of``, ``texture_of`` and ``phase`` as
-    `tts2face.render.raster` names the phases; ``materials`` (P, 9) as `tts2face.render.fragment_rows` names its columns; ``wrap`` (V,); ``thin`` (F,) marks triangles of thin parts; the
+    ``triangles`` (F, 3); ``colours`` (V, 3) linear light; ``uv`` (V, 2); ``textures`` their pixels and coverage,
+    ``texels`` and ``levels`` as `tts2face.render.textures` packs them; ``part_of`` and ``texture_of`` (F,); ``phase``
+    (F, 2) of the front and the back of triangles as `tts2face.render.raster` names them; ``thin`` (F,) marks triangles
+    of thin parts; ``materials`` (P, 9) as `tts2face.render.fragment_rows` names its columns; ``wrap`` (V,); the
     triangles around vertex v are ``members[starts[v]:starts[v + 1]]``, those of vertices at the same place and of the
     same part included, so that a seam of the texture does not show.
     """
@@ -85,7 +86,7 @@ def _is_cut_out(face: Face, part: Part) -> bool:
 
 
 def _phases(face: Face, part_of: NDArray[np.int32]) -> NDArray[np.int8]:
-    """Phase (F, 2) of the front and back of each triangle: the largest opaque part is drawn first and hides much of the others."""
+    """Phase (F, 2) of the front and back of each triangle; the largest opaque part is drawn first."""
     sizes = [-1 if part.opacity < 1 or _is_cut_out(face, part) else part.count for part in face.parts]
     phases = np.full(len(face.parts), LATER, np.int8)
     if sizes:

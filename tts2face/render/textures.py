@@ -41,7 +41,10 @@ def read_texel(texels: Array, place: Array, linear: Array, uv: tuple[float, floa
     q, r, s = p + right, p + below, p + below + right
     for k in range(3):
         colour[k] = (
-            linear[texels[p, k]] * w0 + linear[texels[q, k]] * w1 + linear[texels[r, k]] * w2 + linear[texels[s, k]] * w3
+            linear[texels[p, k]] * w0
+            + linear[texels[q, k]] * w1
+            + linear[texels[r, k]] * w2
+            + linear[texels[s, k]] * w3
         )
     coverage = texels[p, 3] * w0 + texels[q, 3] * w1 + texels[r, 3] * w2 + texels[s, 3] * w3
     return coverage * np.float32(1 / 255)
@@ -50,10 +53,10 @@ def read_texel(texels: Array, place: Array, linear: Array, uv: tuple[float, floa
 def pack_textures(
     textures: tuple[Texture, ...], tables: tuple[Any, Any]
 ) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
-    """Texels (N, 4), sRGB and coverage, of all levels of all textures, and (T, L, 3) where each level begins, its width
-    and its height.
+    """Texels (N, 4), sRGB and coverage, of all levels of all textures, and the places of the levels (T, L, 3).
 
-    `tables` convert between 8-bit sRGB and linear light. Coarser levels average the light of visible texels.
+    A place is the first texel, the width and the height. `tables` convert between 8-bit sRGB and linear
+    light. Coarser levels average the light of visible texels.
     """
     parts: list[NDArray[np.uint8]] = []
     levels = np.zeros((max(len(textures), 1), N_LEVELS, 3), np.int64)

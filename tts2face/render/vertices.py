@@ -38,9 +38,10 @@ SHADE_STEP, N_SHADES = 1.5, 6  # brightness ratio and number of the copies of a 
 class VertexLight:
     """Vertex lighting of one surface, with its buffers.
 
-    ``table`` (N_ROWS, V) holds one fragment per vertex in the rows of `tts2face.render.fragment_rows`; ``albedo`` (V, 3) is the
-    unlit sRGB colour in [0, 1], ``divisor`` (V, 3) that colour on textured vertices, else the opacity; ``front`` and
-    ``back`` (V, 3) are the colours of outer and inner sides after the last `update`, sRGB divided by ``divisor``.
+    ``table`` (N_ROWS, V) holds one fragment per vertex in the rows of `tts2face.render.fragment_rows`; ``albedo``
+    (V, 3) is the unlit sRGB colour in [0, 1], ``divisor`` (V, 3) that colour on textured vertices, else the opacity;
+    ``front`` and ``back`` (V, 3) are the colours of outer and inner sides after the last `update`, sRGB
+    divided by ``divisor``.
     """
 
     surface: Surface
@@ -107,7 +108,9 @@ def build_vertex_light(surface: Surface) -> VertexLight:
         table=table,
         inside=np.where(material[:, OPEN_SURFACE] > 0, np.float32(1), BACK_LIGHT_SHARE),
         albedo=albedo,
-        divisor=np.where(textured[:, None], albedo, np.maximum(material[:, OPACITY : OPACITY + 1], np.float32(1 / 255))),
+        divisor=np.where(
+            textured[:, None], albedo, np.maximum(material[:, OPACITY : OPACITY + 1], np.float32(1 / 255))
+        ),
         front=light_of[0],
         back=light_of[1],
     )
