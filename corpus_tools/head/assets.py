@@ -122,7 +122,8 @@ def _offset_size(references: Ints, weights: Floats, roots: Floats, base: Floats)
     """(3,) size of the base mesh over that of the head on which the roots (N, 3) lie."""
     own = np.einsum("nk,nkc->nc", weights, base[references])
     spread = own - own.mean(axis=0)
-    slope = (spread * roots).sum(axis=0) / np.maximum((spread**2).sum(axis=0), 1e-12)
+    size = (spread**2).sum(axis=0)
+    slope = np.where(size > 0, (spread * roots).sum(axis=0) / np.where(size > 0, size, 1.0), 1.0)
     factor: Floats = 1.0 / np.clip(slope, 0.8, 1.25)
     return factor
 

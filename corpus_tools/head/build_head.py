@@ -132,7 +132,7 @@ def _build_default(data: Data) -> tuple[ReferenceHead, Face, HeadPieces]:
 
 def paint_textures(data: Data, ground: ReferenceHead, look: HeadStyle) -> tuple[Texture, ...]:
     """Textures of skin, of brows and lashes, and of the eyes."""
-    skin = paint_texture(data.source, ground.skin, look.palette, np.random.default_rng(look.seed))
+    skin = paint_texture(data.source, ground.skin, ground.lids, look.palette, np.random.default_rng(look.seed))
     eye = eye_texture(read_picture(data.assets / asset_files()["eyes/grey"][1]), look.eyes)
     return Texture(skin), cards_texture(data.assets, look.palette.brows), Texture(eye)
 

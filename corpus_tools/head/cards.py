@@ -18,10 +18,8 @@ LASHES = ("eyelashes02", "eyelashes01")
 BROW_ROWS = {"eyebrow001": (140, 400), "eyebrow010": (252, 512), "eyebrow008": (200, 460), "eyebrow012": (240, 500)}
 BROW_HEIGHT = 252
 LASH_LEFT = 512
-LINE_BOX = (8, 504, 1010, 1022)  # columns and rows of the lid's dark line
-BROW_COLOUR, LASH_COLOUR = (0.215, 0.155, 0.118), (0.115, 0.080, 0.065)  # sRGB
-LINE_COVER = 0.85
-HAZE = 26.0  # coverage between the hairs of the pictures, of 255
+BROW_COLOUR, LASH_COLOUR = (0.185, 0.133, 0.102), (0.115, 0.080, 0.065)  # sRGB
+HAZE = 40.0  # coverage between the hairs of the pictures, of 255
 CARDS_TEXTURE, EYE_TEXTURE = 1, 2  # numbers of the face's textures
 HIDDEN = np.array([0.0, 10.0, -85.0])  # inside the skull: cards that a person does not show
 
@@ -45,17 +43,10 @@ def cards_texture(folder: Path, brow_colour: tuple[float, float, float] = BROW_C
     for number, name in enumerate(LASHES):
         picture = read_picture(folder / asset_files()[f"lashes/{name}"][1])
         alpha[number * 512 : number * 512 + 512, LASH_LEFT:] = picture[:, :, 3]
-    left, right, top, bottom = LINE_BOX
-    across = np.linspace(-1, 1, bottom - top)[:, None]
-    along = np.linspace(-1, 1, right - left)[None]
-    alpha[top:bottom, left:right] = 255 * LINE_COVER * np.exp(-3 * across**2) * np.clip(6 * (1 - np.abs(along)), 0, 1)
     pixels = np.zeros((SIDE, SIDE, 3))
     pixels[:], pixels[:, :LASH_LEFT] = LASH_COLOUR, brow_colour
-    pixels[top - 2 :, :LASH_LEFT] = LASH_COLOUR
-    return Texture(
-        np.rint(255 * pixels).astype(np.uint8),
-        np.rint(np.clip((alpha - HAZE) * 255 / (250 - HAZE), 0, 255)).astype(np.uint8),
-    )
+    cover = np.clip((alpha - HAZE) * 255 / (225 - HAZE), 0, 255)
+    return Texture(np.rint(255 * pixels).astype(np.uint8), np.rint(cover).astype(np.uint8))
 
 
 def brow_coordinates(name: str, uv: Floats) -> Floats:
@@ -69,13 +60,4 @@ def brow_coordinates(name: str, uv: Floats) -> Floats:
 def lash_coordinates(name: str, uv: Floats) -> Floats:
     """(N, 2) coordinates in the texture of a set of lashes' own (N, 2)."""
     placed: Floats = (512 * uv + [LASH_LEFT, 512 * LASHES.index(name)]) / SIDE
-    return placed
-
-
-def line_coordinates(n: int) -> Floats:
-    """(2 n, 2) coordinates of the lid's dark line: its lower edge, then its upper one."""
-    left, right, top, bottom = LINE_BOX
-    along = np.linspace(left + 1, right - 1, n)
-    rows = [np.column_stack([along, np.full(n, row)]) for row in (bottom - 1.0, top + 1.0)]
-    placed: Floats = np.concatenate(rows) / SIDE
     return placed

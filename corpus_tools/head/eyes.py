@@ -106,7 +106,7 @@ def eye_coordinates(off: Floats, turn: Floats) -> Floats:
 
 
 def eye_texture(picture: NDArray[np.uint8], style: EyeStyle) -> NDArray[np.uint8]:
-    """(SIDE, SIDE, 3) texture of an eyeball from the package's picture of an eye (H, W, 4), with the upper lid's shadow.
+    """(SIDE, SIDE, 3) texture of an eyeball from the package's picture (H, W, 4), with the upper lid's shadow.
 
     Iris and pupil get the angles of `style`, and the iris its colour.
     """

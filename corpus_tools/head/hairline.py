@@ -2,9 +2,10 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
-from corpus_tools.dense.texels import find_texels
+from corpus_tools.dense.texels import Texels, find_texels
 from corpus_tools.head.layout import layout_coordinates
 from corpus_tools.head.noise import value_noise
 from corpus_tools.head.skin import Skin, vertex_normals
@@ -48,8 +49,8 @@ def covered_share(skin: Skin, hair: Floats) -> Floats:
     normals = vertex_normals(skin.vertices, skin.quads, skin.base)[scalp]
     heights = np.arange(-STEP_MM, REACH_MM, STEP_MM)
     rays = points[:, None] + heights[:, None] * normals[:, None]
-    distance = cKDTree(hair).query(rays.reshape(-1, 3), distance_upper_bound=BESIDE_MM)[0].reshape(len(points), -1)
-    covered = np.isfinite(distance).any(axis=1).astype(float)
+    distance = np.asarray(cKDTree(hair).query(rays.reshape(-1, 3), distance_upper_bound=BESIDE_MM)[0])
+    covered = np.isfinite(distance).reshape(len(points), -1).any(axis=1).astype(float)
     near = cKDTree(points).sparse_distance_matrix(cKDTree(points), 2.5 * SMOOTH_MM, output_type="coo_matrix").tocsr()
     near.data = np.exp(-((near.data / SMOOTH_MM) ** 2))
     smooth = (near @ covered + covered) / (np.asarray(near.sum(axis=1)).ravel() + 1.0)
@@ -64,9 +65,8 @@ def paint_scalp(skin: Skin, share: Floats, side: int, generator: np.random.Gener
     grown = texels.interpolate(share[:, None])[:, 0] * hair_share(place)
     fine = value_noise(strand_field(place, 1.4, 16.0), 1.0, generator)
     edge = 4 * grown * (1 - grown)
-    cover = np.zeros((side, side))
-    cover[texels.rows, texels.columns] = np.clip(grown + 0.28 * fine * edge, 0, 1) * (grown > 0.01)
-    return np.rint(cover * 31 * 0.97).astype(np.uint8) * np.uint8(8)
+    cover = np.clip(grown + 0.28 * fine * edge, 0, 1) * (grown > 0.01)
+    return _fill_gaps(texels, 0.97 * cover, side)
 
 
 def paint_stubble(skin: Skin, side: int, generator: np.random.Generator) -> NDArray[np.uint8]:
@@ -74,9 +74,16 @@ def paint_stubble(skin: Skin, side: int, generator: np.random.Generator) -> NDAr
     texels = find_texels(layout_coordinates(skin.source_uv), triangulate(skin.quads), side)
     place = texels.interpolate(skin.vertices)
     grain = value_noise(place, STUBBLE_MM, generator)
-    cover = np.zeros((side, side))
-    cover[texels.rows, texels.columns] = hair_share(place) * np.clip(0.60 + 0.16 * grain, 0, 1)
-    return np.rint(cover * 31).astype(np.uint8) * np.uint8(8)
+    return _fill_gaps(texels, hair_share(place) * np.clip(0.60 + 0.16 * grain, 0, 1), side)
+
+
+def _fill_gaps(texels: Texels, cover: Floats, side: int) -> NDArray[np.uint8]:
+    """(side, side) coverage, 0-255 in 32 steps; texels off the surface take the nearest value on it."""
+    picture, is_gap = np.zeros((side, side)), np.ones((side, side), bool)
+    picture[texels.rows, texels.columns], is_gap[texels.rows, texels.columns] = cover, False
+    nearest = distance_transform_edt(is_gap, return_distances=False, return_indices=True)
+    steps: NDArray[np.uint8] = np.rint(picture[tuple(nearest)] * 31).astype(np.uint8) * np.uint8(8)
+    return steps
 
 
 def strand_field(places: Floats, width_mm: float, length_mm: float) -> Floats:

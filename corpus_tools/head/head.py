@@ -22,7 +22,7 @@ from corpus_tools.head.piece import HeadPieces, MaterialSpan, Piece
 from corpus_tools.head.shapes import clear_eyeballs, correct_shapes
 from corpus_tools.head.skin import Skin, build_shoulders, build_skin
 from corpus_tools.head.subdivide import triangulate
-from corpus_tools.head.teeth import LOWER, UPPER, arch_piece, fit_teeth, follow_lips
+from corpus_tools.head.teeth import LOWER, UPPER, arch_piece, fit_teeth, follow_lips, keep_behind
 from corpus_tools.head.texture import HeadColours
 from corpus_tools.head.tongue import tongue_piece
 
@@ -43,7 +43,8 @@ DEFAULT_PERSON = ADULT | {
     "eyes/r-eye-scale-incr": 0.15, "eyes/l-eye-corner2-up": 0.2, "eyes/r-eye-corner2-up": 0.2,
     "mouth/mouth-angles-up": 0.6, "mouth/mouth-cupidsbow-incr": 0.25, "mouth/mouth-lowerlip-volume-incr": 0.15,
     "mouth/mouth-upperlip-volume-incr": 0.25, "mouth/mouth-scale-horiz-incr": 0.15, "neck/neck-scale-horiz-decr": 0.3,
-    "eyebrows/eyebrows-trans-up": 0.25, "eyebrows/eyebrows-angle-up": 0.15, "nose/nose-scale-horiz-decr": 0.35, "nose/nose-point-width-decr": 0.3, "nose/nose-width3-decr": 0.3,
+    "eyebrows/eyebrows-trans-up": 0.25, "eyebrows/eyebrows-angle-up": 0.15,
+    "nose/nose-scale-horiz-decr": 0.35, "nose/nose-point-width-decr": 0.3, "nose/nose-width3-decr": 0.3,
 }  # fmt: skip
 
 
@@ -95,7 +96,7 @@ def assemble_head(cage: Cage, reference: ReferenceHead, style: HeadStyle) -> Hea
         tongue_piece(cage, jaw),
         wet_piece(skin, balls, reference.lids),
         brow_piece(skin, reference.brows, style.cards.brows),
-        lash_piece(cage, skin, balls, reference.lids, (reference.lashes, style.cards.lashes)),
+        lash_piece(cage, skin, reference.lashes, style.cards.lashes),
         shirt_piece(reference.shoulders, build_shoulders(cage), np.array(style.shirt)),
     )
     return HeadPieces(pieces, (1, 2), balls, PIVOT)
@@ -115,7 +116,7 @@ def _teeth_pieces(cage: Cage, skin: Skin, reference: ReferenceHead, jaw: Jaw) ->
         strip = cage.group(f"helper-{name}-teeth")
         piece = arch_piece(arch, name)
         points = fit_teeth(piece.vertices, reference.cage.vertices[strip], cage.vertices[strip])
-        points = follow_lips(points, piece.vertices, ahead)
+        points = keep_behind(follow_lips(points, piece.vertices, ahead), skin.vertices)
         moved = jaw.shapes(points) if name == "lower" else {}
         pieces.append(Piece(points, piece.spans, piece.colours, moved))
     return pieces[0], pieces[1]

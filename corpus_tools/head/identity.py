@@ -1,4 +1,4 @@
-"""Presets of age, sex and ancestry: MakeHuman's macro targets, blended, with hair, and tints of skin, brows and eyes."""
+"""Presets of age, sex and ancestry: MakeHuman's macro targets, with hair and tints of skin, brows and eyes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -15,6 +15,7 @@ from tts2face.models.face_file import Identity
 
 Tint = tuple[float, float, float]
 PLAIN: Tint = (1.0, 1.0, 1.0)
+FRIENDLY: Mapping[str, float] = {"mouth/mouth-angles-up": 0.3}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +54,13 @@ class Preset:
         )
 
 
-FRIENDLY = {"mouth/mouth-angles-up": 0.3}
 BROWN, DARK = (0.66, 0.46, 0.33), (0.42, 0.28, 0.20)  # eyes; the iris in the texture is light
 BLACK, BLOND, GREY = (0.42, 0.43, 0.47), (1.9, 2.0, 1.75), (2.1, 2.8, 3.4)  # brows
 YOUNG, OLD, CHILD = {"young": 1.0}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
 PRESETS: dict[str, Preset] = {
     "erik": Preset(
         "man, about 30, European", "male", YOUNG, {"caucasian": 1}, Hairdo("short02", "dark-blond"),
-        (0.98, 0.95, 0.93), BLOND, (0.85, 0.95, 1.2), (1.2, 0.9, 0.8),
+        (0.98, 0.95, 0.93), BLOND, (0.85, 0.93, 1.02), (1.2, 0.9, 0.8),
     ),
     "amara": Preset(
         "woman, about 30, West African", "female", YOUNG, {"african": 1}, Hairdo("afro01", "black"),
@@ -85,7 +85,7 @@ PRESETS: dict[str, Preset] = {
     ),
     "ravi": Preset(
         "man, about 30, mixed ancestry", "male", YOUNG, {"caucasian": 0.5, "african": 0.2, "asian": 0.3},
-        Hairdo("short03", "black"), (0.70, 0.61, 0.55), BLACK, DARK, (1.7, 1.7, 1.6),
+        Hairdo("short02", "black"), (0.70, 0.61, 0.55), BLACK, DARK, (1.7, 1.7, 1.6),
     ),
     "ingrid": Preset(
         "woman, about 70, European", "female", OLD, {"caucasian": 1}, Hairdo("bob02", "white"),

@@ -1,5 +1,6 @@
-"""Lashes: MakeHuman's cards, which follow the edges of the lids and turn with them, and the line at their roots."""
+"""Lashes: MakeHuman's cards, which follow the edges of the lids and turn with them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,10 +10,10 @@ from scipy.spatial import cKDTree
 
 from corpus_tools.head.assets import Asset, read_asset
 from corpus_tools.head.cage import Cage
-from corpus_tools.head.cards import CARDS_TEXTURE, HIDDEN, LASHES, lash_coordinates, line_coordinates
+from corpus_tools.head.cards import CARDS_TEXTURE, HIDDEN, LASHES, lash_coordinates
 from corpus_tools.head.haircut import split_seams
-from corpus_tools.head.lids import LidEdge, strip_triangles
-from corpus_tools.head.piece import Eyeball, MaterialSpan, Piece
+from corpus_tools.head.lids import LidEdge
+from corpus_tools.head.piece import MaterialSpan, Piece
 from corpus_tools.head.skin import Skin
 
 Floats = NDArray[np.float64]
@@ -23,7 +24,6 @@ MATERIAL = {"specular": 0.05, "shininess": 20.0, "cutout": True, "kind": "strand
 N_ROOTS = 3  # vertices of the lid's edge that a lash follows
 SHUT_DOWN, SHUT_AHEAD = 0.55, 0.83  # offset of upper lashes from their roots when the lids are shut, in their lengths
 LOOK_DOWN_SHARE = 0.4  # of that turn when the eye looks down
-LINE_OFF_MM, LINE_BELOW_MM, LINE_ABOVE_MM = 0.22, 0.45, 0.75  # the dark line, from the edge of the upper lid
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,15 +63,8 @@ def bind_lashes(folder: Path, cage: Cage, skin: Skin, edges: tuple[LidEdge, LidE
     return bound
 
 
-def lash_piece(
-    cage: Cage,
-    skin: Skin,
-    balls: tuple[Eyeball, Eyeball],
-    edges: tuple[LidEdge, LidEdge],
-    cards: tuple[dict[str, LashCards], str],
-) -> Piece:
-    """All sets of lashes of a head, of which `cards` names the one that is shown, and the dark lines of its lids."""
-    bound, shown = cards
+def lash_piece(cage: Cage, skin: Skin, bound: Mapping[str, LashCards], shown: str) -> Piece:
+    """All sets of lashes of a head; those that are not shown lie inside the skull."""
     points, faces, coordinates, tangents, count = [], [], [], [], 0
     shapes: dict[str, list[Floats]] = {name: [] for name in skin.shapes}
     for name, own in bound.items():
@@ -86,17 +79,6 @@ def lash_piece(
         coordinates.append(own.uv)
         tangents.append(off / np.maximum(np.linalg.norm(off, axis=1, keepdims=True), 1e-6))
         count += len(places)
-    for ball, edge in zip(balls, edges, strict=True):
-        line = skin.vertices[edge.upper]
-        out = line - ball.centre
-        line = line + LINE_OFF_MM * out / np.linalg.norm(out, axis=1, keepdims=True)
-        points += [line - np.array([0, LINE_BELOW_MM, 0]), line + np.array([0, LINE_ABOVE_MM, 0])]
-        faces.append(strip_triangles(len(line)) + count)
-        coordinates.append(line_coordinates(len(line)))
-        tangents.append(np.tile([1.0, 0.0, 0.0], (2 * len(line), 1)))
-        for shape, moved in skin.shapes.items():
-            shapes[shape].append(np.tile(moved[edge.upper], (2, 1)))
-        count += 2 * len(line)
     vertices = np.concatenate(points)
     joined = {name: np.concatenate(blocks) for name, blocks in shapes.items()}
     return Piece(

@@ -21,15 +21,3 @@ def gaussian_bump(points: Floats, centre: tuple[float, ...], reach: tuple[float,
     mirrored = np.column_stack([np.abs(points[:, 0]), points[:, 1:]])[:, : len(centre)]
     falling: Floats = np.exp(-(((mirrored - np.array(centre)) / np.array(reach)) ** 2).sum(axis=1))
     return falling
-
-
-def stroke_cover(places: Floats, starts: Floats, ends: Floats, widths: Floats) -> Floats:
-    """(P,) coverage of points (P, 2) by tapering strokes, 1 on a stroke's line; `widths` at the root, mm."""
-    cover = np.zeros(len(places))
-    for start, end, width in zip(starts, ends, widths, strict=True):
-        near = np.flatnonzero(np.abs(places - (start + end) / 2).max(axis=1) < np.abs(end - start).max() / 2 + width)
-        along = end - start
-        share = np.clip((places[near] - start) @ along / (along @ along), 0, 1)
-        off = np.linalg.norm(places[near] - start - share[:, None] * along, axis=1)
-        cover[near] = np.maximum(cover[near], np.clip(1.3 - off / (width * (1.05 - 0.75 * share)), 0, 1))
-    return cover

@@ -15,8 +15,8 @@ from tts2face.numeric import smoothstep
 Floats = NDArray[np.float64]
 
 SMOOTHED_SHAPES = ("mouthSmileLeft", "mouthSmileRight", "mouthDimpleLeft", "mouthDimpleRight", "cheekPuff")
-SHAPE_GAINS = {  # real brows rise 8 mm, these 5; these upper lids hardly follow an upward gaze
-    "browInnerUp": 1.6,
+SHAPE_GAINS = {  # brows of MakeHuman hardly rise; its upper lids hardly follow an upward gaze
+    "browInnerUp": 2.2,
     "browOuterUpLeft": 1.4,
     "browOuterUpRight": 1.4,
     "eyeLookUpLeft": 1.7,

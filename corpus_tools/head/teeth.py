@@ -60,6 +60,7 @@ SHADE = np.array([1.0, 1.0, 0.95, 0.84, 0.70, 0.56])  # brightness of the crowns
 TOOTH, TOOTH_DARK = np.array([0.955, 0.93, 0.875]), np.array([0.88, 0.82, 0.72])
 GUM = np.array([0.68, 0.36, 0.36])
 BACK_Z, FRONT_Z, MOST_SHIFT_MM = -16.0, 14.0, 5.0  # molars stay; front teeth follow the lips
+COVER_MM = 2.2  # of skin in front of teeth and gums at rest
 N_AROUND, LEVELS = 12, np.array([0.0, 0.04, 0.13, 0.45, 1.0])
 MATERIALS = {
     "teeth": {"specular": 0.5, "shininess": 60.0, "wrap": 0.3},
@@ -110,6 +111,16 @@ def follow_lips(points: Floats, default: Floats, ahead: float) -> Floats:
     share = smoothstep(default[:, 2], BACK_Z, FRONT_Z)
     moved = points.copy()
     moved[:, 2] += share * np.clip(ahead - own, -MOST_SHIFT_MM, MOST_SHIFT_MM)
+    return moved
+
+
+def keep_behind(points: Floats, skin: Floats) -> Floats:
+    """Points (N, 3) at least `COVER_MM` behind the foremost of the skin's vertices (S, 3) nearby, in front view."""
+    from scipy.spatial import cKDTree
+
+    near = cKDTree(skin[:, :2]).query(points[:, :2], 8)[1]
+    moved = points.copy()
+    moved[:, 2] = np.minimum(points[:, 2], skin[near, 2].max(axis=1) - COVER_MM)
     return moved
 
 

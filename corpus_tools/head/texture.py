@@ -1,15 +1,18 @@
 """Procedural texture of the skin and brows, computed per texel from its 3-D position, so that it has no seams."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates
+from scipy.spatial import cKDTree
 
 from corpus_tools.dense.texels import find_texels
 from corpus_tools.head.cards import BROW_COLOUR
 from corpus_tools.head.layout import SIDE, layout_coordinates
+from corpus_tools.head.lids import LidEdge
 from corpus_tools.head.noise import gaussian_bump, value_noise
 from corpus_tools.head.skin import Skin
 from corpus_tools.head.source import SourceMesh
@@ -44,12 +47,14 @@ TINTS = (
 )
 FOLD = np.array([(16, -43), (22, -52), (27, -61), (29, -69)])  # from the nose to beside the mouth: |x|, y in mm
 N_FRECKLES = 240
+UPPER_LINE, LOWER_LINE, LINE_MM = 0.72, 0.30, 1.15  # dark roots of the lashes at the lids: strengths, half width
+LINE_TINT = np.array([0.90, 1.0, 1.0])
 
 
 def paint_texture(
-    source: SourceMesh, skin: Skin, palette: HeadColours, generator: np.random.Generator
+    source: SourceMesh, skin: Skin, lids: Sequence[LidEdge], palette: HeadColours, generator: np.random.Generator
 ) -> NDArray[np.uint8]:
-    """(SIDE, SIDE, 3) texture of a skin."""
+    """(SIDE, SIDE, 3) texture of a skin with the edges `lids` of its lids."""
     texels = find_texels(layout_coordinates(skin.source_uv), triangulate(skin.quads), SIDE)
     place = texels.interpolate(skin.vertices)
     where = texels.interpolate(skin.source_uv)
@@ -58,6 +63,9 @@ def paint_texture(
     colour += _lip_share(lips)[:, None] * (_lip_colour(place, palette, generator) - colour)
     inside = np.maximum(_sample_mask(gaussian_filter(source.mask("inside-mouth"), 2.0), where), _in_mouth(where))
     colour += smoothstep(inside, 0.15, 0.95)[:, None] * (np.array(palette.cavity) - colour)
+    for edge in lids:
+        colour *= 1 - UPPER_LINE * _beside(place, skin.vertices[edge.upper])[:, None] * LINE_TINT
+        colour *= 1 - LOWER_LINE * _beside(place, skin.vertices[edge.lower])[:, None] * LINE_TINT
     return _fill_gaps(texels.rows, texels.columns, colour)
 
 
@@ -95,8 +103,6 @@ def _freckles(place: Floats, generator: np.random.Generator) -> Floats:
     chance *= place[:, 2] > -30
     centres = place[generator.choice(len(place), N_FRECKLES, p=chance / chance.sum())]
     spots = np.zeros(len(place))
-    from scipy.spatial import cKDTree
-
     tree = cKDTree(place)
     for centre, size in zip(centres, generator.uniform(0.35, 0.9, N_FRECKLES), strict=True):
         near = tree.query_ball_point(centre, 2.2 * size)
@@ -112,6 +118,14 @@ def _lip_colour(place: Floats, palette: HeadColours, generator: np.random.Genera
     lines = value_noise(place * np.array([1.0, 0.22, 0.3]), 0.9, generator)  # fine creases from edge to edge
     colour = np.tile(np.array(palette.lips), (len(place), 1))
     return colour * (1 + palette.variation * (0.035 * lines + 0.03 * value_noise(place, 4.0, generator))[:, None])
+
+
+def _beside(place: Floats, line: Floats) -> Floats:
+    """(P,) 1 on a line of points (L, 3), falling off beside it."""
+    fine = np.linspace(0, len(line) - 1, 12 * len(line))
+    dense = np.stack([np.interp(fine, np.arange(len(line)), line[:, k]) for k in range(3)], axis=1)
+    near: Floats = np.exp(-((cKDTree(dense).query(place, distance_upper_bound=6.0)[0] / LINE_MM) ** 2))
+    return near
 
 
 def _in_mouth(where: Floats) -> Floats:

@@ -9,12 +9,9 @@ from corpus_tools.dense.texels import find_texels
 from corpus_tools.head import source
 from corpus_tools.head.cage import fit_rotation, fit_sphere
 from corpus_tools.head.cloth import Sheet, clip_sheet
-from corpus_tools.head.lashes import strip_grid
 from corpus_tools.head.layout import layout_coordinates
-from corpus_tools.head.noise import stroke_cover
 from corpus_tools.head.teeth import LOWER, UPPER, arch_piece
 from lexicon.errors import DataError
-from tts2face.numeric import smoothstep
 
 OBJ = """v 0 0 0
 v 1 0 0
@@ -87,14 +84,6 @@ def test_a_cut_sheet_keeps_the_area_on_its_side():
     assert cut.points[:, 0].min() == pytest.approx(0.5)
 
 
-def test_a_strip_of_lashes_is_a_grid():
-    at = np.random.default_rng(2).permutation(15).reshape(3, 5)
-    quads = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 4)
-    grid = strip_grid(quads)
-    assert grid.shape == (3, 5)
-    assert any(np.array_equal(grid, turned) for turned in (at, at[::-1], at[:, ::-1], at[::-1, ::-1]))
-
-
 def test_the_layout_never_turns_a_texel_over():
     across = np.linspace(0.65, 0.98, 60)
     up = np.linspace(0.16, 0.80, 60)
@@ -111,13 +100,6 @@ def test_texels_carry_what_vertices_hold():
     where = texels.interpolate(uv)
     assert len(texels.rows) == 16 * 16
     assert np.allclose(where, (np.column_stack([texels.columns, texels.rows]) + 0.5) / 20, atol=1e-9)
-
-
-def test_strokes_cover_their_line_and_no_more():
-    places = np.array([[0.0, 0], [5, 0], [5, 2], [11, 0]])
-    cover = stroke_cover(places, np.array([[0.0, 0]]), np.array([[10.0, 0]]), np.array([0.5]))
-    assert cover.tolist() == [1, 1, 0, 0]
-    assert smoothstep(np.array([0.0, 0.5, 1]), 1, 0).tolist() == [1, 0.5, 0]
 
 
 @pytest.mark.parametrize("arch", [UPPER, LOWER])
