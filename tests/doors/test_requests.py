@@ -27,6 +27,7 @@ CHANGES = {
     "synthesis": "theobald2007",
     "context": 1,
     "exemplars": 3,
+    "articulation": "natural",
     "fps": 25.0,
     "gestures": "ju2008",
     "pitch": True,

@@ -29,7 +29,7 @@ FRONT_SHARE, EDGE_SHARE = 0.06, 0.01  # of the mouth's width: depth of the front
 # Incisors of a face without teeth, or whose teeth are elsewhere, relative to the middle of the upper lip and to the
 # mouth's width: as on the default head.
 EDGE_BELOW_LIP, EDGE_BEHIND_LIP = 0.055, 0.085
-PLAUSIBLE_BELOW, PLAUSIBLE_BEHIND = (-0.02, 0.14), (-0.02, 0.22)
+PLAUSIBLE_BELOW, PLAUSIBLE_BEHIND = (-0.02, 0.14), (-0.02, 0.3)
 COVER_SHARE, AHEAD_SHARE = 0.03, 0.012  # of the mouth's width, by which the lip covers the edge and lies before it
 
 
