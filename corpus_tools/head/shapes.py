@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 SMOOTHED_SHAPES = ("mouthSmileLeft", "mouthSmileRight", "mouthDimpleLeft", "mouthDimpleRight", "cheekPuff")
 SHAPE_GAINS = {  # brows of MakeHuman hardly rise; its upper lids hardly follow an upward gaze
-    "browInnerUp": 2.2,
+    "browInnerUp": 2.4,
     "browOuterUpLeft": 1.4,
     "browOuterUpRight": 1.4,
     "eyeLookUpLeft": 1.7,

@@ -38,6 +38,8 @@ from tts2face.storage.files import SHIPPED_FOLDER
 
 SMALL = {"--size": "64x64", "--fps": "5"}
 LISTS = {
+    "haircuts",
+    "hair-colors",
     "voices",
     "languages",
     "faces",

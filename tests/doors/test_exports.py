@@ -161,7 +161,7 @@ def test_a_track_of_another_face_is_refused(session: Session, here: Path) -> Non
     other = tts2face.Clip(tts2face.Trajectory(names, clip.motion.values, 5.0), clip.head, clip.speech)
     tts2face.export(other, "a.json")
     with pytest.raises(
-        DataError, match=r"65 channels .* which are not those of the face head with the palette starter"
+        DataError, match=r"66 channels .* which are not those of the face head with the palette starter"
     ):
         tts2face.convert("a.json", "a.glb")
     tts2face.convert("a.json", "a.bvh")
