@@ -166,6 +166,7 @@ def test_words_that_no_voice_speaks_are_a_warning_with_their_line(plan_of: Plann
         ('talker = "grid"', "there is no talker 'grid'"),
         ('identity = "adda"', "the face head has no identity 'adda'; it has erik"),
         ('style = "gleeful"', "there is no style 'gleeful' in the palette"),
+        ('face = "self"\narticulation = "clear"', "a talker's own face articulates as recorded; remove articulation"),
         ('voice = "nosuch"', "there is no voice 'nosuch'; give heart"),
         ('voice = "/no/such.onnx"', "cannot read /no/such.onnx: No such file"),
     ],

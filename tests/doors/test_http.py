@@ -30,6 +30,7 @@ REQUESTS: dict[str, dict[str, Any]] = {
     "dictionary": {"text": TEXT, "dictionary": "names"},
     "gestures none": {"text": TEXT, "gestures": "none"},
     "gestures ju2008": {"text": TEXT, "gestures": "ju2008", "synthesis": "theobald2007"},
+    "articulation": {"text": TEXT, "articulation": "natural"},
     "espeak": {"text": "Guten Morgen, liebe Welt.", "language": "de", "rate": 1.2, "volume": 0.8},
     "long first sentence": {"text": LONG},
     "talker and face": {"text": TEXT, "talker": "grid_s1", "face": "cartoon"},

@@ -96,6 +96,7 @@ def test_a_picture_between_two_others_has_no_jump(pictures: np.ndarray) -> None:
     [
         (["Hi.", "--face", "self", "--out", "x.mp4"], "motion only"),
         (["Hi.", "--face", "self", "--identity", "mei", "--out", "x.mp4"], "has no identity presets"),
+        (["Hi.", "--face", "self", "--articulation", "loud", "--out", "x.mp4"], "must be natural, clear or a factor"),
         (["Hi.", "--face", "self", "--view"], "--view cannot show the talker's own face"),
     ],
 )

@@ -27,6 +27,7 @@ CHANGES = {
     "synthesis": "theobald2007",
     "context": 1,
     "exemplars": 3,
+    "articulation": "natural",
     "fps": 25.0,
     "gestures": "ju2008",
     "pitch": True,
@@ -148,6 +149,14 @@ def test_requests_that_cannot_be_spoken_are_refused(change: dict, reason: str, s
         ({"fps": float("nan")}, "fps must lie between"),
         ({"seed": -1}, "seed must be 0 or more, not -1"),
         ({"synthesis": "magic"}, "no synthesis 'magic'"),
+        ({"articulation": "mumbled"}, "articulation must be natural, clear or a factor from 0.5 to 2, not 'mumbled'"),
+        ({"articulation": "2.5"}, "articulation must lie between 0.5 and 2, not 2.5"),
+        ({"articulation": "nan"}, "articulation must lie between 0.5 and 2"),
+        ({"articulation": "clear", "idle": 2.0, "text": ""}, "--articulation has no effect with --idle; remove one"),
+        (
+            {"articulation": "clear", "audio": Path("speech.wav"), "text": ""},
+            "--articulation needs the phones of a recording; give its words as text, or remove it",
+        ),
         ({"idle": 5.0}, "--idle cannot be combined with text or --audio; remove one of them"),
         (
             {"idle": 5.0, "text": "", "voice": "espeak"},
@@ -162,3 +171,10 @@ def test_requests_that_cannot_be_spoken_are_refused(change: dict, reason: str, s
 def test_options_out_of_range_are_refused(change: dict, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         Request(**{"text": "Hi.", **change})
+
+
+def test_an_articulation_is_a_name_or_a_factor(clip: Clip, session: Session) -> None:
+    by_name = [session.clip(TEXT, articulation=given) for given in ("natural", 1.0, "1")]
+    assert len({digest(one) for one in by_name}) == 1
+    assert digest(session.clip(TEXT, articulation="clear")) == digest(clip)  # the default of a mesh
+    assert digest(session.clip(TEXT, articulation="1.5")) == digest(clip)

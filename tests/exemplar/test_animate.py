@@ -145,7 +145,10 @@ def test_one_exemplar_of_a_recorded_sentence_gives_the_recording_back(voice: Exe
     assert np.abs(made[inner, 0] - phone_sequences.shape[inner, 0]).max() < 0.6
 
 
-@pytest.mark.parametrize("name", [field.name for field in fields(SynthesisOptions) if field.name != "network"])
+OF_OTHERS = {"network", "articulation"}  # this talker has no network; faces articulate (tests/retargeting)
+
+
+@pytest.mark.parametrize("name", [field.name for field in fields(SynthesisOptions) if field.name not in OF_OTHERS])
 def test_every_option_matters(voice: ExemplarModel, name):
     changed = {
         "context": 1, "k": 1, "duration": 0.0, "sharpness": 0.0, "overlap": False, "precision": 0.0, "align": False,

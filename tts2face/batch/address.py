@@ -12,7 +12,7 @@ from lexicon.errors import DataError, InputError
 from tts2face import __version__
 from tts2face.storage.files import find_file
 
-SEGMENT_FORMAT = 1  # raised when equal requests give other segments
+SEGMENT_FORMAT = 2  # raised when equal requests give other segments
 VOICE_PACKAGES = ("hibari-tts", "onnxruntime", "espeakng-loader", "piper-tts", "pocketsphinx", "pyopenjtalk-plus", "av")
 
 

@@ -88,7 +88,7 @@ class Articulator:
             values = self._add_by_class(values, tracks, (factor - NATURAL) / (CLEAR - NATURAL))
         elif factor < NATURAL:
             values = self._reduce_by_class(values, tracks, 1.0 - factor)
-        values = self.incisors.enforce(values, tracks["incisor_contact"])
+        values = self.incisors.enforce(values, tracks["incisor_contact"] * (1.0 - tracks["lip_contact"] ** 2))
         values = self._close_pauses(values, closure)
         gap = ordered_product(values, self.mouth.gaps[MIDDLE_PAIR])
         values = self.tongue.move(values, gap, tracks)

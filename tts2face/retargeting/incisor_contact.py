@@ -11,6 +11,7 @@ from tts2face.face.lip_constraints import LipConstraints
 from tts2face.models.face import Face
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
+    INNER_LIP_UPPER,
     MOUTH_CORNER_LEFT,
     MOUTH_CORNER_RIGHT,
     UPPER_LIP_INNER_MID,
@@ -19,7 +20,7 @@ from tts2face.numeric import ordered_product
 
 FloatArray = NDArray[np.float64]
 
-TOUCHING_LANDMARKS = INNER_LIP_LOWER[4:7]  # of the lower lip, about the middle
+TOUCHING_LANDMARKS, FACING_LANDMARKS = INNER_LIP_LOWER[4:7], INNER_LIP_UPPER[4:7]  # of the lips, about the middle
 CONTACT_WEIGHT = 1e4  # of a coordinate of these landmarks, relative to a landmark of the cheek
 TEETH_NAMES = ("teeth", "tooth")  # in the names of parts
 JAW = "jawOpen"
@@ -29,7 +30,8 @@ FRONT_SHARE, EDGE_SHARE = 0.06, 0.01  # of the mouth's width: depth of the front
 # Incisors of a face without teeth, or whose teeth are elsewhere, relative to the middle of the upper lip and to the
 # mouth's width: as on the default head.
 EDGE_BELOW_LIP, EDGE_BEHIND_LIP = 0.055, 0.085
-PLAUSIBLE_BELOW, PLAUSIBLE_BEHIND = (-0.02, 0.14), (-0.02, 0.22)
+PLAUSIBLE_BELOW, PLAUSIBLE_BEHIND = (-0.02, 0.14), (-0.02, 0.3)
+SHOWN_SHARE = 0.03  # of the mouth's width: least distance of the upper lip, which shows the teeth
 COVER_SHARE, AHEAD_SHARE = 0.03, 0.012  # of the mouth's width, by which the lip covers the edge and lies before it
 
 
@@ -45,20 +47,29 @@ class IncisorContact:
         Height and depth of the touching landmarks per weight, mm.
     target : (r,)
         Their displacement from rest in contact, mm.
+    upper_motion : (u, K)
+        Height of the facing landmarks of the upper lip per weight, mm.
+    upper_target : (u,)
+        Their least displacement from rest in contact, mm.
     """
 
     mouth: LipConstraints
     motion: FloatArray
     target: FloatArray
+    upper_motion: FloatArray
+    upper_target: FloatArray
 
     def enforce(self, speech: FloatArray, contact: FloatArray) -> FloatArray:
         """Weights (T, K) whose lower lip is in contact by shares (T,): 0 as in speech, 1 at the incisors."""
         changed = contact > 0
         if not changed.any():
             return speech
-        mouth, moved = self.mouth, self.motion[:, self.mouth.moving]
-        now = ordered_product(speech[changed], self.motion.T)
-        shift = contact[changed, None] * (self.target - now)
+        mouth, lips = self.mouth, np.concatenate([self.motion, self.upper_motion])
+        moved, now = lips[:, self.mouth.moving], ordered_product(speech[changed], lips.T)
+        n_lower = len(self.motion)
+        wanted_now = np.maximum(self.upper_target, now[:, n_lower:])
+        wanted_now = np.concatenate([np.broadcast_to(self.target, (len(now), n_lower)), wanted_now], axis=1)
+        shift = contact[changed, None] * (wanted_now - now)
         current = speech[np.ix_(changed, mouth.moving)]
         wanted = ordered_product(current, moved.T) + shift
         curvature = mouth.curvature + CONTACT_WEIGHT * ordered_product(moved.T, moved)
@@ -75,7 +86,14 @@ def build_incisor_contact(face: Face, mouth: LipConstraints, edge: tuple[float, 
     width = float(np.linalg.norm(places[MOUTH_CORNER_LEFT] - places[MOUTH_CORNER_RIGHT]))
     lips = list(TOUCHING_LANDMARKS)
     target = np.array([edge[0] + COVER_SHARE * width, edge[1] + AHEAD_SHARE * width]) - places[lips, 1:]
-    return IncisorContact(mouth, motion[lips, 1:].reshape(2 * len(lips), -1), target.ravel())
+    upper = list(FACING_LANDMARKS)
+    return IncisorContact(
+        mouth=mouth,
+        motion=motion[lips, 1:].reshape(2 * len(lips), -1),
+        target=target.ravel(),
+        upper_motion=motion[upper, 1],
+        upper_target=edge[0] + (COVER_SHARE + SHOWN_SHARE) * width - places[upper, 1],
+    )
 
 
 def incisor_edge(face: Face, places: FloatArray, width: float) -> tuple[float, float]:

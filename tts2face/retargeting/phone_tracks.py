@@ -15,7 +15,7 @@ CLOCK_HZ = 200.0  # rate at which tracks are computed; they are interpolated at 
 HOLD_SHARE = 0.5  # share of a phone, or of the half of a diphthong, in which its target is held
 MAX_TRANSITION_S = 0.16  # lips round at most this long before a rounded phone is held (Perkell and Matthies 1992)
 SMOOTHING_S = 0.012  # standard deviation of a Gaussian; short phones of fast speech fall short of their targets
-CONTACT_EASE_S, TONGUE_EASE_S = 0.08, 0.07  # transition to and from a contact of the lip, and of the tongue
+CONTACT_EASE_S, TONGUE_EASE_S = 0.1, 0.07  # transition to and from a contact of the lip, and of the tongue
 EASES_S = {
     "lip_contact": CONTACT_EASE_S,
     "incisor_contact": CONTACT_EASE_S,
