@@ -27,8 +27,10 @@ from tts2face.video.track import FaceTracker
 
 N_UTTERANCES = 40  # of the talker whose poses the face takes
 N_POSES = 4000  # whose scores are computed from landmarks
-N_DRAWN = 160  # poses of speech, and as many variations, that are rendered in each round of the correction
-N_ROUNDS = 2  # of the correction: the first changes the poses that speech gives
+# Poses of speech, and variations of them, that are rendered in each round; each round changes the poses of speech, and
+# Gauss-Newton steps lead to where the map is wrong, so that rounds must follow each other.
+N_DRAWN = ((150, 350), (300, 150), (300, 150))
+DRAWN_COPIES = 3  # of a rendered pose in the training data, of which those of landmarks are the rest
 SIZE_PX = 256
 RIDGE = 30.0  # of the correction, for weights and logits of unit size
 LEAST_PRECISION = 0.01  # of a logit in the correction; that of a score of s is s (1 - s)
@@ -67,20 +69,21 @@ def calibrate_face(
     report = on_progress or (lambda done, of: None)
     rng = np.random.default_rng(0)
     columns = [face.shape_names.index(name) for name in names]
-    plain = replace(face, scores=None)
-    spoken = _speech_poses(plain, talker)[:, columns]
+    spoken = _speech_poses(replace(face, scores=None), talker)[:, columns]
     poses = vary_poses(spoken, names, N_POSES, rng)
-    geometric = fit_score_map(names, poses, read_mouth_scores(_landmarks(face, poses, columns), reader))
-    report(1, 1 + N_ROUNDS)
-    found, drawn, read = geometric, np.zeros((0, len(names))), np.zeros((0, len(SCORE_SHAPES)))
-    for number in range(N_ROUNDS):
+    read = read_mouth_scores(_landmarks(face, poses, columns), reader)
+    drawn, drawn_read = np.zeros((0, len(names))), np.zeros((0, len(SCORE_SHAPES)))
+    found: ScoreMap | None = None
+    for number, (n_spoken, n_varied) in enumerate(N_DRAWN):
         spoken = _speech_poses(replace(face, scores=found), talker)[:, columns]
-        chosen = spoken[rng.choice(len(spoken), N_DRAWN, replace=False)]
-        poses = np.concatenate([np.zeros((1, len(names))), chosen, vary_poses(spoken, names, N_DRAWN, rng)])
-        seen, scores = _read_drawn(face, poses, columns, (tracker, reader))
-        drawn, read = np.concatenate([drawn, seen]), np.concatenate([read, scores])
-        found = correct_score_map(geometric, drawn, read)
-        report(2 + number, 1 + N_ROUNDS)
+        chosen = spoken[rng.choice(len(spoken), n_spoken, replace=False)]
+        shown = np.concatenate([np.zeros((1, len(names))), chosen, vary_poses(spoken, names, n_varied, rng)])
+        seen, scores = _read_drawn(face, shown, columns, (tracker, reader))
+        drawn, drawn_read = np.concatenate([drawn, seen]), np.concatenate([drawn_read, scores])
+        known = np.concatenate([poses, *[drawn] * DRAWN_COPIES])
+        known_scores = np.concatenate([read, *[drawn_read] * DRAWN_COPIES])
+        found = correct_score_map(fit_score_map(names, known, known_scores), drawn, drawn_read)
+        report(1 + number, len(N_DRAWN))
     return replace(face, scores=found)
 
 

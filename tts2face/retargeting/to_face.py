@@ -48,8 +48,8 @@ MAX_CONTACT_MM = 1.5  # upper limit of the tracked gap of touching lips; larger 
 FULL_GAP_MM = 3.0  # gap beyond contact from which it is reproduced in full
 GAP_WEIGHT = 300.0  # of a lip gap, relative to a landmark of the cheek: contact is the most visible
 # With score rows: the scores determine the jaw, and the width must hold against them.
-SCORED_GAP_WEIGHT = 1000.0
-SCORED_MOUTH = MouthWeights(width=3000.0, chin=60.0)
+SCORED_GAP_WEIGHT = 3000.0
+SCORED_MOUTH = MouthWeights(width=20_000.0, chin=60.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,8 +149,9 @@ def build_retargeter(
     turn, scale = _fit_face_axes(talker, face, rest)
     shape_motion = per_weight[[int(np.flatnonzero(face.landmarks == landmark)[0]) for landmark in common]]
     talker_motion = _displacements(talker, common, scale * turn)
-    if rest_scores is None and talker.scores is not None:
-        rest_scores = talker.scores.scores(talker.model.rest[None, : talker.model.n_speech])[0]
+    scores = talker.scores if talker.scores and len(talker.scores.inputs) == talker.model.n_speech else None
+    if rest_scores is None and scores is not None:
+        rest_scores = scores.scores(talker.model.rest[None, : talker.model.n_speech])[0]
     response = None if rest_scores is None else _response(face, moving)
     mouth, gap_weight = (VISIBLE, GAP_WEIGHT) if response is None else (SCORED_MOUTH, SCORED_GAP_WEIGHT)
     weighted = shape_motion * landmark_weights(common)[..., None]
@@ -178,7 +179,7 @@ def build_retargeter(
         gap_linear_term=gap_weight * opened.T,
         lip_linear_term=(weighted[upper, 1] - weighted[lower, 1]).T / 2,
         model=talker.model,
-        scores=talker.scores,
+        scores=scores,
         matching=None
         if response is None or rest_scores is None
         else build_score_matching(response, curvature, limits, opened, rest_scores),
