@@ -46,17 +46,17 @@ def whole_number(help_text: str) -> Parameter:
     return Parameter(help=help_text, converter=parse_whole_number)
 
 
-Jobs = Annotated[int | None, whole_number("Number of processes; by default one per core.")]
-Cache = Annotated[Path | None, Parameter(help="Folder for intermediate results; by default the user's cache folder.")]
-Model = Annotated[Path | None, Parameter(help="Path of face_landmarker.task; by default found or set up.")]
-
-
 def parse_whole_number(_: Any, tokens: "Sequence[Token]") -> int:
     """Value of an integer flag; cyclopts itself rounds 2.5 to 2."""
     try:
         return int(tokens[0].value)
     except ValueError as wrong:
         raise ValueError(f'"{tokens[0].value}" is not a whole number') from wrong
+
+
+Jobs = Annotated[int | None, whole_number("Number of processes; by default one per core.")]
+Cache = Annotated[Path | None, Parameter(help="Folder for intermediate results; by default the user's cache folder.")]
+Model = Annotated[Path | None, Parameter(help="Path of face_landmarker.task; by default found or set up.")]
 
 
 def add_option_flags(*groups: tuple[str, type], without: frozenset[str] = frozenset()) -> Callable[..., Any]:

@@ -30,7 +30,7 @@ def retargeting_page(study: RetargetingStudy) -> str:
     others = [one for one in study.phones if not one.is_judged]
     parts = [
         paragraphs(
-            f"{study.n_recordings} recordings, {study.n_frames} frames, mimicked frame by frame by the face {study.face}.",
+            f"{study.n_recordings} recordings, {study.n_frames} frames; the face {study.face} mimics every frame.",
             f"{study.n_missed} of {study.differences.size} differences exceed {TOLERANCE} (phones with {LEAST_TOKENS} "
             "tokens or more).",
         ),

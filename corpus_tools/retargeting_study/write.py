@@ -14,7 +14,7 @@ from corpus_tools.report.page import report_writer
 from corpus_tools.retargeting_study.analysis import SCORES, TOLERANCE, RetargetingStudy, study_retargeting
 from corpus_tools.retargeting_study.page import figure_png, retargeting_page
 from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
-from lexicon.phones import ARPABET
+from corpus_tools.similarity.tokens import phone_label
 from tts2face.models.face_loading import load_face
 from tts2face.storage.files import write_atomically
 
@@ -54,7 +54,7 @@ def study_csv(study: RetargetingStudy) -> str:
     for one in study.phones:
         for score, person, face in zip(SCORES, one.person, one.face, strict=True):
             numbers = (f"{value:.4f}" for value in (person, face, face - person))
-            rows.writerow([one.phone, ARPABET[one.phone], one.n_tokens, score, *numbers])
+            rows.writerow([one.phone, phone_label(one.phone, "arpabet"), one.n_tokens, score, *numbers])
     return file.getvalue()
 
 

@@ -22,7 +22,7 @@ STEP_SHARE = 0.5  # of each step: full steps oscillate, because scores are steep
 BLOCK = 256  # frames solved together, which bounds the memory
 GRID = np.linspace(0.0, 1.0, 51)  # weights at which a shape's own score is tabulated
 # Of the squared error of a logit, relative to a landmark of the cheek (1 / mm^2), in the order of `SCORE_SHAPES`.
-SCORE_WEIGHTS = np.array([100_000.0, 10_000.0, 10_000.0, 10_000.0, 10_000.0, 10_000.0, 10_000.0])
+SCORE_WEIGHTS = np.array([300_000.0, 10_000.0, 10_000.0, 10_000.0, 10_000.0, 10_000.0, 10_000.0])
 # Pull of a score's shapes to the weight that gives the score, as a share of the curvature along the shape.
 PRIOR_SHARES = np.array([0.1, 0.3, 0.1, 0.3, 0.1, 0.1, 0.3])
 # The prior weight of a score minimises its squared error over this one, plus the squared weight times a cost: a shape
@@ -32,7 +32,7 @@ OTHER_SHARE = 0.1  # pull of all other shapes to 0, as a share of the median cur
 JAW = tuple(SCORE_SHAPES).index("jawOpen")
 # Of a lip gap where the lips touch, in addition to that of `curvature`; it falls to 0 at `FREE_GAP_MM`.
 CLOSED_GAP_WEIGHT, FREE_GAP_MM = 100_000.0, 3.0
-JAW_GAP_MM = 2.0  # lip gap from which the jaw follows its score in full; on closed lips the tracker sees no jaw
+JAW_GAP_MM = 1.0  # lip gap from which the jaw follows its score in full; on closed lips the tracker sees no jaw
 LOW_SCORE = 0.02  # scores below it are not told apart
 SCORE_LIMITS = (0.01, 0.97)  # of target scores, so that their logits are finite
 REST_TOLERANCE = 0.08  # difference of the scores at rest that vanishes during speech; more is a person's build
