@@ -69,6 +69,7 @@ def calibrate_face(
     report = on_progress or (lambda done, of: None)
     rng = np.random.default_rng(0)
     columns = [face.shape_names.index(name) for name in names]
+    mirror = [names.index(mirrored_name(name)) if mirrored_name(name) in names else at for at, name in enumerate(names)]
     spoken = _speech_poses(replace(face, scores=None), talker)[:, columns]
     poses = vary_poses(spoken, names, N_POSES, rng)
     read = read_mouth_scores(_landmarks(face, poses, columns), reader)
@@ -82,7 +83,8 @@ def calibrate_face(
         drawn, drawn_read = np.concatenate([drawn, seen]), np.concatenate([drawn_read, scores])
         known = np.concatenate([poses, *[drawn] * DRAWN_COPIES])
         known_scores = np.concatenate([read, *[drawn_read] * DRAWN_COPIES])
-        found = correct_score_map(fit_score_map(names, known, known_scores), drawn, drawn_read)
+        fitted = fit_score_map(names, np.concatenate([known, known[:, mirror]]), np.tile(known_scores, (2, 1)))
+        found = symmetrise_score_map(correct_score_map(fitted, drawn, drawn_read), mirror)
         report(1 + number, len(N_DRAWN))
     return replace(face, scores=found)
 
@@ -125,6 +127,28 @@ def correct_score_map(score_map: ScoreMap, poses: FloatArray, scores: FloatArray
         direct=(mixing @ score_map.direct + by_pose).astype(np.float32),
         bias=(mixing @ score_map.bias + constant[:, 0]).astype(np.float32),
     )
+
+
+def symmetrise_score_map(score_map: ScoreMap, mirror: list[int]) -> ScoreMap:
+    """Mean of the map and of the map for mirrored inputs, whose order is `mirror`.
+
+    The scores average left and right; a map that treats them differently would turn the mouth to one side.
+    """
+    half = score_map.output / 2
+    return replace(
+        score_map,
+        hidden=np.concatenate([score_map.hidden, score_map.hidden[:, mirror]]),
+        hidden_bias=np.tile(score_map.hidden_bias, 2),
+        output=np.concatenate([half, half], axis=1),
+        direct=(score_map.direct + score_map.direct[:, mirror]) / 2,
+    )
+
+
+def mirrored_name(name: str) -> str:
+    """Name of a shape on the other half of the face; the same for shapes of both halves."""
+    if "Left" in name:
+        return name.replace("Left", "Right")
+    return name.replace("Right", "Left")
 
 
 def _speech_shapes(face: Face) -> tuple[str, ...]:

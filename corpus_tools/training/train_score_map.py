@@ -11,7 +11,7 @@ from tts2face.models.talker import Talker, speech_channels
 from tts2face.types import Trajectory
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 
-N_UNITS = 32
+N_UNITS = 24
 DECAY = 1e-3  # of the weights of both layers: steep maps are hard to invert
 N_EPOCHS, BATCH = 40, 128
 LEARNING_RATE = 0.004  # of Adam (Kingma and Ba 2015), falling linearly to 0

@@ -48,8 +48,8 @@ MAX_CONTACT_MM = 1.5  # upper limit of the tracked gap of touching lips; larger 
 FULL_GAP_MM = 3.0  # gap beyond contact from which it is reproduced in full
 GAP_WEIGHT = 300.0  # of a lip gap, relative to a landmark of the cheek: contact is the most visible
 # With score rows: the scores determine the jaw, and the width must hold against them.
-SCORED_GAP_WEIGHT = 3000.0
-SCORED_MOUTH = MouthWeights(width=20_000.0, chin=60.0)
+SCORED_GAP_WEIGHT = 10_000.0
+SCORED_MOUTH = MouthWeights(width=50_000.0, chin=60.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
