@@ -47,9 +47,9 @@ CONTACT_PERCENTILE = 90  # of the smallest gaps in bilabials: the tracked gap up
 MAX_CONTACT_MM = 1.5  # upper limit of the tracked gap of touching lips; larger values are tracking errors
 FULL_GAP_MM = 3.0  # gap beyond contact from which it is reproduced in full
 GAP_WEIGHT = 300.0  # of a lip gap, relative to a landmark of the cheek: contact is the most visible
-# With score rows: the scores determine the jaw, and the width must hold against them.
-SCORED_GAP_WEIGHT = 10_000.0
-SCORED_MOUTH = MouthWeights(width=50_000.0, chin=60.0)
+# With score rows, whose logits weigh as much: gaps, width and chin must hold against them.
+SCORED_GAP_WEIGHT = 30_000.0
+SCORED_MOUTH = MouthWeights(width=150_000.0, chin=10_000.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
