@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from cli.flags import switch, whole_number
+from cli.flags import Cache, Jobs, Model, switch, whole_number
 from cli.process import write_message
 from cli.progress import progress_bar, stage_bar
 from tts2face.storage.output_names import check_file_name
@@ -15,8 +15,6 @@ from tts2face.storage.overwrite import refuse_overwriting
 
 corpus = App(name="corpus", help="Build, show and evaluate talkers.")
 
-Jobs = Annotated[int | None, whole_number("Number of processes; by default one per core.")]
-Cache = Annotated[Path | None, Parameter(help="Folder for intermediate results; by default the user's cache folder.")]
 OutTalker = Annotated[Path, Parameter(help="Output talker (.talker).", alias="-o")]
 TalkerName = Annotated[str, Parameter(help="A shipped talker or a .talker file.")]
 Provenance = Annotated[
@@ -25,7 +23,6 @@ Provenance = Annotated[
         help="JSON with name, language, sources, licence and attribution; by default provenance.json of the folder."
     ),
 ]
-Model = Annotated[Path | None, Parameter(help="Path of face_landmarker.task; by default found or set up.")]
 
 
 @corpus.command

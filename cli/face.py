@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
-from cli.flags import switch
+from cli.flags import Model, switch
 from cli.process import write_message
 from cli.progress import progress_bar
 from tts2face.storage.output_names import check_file_name
@@ -72,6 +72,25 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
     if not quiet:
         print(_report_text(imported.report), end="")  # noqa: T201 - the result
         write_message(f"wrote {out}")
+
+
+@face.command
+def calibrate(
+    name: Annotated[str, Parameter(name="face", help="Shipped face or .face file.")],
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="Output face (.face); may be the face itself.", alias="-o")],
+    talker: Annotated[str, Parameter(help="Talker whose speech gives the poses.")] = "grid_s1",
+    model: Model = None,
+) -> None:
+    """Measure what the face tracker reads in a face's mouth, so that it opens as the person's (some minutes)."""
+    check_file_name(out, "a face", (".face",))
+    refuse_overwriting({"--out": out}, {"--talker": talker, "--model": model})
+    from corpus_tools.training.score_files import calibrate_face_file
+
+    with progress_bar("rendering poses") as on_progress:
+        calibrate_face_file(name, out, source=talker, model=model, on_progress=on_progress)
+    write_message(f"wrote {out}")
 
 
 @face.command

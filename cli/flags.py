@@ -54,6 +54,11 @@ def parse_whole_number(_: Any, tokens: "Sequence[Token]") -> int:
         raise ValueError(f'"{tokens[0].value}" is not a whole number') from wrong
 
 
+Jobs = Annotated[int | None, whole_number("Number of processes; by default one per core.")]
+Cache = Annotated[Path | None, Parameter(help="Folder for intermediate results; by default the user's cache folder.")]
+Model = Annotated[Path | None, Parameter(help="Path of face_landmarker.task; by default found or set up.")]
+
+
 def add_option_flags(*groups: tuple[str, type], without: frozenset[str] = frozenset()) -> Callable[..., Any]:
     """Give a command one keyword flag for each field of the option dataclasses, under a heading for each class.
 

@@ -5,8 +5,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from cli.corpus import Cache, Jobs, Model, Provenance, check_suffix, corpus
-from cli.flags import switch
+from cli.corpus import Provenance, check_suffix, corpus
+from cli.flags import Cache, Jobs, Model, switch
 from cli.process import write_message
 from cli.progress import stage_bar
 from tts2face.storage.overwrite import refuse_overwriting

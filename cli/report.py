@@ -5,13 +5,16 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from cli.flags import whole_number
+from cli.flags import Cache, Jobs, Model, whole_number
 from cli.process import write_message
-from cli.progress import progress_bar
+from cli.progress import progress_bar, stage_bar
 from lexicon.errors import InputError
 from tts2face.storage.overwrite import refuse_overwriting
 
-report = App(name="report", help="Analyse recordings: visual similarity of phones, statistics of gestures.")
+report = App(
+    name="report",
+    help="Analyse recordings: visual similarity of phones, statistics of gestures, retargeting to a face.",
+)
 
 
 @report.command
@@ -91,6 +94,38 @@ def moods(
     write_message(
         f"wrote {out}: of {int(study.confusion.sum())} clips of {len(study.moods)} moods {study.accuracy:.0%} are "
         f"recognised, of their single frames {study.frame_accuracy:.0%}"
+    )
+
+
+@report.command
+def retarget(  # noqa: PLR0913 - one parameter a flag
+    recordings: Annotated[Path, Parameter(help="Folder of recordings of a person, or one video.")],
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="Output: .html, .csv, .json or .png.", alias="-o")],
+    face: Annotated[str, Parameter(help="Face that mimics the recordings: head, cartoon or a .face file.")] = "head",
+    identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
+    jobs: Jobs = None,
+    cache: Cache = None,
+    model: Model = None,
+) -> None:
+    """Compare what the face tracker reads in recordings and in a face that mimics them, phone by phone."""
+    refuse_overwriting({"--out": out}, {"the recordings": recordings, "--face": face, "--model": model})
+    from corpus_tools.retargeting_study.write import write_retargeting
+    from corpus_tools.run_options import RunOptions, ignore_stage
+
+    with stage_bar() as stages:
+        study = write_retargeting(
+            recordings,
+            out,
+            face=face,
+            identity=identity,
+            run_options=RunOptions(cache, jobs, model),
+            stages=stages or ignore_stage,
+        )
+    write_message(
+        f"wrote {out}: {study.n_recordings} recordings, {study.n_missed} of {study.differences.size} scores differ by "
+        "more than .06"
     )
 
 

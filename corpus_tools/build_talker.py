@@ -16,12 +16,14 @@ from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.pose_correction import correct_pose
 from corpus_tools.training.train_audio_map import learn_audio_maps
 from corpus_tools.training.train_phone_network import add_phone_network
+from corpus_tools.training.train_score_map import add_score_map
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_json
 from tts2face.models.talker import Talker, write_talker
 from tts2face.storage.files import write_atomically
 from tts2face.types import Progress
+from tts2face.video.blendshapes import BlendshapeReader
 from tts2face.video.landmark_models import find_bundle
 
 PROVENANCE = "provenance.json"  # in the folder of recordings: their sources and licence
@@ -104,6 +106,7 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
     steady = correct_pose(observations.kept)
     talker = add_phone_network(learn_talker(steady, metadata=metadata), on_progress=stages("learning phone network"))
     talker = replace(talker, audio_maps=learn_audio_maps(steady, talker, stages=stages))
+    talker = add_score_map(talker, BlendshapeReader((run_options or RunOptions()).model))
     if consent is not None:
         on_frames = stages("learning appearance")
         talker = add_appearance(

@@ -26,6 +26,7 @@ NOT_EXECUTED = {  # beginning of a command line: why it is parsed only
     "corpus build": PERSON,
     "corpus face": PERSON,
     "corpus gestures": PERSON,
+    "report retarget": PERSON,
     "corpus audio-maps": "needs 20 or more recordings",
     "corpus evaluate": PERSON,
     "report gestures": LONG,

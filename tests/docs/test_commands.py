@@ -143,6 +143,9 @@ def test_command_lines_of_readme_and_cli_page_work(
         words = _small(words)
     if words[:2] == ["report", "similarity"]:
         words += ["--halves", "2"]
+    if words[:2] == ["face", "calibrate"]:  # takes minutes with the poses that a face needs
+        monkeypatch.setattr("corpus_tools.training.calibrate_face.N_POSES", 40)
+        monkeypatch.setattr("corpus_tools.training.calibrate_face.N_DRAWN", ((2, 2),))
     assert run(words) == 0, capsys.readouterr().err
     named = [after for word, after in pairwise(words) if word in {"--out", "--explain", "--export"}]
     named += [word for word in words[2:] if "." in word] if words[0] == "convert" else []

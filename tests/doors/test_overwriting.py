@@ -37,6 +37,7 @@ COMMANDS = {
     "a model": ["corpus", "face", ".", "--model", "in.face", "--out", "in.face", "--consent", "I agree"],
     "a talker to study": ["report", "similarity", "in.json", "--out", "in.json"],
     "a palette to study": ["report", "gestures", "in.json", "--out", "in.json"],
+    "a video to study": ["report", "retarget", "in.mp4", "--out", "in.mp4"],
 }  # fmt: skip
 
 

@@ -80,7 +80,7 @@ def face_of(shapes: np.ndarray, limits: tuple[float, float] = (-100.0, 100.0)) -
         eyes=(),
         colours=np.zeros((N_LANDMARKS, 3), np.uint8),
         uv=None,
-        texture=None,
+        textures=(),
         landmarks=np.arange(N_LANDMARKS, dtype=np.int32),
         landmark_vertices=here,
         landmark_weights=np.tile(np.array([1, 0, 0], np.float32), (N_LANDMARKS, 1)),

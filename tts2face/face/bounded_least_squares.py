@@ -21,8 +21,8 @@ def bounded_least_squares(curvature: FloatArray, linear: FloatArray, limits: Flo
 
     Parameters
     ----------
-    curvature : (k, k)
-        H, symmetric and positive definite, so that the solution is unique.
+    curvature : (k, k) or (T, k, k)
+        H, symmetric and positive definite, so that the solution is unique; one for all rows, or one for each.
     linear : (T, k)
         Linear terms f.
     limits : (k, 2)
@@ -41,10 +41,11 @@ def bounded_least_squares(curvature: FloatArray, linear: FloatArray, limits: Flo
     """
     low, high = np.ascontiguousarray(limits[:, 0]), np.ascontiguousarray(limits[:, 1])
     solved: FloatArray = np.zeros(linear.shape)
-    slack = SLOPE_TOLERANCE * float(np.trace(curvature)) / len(curvature)
+    matrices = np.ascontiguousarray(np.reshape(curvature, (-1, *curvature.shape[-2:])))
+    slack = SLOPE_TOLERANCE * float(np.trace(matrices.mean(axis=0))) / curvature.shape[-1]
     bounds = (low, high, slack)
     try:
-        rounds = _solve_all(np.ascontiguousarray(curvature), np.ascontiguousarray(linear), bounds, solved)
+        rounds = _solve_all(matrices, np.ascontiguousarray(linear), bounds, solved)
     except ZeroDivisionError:  # a pivot of the factor is 0
         rounds = MAX_ROUNDS
     if rounds >= MAX_ROUNDS or not np.isfinite(solved).all():
@@ -55,7 +56,7 @@ def bounded_least_squares(curvature: FloatArray, linear: FloatArray, limits: Flo
 
 
 @kernel
-def _solve_all(curvature, linear, bounds, weights):  # type: ignore[no-untyped-def]
+def _solve_all(matrices, linear, bounds, weights):  # type: ignore[no-untyped-def]
     """Write the minimisers; returns the largest number of rounds of a frame. Plain loops compile in a second."""
     low, high, _ = bounds
     n_frames, k = linear.shape
@@ -64,6 +65,7 @@ def _solve_all(curvature, linear, bounds, weights):  # type: ignore[no-untyped-d
     free = np.zeros(k, np.int64)
     longest = 0
     for t in range(n_frames):
+        curvature = matrices[min(t, len(matrices) - 1)]
         for i in range(k):
             state[i] = 0
         fewest, patience, rounds = k + 1, MAX_STALLED_ROUNDS, 0
@@ -83,7 +85,7 @@ def _solve_all(curvature, linear, bounds, weights):  # type: ignore[no-untyped-d
             fewest = min(fewest, n_differing)
             _pivot_states(state, target, patience < 0)
         longest = max(longest, rounds)
-        if rounds >= MAX_ROUNDS:  # not solvable: H is the same for all frames
+        if rounds >= MAX_ROUNDS:  # not solvable
             break
     return longest
 

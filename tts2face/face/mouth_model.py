@@ -1,5 +1,7 @@
 """Mouth of a face: the shapes that speech moves, and the normal matrix of its visible changes."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,7 +28,18 @@ CHIN_WEIGHT = 600.0  # of the drop of the chin, relative to a landmark: it sets 
 REGULARISATION = 0.005  # ridge term as a share of the mean curvature: makes the solution unique and smooth
 
 
-def mouth_curvature(moved: FloatArray, common: list[int]) -> FloatArray:
+@dataclass(frozen=True, slots=True)
+class MouthWeights:
+    """Weights of a mouth's width and of the drop of its chin, relative to a landmark of the cheek."""
+
+    width: float = WIDTH_WEIGHT
+    chin: float = CHIN_WEIGHT
+
+
+VISIBLE = MouthWeights()
+
+
+def mouth_curvature(moved: FloatArray, common: list[int], weights: MouthWeights = VISIBLE) -> FloatArray:
     """Normal matrix (k, k) of the visible changes of a mouth without its lip gaps, plus a ridge term.
 
     Parameters
@@ -41,9 +54,9 @@ def mouth_curvature(moved: FloatArray, common: list[int]) -> FloatArray:
     ridge = REGULARISATION * np.trace(curvature) / moved.shape[-1]
     left, right = ([at[corner] for corner in corners] for corners in (CORNERS_LEFT, CORNERS_RIGHT))
     widened = moved[left, 0] - moved[right, 0]
-    curvature += WIDTH_WEIGHT * ordered_product(widened.T, widened) + ridge * np.eye(moved.shape[-1])
+    curvature += weights.width * ordered_product(widened.T, widened) + ridge * np.eye(moved.shape[-1])
     dropped = moved[[at[landmark] for landmark in CHIN_LANDMARKS if landmark in at], 1].mean(axis=0)
-    curvature += CHIN_WEIGHT * np.outer(dropped, dropped)
+    curvature += weights.chin * np.outer(dropped, dropped)
     return curvature
 
 

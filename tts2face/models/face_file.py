@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Hairdo, Part, Texture
-from tts2face.models.face_layout import MAX_TEXTURES, WIDE_OPEN, check_face, texture_number
+from tts2face.models.face_layout import MAX_TEXTURES, SCORE_INPUTS, WIDE_OPEN, check_face, texture_number
 from tts2face.models.occlusion_coding import decode_occlusion, encode_occlusion
 from tts2face.models.picture_coding import decode_colours, decode_coverage, encode_colours, encode_coverage
+from tts2face.models.score_map import score_map_arrays, score_map_from_arrays
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 KIND = "face"
@@ -89,6 +90,9 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
         "occlusion_bytes": 0 if face.occlusion is None else face.occlusion.shape[2],
         "metadata": dict(face.metadata),
     }
+    if face.scores is not None:
+        arrays |= score_map_arrays(face.scores)
+        header[SCORE_INPUTS] = list(face.scores.inputs)
     write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
 
 
@@ -217,6 +221,7 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
         landmark_weights=arrays["landmark_weights"],
         pivot=arrays["pivot"],
         metadata=header["metadata"],
+        scores=score_map_from_arrays(arrays, tuple(header.get(SCORE_INPUTS, ()))),
     )
 
 

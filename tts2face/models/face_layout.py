@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tts2face.models.face import PART_KINDS
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.occlusion_coding import MAX_OCCLUSION_BYTES
+from tts2face.models.score_map import check_score_map
 from tts2face.storage.schema import (
     MAX_MM,
     Check,
@@ -29,6 +30,7 @@ from tts2face.storage.schema import (
     whole,
 )
 
+SCORE_INPUTS = "score_inputs"  # key of the metadata: names of the shapes that the score map reads
 MAX_TEXTURES = 16
 MAX_WEIGHT = 100.0  # of a shape; common shapes have 0 to 1, gesture modes up to about 30
 MAX_STEP_MM = 0.1  # 16 bits of it are 3 m
@@ -108,6 +110,7 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
             for kind in ("texture", "alpha")
         }
     )
+    _check_scores(contents)
     contents.only_known()
     n_vertices = contents.sizes["vertices"]
     for name in ("triangles", "shape_vertices", "landmark_vertices"):
@@ -139,6 +142,14 @@ def _check_textures(contents: Contents) -> None:
 def texture_number(part: Mapping[str, Any]) -> int:
     """Number of the texture of a part in a file; earlier versions say whether it has the only one."""
     return int(part.get("texture", 0 if part.get("textured") else -1))
+
+
+def _check_scores(contents: Contents) -> None:
+    inputs = contents.header.get(SCORE_INPUTS, [])
+    list_of(text)(inputs, f"{contents.path}: metadata: {SCORE_INPUTS}")
+    unknown = sorted(set(inputs) - set(contents.header["shape_names"]))
+    contents.require(not unknown, f"{SCORE_INPUTS} holds {unknown[:1]}, which is not one of its shapes")
+    check_score_map(contents, len(inputs))
 
 
 def _check_places(contents: Contents) -> None:

@@ -13,6 +13,7 @@ from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.models.appearance import STEPS_PER_PARAMETER, Appearance, appearance_arrays, appearance_from_arrays
 from tts2face.models.audio_map import AudioMap, audio_map_arrays, audio_maps_from_arrays
 from tts2face.models.phone_network import PhoneNetwork, network_arrays, network_from_arrays
+from tts2face.models.score_map import ScoreMap, score_map_arrays, score_map_from_arrays
 from tts2face.models.talker_layout import check_talker
 from tts2face.storage.files import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
@@ -94,7 +95,8 @@ class Talker:
 
     ``metadata`` holds at least name, language, sources, licence, attribution, command and created. ``network`` predicts
     speech parameters from phones, None if there was too little training data; ``audio_maps`` predict them from sound,
-    by name, empty if the talker was built without sound.
+    by name, empty if the talker was built without sound; ``scores`` gives what the face tracker reads in the talker's
+    mouth for speech parameters, None if unknown.
     """
 
     fps: float
@@ -104,6 +106,7 @@ class Talker:
     appearance: Appearance | None = None
     network: PhoneNetwork | None = None
     audio_maps: Mapping[str, AudioMap] = field(default_factory=dict)
+    scores: ScoreMap | None = None
 
     def speech_trajectory(self, utterance: Utterance) -> Trajectory:
         """Speech parameters (T, S) of a recorded utterance."""
@@ -162,7 +165,7 @@ def write_talker(path: Path, talker: Talker) -> None:
         arrays |= appearance_arrays(talker.appearance)
     if talker.network is not None:
         arrays |= network_arrays(talker.network)
-    arrays |= audio_map_arrays(talker.audio_maps)
+    arrays |= audio_map_arrays(talker.audio_maps) | score_map_arrays(talker.scores)
     header = {
         **talker.metadata,
         "fps": talker.fps,
@@ -220,4 +223,6 @@ def _talker_from_arrays(arrays: dict[str, NDArray[Any]], header: dict[str, Any])
         utterances.append(
             Utterance(name, sequence, spans, shape[span], head[span], intensity[span], appearance_parameters)
         )
-    return Talker(fps, model, tuple(utterances), header, appearance, network, audio_maps_from_arrays(arrays))
+    maps = audio_maps_from_arrays(arrays)
+    scores = score_map_from_arrays(arrays, speech_channels(model))
+    return Talker(fps, model, tuple(utterances), header, appearance, network, maps, scores)

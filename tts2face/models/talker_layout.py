@@ -12,6 +12,7 @@ from lexicon.sequence import SILENCE
 from tts2face.models.audio_map import AUDIO_MAP_PREFIX, FEATURE_SIZES, MAX_CONTEXT
 from tts2face.models.landmarks import FACE_OVAL, N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.models.phone_network import N_PHONES_SEEN, N_PLACE
+from tts2face.models.score_map import check_score_map
 from tts2face.storage.schema import (
     MAX_MM,
     Check,
@@ -82,6 +83,7 @@ def check_talker(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping
         _check_network(contents)
     for name in sorted({name.split(".")[1] for name in arrays if name.startswith(AUDIO_MAP_PREFIX)}):
         _check_audio_map(contents, f"{AUDIO_MAP_PREFIX}{name}")
+    check_score_map(contents, header["n_speech"])
     contents.only_known()
 
 

@@ -9,8 +9,10 @@ from lexicon.errors import DataError
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
 from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS, inner_lip_gaps
+from tts2face.models.score_map import mouth_scores
 from tts2face.models.talker import ShapeModel, Talker, speech_channels
 from tts2face.numeric import principal_axes
+from tts2face.retargeting.score_matching import scaled_scores
 from tts2face.retargeting.to_face import Retargeter, build_retargeter
 from tts2face.types import Trajectory
 
@@ -33,7 +35,8 @@ FloatArray = NDArray[np.float64]
 class PerformerRetargeter:
     """Mapping from a performer's landmarks and scores to the weights of a face; built by `build_performer_retargeter`.
 
-    ``open_apertures`` holds the aperture of each open eye over its width, ``neutral_scores`` (B,) the median scores.
+    ``open_apertures`` holds the aperture of each open eye over its width, ``neutral_scores`` (B,) the median scores,
+    ``rest_scores`` (n,) those of `mouth_scores` with closed lips.
     """
 
     model: ShapeModel
@@ -41,6 +44,7 @@ class PerformerRetargeter:
     face: Face
     open_apertures: dict[str, float]
     neutral_scores: NDArray[np.float32]
+    rest_scores: FloatArray
 
     def weights(self, landmarks: NDArray[np.floating], scores: Trajectory, *, gain: float = 1.0) -> Trajectory:
         """Weights (T, K) of the face's shapes.
@@ -55,7 +59,8 @@ class PerformerRetargeter:
             Factor on the motion of lips and brows; lids and gaze are not scaled.
         """
         speech = self.lip_motion(landmarks, scores.fps, gain=gain)
-        weights = np.array(self.lips.retarget(speech).values)
+        mouth = scaled_scores(mouth_scores(scores), self.rest_scores, gain)
+        weights = np.array(self.lips.retarget(speech, mouth).values)
         lids = {side: self._lid_closure(landmarks, side) for side in EYELID_LANDMARKS}
         for column, name in enumerate(self.face.shape_names):
             if not name.startswith(SCORE_DRIVEN_SHAPES) or name not in scores.channels:
@@ -95,17 +100,19 @@ def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajecto
     """
     model = lip_model(landmarks)
     gaps = inner_lip_gaps(landmarks)
-    closed = gaps[np.argsort(gaps[:, MIDDLE_PAIR], kind="stable")[: max(1, int(CLOSED_FRAME_SHARE * len(gaps)))]]
-    contact = np.clip(np.percentile(closed, 50, axis=0), 0.0, MAX_CONTACT_MM)
+    closed = np.argsort(gaps[:, MIDDLE_PAIR], kind="stable")[: max(1, int(CLOSED_FRAME_SHARE * len(gaps)))]
+    contact = np.clip(np.percentile(gaps[closed], 50, axis=0), 0.0, MAX_CONTACT_MM)
+    rest_scores = np.median(mouth_scores(scores)[closed], axis=0)
     talker = Talker(scores.fps, model, (), {"name": "performer"})
     return PerformerRetargeter(
         model=model,
-        lips=build_retargeter(talker, face, contact=contact),
+        lips=build_retargeter(talker, face, contact=contact, rest_scores=rest_scores),
         face=face,
         open_apertures={
             side: float(np.quantile(eye_aperture(landmarks, side), OPEN_LID_QUANTILE)) for side in EYELID_LANDMARKS
         },
         neutral_scores=np.median(scores.values, axis=0),
+        rest_scores=rest_scores,
     )
 
 

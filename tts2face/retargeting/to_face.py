@@ -15,12 +15,12 @@ from tts2face.face.bounded_least_squares import bounded_least_squares
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions, procrustes_rotation
 from tts2face.face.mouth_model import (
     CHIN_LANDMARKS,
-    CHIN_WEIGHT,
     CORNERS_LEFT,
     CORNERS_RIGHT,
     MIDDLE_PAIR,
     SPEECH_SHAPE_PREFIXES,
-    WIDTH_WEIGHT,
+    VISIBLE,
+    MouthWeights,
     landmark_weights,
     mouth_curvature,
     require_lips,
@@ -34,8 +34,10 @@ from tts2face.models.landmarks import (
     MOUTH_REGION,
     inner_lip_gaps,
 )
-from tts2face.models.talker import Talker
+from tts2face.models.score_map import ScoreMap
+from tts2face.models.talker import ShapeModel, Talker
 from tts2face.numeric import ordered_product
+from tts2face.retargeting.score_matching import ScoreMatching, build_score_matching
 from tts2face.types import Trajectory
 
 FloatArray = NDArray[np.float64]
@@ -45,6 +47,9 @@ CONTACT_PERCENTILE = 90  # of the smallest gaps in bilabials: the tracked gap up
 MAX_CONTACT_MM = 1.5  # upper limit of the tracked gap of touching lips; larger values are tracking errors
 FULL_GAP_MM = 3.0  # gap beyond contact from which it is reproduced in full
 GAP_WEIGHT = 300.0  # of a lip gap, relative to a landmark of the cheek: contact is the most visible
+# With score rows, whose logits weigh as much: gaps, width and chin must hold against them.
+SCORED_GAP_WEIGHT = 30_000.0
+SCORED_MOUTH = MouthWeights(width=150_000.0, chin=10_000.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +73,12 @@ class Retargeter:
     gap_linear_term, lip_linear_term : (k, P)
         Linear term per mm of target gap, and of the two lip landmarks per mm by which the target gap exceeds the
         talker's.
+    model
+        The talker's shape model.
+    scores
+        Scores of the talker for speech parameters; None if they are given with the parameters.
+    matching
+        Rows of the scores; None for a face or a talker whose scores are unknown.
     """
 
     shape_names: tuple[str, ...]
@@ -80,11 +91,19 @@ class Retargeter:
     gap_rest: FloatArray
     gap_linear_term: FloatArray
     lip_linear_term: FloatArray
+    model: ShapeModel
+    scores: ScoreMap | None = None
+    matching: ScoreMatching | None = None
 
-    def retarget(self, speech: Trajectory) -> Trajectory:
+    def retarget(self, speech: Trajectory, scores: FloatArray | None = None) -> Trajectory:
         """Weights (T, K) of all shapes of the face for a trajectory of speech parameters (T, S).
 
         Frames are solved independently of each other.
+
+        Parameters
+        ----------
+        scores : (T, n)
+            Scores of the frames as of `mouth_scores`; by default those of the talker's score map.
         """
         parameters = speech.values.astype(np.float64)
         tracked_gaps = ordered_product(parameters, self.gaps[:, :-1].T) + self.gaps[:, -1]
@@ -94,19 +113,28 @@ class Retargeter:
         linear += ordered_product(target_gaps, self.gap_linear_term.T) + ordered_product(
             target_gaps - tracked_gaps + self.gap_rest, self.lip_linear_term.T
         )
-        solved = bounded_least_squares(self.curvature, linear, self.limits)
+        if scores is None and self.scores is not None:
+            scores = self.scores.scores(parameters)
+        if scores is None or self.matching is None:
+            solved = bounded_least_squares(self.curvature, linear, self.limits)
+        else:
+            solved = self.matching.solve(linear, scores, target_gaps, distance_from_rest(parameters, self.model))
         weights = np.zeros((len(parameters), len(self.shape_names)), np.float32)
         weights[:, self.moving] = solved
         return Trajectory(self.shape_names, weights, speech.fps)
 
 
-def build_retargeter(talker: Talker, face: Face, *, contact: FloatArray | None = None) -> Retargeter:
+def build_retargeter(
+    talker: Talker, face: Face, *, contact: FloatArray | None = None, rest_scores: FloatArray | None = None
+) -> Retargeter:
     """Retargeter from a talker to a face.
 
     Parameters
     ----------
     contact : (P,)
         Gaps, in the talker's mm, up to which facing lip points touch; `contact_gaps` of the talker when None.
+    rest_scores : (n,)
+        Scores of the talker at rest as of `mouth_scores`, if scores will be given with the parameters.
 
     Raises
     ------
@@ -121,29 +149,54 @@ def build_retargeter(talker: Talker, face: Face, *, contact: FloatArray | None =
     turn, scale = _fit_face_axes(talker, face, rest)
     shape_motion = per_weight[[int(np.flatnonzero(face.landmarks == landmark)[0]) for landmark in common]]
     talker_motion = _displacements(talker, common, scale * turn)
+    scores = talker.scores if talker.scores and len(talker.scores.inputs) == talker.model.n_speech else None
+    if rest_scores is None and scores is not None:
+        rest_scores = scores.scores(talker.model.rest[None, : talker.model.n_speech])[0]
+    response = None if rest_scores is None else _response(face, moving)
+    mouth, gap_weight = (VISIBLE, GAP_WEIGHT) if response is None else (SCORED_MOUTH, SCORED_GAP_WEIGHT)
     weighted = shape_motion * landmark_weights(common)[..., None]
     linear_term = np.einsum("ldk,lds->ks", weighted, talker_motion)
     left, right = ([at[corner] for corner in corners] for corners in (CORNERS_LEFT, CORNERS_RIGHT))
     upper, lower = ([at[lip] for lip in lips] for lips in (INNER_LIP_UPPER, INNER_LIP_LOWER))
     widened, opened = shape_motion[left, 0] - shape_motion[right, 0], shape_motion[upper, 1] - shape_motion[lower, 1]
-    linear_term += WIDTH_WEIGHT * ordered_product(widened.T, talker_motion[left, 0] - talker_motion[right, 0])
+    linear_term += mouth.width * ordered_product(widened.T, talker_motion[left, 0] - talker_motion[right, 0])
     chin = [at[landmark] for landmark in CHIN_LANDMARKS if landmark in at]
     dropped = shape_motion[chin, 1].mean(axis=0)
-    linear_term += CHIN_WEIGHT * np.outer(dropped, talker_motion[chin, 1].mean(axis=0))
+    linear_term += mouth.chin * np.outer(dropped, talker_motion[chin, 1].mean(axis=0))
     contact = scale * (contact_gaps(talker) if contact is None else contact)
     gaps = _talker_gaps(talker, scale * turn[1], contact)
+    curvature = mouth_curvature(shape_motion, common, mouth) + gap_weight * ordered_product(opened.T, opened)
+    limits = face.limits[moving].astype(np.float64)
     return Retargeter(
         shape_names=face.shape_names,
         moving=moving,
-        limits=face.limits[moving].astype(np.float64),
-        curvature=mouth_curvature(shape_motion, common) + GAP_WEIGHT * ordered_product(opened.T, opened),
+        limits=limits,
+        curvature=curvature,
         linear_term=linear_term,
         gaps=gaps,
         contact=contact,
         gap_rest=ordered_product(gaps[:, :-1], talker.model.rest[: talker.model.n_speech]) + gaps[:, -1],
-        gap_linear_term=GAP_WEIGHT * opened.T,
+        gap_linear_term=gap_weight * opened.T,
         lip_linear_term=(weighted[upper, 1] - weighted[lower, 1]).T / 2,
+        model=talker.model,
+        scores=scores,
+        matching=None
+        if response is None or rest_scores is None
+        else build_score_matching(response, curvature, limits, opened, rest_scores),
     )
+
+
+def distance_from_rest(parameters: FloatArray, model: ShapeModel) -> FloatArray:
+    """Distance (T,) of speech parameters (T, S) from rest in standard deviations of the recorded speech."""
+    n_speech = model.n_speech
+    away = np.square(parameters - model.rest[:n_speech]).sum(axis=1)
+    return np.asarray(np.sqrt(away / max(float(np.square(model.spread[:n_speech]).sum()), 1e-12)), np.float64)
+
+
+def _response(face: Face, moving: NDArray[np.int64]) -> ScoreMap | None:
+    """Score map of a face, if it has one of exactly the shapes that speech moves."""
+    names = tuple(face.shape_names[at] for at in moving)
+    return face.scores if face.scores is not None and face.scores.inputs == names else None
 
 
 def inner_product_map(source: NDArray[np.floating], target: NDArray[np.floating]) -> FloatArray:

@@ -1,0 +1,1 @@
+"""Study of retargeting: what the face tracker reads in recordings and in a face that mimics them."""
