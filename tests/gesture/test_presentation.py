@@ -188,3 +188,13 @@ def test_spread_from_the_spectrum_is_that_of_the_filter() -> None:
     noise = np.random.default_rng(0).normal(size=(20_000, 2))
     filtered = LowPass(0.7, np.zeros(2)).filter(noise)
     np.testing.assert_allclose(filtered_spread(noise - noise.mean(axis=0), 0.7), filtered.std(axis=0), rtol=0.02)
+
+
+def test_a_copied_stream_continues_independently(fields: GestureFields) -> None:
+    stream = GestureStream(fields, style="neutral", seed=2, fps=FPS)
+    stream.next(phrases(4.0), 120, Timeline())
+    copied = stream.copy()
+    first = stream.next(phrases(4.0, 1), 120, Timeline())
+    again = copied.next(phrases(4.0, 1), 120, Timeline())
+    for name in FEATURES:
+        np.testing.assert_array_equal(first[name], again[name])

@@ -5,6 +5,7 @@ opening are played at pauses and phrase ends.
 """
 
 from collections.abc import Iterator
+from copy import copy, deepcopy
 from itertools import pairwise
 from statistics import NormalDist
 
@@ -110,6 +111,12 @@ class BlinkPresentation:
         self._waited = self._interval * self._generator.random()
         self._paused_frames, self._frame, self._time = 0, 0, 0.0
         self._profile = np.zeros((0, 2))
+
+    def copy(self) -> "BlinkPresentation":
+        """A presentation that continues as this one, independently of it."""
+        new = copy(self)
+        new._generator = deepcopy(self._generator)  # all else is replaced, not changed
+        return new
 
     def apply(self, values: Float32Array, frames: FrameContext) -> Float32Array:
         """Lid closures (n, 2) with blinks."""
