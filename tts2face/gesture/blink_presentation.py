@@ -29,9 +29,7 @@ MEAN_INTERVAL_S, INTERVAL_SHAPE, MIN_INTERVAL_S = 4.4, 10.0, 1.5
 EARLY_SHARE = 0.6  # of the interval after which a phrase end is used
 PATIENCE_S = 1.6  # an overdue blink waits this long for a pause
 PAUSE_DB = -20.0  # intensity of a pause, relative to the mean level of speech
-PHRASE_END_FRAMES = (
-    4  # frames of a pause after which it counts as the end of a phrase; closures of plosives are shorter
-)
+PHRASE_END_FRAMES = 3  # of a pause, after which a phrase has ended; most closures of plosives are shorter
 
 Float32Array = NDArray[np.float32]
 
