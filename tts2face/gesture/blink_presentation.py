@@ -25,7 +25,7 @@ MAX_PROFILES = 256
 # Seconds between blinks: a gamma distribution. In conversation 10 to 26 blinks a minute are usual, most of them at
 # pauses and ends of phrases (Bentivoglio et al. 1997, Movement Disorders 12; Nakano and Kitazawa 2010, Experimental
 # Brain Research 205).
-MEAN_INTERVAL_S, INTERVAL_SHAPE, MIN_INTERVAL_S = 4.4, 10.0, 1.5
+MEAN_INTERVAL_S, INTERVAL_SHAPE, MIN_INTERVAL_S = 4.7, 10.0, 1.5
 EARLY_SHARE = 0.6  # of the interval after which a phrase end is used
 PATIENCE_S = 1.6  # an overdue blink waits this long for a pause
 PAUSE_DB = -20.0  # intensity of a pause, relative to the mean level of speech
