@@ -126,6 +126,11 @@ class Trajectory:
         return len(self.values)
 
 
+def resting_head(n_frames: int, fps: float) -> Trajectory:
+    """Head pose (`n_frames`, 6) of a head that does not move: all zeros."""
+    return Trajectory(HEAD_CHANNELS, np.zeros((n_frames, len(HEAD_CHANNELS)), np.float32), fps)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Speech:
     """Synthesised or recorded speech: sound with its phones and words.

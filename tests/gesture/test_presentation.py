@@ -71,11 +71,15 @@ def test_derived_styles_blink_as_in_conversation_and_measured_as_recorded(neutra
     assert blinks_of(measured).per_minute > 35
 
 
-def test_an_idle_face_blinks(fields: GestureFields) -> None:
-    n_frames = round(120 * FPS)
-    silence = Waveform(np.zeros(120 * RATE), RATE)
-    clip = GestureStream(fields, style="neutral", seed=0, fps=FPS).next(silence, n_frames, Timeline())
-    assert 10 <= blinks_of([clip]).per_minute <= 20
+@pytest.fixture(scope="module")
+def idle(fields: GestureFields):
+    seconds = 600
+    silence = Waveform(np.zeros(seconds * RATE), RATE)
+    return GestureStream(fields, style="neutral", seed=0, fps=FPS).next(silence, round(seconds * FPS), Timeline())
+
+
+def test_an_idle_face_blinks(idle) -> None:
+    assert 10 <= blinks_of([idle]).per_minute <= 20
 
 
 def test_most_blinks_begin_at_pauses(neutral) -> None:
@@ -88,11 +92,11 @@ def test_most_blinks_begin_at_pauses(neutral) -> None:
 
 
 @pytest.mark.parametrize("phase", ["closing", "opening", "closing_speeds", "opening_speeds"])
-def test_presented_blinks_have_the_recorded_form(phase: str, neutral, starter: Palette) -> None:
+def test_presented_blinks_have_the_recorded_form(phase: str, idle, starter: Palette) -> None:
     style = starter.styles["grid_s1"]
     recorded = getattr(find_blinks(style.motion["blink"], style.lengths, GESTURE_FPS), phase)
-    presented = getattr(blinks_of(neutral), phase)
-    assert len(presented) > 20
+    presented = getattr(blinks_of([idle]), phase)
+    assert len(presented) > 100
     assert np.median(presented) == pytest.approx(np.median(recorded), rel=0.15)
     assert wasserstein(presented, recorded) < 0.6 * recorded.std()
 
@@ -188,3 +192,13 @@ def test_spread_from_the_spectrum_is_that_of_the_filter() -> None:
     noise = np.random.default_rng(0).normal(size=(20_000, 2))
     filtered = LowPass(0.7, np.zeros(2)).filter(noise)
     np.testing.assert_allclose(filtered_spread(noise - noise.mean(axis=0), 0.7), filtered.std(axis=0), rtol=0.02)
+
+
+def test_a_copied_stream_continues_independently(fields: GestureFields) -> None:
+    stream = GestureStream(fields, style="neutral", seed=2, fps=FPS)
+    stream.next(phrases(4.0), 120, Timeline())
+    copied = stream.copy()
+    first = stream.next(phrases(4.0, 1), 120, Timeline())
+    again = copied.next(phrases(4.0, 1), 120, Timeline())
+    for name in FEATURES:
+        np.testing.assert_array_equal(first[name], again[name])

@@ -5,6 +5,7 @@ opening are played at pauses and phrase ends.
 """
 
 from collections.abc import Iterator
+from copy import copy, deepcopy
 from itertools import pairwise
 from statistics import NormalDist
 
@@ -24,13 +25,11 @@ MAX_PROFILES = 256
 # Seconds between blinks: a gamma distribution. In conversation 10 to 26 blinks a minute are usual, most of them at
 # pauses and ends of phrases (Bentivoglio et al. 1997, Movement Disorders 12; Nakano and Kitazawa 2010, Experimental
 # Brain Research 205).
-MEAN_INTERVAL_S, INTERVAL_SHAPE, MIN_INTERVAL_S = 4.4, 10.0, 1.5
+MEAN_INTERVAL_S, INTERVAL_SHAPE, MIN_INTERVAL_S = 4.7, 10.0, 1.5
 EARLY_SHARE = 0.6  # of the interval after which a phrase end is used
 PATIENCE_S = 1.6  # an overdue blink waits this long for a pause
 PAUSE_DB = -20.0  # intensity of a pause, relative to the mean level of speech
-PHRASE_END_FRAMES = (
-    4  # frames of a pause after which it counts as the end of a phrase; closures of plosives are shorter
-)
+PHRASE_END_FRAMES = 3  # of a pause, after which a phrase has ended; most closures of plosives are shorter
 
 Float32Array = NDArray[np.float32]
 
@@ -110,6 +109,12 @@ class BlinkPresentation:
         self._waited = self._interval * self._generator.random()
         self._paused_frames, self._frame, self._time = 0, 0, 0.0
         self._profile = np.zeros((0, 2))
+
+    def copy(self) -> "BlinkPresentation":
+        """A presentation that continues as this one, independently of it."""
+        new = copy(self)
+        new._generator = deepcopy(self._generator)  # all else is replaced, not changed
+        return new
 
     def apply(self, values: Float32Array, frames: FrameContext) -> Float32Array:
         """Lid closures (n, 2) with blinks."""

@@ -211,6 +211,8 @@ class _FeatureTrack:
         """A track that continues as this one, independently of it."""
         new = copy(self)
         new._generator, new._times = deepcopy(self._generator), self._times.copy()  # all else is replaced, not changed
+        new._presentation = None if self._presentation is None else self._presentation.copy()
+        new._emphasis = None if self._emphasis is None else self._emphasis.copy()
         return new
 
     def extend(self, sound: "_SoundFeatures", end: float, timeline: Timeline) -> None:

@@ -1,5 +1,6 @@
 """Presented head motion: the slow part of the recorded motion, scaled to what viewers see, and nods at accents."""
 
+from copy import copy, deepcopy
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,6 +94,13 @@ class HeadPresentation:
         self._share = -1.0
         self._nods: list[_Nod] = []
         self._last_accent = -ACCENT_GAP_S
+
+    def copy(self) -> "HeadPresentation":
+        """A presentation that continues as this one, independently of it."""
+        new = copy(self)
+        new._generator, new._nods = deepcopy(self._generator), self._nods.copy()
+        new._slow, new._lasting = self._slow.copy(), self._lasting.copy()
+        return new
 
     def apply(self, values: Float32Array, frames: FrameContext) -> Float32Array:
         """Head poses (n, 6) with the slow part scaled and nods added."""

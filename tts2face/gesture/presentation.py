@@ -5,8 +5,9 @@ Derived styles keep the form of the recorded motion (profiles of blinks, slow pa
 often and how far; recorded styles and the style ``measured`` are unchanged.
 """
 
+from copy import copy, deepcopy
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,9 @@ class FrameContext:
 class Presentation(Protocol):
     """Change of a feature's sampled frames; keeps its state from piece to piece."""
 
+    def copy(self) -> Self:
+        """A presentation that continues as this one, independently of it."""
+
     def apply(self, values: Float32Array, frames: FrameContext) -> Float32Array:
         """Presented values (n, k) of sampled values (n, k)."""
 
@@ -68,6 +72,12 @@ class LowPass:
     def __init__(self, cutoff_hz: float, first: FloatArray) -> None:
         self._share = 1.0 - np.exp(-2.0 * np.pi * cutoff_hz / GESTURE_FPS)
         self._stages = np.tile(np.asarray(first, np.float64), (SMOOTHING_STAGES, 1))
+
+    def copy(self) -> "LowPass":
+        """A filter that continues as this one, independently of it."""
+        new = copy(self)
+        new._stages = self._stages.copy()
+        return new
 
     def filter(self, values: FloatArray) -> FloatArray:
         """Filtered values (n, k) of the next values (n, k)."""
@@ -98,6 +108,10 @@ class Emphasis:
         impulse = np.zeros((round(20 * GESTURE_FPS / RANDOM_HZ), 1))
         impulse[0] = np.sqrt(len(impulse))  # its spectrum is that of white noise of standard deviation 1
         self._random_gain = float(1.0 / filtered_spread(impulse, RANDOM_HZ)[0])
+
+    def copy(self) -> "Emphasis":
+        """An emphasis that continues as this one, independently of it."""
+        return deepcopy(self)
 
     def next(self, frames: FrameContext) -> FloatArray:
         """(n,) factors of a mood's expression at the next frames; 1 where the style is a recorded one."""

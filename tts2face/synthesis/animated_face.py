@@ -34,7 +34,7 @@ from tts2face.request import NATURAL
 from tts2face.retargeting.articulation import DEFAULT_ARTICULATION, Articulator, build_articulator
 from tts2face.retargeting.performer import build_performer_retargeter, lip_model, match_shapes
 from tts2face.retargeting.to_face import Retargeter, build_retargeter
-from tts2face.types import HEAD_CHANNELS, GiveWay, Trajectory, keep_on
+from tts2face.types import GiveWay, Trajectory, keep_on, resting_head
 from tts2face.video.livelink import FaceCapture
 from tts2face.video.take import Take
 
@@ -328,8 +328,3 @@ def own_appearance_face(talker: Talker, exemplars: ExemplarModel, palette: Palet
     gestures = None if palette is None else build_own_face_gestures(talker, palette)
     appearance = build_appearance_exemplars(talker, exemplars)
     return OwnAppearanceFace(talker, exemplars, appearance, fit_appearance_regression(talker), gestures)
-
-
-def resting_head(n_frames: int, fps: float) -> Trajectory:
-    """Head pose (`n_frames`, 6) of a head that does not move: all zeros."""
-    return Trajectory(HEAD_CHANNELS, np.zeros((n_frames, len(HEAD_CHANNELS)), np.float32), fps)

@@ -18,7 +18,7 @@ from tts2face.gesture.timeline import Timeline
 from tts2face.models.talker import Talker
 from tts2face.request import Request
 from tts2face.speech.text_fit import TextMismatch
-from tts2face.synthesis.animated_face import AnimatedFace, resting_head
+from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.audio_input import (
     TimedTranscript,
     align_transcript,
@@ -37,7 +37,7 @@ from tts2face.synthesis.marked_speech import (
     speak_sentence,
 )
 from tts2face.synthesis.prepared_request import IDLE_STEPS, RECORDING_STEPS, PreparedRequest
-from tts2face.types import Clip, GiveWay, Speech, Trajectory, Waveform, frame_count, keep_on
+from tts2face.types import Clip, GiveWay, Speech, Trajectory, Waveform, frame_count, keep_on, resting_head
 from tts2face.voice.engine import Voice
 
 Spoken = TypeVar("Spoken")

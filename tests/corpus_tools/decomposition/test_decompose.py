@@ -167,7 +167,7 @@ def test_a_person_of_another_size_moves_the_common_face_alike(basis: ExpressionB
     first = add_style(None, "small", _style(basis, 1), basis.rest, {})
     assert min(first.kept.values()) > 0.95
     second = add_style(first.palette, "large", _style(basis, 1, 1.3), 1.3 * basis.rest, {})
-    assert second.palette.names == ("small", "large")
+    assert second.palette.names == ("small", "large", "measured")
     for feature in REGION_FEATURES:
         small, large = (second.palette.styles[name].motion[feature] for name in ("small", "large"))
         np.testing.assert_allclose(large, small, atol=0.02 * np.abs(small).max())
