@@ -1,6 +1,7 @@
 """The pictures of the README and the docs: ``python docs/make_pictures.py [--own-face me.talker]``."""
 
 import argparse
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,10 @@ from corpus_tools.similarity.analysis import Options
 from corpus_tools.similarity.write import write_similarity
 from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE
-from tts2face.catalogue import identities
+from tts2face.catalogue import haircuts, identities
+from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
+from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
 from tts2face.render.draw import draw
 from tts2face.render.picture import Picture
@@ -29,8 +32,14 @@ NEW_SENTENCES = (
     "She sells sea shells, please believe me.",
     "My mother baked five big apple pies for Bob.",
 )
-SIDE = 240
-WORD_PIXELS = 16
+SHAPES_TEXT = "My father thinks she saw you leave the old red boat."
+SHAPES = ("m", "f", "ɑ", "ð", "θ", "ʃ", "u", "l", "i", "b")  # one frame for each, in the order of speech
+VIEWS = {"front": "0,0,420", "three-quarter": "38,0,420"}  # close to the mouth
+MOOD_TEXT = "I have a lot to tell you, so please sit down and listen while I explain what happened yesterday."
+N_MOOD_FRAMES = 6
+SIDE = 320
+WORD_PIXELS = 18
+JPEG_QUALITY = 88
 
 
 def labelled(pixels: NDArray[np.uint8], text: str) -> Image.Image:
@@ -50,32 +59,77 @@ def sheet(pictures: list[Image.Image], columns: int) -> Image.Image:
     return whole
 
 
-def clip_sheet() -> Image.Image:
-    """Frames of one clip at the middle of twelve of its phones."""
-    ready, request = Session(load_talker("grid_s1"), load_face("head")), Request(text=SENTENCE)
-    renderer = ready.renderer(Picture(size=f"{SIDE}x{SIDE}", camera="close"))
-    (piece,) = ready.stream(request)
-    phones, pictures, after = piece.clip.speech.phones, [], 0
-    for wanted in SPOKEN:
-        at = phones.phones.index(wanted, after)
+def frames_of_phones(
+    session: Session, text: str, wanted: Sequence[str], picture: Picture
+) -> Iterator[tuple[NDArray[np.uint8], str, str]]:
+    """Frames at the middle of phones of a text, in the order of speech, each with its phone and word."""
+    request = Request(text=text)
+    renderer = session.renderer(picture)
+    (piece,) = session.stream(request)
+    phones, after = piece.clip.speech.phones, 0
+    for phone in wanted:
+        at = phones.phones.index(phone, after)
         after = at + 1
         middle = round((phones.edges[at] + phones.edges[at + 1]) / 2 * piece.clip.fps)
         word = next((word.text for word in piece.clip.speech.words if word.first <= at < word.last), SILENCE)
-        pictures.append(labelled(renderer.frame(piece.clip, middle), f"{ipa_to_arpabet(wanted)}  {word}"))
-    return sheet(pictures, 6)
+        yield renderer.frame(piece.clip, middle), phone, word
+
+
+def clip_sheet() -> Image.Image:
+    """Frames of one clip at the middle of twelve of its phones."""
+    picture = Picture(size=f"{SIDE}x{SIDE}")
+    return sheet(
+        [
+            labelled(pixels, f"{ipa_to_arpabet(phone)}  {word}")
+            for pixels, phone, word in frames_of_phones(Session(), SENTENCE, SPOKEN, picture)
+        ],
+        4,
+    )
+
+
+def shapes_sheet() -> Image.Image:
+    """Mouth shapes of ten phones within one sentence, from the front and from three quarters."""
+    pictures = []
+    for camera in VIEWS.values():
+        picture = Picture(size=f"{SIDE}x{SIDE}", camera=camera)
+        shown = list(frames_of_phones(Session(), SHAPES_TEXT, SHAPES, picture))
+        pictures.append([labelled(pixels, f"/{phone}/  {word}") for pixels, phone, word in shown])
+    rows = [row[at : at + 5] for at in (0, 5) for row in pictures]
+    return sheet([picture for row in rows for picture in row], 5)
+
+
+def still(face: Face, label: str, camera: str = "front") -> Image.Image:
+    """A face at rest."""
+    weights = np.zeros(len(face.shape_names), np.float32)
+    return labelled(draw(face, weights, picture=Picture(size=f"{SIDE}x{SIDE}", camera=camera)), label)
 
 
 def faces_sheet() -> Image.Image:
     """The shipped faces and the identities of the head, at rest."""
     chosen: list[tuple[str, str | None]] = [("head", None), ("cartoon", None)]
     chosen += [("head", name) for name in (entry.name for entry in identities())]
-    pictures = []
-    for name, identity in chosen:
-        face = load_face(name, identity)
-        still = np.zeros(len(face.shape_names), np.float32)
-        pixels = draw(face, still, picture=Picture(size=f"{SIDE}x{SIDE}"))
-        pictures.append(labelled(pixels, identity or name))
+    return sheet([still(load_face(name, identity), identity or name) for name, identity in chosen], 4)
+
+
+def hair_sheet() -> Image.Image:
+    """The haircuts on the default head, from the front and from three quarters."""
+    pictures = [
+        still(load_face("head", hair=entry.name), entry.name, camera)
+        for entry in haircuts()
+        for camera in ("front", "three-quarter")
+    ]
     return sheet(pictures, 6)
+
+
+def moods_sheet() -> Image.Image:
+    """Frames of one sentence in each mood, evenly spaced."""
+    session, pictures = Session(), []
+    renderer = session.renderer(Picture(size=f"{SIDE}x{SIDE}"))
+    for style in load_palette("starter").derivations:
+        clip = session.clip(MOOD_TEXT, style=style)
+        at = np.linspace(0, len(clip.motion) - 1, N_MOOD_FRAMES + 2).round().astype(int)[1:-1]
+        pictures += [labelled(renderer.frame(clip, int(number)), style) for number in at]
+    return sheet(pictures, N_MOOD_FRAMES)
 
 
 def own_face_sheet(talker: Path) -> Image.Image:
@@ -103,8 +157,15 @@ def main() -> None:
         own_face_sheet(talker).save(HERE / "own_face.jpg", quality=85)
     write_similarity("grid_s1", HERE / "similarity.png", Options())
     write_gestures("starter", HERE / "gestures.png", GestureOptions())
-    clip_sheet().save(HERE / "clip.png", optimize=True)
-    faces_sheet().save(HERE / "faces.png", optimize=True)
+    sheets = {
+        "clip": clip_sheet,
+        "faces": faces_sheet,
+        "hair": hair_sheet,
+        "moods": moods_sheet,
+        "shapes": shapes_sheet,
+    }
+    for name, draw_sheet in sheets.items():
+        draw_sheet().save(HERE / f"{name}.jpg", quality=JPEG_QUALITY)
 
 
 if __name__ == "__main__":
