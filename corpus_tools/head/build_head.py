@@ -20,10 +20,13 @@ from corpus_tools.head.skin import build_skin
 from corpus_tools.head.source import PACKAGE, SourceMesh, fetch_data, read_source
 from corpus_tools.head.texture import HeadColours, paint_texture
 from corpus_tools.head.tongue import TONGUE_UP
+from corpus_tools.training.score_files import calibrate_face_file
 from tts2face.models.face import Face, Hairdo, Texture
 from tts2face.models.face_file import Identity, write_face
 from tts2face.models.hair_file import write_hair
 from tts2face.numeric import smoothstep
+from tts2face.render.occlusion import bake_hair, bake_occlusion
+from tts2face.render.scene import available_cores
 
 Floats = NDArray[np.float64]
 
@@ -159,12 +162,17 @@ def main() -> None:
     arguments = parser.parse_args()
     data = fetch_all(arguments.data, arguments.assets)
     arguments.out.mkdir(parents=True, exist_ok=True)
-    head, identities = head_with_identities(data)
+    threads = available_cores()
+    bare, identities = head_with_identities(data)
+    head = bake_occlusion(bare, threads)
     write_face(arguments.out / "head.face", head, identities)
-    write_face(arguments.out / "cartoon.face", cartoon_face(data))
+    write_face(arguments.out / "cartoon.face", bake_occlusion(cartoon_face(data), threads))
     cage = build_cage(data.source, DEFAULT_PERSON)
     for name, hair in build_haircuts(data.assets, cage, build_skin(cage), head.vertices.astype(np.float64)):
-        write_hair(arguments.out / f"{name}.hair", hair)
+        write_hair(arguments.out / f"{name}.hair", bake_hair(head, hair, threads))
+    for name in ("head", "cartoon"):
+        path = arguments.out / f"{name}.face"
+        calibrate_face_file(str(path), path)
 
 
 if __name__ == "__main__":
