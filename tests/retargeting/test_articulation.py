@@ -200,7 +200,7 @@ def test_weights_are_smooth_and_within_their_limits(spoken: Spoken) -> None:
     for motion in (spoken.recorded, spoken.clear, spoken.less):
         assert (motion.values >= low - 1e-6).all()
         assert (motion.values <= high + 1e-6).all()
-        assert np.abs(np.diff(motion.values, axis=0)).max() < 0.65  # per 1/60 s: the lower lip moves at most 0.18 m/s
+        assert np.abs(np.diff(motion.values, axis=0)).max() < 0.75  # per 1/60 s: the lower lip moves at most 0.2 m/s
 
 
 def test_natural_changes_neither_vowels_nor_consonants_without_a_contact(

@@ -38,8 +38,9 @@ LEAST_MOTION_MM = 0.5  # per weight of a shape: shapes that move less, as on a f
 ROUND_SHAPES = {"mouthPucker": 1.0}
 FLARED_SHAPES = {"mouthPucker": 0.85, "mouthFunnel": 0.3}
 SPREAD_SHAPES = {"mouthStretchLeft": 0.5, "mouthStretchRight": 0.5, "mouthSmileLeft": 0.5, "mouthSmileRight": 0.5}
-DENTAL_SHAPES = {"jawOpen": 0.15, "mouthLowerDownLeft": 0.4, "mouthLowerDownRight": 0.4}
-DENTAL_DROP_MM = 5.6  # drop of the jaw at which the tip of the tongue is seen between the teeth
+LOWERED_SHAPES = {"mouthLowerDownLeft": 1.0, "mouthLowerDownRight": 1.0}
+# Drop of the jaw and gap of the lips at which the tip of the tongue is seen between the teeth; largest weight for it.
+DENTAL_DROP_MM, DENTAL_GAP_MM, LARGEST_LOWERED = 5.5, 8.0, 0.8
 JAW = "jawOpen"
 OUTER_UPPER_MID, OUTER_LOWER_MID = OUTER_LIP_UPPER[5], OUTER_LIP_LOWER[5]
 
@@ -57,7 +58,8 @@ class Articulator:
     rest_width
         Width of the mouth at rest, mm.
     directions
-        Weights (K,) of ``round``, ``flared``, ``spread``, ``dental`` and ``open`` mouths; zero without such shapes.
+        Weights (K,) that make the mouth ``round``, ``flared``, ``spread`` or ``open``, or lower the lip (``lowered``);
+        zero without such shapes.
     tongue
         Shapes of the tongue.
     incisors
@@ -120,10 +122,15 @@ class Articulator:
         return (share * np.clip(missing / widening, 0.0, 1.0))[:, None] * spread
 
     def _parting(self, speech: FloatArray, share: FloatArray) -> FloatArray:
-        """Weights (T, K) that part the teeth for the tip of the tongue, times shares (T,)."""
-        dropped = ordered_product(speech, self.directions["open"]) * self._gap_by_jaw()
-        missing = 1.0 - dropped / (DENTAL_DROP_MM * self.rest_width / HEAD_MOUTH_MM)
-        return (share * np.clip(missing, 0.0, 1.0))[:, None] * self.directions["dental"]
+        """Weights (T, K) that part teeth and lips for the tip of the tongue, times shares (T,)."""
+        size, jaw, lip = self.rest_width / HEAD_MOUTH_MM, self.directions["open"], self.directions["lowered"]
+        dropped = ordered_product(speech, jaw) * self._gap_by_jaw()
+        drop = np.clip(DENTAL_DROP_MM * size - dropped, 0.0, DENTAL_DROP_MM * size)
+        gap = ordered_product(speech, self.mouth.gaps[MIDDLE_PAIR]) + drop
+        by_lip = max(float(ordered_product(lip, self.mouth.gaps[MIDDLE_PAIR])), LEAST_MOTION_MM)
+        lowered = np.clip((DENTAL_GAP_MM * size - gap) / by_lip, 0.0, LARGEST_LOWERED)
+        weights: FloatArray = (share * drop / self._gap_by_jaw())[:, None] * jaw + (share * lowered)[:, None] * lip
+        return weights
 
     def _gap_by_jaw(self) -> float:
         """Gap of the lips per weight of the jaw, mm."""
@@ -176,7 +183,7 @@ def build_articulator(face: Face) -> Articulator:
     motion = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))
     rest_width = float(np.linalg.norm(places[MOUTH_CORNER_LEFT] - places[MOUTH_CORNER_RIGHT]))
     edge = incisor_edge(face, places, rest_width)
-    tables = {"round": ROUND_SHAPES, "flared": FLARED_SHAPES, "spread": SPREAD_SHAPES, "dental": DENTAL_SHAPES}
+    tables = {"round": ROUND_SHAPES, "flared": FLARED_SHAPES, "spread": SPREAD_SHAPES, "lowered": LOWERED_SHAPES}
     tables["open"] = {JAW: 1.0}
     if not {*ROUND_SHAPES, *FLARED_SHAPES} <= {*face.shape_names}:
         tables["flared"] = ROUND_SHAPES
