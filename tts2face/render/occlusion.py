@@ -32,6 +32,7 @@ VIEW_SAMPLES = 192  # samples along a side of the views: 1.5 mm each on a head
 LIFT_MM, SLACK_MM = 1.2, 1.2  # offset of a vertex along its normal, and depth tolerance of occlusion
 VIEW_DISTANCE_MM = 20_000.0  # distance of the cameras: almost parallel light
 OPEN_JAW_WEIGHT = 0.6  # jawOpen weight of the wide open mouth
+MIN_CACHED_VERTICES = 5000  # smaller faces are traced as fast as a file is read
 CACHE_KIND, CACHE_VERSION = "occlusion", 1
 
 Bits = NDArray[np.uint8]
@@ -57,6 +58,8 @@ def occlusion_of(face: Face, surface: Surface, threads: int) -> Bits:
     """Occlusion (P, V, D / 8) of a face: its own, else from the cache folder, else computed and kept there."""
     if face.occlusion is not None:
         return face.occlusion
+    if len(face.vertices) < MIN_CACHED_VERTICES:
+        return _trace(face, surface, threads, N_DIRECTIONS)
     path = user_cache() / CACHE_KIND / f"{_fingerprint(face)}.bits"
     with suppress(InputError, DataError):
         kept = read_tensors(path, CACHE_KIND, CACHE_VERSION)[0]["bits"]
