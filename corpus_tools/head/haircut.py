@@ -26,7 +26,6 @@ AXIS_Z, FRONT_DEG = -60.0, (36.0, 60.0)  # the vertical axis of the head; a frin
 FRINGE_TOP, BROW_Y = 62.0, 25.0  # heights between which a fringe ends up
 BUST_Y = -335.0
 CROWN_Y, N_CROWN_MEANS = (40.0, 80.0), 12  # heights between which the crown begins
-SINK_MM = 6.0  # of the sheets below
 
 
 def trim_fringe(cards: Cards) -> Cards:
@@ -41,8 +40,8 @@ def trim_fringe(cards: Cards) -> Cards:
     return Cards(moved, cards.triangles, cards.uv, cards.weld)
 
 
-def smooth_crown(cards: Cards) -> Cards:
-    """Cards whose largest sheet is smooth on the crown, with the others below it there."""
+def smooth_sheet(cards: Cards) -> Cards:
+    """The largest sheet, smooth on the crown; the others run so close to it that they would cut through."""
     welded = cards.weld[cards.triangles]
     n = int(cards.weld.max()) + 1
     islands = number_islands(n, welded)[cards.weld]
@@ -55,16 +54,17 @@ def smooth_crown(cards: Cards) -> Cards:
     for _ in range(N_CROWN_MEANS):  # without shrinking: Taubin 1995
         for step in (0.5, -0.53):
             places = places + step * (mean @ places - places)
-    inwards = MIDDLE - cards.vertices
-    inwards /= np.linalg.norm(inwards, axis=1, keepdims=True)
-    moved = np.where(is_main[:, None], places[cards.weld] - cards.vertices, SINK_MM * inwards)
-    return Cards(cards.vertices + share * moved, cards.triangles, cards.uv, cards.weld)
+    moved = cards.vertices + share * (places[cards.weld] - cards.vertices)
+    return _used_cards(Cards(moved, cards.triangles, cards.uv, cards.weld), is_main[cards.triangles].all(axis=1))
 
 
 def cut_at_bust(cards: Cards) -> Cards:
     """Cards without what hangs below the bust."""
-    kept = cards.triangles[(cards.vertices[cards.triangles, 1] > BUST_Y).any(axis=1)]
-    used, packed = np.unique(kept, return_inverse=True)
+    return _used_cards(cards, (cards.vertices[cards.triangles, 1] > BUST_Y).any(axis=1))
+
+
+def _used_cards(cards: Cards, is_kept: NDArray[np.bool_]) -> Cards:
+    used, packed = np.unique(cards.triangles[is_kept], return_inverse=True)
     return Cards(cards.vertices[used], packed.reshape(-1, 3), cards.uv[used], cards.weld[used])
 
 
@@ -80,7 +80,7 @@ class Haircut:
 
 HAIRCUTS: Mapping[str, Haircut] = {
     "long01": Haircut(
-        "long, straight, parted in the middle", 896, StrandStyle(14.0, 3.0, matte=True), (smooth_crown, cut_at_bust)
+        "long, straight, parted in the middle", 896, StrandStyle(14.0, 3.0, matte=True), (smooth_sheet, cut_at_bust)
     ),
     "bob01": Haircut("chin-length bob with a fringe", 704, edits=(trim_fringe,)),
     "bob02": Haircut("chin-length bob with a long side fringe", 896, StrandStyle(10.0, 0.6), (trim_fringe,)),

@@ -17,7 +17,7 @@ from corpus_tools.head.haircut import (
     BUST_Y,
     choose_anchors,
     cut_at_bust,
-    smooth_crown,
+    smooth_sheet,
     split_seams,
     trim_fringe,
 )
@@ -159,7 +159,7 @@ def test_the_crown_gets_smooth_and_keeps_its_height() -> None:
     row, column = (grid.ravel() for grid in np.meshgrid(np.arange(10), np.arange(10), indexing="ij"))
     a = row * 11 + column
     triangles = np.concatenate([np.stack([a, a + 1, a + 12], 1), np.stack([a, a + 12, a + 11], 1)])
-    smooth = smooth_crown(Cards(vertices, triangles, np.zeros((121, 2)), np.arange(121))).vertices
+    smooth = smooth_sheet(Cards(vertices, triangles, np.zeros((121, 2)), np.arange(121))).vertices
     inner = (np.abs(x) < 35) & (np.abs(z + 70) < 35)
     assert np.ptp(smooth[inner, 1]) < 0.3 * np.ptp(vertices[inner, 1])
     assert smooth[inner, 1].mean() == pytest.approx(120, abs=0.5)
