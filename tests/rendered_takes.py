@@ -35,6 +35,11 @@ WORDS = (
     dict(zip("123456789z", DIGITS, strict=True)),
     {"a": "again", "n": "now", "p": "please", "s": "soon"},
 )
+MOODS: tuple[dict[str, str], ...] = (
+    {},
+    {"expression": "happy=0.5", "gain": "head=1.7,brows=1.5"},
+    {"expression": "surprised=0.15", "gain": "head=2.4,brows=2.2,cheeks=1.6"},
+)
 FPS = 25
 SIZE = "208x248"  # pixels, as the real takes; the tracker finds the rendered head from 160 x 160 on
 ROOM_NOISE = 0.001  # standard deviation, -60 dB; forced alignment is inaccurate next to digital silence
@@ -69,9 +74,9 @@ def render_takes(folder: Path) -> None:
         text = transcript(name)
         spoken = " ".join(word.upper() if len(word) == 1 else word for word in text.split())
         marked = f"[pause {LEAD_S}]{spoken}.[pause {TAIL_S}]"
-        # Gestures of the same sound would be alike in every take: each take has a seed and a style of its own.
-        style = ("neutral", "delighted", "exaggerated")[number % 3]
-        clip = session.clip(marked, fps=FPS, seed=number, style=style)
+        # Gestures of the same sound would be alike in every take: each take has a seed and a mood of its own. Head and
+        # blinks are those of a person who is recorded.
+        clip = session.clip(marked, fps=FPS, seed=number, style="measured", **MOODS[number % 3])
         write_clips(folder / f"{name}.mp4", [in_a_room(clip, number)], renderer)
         _remux(folder / f"{name}.mp4", folder / "clips" / f"{name}.mkv")
         times = word_times(clip)
@@ -86,7 +91,7 @@ def write_capture(folder: Path) -> None:
     folder.mkdir(parents=True)
     session = Session("grid_s1", "head")
     text = " [pause 1] ".join(f"{transcript(name)}." for name in NAMES[3:8])
-    clip = session.clip(f"[pause 1] {text} [pause 1]", fps=CAPTURE_FPS)
+    clip = session.clip(f"[pause 1] {text} [pause 1]", fps=CAPTURE_FPS, style="measured")
     mesh_names = Session("grid_s1", "head", palette=None).mesh.shape_names
     columns = [clip.motion.channels.index(name) for name in mesh_names]
     turns = clip.head.values[:, :3] * (1, -1, 1)  # pitch, yaw, roll with the signs of Live Link
