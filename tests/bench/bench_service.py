@@ -28,6 +28,7 @@ VOICE_TEXT = "We were away a year ago, but Bob may move five big maps before we 
 LONG_TEXT = " ".join(["the garden behind the old house near the river had been green for years and nobody knew"] * 12)
 CLIENTS = (1, 4, 16, 64)
 LEAVE_AFTER_S = 2.0  # clients leave at a random time until then
+CANCEL_AFTER_S = 6.0  # the same for `cancel`: within the first sentence or a later one, which is longer
 LIVE_S = 20.0
 Measure = Callable[[str], Awaitable[float]]
 
@@ -123,18 +124,19 @@ async def lateness(url: str, seconds: float = LIVE_S) -> list[float]:
     return found
 
 
-async def cancel(url: str) -> float:
-    """Seconds from the arrival of `cancel` at a synthesis process to the end of what it cancels."""
+async def cancel(url: str, *, at_client: bool = False) -> float:
+    """Seconds from `cancel` to the end of what it cancels, in the synthesis process or as the client sees it."""
     async with websockets.connect(f"{url.replace('http', 'ws', 1)}/v1/stream", max_size=None) as connection:
         await connection.send(json.dumps({"type": "start", "with_idle": False}))
         await connection.send(json.dumps({"type": "text", "text": LONG_TEXT}))
         await connection.send('{"type": "flush"}')
-        await asyncio.sleep(random.uniform(0.0, LEAVE_AFTER_S))
+        await asyncio.sleep(random.uniform(0.0, CANCEL_AFTER_S))
+        begin = time.perf_counter()
         await connection.send('{"type": "cancel"}')
         while True:
             message = await connection.recv()
             if isinstance(message, str) and (content := json.loads(message))["type"] == "cancelled":
-                return float(content["after_ms"]) / 1000
+                return time.perf_counter() - begin if at_client else float(content["after_ms"]) / 1000
 
 
 async def leave(url: str) -> float:
@@ -208,8 +210,9 @@ def main() -> None:
         for streams in (1, 8):
             found = asyncio.run(_gather_lateness(url, streams))
             row("lateness of live curves", streams, *percentiles(found))
-        row("cancel in a sentence, at the process", 1, *percentiles(repeat(url, cancel, 1, 8 * rounds)))
-        row("cancel in a sentence, at the process", 8, *percentiles(repeat(url, cancel, 8, rounds)))
+        for name, one in {"process": cancel, "client": functools.partial(cancel, at_client=True)}.items():
+            row(f"cancel in a sentence, at the {name}", 1, *percentiles(repeat(url, one, 1, 8 * rounds)))
+            row(f"cancel in a sentence, at the {name}", 8, *percentiles(repeat(url, one, 8, rounds)))
         repeat(url, leave, 4, 4 * rounds)
         time.sleep(5.0)
         for bound in ("0.025", "0.05", "0.1"):

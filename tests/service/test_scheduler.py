@@ -103,13 +103,14 @@ def test_a_task_without_input_waits_until_it_is_woken(scheduler: Scheduler, sent
 
 
 def test_an_urgent_task_runs_next(scheduler: Scheduler, sent: list[Message], clock: Clock) -> None:
-    """Even if it is ahead, and first waits for what it has interrupted."""
+    """Until it answers, even if it is ahead, waits for what it has interrupted, and first completes a piece."""
 
     def interrupted() -> Iterator[Step]:
         yield Chunk(b"", 100.0)
         yield Wait()
         yield Wait()
-        yield Event({"type": "cancelled"})
+        yield Chunk(b"sound", 1.0)
+        yield Event({"type": "cancelled"}, is_answer=True)
         yield Event({"type": "later"})
 
     scheduler.start(1, interrupted)
@@ -120,7 +121,7 @@ def test_an_urgent_task_runs_next(scheduler: Scheduler, sent: list[Message], clo
         scheduler.wake(1, is_urgent=True)
         scheduler.run_step()
     run(scheduler)
-    assert [one.task for one in sent if one.kind in {MessageKind.DATA, MessageKind.EVENT}] == [1, 2, 2, 1]
+    assert [one.task for one in sent if one.kind in {MessageKind.DATA, MessageKind.EVENT}] == [1, 1, 2, 2, 1]
 
 
 def test_a_cancelled_task_releases_what_it_holds(scheduler: Scheduler, sent: list[Message], clock: Clock) -> None:

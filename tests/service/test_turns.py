@@ -107,6 +107,18 @@ def test_an_interrupted_task_goes_on(elsewhere: Elsewhere) -> None:
     assert list(steps) == []
 
 
+def test_a_task_is_interrupted_before_its_turn_after_a_wait(elsewhere: Elsewhere) -> None:
+    """As between two steps of a piece, where the wait is over at once."""
+    steps = turns(elsewhere, lambda: waits(elsewhere, []))
+    assert next(steps) == Chunk(b"before")
+    assert next(steps) == Wait()
+    elsewhere.end.set()
+    assert elsewhere.woken.wait(WAIT_S)
+    steps.interrupt()
+    assert next(steps) == Chunk(b"interrupted")
+    assert not elsewhere.is_abandoned
+
+
 def test_without_turns_a_wait_is_a_wait(elsewhere: Elsewhere) -> None:
     elsewhere.end.set()
     assert wait_elsewhere(elsewhere.wait, elsewhere.abandon) == 7

@@ -25,7 +25,7 @@ from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker, speech_channels
 from tts2face.numeric import smoothstep
-from tts2face.types import Trajectory
+from tts2face.types import GiveWay, Trajectory, keep_on
 
 RELEASE_FROM_S = 0.08  # distance from speech at which the transition to rest begins
 REST_FROM_S = 0.20  # distance from speech at which the face is at rest; recorded lips settle within 0.2 s
@@ -143,8 +143,15 @@ def speech_trajectory(
     return blend_trajectory(select_tokens(phones, exemplars, options), exemplars, fps=fps, n_frames=n_frames)
 
 
-def blend_trajectory(selection: TokenSelection, exemplars: ExemplarModel, *, fps: float, n_frames: int) -> Trajectory:
+def blend_trajectory(
+    selection: TokenSelection, exemplars: ExemplarModel, *, fps: float, n_frames: int, give_way: GiveWay = keep_on
+) -> Trajectory:
     """Motion of the talker's speech parameters from selected tokens; the first and the last frame are at rest.
+
+    Parameters
+    ----------
+    give_way
+        Called between the steps.
 
     Notes
     -----
@@ -154,7 +161,7 @@ def blend_trajectory(selection: TokenSelection, exemplars: ExemplarModel, *, fps
     """
     frame_times = np.arange(n_frames) / fps
     n_instants = int(np.ceil(max(selection.phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2
-    motion = _blend_motion(selection.targets, selection.found, exemplars, n_instants, selection.options)
+    motion = _blend_motion(selection, exemplars, n_instants, give_way)
     return Trajectory(exemplars.channels, read_at_frames(motion, selection.phones, frame_times, exemplars.rest), fps)
 
 
@@ -172,17 +179,20 @@ def read_at_frames(
 
 
 def _blend_motion(
-    targets: Targets, found: TokenRanking, exemplars: ExemplarModel, n_instants: int, options: SynthesisOptions
+    selection: TokenSelection, exemplars: ExemplarModel, n_instants: int, give_way: GiveWay
 ) -> NDArray[np.float32]:
     """(n, D) motion at the instants of the clock."""
+    targets, found, options = selection.targets, selection.found, selection.options
     weights = blending.exemplar_weights(found.scores, options.sharpness)
     pieces = blending.average_tokens(exemplars.tokens, found.tokens, weights, exemplars.spread, options)
     joined, is_covered = blending.join_averages(pieces, targets, n_instants, options)
     speech = joined * exemplars.spread
+    give_way()
     if exemplars.network is not None and options.network > 0:
         instants = np.arange(n_instants) / blending.CLOCK_HZ
         predicted = exemplars.network.parameters(target_phones(targets), instants)
         speech = (1 - options.network) * speech + options.network * predicted
+        give_way()
     speech = exemplars.mean_speaking_pose + options.articulation * (speech - exemplars.mean_speaking_pose)
     motion = np.where(is_covered[:, None], speech, exemplars.rest).astype(np.float32)
     motion = blending.gaussian_smooth(motion, options.smoothing_s, blending.CLOCK_HZ)

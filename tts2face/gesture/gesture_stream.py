@@ -2,6 +2,7 @@
 
 from bisect import bisect_right
 from collections.abc import Mapping
+from copy import copy, deepcopy
 from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
@@ -15,7 +16,7 @@ from tts2face.gesture.prosody import prosody_features
 from tts2face.gesture.timeline import Timeline
 from tts2face.interpolation import interpolate_cubic
 from tts2face.models.palette import FEATURES, GESTURE_FPS, FeatureChange, Palette, Style
-from tts2face.types import Waveform
+from tts2face.types import GiveWay, Waveform, keep_on
 
 N_LOOKAHEAD_FRAMES = 2  # frames after a time that cubic interpolation needs
 NO_CHANGE = FeatureChange()
@@ -97,7 +98,13 @@ class GestureStream:
         self._tracks = {name: _FeatureTrack(fields, name, style, seed) for name in fields.features}
         self._n_frames = 0
 
-    def next(self, sound: Waveform, n_frames: int, timeline: Timeline) -> GestureValues:
+    def copy(self) -> "GestureStream":
+        """A stream that continues as this one, independently of it."""
+        new = copy(self)
+        new._tracks = {name: track.copy() for name, track in self._tracks.items()}
+        return new
+
+    def next(self, sound: Waveform, n_frames: int, timeline: Timeline, give_way: GiveWay = keep_on) -> GestureValues:
         """Values (n_frames, k) of each feature for the next frames.
 
         Parameters
@@ -106,6 +113,8 @@ class GestureStream:
             Sound of these frames.
         timeline
             Styles, expressions, nods and gains, in seconds of the whole clip; all of them are applied.
+        give_way
+            Called after each feature. After an exception that it raises, the stream cannot be continued.
         """
         begin = self._n_frames / self._fps
         times = (self._n_frames + np.arange(n_frames)) / self._fps
@@ -114,6 +123,7 @@ class GestureStream:
         for name, track in self._tracks.items():
             track.extend(prosody, float(times[-1]), timeline)
             values[name] = apply_timeline(name, track.at(times, timeline), times, timeline)
+            give_way()
         return values
 
 
@@ -153,6 +163,12 @@ class _FeatureTrack:
         self._state = initial_state(field, self._generator.random())
         self._times: list[float] = []
         self._values = np.zeros((0, field.values.shape[1]), np.float32)
+
+    def copy(self) -> "_FeatureTrack":
+        """A track that continues as this one, independently of it."""
+        new = copy(self)
+        new._generator, new._times = deepcopy(self._generator), self._times.copy()  # all else is replaced, not changed
+        return new
 
     def extend(self, sound: "_SoundFeatures", end: float, timeline: Timeline) -> None:
         """Generate frames up to `N_LOOKAHEAD_FRAMES` after `end` seconds."""

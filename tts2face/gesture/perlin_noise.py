@@ -3,6 +3,7 @@
 Amplitudes and blink rates are those of the recordings; the timing is independent of the sound.
 """
 
+from copy import copy
 from zlib import crc32
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from tts2face.gesture.gesture_stream import GestureFields, GestureValues, apply_timeline, style_median
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS
-from tts2face.types import Waveform
+from tts2face.types import GiveWay, Waveform, keep_on
 
 OCTAVES_HZ = (0.5, 1.0, 2.0)  # each half as strong as the last (Perlin 1985)
 NOISE_STANDARD_DEVIATION = 0.164  # standard deviation of the octaves' sum, over two hours of it
@@ -27,8 +28,12 @@ class NoiseStream:
         self._fields, self._style, self._seed, self._fps = fields, fields.palette.require(style), seed, fps
         self._n_frames = 0
 
-    def next(self, sound: Waveform, n_frames: int, timeline: Timeline) -> GestureValues:
-        """Values (n_frames, k) of each feature for the next frames; the sound is not used."""
+    def copy(self) -> "NoiseStream":
+        """A stream that continues as this one, independently of it."""
+        return copy(self)
+
+    def next(self, sound: Waveform, n_frames: int, timeline: Timeline, give_way: GiveWay = keep_on) -> GestureValues:
+        """Values (n_frames, k) of each feature for the next frames; neither the sound nor `give_way` is used."""
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
         return {

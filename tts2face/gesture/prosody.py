@@ -25,12 +25,12 @@ def prosody_features(sound: Waveform, times: NDArray[np.float64], *, with_pitch:
     if sound.duration < MIN_PITCH_SOUND_S:
         return features
     grid = np.arange(0.0, sound.duration, 0.02)
-    levels = intensity(sound, grid)
     inside = (times >= 0.0) & (times < sound.duration)
+    levels, levels_inside = np.split(intensity(sound, np.concatenate([grid, times[inside]])), [len(grid)])
     if levels.max() < AUDIBLE_DB:
         return features
     level = speech_level(levels[:, None])
-    features[inside, 0] = np.clip(intensity(sound, times[inside]) - level, QUIET_DB, LOUD_DB)
+    features[inside, 0] = np.clip(levels_inside - level, QUIET_DB, LOUD_DB)
     if with_pitch:
         features[inside, 1] = np.clip(pitch(sound, times[inside]), -HIGH_SEMITONES, HIGH_SEMITONES)
     return features

@@ -31,7 +31,7 @@ from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
 from tts2face.retargeting.performer import build_performer_retargeter, lip_model, match_shapes
 from tts2face.retargeting.to_face import Retargeter, build_retargeter
-from tts2face.types import HEAD_CHANNELS, Trajectory
+from tts2face.types import HEAD_CHANNELS, GiveWay, Trajectory, keep_on
 from tts2face.video.livelink import FaceCapture
 from tts2face.video.take import Take
 
@@ -65,8 +65,10 @@ class AnimatedFace(Protocol):
             The face has no mesh.
         """
 
-    def motion_of_tokens(self, selection: TokenSelection, *, fps: float, n_frames: int) -> Trajectory:
-        """Speech motion (`n_frames`, K) from selected tokens of the talker."""
+    def motion_of_tokens(
+        self, selection: TokenSelection, *, fps: float, n_frames: int, give_way: GiveWay = keep_on
+    ) -> Trajectory:
+        """Speech motion (`n_frames`, K) from selected tokens of the talker; `give_way` is called between its steps."""
 
     def motion_of_parameters(self, speech: Trajectory) -> Trajectory:
         """Speech motion (T, K) from the talker's speech parameters (T, S)."""
@@ -154,9 +156,12 @@ class MeshFace:
         """Mesh with the shapes of all channels."""
         return self.face if self.gestures is None else self.gestures.face
 
-    def motion_of_tokens(self, selection: TokenSelection, *, fps: float, n_frames: int) -> Trajectory:
+    def motion_of_tokens(
+        self, selection: TokenSelection, *, fps: float, n_frames: int, give_way: GiveWay = keep_on
+    ) -> Trajectory:
         """Shape weights (`n_frames`, K) from selected tokens of the talker."""
-        return self.retargeter.retarget(blend_trajectory(selection, self.exemplars, fps=fps, n_frames=n_frames))
+        lips = blend_trajectory(selection, self.exemplars, fps=fps, n_frames=n_frames, give_way=give_way)
+        return self.retargeter.retarget(lips)
 
     def motion_of_parameters(self, speech: Trajectory) -> Trajectory:
         """Shape weights (T, K) from the talker's speech parameters (T, S)."""
@@ -164,9 +169,8 @@ class MeshFace:
 
     def motion_of_take(self, take: Take, *, gain: float = 1.0) -> Trajectory:
         """Shape weights (T, K) of a performer: lips by least squares on landmarks, eyes and brows from scores."""
-        return build_performer_retargeter(take.landmarks, take.scores, self.face).weights(
-            take.landmarks, take.scores, gain=gain
-        )
+        retargeter = build_performer_retargeter(take.landmarks, take.scores, self.face)
+        return retargeter.weights(take.landmarks, take.scores, gain=gain)
 
     def motion_of_capture(self, capture: FaceCapture, *, gain: float = 1.0) -> Trajectory:
         """Shape weights (T, K) of an ARKit capture, matched by name; the gain does not apply to the gaze."""
@@ -213,9 +217,12 @@ class OwnAppearanceFace:
         """Raise InputError: a talker's own face is drawn from pictures and has no mesh."""
         raise InputError("a talker's own face has no mesh; choose --face head, cartoon or a .face file")
 
-    def motion_of_tokens(self, selection: TokenSelection, *, fps: float, n_frames: int) -> Trajectory:
+    def motion_of_tokens(
+        self, selection: TokenSelection, *, fps: float, n_frames: int, give_way: GiveWay = keep_on
+    ) -> Trajectory:
         """Speech and appearance parameters (`n_frames`, K), both blended from the same selected tokens."""
-        lips = blend_trajectory(selection, self.exemplars, fps=fps, n_frames=n_frames)
+        lips = blend_trajectory(selection, self.exemplars, fps=fps, n_frames=n_frames, give_way=give_way)
+        give_way()
         appearance = appearance_trajectory(selection, self.appearance, fps=fps, n_frames=n_frames)
         values = np.concatenate([lips.values, appearance.values], axis=1)
         return Trajectory(lips.channels + appearance.channels, values, fps)

@@ -37,7 +37,7 @@ from tts2face.synthesis.marked_speech import (
     speak_sentence,
 )
 from tts2face.synthesis.prepared_request import IDLE_STEPS, RECORDING_STEPS, PreparedRequest
-from tts2face.types import Clip, Speech, Trajectory, Waveform, frame_count
+from tts2face.types import Clip, GiveWay, Speech, Trajectory, Waveform, frame_count, keep_on
 from tts2face.voice.engine import Voice
 
 Spoken = TypeVar("Spoken")
@@ -87,7 +87,7 @@ class SynthesisModels:
     exemplars: ExemplarModel
     face: AnimatedFace
     voice: Voices
-    give_way: Callable[[], None] = lambda: None
+    give_way: GiveWay = keep_on
 
 
 def pieces(prepared: PreparedRequest, models: SynthesisModels, layer: GestureLayer | None) -> Iterator[Piece]:
@@ -143,7 +143,8 @@ def pieces_from(
         n_frames = frame_count(speech.waveform.duration, float(fps))
         models.give_way()
         selection = select_tokens(speech.phones, models.exemplars, prepared.options)
-        lips = models.face.motion_of_tokens(selection, fps=float(fps), n_frames=n_frames)
+        models.give_way()
+        lips = models.face.motion_of_tokens(selection, fps=float(fps), n_frames=n_frames, give_way=models.give_way)
         models.give_way()
         clip = _with_sound(_with_gestures(speech, lips, timeline, layer), spoken.sound)
         first_frame += n_frames
@@ -215,7 +216,8 @@ def _sentences(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[t
 
     def speak(voice: Voice, sentence: Sentence, request: Request, voices: Voices) -> tuple[SpokenSentence, int, str]:
         text = " ".join(phrase.source for phrase in sentence.utterances)
-        return speak_sentence(voice, sentence, request, voices), sentence.n_characters, text
+        spoken = speak_sentence(voice, sentence, request, voices, models.give_way)
+        return spoken, sentence.n_characters, text
 
     yield from _spoken(prepared, models, speak)
 

@@ -1,6 +1,5 @@
 """Gestures of a request, added to the speech motion of its clip."""
 
-from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
@@ -13,7 +12,7 @@ from tts2face.models.palette import Palette
 from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.marked_speech import marked_styles
 from tts2face.synthesis.prepared_request import PreparedRequest
-from tts2face.types import Clip, Speech, Trajectory
+from tts2face.types import Clip, GiveWay, Speech, Trajectory, keep_on
 
 DEFAULT_STYLE = "neutral"
 
@@ -42,7 +41,7 @@ class GestureLayer:
         prepared: PreparedRequest,
         fields: GestureFields,
         face: AnimatedFace,
-        give_way: Callable[[], None] = lambda: None,
+        give_way: GiveWay = keep_on,
     ) -> None:
         self._requested, self._face, self._give_way = prepared.timeline, face, give_way
         palette, request = fields.palette, prepared.request
@@ -52,15 +51,16 @@ class GestureLayer:
         face.check_gains(self._requested.gains.factors)
         kind: type[NoiseStream] | type[GestureStream] = NoiseStream if request.gestures == "noise" else GestureStream
         executor = ThreadPoolExecutor(1)  # building the fields takes 0.5 s, in parallel with loading the voice
-        self._stream: Future[GestureStream | NoiseStream] = executor.submit(
+        self._first: Future[GestureStream | NoiseStream] = executor.submit(
             kind, fields, style=default_style(palette), seed=request.seed, fps=float(prepared.fps)
         )
         executor.shutdown(wait=False)
+        self._stream: GestureStream | NoiseStream | None = None  # after the last piece
         self._marked = Timeline()
         self._seconds = 0.0
 
     def add(self, speech: Speech, lips: Trajectory, marks: Timeline) -> Clip:
-        """Add gestures to the next piece of the clip.
+        """Add gestures to the next piece of the clip; after an exception of `give_way`, the next one is the same piece.
 
         Parameters
         ----------
@@ -72,13 +72,13 @@ class GestureLayer:
             Gestures requested by the marks of the piece's text, in seconds of the whole clip.
         """
         recent = self._marked.restrict(self._seconds - 1.0, np.inf)  # a nod of the last piece lasts half a second
-        self._marked = recent.merge(marks)
-        timeline = self._requested.merge(self._marked)
-        self._seconds += len(lips) / lips.fps
-        gestures = _gaze_relative_to_head(self._stream.result().next(speech.waveform, len(lips), timeline))
-        self._give_way()
+        marked = recent.merge(marks)
+        timeline = self._requested.merge(marked)
+        stream = (self._stream or self._first.result()).copy()
+        gestures = _gaze_relative_to_head(stream.next(speech.waveform, len(lips), timeline, self._give_way))
         gains = {name: timeline.gains.of(name) for name in SPEECH_GAINS}
         moved = self._face.add_gestures(lips, gestures, gains)
+        self._stream, self._marked, self._seconds = stream, marked, self._seconds + len(lips) / lips.fps
         return Clip(moved.face, moved.head, speech)
 
     def finish(self) -> None:

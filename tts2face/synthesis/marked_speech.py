@@ -24,7 +24,7 @@ from tts2face.gesture.timeline import Timeline
 from tts2face.request import RATE_LIMITS, VOLUME_LIMITS, Request
 from tts2face.synthesis.speech_joining import join_utterances, resampled_speech, silent_speech, trim_end
 from tts2face.synthesis.word_times import LetterTimes, SentenceTimes, WordTimes
-from tts2face.types import Speech, Waveform, concatenate_speech, frame_count
+from tts2face.types import GiveWay, Speech, Waveform, concatenate_speech, frame_count, keep_on
 from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES, SpeechInput, SpokenWord, Voice, apply_volume
 from tts2face.voice.level import level_speech
 
@@ -68,11 +68,14 @@ class SpokenSentence:
     sound: Waveform
 
 
-def speak_sentence(voice: Voice, sentence: Sentence, request: Request, voices: Voices | None = None) -> SpokenSentence:
+def speak_sentence(
+    voice: Voice, sentence: Sentence, request: Request, voices: Voices | None = None, give_way: GiveWay = keep_on
+) -> SpokenSentence:
     """Synthesise a sentence with its pauses, speeds and loudness, and compute the times of its marks.
 
     The speech of a sentence without marks equals the output of the voice, byte for byte. The sound is normalised to the
-    loudness of all clips, to which the loudness of the request and of the marks is relative.
+    loudness of all clips, to which the loudness of the request and of the marks is relative. `give_way` is called
+    between the steps.
 
     Parameters
     ----------
@@ -101,7 +104,8 @@ def speak_sentence(voice: Voice, sentence: Sentence, request: Request, voices: V
         gains.append(_gain(speech.waveform, sentence.runs, part, times_of_part))
     scaled = [_scale_speech(speech, request.volume, gain) for speech, gain in zip(spoken, gains, strict=True)]
     speech, begins = _join_sentence(scaled, sentence, voice.sample_rate)
-    levelled = level_speech(spoken, [request.volume * gain for gain in gains])
+    give_way()
+    levelled = level_speech(spoken, [request.volume * gain for gain in gains], give_way)
     sound = _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
     times = SentenceTimes(tuple(part.first for part in sentence.utterances), tuple(word_times), tuple(begins))
     return SpokenSentence(

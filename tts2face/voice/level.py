@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.speech.bs1770 import ABSOLUTE_GATE_LUFS, integrated_loudness, oversampled_peaks
-from tts2face.types import Speech, Waveform
+from tts2face.types import GiveWay, Speech, Waveform, keep_on
 
 LOUDNESS_LUFS = -16.0  # target for mono speech on phones and computers (AES TD1004: -16 to -20)
 CEILING_DB = -1.5  # true peak of a clip, which keeps it below -1 dB after AAC encoding as well
@@ -19,7 +19,7 @@ MOST_STEPS = 12  # iterations; speech of espeak-ng takes 5
 Floats = NDArray[np.float64]
 
 
-def level_speech(speeches: Sequence[Speech], gains: Sequence[Floats]) -> list[Speech]:
+def level_speech(speeches: Sequence[Speech], gains: Sequence[Floats], give_way: GiveWay = keep_on) -> list[Speech]:
     """Normalise utterances together to `LOUDNESS_LUFS`, apply a relative gain to each, and limit the peaks.
 
     Parameters
@@ -28,8 +28,11 @@ def level_speech(speeches: Sequence[Speech], gains: Sequence[Floats]) -> list[Sp
         N utterances.
     gains
         N arrays of shape (n,), one factor for each sample, or (1,).
+    give_way
+        Called between the steps.
     """
     levelled = normalise_loudness([speech.waveform for speech in speeches])
+    give_way()
     return [
         replace(speech, waveform=Waveform(limit_peaks(sound.samples * gain, sound.rate), sound.rate))
         for speech, sound, gain in zip(speeches, levelled, gains, strict=True)

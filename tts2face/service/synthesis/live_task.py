@@ -5,6 +5,7 @@ import itertools
 import time
 from collections import deque
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,8 +67,9 @@ class LiveTask:
             if lead > LEAD_S:
                 yield Wait(lead - LEAD_S)
                 continue
-            for piece in self._speech.idle(IDLE_S):
-                yield self._curves.event(piece.clip, piece.begin)
+            with suppress(InterruptedTaskError):  # by a message that is read next
+                for piece in self._speech.idle(IDLE_S):
+                    yield self._curves.event(piece.clip, piece.begin)
 
     def _say(self, sentence: str) -> Iterator[Event | Chunk]:
         n_cancels = self._n_cancels
@@ -102,9 +104,8 @@ class LiveTask:
                     self._n_cancels += 1
                     self._began = self._clock() - self._speech.seconds  # what follows is due now
                     after_ms = 1000 * (self._clock() - content["arrived"])
-                    yield Event({
-                        "type": "cancelled", "at": round(self._speech.seconds, 4), "after_ms": round(after_ms, 1)
-                    })  # fmt: skip
+                    cancelled = {"at": round(self._speech.seconds, 4), "after_ms": round(after_ms, 1)}
+                    yield Event({"type": "cancelled", **cancelled}, is_answer=True)
 
 
 def live(session: "Session", work: Work, inputs: Inputs) -> Iterator[Event | Chunk | Wait]:

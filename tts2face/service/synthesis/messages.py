@@ -53,3 +53,4 @@ class Event:
 
     content: dict[str, Any]
     seconds: float = 0.0
+    is_answer: bool = False  # to an urgent input

@@ -29,7 +29,7 @@ class Task:
     cpu_s: float = 0.0
     is_paused: bool = False
     wakes_at: float = 0.0  # seconds of the clock; infinite: only by input
-    is_urgent: bool = False  # it runs before all others, as something is to be ended
+    is_urgent: bool = False  # it runs before all others, as something is to be ended, until it answers
     request: str | None = None  # id of the request, for the log
 
     def lead(self, now: float) -> float:
@@ -81,7 +81,7 @@ class Scheduler:
             self._tasks[number].is_paused = is_paused
 
     def wake(self, number: int, *, is_urgent: bool = False) -> None:
-        """Continue a task that waited for input; an urgent one runs before all others until its next result."""
+        """Continue a task that waited for input; an urgent one runs before all others until it answers (`Event`)."""
         if number in self._tasks:
             self._tasks[number].wakes_at = 0.0
             self._tasks[number].is_urgent |= is_urgent
@@ -119,9 +119,9 @@ class Scheduler:
         if isinstance(step, Wait):
             task.wakes_at = math.inf if step.seconds is None else self._clock() + step.seconds
             return
-        task.is_urgent = False
         task.seconds += step.seconds
         if isinstance(step, Event):
+            task.is_urgent &= not step.is_answer
             self._send(_json_message(task.number, MessageKind.EVENT, step.content, step.seconds))
         elif step.content:
             self._send(Message(task.number, MessageKind.DATA, step.content, step.seconds))

@@ -83,9 +83,14 @@ class TurnSteps:
         self._thread.join()
 
     def interrupt(self) -> None:
-        """End a wait for another process by an `InterruptedTaskError`; do nothing if the task does not wait."""
-        if self._is_waiting and not self._is_over and self._abandon is not None:
-            self._is_interrupted = True
+        """Continue the task with an `InterruptedTaskError` where it waits, even if that wait is over.
+
+        Does nothing if the task does not wait, that is, has made a step.
+        """
+        if not self._is_waiting:
+            return
+        self._is_interrupted = True
+        if not self._is_over and self._abandon is not None:
             self._abandon()
 
     def wait_elsewhere(self, wait: Callable[[], Result], abandon: Callable[[], None]) -> Result:

@@ -17,6 +17,7 @@ from tts2face.service.synthesis.work import Work
 
 PAUSE_BYTES = 8 << 20  # of a result that nobody has read yet, beyond which its task is paused
 RESUME_BYTES = 2 << 20
+END_S = 1.0  # until a process that has closed its output must have ended
 
 
 class ProcessEndedError(BackendError):
@@ -182,10 +183,12 @@ class WarmProcess:
     async def _end(self) -> None:
         child, self._child = self._child, None
         if child is not None:
-            if child.returncode is None:
+            try:  # killing one that has just ended would take its exit status from asyncio, which warns then
+                await asyncio.wait_for(child.wait(), END_S)
+            except TimeoutError:
                 with suppress(ProcessLookupError):
                     child.kill()
-            await child.wait()
+                await child.wait()
         for result in self._results.values():
             result.messages.put_nowait(None)
 

@@ -1,0 +1,29 @@
+"""The task of a live stream, without a service."""
+
+import queue
+from collections.abc import Callable
+from typing import Any
+
+import tts2face
+from tts2face.service.synthesis.live_task import LiveTask
+from tts2face.service.synthesis.messages import Event
+from tts2face.service.synthesis.turns import InterruptedTaskError
+from tts2face.service.synthesis.work import Work
+from tts2face.voice.pool import VoicePool
+
+
+def test_idle_motion_is_interrupted_by_cancel() -> None:
+    """The stream answers and goes on."""
+    inputs: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    arriving = [{"type": "cancel", "arrived": 0.0}]  # between the steps of idle motion
+
+    def run(compute: Callable[[], Any], _: Callable[[], None]) -> Any:
+        if arriving:
+            inputs.put(arriving.pop())
+            raise InterruptedTaskError
+        return compute()
+
+    session = tts2face.Session(voices=VoicePool(run=run))
+    steps = LiveTask(session, Work(kind="live"), inputs, clock=lambda: 0.0).steps()
+    found = [next(steps) for _ in range(2)]
+    assert [one.content["type"] for one in found if isinstance(one, Event)] == ["cancelled", "curves"]

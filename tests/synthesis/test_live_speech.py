@@ -1,0 +1,95 @@
+"""Live speech that is interrupted between its steps, and the length of the steps."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import tts2face
+from tts2face.synthesis.clip_stream import Piece
+from tts2face.synthesis.live_speech import LiveSpeech
+from tts2face.voice.pool import VoicePool
+
+LONG = "the garden behind the old house near the river had been green for years and nobody knew it " * 3
+MAX_SHARE = 0.3  # of the time after the voice in one step; 0.48 before gestures gave way between features
+
+
+class InterruptedSpeechError(Exception):
+    """Raised where live speech gives way."""
+
+
+class Turns:
+    """Runs models and ends of steps as a service does; notes the seconds of computing before each.
+
+    ``interrupt_at`` is the number of the run that raises; None: none.
+    """
+
+    def __init__(self) -> None:
+        self.seconds: list[float] = []
+        self.interrupt_at: int | None = None
+        self._began = time.thread_time()
+
+    def run(self, compute: Callable[[], Any], _: Callable[[], None]) -> Any:
+        self.seconds.append(time.thread_time() - self._began)
+        found = compute()
+        self._began = time.thread_time()
+        if self.interrupt_at == len(self.seconds) - 1:
+            raise InterruptedSpeechError
+        return found
+
+    def restart(self, interrupt_at: int | None = None) -> None:
+        self.seconds, self.interrupt_at = [], interrupt_at
+
+
+@pytest.fixture(scope="module")
+def turns() -> Turns:
+    return Turns()
+
+
+@pytest.fixture(scope="module")
+def session(turns: Turns) -> tts2face.Session:
+    return tts2face.Session(voices=VoicePool(run=turns.run))
+
+
+def continue_idly(live: LiveSpeech) -> Piece:
+    (piece,) = live.idle(1.0)
+    return piece
+
+
+@pytest.mark.parametrize("gestures", ["fields", "noise"])
+def test_an_interrupted_sentence_does_not_change_what_follows(
+    session: tts2face.Session, turns: Turns, gestures: str
+) -> None:
+    """Wherever it is interrupted: the gestures continue from the last piece that was made."""
+    turns.restart()
+    live = session.live(gestures=gestures)
+    list(live.say("Hello there."))
+    n_runs = len(turns.seconds)
+    expected = continue_idly(live)
+    for number in range(n_runs):
+        turns.restart()
+        live = session.live(gestures=gestures)
+        list(live.say("Hello there."))
+        turns.restart(number)
+        with pytest.raises(InterruptedSpeechError):
+            list(live.say("Hello there."))
+        turns.restart()
+        found = continue_idly(live)
+        assert found.begin == expected.begin
+        np.testing.assert_array_equal(found.clip.motion.values, expected.clip.motion.values)
+        np.testing.assert_array_equal(found.clip.head.values, expected.clip.head.values)
+
+
+def test_the_steps_of_a_long_sentence_are_short(session: tts2face.Session, turns: Turns) -> None:
+    """A service reads `cancel` between them. The alignment, which it runs elsewhere, is not counted."""
+    live = session.live()
+    list(live.say(LONG))  # compiles and loads
+    turns.restart()
+    begin = time.thread_time()
+    pieces = list(live.say(LONG))
+    assert time.thread_time() - begin > 0.1
+    first = len(turns.seconds) // len(pieces)
+    after_voice = turns.seconds[-first + 2 :]
+    assert max(after_voice) < MAX_SHARE * sum(after_voice), turns.seconds
