@@ -134,13 +134,13 @@ def symmetrise_score_map(score_map: ScoreMap, mirror: list[int]) -> ScoreMap:
 
     The scores average left and right; a map that treats them differently would turn the mouth to one side.
     """
-    half = score_map.output / 2
+    half = (score_map.output / 2).astype(np.float32)
     return replace(
         score_map,
         hidden=np.concatenate([score_map.hidden, score_map.hidden[:, mirror]]),
         hidden_bias=np.tile(score_map.hidden_bias, 2),
         output=np.concatenate([half, half], axis=1),
-        direct=(score_map.direct + score_map.direct[:, mirror]) / 2,
+        direct=((score_map.direct + score_map.direct[:, mirror]) / 2).astype(np.float32),
     )
 
 

@@ -31,7 +31,7 @@ PRIOR_SCORE_ERROR, PRIOR_WEIGHT_COST = 0.05, 0.3
 OTHER_SHARE = 0.1  # pull of all other shapes to 0, as a share of the median curvature
 JAW = tuple(SCORE_SHAPES).index("jawOpen")
 # Of a lip gap where the lips touch, in addition to that of `curvature`; it falls to 0 at `FREE_GAP_MM`.
-CLOSED_GAP_WEIGHT, FREE_GAP_MM = 1_000_000.0, 3.0
+CLOSED_GAP_WEIGHT, FREE_GAP_MM = 300_000.0, 3.0
 JAW_GAP_MM = 1.0  # lip gap from which the jaw follows its score in full; on closed lips the tracker sees no jaw
 LOW_SCORE = 0.02  # scores below it are not told apart
 SCORE_LIMITS = (0.01, 0.97)  # of target scores, so that their logits are finite

@@ -48,8 +48,9 @@ MAX_CONTACT_MM = 1.5  # upper limit of the tracked gap of touching lips; larger 
 FULL_GAP_MM = 3.0  # gap beyond contact from which it is reproduced in full
 GAP_WEIGHT = 300.0  # of a lip gap, relative to a landmark of the cheek: contact is the most visible
 # With score rows, whose logits weigh as much: gaps, width and chin must hold against them.
-SCORED_GAP_WEIGHT = 30_000.0
-SCORED_MOUTH = MouthWeights(width=150_000.0, chin=10_000.0)
+SCORED_GAP_WEIGHT = 10_000.0
+SCORED_DEPTH_WEIGHT = 3000.0  # of the depth between facing lip points
+SCORED_MOUTH = MouthWeights(width=50_000.0, chin=3000.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,9 +164,13 @@ def build_retargeter(
     chin = [at[landmark] for landmark in CHIN_LANDMARKS if landmark in at]
     dropped = shape_motion[chin, 1].mean(axis=0)
     linear_term += mouth.chin * np.outer(dropped, talker_motion[chin, 1].mean(axis=0))
+    apart = shape_motion[upper, 2] - shape_motion[lower, 2]
+    depth_weight = 0.0 if response is None else SCORED_DEPTH_WEIGHT
+    linear_term += depth_weight * ordered_product(apart.T, talker_motion[upper, 2] - talker_motion[lower, 2])
     contact = scale * (contact_gaps(talker) if contact is None else contact)
     gaps = _talker_gaps(talker, scale * turn[1], contact)
     curvature = mouth_curvature(shape_motion, common, mouth) + gap_weight * ordered_product(opened.T, opened)
+    curvature += depth_weight * ordered_product(apart.T, apart)
     limits = face.limits[moving].astype(np.float64)
     return Retargeter(
         shape_names=face.shape_names,
