@@ -19,7 +19,7 @@ from tts2face.models.talker import load_talker
 from tts2face.request import OWN_FACE
 from tts2face.voice.loading import load_voice
 
-LISTED = ["voices", "languages", "faces", "identities", "styles", "talkers", "formats"]
+LISTED = ["voices", "languages", "faces", "identities", "haircuts", "hair_colors", "styles", "talkers", "formats"]
 
 
 def test_there_is_a_command_for_each_list() -> None:
@@ -29,10 +29,10 @@ def test_there_is_a_command_for_each_list() -> None:
 @pytest.mark.parametrize("name", LISTED)
 def test_a_list_is_a_table_or_json(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     entries = getattr(catalogue, name)()
-    assert run([name, "--json"]) == 0
+    assert run([name.replace("_", "-"), "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
     assert shown == json.loads(json.dumps([asdict(entry) for entry in entries]))
-    assert run([name]) == 0
+    assert run([name.replace("_", "-")]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 1 + len(entries)
     first = [next(iter(asdict(entry).values())) for entry in entries]
