@@ -34,7 +34,8 @@ NEW_SENTENCES = (
 )
 SHAPES_TEXT = "My father thinks she saw you leave the old red boat."
 SHAPES = ("m", "f", "ɑ", "ð", "θ", "ʃ", "u", "l", "i", "b")  # one frame for each, in the order of speech
-VIEWS = {"front": "0,0,420", "three-quarter": "38,0,420"}  # close to the mouth
+MOUTH_PIXELS = 800  # side of the pictures from which the mouths are cut
+MOUTHS = {"0,0,600": (240, 408), "38,0,600": (20, 408)}  # left upper corner of the mouth in each view
 MOOD_TEXT = "I have a lot to tell you, so please sit down and listen while I explain what happened yesterday."
 N_MOOD_FRAMES = 6
 SIDE = 320
@@ -90,10 +91,14 @@ def clip_sheet() -> Image.Image:
 def shapes_sheet() -> Image.Image:
     """Mouth shapes of ten phones within one sentence, from the front and from three quarters."""
     pictures = []
-    for camera in VIEWS.values():
-        picture = Picture(size=f"{SIDE}x{SIDE}", camera=camera)
-        shown = list(frames_of_phones(Session(), SHAPES_TEXT, SHAPES, picture))
-        pictures.append([labelled(pixels, f"/{phone}/  {word}") for pixels, phone, word in shown])
+    for camera, (left, top) in MOUTHS.items():
+        picture = Picture(size=f"{MOUTH_PIXELS}x{MOUTH_PIXELS}", camera=camera)
+        pictures.append(
+            [
+                labelled(pixels[top : top + SIDE, left : left + SIDE], f"{ipa_to_arpabet(phone)}  {word}")
+                for pixels, phone, word in frames_of_phones(Session(), SHAPES_TEXT, SHAPES, picture)
+            ]
+        )
     rows = [row[at : at + 5] for at in (0, 5) for row in pictures]
     return sheet([picture for row in rows for picture in row], 5)
 
