@@ -21,7 +21,7 @@ from tts2face.models.talker import Talker, load_talker
 from tts2face.retargeting.articulation import Articulator, build_articulator
 from tts2face.retargeting.incisor_contact import incisor_edge, upper_teeth
 from tts2face.retargeting.phone_tracks import articulation_tracks, pause_closure
-from tts2face.synthesis.animated_face import mesh_face
+from tts2face.synthesis.mesh_face import mesh_face
 from tts2face.types import Trajectory
 
 FPS = 60.0

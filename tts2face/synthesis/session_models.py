@@ -19,9 +19,11 @@ from tts2face.models.talker import Talker, load_talker
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
 from tts2face.request import OWN_FACE, Request
-from tts2face.synthesis.animated_face import AnimatedFace, mesh_face, own_appearance_face
+from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.clip_stream import Piece, SynthesisModels, pieces
 from tts2face.synthesis.gesture_layer import GestureLayer
+from tts2face.synthesis.mesh_face import mesh_face
+from tts2face.synthesis.own_appearance_face import own_appearance_face
 from tts2face.synthesis.prepared_request import PreparedRequest
 from tts2face.voice.engine import Voice
 from tts2face.voice.pool import VoicePool
