@@ -13,6 +13,7 @@ from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.hair import HAIR_COLOURS, Hair, attach_hair, fit_hair, parse_hair_colour
 from tts2face.models.hair_file import read_hair, write_hair
+from tts2face.render.camera import camera_matrices
 from tts2face.render.draw import draw
 from tts2face.render.picture import Picture
 
@@ -91,6 +92,34 @@ def test_half_of_a_card_is_covered() -> None:
     skin, covered, cards = (picture[:, :, 1] - picture[:, :, ::2].max(axis=2) > 20 for picture in pictures)  # green
     assert not skin.any()
     assert 0.3 < covered.sum() / cards.sum() < 0.7
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_sliver_of_hair_stays_within_its_corners(seed: int) -> None:
+    bare, rng = tiny_face(textured=True), np.random.default_rng(seed)
+    begin, end = np.array([-30.0, 115.0, 0.0]), np.array([10.0, 115.0 + rng.normal(0, 1), 0.0])
+    middle = begin + 0.5 * (end - begin) + [0.0, 10.0 ** rng.uniform(-3, 0), 0.0]
+    sliver = replace(
+        cap(bare),
+        vertices=np.float32([begin, end, middle]),
+        triangles=np.int32([[0, 1, 2]]),
+        uv=np.float32([[0, 0], [1, 0], [1, 1]]),
+        tangents=np.float32([[1, 0, 0]] * 3),
+        alpha=np.full((8, 8), 255, np.uint8),
+        scalp=None,
+    )
+    options = Picture(size="256x256", background="white")
+    seen, unseen = (
+        attach_hair(bare, one, GREEN) for one in (sliver, replace(sliver, alpha=np.zeros((8, 8), np.uint8)))
+    )
+    hair, skin = (draw(face, np.zeros(len(face.shape_names)), picture=options).astype(int) for face in (seen, unseen))
+    wall = (skin == 255).all(axis=2)
+    columns = np.flatnonzero(((hair != skin).any(axis=2) & wall).any(axis=0))
+    camera = camera_matrices(options.view, seen, (256, 256))
+    places = sliver.vertices @ camera.view[:, :3].T + camera.view[:, 3]
+    across = camera.lens[1] + camera.lens[0] * places[:, 0] / places[:, 2]
+    assert len(columns) > 0
+    assert across.min() - 2 <= columns.min() <= columns.max() <= across.max() + 2
 
 
 def test_hair_moves_as_its_anchors_do() -> None:

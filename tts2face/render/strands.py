@@ -202,7 +202,7 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, fragments: A
         for r in range(first, last + 1):
             py = np.float32((r + top_px + 0.5) * side)
             least, most = row_range(wide, py, py, (zero, np.float32(width * side)))
-            for x in range(int(least) // side, min(int(most) // side, width - 1) + 1):
+            for x in range(max(int(least) // side, left), min(int(most) // side, right) + 1):  # slivers reach far
                 if is_open[r, x] == 0:
                     continue
                 px = np.float32((x + 0.5) * side)
