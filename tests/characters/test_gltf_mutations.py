@@ -34,7 +34,10 @@ def small_head() -> Face:
         first += len(corners)
     names = ("eyeBlinkLeft", "eyeBlinkRight", "jawOpen", "mouthPucker", "mouthSmileLeft")
     rows = [head.shape_names.index(name) for name in names]
-    textures = tuple(Texture(texture.pixels[::16, ::16].copy()) for texture in head.textures)
+    textures = tuple(
+        Texture(texture.pixels[::16, ::16].copy(), None if texture.alpha is None else texture.alpha[::16, ::16].copy())
+        for texture in head.textures
+    )
     used, corners = np.unique(np.concatenate(triangles), return_inverse=True)
     bounds = [np.searchsorted(used, [eye.first, eye.first + eye.count]).tolist() for eye in head.eyes]
     eyes = tuple(replace(eye, first=low, count=high - low) for eye, (low, high) in zip(head.eyes, bounds, strict=True))
@@ -53,6 +56,10 @@ def small_head() -> Face:
         shapes=head.shapes[rows][:, used],
         limits=head.limits[rows],
         textures=textures,
+        tangents=None,
+        occlusion=None,
+        scores=None,
+        hairdo=None,
     )
 
 

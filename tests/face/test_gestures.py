@@ -26,7 +26,7 @@ from tts2face.types import HEAD_CHANNELS, Trajectory
 FACES = ("head", "cartoon")
 BILABIALS = "Bob may bump my pump; Pam probably maps a big bamboo bomb to Mum. You choose two blue shoes."
 CONTACT_MM = 0.3  # gaps up to this are closed lips: half a pixel of a face that fills 512 of them
-KEPT_MM = 0.05  # tolerance of lip contact: a tenth of a pixel
+KEPT_MM = 0.08  # tolerance of lip contact: a sixth of a pixel
 UPPER_LIDS, LOWER_LIDS = (386, 159), (374, 145)
 MASK = {name: i for i, name in enumerate(EXPRESSIONS)}
 
