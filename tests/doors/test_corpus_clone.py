@@ -23,6 +23,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         few,
         model=model,
         network=None,
+        scores=None,
         audio_maps={},
         utterances=tuple(replace(u, shape=u.shape[:, kept]) for u in few.utterances),
     )

@@ -223,7 +223,9 @@ def extend_talker(source: ShapeModel, target: Talker) -> Talker:
     appearance = target.appearance
     if appearance is not None:
         appearance = replace(appearance, plate=replace(appearance.plate, shape=insert_zeros(appearance.plate.shape)))
-    return replace(target, model=model, utterances=utterances, appearance=appearance, network=None, audio_maps={})
+    return replace(
+        target, model=model, utterances=utterances, appearance=appearance, network=None, audio_maps={}, scores=None
+    )
 
 
 def face_size(model: ShapeModel) -> float:
