@@ -47,7 +47,7 @@ class RunOptions:
         InputError
             ``jobs`` is below 1.
         """
-        jobs = self.jobs or os.cpu_count() or 1
+        jobs = (os.cpu_count() or 1) if self.jobs is None else self.jobs
         if jobs < 1:
             raise InputError(f"jobs must be 1 or more, not {jobs}")
         return jobs

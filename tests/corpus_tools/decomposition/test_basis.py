@@ -128,7 +128,7 @@ def test_pictures_and_instants_are_read_by_the_tracker(takes: Path, face_model: 
     instant = read(Still(film, pictures[30].time + 0.01))
     np.testing.assert_array_equal(instant, read(Still(path)))
     eyes = np.linalg.norm(instant[33] - instant[263])
-    assert eyes == pytest.approx(88.9, abs=4.0)  # mm of the canonical face
+    assert eyes == pytest.approx(88.9, abs=5.0)  # mm of the canonical face
     with pytest.raises(InputError, match=rf"ends at {pictures[-1].time:.2f} s; 7 s is beyond it"):
         read(Still(film, 7.0))
     Image.fromarray(np.full((200, 200, 3), 90, np.uint8)).save(path)
