@@ -79,8 +79,9 @@ def test_speech_moves_an_imported_face_as_the_face_it_was_made_of(plain: Importe
     parameters = talker.utterances[0].shape[:, : talker.model.n_speech]
     speech = Trajectory(tuple(f"shape{n}" for n in range(talker.model.n_speech)), parameters, talker.fps)
     weights = [build_retargeter(talker, face).retarget(speech) for face in (plain.face, head)]
-    assert weights[0].channels == weights[1].channels
-    np.testing.assert_allclose(weights[0].values, weights[1].values, atol=2e-3)  # share of a shape
+    shared = [weights[1].channels.index(name) for name in weights[0].channels]  # all but tongueUp
+    assert len(shared) == len(weights[1].channels) - 1
+    np.testing.assert_allclose(weights[0].values, weights[1].values[:, shared], atol=2e-3)  # share of a shape
 
 
 def test_a_skinned_head_turns_about_its_bone(tmp_path: Path) -> None:
