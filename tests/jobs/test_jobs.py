@@ -20,7 +20,7 @@ from tests.jobs.conftest import ROOT, Postgres, StartWorker, wait_until
 from tts2face.batch.segment import Segment
 from tts2face.batch.store import open_store
 from tts2face.jobs.control import cancel_jobs, list_jobs, prune_jobs, retry_jobs, show_job
-from tts2face.jobs.database import DEAD_AFTER_S, Workers, database_url, prepare_database, shown_url
+from tts2face.jobs.database import APPLICATION_VERSION, DEAD_AFTER_S, Workers, database_url, prepare_database, shown_url
 from tts2face.jobs.engine import DatabaseEngine, enqueue, open_client
 
 Segments = Callable[..., dict[str, Segment]]
@@ -136,7 +136,7 @@ def test_a_double_start_costs_time_and_nothing_else(
     with open_client(url) as client:
         for number in (0, 1):
             options = {"queue_name": "tts2face-segments", "workflow_name": "render_segment",
-                       "workflow_id": f"{address}.{number}", "app_version": "segments-1", "priority": 1}  # fmt: skip
+                       "workflow_id": f"{address}.{number}", "app_version": APPLICATION_VERSION, "priority": 1}  # fmt: skip
             client.enqueue(options, address, segment.as_json())
     start_worker(database, 1.0)
     start_worker(database, 1.0)
