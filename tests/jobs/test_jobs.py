@@ -136,7 +136,8 @@ def test_a_double_start_costs_time_and_nothing_else(
     with open_client(url) as client:
         for number in (0, 1):
             options = {"queue_name": "tts2face-segments", "workflow_name": "render_segment",
-                       "workflow_id": f"{address}.{number}", "app_version": APPLICATION_VERSION, "priority": 1}  # fmt: skip
+                       "workflow_id": f"{address}.{number}", "app_version": APPLICATION_VERSION,
+                       "priority": 1}  # fmt: skip
             client.enqueue(options, address, segment.as_json())
     start_worker(database, 1.0)
     start_worker(database, 1.0)
