@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lexicon.articulation import TARGET_NAMES, VisibleTarget, visible_targets
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.numeric import smoothstep
+from tts2face.numeric import smooth_gaussian, smoothstep
 
 FloatArray = NDArray[np.float64]
 
@@ -15,6 +15,7 @@ CLOCK_HZ = 200.0  # rate at which tracks are computed; they are interpolated at 
 HOLD_SHARE = 0.5  # share of a phone, or of the half of a diphthong, in which its target is held
 MAX_TRANSITION_S = 0.16  # lips round at most this long before a rounded phone is held (Perkell and Matthies 1992)
 SMOOTHING_S = 0.012  # standard deviation of a Gaussian; short phones of fast speech fall short of their targets
+SMOOTHING_REACH = int(4 * SMOOTHING_S * CLOCK_HZ)
 CONTACT_EASE_S, TONGUE_EASE_S = 0.1, 0.07  # transition to and from a contact of the lip, and of the tongue
 EASES_S = {
     "lip_contact": CONTACT_EASE_S,
@@ -41,7 +42,7 @@ def articulation_tracks(phones: PhoneSequence, times: FloatArray) -> Mapping[str
     for name in TARGET_NAMES:
         keys = [(start, end, getattr(target, name)) for start, end, target in halves]
         raw = _keyframe_track([key for key in keys if key[2] is not None], clock, EASES_S.get(name, MAX_TRANSITION_S))
-        tracks[name] = np.interp(times, clock, _smooth(raw))
+        tracks[name] = np.interp(times, clock, smooth_gaussian(raw, SMOOTHING_S * CLOCK_HZ, SMOOTHING_REACH))
     return tracks
 
 
@@ -99,10 +100,3 @@ def _keyframe_track(keys: list[tuple[float, float, float]], clock: FloatArray, l
         rising = low + (value - low) * smoothstep(clock[between] - start, -min(longest, start - before), 0.0)
         track[between] = np.maximum(falling, rising)
     return track
-
-
-def _smooth(track: FloatArray) -> FloatArray:
-    reach = int(4 * SMOOTHING_S * CLOCK_HZ)
-    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (SMOOTHING_S * CLOCK_HZ)) ** 2)
-    padded = np.pad(track, reach, mode="edge")
-    return np.convolve(padded, kernel / kernel.sum(), mode="valid")
