@@ -18,7 +18,7 @@ from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID
 from tts2face.models.talker import Talker, load_talker
-from tts2face.retargeting.articulation import Articulator, build_articulator
+from tts2face.retargeting.articulation import build_articulator
 from tts2face.retargeting.incisor_contact import incisor_edge, upper_teeth
 from tts2face.retargeting.phone_tracks import articulation_tracks, pause_closure
 from tts2face.synthesis.mesh_face import mesh_face
@@ -49,11 +49,6 @@ def exemplars(talker: Talker) -> ExemplarModel:
 @cache
 def named_face(identity: str | None) -> Face:
     return load_face("head", identity, hair="bald")
-
-
-@cache
-def articulator_of(identity: str | None) -> Articulator:
-    return build_articulator(named_face(identity))
 
 
 class Spoken:

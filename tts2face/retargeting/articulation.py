@@ -15,6 +15,7 @@ from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scat
 from tts2face.face.lip_constraints import LipConstraints, build_lip_constraints
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
+from tts2face.models.face_layout import WIDE_OPEN
 from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, OUTER_LIP_LOWER, OUTER_LIP_UPPER
 from tts2face.numeric import ordered_product, smoothstep
 from tts2face.request import CLEAR, NATURAL
@@ -41,7 +42,6 @@ SPREAD_SHAPES = {"mouthStretchLeft": 0.5, "mouthStretchRight": 0.5, "mouthSmileL
 LOWERED_SHAPES = {"mouthLowerDownLeft": 1.0, "mouthLowerDownRight": 1.0}
 # Drop of the jaw and gap of the lips at which the tip of the tongue is seen between the teeth; largest weight for it.
 DENTAL_DROP_MM, DENTAL_GAP_MM, LARGEST_LOWERED = 5.5, 8.0, 0.8
-JAW = "jawOpen"
 OUTER_UPPER_MID, OUTER_LOWER_MID = OUTER_LIP_UPPER[5], OUTER_LIP_LOWER[5]
 
 
@@ -184,7 +184,7 @@ def build_articulator(face: Face) -> Articulator:
     rest_width = float(np.linalg.norm(places[MOUTH_CORNER_LEFT] - places[MOUTH_CORNER_RIGHT]))
     edge = incisor_edge(face, places, rest_width)
     tables = {"round": ROUND_SHAPES, "flared": FLARED_SHAPES, "spread": SPREAD_SHAPES, "lowered": LOWERED_SHAPES}
-    tables["open"] = {JAW: 1.0}
+    tables["open"] = {WIDE_OPEN: 1.0}
     if not {*ROUND_SHAPES, *FLARED_SHAPES} <= {*face.shape_names}:
         tables["flared"] = ROUND_SHAPES
     return Articulator(
@@ -195,5 +195,5 @@ def build_articulator(face: Face) -> Articulator:
             kind: np.array([table.get(name, 0.0) for name in face.shape_names]) for kind, table in tables.items()
         },
         tongue=build_tongue(face, edge, rest_width),
-        incisors=build_incisor_contact(face, mouth, edge),
+        incisors=build_incisor_contact(mouth, edge, places=places, motion=motion, width=rest_width),
     )

@@ -6,14 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.face.bounded_least_squares import bounded_least_squares
-from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.lip_constraints import LipConstraints
 from tts2face.models.face import Face
+from tts2face.models.face_layout import WIDE_OPEN
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
-    MOUTH_CORNER_LEFT,
-    MOUTH_CORNER_RIGHT,
     UPPER_LIP_INNER_MID,
 )
 from tts2face.numeric import ordered_product
@@ -23,7 +21,6 @@ FloatArray = NDArray[np.float64]
 TOUCHING_LANDMARKS, FACING_LANDMARKS = INNER_LIP_LOWER[4:7], INNER_LIP_UPPER[4:7]  # of the lips, about the middle
 CONTACT_WEIGHT = 1e4  # of a coordinate of these landmarks, relative to a landmark of the cheek
 TEETH_NAMES = ("teeth", "tooth")  # in the names of parts
-JAW = "jawOpen"
 INCISOR_SHARE = 0.08  # of the mouth's width: half the width of the middle incisors
 STILL_SHARE = 0.1  # of the largest motion of the jaw: upper teeth move less
 FRONT_SHARE, EDGE_SHARE = 0.06, 0.01  # of the mouth's width: depth of the front teeth, and height of their edge
@@ -79,11 +76,18 @@ class IncisorContact:
         return values
 
 
-def build_incisor_contact(face: Face, mouth: LipConstraints, edge: tuple[float, float]) -> IncisorContact:
-    """Contact of a face's lower lip with its upper incisors, whose `edge` has a height and a depth, mm."""
-    places = scatter_landmarks(face, landmark_positions(face))
-    motion = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))
-    width = float(np.linalg.norm(places[MOUTH_CORNER_LEFT] - places[MOUTH_CORNER_RIGHT]))
+def build_incisor_contact(
+    mouth: LipConstraints, edge: tuple[float, float], *, places: FloatArray, motion: FloatArray, width: float
+) -> IncisorContact:
+    """Contact for incisors whose edge is at a height and depth, mm.
+
+    Parameters
+    ----------
+    places, motion : (478, 3), (478, 3, K)
+        Landmarks of the face, and their motion per weight, mm.
+    width
+        Width of the mouth at rest, mm.
+    """
     lips = list(TOUCHING_LANDMARKS)
     target = np.array([edge[0] + COVER_SHARE * width, edge[1] + AHEAD_SHARE * width]) - places[lips, 1:]
     upper = list(FACING_LANDMARKS)
@@ -124,7 +128,7 @@ def upper_teeth(face: Face) -> FloatArray:
     parts = [part for part in face.parts if any(name in part.name.lower() for name in TEETH_NAMES)]
     used = [face.triangles[part.first : part.first + part.count].ravel() for part in parts]
     numbers = np.unique(np.concatenate([np.zeros(0, np.int32), *used]))
-    if JAW in face.shape_names and len(numbers):
-        jaw = np.linalg.norm(face.shapes[face.shape_names.index(JAW)], axis=1)
+    if WIDE_OPEN in face.shape_names and len(numbers):
+        jaw = np.linalg.norm(face.shapes[face.shape_names.index(WIDE_OPEN)], axis=1)
         numbers = numbers[jaw[numbers] < STILL_SHARE * jaw.max()]
     return np.asarray(face.vertices[numbers], np.float64)
