@@ -20,7 +20,8 @@ from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, OUT
 from tts2face.numeric import ordered_product, smoothstep
 from tts2face.request import CLEAR, NATURAL
 from tts2face.retargeting.incisor_contact import IncisorContact, build_incisor_contact, incisor_edge
-from tts2face.retargeting.phone_tracks import articulation_tracks, pause_closure
+from tts2face.retargeting.lip_closure import close_lips, largest_gaps, limit_speed
+from tts2face.retargeting.phone_tracks import articulation_tracks, pause_closure, seconds_from_closure
 from tts2face.retargeting.tongue import Tongue, build_tongue
 from tts2face.types import Trajectory
 
@@ -35,6 +36,7 @@ OPENING_GAIN = 0.22  # growth of the gap of an open vowel, by the jaw
 MIN_GAP_SHARE = 0.6  # of a gap that rounding leaves open
 FOLLOW_GAPS_MM = (0.2, 2.5)  # gap of the lips up to which they keep it, and from which they follow in full
 LARGEST_ADDED_WEIGHT = 1.2
+N_CLOSURE_ROUNDS = 2  # of limiting the speed and closing the lips, which disturb each other a little
 LEAST_MOTION_MM = 0.5  # per weight of a shape: shapes that move less, as on a face without them, are not used
 ROUND_SHAPES = {"mouthPucker": 1.0}
 FLARED_SHAPES = {"mouthPucker": 0.85, "mouthFunnel": 0.3}
@@ -84,14 +86,17 @@ class Articulator:
             Of rounding, spreading and opening, `NATURAL` for the talker's own.
         """
         times = np.arange(len(weights)) / weights.fps
-        tracks, closure = articulation_tracks(phones, times), pause_closure(phones, times)
+        tracks = articulation_tracks(phones, times)
         values = weights.values.astype(np.float64)
         if factor > NATURAL:
             values = self._add_by_class(values, tracks, (factor - NATURAL) / (CLEAR - NATURAL))
         elif factor < NATURAL:
             values = self._reduce_by_class(values, tracks, 1.0 - factor)
         values = self.incisors.enforce(values, tracks["incisor_contact"] * (1.0 - tracks["lip_contact"] ** 2))
-        values = self._close_pauses(values, closure)
+        bounds = largest_gaps(seconds_from_closure(phones, times), self.rest_width / HEAD_MOUTH_MM)
+        pauses = pause_closure(phones, times)
+        for _ in range(N_CLOSURE_ROUNDS):
+            values = close_lips(self.mouth, limit_speed(values, weights.fps), bounds, pauses)
         gap = ordered_product(values, self.mouth.gaps[MIDDLE_PAIR])
         values = self.tongue.move(values, gap, tracks)
         return Trajectory(weights.channels, values.astype(np.float32), weights.fps)
@@ -162,13 +167,6 @@ class Articulator:
         gaps = ordered_product(speech, self.mouth.gaps.T)
         return self.mouth.solve(speech, added, gaps - of_class[:, None] * np.maximum(gaps, 0.0))
 
-    def _close_pauses(self, speech: FloatArray, closure: FloatArray) -> FloatArray:
-        """Speech (T, K) with the lips closed by shares (T,)."""
-        gaps = ordered_product(speech, self.mouth.gaps.T)
-        closing = closure * (gaps > 0).any(axis=1)
-        target_gaps = gaps - closing[:, None] * np.maximum(gaps, 0.0)
-        return self.mouth.solve(speech, np.zeros_like(speech), target_gaps, closing > 0)
-
 
 def build_articulator(face: Face) -> Articulator:
     """Articulator of a face.
@@ -195,5 +193,5 @@ def build_articulator(face: Face) -> Articulator:
             kind: np.array([table.get(name, 0.0) for name in face.shape_names]) for kind, table in tables.items()
         },
         tongue=build_tongue(face, edge, rest_width),
-        incisors=build_incisor_contact(mouth, edge, places=places, motion=motion, width=rest_width),
+        incisors=build_incisor_contact(face.shape_names, mouth, edge, places=places, motion=motion, width=rest_width),
     )
