@@ -1,5 +1,7 @@
 """Last steps of articulation: limited speed of the mouth, and lips that meet in bilabials and pauses."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +17,8 @@ LARGEST_SPEED_PER_S = 20.0
 # time in which they reach half of it.
 LIP_SPEED_MM_PER_S, LIP_ONSET_S = 300.0, 0.01
 FIRM_POWER = 4  # of the smooth minimum of a gap and its bound: a bound of twice the gap lowers it by 1.5 %
+# Of changes of the weights, relative to the median curvature; without it, opposite shapes take turns near the corners.
+CHANGE_COST = 0.5
 LEAST_CHANGE_MM = 1e-4  # of a gap; frames that would change less are unchanged
 
 
@@ -46,10 +50,12 @@ def close_lips(mouth: LipConstraints, speech: FloatArray, bounds: FloatArray, cl
 
     All gaps of a frame shrink by the same share. Overlapping lips, whose gap is negative, stay as they are.
     """
+    cost = CHANGE_COST * np.median(np.diag(mouth.curvature))
+    firm = replace(mouth, curvature=mouth.curvature + cost * np.eye(len(mouth.moving)))
     gaps = np.maximum(ordered_product(speech, mouth.gaps.T), 0.0)
     widest = gaps.max(axis=1)
     ratio = np.divide(widest, bounds, out=np.full(len(widest), np.inf), where=bounds > 0)
     kept = (1.0 - closure) * (1.0 + ratio**FIRM_POWER) ** (-1.0 / FIRM_POWER)
     changed = (1.0 - kept) * widest > LEAST_CHANGE_MM
     targets = ordered_product(speech, mouth.gaps.T) - (1.0 - kept)[:, None] * gaps
-    return mouth.solve(speech, np.zeros_like(speech), targets, changed)
+    return firm.solve(speech, np.zeros_like(speech), targets, changed)
