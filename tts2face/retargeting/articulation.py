@@ -16,7 +16,13 @@ from tts2face.face.lip_constraints import LipConstraints, build_lip_constraints
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
 from tts2face.models.face_layout import WIDE_OPEN
-from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, OUTER_LIP_LOWER, OUTER_LIP_UPPER
+from tts2face.models.landmarks import (
+    MOUTH_CORNER_LEFT,
+    MOUTH_CORNER_RIGHT,
+    OUTER_LIP_LOWER,
+    OUTER_LIP_UPPER,
+    inner_lip_gaps,
+)
 from tts2face.numeric import ordered_product, smoothstep
 from tts2face.request import CLEAR, NATURAL
 from tts2face.retargeting.incisor_contact import IncisorContact, build_incisor_contact, incisor_edge
@@ -36,7 +42,8 @@ OPENING_GAIN = 0.22  # growth of the gap of an open vowel, by the jaw
 MIN_GAP_SHARE = 0.6  # of a gap that rounding leaves open
 FOLLOW_GAPS_MM = (0.2, 2.5)  # gap of the lips up to which they keep it, and from which they follow in full
 LARGEST_ADDED_WEIGHT = 1.2
-N_CLOSURE_ROUNDS = 2  # of limiting the speed and closing the lips, which disturb each other a little
+LARGEST_REST_GAP_SHARE = 0.02  # of the mouth's width: a gap at rest that contacts close; landmarks may be further apart
+N_CLOSURE_ROUNDS = 3  # of limiting the speed and closing the lips, which disturb each other a little
 LEAST_MOTION_MM = 0.5  # per weight of a shape: shapes that move less, as on a face without them, are not used
 ROUND_SHAPES = {"mouthPucker": 1.0}
 FLARED_SHAPES = {"mouthPucker": 0.85, "mouthFunnel": 0.3}
@@ -57,8 +64,8 @@ class Articulator:
         Lip gaps, mouth width and cost of a change.
     protrusion : (K,)
         Forward motion of the lips' outer edges per weight, mm.
-    rest_width
-        Width of the mouth at rest, mm.
+    rest_width, rest_gaps : (), (P,)
+        Width of the mouth at rest, and gaps of the lips at rest that contacts close as well, mm.
     directions
         Weights (K,) that make the mouth ``round``, ``flared``, ``spread`` or ``open``, or lower the lip (``lowered``);
         zero without such shapes.
@@ -71,6 +78,7 @@ class Articulator:
     mouth: LipConstraints
     protrusion: FloatArray
     rest_width: float
+    rest_gaps: FloatArray
     directions: Mapping[str, FloatArray]
     tongue: Tongue
     incisors: IncisorContact
@@ -96,9 +104,12 @@ class Articulator:
         bounds = largest_gaps(seconds_from_closure(phones, times), self.rest_width / HEAD_MOUTH_MM)
         pauses = pause_closure(phones, times)
         for _ in range(N_CLOSURE_ROUNDS):
-            values = close_lips(self.mouth, limit_speed(values, weights.fps), bounds, pauses)
+            values = limit_speed(values, weights.fps)
+            values = close_lips(self.mouth, values, self.rest_gaps, bounds, pauses)
         gap = ordered_product(values, self.mouth.gaps[MIDDLE_PAIR])
         values = self.tongue.move(values, gap, tracks)
+        tongue = np.setdiff1d(np.arange(values.shape[1]), self.mouth.moving)
+        values[:, tongue] = limit_speed(values[:, tongue], weights.fps)
         return Trajectory(weights.channels, values.astype(np.float32), weights.fps)
 
     def _add_by_class(self, speech: FloatArray, tracks: Mapping[str, FloatArray], strength: float) -> FloatArray:
@@ -189,6 +200,7 @@ def build_articulator(face: Face) -> Articulator:
         mouth=mouth,
         protrusion=(motion[OUTER_UPPER_MID, 2] + motion[OUTER_LOWER_MID, 2]) / 2,
         rest_width=rest_width,
+        rest_gaps=np.clip(inner_lip_gaps(places), 0.0, LARGEST_REST_GAP_SHARE * rest_width),
         directions={
             kind: np.array([table.get(name, 0.0) for name in face.shape_names]) for kind, table in tables.items()
         },

@@ -21,10 +21,10 @@ FloatArray = NDArray[np.float64]
 TOUCHING_LANDMARKS, FACING_LANDMARKS = INNER_LIP_LOWER[4:7], INNER_LIP_UPPER[4:7]  # of the lips, about the middle
 CONTACT_WEIGHT = 1e4  # of a coordinate of these landmarks, relative to a landmark of the cheek
 # The jaw rises in labiodentals, and a lip that is rolled in far is a flat, pale band: shares of the weights in speech
-# that are preferred, and costs of other weights, relative to the median curvature.
+# that are preferred, and cost of the roll relative to the median curvature.
 ROLLED = "mouthRollLower"
 KEPT_SHARES = {WIDE_OPEN: 0.4, "mouthClose": 0.4, ROLLED: 0.0}
-ROLL_COST, CHANGE_COST = 1.0, 0.1
+ROLL_COST = 1.0
 TEETH_NAMES = ("teeth", "tooth")  # in the names of parts
 INCISOR_SHARE = 0.08  # of the mouth's width: half the width of the middle incisors
 STILL_SHARE = 0.1  # of the largest motion of the jaw: upper teeth move less
@@ -53,7 +53,7 @@ class IncisorContact:
         Height of the facing landmarks of the upper lip per weight, mm.
     upper_target : (u,)
         Their least displacement from rest in contact, mm.
-    kept, pull : (k,)
+    kept, cost : (k,)
         Share of each shape's weight in speech that is preferred in contact, and the cost of other weights.
     """
 
@@ -63,7 +63,7 @@ class IncisorContact:
     upper_motion: FloatArray
     upper_target: FloatArray
     kept: FloatArray
-    pull: FloatArray
+    cost: FloatArray
 
     def enforce(self, speech: FloatArray, contact: FloatArray) -> FloatArray:
         """Weights (T, K) whose lower lip is in contact by shares (T,): 0 as in speech, 1 at the incisors."""
@@ -80,12 +80,12 @@ class IncisorContact:
         wanted = ordered_product(current, moved.T) + shift
         share = contact[changed, None]
         preferred = current * (1.0 - share * (1.0 - self.kept))
-        pull = share * self.pull
+        cost = share * self.cost
         curvature = mouth.curvature + CONTACT_WEIGHT * ordered_product(moved.T, moved)
         linear = ordered_product(preferred, mouth.curvature) + CONTACT_WEIGHT * ordered_product(wanted, moved)
         values = speech.copy()
         values[np.ix_(changed, mouth.moving)] = bounded_least_squares(
-            curvature + pull[:, :, None] * np.eye(pull.shape[1]), linear + pull * preferred, mouth.limits
+            curvature + cost[:, :, None] * np.eye(cost.shape[1]), linear + cost * preferred, mouth.limits
         )
         return values
 
@@ -119,8 +119,7 @@ def build_incisor_contact(
         upper_motion=motion[upper, 1],
         upper_target=edge[0] + (COVER_SHARE + SHOWN_SHARE) * width - places[upper, 1],
         kept=np.array([KEPT_SHARES.get(name, 1.0) for name in names]),
-        pull=np.array([ROLL_COST if name == ROLLED else CHANGE_COST for name in names])
-        * np.median(np.diag(mouth.curvature)),
+        cost=np.array([ROLL_COST if name == ROLLED else 0.0 for name in names]) * np.median(np.diag(mouth.curvature)),
     )
 
 

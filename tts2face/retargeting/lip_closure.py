@@ -1,7 +1,5 @@
 """Last steps of articulation: limited speed of the mouth, and lips that meet in bilabials and pauses."""
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,15 +8,14 @@ from tts2face.numeric import ordered_product
 
 FloatArray = NDArray[np.float64]
 
-# Largest change of a shape's weight per second. The fastest score of the mouth in recordings (mouthPucker; 14 sentences
-# of GRID s1) changes by .34 per 1/60 s (99.9th percentile); that of the Live Link capture (mouthFunnel) by .25.
-LARGEST_SPEED_PER_S = 20.0
+# Largest change of a shape's weight per second, .3 per 1/60 s; closing the lips afterwards adds a little. The fastest
+# score of the mouth in 14 recordings of GRID s1 (mouthPucker) changes by .34 per 1/60 s (99.9th percentile), that of
+# the Live Link capture (mouthFunnel) by .25.
+LARGEST_SPEED_PER_S = 18.0
 # Speed at which the lips of a mouth of 50 mm open or close (99.9th percentile of GRID s1: 265 and 310 mm/s), and the
 # time in which they reach half of it.
 LIP_SPEED_MM_PER_S, LIP_ONSET_S = 300.0, 0.01
-FIRM_POWER = 4  # of the smooth minimum of a gap and its bound: a bound of twice the gap lowers it by 1.5 %
-# Of changes of the weights, relative to the median curvature; without it, opposite shapes take turns near the corners.
-CHANGE_COST = 0.5
+FIRM_POWER = 6  # of the smooth minimum of a gap and its bound: a bound of twice the gap lowers it by .3 %
 LEAST_CHANGE_MM = 1e-4  # of a gap; frames that would change less are unchanged
 
 
@@ -45,17 +42,23 @@ def largest_gaps(seconds: FloatArray, mouth_share: float) -> FloatArray:
     return mouth_share * LIP_SPEED_MM_PER_S * far * far / (far + LIP_ONSET_S)
 
 
-def close_lips(mouth: LipConstraints, speech: FloatArray, bounds: FloatArray, closure: FloatArray) -> FloatArray:
+def close_lips(
+    mouth: LipConstraints, speech: FloatArray, rest_gaps: FloatArray, bounds: FloatArray, closure: FloatArray
+) -> FloatArray:
     """Speech (T, K) whose lip gaps are within bounds (T,), mm, and smaller by shares `closure` (T,).
 
     All gaps of a frame shrink by the same share. Overlapping lips, whose gap is negative, stay as they are.
+
+    Parameters
+    ----------
+    rest_gaps : (P,)
+        Gaps of the face at rest that are to be closed, mm.
     """
-    cost = CHANGE_COST * np.median(np.diag(mouth.curvature))
-    firm = replace(mouth, curvature=mouth.curvature + cost * np.eye(len(mouth.moving)))
-    gaps = np.maximum(ordered_product(speech, mouth.gaps.T), 0.0)
+    displaced = ordered_product(speech, mouth.gaps.T)
+    gaps = np.maximum(displaced + rest_gaps, 0.0)
     widest = gaps.max(axis=1)
     ratio = np.divide(widest, bounds, out=np.full(len(widest), np.inf), where=bounds > 0)
     kept = (1.0 - closure) * (1.0 + ratio**FIRM_POWER) ** (-1.0 / FIRM_POWER)
     changed = (1.0 - kept) * widest > LEAST_CHANGE_MM
-    targets = ordered_product(speech, mouth.gaps.T) - (1.0 - kept)[:, None] * gaps
-    return firm.solve(speech, np.zeros_like(speech), targets, changed)
+    targets = displaced - (1.0 - kept)[:, None] * gaps
+    return mouth.solve(speech, np.zeros_like(speech), targets, changed)
