@@ -1,7 +1,7 @@
 """Visible articulation of phones: targets of lips, jaw and tongue, from the features of the phone table."""
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from types import MappingProxyType
 
 from lexicon.phone_table import HEIGHTS, Phone
@@ -56,16 +56,7 @@ class VisibleTarget:
     tongue_up: float = 0.0
 
 
-TARGET_NAMES = (
-    "rounding",
-    "flare",
-    "spreading",
-    "opening",
-    "lip_contact",
-    "incisor_contact",
-    "tongue_out",
-    "tongue_up",
-)
+TARGET_NAMES = tuple(field.name for field in fields(VisibleTarget))
 
 
 @functools.cache

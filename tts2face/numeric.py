@@ -29,6 +29,13 @@ def unit_vectors(vectors: NDArray[AnyFloat]) -> NDArray[AnyFloat]:
     return units
 
 
+def smooth_gaussian(values: FloatArray, spread: float, reach: int) -> FloatArray:
+    """Values (n,) smoothed by a Gaussian of `spread` samples, cut off at `reach` samples; ends are continued."""
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / spread) ** 2)
+    smooth: FloatArray = np.convolve(np.pad(values, reach, mode="edge"), kernel / kernel.sum(), mode="valid")
+    return smooth
+
+
 def nearest_rotation(matrix: NDArray[np.floating]) -> FloatArray:
     """The rotation (3, 3) nearest to a matrix (3, 3) in least squares; never a reflection (Kabsch 1976)."""
     left, _, right = np.linalg.svd(matrix)

@@ -1,16 +1,15 @@
-"""Score maps added to talker and face files; everything else in a file keeps its bytes."""
+"""Score maps added to face files; everything else in a file keeps its bytes."""
 
 from pathlib import Path
 
 from corpus_tools.training.calibrate_face import calibrate_face
-from corpus_tools.training.train_score_map import add_score_map
-from tts2face.models import face_file, talker
+from tts2face.models import face_file
 from tts2face.models.face_layout import SCORE_INPUTS
-from tts2face.models.score_map import SCORE_MAP_PREFIX, score_map_arrays
+from tts2face.models.score_map import SCORE_MAP_PREFIX, ScoreMap, score_map_arrays
+from tts2face.models.talker import load_talker
 from tts2face.storage.files import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import Progress
-from tts2face.video.blendshapes import BlendshapeReader
 
 
 def calibrate_face_file(
@@ -35,22 +34,13 @@ def calibrate_face_file(
         The face tracker or its models are missing, or the file cannot be written.
     """
     path = find_file(face, face_file.KIND)
-    calibrated = calibrate_face(
-        face_file.read_face(path), talker.load_talker(source), model=model, on_progress=on_progress
-    )
+    calibrated = calibrate_face(face_file.read_face(path), load_talker(source), model=model, on_progress=on_progress)
     if calibrated.scores is not None:
-        added = score_map_arrays(calibrated.scores)
-        _add(path, out, (face_file.KIND, face_file.FORMAT_VERSION), added, {SCORE_INPUTS: calibrated.scores.inputs})
+        _replace_score_map(path, out, calibrated.scores)
 
 
-def add_talker_scores(name: str, out: Path, *, model: Path | None = None) -> None:
-    """Write a talker file with its score map, which replaces one that it has; errors as `calibrate_face_file`."""
-    path = find_file(name, talker.KIND)
-    scored = add_score_map(talker.read_talker(path), BlendshapeReader(model))
-    _add(path, out, (talker.KIND, talker.FORMAT_VERSION), score_map_arrays(scored.scores), {})
-
-
-def _add(path: Path, out: Path, kind: tuple[str, int], added: dict, header: dict) -> None:  # type: ignore[type-arg]
-    arrays, known = read_tensors(path, *kind)
+def _replace_score_map(path: Path, out: Path, scores: ScoreMap) -> None:
+    arrays, header = read_tensors(path, face_file.KIND, face_file.FORMAT_VERSION)
     kept = {name: array for name, array in arrays.items() if not name.startswith(SCORE_MAP_PREFIX)}
-    write_tensors(out, *kind, kept | added, known | {name: list(value) for name, value in header.items()})
+    header = header | {SCORE_INPUTS: list(scores.inputs)}
+    write_tensors(out, face_file.KIND, face_file.FORMAT_VERSION, kept | score_map_arrays(scores), header)

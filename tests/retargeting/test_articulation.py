@@ -16,11 +16,11 @@ from tts2face.face.landmark_fit import landmark_positions, scatter_landmarks
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
-from tts2face.models.landmarks import LOWER_LIP_INNER_MID
+from tts2face.models.landmarks import LOWER_LIP_INNER_MID, inner_lip_gaps
 from tts2face.models.talker import Talker, load_talker
-from tts2face.retargeting.articulation import Articulator, build_articulator
+from tts2face.retargeting.articulation import build_articulator
 from tts2face.retargeting.incisor_contact import incisor_edge, upper_teeth
-from tts2face.retargeting.phone_tracks import articulation_tracks, pause_closure
+from tts2face.retargeting.phone_tracks import articulation_tracks, pause_closure, seconds_from_closure
 from tts2face.synthesis.mesh_face import mesh_face
 from tts2face.types import Trajectory
 
@@ -49,11 +49,6 @@ def exemplars(talker: Talker) -> ExemplarModel:
 @cache
 def named_face(identity: str | None) -> Face:
     return load_face("head", identity, hair="bald")
-
-
-@cache
-def articulator_of(identity: str | None) -> Articulator:
-    return build_articulator(named_face(identity))
 
 
 class Spoken:
@@ -129,7 +124,8 @@ def test_targets_are_held_in_the_middle_of_their_phones() -> None:
     tracks = articulation_tracks(phones, middles)
     np.testing.assert_allclose(tracks["rounding"][[2, 4, 6]], [1, 0, 0], atol=0.06)
     np.testing.assert_allclose(tracks["spreading"][[2, 4]], [0, 1], atol=0.06)
-    np.testing.assert_allclose(tracks["incisor_contact"][[5, 6]], [0, 1], atol=0.06)
+    np.testing.assert_allclose(tracks["incisor_contact"][[4, 6]], [0, 1], atol=0.06)
+    assert tracks["incisor_contact"][5] < 0.2
     assert 0.2 < tracks["rounding"][1] < 0.98  # /t/ before /u/ is being rounded
     assert not tracks["rounding"][0]
 
@@ -141,9 +137,20 @@ def test_tracks_are_smooth_and_fall_short_in_fast_speech() -> None:
         for track in tracks.values():
             assert np.abs(np.diff(track)).max() < 0.045  # per millisecond
             assert -1e-9 <= track.min() <= track.max() <= 1 + 1e-9
-    fast, slow = (articulation_tracks(sequence("s f s", s), np.array([0.4 + 1.5 * s])) for s in (0.03, 0.1))
-    assert fast["incisor_contact"][0] < 0.8
-    assert slow["incisor_contact"][0] > 0.95
+    fast, slow = (articulation_tracks(sequence("s u s", s), np.array([0.4 + 1.5 * s])) for s in (0.03, 0.1))
+    assert fast["rounding"][0] < 0.8
+    assert slow["rounding"][0] > 0.95
+
+
+def test_contacts_are_reached_in_fast_speech_and_begin_before_their_phones() -> None:
+    for phone_s in (0.03, 0.1):
+        phones = sequence("s f s", phone_s)
+        middle, before = (
+            articulation_tracks(phones, np.array([0.4 + at]))["incisor_contact"]
+            for at in (1.5 * phone_s, 1.1 * phone_s - 0.03)
+        )
+        assert middle[0] == 1.0
+        assert 0.3 < before[0] < 0.95
 
 
 def test_lips_meet_in_long_pauses_only() -> None:
@@ -185,14 +192,24 @@ def test_factors_are_ordered_and_clear_is_the_default_of_a_mesh(spoken: Spoken) 
     np.testing.assert_array_equal(spoken.default.values, spoken.clear.values)
 
 
+def largest_closed_gap(spoken: Spoken, motion: Trajectory, *labels: str) -> float:
+    """Largest gap of all pairs of inner lip points at the middle of phones, mm."""
+    rest = inner_lip_gaps(scatter_landmarks(spoken.face, landmark_positions(spoken.face)))
+    gaps = motion.values[spoken.middles(*labels)] @ spoken.articulator.mouth.gaps.T + rest
+    return float(gaps.max())
+
+
 def test_bilabials_stay_closed_and_open_vowels_open(spoken: Spoken) -> None:
     natural = spoken.gaps(spoken.recorded)
-    for motion in (spoken.clear, spoken.more, spoken.less):
-        gaps = spoken.gaps(motion)
-        for span in spoken.within("b", "m"):
-            assert gaps[span].min() <= max(0.15, natural[span].min())
+    for motion in (spoken.recorded, spoken.clear, spoken.more, spoken.less):
+        assert largest_closed_gap(spoken, motion, "b", "m") <= 0.1
         if motion is not spoken.less:
-            assert (gaps[spoken.middles("ɑ", "æ")] > 0.98 * natural[spoken.middles("ɑ", "æ")]).all()
+            assert (gaps_of(spoken, motion, "ɑ", "æ") > 0.98 * natural[spoken.middles("ɑ", "æ")]).all()
+
+
+def gaps_of(spoken: Spoken, motion: Trajectory, *labels: str) -> NDArray[np.float64]:
+    """Gap of the middle of the lips at the middle of phones, mm."""
+    return spoken.gaps(motion)[spoken.middles(*labels)]
 
 
 def test_weights_are_smooth_and_within_their_limits(spoken: Spoken) -> None:
@@ -200,7 +217,7 @@ def test_weights_are_smooth_and_within_their_limits(spoken: Spoken) -> None:
     for motion in (spoken.recorded, spoken.clear, spoken.less):
         assert (motion.values >= low - 1e-6).all()
         assert (motion.values <= high + 1e-6).all()
-        assert np.abs(np.diff(motion.values, axis=0)).max() < 0.75  # per 1/60 s: the lower lip moves at most 0.2 m/s
+        assert np.abs(np.diff(motion.values, axis=0)).max() < 0.34  # per 1/60 s, as scores in recordings of people
 
 
 def test_natural_changes_neither_vowels_nor_consonants_without_a_contact(
@@ -213,9 +230,14 @@ def test_natural_changes_neither_vowels_nor_consonants_without_a_contact(
     )
     tracks = articulation_tracks(spoken.phones, spoken.times)
     free = (tracks["incisor_contact"] == 0) & (pause_closure(spoken.phones, spoken.times) == 0)
+    free &= seconds_from_closure(spoken.phones, spoken.times) > 0.1
+    fast = np.abs(np.diff(retargeted.values, axis=0, append=0)).max(axis=1) > 0.25
+    free &= np.convolve(fast, np.ones(7), "same") == 0
     lips = animated.articulator.mouth.moving
-    assert free.sum() > 60
-    np.testing.assert_array_equal(spoken.recorded.values[np.ix_(free, lips)], retargeted.values[np.ix_(free, lips)])
+    assert free.sum() > 40
+    np.testing.assert_allclose(
+        spoken.recorded.values[np.ix_(free, lips)], retargeted.values[np.ix_(free, lips)], atol=0.01
+    )
 
 
 def lips_of(selection: object, exemplars: ExemplarModel, n_frames: int) -> NDArray[np.float32]:

@@ -25,6 +25,8 @@ from tts2face.numeric import ordered_product, smoothstep
 FULL_EXPRESSION_GAP_MM = 4.0  # gap from which lips follow an expression in full; touching lips do not follow it
 MIN_GAP_SHARE = 0.5  # least share of the speech gap that an expression leaves open
 GAP_CONSTRAINT_WEIGHT = 1e5  # relative to a landmark of the cheek; 300 in retargeting, where gaps may deviate a little
+# Of changes of the weights, relative to the median curvature; without it, opposite shapes take turns near the corners.
+CHANGE_COST = 0.5
 FULL_GROWTH_GAP_MM = 1.5  # gaps smaller than this are amplified by less than the gain
 GAP_TOLERANCE_MM = 0.01  # largest gap of closed lips
 FULL_ROUNDING_MM = 8.0  # a mouth this much narrower than at rest is fully rounded
@@ -42,7 +44,7 @@ class LipConstraints:
     moving : (k,)
         Indices of the shapes that speech moves.
     curvature : (k, k)
-        Normal matrix of the visible changes of the mouth without its gaps.
+        Normal matrix of the visible changes of the mouth without its gaps, and of the changes of weights.
     gaps : (P, K)
         Widening of the gap between facing inner lip points per weight, mm.
     width : (K,)
@@ -132,9 +134,10 @@ def build_lip_constraints(face: Face) -> LipConstraints:
     require_lips(face, moving)
     motion = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))
     common = [landmark for landmark in MOUTH_REGION if np.isfinite(motion[landmark]).all()]
+    curvature = mouth_curvature(motion[common][:, :, moving], common)
     return LipConstraints(
         moving=moving,
-        curvature=mouth_curvature(motion[common][:, :, moving], common),
+        curvature=curvature + CHANGE_COST * np.median(np.diag(curvature)) * np.eye(len(moving)),
         gaps=motion[list(INNER_LIP_UPPER), 1] - motion[list(INNER_LIP_LOWER), 1],
         width=motion[MOUTH_CORNER_LEFT, 0] - motion[MOUTH_CORNER_RIGHT, 0],
         limits=face.limits[moving].astype(np.float64),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tts2face.gesture.presentation import FloatArray, FrameContext, LowPass, filtered_spread
 from tts2face.gesture.prosody import prosody_features
 from tts2face.models.palette import GESTURE_FPS, Style
-from tts2face.numeric import smoothstep
+from tts2face.numeric import smooth_gaussian, smoothstep
 from tts2face.types import HEAD_CHANNELS, Waveform
 
 SLOW_HZ = 0.7  # cut-off of the part that is scaled: turns and tilts that last a phrase
@@ -48,10 +48,8 @@ def find_accents(sound: Waveform) -> FloatArray:
     if len(times) < 3:
         return np.zeros((0, 2))
     level = prosody_features(sound, times, with_pitch=False)[:, 0].astype(np.float64)
-    reach = np.arange(-3 * ACCENT_SMOOTHING_S, 3 * ACCENT_SMOOTHING_S + 1e-9, ACCENT_STEP_S)
-    window = np.exp(-0.5 * np.square(reach / ACCENT_SMOOTHING_S))
-    padded = np.pad(level, len(reach) // 2, mode="edge")
-    smooth = np.convolve(padded, window / window.sum(), "valid")[: len(level)]
+    spread = ACCENT_SMOOTHING_S / ACCENT_STEP_S
+    smooth = smooth_gaussian(level, spread, round(3 * spread))
     inner = smooth[1:-1]
     peaks = 1 + np.flatnonzero((inner > smooth[:-2]) & (inner >= smooth[2:]) & (inner > ACCENT_DB))
     chosen: list[int] = []

@@ -15,11 +15,19 @@ from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scat
 from tts2face.face.lip_constraints import LipConstraints, build_lip_constraints
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
-from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, OUTER_LIP_LOWER, OUTER_LIP_UPPER
+from tts2face.models.face_layout import WIDE_OPEN
+from tts2face.models.landmarks import (
+    MOUTH_CORNER_LEFT,
+    MOUTH_CORNER_RIGHT,
+    OUTER_LIP_LOWER,
+    OUTER_LIP_UPPER,
+    inner_lip_gaps,
+)
 from tts2face.numeric import ordered_product, smoothstep
 from tts2face.request import CLEAR, NATURAL
 from tts2face.retargeting.incisor_contact import IncisorContact, build_incisor_contact, incisor_edge
-from tts2face.retargeting.phone_tracks import articulation_tracks, pause_closure
+from tts2face.retargeting.lip_closure import close_lips, largest_gaps, limit_speed
+from tts2face.retargeting.phone_tracks import articulation_tracks, pause_closure, seconds_from_closure
 from tts2face.retargeting.tongue import Tongue, build_tongue
 from tts2face.types import Trajectory
 
@@ -34,6 +42,8 @@ OPENING_GAIN = 0.22  # growth of the gap of an open vowel, by the jaw
 MIN_GAP_SHARE = 0.6  # of a gap that rounding leaves open
 FOLLOW_GAPS_MM = (0.2, 2.5)  # gap of the lips up to which they keep it, and from which they follow in full
 LARGEST_ADDED_WEIGHT = 1.2
+LARGEST_REST_GAP_SHARE = 0.02  # of the mouth's width: a gap at rest that contacts close; landmarks may be further apart
+N_CLOSURE_ROUNDS = 3  # of limiting the speed and closing the lips, which disturb each other a little
 LEAST_MOTION_MM = 0.5  # per weight of a shape: shapes that move less, as on a face without them, are not used
 ROUND_SHAPES = {"mouthPucker": 1.0}
 FLARED_SHAPES = {"mouthPucker": 0.85, "mouthFunnel": 0.3}
@@ -41,7 +51,6 @@ SPREAD_SHAPES = {"mouthStretchLeft": 0.5, "mouthStretchRight": 0.5, "mouthSmileL
 LOWERED_SHAPES = {"mouthLowerDownLeft": 1.0, "mouthLowerDownRight": 1.0}
 # Drop of the jaw and gap of the lips at which the tip of the tongue is seen between the teeth; largest weight for it.
 DENTAL_DROP_MM, DENTAL_GAP_MM, LARGEST_LOWERED = 5.5, 8.0, 0.8
-JAW = "jawOpen"
 OUTER_UPPER_MID, OUTER_LOWER_MID = OUTER_LIP_UPPER[5], OUTER_LIP_LOWER[5]
 
 
@@ -55,8 +64,8 @@ class Articulator:
         Lip gaps, mouth width and cost of a change.
     protrusion : (K,)
         Forward motion of the lips' outer edges per weight, mm.
-    rest_width
-        Width of the mouth at rest, mm.
+    rest_width, rest_gaps : (), (P,)
+        Width of the mouth at rest, and gaps of the lips at rest that contacts close as well, mm.
     directions
         Weights (K,) that make the mouth ``round``, ``flared``, ``spread`` or ``open``, or lower the lip (``lowered``);
         zero without such shapes.
@@ -69,6 +78,7 @@ class Articulator:
     mouth: LipConstraints
     protrusion: FloatArray
     rest_width: float
+    rest_gaps: FloatArray
     directions: Mapping[str, FloatArray]
     tongue: Tongue
     incisors: IncisorContact
@@ -84,16 +94,22 @@ class Articulator:
             Of rounding, spreading and opening, `NATURAL` for the talker's own.
         """
         times = np.arange(len(weights)) / weights.fps
-        tracks, closure = articulation_tracks(phones, times), pause_closure(phones, times)
+        tracks = articulation_tracks(phones, times)
         values = weights.values.astype(np.float64)
         if factor > NATURAL:
             values = self._add_by_class(values, tracks, (factor - NATURAL) / (CLEAR - NATURAL))
         elif factor < NATURAL:
             values = self._reduce_by_class(values, tracks, 1.0 - factor)
         values = self.incisors.enforce(values, tracks["incisor_contact"] * (1.0 - tracks["lip_contact"] ** 2))
-        values = self._close_pauses(values, closure)
+        bounds = largest_gaps(seconds_from_closure(phones, times), self.rest_width / HEAD_MOUTH_MM)
+        pauses = pause_closure(phones, times)
+        for _ in range(N_CLOSURE_ROUNDS):
+            values = limit_speed(values, weights.fps)
+            values = close_lips(self.mouth, values, self.rest_gaps, bounds, pauses)
         gap = ordered_product(values, self.mouth.gaps[MIDDLE_PAIR])
         values = self.tongue.move(values, gap, tracks)
+        tongue = np.setdiff1d(np.arange(values.shape[1]), self.mouth.moving)
+        values[:, tongue] = limit_speed(values[:, tongue], weights.fps)
         return Trajectory(weights.channels, values.astype(np.float32), weights.fps)
 
     def _add_by_class(self, speech: FloatArray, tracks: Mapping[str, FloatArray], strength: float) -> FloatArray:
@@ -162,13 +178,6 @@ class Articulator:
         gaps = ordered_product(speech, self.mouth.gaps.T)
         return self.mouth.solve(speech, added, gaps - of_class[:, None] * np.maximum(gaps, 0.0))
 
-    def _close_pauses(self, speech: FloatArray, closure: FloatArray) -> FloatArray:
-        """Speech (T, K) with the lips closed by shares (T,)."""
-        gaps = ordered_product(speech, self.mouth.gaps.T)
-        closing = closure * (gaps > 0).any(axis=1)
-        target_gaps = gaps - closing[:, None] * np.maximum(gaps, 0.0)
-        return self.mouth.solve(speech, np.zeros_like(speech), target_gaps, closing > 0)
-
 
 def build_articulator(face: Face) -> Articulator:
     """Articulator of a face.
@@ -184,16 +193,17 @@ def build_articulator(face: Face) -> Articulator:
     rest_width = float(np.linalg.norm(places[MOUTH_CORNER_LEFT] - places[MOUTH_CORNER_RIGHT]))
     edge = incisor_edge(face, places, rest_width)
     tables = {"round": ROUND_SHAPES, "flared": FLARED_SHAPES, "spread": SPREAD_SHAPES, "lowered": LOWERED_SHAPES}
-    tables["open"] = {JAW: 1.0}
+    tables["open"] = {WIDE_OPEN: 1.0}
     if not {*ROUND_SHAPES, *FLARED_SHAPES} <= {*face.shape_names}:
         tables["flared"] = ROUND_SHAPES
     return Articulator(
         mouth=mouth,
         protrusion=(motion[OUTER_UPPER_MID, 2] + motion[OUTER_LOWER_MID, 2]) / 2,
         rest_width=rest_width,
+        rest_gaps=np.clip(inner_lip_gaps(places), 0.0, LARGEST_REST_GAP_SHARE * rest_width),
         directions={
             kind: np.array([table.get(name, 0.0) for name in face.shape_names]) for kind, table in tables.items()
         },
         tongue=build_tongue(face, edge, rest_width),
-        incisors=build_incisor_contact(face, mouth, edge),
+        incisors=build_incisor_contact(face.shape_names, mouth, edge, places=places, motion=motion, width=rest_width),
     )

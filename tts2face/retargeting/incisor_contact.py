@@ -6,14 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.face.bounded_least_squares import bounded_least_squares
-from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.lip_constraints import LipConstraints
 from tts2face.models.face import Face
+from tts2face.models.face_layout import WIDE_OPEN
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
-    MOUTH_CORNER_LEFT,
-    MOUTH_CORNER_RIGHT,
     UPPER_LIP_INNER_MID,
 )
 from tts2face.numeric import ordered_product
@@ -22,8 +20,12 @@ FloatArray = NDArray[np.float64]
 
 TOUCHING_LANDMARKS, FACING_LANDMARKS = INNER_LIP_LOWER[4:7], INNER_LIP_UPPER[4:7]  # of the lips, about the middle
 CONTACT_WEIGHT = 1e4  # of a coordinate of these landmarks, relative to a landmark of the cheek
+# The jaw rises in labiodentals, and a lip that is rolled in far is a flat, pale band: shares of the weights in speech
+# that are preferred, and cost of the roll relative to the median curvature.
+ROLLED = "mouthRollLower"
+KEPT_SHARES = {WIDE_OPEN: 0.4, "mouthClose": 0.4, ROLLED: 0.0}
+ROLL_COST = 1.0
 TEETH_NAMES = ("teeth", "tooth")  # in the names of parts
-JAW = "jawOpen"
 INCISOR_SHARE = 0.08  # of the mouth's width: half the width of the middle incisors
 STILL_SHARE = 0.1  # of the largest motion of the jaw: upper teeth move less
 FRONT_SHARE, EDGE_SHARE = 0.06, 0.01  # of the mouth's width: depth of the front teeth, and height of their edge
@@ -51,6 +53,8 @@ class IncisorContact:
         Height of the facing landmarks of the upper lip per weight, mm.
     upper_target : (u,)
         Their least displacement from rest in contact, mm.
+    kept, cost : (k,)
+        Share of each shape's weight in speech that is preferred in contact, and the cost of other weights.
     """
 
     mouth: LipConstraints
@@ -58,6 +62,8 @@ class IncisorContact:
     target: FloatArray
     upper_motion: FloatArray
     upper_target: FloatArray
+    kept: FloatArray
+    cost: FloatArray
 
     def enforce(self, speech: FloatArray, contact: FloatArray) -> FloatArray:
         """Weights (T, K) whose lower lip is in contact by shares (T,): 0 as in speech, 1 at the incisors."""
@@ -72,18 +78,37 @@ class IncisorContact:
         shift = contact[changed, None] * (wanted_now - now)
         current = speech[np.ix_(changed, mouth.moving)]
         wanted = ordered_product(current, moved.T) + shift
+        share = contact[changed, None]
+        preferred = current * (1.0 - share * (1.0 - self.kept))
+        cost = share * self.cost
         curvature = mouth.curvature + CONTACT_WEIGHT * ordered_product(moved.T, moved)
-        linear = ordered_product(current, mouth.curvature) + CONTACT_WEIGHT * ordered_product(wanted, moved)
+        linear = ordered_product(preferred, mouth.curvature) + CONTACT_WEIGHT * ordered_product(wanted, moved)
         values = speech.copy()
-        values[np.ix_(changed, mouth.moving)] = bounded_least_squares(curvature, linear, mouth.limits)
+        values[np.ix_(changed, mouth.moving)] = bounded_least_squares(
+            curvature + cost[:, :, None] * np.eye(cost.shape[1]), linear + cost * preferred, mouth.limits
+        )
         return values
 
 
-def build_incisor_contact(face: Face, mouth: LipConstraints, edge: tuple[float, float]) -> IncisorContact:
-    """Contact of a face's lower lip with its upper incisors, whose `edge` has a height and a depth, mm."""
-    places = scatter_landmarks(face, landmark_positions(face))
-    motion = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))
-    width = float(np.linalg.norm(places[MOUTH_CORNER_LEFT] - places[MOUTH_CORNER_RIGHT]))
+def build_incisor_contact(
+    shape_names: tuple[str, ...],
+    mouth: LipConstraints,
+    edge: tuple[float, float],
+    *,
+    places: FloatArray,
+    motion: FloatArray,
+    width: float,
+) -> IncisorContact:
+    """Contact of a face with given shapes, for incisors whose edge is at a height and depth, mm.
+
+    Parameters
+    ----------
+    places, motion : (478, 3), (478, 3, K)
+        Landmarks of the face, and their motion per weight, mm.
+    width
+        Width of the mouth at rest, mm.
+    """
+    names = [shape_names[at] for at in mouth.moving]
     lips = list(TOUCHING_LANDMARKS)
     target = np.array([edge[0] + COVER_SHARE * width, edge[1] + AHEAD_SHARE * width]) - places[lips, 1:]
     upper = list(FACING_LANDMARKS)
@@ -93,6 +118,8 @@ def build_incisor_contact(face: Face, mouth: LipConstraints, edge: tuple[float, 
         target=target.ravel(),
         upper_motion=motion[upper, 1],
         upper_target=edge[0] + (COVER_SHARE + SHOWN_SHARE) * width - places[upper, 1],
+        kept=np.array([KEPT_SHARES.get(name, 1.0) for name in names]),
+        cost=np.array([ROLL_COST if name == ROLLED else 0.0 for name in names]) * np.median(np.diag(mouth.curvature)),
     )
 
 
@@ -124,7 +151,7 @@ def upper_teeth(face: Face) -> FloatArray:
     parts = [part for part in face.parts if any(name in part.name.lower() for name in TEETH_NAMES)]
     used = [face.triangles[part.first : part.first + part.count].ravel() for part in parts]
     numbers = np.unique(np.concatenate([np.zeros(0, np.int32), *used]))
-    if JAW in face.shape_names and len(numbers):
-        jaw = np.linalg.norm(face.shapes[face.shape_names.index(JAW)], axis=1)
+    if WIDE_OPEN in face.shape_names and len(numbers):
+        jaw = np.linalg.norm(face.shapes[face.shape_names.index(WIDE_OPEN)], axis=1)
         numbers = numbers[jaw[numbers] < STILL_SHARE * jaw.max()]
     return np.asarray(face.vertices[numbers], np.float64)

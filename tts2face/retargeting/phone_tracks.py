@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lexicon.articulation import TARGET_NAMES, VisibleTarget, visible_targets
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.numeric import smoothstep
+from tts2face.numeric import smooth_gaussian, smoothstep
 
 FloatArray = NDArray[np.float64]
 
@@ -15,13 +15,12 @@ CLOCK_HZ = 200.0  # rate at which tracks are computed; they are interpolated at 
 HOLD_SHARE = 0.5  # share of a phone, or of the half of a diphthong, in which its target is held
 MAX_TRANSITION_S = 0.16  # lips round at most this long before a rounded phone is held (Perkell and Matthies 1992)
 SMOOTHING_S = 0.012  # standard deviation of a Gaussian; short phones of fast speech fall short of their targets
-CONTACT_EASE_S, TONGUE_EASE_S = 0.1, 0.07  # transition to and from a contact of the lip, and of the tongue
-EASES_S = {
-    "lip_contact": CONTACT_EASE_S,
-    "incisor_contact": CONTACT_EASE_S,
-    "tongue_out": TONGUE_EASE_S,
-    "tongue_up": TONGUE_EASE_S,
-}
+SMOOTHING_REACH = int(4 * SMOOTHING_S * CLOCK_HZ)
+# Transition to and from a contact of the lip, which may begin while a neighbouring phone is held, and of the tongue.
+CONTACT_EASE_S, TONGUE_EASE_S = 0.1, 0.07
+LIP_CONTACTS = ("lip_contact", "incisor_contact")
+EASES_S = {"tongue_out": TONGUE_EASE_S, "tongue_up": TONGUE_EASE_S}
+MIN_CLOSURE_S = 0.04  # bilabials are closed at least this long: a frame lies within at 25 frames/s
 SHORT_PAUSE_S, LONG_PAUSE_S = 0.17, 0.25  # lips stay as they are in shorter pauses, and meet in longer ones
 CLOSING_S, PARTING_S = 0.12, 0.20  # longest closing after speech, and parting before it, in which speakers breathe in
 PARTING_SHARE = 0.4  # of a short pause
@@ -40,9 +39,26 @@ def articulation_tracks(phones: PhoneSequence, times: FloatArray) -> Mapping[str
     tracks = {}
     for name in TARGET_NAMES:
         keys = [(start, end, getattr(target, name)) for start, end, target in halves]
+        if name in LIP_CONTACTS:
+            tracks[name] = _contact_track([(start, end) for start, end, value in keys if value], times)
+            continue
         raw = _keyframe_track([key for key in keys if key[2] is not None], clock, EASES_S.get(name, MAX_TRANSITION_S))
-        tracks[name] = np.interp(times, clock, _smooth(raw))
+        tracks[name] = np.interp(times, clock, smooth_gaussian(raw, SMOOTHING_S * CLOCK_HZ, SMOOTHING_REACH))
     return tracks
+
+
+def seconds_from_closure(phones: PhoneSequence, times: FloatArray) -> FloatArray:
+    """Time (T,) in seconds to the nearest closed span of a bilabial, 0 within it; infinite without bilabials.
+
+    Each is closed in its middle, for at least `MIN_CLOSURE_S` and one frame.
+    """
+    frame_s = float(times[1] - times[0]) if len(times) > 1 else 0.0
+    nearest = np.full(len(times), np.inf)
+    for label, start, end in zip(phones.phones, phones.edges[:-1], phones.edges[1:], strict=True):
+        if visible_targets(label)[0].lip_contact > 0:
+            held_s = max(HOLD_SHARE * (end - start), MIN_CLOSURE_S, frame_s)
+            nearest = np.minimum(nearest, np.maximum(np.abs(times - (start + end) / 2) - held_s / 2, 0.0))
+    return nearest
 
 
 def pause_closure(phones: PhoneSequence, times: FloatArray) -> FloatArray:
@@ -82,6 +98,15 @@ def _halves(phones: PhoneSequence) -> list[tuple[float, float, VisibleTarget]]:
     return found
 
 
+def _contact_track(held: list[tuple[float, float]], times: FloatArray) -> FloatArray:
+    """Contact (T,): 1 in held spans, with transitions of `CONTACT_EASE_S` on both sides."""
+    track = np.zeros(len(times))
+    for start, end in held:
+        beyond = np.maximum(np.maximum(start - times, times - end), 0.0)
+        track = np.maximum(track, smoothstep(beyond, CONTACT_EASE_S, 0.0))
+    return track
+
+
 def _keyframe_track(keys: list[tuple[float, float, float]], clock: FloatArray, longest: float) -> FloatArray:
     """Values at the clock: each held within its span, with cosine-like transitions of at most `longest` seconds.
 
@@ -99,10 +124,3 @@ def _keyframe_track(keys: list[tuple[float, float, float]], clock: FloatArray, l
         rising = low + (value - low) * smoothstep(clock[between] - start, -min(longest, start - before), 0.0)
         track[between] = np.maximum(falling, rising)
     return track
-
-
-def _smooth(track: FloatArray) -> FloatArray:
-    reach = int(4 * SMOOTHING_S * CLOCK_HZ)
-    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (SMOOTHING_S * CLOCK_HZ)) ** 2)
-    padded = np.pad(track, reach, mode="edge")
-    return np.convolve(padded, kernel / kernel.sum(), mode="valid")

@@ -22,17 +22,20 @@ STEP_SHARE = 0.5  # of each step: full steps oscillate, because scores are steep
 BLOCK = 256  # frames solved together, which bounds the memory
 GRID = np.linspace(0.0, 1.0, 51)  # weights at which a shape's own score is tabulated
 # Of the squared error of a logit, relative to a landmark of the cheek (1 / mm^2), in the order of `SCORE_SHAPES`.
-SCORE_WEIGHTS = np.array([300_000.0, 30_000.0, 30_000.0, 30_000.0, 30_000.0, 30_000.0, 30_000.0])
+SCORE_WEIGHTS = np.array([3e6, 1e5, 1e6, 1e5, 1e6, 1e5, 1e5])
 # Pull of a score's shapes to the weight that gives the score, as a share of the curvature along the shape.
-PRIOR_SHARES = np.array([0.1, 0.3, 0.1, 0.3, 0.1, 0.1, 0.3])
+PRIOR_SHARES = np.array([0.1, 0.3, 0.1, 0.3, 1.0, 0.1, 0.3])
 # The prior weight of a score minimises its squared error over this one, plus the squared weight times a cost: a shape
 # that hardly changes its score is not used for it.
 PRIOR_SCORE_ERROR, PRIOR_WEIGHT_COST = 0.05, 0.3
 OTHER_SHARE = 0.1  # pull of all other shapes to 0, as a share of the median curvature
 JAW = tuple(SCORE_SHAPES).index("jawOpen")
 # Of a lip gap where the lips touch, in addition to that of `curvature`; it falls to 0 at `FREE_GAP_MM`.
-CLOSED_GAP_WEIGHT, FREE_GAP_MM = 300_000.0, 3.0
-JAW_GAP_MM = 1.0  # lip gap from which the jaw follows its score in full; on closed lips the tracker sees no jaw
+CLOSED_GAP_WEIGHT, FREE_GAP_MM = 1e6, 3.0
+JAW_GAP_MM = 3.0  # lip gap from which the jaw follows its score in full; on closed lips the tracker sees no jaw
+# Scores between which the weight of a logit grows with its precision, s (1 - s): where a score hardly responds to the
+# shapes, as that of the jaw behind nearly closed lips, a logit of it would move them without limit.
+PRECISION_LIMITS = (0.01, 0.5)
 LOW_SCORE = 0.02  # scores below it are not told apart
 SCORE_LIMITS = (0.01, 0.97)  # of target scores, so that their logits are finite
 REST_TOLERANCE = 0.08  # difference of the scores at rest that vanishes during speech; more is a person's build
@@ -116,6 +119,8 @@ class ScoreMatching:
             found, slopes = self.response.logits(weights), self.response.slopes(weights)
             both_low = np.maximum(logistic(found), targets) < LOW_SCORE
             active = np.where(both_low, 0.0, strength)
+            read = np.clip(logistic(found), *PRECISION_LIMITS)
+            active *= 4.0 * read * (1.0 - read)
             wanted = active * (logits - found + np.einsum("tsk,tk->ts", slopes, weights))
             solved = bounded_least_squares(
                 base + np.einsum("tsk,tsj->tkj", slopes * active[:, :, None], slopes),

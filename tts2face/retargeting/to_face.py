@@ -48,9 +48,10 @@ MAX_CONTACT_MM = 1.5  # upper limit of the tracked gap of touching lips; larger 
 FULL_GAP_MM = 3.0  # gap beyond contact from which it is reproduced in full
 GAP_WEIGHT = 300.0  # of a lip gap, relative to a landmark of the cheek: contact is the most visible
 # With score rows, whose logits weigh as much: gaps, width and chin must hold against them.
-SCORED_GAP_WEIGHT = 10_000.0
+SCORED_GAP_WEIGHT = 50_000.0
+SCORED_GAP_GAIN = 1.1  # of target gaps: the ridge and the other rows make them smaller
 SCORED_DEPTH_WEIGHT = 3000.0  # of the depth between facing lip points
-SCORED_MOUTH = MouthWeights(width=50_000.0, chin=3000.0)
+SCORED_MOUTH = MouthWeights(width=200_000.0, chin=3000.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,6 +111,8 @@ class Retargeter:
         tracked_gaps = ordered_product(parameters, self.gaps[:, :-1].T) + self.gaps[:, -1]
         beyond_contact = np.maximum(tracked_gaps, 0.0)  # gaps of the face are relative to its rest, where lips touch
         target_gaps = beyond_contact + self.contact * np.minimum(beyond_contact / FULL_GAP_MM, 1.0)
+        if self.matching is not None:
+            target_gaps = SCORED_GAP_GAIN * target_gaps
         linear = ordered_product(parameters, self.linear_term[:, :-1].T) + self.linear_term[:, -1]
         linear += ordered_product(target_gaps, self.gap_linear_term.T) + ordered_product(
             target_gaps - tracked_gaps + self.gap_rest, self.lip_linear_term.T
