@@ -31,24 +31,27 @@ def find_edges(centres: tuple[Any, Any], n_layers: int, part_of: Array, mm: floa
     """
     near, owner = centres
     n_rows, width = edges.shape
+    seen = np.zeros((n_rows + 2, width), np.int32)
     for layer in range(n_layers):
+        for r in range(n_rows + 2):
+            for x in range(width):
+                seen[r, x] = visible_part(owner[layer, r, x], part_of)
         for r in range(n_rows + 1):
             for x in range(width):
-                number, below = owner[layer, r, x], owner[layer, r + 1, x]
-                if number != below and not is_same_part(number, below, part_of):
+                own, below = seen[r, x], seen[r + 1, x]
+                if own != below:
                     edges[max(r - 1, 0), x] = edges[min(r, n_rows - 1), x] = 1
                 if r == 0:
                     continue
                 value = near[layer, r, x]
                 limit = value * value * np.float32(mm)
                 if x + 1 < width:
-                    beside = owner[layer, r, x + 1]
-                    corner = owner[layer, r + 1, x + 1]
-                    if number != corner and not is_same_part(number, corner, part_of):
+                    beside, corner = seen[r, x + 1], seen[r + 1, x + 1]
+                    if own != corner:
                         edges[r - 1, x] = edges[min(r, n_rows - 1), x + 1] = 1
-                    if below != beside and not is_same_part(below, beside, part_of):
+                    if below != beside:
                         edges[min(r, n_rows - 1), x] = edges[r - 1, x + 1] = 1
-                    if number != beside and not is_same_part(number, beside, part_of):
+                    if own != beside:
                         edges[r - 1, x] = edges[r - 1, x + 1] = 1
                     if x > 0:
                         bend = near[layer, r, x - 1] - value - value + near[layer, r, x + 1]
@@ -60,11 +63,12 @@ def find_edges(centres: tuple[Any, Any], n_layers: int, part_of: Array, mm: floa
 
 
 @inlined_kernel
-def is_same_part(number: int, other: int, part_of: Array) -> bool:
-    """Whether two visible triangles show the same side of the same part; not for samples without a triangle."""
-    if max(number, other) == NO_TRIANGLE or (number < 0) != (other < 0):  # NO_TRIANGLE is the largest number
-        return False
-    return bool(part_of[number if number >= 0 else ~number] == part_of[other if other >= 0 else ~other])
+def visible_part(number: int, part_of: Array) -> Any:
+    """Part p whose front a sample shows, ~p for its back; `NO_TRIANGLE` without a triangle."""
+    part = number
+    if number != NO_TRIANGLE:
+        part = part_of[number] if number >= 0 else ~part_of[~number]
+    return part
 
 
 @kernel
