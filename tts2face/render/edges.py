@@ -32,34 +32,44 @@ def find_edges(centres: tuple[Any, Any], n_layers: int, part_of: Array, mm: floa
     near, owner = centres
     n_rows, width = edges.shape
     seen = np.zeros((n_rows + 2, width), np.int32)
+    depth_step = np.float32(mm)
     for layer in range(n_layers):
         for r in range(n_rows + 2):
             for x in range(width):
                 seen[r, x] = visible_part(owner[layer, r, x], part_of)
         for r in range(n_rows + 1):
-            for x in range(width):
-                own, below = seen[r, x], seen[r + 1, x]
-                if own != below:
-                    edges[max(r - 1, 0), x] = edges[min(r, n_rows - 1), x] = 1
-                if r == 0:
-                    continue
-                value = near[layer, r, x]
-                limit = value * value * np.float32(mm)
-                if x + 1 < width:
-                    beside, corner = seen[r, x + 1], seen[r + 1, x + 1]
-                    if own != corner:
-                        edges[r - 1, x] = edges[min(r, n_rows - 1), x + 1] = 1
-                    if below != beside:
-                        edges[min(r, n_rows - 1), x] = edges[r - 1, x + 1] = 1
-                    if own != beside:
-                        edges[r - 1, x] = edges[r - 1, x + 1] = 1
-                    if x > 0:
-                        bend = near[layer, r, x - 1] - value - value + near[layer, r, x + 1]
-                        if abs(bend) > limit:
-                            edges[r - 1, x - 1] = edges[r - 1, x] = edges[r - 1, x + 1] = 1
-                bend = near[layer, r - 1, x] - value - value + near[layer, r + 1, x]
-                if abs(bend) > limit:
-                    edges[r - 1, x] = edges[max(r - 2, 0), x] = edges[min(r, n_rows - 1), x] = 1
+            mark_steps(seen[r], seen[r + 1], r > 0, edges[max(r - 1, 0)], edges[min(r, n_rows - 1)])
+            if r > 0:
+                value, above, below = near[layer, r], near[layer, r - 1], near[layer, r + 1]
+                own, upper, lower = edges[r - 1], edges[max(r - 2, 0)], edges[min(r, n_rows - 1)]
+                for x in range(width):
+                    bends = abs(above[x] - value[x] - value[x] + below[x]) > value[x] * value[x] * depth_step
+                    own[x] |= bends
+                    upper[x] |= bends
+                    lower[x] |= bends
+                for x in range(1, width - 1):
+                    if abs(value[x - 1] - value[x] - value[x] + value[x + 1]) > value[x] * value[x] * depth_step:
+                        own[x - 1] = own[x] = own[x + 1] = 1
+
+
+@kernel
+def mark_steps(own: Array, below: Array, is_inside: bool, upper: Array, lower: Array) -> None:
+    """Mark in two rows of pixels `upper` and `lower` (W,) the neighbours that show different parts (W,).
+
+    Only neighbours above each other where `own` is a row outside of the band.
+    """
+    for x in range(len(own)):
+        differs = own[x] != below[x]
+        upper[x] |= differs
+        lower[x] |= differs
+    if is_inside:
+        for x in range(len(own) - 1):
+            if own[x] != below[x + 1]:
+                upper[x] = lower[x + 1] = 1
+            if below[x] != own[x + 1]:
+                lower[x] = upper[x + 1] = 1
+            if own[x] != own[x + 1]:
+                upper[x] = upper[x + 1] = 1
 
 
 @inlined_kernel
