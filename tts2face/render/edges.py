@@ -32,6 +32,7 @@ def find_edges(centres: tuple[Any, Any], n_layers: int, part_of: Array, mm: floa
     near, owner = centres
     n_rows, width = edges.shape
     seen = np.zeros((n_rows + 2, width), np.int32)
+    bent = np.zeros(max(width, 3), np.uint8)
     depth_step = np.float32(mm)
     for layer in range(n_layers):
         for r in range(n_rows + 2):
@@ -48,8 +49,13 @@ def find_edges(centres: tuple[Any, Any], n_layers: int, part_of: Array, mm: floa
                     upper[x] |= bends
                     lower[x] |= bends
                 for x in range(1, width - 1):
-                    if abs(value[x - 1] - value[x] - value[x] + value[x + 1]) > value[x] * value[x] * depth_step:
-                        own[x - 1] = own[x] = own[x + 1] = 1
+                    bent[x] = (
+                        abs(value[x - 1] - value[x] - value[x] + value[x + 1]) > value[x] * value[x] * depth_step
+                    )
+                for x in range(1, width - 1):
+                    own[x] |= bent[x - 1] | bent[x] | bent[x + 1]
+                own[0] |= bent[1]
+                own[width - 1] |= bent[width - 2]
 
 
 @kernel
@@ -64,12 +70,13 @@ def mark_steps(own: Array, below: Array, is_inside: bool, upper: Array, lower: A
         lower[x] |= differs
     if is_inside:
         for x in range(len(own) - 1):
-            if own[x] != below[x + 1]:
-                upper[x] = lower[x + 1] = 1
-            if below[x] != own[x + 1]:
-                lower[x] = upper[x + 1] = 1
-            if own[x] != own[x + 1]:
-                upper[x] = upper[x + 1] = 1
+            upper[x] |= (own[x] != below[x + 1]) | (own[x] != own[x + 1])
+        for x in range(len(own) - 1):
+            lower[x] |= below[x] != own[x + 1]
+        for x in range(1, len(own)):
+            upper[x] |= (below[x - 1] != own[x]) | (own[x - 1] != own[x])
+        for x in range(1, len(own)):
+            lower[x] |= own[x - 1] != below[x]
 
 
 @inlined_kernel

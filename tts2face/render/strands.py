@@ -215,8 +215,7 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, fragments: A
                     continue
                 if edges[r, x] == 0:
                     seen = fade_in(near_0 + near_x * px + near_y * py, centres[r + 1, x]) * through[r, x, 0]
-                    for s in range(n_samples):
-                        passing[s] = seen
+                    passing[0] = seen
                 else:
                     seen = visible_share((r, x, first_row, side), planes[3], depth, through[r, x], passing)
                 seen *= cover
@@ -239,9 +238,14 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, fragments: A
                 rows[3, n], rows[4, n], rows[5, n], rows[6, n] = shift, wb, wc, seen * coverage
                 n += 1
                 rest = zero
-                for s in range(n_samples):
-                    through[r, x, s] -= passing[s] * coverage * cover
-                    rest = max(rest, through[r, x, s])
+                if edges[r, x] == 0:
+                    rest = through[r, x, 0] - passing[0] * coverage * cover
+                    for s in range(n_samples):
+                        through[r, x, s] = rest
+                else:
+                    for s in range(n_samples):
+                        through[r, x, s] -= passing[s] * coverage * cover
+                        rest = max(rest, through[r, x, s])
                 if rest < SOLID:
                     is_open[r, x] = 0
                     n_open[r // TILE_PX, x // TILE_PX] -= 1
