@@ -16,6 +16,7 @@ from tts2face.render.textures import mip_level, read_texel
 Array = NDArray[Any]
 
 FADE_BEHIND, FADE_SCALE = np.float32(0.9996), np.float32(1200.0)  # cards fade over 0.6 mm where they enter a surface
+SMOOTH_TEXELS = np.float32(2.0)  # coarser levels than for skin: one strand is narrower than a pixel and flickers
 LEAST_COVERAGE = np.float32(0.03)
 SOLID = np.float32(1 / 40)  # passing light below which a sample is full
 TILE_PX = 8  # pixels along a side of the tiles in which cards behind everything are skipped
@@ -198,7 +199,7 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, fragments: A
         u1, v1, u2, v2 = b[AT_U] - a[AT_U], b[AT_V] - a[AT_V], c[AT_U] - a[AT_U], c[AT_V] - a[AT_V]
         number = texture[t]
         size = np.float32(levels[number, 0, 1] * levels[number, 0, 2] * side * side)
-        level = mip_level(abs((u1 * v2 - u2 * v1) / area) * size, levels.shape[1])
+        level = mip_level(SMOOTH_TEXELS * abs((u1 * v2 - u2 * v1) / area) * size, levels.shape[1])
         place = (levels[number, level, 0], levels[number, level, 1], levels[number, level, 2])
         for r in range(first, last + 1):
             py = np.float32((r + top_px + 0.5) * side)
