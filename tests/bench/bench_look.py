@@ -7,12 +7,12 @@ skin. The ladder draws the same frame with and without each step.
 
 import sys
 import time
-from dataclasses import replace
 
 import numpy as np
 
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
+from tts2face.models.face_parts import keep_parts
 from tts2face.render.draw import MeshRenderer, mesh_renderer
 from tts2face.render.picture import Picture
 from tts2face.render.picture_kernels import allocate_buffers
@@ -49,21 +49,10 @@ def frame_ms(renderer: MeshRenderer, n: int = 25, **options: bool) -> float:
     return 1e3 * min(spent)
 
 
-def without_strands(face: Face) -> Face:
-    """The face without hair, lashes and brows of cards."""
-    kept, triangles, first = [], [np.zeros((0, 3), np.int32)], 0
-    for part in face.parts:
-        if part.kind != "strands":
-            kept.append(replace(part, first=first))
-            triangles.append(face.triangles[part.first : part.first + part.count])
-            first += part.count
-    return replace(face, parts=tuple(kept), triangles=np.concatenate(triangles))
-
-
 def ladder(face: Face) -> None:
     """Print what each step costs."""
     standard = mesh_renderer(face, Picture())
-    bald = without_strands(face)
+    bald = keep_parts(face, lambda part: part.kind != "strands")
     for name, ms in {
         "standard": frame_ms(standard),
         "2 x 2 samples in every pixel": frame_ms(standard, samples_all=True),

@@ -156,17 +156,21 @@ QUANTUM = 0.5 / 32767  # metres of an integer step of quantised positions
 
 
 def _add_materials(maker: GltfMaker, face: Face) -> None:
-    if face.textures:
+    for number, texture in enumerate(face.textures):
+        pixels = texture.pixels if texture.alpha is None else np.dstack([texture.pixels, texture.alpha])
         content = io.BytesIO()
-        Image.fromarray(face.textures[0].pixels).save(content, "PNG", compress_level=1)
+        Image.fromarray(pixels).save(content, "PNG", compress_level=1)
         view = maker.view(content.getvalue())
         maker.add("images", {"bufferView": view, "mimeType": "image/png"})
-        maker.add("textures", {"source": 0})
+        maker.add("textures", {"source": number})
     for part in face.parts:
         rough: dict[str, Any] = {"roughnessFactor": 0.6, "metallicFactor": 0.0}
+        entry: dict[str, Any] = {"name": part.name, "pbrMetallicRoughness": rough}
         if part.is_textured:
-            rough["baseColorTexture"] = {"index": 0}
-        maker.add("materials", {"name": part.name, "pbrMetallicRoughness": rough})
+            rough["baseColorTexture"] = {"index": part.texture}
+            if face.textures[part.texture].alpha is not None:
+                entry |= {"alphaMode": "MASK", "alphaCutoff": 0.5, "doubleSided": True}
+        maker.add("materials", entry)
 
 
 def _shapes(face: Face, variant: Variant) -> dict[str, NDArray[np.float32]]:

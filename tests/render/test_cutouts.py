@@ -53,9 +53,9 @@ def test_half_coverage_is_the_mean_of_both() -> None:
     inside = np.abs(with_it - without).max(axis=2) > 60
     assert inside.sum() > 100
     light = linear_table()
-    whole = (light[with_it] - light[without])[inside].sum()
-    share = (light[mixed] - light[without])[inside].sum() / whole
-    assert share == pytest.approx(0.5, abs=0.06)  # the shadow of the sheet does not become half
+    whole, part = ((light[one] - light[without])[inside] for one in (with_it, mixed))
+    share = (part * whole).sum() / (whole * whole).sum()  # by least squares; a sum of signed differences nearly cancels
+    assert share == pytest.approx(0.5, abs=0.04)  # the shadow of the sheet does not become half
 
 
 def test_an_edge_in_the_texture_is_an_edge_of_the_sheet() -> None:

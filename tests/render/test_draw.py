@@ -10,6 +10,7 @@ from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_face import tiny_face
 from tts2face.models.face_loading import load_face
+from tts2face.models.face_parts import keep_parts
 from tts2face.render.draw import draw, mesh_renderer
 from tts2face.render.picture import Picture
 from tts2face.render.tone_tables import linear_table
@@ -89,13 +90,12 @@ def test_a_transparent_picture_laid_over_a_colour_is_the_picture_on_that_colour(
 
 @pytest.mark.parametrize("yaw", [0.0, 0.5])
 def test_coverage_is_the_share_of_samples_that_the_head_covers(yaw):
-    face = load_face("head", hair="bald")
+    face = keep_parts(load_face("head", hair="bald"), lambda part: part.kind != "strands")  # blended by their area
     pose = np.zeros(len(face.shape_names)), np.array([0, yaw, 0, 0, 0, 0])
     joined = draw(face, *pose, picture=Picture(size="96x96", supersampling=3, background="transparent"))
     single = draw(face, *pose, picture=Picture(size="288x288", supersampling=1, background="transparent"))
     covered = (single[:, :, 3] / 255).reshape(96, 3, 96, 3).mean(axis=(1, 3))
-    assert np.abs(joined[:, :, 3] / 255 - covered).max() <= 0.05  # lashes are blended by area
-    assert np.abs(joined[:, :, 3] / 255 - covered).mean() <= 0.0005
+    assert np.abs(joined[:, :, 3] / 255 - covered).max() <= 0.002  # half a level of 255
 
 
 def test_an_image_background_fills_the_picture(tmp_path):

@@ -11,6 +11,7 @@ from lexicon.errors import DataError
 from tts2face.characters.shape_names import VISEME_PREFIX
 from tts2face.characters.surface_points import SurfacePoints, points_under_pixels
 from tts2face.models.face import Face
+from tts2face.models.face_parts import keep_parts
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.render.camera import camera_matrices
 from tts2face.render.draw import MeshRenderer, mesh_renderer
@@ -24,9 +25,13 @@ LEAST_FACING = 0.3  # cosine between ray and surface normal; readings at lower v
 LEAST_VIEWS = 3  # reliable readings of a landmark; with fewer all are used
 SIDE_PX = 640
 BACKGROUND = "#8a8f98"
-OPENINGS = (0.35, 0.6)  # weights of the opening shape at which the inner lips are read
+OPENINGS = (0.5, 0.8)  # weights of the opening shape at which the inner lips are read
 OPENING_SHAPES = ("jawOpen", f"{VISEME_PREFIX}aa", f"{VISEME_PREFIX}oh")
 SKIN, EYES = "skin", "eyes"  # beginnings of the names of parts on which landmarks lie
+BEHIND_LIPS = (
+    "teeth",
+    "tongue",
+)  # parts that the views leave out: the tracker reads the upper teeth as a part of the lip
 
 FloatArray = NDArray[np.float64]
 
@@ -41,7 +46,7 @@ class LocatedLandmarks:
 
 
 class CharacterViews:
-    """Rendered views of a face, with landmarks read in each; soft shadows are computed once.
+    """Rendered views of a face without teeth and tongue, with landmarks read in each; soft shadows are computed once.
 
     Raises
     ------
@@ -52,7 +57,9 @@ class CharacterViews:
     def __init__(self, face: Face, model: Path | None = None) -> None:
         self.face = face
         self._tracker = FaceTracker(model)
-        self._renderer: MeshRenderer = mesh_renderer(face, _picture(0, 0))
+        self._renderer: MeshRenderer = mesh_renderer(
+            keep_parts(face, lambda part: not part.name.startswith(BEHIND_LIPS)), _picture(0, 0)
+        )
 
     def read(self, view: tuple[float, float], weights: NDArray[np.float32]) -> tuple[FloatArray, float]:
         """Landmarks (478, 2) in pixels of a view (yaw and pitch in degrees), and the score; NaN without a face."""

@@ -131,13 +131,24 @@ def _join_occlusion(face: Face, hair: Hair) -> NDArray[np.uint8] | None:
 
 def fit_hair(face: Face, hair: Hair) -> NDArray[np.float32]:
     """Vertices (V, 3) of a haircut on a face: it moves as its anchors do (biharmonic interpolation in space)."""
-    from scipy.interpolate import RBFInterpolator
-
-    moved = face.vertices[hair.anchors].astype(np.float64) - hair.anchor_places
+    places = hair.anchor_places.astype(np.float64)
+    moved = face.vertices[hair.anchors].astype(np.float64) - places
     if not np.abs(moved).max(initial=0.0) > 0:
         return hair.vertices.astype(np.float32)
-    field_of = RBFInterpolator(hair.anchor_places.astype(np.float64), moved, kernel="linear", degree=1)
-    fitted: NDArray[np.float32] = (hair.vertices + field_of(hair.vertices.astype(np.float64))).astype(np.float32)
+    n, middle, scale = len(places), places.mean(axis=0), float(np.ptp(places, axis=0).max())
+
+    def terms(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distances from the anchors, and an affine map, at points (N, 3)."""
+        squared = (points**2).sum(axis=1)[:, None] + (places**2).sum(axis=1) - 2 * points @ places.T
+        affine = np.column_stack([np.ones(len(points)), (points - middle) / scale])
+        return np.hstack([-np.sqrt(np.maximum(squared, 0.0)), affine])
+
+    matrix = np.zeros((n + 4, n + 4))
+    matrix[:n] = terms(places)
+    matrix[n:, :n] = matrix[:n, n:].T
+    np.fill_diagonal(matrix[:n, :n], 0.0)
+    factors = np.linalg.solve(matrix, np.concatenate([moved, np.zeros((4, 3))]))
+    fitted: NDArray[np.float32] = (hair.vertices + terms(hair.vertices.astype(np.float64)) @ factors).astype(np.float32)
     return fitted
 
 
@@ -158,5 +169,8 @@ def _paint_scalp(face: Face, hair: Hair, srgb: NDArray[np.float64]) -> tuple[Tex
     cover = (
         np.asarray(Image.fromarray(hair.scalp).resize(size, Image.Resampling.BILINEAR), np.float32)[:, :, None] / 255
     )
-    mixed = decode_srgb(skin.pixels / 255.0) * (1 - cover) + decode_srgb(srgb) * cover
-    return (Texture(encode_srgb(mixed), skin.alpha), *face.textures[1:])
+    covered = cover[:, :, 0] > 0
+    light, cover = decode_srgb(np.arange(256) / 255.0)[skin.pixels[covered]], cover[covered]
+    pixels = np.array(skin.pixels)
+    pixels[covered] = encode_srgb(light * (1 - cover) + decode_srgb(srgb) * cover)
+    return (Texture(pixels, skin.alpha), *face.textures[1:])

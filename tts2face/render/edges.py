@@ -31,40 +31,61 @@ def find_edges(centres: tuple[Any, Any], n_layers: int, part_of: Array, mm: floa
     """
     near, owner = centres
     n_rows, width = edges.shape
+    seen = np.zeros((n_rows + 2, width), np.int32)
+    bent = np.zeros(max(width, 3), np.uint8)
+    depth_step = np.float32(mm)
     for layer in range(n_layers):
-        for r in range(n_rows + 1):
+        for r in range(n_rows + 2):
             for x in range(width):
-                number, below = owner[layer, r, x], owner[layer, r + 1, x]
-                if number != below and not is_same_part(number, below, part_of):
-                    edges[max(r - 1, 0), x] = edges[min(r, n_rows - 1), x] = 1
-                if r == 0:
-                    continue
-                value = near[layer, r, x]
-                limit = value * value * np.float32(mm)
-                if x + 1 < width:
-                    beside = owner[layer, r, x + 1]
-                    corner = owner[layer, r + 1, x + 1]
-                    if number != corner and not is_same_part(number, corner, part_of):
-                        edges[r - 1, x] = edges[min(r, n_rows - 1), x + 1] = 1
-                    if below != beside and not is_same_part(below, beside, part_of):
-                        edges[min(r, n_rows - 1), x] = edges[r - 1, x + 1] = 1
-                    if number != beside and not is_same_part(number, beside, part_of):
-                        edges[r - 1, x] = edges[r - 1, x + 1] = 1
-                    if x > 0:
-                        bend = near[layer, r, x - 1] - value - value + near[layer, r, x + 1]
-                        if abs(bend) > limit:
-                            edges[r - 1, x - 1] = edges[r - 1, x] = edges[r - 1, x + 1] = 1
-                bend = near[layer, r - 1, x] - value - value + near[layer, r + 1, x]
-                if abs(bend) > limit:
-                    edges[r - 1, x] = edges[max(r - 2, 0), x] = edges[min(r, n_rows - 1), x] = 1
+                seen[r, x] = visible_part(owner[layer, r, x], part_of)
+        for r in range(n_rows + 1):
+            mark_steps(seen[r], seen[r + 1], r > 0, edges[max(r - 1, 0)], edges[min(r, n_rows - 1)])
+            if r > 0:
+                value, above, below = near[layer, r], near[layer, r - 1], near[layer, r + 1]
+                own, upper, lower = edges[r - 1], edges[max(r - 2, 0)], edges[min(r, n_rows - 1)]
+                for x in range(width):
+                    bends = abs(above[x] - value[x] - value[x] + below[x]) > value[x] * value[x] * depth_step
+                    own[x] |= bends
+                    upper[x] |= bends
+                    lower[x] |= bends
+                for x in range(1, width - 1):
+                    bent[x] = (
+                        abs(value[x - 1] - value[x] - value[x] + value[x + 1]) > value[x] * value[x] * depth_step
+                    )
+                for x in range(1, width - 1):
+                    own[x] |= bent[x - 1] | bent[x] | bent[x + 1]
+                own[0] |= bent[1]
+                own[width - 1] |= bent[width - 2]
+
+
+@kernel
+def mark_steps(own: Array, below: Array, is_inside: bool, upper: Array, lower: Array) -> None:
+    """Mark in two rows of pixels `upper` and `lower` (W,) the neighbours that show different parts (W,).
+
+    Only neighbours above each other where `own` is a row outside of the band.
+    """
+    for x in range(len(own)):
+        differs = own[x] != below[x]
+        upper[x] |= differs
+        lower[x] |= differs
+    if is_inside:
+        for x in range(len(own) - 1):
+            upper[x] |= (own[x] != below[x + 1]) | (own[x] != own[x + 1])
+        for x in range(len(own) - 1):
+            lower[x] |= below[x] != own[x + 1]
+        for x in range(1, len(own)):
+            upper[x] |= (below[x - 1] != own[x]) | (own[x - 1] != own[x])
+        for x in range(1, len(own)):
+            lower[x] |= own[x - 1] != below[x]
 
 
 @inlined_kernel
-def is_same_part(number: int, other: int, part_of: Array) -> bool:
-    """Whether two visible triangles show the same side of the same part; not for samples without a triangle."""
-    if max(number, other) == NO_TRIANGLE or (number < 0) != (other < 0):  # NO_TRIANGLE is the largest number
-        return False
-    return bool(part_of[number if number >= 0 else ~number] == part_of[other if other >= 0 else ~other])
+def visible_part(number: int, part_of: Array) -> Any:
+    """Part p whose front a sample shows, ~p for its back; `NO_TRIANGLE` without a triangle."""
+    part = number
+    if number != NO_TRIANGLE:
+        part = part_of[number] if number >= 0 else ~part_of[~number]
+    return part
 
 
 @kernel

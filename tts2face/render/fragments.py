@@ -177,35 +177,43 @@ def evaluate_fragments(found: Any, n_fragments: int, vertex: Array, scene: Any, 
     one, zero = np.float32(1), np.float32(0)
     focal, middle_x, middle_y = np.float32(1 / lens[0]), np.float32(lens[1] - 0.5), np.float32(lens[2] - 0.5)
     pixel = np.float32((side / lens[0]) ** 2)
+    sx = sy = sz = e1x = e1y = e1z = e2x = e2y = e2z = rx = ry = rz = zero
+    ua = va = u1 = v1 = u2 = v2 = texel_area = zero
+    last, a, b, c, material, texture = NO_TRIANGLE, 0, 0, 0, 0, -1
     for g in range(n_fragments):
         number = number_of[g]
-        t = number if number >= 0 else ~number
+        if number != last:  # fragments of one triangle often follow each other
+            last = number
+            t = number if number >= 0 else ~number
+            a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+            sx, sy, sz = -vertex[a, 0], -vertex[a, 1], -vertex[a, 2]
+            e1x, e1y, e1z = vertex[b, 0] + sx, vertex[b, 1] + sy, vertex[b, 2] + sz
+            e2x, e2y, e2z = vertex[c, 0] + sx, vertex[c, 1] + sy, vertex[c, 2] + sz
+            rx, ry, rz = sy * e1z - sz * e1y, sz * e1x - sx * e1z, sx * e1y - sy * e1x
+            material = part_of[t]
+            texture = int(materials[material, TEXTURE])
+            if texture >= 0:
+                ua, va = vertex[a, UV], vertex[a, UV + 1]
+                u1, v1, u2, v2 = vertex[b, UV] - ua, vertex[b, UV + 1] - va, vertex[c, UV] - ua, vertex[c, UV + 1] - va
+                texel_area = abs(u1 * v2 - u2 * v1)
+                texel_area *= np.float32(levels[texture, 0, 1]) * np.float32(levels[texture, 0, 2])
         share = one / spread[g, 2]
         dx, dy = (spread[g, 0] * share - middle_x) * focal, (spread[g, 1] * share - middle_y) * focal
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        sx, sy, sz = -vertex[a, 0], -vertex[a, 1], -vertex[a, 2]
-        e1x, e1y, e1z = vertex[b, 0] + sx, vertex[b, 1] + sy, vertex[b, 2] + sz
-        e2x, e2y, e2z = vertex[c, 0] + sx, vertex[c, 1] + sy, vertex[c, 2] + sz
         qx, qy, qz = dy * e2z - e2y, e2x - dx * e2z, dx * e2y - dy * e2x
         determinant = e1x * qx + e1y * qy + e1z * qz
         inverse = one / determinant if determinant != zero else zero
-        rx, ry, rz = sy * e1z - sz * e1y, sz * e1x - sx * e1z, sx * e1y - sy * e1x
         wb = min(max((sx * qx + sy * qy + sz * qz) * inverse, zero), one)
         wc = min(max((dx * rx + dy * ry + rz) * inverse, zero), one - wb)
         wa = one - wb - wc
-        material = part_of[t]
         for k in range(3):
             n, d = NORMAL + k, DIFFUSE + k
             table[AT_NORMAL + k, g] = wa * vertex[a, n] + wb * vertex[b, n] + wc * vertex[c, n]
             table[AT_DIFFUSE + k, g] = wa * vertex[a, d] + wb * vertex[b, d] + wc * vertex[c, d]
-        texture = int(materials[material, TEXTURE])
         if texture >= 0:
-            ua, va = vertex[a, UV], vertex[a, UV + 1]
-            u1, v1, u2, v2 = vertex[b, UV] - ua, vertex[b, UV + 1] - va, vertex[c, UV] - ua, vertex[c, UV + 1] - va
-            area = abs(u1 * v2 - u2 * v1) * np.float32(levels[texture, 0, 1]) * np.float32(levels[texture, 0, 2])
-            level = mip_level(area * pixel * sz * sz * abs(inverse), levels.shape[1])
-            place = levels[texture, level]
-            read_texel(texels, place, linear, (ua + wb * u1 + wc * u2, va + wb * v1 + wc * v2), table[AT_ALBEDO:, g])
+            level = mip_level(texel_area * pixel * sz * sz * abs(inverse), levels.shape[1])
+            place = (levels[texture, level, 0], levels[texture, level, 1], levels[texture, level, 2])
+            red, green, blue, _ = read_texel(texels, place, linear, ua + wb * u1 + wc * u2, va + wb * v1 + wc * v2)
+            table[AT_ALBEDO, g], table[AT_ALBEDO + 1, g], table[AT_ALBEDO + 2, g] = red, green, blue
         else:
             for k in range(COLOUR, COLOUR + 3):
                 table[AT_ALBEDO + k - COLOUR, g] = wa * vertex[a, k] + wb * vertex[b, k] + wc * vertex[c, k]

@@ -87,8 +87,8 @@ def find_skin(face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int3
 def _free_edge_share(triangles: NDArray[np.int32]) -> float:
     if not len(triangles):
         return 0.0
-    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    _, uses = np.unique(edges, axis=0, return_counts=True)
+    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1).astype(np.int64)
+    _, uses = np.unique((edges[:, 0] << 32) | edges[:, 1], return_counts=True)
     return float((uses == 1).mean())
 
 

@@ -173,6 +173,16 @@ def clear_layer(depth: Array, owner: Array, layer: int) -> None:
             depth[layer, r, x], owner[layer, r, x] = np.float32(0), NO_TRIANGLE
 
 
+@kernel
+def clear_tiles(depth: Array, owner: Array, wanted: Array) -> None:
+    """Clear the opaque surface in the wanted tiles of a band; the other samples are not read."""
+    for r in range(depth.shape[1]):
+        for tile in range(wanted.shape[1]):
+            if wanted[r // TILE_SAMPLES, tile]:
+                for x in range(tile * TILE_SAMPLES, min((tile + 1) * TILE_SAMPLES, depth.shape[2])):
+                    depth[0, r, x], owner[0, r, x] = np.float32(0), NO_TRIANGLE
+
+
 @inlined_kernel
 def samples_below(value: int, side: int) -> int:
     """Number of samples, `side` samples of the grid apart, whose centres lie below a grid coordinate."""
@@ -195,8 +205,8 @@ def draw_band(geometry: Any, batch: Any, place: tuple[int, int], wanted: Array, 
         phases (4 or more).
     place
         The band's first row of samples, and their distance in samples of the lens: 1, or the side of a pixel.
-    wanted : (R / 8, W / 8)
-        Whether each tile of samples is drawn; of size 0 for all.
+    wanted : (R / 4, W / 4)
+        Whether each tile of samples is drawn; of size 0 for all. The samples of the others are undefined.
     depth, owner : (3, R, W)
         Out: 1/z and triangle index of the opaque surface and of the two nearest translucent ones in front of it.
     """
@@ -206,15 +216,17 @@ def draw_band(geometry: Any, batch: Any, place: tuple[int, int], wanted: Array, 
     first_row, side = place
     step, half = side << GRID_SHIFT, (side << GRID_SHIFT) >> 1
     n_rows, width = depth.shape[1], depth.shape[2]
-    clear_layer(depth, owner, 0)
     tiles = np.zeros(
         ((n_rows + TILE_SAMPLES - 1) // TILE_SAMPLES, (width + TILE_SAMPLES - 1) // TILE_SAMPLES), np.float32
     )
     is_partial = wanted.size > 0
     if is_partial:
+        clear_tiles(depth, owner, wanted)
         for r in range(tiles.shape[0]):
             for x in range(tiles.shape[1]):
                 tiles[r, x] = np.float32(0) if wanted[r, x] else np.float32(np.inf)
+    else:
+        clear_layer(depth, owner, 0)
     for turn in range(TRANSLUCENT + 1):
         if bounds[turn] == bounds[turn + 1]:
             continue

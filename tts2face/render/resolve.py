@@ -13,19 +13,25 @@ from tts2face.render.raster import NO_TRIANGLE
 Array = NDArray[Any]
 
 
-@kernel
-def write_pixel(total: Array, tables: tuple[Any, Any], picture: Array, x: int, y: int) -> None:
-    """Composite light and coverage (4,) over a pixel; a picture of four channels stores the coverage."""
+@inlined_kernel
+def write_pixel(light: tuple[Any, Any, Any], cover: float, tables: tuple[Any, Any], picture: Array, at: Any) -> None:
+    """Composite light and coverage over a pixel (y, x); a picture of four channels stores the coverage."""
     linear, encoded = tables
+    y, x = at
     one, zero, half = np.float32(1), np.float32(0), np.float32(0.5)
     top = np.float32(len(encoded) - 1)
-    behind, scale = one - total[3], one
+    behind, scale = one - cover, one
     if picture.shape[2] == 4:
-        picture[y, x, 3] = np.uint8(min(total[3], one) * np.float32(255) + half)
-        behind, scale = zero, one / max(total[3], np.float32(1e-6))
-    for c in range(3):
-        value = total[c] * scale + behind * linear[picture[y, x, c]]
-        picture[y, x, c] = encoded[int(min(max(value, zero), one) * top + half)]
+        picture[y, x, 3] = np.uint8(min(cover, one) * np.float32(255) + half)
+        behind, scale = zero, one / max(cover, np.float32(1e-6))
+    red, green, blue = light[0] * scale, light[1] * scale, light[2] * scale
+    if behind != zero:
+        red += behind * linear[picture[y, x, 0]]
+        green += behind * linear[picture[y, x, 1]]
+        blue += behind * linear[picture[y, x, 2]]
+    picture[y, x, 0] = encoded[int(min(max(red, zero), one) * top + half)]
+    picture[y, x, 1] = encoded[int(min(max(green, zero), one) * top + half)]
+    picture[y, x, 2] = encoded[int(min(max(blue, zero), one) * top + half)]
 
 
 @kernel
@@ -79,16 +85,6 @@ def mix_samples(
         total[3] += one / np.float32(side * side) - share * (one - coverage)
 
 
-@inlined_kernel
-def mean_and_least(values: Array) -> tuple[Any, Any]:
-    """Mean and least of a few values."""
-    total, least = np.float32(0), values[0]
-    for s in range(len(values)):
-        total += values[s]
-        least = min(least, values[s])
-    return total / np.float32(len(values)), least
-
-
 @kernel
 def compose_band(
     samples: tuple[Any, Any, Any],
@@ -116,37 +112,52 @@ def compose_band(
         Picture with the background, written in place, and the tables between 8 bits and linear light.
     """
     first_row, side = place[0], place[2]
+    rows, n_pixels = pixels
+    edges = samples[2]
     table, colour, through, strands = shading
     picture, tables = out
-    share = np.float32(1) / np.float32(side * side)
+    one, zero = np.float32(1), np.float32(0)
+    n_samples = side * side
+    share = one / np.float32(n_samples)
     total, nothing = np.zeros(4, np.float32), np.zeros(0, np.float32)
-    for p in range(pixels[1]):
-        row = pixels[0][p]
-        begin, end = row[PIXEL_ENDS], row[PIXEL_ENDS + 3]
-        r, x = row[PIXEL_Y] - first_row // side, row[PIXEL_X]
-        total[0] = total[1] = total[2] = total[3] = np.float32(0)
-        passing, rest = nothing, np.float32(1)
+    for p in range(n_pixels):
+        begin, end = rows[p, PIXEL_ENDS], rows[p, PIXEL_ENDS + 3]
+        x, y = rows[p, PIXEL_X], rows[p, PIXEL_Y]
+        r = y - first_row // side
+        red, green, blue, rest, least = zero, zero, zero, one, one
         if through.size > 0:
-            rest, least = mean_and_least(through[r, x])
-            if least < np.float32(1):
-                if samples[2][r, x] or end > begin + 1:
-                    passing = through[r, x]
-                for c in range(3):
-                    total[c] = strands[r, x, c]
-        if end == begin or (len(passing) == 0 and end == begin + 1):  # hair only, or all samples alike
-            total[3] = np.float32(1) - rest
+            rest, least = zero, through[r, x, 0]
+            for s in range(n_samples):
+                rest += through[r, x, s]
+                least = min(least, through[r, x, s])
+            rest /= np.float32(n_samples)
+            if least < one:
+                red, green, blue = strands[r, x, 0], strands[r, x, 1], strands[r, x, 2]
+        is_mixed = least < one and (edges[r, x] != 0 or end > begin + 1)
+        if end == begin or (not is_mixed and end == begin + 1):  # hair only, or all samples alike
+            cover = one - rest
             for g in range(begin, end):
                 weight = table[AT_SHARE, g] * share * rest
-                for c in range(3):
-                    total[c] += colour[c, g] * weight
-                total[3] += weight * table[AT_OPACITY, g]
-        elif len(passing) > 0 or row[PIXEL_ENDS + 1] < end:
-            begins = (row[PIXEL_ENDS:], passing)
+                red, green, blue = (
+                    red + colour[0, g] * weight,
+                    green + colour[1, g] * weight,
+                    blue + colour[2, g] * weight,
+                )
+                cover += weight * table[AT_OPACITY, g]
+            write_pixel((red, green, blue), cover, tables, picture, (y, x))
+        elif is_mixed or rows[p, PIXEL_ENDS + 1] < end:
+            total[0], total[1], total[2], total[3] = red, green, blue, zero
+            begins = (rows[p, PIXEL_ENDS:], through[r, x] if is_mixed else nothing)
             mix_samples(samples, (r, x, side), which, (table, colour, begins), total)
+            write_pixel((total[0], total[1], total[2]), total[3], tables, picture, (y, x))
         else:
+            cover = zero
             for g in range(begin, end):
                 weight = table[AT_SHARE, g] * share
-                for c in range(3):
-                    total[c] += colour[c, g] * weight
-                total[3] += weight
-        write_pixel(total, tables, picture, x, row[PIXEL_Y])
+                red, green, blue = (
+                    red + colour[0, g] * weight,
+                    green + colour[1, g] * weight,
+                    blue + colour[2, g] * weight,
+                )
+                cover += weight
+            write_pixel((red, green, blue), cover, tables, picture, (y, x))

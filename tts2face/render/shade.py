@@ -32,16 +32,17 @@ from tts2face.render.studio_light import BRIGHTNESS, FIRST_LIGHT_ROW, FLOOR_ROW,
 Array = NDArray[Any]
 
 SKIN_SCATTERING = np.array(
-    [1.0, 0.5, 0.36], np.float32
+    [1.0, 0.75, 0.65], np.float32
 )  # scattering of red, green and blue light under skin, relative to the part's wrap
 SCATTER_MM = (1.9, 0.8, 0.45)  # standard deviation of the scattering of red, green and blue light in skin
 N_SCATTER_PASSES = 2
-INTERREFLECTION = np.float32(0.8)  # share of the light that a cavity reflects between its walls
+INTERREFLECTION = np.float32(0.8)  # share of the light that a closed cavity reflects between its walls
 REFLECTANCE = np.float32(0.03)  # of skin, enamel and tears at normal incidence
 SKY_GLOSS = np.float32(0.35)  # share of the sky that surfaces reflect at grazing incidence
 SECOND_ROUGHNESS = np.float32(0.24)  # of the second lobe, relative to the first: (0.7)^4
 DARK_ALBEDO, LIGHT_ALBEDO = np.float32(0.03), np.float32(0.30)  # between them the gloss of skin rises to its full value
 TONE = tuple(np.float32(value) for value in (2.51, 0.03, 2.43, 0.59, 0.14))  # Narkowicz 2016, fit of the ACES curve
+KEPT_HUE = np.float32(0.75)  # share of the tone curve that keeps the hue of dark pixels; by channel it reddens skin
 N_SCRATCH_ROWS = 10
 
 
@@ -130,6 +131,18 @@ def tone_curve(light: float) -> Any:
     return min((x * (TONE[0] * x + TONE[1])) / (x * (TONE[2] * x + TONE[3]) + TONE[4]), np.float32(1))
 
 
+@inlined_kernel
+def kept_hue(red: float, green: float, blue: float) -> Any:
+    """Share of the tone curve that keeps the hue, and its factor for the light of a fragment.
+
+    The curve of the strongest channel scales all of them where it is dark; bright light fades to white by channel.
+    """
+    strongest = max(max(red, green), max(blue, np.float32(1e-6)))
+    display = tone_curve(strongest)
+    share = KEPT_HUE * (np.float32(1) - display)
+    return share, share * display / strongest
+
+
 @vectorized_kernel
 def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour: Array) -> None:
     """Compute the light of n fragments.
@@ -198,7 +211,12 @@ def shade_fragments(table: Array, n: int, lights: Array, scratch: Array, colour:
             for i in range(n):
                 shine[i] += strength * lobe[i]
     for c in range(3):
-        matt, shine, albedo, opacity = table[AT_DIFFUSE + c], scratch[6 + c], table[AT_ALBEDO + c], table[AT_OPACITY]
+        matt, shine, albedo = table[AT_DIFFUSE + c], scratch[6 + c], table[AT_ALBEDO + c]
         for i in range(n):
-            light = matt[i] * albedo[i] / (one - (one - around[i]) * albedo[i] * INTERREFLECTION) + shine[i]
-            colour[c, i] = opacity[i] * tone_curve(light)
+            hidden = one - around[i]
+            colour[c, i] = matt[i] * albedo[i] / (one - hidden * hidden * albedo[i] * INTERREFLECTION) + shine[i]
+    opacity = table[AT_OPACITY]
+    for i in range(n):
+        kept, scale = kept_hue(colour[0, i], colour[1, i], colour[2, i])
+        for c in range(3):
+            colour[c, i] = opacity[i] * (scale * colour[c, i] + (one - kept) * tone_curve(colour[c, i]))

@@ -26,7 +26,7 @@ from tts2face.render.occlusion import (
 from tts2face.render.studio_light import LAMP_RADIUS_RAD
 from tts2face.render.surface import Surface
 
-HIDDEN_EYE_LIGHT = 0.75  # least exposure of an eyeball, as a share of that of its lit parts: it turns
+HIDDEN_EYE_LIGHT = 0.6  # least exposure of an eyeball, as a share of that of its lit parts: it turns
 HIDDEN_TOOTH_LIGHT = 0.6  # likewise of teeth behind the lips of the open mouth: enamel scatters light
 N_SMOOTHING_PASSES = 2  # smoothing passes over neighbours, against the noise of few directions
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tts2face.compilation import vectorized_kernel
 from tts2face.render.fragment_rows import NORMAL
-from tts2face.render.shade import tone_curve
+from tts2face.render.shade import kept_hue, tone_curve
 from tts2face.render.studio_light import FIRST_LIGHT_ROW, FLOOR_ROW, SKY_ROW, UP_ROW
 
 Array = NDArray[Any]
@@ -133,9 +133,12 @@ def shade_strands(fragments: Any, n: int, strands: Any, lights: Array, colour: A
             light, albedo, strength = rows[7 + k], rows[k], lights[lamp_row, 3 + k]
             for i in range(n):
                 light[i] += strength * (tangent[i] + normal[i] * albedo[i])
+    share, kept, scale = rows[6], rows[10], rows[11]
+    for i in range(n):
+        kept[i], scale[i] = kept_hue(rows[7, i], rows[8, i], rows[9, i])
     for k in range(3):
-        light, share = rows[7 + k], rows[6]
+        light = rows[7 + k]
         for i in range(n):
-            light[i] = tone_curve(light[i]) * share[i]
+            light[i] = (scale[i] * light[i] + (one - kept[i]) * tone_curve(light[i])) * share[i]
         for i in range(n):
             colour[which[1, i], which[2, i], k] += light[i]

@@ -16,6 +16,7 @@ from tts2face.render.textures import mip_level, read_texel
 Array = NDArray[Any]
 
 FADE_BEHIND, FADE_SCALE = np.float32(0.9996), np.float32(1200.0)  # cards fade over 0.6 mm where they enter a surface
+SMOOTH_TEXELS = np.float32(2.0)  # coarser levels than for skin: one strand is narrower than a pixel and flickers
 LEAST_COVERAGE = np.float32(0.03)
 SOLID = np.float32(1 / 40)  # passing light below which a sample is full
 TILE_PX = 8  # pixels along a side of the tiles in which cards behind everything are skipped
@@ -165,7 +166,7 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, fragments: A
     planes, passing = np.zeros((4, 3), np.float32), np.zeros(n_samples, np.float32)
     wide, slopes = np.zeros((3, 3), np.float32), np.zeros(3, np.float32)
     reach = np.float32(0.5 * side)
-    sample, n = np.zeros(3, np.float32), 0
+    n = 0
     which, rows = fragments
     is_open = np.ones((n_rows, width), np.uint8)
     tiles = np.zeros(((n_rows + TILE_PX - 1) // TILE_PX, (width + TILE_PX - 1) // TILE_PX), np.float32)
@@ -198,7 +199,8 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, fragments: A
         u1, v1, u2, v2 = b[AT_U] - a[AT_U], b[AT_V] - a[AT_V], c[AT_U] - a[AT_U], c[AT_V] - a[AT_V]
         number = texture[t]
         size = np.float32(levels[number, 0, 1] * levels[number, 0, 2] * side * side)
-        place = levels[number, mip_level(abs((u1 * v2 - u2 * v1) / area) * size, levels.shape[1])]
+        level = mip_level(SMOOTH_TEXELS * abs((u1 * v2 - u2 * v1) / area) * size, levels.shape[1])
+        place = (levels[number, level, 0], levels[number, level, 1], levels[number, level, 2])
         for r in range(first, last + 1):
             py = np.float32((r + top_px + 0.5) * side)
             least, most = row_range(wide, py, py, (zero, np.float32(width * side)))
@@ -214,8 +216,7 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, fragments: A
                     continue
                 if edges[r, x] == 0:
                     seen = fade_in(near_0 + near_x * px + near_y * py, centres[r + 1, x]) * through[r, x, 0]
-                    for s in range(n_samples):
-                        passing[s] = seen
+                    passing[0] = seen
                 else:
                     seen = visible_share((r, x, first_row, side), planes[3], depth, through[r, x], passing)
                 seen *= cover
@@ -223,24 +224,29 @@ def draw_strands(strands: Any, order: Array, scene: Any, band: Any, fragments: A
                 wc = min(max(wc, zero), one - wb)
                 if seen <= np.float32(2e-3):
                     continue
-                uv = (a[AT_U] + wb * u1 + wc * u2, a[AT_V] + wb * v1 + wc * v2)
-                coverage = read_texel(texels, place, linear, uv, sample)
+                red, green, blue, coverage = read_texel(
+                    texels, place, linear, a[AT_U] + wb * u1 + wc * u2, a[AT_V] + wb * v1 + wc * v2
+                )
                 if coverage < LEAST_COVERAGE:
                     continue
-                shift = (sample[0] + sample[1] + sample[2]) * np.float32(1 / 3) / mean_light[number] - one
+                shift = (red + green + blue) * np.float32(1 / 3) / mean_light[number] - one
                 shift = min(max(shift, -one), one) * TEXTURE_SHIFT
                 if n == which.shape[1]:
                     shade_strands(fragments, n, (table, triangles, gloss), lights, colour)
                     n = 0
                 which[0, n], which[1, n], which[2, n] = t, r, x
-                for k in range(3):
-                    rows[k, n] = sample[k]
+                rows[0, n], rows[1, n], rows[2, n] = red, green, blue
                 rows[3, n], rows[4, n], rows[5, n], rows[6, n] = shift, wb, wc, seen * coverage
                 n += 1
                 rest = zero
-                for s in range(n_samples):
-                    through[r, x, s] -= passing[s] * coverage * cover
-                    rest = max(rest, through[r, x, s])
+                if edges[r, x] == 0:
+                    rest = through[r, x, 0] - passing[0] * coverage * cover
+                    for s in range(n_samples):
+                        through[r, x, s] = rest
+                else:
+                    for s in range(n_samples):
+                        through[r, x, s] -= passing[s] * coverage * cover
+                        rest = max(rest, through[r, x, s])
                 if rest < SOLID:
                     is_open[r, x] = 0
                     n_open[r // TILE_PX, x // TILE_PX] -= 1

@@ -25,29 +25,29 @@ def mip_level(texels_per_pixel: float, n_levels: int) -> int:
 
 
 @kernel
-def read_texel(texels: Array, place: Array, linear: Array, uv: tuple[float, float], colour: Array) -> Any:
-    """Write the bilinear colour (3,) in linear light at (u, v) of a level; returns its coverage in [0, 1]."""
-    width, height = place[1], place[2]
+def read_texel(
+    texels: Array, place: tuple[int, int, int], linear: Array, u: float, v: float
+) -> tuple[float, float, float, float]:
+    """Bilinear colour in linear light, and coverage in [0, 1], at (u, v) of a level (first texel, width, height)."""
+    begin, width, height = place
     zero, half = np.float32(0), np.float32(0.5)
-    x = min(max(uv[0] * np.float32(width) - half, zero), np.float32(width - 1))
-    y = min(max(uv[1] * np.float32(height) - half, zero), np.float32(height - 1))
+    x = min(max(u * np.float32(width) - half, zero), np.float32(width - 1))
+    y = min(max(v * np.float32(height) - half, zero), np.float32(height - 1))
     left, top = int(x), int(y)
     across, along = x - np.float32(left), y - np.float32(top)
     one = np.float32(1)
     right, below = 1 if left + 1 < width else 0, width if top + 1 < height else 0
-    p = place[0] + top * width + left
+    p = begin + top * width + left
     w0, w1 = (one - across) * (one - along), across * (one - along)
     w2, w3 = (one - across) * along, across * along
     q, r, s = p + right, p + below, p + below + right
-    for k in range(3):
-        colour[k] = (
-            linear[texels[p, k]] * w0
-            + linear[texels[q, k]] * w1
-            + linear[texels[r, k]] * w2
-            + linear[texels[s, k]] * w3
-        )
+    red = linear[texels[p, 0]] * w0 + linear[texels[q, 0]] * w1 + linear[texels[r, 0]] * w2 + linear[texels[s, 0]] * w3
+    green = (
+        linear[texels[p, 1]] * w0 + linear[texels[q, 1]] * w1 + linear[texels[r, 1]] * w2 + linear[texels[s, 1]] * w3
+    )
+    blue = linear[texels[p, 2]] * w0 + linear[texels[q, 2]] * w1 + linear[texels[r, 2]] * w2 + linear[texels[s, 2]] * w3
     coverage = texels[p, 3] * w0 + texels[q, 3] * w1 + texels[r, 3] * w2 + texels[s, 3] * w3
-    return coverage * np.float32(1 / 255)
+    return red, green, blue, coverage * np.float32(1 / 255)
 
 
 def pack_textures(

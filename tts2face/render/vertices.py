@@ -147,4 +147,5 @@ def sample_texture(textures: Any, linear: Any, uv: Any, texture: Any, albedo: An
     texels, levels = textures
     for v in range(len(texture)):
         if texture[v] >= 0:
-            read_texel(texels, levels[texture[v], 0], linear, (uv[v, 0], uv[v, 1]), albedo[v])
+            place = (levels[texture[v], 0, 0], levels[texture[v], 0, 1], levels[texture[v], 0, 2])
+            albedo[v, 0], albedo[v, 1], albedo[v, 2], _ = read_texel(texels, place, linear, uv[v, 0], uv[v, 1])
