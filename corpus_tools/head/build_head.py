@@ -38,7 +38,7 @@ CARTOON_TARGETS = {
 }  # fmt: skip
 CARTOON_STYLE = HeadStyle(
     palette=HeadColours(
-        skin=(0.93, 0.715, 0.60), lips=(0.80, 0.40, 0.38), cavity=(0.42, 0.12, 0.14), brows=(0.36, 0.15, 0.09),
+        skin=(0.93, 0.715, 0.60), lips=(0.80, 0.40, 0.38), cavity=(0.66, 0.27, 0.27), brows=(0.36, 0.15, 0.09),
         variation=0.35,
     ),
     eyes=EyeStyle(iris=0.47, pupil=0.22, colour=(0.28, 0.62, 0.50)),

@@ -22,7 +22,7 @@ from corpus_tools.head.piece import HeadPieces, MaterialSpan, Piece
 from corpus_tools.head.shapes import clear_eyeballs, correct_shapes
 from corpus_tools.head.skin import Skin, build_shoulders, build_skin
 from corpus_tools.head.subdivide import triangulate
-from corpus_tools.head.teeth import LOWER, UPPER, arch_piece, fit_teeth, follow_lips, keep_behind
+from corpus_tools.head.teeth import COVER_MM, LOWER, UPPER, arch_piece, fit_teeth, follow_lips, keep_behind
 from corpus_tools.head.texture import HeadColours
 from corpus_tools.head.tongue import tongue_piece
 
@@ -117,7 +117,7 @@ def _teeth_pieces(cage: Cage, skin: Skin, reference: ReferenceHead, jaw: Jaw) ->
         strip = cage.group(f"helper-{name}-teeth")
         piece = arch_piece(arch, name)
         points = fit_teeth(piece.vertices, reference.cage.vertices[strip], cage.vertices[strip])
-        points = keep_behind(follow_lips(points, piece.vertices, ahead), skin.vertices)
+        points = keep_behind(follow_lips(points, piece.vertices, ahead), skin.vertices, COVER_MM[name])
         moved = jaw.shapes(points) if name == "lower" else {}
         pieces.append(Piece(points, piece.spans, piece.colours, moved))
     return pieces[0], pieces[1]

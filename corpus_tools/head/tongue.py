@@ -20,9 +20,9 @@ GROOVE_MM, GROOVE_WIDTH_MM = 0.8, 2.4
 OUT_RISE_MM = 2.2  # the tip that is put out passes over the lower incisors
 UP_MM, UP_FREE_MM = 12.5, 26.0  # rise of the tip to the alveolar ridge with a jawOpen of about 0.25
 COLOUR, ROOT_COLOUR, TIP_COLOUR = (
-    np.array([0.73, 0.37, 0.37]),
-    np.array([0.40, 0.13, 0.14]),
-    np.array([0.78, 0.43, 0.42]),
+    np.array([0.70, 0.34, 0.34]),
+    np.array([0.56, 0.22, 0.22]),
+    np.array([0.74, 0.39, 0.38]),
 )
 MATERIAL = {"specular": 0.35, "shininess": 30.0, "wrap": 0.3}
 
