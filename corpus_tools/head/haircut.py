@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from corpus_tools.head.assets import PACKAGE, Asset, read_asset
+from corpus_tools.dense.texels import find_texels
 from corpus_tools.head.cage import Cage
 from corpus_tools.head.hairline import MIDDLE, covered_share, hair_share, paint_scalp, paint_stubble
+from corpus_tools.head.noise import value_noise
 from corpus_tools.head.skin import Skin, vertex_normals
 from corpus_tools.head.strands import Cards, StrandStyle, bake_strands, edge_graph, number_islands, strand_tangents
 from corpus_tools.head.subdivide import triangulate
@@ -80,7 +82,7 @@ class Haircut:
 
 HAIRCUTS: Mapping[str, Haircut] = {
     "long01": Haircut(
-        "long, straight, parted in the middle", 896, StrandStyle(14.0, 3.0, matte=True), (smooth_sheet, cut_at_bust)
+        "long, straight, parted in the middle", 896, StrandStyle(14.0, 3.0, matte=True, contrast=0.6, shade_px=5.0, broad=0.10), (smooth_sheet, cut_at_bust)
     ),
     "bob01": Haircut("chin-length bob with a fringe", 704, edits=(trim_fringe,)),
     "bob02": Haircut("chin-length bob with a long side fringe", 896, StrandStyle(10.0, 0.6), (trim_fringe,)),
@@ -88,7 +90,7 @@ HAIRCUTS: Mapping[str, Haircut] = {
     "braid01": Haircut("side fringe and a braid at the back", 640, StrandStyle(contrast=0.3), (trim_fringe,)),
     "afro01": Haircut("rounded afro", 640),
     "short01": Haircut("short, tousled on top", 640),
-    "short02": Haircut("short with a full fringe"),
+    "short02": Haircut("short with a full fringe", 896, StrandStyle(12.0, contrast=0.5, broad=0.12)),
     "short03": Haircut("short bob with a side fringe", edits=(trim_fringe,)),
     "short04": Haircut("short, combed back", 768),
 }
@@ -96,8 +98,8 @@ CROPPED = "cropped"
 N_ANCHORS = 180
 N_SAMPLES = 60_000  # points on the cards
 SOLID = 0.4  # coverage of a card from which it hides the scalp
-SCALP_SIDE, STUBBLE_SIDE = 512, 768
-FUZZ_MM = 0.9
+SCALP_SIDE, STUBBLE_SIDE = 1024, 1024
+FUZZ_MM, FUZZ, FUZZ_SIDE = 0.9, 0.30, 512  # height of the layer above a cropped scalp, coverage, pixels
 SEED = 11
 
 
@@ -137,25 +139,36 @@ def build_cropped(skin: Skin, head: Floats) -> Hair:
     """Hair of a few millimetres: painted, with a layer of fuzz above the scalp."""
     generator = np.random.default_rng(SEED)
     normals = vertex_normals(skin.vertices, skin.quads, skin.base)
-    full = hair_share(skin.vertices)[skin.quads].min(axis=1) > 0.9
-    used, quads = np.unique(skin.quads[full], return_inverse=True)
+    grown = hair_share(skin.vertices)[skin.quads].max(axis=1) > 0.0
+    used, quads = np.unique(skin.quads[grown], return_inverse=True)
     vertices = skin.vertices[used] + FUZZ_MM * normals[used]
-    side = 512
-    grain = generator.uniform(0, 1, (side, side))
+    triangles, uv = triangulate(quads.reshape(-1, 4)), flatten_skull(vertices)
     anchors = choose_anchors(head)
     return Hair(
         vertices=vertices.astype(np.float32),
-        triangles=triangulate(quads.reshape(-1, 4)).astype(np.int32),
-        uv=flatten_skull(vertices).astype(np.float32),
+        triangles=triangles.astype(np.int32),
+        uv=uv.astype(np.float32),
         tangents=normals[used].astype(np.float32),
-        relief=np.full((side, side), 128, np.uint8),
-        alpha=np.where(grain > 0.62, 160, 0).astype(np.uint8),
+        relief=np.full((FUZZ_SIDE, FUZZ_SIDE), 128, np.uint8),
+        alpha=paint_fuzz(skin.vertices[used], triangles, uv, generator),
         anchors=anchors.astype(np.int32),
         anchor_places=head[anchors].astype(np.float32),
         n_face_vertices=len(head),
         scalp=paint_stubble(skin, STUBBLE_SIDE, generator),
         metadata=_metadata(CROPPED, "cropped to a few millimetres"),
     )
+
+
+def paint_fuzz(places: Floats, triangles: Ints, uv: Floats, generator: np.random.Generator) -> NDArray[np.uint8]:
+    """(FUZZ_SIDE, FUZZ_SIDE) coverage of the layer above the scalp with vertices over `places` (N, 3): thin, and none
+    at the hairline."""
+    texels = find_texels(uv, triangles, FUZZ_SIDE)
+    place = texels.interpolate(places)
+    cover = FUZZ * hair_share(place) ** 2 * np.clip(1 + 0.35 * value_noise(place, 0.9, generator), 0, 2)
+    alpha = np.zeros((FUZZ_SIDE, FUZZ_SIDE))
+    alpha[texels.rows, texels.columns] = np.clip(cover, 0, 1)
+    painted: NDArray[np.uint8] = np.rint(alpha * 31).astype(np.uint8) * np.uint8(8)
+    return painted
 
 
 def flatten_skull(places: Floats) -> Floats:

@@ -61,6 +61,7 @@ TOOTH, TOOTH_DARK = np.array([0.92, 0.895, 0.84]), np.array([0.86, 0.80, 0.71])
 GUM = np.array([0.68, 0.36, 0.36])
 BACK_Z, FRONT_Z, MOST_SHIFT_MM = -16.0, 14.0, 5.0  # molars stay; front teeth follow the lips
 COVER_MM = {"upper": 2.2, "lower": 3.8}  # of skin in front of teeth and gums at rest; a smile draws the lower lip back
+UPPER_PLATE_MM, LOWER_PLATE_MM = 0.5, -2.2  # of the gums near the roots, outwards: the chin's fold lies before the lower
 N_AROUND, LEVELS = 12, np.array([0.0, 0.04, 0.13, 0.45, 1.0])
 MATERIALS = {
     "teeth": {"specular": 0.5, "shininess": 60.0, "wrap": 0.3},
@@ -206,8 +207,9 @@ def _gum(path: ArchPath, arch: Arch) -> Floats:
     depth = np.interp(np.abs(along), middles, arch.depths)
     line = height * (0.80 + 0.20 * np.abs(np.sin(np.pi * within)) ** 0.8)
     one = np.ones_like(line)
+    plate = UPPER_PLATE_MM if arch.up > 0 else LOWER_PLATE_MM
     ring = [  # height, outwards
-        (line, -0.5 * one), (line + 0.8, 0.45 * one), (height + 3.0, 0.5 * one), (height + 6.5, -1.8 * one),
+        (line, -0.5 * one), (line + 0.8, 0.45 * one), (height + 3.0, plate * one), (height + 6.5, (plate - 2.3) * one),
         (height + 7.0, -depth - 1), (height + 3.0, -depth - 2.5), (line + 0.8, -depth - 1.0), (line, -depth + 0.3),
     ]  # fmt: skip
     place, normal = path.at(along)
