@@ -18,12 +18,12 @@ MIDDLE = np.array([0.0, 25.0, -72.0])  # of the skull, mm
 CROWN = np.array([14.0, 122.0, -98.0])  # strands run from here
 # The hairline: height y in mm by the angle from the front about the skull's middle, in degrees.
 LINE_DEG = np.array([0, 18, 34, 48, 58, 66, 74, 84, 98, 108, 122, 140, 160, 180])
-LINE_Y = np.array([67, 66, 64, 60, 50, 30, 4, -6, 14, -6, -42, -60, -70, -72])
+LINE_Y = np.array([66, 67, 68, 62, 50, 30, 4, -6, 14, -6, -42, -60, -70, -72])
 EAR = (np.array([80.0, -8.0, -72.0]), np.array([26.0, 30.0, 17.0]))  # |x|, y, z: no hair grows there
 SOFT_MM = 15.0  # width of the hairline, over which strands get denser
 REACH_MM, STEP_MM, BESIDE_MM = 40.0, 4.0, 5.0  # hair up to so far above the skin, and beside its normal, covers it
 SMOOTH_MM = 7.0  # gaps such as a parting are closed, and the edge of the cover is smoothed, over this distance
-STUBBLE, STUBBLE_MM = 0.62, 0.7  # coverage, and size of the grain
+STUBBLE, STUBBLE_MM = 0.55, 0.7  # coverage, and size of the grain
 STRAND_MM = 0.55  # width of a painted strand
 
 
@@ -73,7 +73,7 @@ def paint_stubble(skin: Skin, side: int, generator: np.random.Generator) -> NDAr
     texels = find_texels(layout_coordinates(skin.source_uv), triangulate(skin.quads), side)
     place = texels.interpolate(skin.vertices)
     grain = value_noise(place, STUBBLE_MM, generator)
-    return _fill_gaps(texels, hair_share(place) * np.clip(STUBBLE + 0.07 * grain, 0, 1), side)
+    return _fill_gaps(texels, hair_share(place) * np.clip(STUBBLE + 0.11 * grain, 0, 1), side)
 
 
 def _fill_gaps(texels: Texels, cover: Floats, side: int) -> NDArray[np.uint8]:

@@ -35,8 +35,8 @@ ADULT = {
     "macrodetails/caucasian-female-young": 1.0,
     "macrodetails/universal-female-young-averagemuscle-averageweight": 1.0,
 }
-# The default person: a woman of about 30. Corners of the mouth any higher are read as a smile by the tracker (.20 at 0.6,
-# .03 at 0.3): the friendliness of speech comes from its gestures.
+# The default person: a woman of about 30. Higher corners of the mouth are read as a smile by the tracker (.20 at 0.6, .03
+# at 0.3): the friendliness of speech comes from its gestures.
 DEFAULT_PERSON = ADULT | {
     "head/head-oval": 0.35, "chin/chin-width-decr": 0.35, "chin/chin-height-decr": 0.15,
     "chin/chin-prominent-decr": 0.1, "cheek/l-cheek-bones-incr": 0.25, "cheek/r-cheek-bones-incr": 0.25,

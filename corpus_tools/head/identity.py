@@ -94,7 +94,7 @@ PRESETS: dict[str, Preset] = {
         (1.0, 0.965, 0.955), GREY, PLAIN, (2.0, 0.8, 1.1),
     ),
     "walter": Preset(
-        "man, about 65, European", "male", OLD, {"caucasian": 1}, Hairdo("cropped", "grey"),
+        "man, about 65, European", "male", OLD, {"caucasian": 1}, Hairdo("cropped", "#6e6862"),
         (0.98, 0.93, 0.91), GREY,
     ),
     "nia": Preset(

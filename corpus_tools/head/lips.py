@@ -74,7 +74,9 @@ def ring_arcs(skin: Skin, ring: NDArray[np.int64]) -> tuple[NDArray[np.int64], N
     ring = np.roll(ring, -int(skin.base[ring, 0].argmin()))
     turn = int(skin.base[ring, 0].argmax())
     arcs = (ring[: turn + 1], np.append(ring[turn:], ring[0])[::-1])
-    lower, upper = sorted(arcs, key=lambda arc: float((skin.vertices + OPENING * skin.shapes["jawOpen"])[arc, 1].mean()))
+    lower, upper = sorted(
+        arcs, key=lambda arc: float((skin.vertices + OPENING * skin.shapes["jawOpen"])[arc, 1].mean())
+    )
     return upper, lower
 
 

@@ -16,15 +16,15 @@ MOUTH_U, MOUTH_V = (0.75, 0.93), 0.14  # MakeHuman's island of the mouth's cavit
 SEED = 5
 
 
-def scatter_in_mouth(face: Face, skin: Skin, n_skin: int) -> Face:
+def scatter_in_mouth(face: Face, skin: Skin) -> Face:
     """A face whose mouth is lit from inside: as with open lips at rest, where it is hidden, and by scattered light.
 
-    `skin` is that of the reference head, whose first `n_skin` vertices are the face's.
+    `skin` is that of the reference head, whose vertices correspond to the face's first ones.
     """
     if face.occlusion is None:
         return face
     bits = np.unpackbits(face.occlusion, axis=2)
-    inside = mouth_vertices(face, skin, n_skin)
+    inside = mouth_vertices(face, skin)
     bits[0, inside] = bits[-1, inside]
     ahead = np.flatnonzero(sphere_directions(bits.shape[2])[:, 2] > AHEAD_Z)
     is_lit = np.random.default_rng(SEED).random((len(inside), len(ahead))) < LIT_SHARE
@@ -33,9 +33,11 @@ def scatter_in_mouth(face: Face, skin: Skin, n_skin: int) -> Face:
     return replace(face, occlusion=np.packbits(bits, axis=2))
 
 
-def mouth_vertices(face: Face, skin: Skin, n_skin: int) -> NDArray[np.int64]:
+def mouth_vertices(face: Face, skin: Skin) -> NDArray[np.int64]:
     """Vertices of teeth, gums, tongue and the cavity."""
-    u, v = skin.source_uv[:n_skin].T
+    u, v = skin.source_uv.T
     cavity = np.flatnonzero((u > MOUTH_U[0]) & (u < MOUTH_U[1]) & (v < MOUTH_V))
-    parts = [face.triangles[part.first : part.first + part.count].ravel() for part in face.parts if part.name in MOUTH_PARTS]
+    parts = [
+        face.triangles[part.first : part.first + part.count].ravel() for part in face.parts if part.name in MOUTH_PARTS
+    ]
     return np.unique(np.concatenate([cavity, *parts]))

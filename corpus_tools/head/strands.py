@@ -39,8 +39,8 @@ class StrandStyle:
     """How the strands of a texture are found.
 
     ``blur_px`` smooths the direction, ``upright`` favours strands that run along v, ``matte`` clears the dark ground
-    of a texture whose coverage is too large, ``contrast`` is that of the relief of the source. ``shade_px`` is the least
-    length along v of lighter and darker areas that are removed, ``broad`` the contrast of broad strands.
+    of a texture whose coverage is too large, ``contrast`` is that of the relief of the source. ``shade_px`` is the
+    least length along v of lighter and darker areas that are removed, ``broad`` the contrast of broad strands.
     """
 
     blur_px: float = 6.0

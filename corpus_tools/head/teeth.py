@@ -61,7 +61,10 @@ TOOTH, TOOTH_DARK = np.array([0.92, 0.895, 0.84]), np.array([0.86, 0.80, 0.71])
 GUM = np.array([0.68, 0.36, 0.36])
 BACK_Z, FRONT_Z, MOST_SHIFT_MM = -16.0, 14.0, 5.0  # molars stay; front teeth follow the lips
 COVER_MM = {"upper": 2.2, "lower": 3.8}  # of skin in front of teeth and gums at rest; a smile draws the lower lip back
-UPPER_PLATE_MM, LOWER_PLATE_MM = 0.5, -2.2  # of the gums near the roots, outwards: the chin's fold lies before the lower
+UPPER_PLATE_MM, LOWER_PLATE_MM = (
+    0.5,
+    -2.2,
+)  # of the gums near the roots, outwards: the chin's fold lies before the lower
 N_AROUND, LEVELS = 12, np.array([0.0, 0.04, 0.13, 0.45, 1.0])
 MATERIALS = {
     "teeth": {"specular": 0.5, "shininess": 60.0, "wrap": 0.3},
