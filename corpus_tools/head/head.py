@@ -30,13 +30,14 @@ Floats = NDArray[np.float64]
 
 SKIN_MATERIAL = {"specular": 0.16, "shininess": 14.0, "wrap": 0.35, "texture": 0, "kind": "skin"}
 
+SMILE, SMILE_COVER_MM = {"mouthSmileLeft": 1.0, "mouthSmileRight": 1.0, "jawOpen": 0.3}, 1.6
 PIVOT = np.array([0.0, -75.0, -95.0])  # where the skull meets the neck
 ADULT = {
     "macrodetails/caucasian-female-young": 1.0,
     "macrodetails/universal-female-young-averagemuscle-averageweight": 1.0,
 }
-# The default person: a woman of about 30. Higher corners of the mouth are read as a smile by the tracker (.20 at 0.6, .03
-# at 0.3): the friendliness of speech comes from its gestures.
+# The default person: a woman of about 30. Higher corners of the mouth are read as a smile by the tracker (.20 at 0.6,
+# .03 at 0.3): the friendliness of speech comes from its gestures.
 DEFAULT_PERSON = ADULT | {
     "head/head-oval": 0.35, "chin/chin-width-decr": 0.35, "chin/chin-height-decr": 0.15,
     "chin/chin-prominent-decr": 0.1, "cheek/l-cheek-bones-incr": 0.25, "cheek/r-cheek-bones-incr": 0.25,
@@ -118,6 +119,16 @@ def _teeth_pieces(cage: Cage, skin: Skin, reference: ReferenceHead, jaw: Jaw) ->
         piece = arch_piece(arch, name)
         points = fit_teeth(piece.vertices, reference.cage.vertices[strip], cage.vertices[strip])
         points = keep_behind(follow_lips(points, piece.vertices, ahead), skin.vertices, COVER_MM[name])
+        if name == "lower":
+            points = _cover_in_smile(points, skin, jaw)
         moved = jaw.shapes(points) if name == "lower" else {}
         pieces.append(Piece(points, piece.spans, piece.colours, moved))
     return pieces[0], pieces[1]
+
+
+def _cover_in_smile(points: Floats, skin: Skin, jaw: Jaw) -> Floats:
+    """Lower teeth and gums (N, 3) that stay behind the skin when a smile draws it back over the open jaw."""
+    posed = skin.vertices + sum(weight * skin.shapes[name] for name, weight in SMILE.items())
+    opened = SMILE["jawOpen"] * jaw.shapes(points)["jawOpen"]
+    covered: Floats = keep_behind(points + opened, posed, SMILE_COVER_MM) - opened
+    return covered

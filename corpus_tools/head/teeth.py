@@ -36,13 +36,13 @@ class Arch:
     depths: Floats
 
 
-# Sizes after Wheeler, Dental Anatomy. The incisors touch the inner side of the lips, 2.5 mm (upper) and 5.5 mm (lower)
+# Sizes after Wheeler, Dental Anatomy. The incisors touch the inner side of the lips, 2.5 mm (upper) and 6 mm (lower)
 # behind the line between them, the canines and premolars that of the cheeks; the molars are those of MakeHuman's strip.
 UPPER_CURVE = np.array(
     [(0, 26.6), (8.6, 25.2), (16.2, 20.4), (21.6, 13.4), (24.9, 5.0), (27.0, -5.0), (28.6, -16.0)]
 )  # fmt: skip
 LOWER_CURVE = np.array(
-    [(0, 23.5), (7.6, 22.2), (14.8, 17.6), (20.0, 10.8), (23.4, 2.6), (26.3, -7.0), (28.1, -18.0)]
+    [(0, 23.2), (7.6, 21.9), (14.7, 17.3), (19.9, 10.6), (23.3, 2.5), (26.3, -7.0), (28.1, -18.0)]
 )  # fmt: skip
 UPPER = Arch(
     UPPER_CURVE, -0.636 * SCALE, 1.0,
@@ -53,7 +53,7 @@ UPPER = Arch(
 LOWER = Arch(
     LOWER_CURVE, -0.632 * SCALE, -1.0,
     np.array([5.6, 6.1, 7.0, 7.0, 7.1, 10.4]),
-    np.array([9.0, 9.2, 10.0, 8.6, 8.0, 7.4]),
+    np.array([7.8, 8.0, 9.0, 8.2, 7.8, 7.4]),
     np.array([4.6, 4.8, 6.0, 7.2, 8.0, 9.4]),
 )  # fmt: skip
 SHADE = np.array([1.0, 1.0, 0.95, 0.84, 0.70, 0.56])  # brightness of the crowns; cheeks shade the back ones
