@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.head.cage import SCALE
 from lexicon.errors import BackendError, DataError
 
 Floats = NDArray[np.float64]
@@ -201,8 +200,3 @@ def unpack_assets(archive: Path, folder: Path) -> None:
             target = folder / row["file"]
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(content)
-
-
-def in_millimetres(offsets: Floats) -> Floats:
-    """Units of the source in mm."""
-    return SCALE * offsets

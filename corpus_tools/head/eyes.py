@@ -23,7 +23,7 @@ GAZE_ANGLES = {
     "eyeLookOut": (0, 1, 25.0),
     "eyeLookIn": (0, -1, 25.0),
 }
-SCLERA = np.array([0.80, 0.775, 0.755])
+SCLERA, SCLERA_MOST = np.array([0.74, 0.72, 0.695]), 0.80  # warm grey, and the brightest value, sRGB
 TEXTURE_SIDE, EDGE_RAD = 512, 1.1  # pixels, and the angle from the gaze at the edge of the texture
 # The eye in the package's picture, pixels: centre, and radii of pupil, iris and the painted part of the ball.
 SOURCE_CENTRE, SOURCE_PUPIL_PX, SOURCE_IRIS_PX, SOURCE_BALL_PX = (361.4, 151.1), 17.0, 60.0, 125.0
@@ -127,9 +127,9 @@ def eye_texture(picture: NDArray[np.uint8], style: EyeStyle) -> NDArray[np.uint8
     iris *= 1 - 0.35 * frill * np.array([0.0, 0.25, 0.6])
     iris *= (1 - LIMBUS * np.clip((depth - 0.80) / 0.20, 0, 1) ** 1.5)[:, :, None]
     iris = np.where((off < style.pupil)[:, :, None], 0.5 * colour * np.array([0.4, 0.35, 0.3]), iris)
-    white = np.clip(colour * SCLERA / SOURCE_SCLERA, 0, 0.88)
-    pink = np.clip((off - style.iris - 0.28) / 0.75, 0, 1)[:, :, None]
-    white *= 1 - pink * np.array([0.05, 0.17, 0.17])
+    white = np.clip(colour * SCLERA / SOURCE_SCLERA, 0, SCLERA_MOST)
+    pink = np.clip((off - style.iris - 0.12) / 0.75, 0, 1)[:, :, None]
+    white *= 1 - pink * np.array([0.13, 0.24, 0.25])
     mixed = white + share * (iris - white)
     height = np.sin(off) * np.sin(turn)
     shade = 1 - LID_SHADE * smoothstep(height, -0.02, 0.40)

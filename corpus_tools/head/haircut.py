@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.spatial import cKDTree
 
+from corpus_tools.dense.texels import find_texels
 from corpus_tools.head.assets import PACKAGE, Asset, read_asset
 from corpus_tools.head.cage import Cage
 from corpus_tools.head.hairline import MIDDLE, covered_share, hair_share, paint_scalp, paint_stubble
+from corpus_tools.head.noise import value_noise
 from corpus_tools.head.skin import Skin, vertex_normals
 from corpus_tools.head.strands import Cards, StrandStyle, bake_strands, edge_graph, number_islands, strand_tangents
 from corpus_tools.head.subdivide import triangulate
@@ -22,9 +25,13 @@ Ints = NDArray[np.int64]
 
 
 Edit = Callable[[Cards], Cards]
+Finish = Callable[[Cards, NDArray[np.uint8], Floats], tuple[NDArray[np.uint8], Floats]]  # of coverage and tangents
 AXIS_Z, FRONT_DEG = -60.0, (36.0, 60.0)  # the vertical axis of the head; a fringe lies in front of these angles
 FRINGE_TOP, BROW_Y = 62.0, 25.0  # heights between which a fringe ends up
-BUST_Y = -335.0
+BUST_Y, SUNK_MM = -335.0, 3.0
+ROOTS_Y, ROOTS_Z = 46.0, -40.0  # above the forehead
+ROOT_MM, ROOT_SPREAD_MM = 7.0, 2.2  # width of a hairline, and that of its raggedness
+CURL_TOP, CURL_ROOT, CURL_SIDE, CURL_SPREAD = 0.68, (0.86, 0.98), 0.08, 0.03  # shares of the texture
 CROWN_Y, N_CROWN_MEANS = (40.0, 80.0), 12  # heights between which the crown begins
 
 
@@ -58,6 +65,15 @@ def smooth_sheet(cards: Cards) -> Cards:
     return _used_cards(Cards(moved, cards.triangles, cards.uv, cards.weld), is_main[cards.triangles].all(axis=1))
 
 
+def sink_strands(cards: Cards) -> Cards:
+    """Cards whose small ones lie below the largest sheet, which they would cut through."""
+    islands = number_islands(int(cards.weld.max()) + 1, cards.weld[cards.triangles])[cards.weld]
+    inwards = MIDDLE - cards.vertices
+    inwards /= np.linalg.norm(inwards, axis=1, keepdims=True)
+    moved = cards.vertices + SUNK_MM * inwards * (islands != np.bincount(islands).argmax())[:, None]
+    return Cards(moved, cards.triangles, cards.uv, cards.weld)
+
+
 def cut_at_bust(cards: Cards) -> Cards:
     """Cards without what hangs below the bust."""
     return _used_cards(cards, (cards.vertices[cards.triangles, 1] > BUST_Y).any(axis=1))
@@ -68,36 +84,88 @@ def _used_cards(cards: Cards, is_kept: NDArray[np.bool_]) -> Cards:
     return Cards(cards.vertices[used], packed.reshape(-1, 3), cards.uv[used], cards.weld[used])
 
 
+def thin_roots(cards: Cards, alpha: NDArray[np.uint8], tangents: Floats) -> tuple[NDArray[np.uint8], Floats]:
+    """Coverage that falls off in single strands towards the edge of the cards above the forehead."""
+    side = len(alpha)
+    texels = find_texels(cards.uv, cards.triangles, side)
+    place = texels.interpolate(cards.vertices)
+    edge = border_points(cards)
+    edge = edge[(edge[:, 1] > ROOTS_Y) & (edge[:, 2] > ROOTS_Z)]
+    distance = cKDTree(edge).query(place)[0]
+    streak = np.random.default_rng(SEED).standard_normal(side)[texels.columns]  # strands run along v
+    share = smoothstep(distance + ROOT_SPREAD_MM * streak, 0.0, ROOT_MM)
+    thinned = alpha.astype(np.float64)
+    thinned[texels.rows, texels.columns] *= share
+    return (np.rint(thinned / 8) * 8).clip(0, 255).astype(np.uint8), tangents
+
+
+def border_points(cards: Cards) -> Floats:
+    """(B, 3) points on the borders of the cards, at most 1 mm apart on edges of up to 40 mm."""
+    welded = cards.weld[cards.triangles]
+    ends = np.sort(np.stack([welded, np.roll(welded, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    pairs, count = np.unique(ends, axis=0, return_counts=True)
+    places = np.zeros((int(cards.weld.max()) + 1, 3))
+    places[cards.weld] = cards.vertices
+    one, two = places[pairs[count == 1]].transpose(1, 0, 2)
+    along = np.linspace(0, 1, 41)[:, None, None]
+    points: Floats = (one + along * (two - one)).reshape(-1, 3)
+    return points
+
+
+def finish_curls(cards: Cards, alpha: NDArray[np.uint8], tangents: Floats) -> tuple[NDArray[np.uint8], Floats]:
+    """Curls point away from the head, so that no card shines as a whole, and have no straight lower edge."""
+    height = np.linspace(0, 1, len(alpha))[:, None]
+    across = np.linspace(0, 1, len(alpha))[None]
+    ragged = CURL_SPREAD * np.random.default_rng(SEED).standard_normal(alpha.shape)
+    is_card = height > CURL_TOP
+    low = 1 - smoothstep(height + ragged, *CURL_ROOT)
+    side = smoothstep(np.minimum(across, 1 - across) + ragged, 0.0, CURL_SIDE)
+    thinned = alpha * np.where(is_card, low * side, 1.0)
+    outwards = cards.vertices - MIDDLE
+    outwards /= np.linalg.norm(outwards, axis=1, keepdims=True)
+    return (np.rint(thinned / 8) * 8).clip(0, 255).astype(np.uint8), outwards
+
+
 @dataclass(frozen=True, slots=True)
 class Haircut:
-    """A haircut of the package, by the asset's name: summary, side of the texture in pixels, strands and edits."""
+    """A haircut of the package: summary, side of the texture in pixels, strands, edits of cards, and of coverage."""
 
     summary: str
     side: int = 896
     style: StrandStyle = field(default_factory=StrandStyle)
     edits: tuple[Edit, ...] = ()
+    finish: Finish | None = None
 
 
 HAIRCUTS: Mapping[str, Haircut] = {
     "long01": Haircut(
-        "long, straight, parted in the middle", 896, StrandStyle(14.0, 3.0, matte=True), (smooth_sheet, cut_at_bust)
+        "long, straight, parted in the middle",
+        896,
+        StrandStyle(14.0, 3.0, matte=True, contrast=0.6, shade_px=5.0, broad=0.10),
+        (smooth_sheet, cut_at_bust),
+        thin_roots,
     ),
     "bob01": Haircut("chin-length bob with a fringe", 704, edits=(trim_fringe,)),
-    "bob02": Haircut("chin-length bob with a long side fringe", 896, StrandStyle(10.0, 0.6), (trim_fringe,)),
-    "ponytail01": Haircut("combed back into a ponytail", 768, StrandStyle(9.0)),
+    "bob02": Haircut(
+        "chin-length bob with a long side fringe",
+        896,
+        StrandStyle(10.0, 0.6, contrast=0.6, broad=0.12),
+        (trim_fringe, sink_strands),
+    ),
+    "ponytail01": Haircut("combed back into a ponytail", 768, StrandStyle(9.0, contrast=0.6)),
     "braid01": Haircut("side fringe and a braid at the back", 640, StrandStyle(contrast=0.3), (trim_fringe,)),
-    "afro01": Haircut("rounded afro", 640),
+    "afro01": Haircut("rounded afro", 640, StrandStyle(contrast=0.8), finish=finish_curls),
     "short01": Haircut("short, tousled on top", 640),
-    "short02": Haircut("short with a full fringe"),
+    "short02": Haircut("short with a full fringe", 896, StrandStyle(12.0, contrast=0.5, broad=0.12)),
     "short03": Haircut("short bob with a side fringe", edits=(trim_fringe,)),
-    "short04": Haircut("short, combed back", 768),
+    "short04": Haircut("short, combed back", 768, edits=(sink_strands,)),
 }
 CROPPED = "cropped"
 N_ANCHORS = 180
 N_SAMPLES = 60_000  # points on the cards
 SOLID = 0.4  # coverage of a card from which it hides the scalp
-SCALP_SIDE, STUBBLE_SIDE = 512, 768
-FUZZ_MM = 0.9
+SCALP_SIDE, STUBBLE_SIDE = 1024, 1024
+FUZZ_MM, FUZZ, FUZZ_SIDE = 0.5, 0.10, 512  # height of the layer above a cropped scalp, coverage, pixels
 SEED = 11
 
 
@@ -116,13 +184,16 @@ def build_hair(name: str, asset: Asset, cage: Cage, skin: Skin, head: Floats) ->
     for edit in cut.edits:
         cards = edit(cards)
     relief, alpha, angles = bake_strands(asset.picture, cut.style, cut.side, np.random.default_rng(SEED))
+    tangents = strand_tangents(cards, angles)
+    if cut.finish is not None:
+        alpha, tangents = cut.finish(cards, alpha, tangents)
     share = covered_share(skin, solid_points(cards, alpha, np.random.default_rng(SEED)))
     anchors = choose_anchors(head)
     return Hair(
         vertices=cards.vertices.astype(np.float32),
         triangles=cards.triangles.astype(np.int32),
         uv=cards.uv.astype(np.float32),
-        tangents=strand_tangents(cards, angles).astype(np.float32),
+        tangents=tangents.astype(np.float32),
         relief=relief,
         alpha=alpha,
         anchors=anchors.astype(np.int32),
@@ -137,25 +208,35 @@ def build_cropped(skin: Skin, head: Floats) -> Hair:
     """Hair of a few millimetres: painted, with a layer of fuzz above the scalp."""
     generator = np.random.default_rng(SEED)
     normals = vertex_normals(skin.vertices, skin.quads, skin.base)
-    full = hair_share(skin.vertices)[skin.quads].min(axis=1) > 0.9
-    used, quads = np.unique(skin.quads[full], return_inverse=True)
+    grown = hair_share(skin.vertices)[skin.quads].max(axis=1) > 0.0
+    used, quads = np.unique(skin.quads[grown], return_inverse=True)
     vertices = skin.vertices[used] + FUZZ_MM * normals[used]
-    side = 512
-    grain = generator.uniform(0, 1, (side, side))
+    triangles, uv = triangulate(quads.reshape(-1, 4)), flatten_skull(vertices)
     anchors = choose_anchors(head)
     return Hair(
         vertices=vertices.astype(np.float32),
-        triangles=triangulate(quads.reshape(-1, 4)).astype(np.int32),
-        uv=flatten_skull(vertices).astype(np.float32),
+        triangles=triangles.astype(np.int32),
+        uv=uv.astype(np.float32),
         tangents=normals[used].astype(np.float32),
-        relief=np.full((side, side), 128, np.uint8),
-        alpha=np.where(grain > 0.62, 160, 0).astype(np.uint8),
+        relief=np.full((FUZZ_SIDE, FUZZ_SIDE), 128, np.uint8),
+        alpha=paint_fuzz(skin.vertices[used], triangles, uv, generator),
         anchors=anchors.astype(np.int32),
         anchor_places=head[anchors].astype(np.float32),
         n_face_vertices=len(head),
         scalp=paint_stubble(skin, STUBBLE_SIDE, generator),
         metadata=_metadata(CROPPED, "cropped to a few millimetres"),
     )
+
+
+def paint_fuzz(places: Floats, triangles: Ints, uv: Floats, generator: np.random.Generator) -> NDArray[np.uint8]:
+    """(FUZZ_SIDE, FUZZ_SIDE) coverage of a layer with vertices above `places` (N, 3): none at the hairline."""
+    texels = find_texels(uv, triangles, FUZZ_SIDE)
+    place = texels.interpolate(places)
+    cover = FUZZ * hair_share(place) ** 2 * np.clip(1 + value_noise(place, 0.9, generator), 0, 3)
+    alpha = np.zeros((FUZZ_SIDE, FUZZ_SIDE))
+    alpha[texels.rows, texels.columns] = np.clip(cover, 0, 1)
+    painted: NDArray[np.uint8] = np.rint(alpha * 31).astype(np.uint8) * np.uint8(8)
+    return painted
 
 
 def flatten_skull(places: Floats) -> Floats:

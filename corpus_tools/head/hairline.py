@@ -18,12 +18,13 @@ MIDDLE = np.array([0.0, 25.0, -72.0])  # of the skull, mm
 CROWN = np.array([14.0, 122.0, -98.0])  # strands run from here
 # The hairline: height y in mm by the angle from the front about the skull's middle, in degrees.
 LINE_DEG = np.array([0, 18, 34, 48, 58, 66, 74, 84, 98, 108, 122, 140, 160, 180])
-LINE_Y = np.array([67, 66, 64, 60, 50, 30, 4, -6, 14, -6, -42, -60, -70, -72])
+LINE_Y = np.array([66, 67, 68, 62, 50, 30, 4, -6, 14, -6, -42, -60, -70, -72])
 EAR = (np.array([80.0, -8.0, -72.0]), np.array([26.0, 30.0, 17.0]))  # |x|, y, z: no hair grows there
-SOFT_MM = 10.0  # width of the hairline
+SOFT_MM = 15.0  # width of the hairline, over which strands get denser
 REACH_MM, STEP_MM, BESIDE_MM = 40.0, 4.0, 5.0  # hair up to so far above the skin, and beside its normal, covers it
 SMOOTH_MM = 7.0  # gaps such as a parting are closed, and the edge of the cover is smoothed, over this distance
-STUBBLE_MM = 1.1  # size of the grain
+STUBBLE, STUBBLE_MM = 0.55, 0.7  # coverage, and size of the grain
+STRAND_MM = 0.55  # width of a painted strand
 
 
 def hair_share(places: Floats) -> Floats:
@@ -31,10 +32,7 @@ def hair_share(places: Floats) -> Floats:
     off = places - MIDDLE
     angle = np.degrees(np.arctan2(np.abs(off[:, 0]), off[:, 2]))
     line = np.interp(angle, LINE_DEG, LINE_Y)
-    ragged = 1.6 * np.sin(0.55 * places[:, 0] + 0.31 * places[:, 2]) + 1.1 * np.sin(
-        1.3 * places[:, 0] - 0.9 * places[:, 2]
-    )
-    share = smoothstep(places[:, 1] + ragged - line, -SOFT_MM / 2, SOFT_MM / 2)
+    share = smoothstep(places[:, 1] - line, -0.35 * SOFT_MM, 0.65 * SOFT_MM)
     mirrored = np.column_stack([np.abs(places[:, 0]), places[:, 1:]])
     ear = np.linalg.norm((mirrored - EAR[0]) / EAR[1], axis=1)
     grown: Floats = share * smoothstep(ear, 0.92, 1.12)
@@ -63,9 +61,10 @@ def paint_scalp(skin: Skin, share: Floats, side: int, generator: np.random.Gener
     texels = find_texels(layout_coordinates(skin.source_uv), triangulate(skin.quads), side)
     place = texels.interpolate(skin.vertices)
     grown = texels.interpolate(share[:, None])[:, 0] * hair_share(place)
-    fine = value_noise(strand_field(place, 1.4, 16.0), 1.0, generator)
+    fine = value_noise(strand_field(place, STRAND_MM, 22.0), 1.0, generator)
+    fine += 0.6 * value_noise(strand_field(place, 3 * STRAND_MM, 30.0), 1.0, generator)
     edge = 4 * grown * (1 - grown)
-    cover = np.clip(grown + 0.28 * fine * edge, 0, 1) * (grown > 0.01)
+    cover = np.clip(grown + 0.22 * fine * edge, 0, 1) * smoothstep(grown, 0.0, 0.12)
     return _fill_gaps(texels, 0.97 * cover, side)
 
 
@@ -74,7 +73,7 @@ def paint_stubble(skin: Skin, side: int, generator: np.random.Generator) -> NDAr
     texels = find_texels(layout_coordinates(skin.source_uv), triangulate(skin.quads), side)
     place = texels.interpolate(skin.vertices)
     grain = value_noise(place, STUBBLE_MM, generator)
-    return _fill_gaps(texels, hair_share(place) * np.clip(0.60 + 0.16 * grain, 0, 1), side)
+    return _fill_gaps(texels, hair_share(place) * np.clip(STUBBLE + 0.11 * grain, 0, 1), side)
 
 
 def _fill_gaps(texels: Texels, cover: Floats, side: int) -> NDArray[np.uint8]:

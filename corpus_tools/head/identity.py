@@ -35,6 +35,7 @@ class Preset:
     iris: Tint = PLAIN
     shirt: Tint = PLAIN
     brows: str = ""
+    sclera: Tint = PLAIN
     more: Mapping[str, float] = field(default_factory=lambda: FRIENDLY)
 
     def targets(self) -> dict[str, float]:
@@ -56,6 +57,7 @@ class Preset:
 
 BROWN, DARK = (0.66, 0.46, 0.33), (0.42, 0.28, 0.20)  # eyes; the iris in the texture is light
 BLACK, BLOND, GREY = (0.42, 0.43, 0.47), (1.9, 2.0, 1.75), (2.1, 2.8, 3.4)  # brows
+DARK_SCLERA = (0.93, 0.905, 0.86)
 YOUNG, OLD, CHILD = {"young": 1.0}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
 PRESETS: dict[str, Preset] = {
     "erik": Preset(
@@ -64,11 +66,11 @@ PRESETS: dict[str, Preset] = {
     ),
     "amara": Preset(
         "woman, about 30, West African", "female", YOUNG, {"african": 1}, Hairdo("afro01", "black"),
-        (0.56, 0.47, 0.42), BLACK, DARK, (2.6, 1.5, 0.7),
+        (0.51, 0.50, 0.465), BLACK, DARK, (2.6, 1.5, 0.7), sclera=DARK_SCLERA,
     ),
     "kofi": Preset(
         "man, about 35, West African", "male", {"young": 0.85, "old": 0.15}, {"african": 1},
-        Hairdo("short04", "black"), (0.48, 0.40, 0.36), BLACK, DARK, brows="eyebrow008",
+        Hairdo("short04", "black"), (0.43, 0.43, 0.405), BLACK, DARK, brows="eyebrow008", sclera=DARK_SCLERA,
     ),
     "mei": Preset(
         "woman, about 28, East Asian", "female", YOUNG, {"asian": 1}, Hairdo("long01", "black"),
@@ -81,23 +83,23 @@ PRESETS: dict[str, Preset] = {
     "leila": Preset(
         "woman, about 35, mixed ancestry", "female", {"young": 0.85, "old": 0.15},
         {"caucasian": 0.45, "african": 0.3, "asian": 0.25}, Hairdo("ponytail01", "dark-brown"),
-        (0.80, 0.72, 0.66), BLACK, BROWN, (1.2, 2.0, 1.3), "eyebrow010",
+        (0.80, 0.80, 0.76), BLACK, BROWN, (1.2, 2.0, 1.3), "eyebrow010", sclera=DARK_SCLERA,
     ),
     "ravi": Preset(
         "man, about 30, mixed ancestry", "male", YOUNG, {"caucasian": 0.5, "african": 0.2, "asian": 0.3},
-        Hairdo("short02", "black"), (0.70, 0.61, 0.55), BLACK, DARK, (1.7, 1.7, 1.6),
+        Hairdo("short02", "black"), (0.69, 0.68, 0.62), BLACK, DARK, (1.7, 1.7, 1.6), sclera=DARK_SCLERA,
     ),
     "ingrid": Preset(
         "woman, about 70, European", "female", OLD, {"caucasian": 1}, Hairdo("bob02", "white"),
         (1.0, 0.965, 0.955), GREY, PLAIN, (2.0, 0.8, 1.1),
     ),
     "walter": Preset(
-        "man, about 65, European", "male", OLD, {"caucasian": 1}, Hairdo("cropped", "grey"),
+        "man, about 65, European", "male", OLD, {"caucasian": 1}, Hairdo("cropped", "#6e6862"),
         (0.98, 0.93, 0.91), GREY,
     ),
     "nia": Preset(
         "child, about 9, mixed ancestry", "female", CHILD, {"caucasian": 0.4, "african": 0.4, "asian": 0.2},
-        Hairdo("braid01", "black"), (0.82, 0.75, 0.70), BLACK, BROWN, (3.2, 2.4, 0.7),
+        Hairdo("braid01", "black"), (0.79, 0.78, 0.735), BLACK, BROWN, (3.2, 2.4, 0.7),
     ),
 }  # fmt: skip
 
@@ -112,7 +114,7 @@ def build_identities(
         own_style = replace(style, cards=person.cards())
         own = stack_vertices(assemble_head(build_cage(source, person.targets()), reference, own_style))
         tints = {
-            "skin": person.skin, "brows": person.brow, "iris": person.iris,
+            "skin": person.skin, "brows": person.brow, "iris": person.iris, "sclera": person.sclera,
             "shirt": person.shirt, "gums_upper": _dampen_tint(person.skin), "gums_lower": _dampen_tint(person.skin),
         }  # fmt: skip
         found[name] = Identity((own - rest).astype(np.float32), tints, person.summary, person.hairdo)

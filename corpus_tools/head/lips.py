@@ -14,6 +14,8 @@ Floats = NDArray[np.float64]
 PRESS_MM = 0.12  # lips overlap by this at rest, so that no light falls between them
 REACH_MM = 5.0  # from the line of contact to where the skin's motion has decayed
 N_COLUMNS = 61
+N_RIM_STEPS, N_RING_STEPS = 5, 20
+RING_PRESS_MM, RING_SPREAD_MM = 0.06, 1.5  # overlap of the ring at rest, and distance over which its motion is averaged
 MIDDLE_MM = 6.0
 OPENING = 0.3  # weight of jawOpen at which the lips are apart
 RING_REACH_MM = 40.0
@@ -57,12 +59,46 @@ def find_lip_line(skin: Skin, ring: NDArray[np.int64]) -> LipLine:
 
 
 def close_lips(skin: Skin, ring: NDArray[np.int64]) -> Skin:
-    """The skin with lips in contact."""
+    """The skin with lips in contact: first where they bulge most, then along the whole ring where they meet."""
     line = find_lip_line(skin, ring)
     vertices = skin.vertices
-    for _ in range(5):
+    for _ in range(N_RIM_STEPS):
         vertices = vertices + _closing_step(replace(skin, vertices=vertices), line)
+    for _ in range(N_RING_STEPS):
+        vertices = vertices + _ring_step(replace(skin, vertices=vertices), line, ring)
     return replace(skin, vertices=vertices)
+
+
+def ring_arcs(skin: Skin, ring: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Vertices of the upper and of the lower half of the ring, each from the right corner to the left one."""
+    ring = np.roll(ring, -int(skin.base[ring, 0].argmin()))
+    turn = int(skin.base[ring, 0].argmax())
+    arcs = (ring[: turn + 1], np.append(ring[turn:], ring[0])[::-1])
+    lower, upper = sorted(
+        arcs, key=lambda arc: float((skin.vertices + OPENING * skin.shapes["jawOpen"])[arc, 1].mean())
+    )
+    return upper, lower
+
+
+def _ring_step(skin: Skin, lips: LipLine, ring: NDArray[np.int64]) -> Floats:
+    """(N, 3) displacement by which each point of the ring meets the one opposite, with the lip around it."""
+    upper, lower = ring_arcs(skin, ring)
+    moved = np.zeros_like(skin.vertices)
+    low, high = np.array(MOUTH_BOX).T
+    near = np.flatnonzero(np.all((skin.base > low) & (skin.base < high), axis=1))
+    for arc, other, sign in ((upper, lower, -1.0), (lower, upper, 1.0)):
+        place, across = skin.vertices[arc], skin.base[other, 0]
+        opposite = np.stack([np.interp(skin.base[arc, 0], across, skin.vertices[other, k]) for k in (1, 2)], axis=1)
+        half = (opposite - place[:, 1:]) / 2
+        half[:, 0] += sign * RING_PRESS_MM / 2
+        half[[0, -1]] = 0.0
+        own = near[(sign * lips.lower[near] > 0) | np.isin(near, arc)]
+        distance = np.linalg.norm(skin.vertices[own][:, None] - place[None], axis=2)
+        weights = np.exp(-((distance / RING_SPREAD_MM) ** 2)) + 1e-12
+        reach = np.exp(-((distance.min(axis=1) / REACH_MM) ** 2)) * np.clip(sign * lips.lower[own], 0, 1)
+        reach[np.isin(own, arc)] = 1.0
+        moved[own, 1:] += reach[:, None] * (weights @ half) / weights.sum(axis=1)[:, None]
+    return moved
 
 
 def lip_gaps(skin: Skin, lips: LipLine) -> tuple[Floats, Floats, Floats]:

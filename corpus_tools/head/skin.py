@@ -12,7 +12,6 @@ from corpus_tools.head.subdivide import catmull_clark
 Floats = NDArray[np.float64]
 
 LOWEST, WIDEST = 4.1, 3.2  # of the bust, in units of the source
-NECK_LOWEST = 5.1
 NECK_Y, NECK_SLOPE = 5.80, -0.272  # the head ends below this plane, under the shirt's collar
 HEAD_WIDEST = 1.2  # half the width of head and neck; arms are further out
 SHOULDER_Y = 6.35  # the bust ends above this

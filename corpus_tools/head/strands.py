@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.ndimage import gaussian_filter, zoom
+from scipy.ndimage import gaussian_filter, minimum_filter, zoom
 from scipy.sparse.csgraph import connected_components
 
 from tts2face.colour import decode_srgb
@@ -21,6 +21,8 @@ BROAD_PX, BROAD_STEPS = 2.2, 60
 FINE_GAIN, BROAD_GAIN, ALPHA_GAIN = 0.20, 0.165, 0.22
 MEAN_RELIEF = 128.0
 N_SMOOTHINGS = 3
+OUTLINE_PX, SOLID_COVER = 5, 0.9  # width of a card's outline in its picture, and coverage inside
+OUTLINE_LIGHT, OUTLINE_WEIGHT = 1.0, 0.02  # brightness of outlines relative to the hair beside, and share of direction
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,13 +40,16 @@ class StrandStyle:
     """How the strands of a texture are found.
 
     ``blur_px`` smooths the direction, ``upright`` favours strands that run along v, ``matte`` clears the dark ground
-    of a texture whose coverage is too large, ``contrast`` is that of the relief of the source.
+    of a texture whose coverage is too large, ``contrast`` is that of the relief of the source. ``shade_px`` is the
+    least length along v of lighter and darker areas that are removed, ``broad`` the contrast of broad strands.
     """
 
     blur_px: float = 6.0
     upright: float = 0.0
     matte: bool = False
     contrast: float = 0.8
+    shade_px: float = SHADE_PX
+    broad: float = BROAD_GAIN
 
 
 def strand_coverage(picture: NDArray[np.uint8], style: StrandStyle) -> Floats:
@@ -57,21 +62,41 @@ def strand_coverage(picture: NDArray[np.uint8], style: StrandStyle) -> Floats:
 
 
 def strand_angles(picture: NDArray[np.uint8], cover: Floats, style: StrandStyle) -> Floats:
-    """(H, W) direction of the strands in the texture, radians from +u towards +v (down), by the structure tensor."""
+    """(H, W) direction of the strands in the texture, radians from +u towards +v (down), by the structure tensor.
+
+    Only texels inside the cards count: the outline of a card is no strand.
+    """
+    inside = solid_share(cover)
     light = np.sqrt(picture[:, :, :3] / 255.0) @ np.array([0.3, 0.6, 0.1]) * cover + 0.5 * cover
     down, across = np.gradient(gaussian_filter(light, 0.8))
-    xx, xy, yy = (gaussian_filter(part, style.blur_px) for part in (across * across, across * down, down * down))
+    weight = inside + OUTLINE_WEIGHT
+    xx, xy, yy = (
+        gaussian_filter(weight * part, style.blur_px) for part in (across * across, across * down, down * down)
+    )
     xx = xx + style.upright * np.mean(xx + yy)
     angles: Floats = 0.5 * np.arctan2(2 * xy, xx - yy) + np.pi / 2
     return angles
 
 
-def flat_relief(picture: NDArray[np.uint8], cover: Floats, contrast: float) -> Floats:
-    """(H, W) luminance over that of the neighbourhood, so that painted highlights vanish; about 1."""
+def solid_share(cover: Floats) -> Floats:
+    """(H, W) 1 for texels with covered ones all around, else 0."""
+    return np.asarray(minimum_filter(cover, OUTLINE_PX) > SOLID_COVER, np.float64)
+
+
+def flat_relief(picture: NDArray[np.uint8], cover: Floats, style: StrandStyle) -> Floats:
+    """(H, W) luminance over that of the neighbourhood, so that painted highlights vanish; about 1.
+
+    Outlines, which the pictures' ground brightens, are no lighter than the hair beside them.
+    """
     light = decode_srgb(picture[:, :, :3] / 255.0) @ LUMINANCE
+    inside = solid_share(cover)
+    near = gaussian_filter(inside, OUTLINE_PX)
+    beside = gaussian_filter(light * inside, OUTLINE_PX) / np.maximum(near, 1e-6)
+    light = np.where((inside < 1) & (near > 1e-3), np.minimum(light, OUTLINE_LIGHT * beside), light)
     weight = np.maximum(cover, 1e-3)
-    around = gaussian_filter(light * weight, SHADE_PX) / gaussian_filter(weight, SHADE_PX)
-    relief: Floats = np.clip(light / np.maximum(around, 1e-4), 0.05, 3.0) ** contrast
+    shade_px = (style.shade_px, SHADE_PX)
+    around = gaussian_filter(light * weight, shade_px) / gaussian_filter(weight, shade_px)
+    relief: Floats = np.clip(light / np.maximum(around, 1e-4), 0.05, 3.0) ** style.contrast
     return relief
 
 
@@ -88,8 +113,8 @@ def bake_strands(
     fine -= gaussian_filter(fine, 12.0)
     fine /= fine.std()
     broad = streaks(wide_angles, BROAD_PX, BROAD_STEPS, generator)
-    relief = zoom(flat_relief(picture, cover, style.contrast), gain, order=1)
-    relief *= np.clip(1 + FINE_GAIN * fine + BROAD_GAIN * broad / broad.std(), 0.25, 2.2)
+    relief = zoom(flat_relief(picture, cover, style), gain, order=1)
+    relief *= np.clip(1 + FINE_GAIN * fine + style.broad * broad / broad.std(), 0.25, 2.2)
     alpha = np.clip(zoom(cover, gain, order=1), 0, 1)
     relief /= (relief * alpha).sum() / alpha.sum()
     has_edge = (alpha > 0.02) & (alpha < 0.97)

@@ -36,13 +36,13 @@ class Arch:
     depths: Floats
 
 
-# Sizes after Wheeler, Dental Anatomy. The incisors stand 3.5 mm (upper) and 6.5 mm (lower) behind the line between the
-# lips; from there the curves run to the molars of MakeHuman's strip.
+# Sizes after Wheeler, Dental Anatomy. The incisors touch the inner side of the lips, 2.5 mm (upper) and 6 mm (lower)
+# behind the line between them, the canines and premolars that of the cheeks; the molars are those of MakeHuman's strip.
 UPPER_CURVE = np.array(
-    [(0, 25.4), (8.4, 23.9), (15.4, 18.9), (20.2, 12.0), (23.6, 4.0), (26.4, -5.0), (28.4, -16.0)]
+    [(0, 26.6), (8.6, 25.2), (16.2, 20.4), (21.6, 13.4), (24.9, 5.0), (27.0, -5.0), (28.6, -16.0)]
 )  # fmt: skip
 LOWER_CURVE = np.array(
-    [(0, 22.3), (7.4, 21.0), (14.0, 16.4), (18.9, 9.8), (22.6, 1.8), (25.9, -7.0), (28.1, -18.0)]
+    [(0, 23.2), (7.6, 21.9), (14.7, 17.3), (19.9, 10.6), (23.3, 2.5), (26.3, -7.0), (28.1, -18.0)]
 )  # fmt: skip
 UPPER = Arch(
     UPPER_CURVE, -0.636 * SCALE, 1.0,
@@ -53,14 +53,18 @@ UPPER = Arch(
 LOWER = Arch(
     LOWER_CURVE, -0.632 * SCALE, -1.0,
     np.array([5.6, 6.1, 7.0, 7.0, 7.1, 10.4]),
-    np.array([9.0, 9.2, 10.0, 8.6, 8.0, 7.4]),
+    np.array([7.8, 8.0, 9.0, 8.2, 7.8, 7.4]),
     np.array([4.6, 4.8, 6.0, 7.2, 8.0, 9.4]),
 )  # fmt: skip
 SHADE = np.array([1.0, 1.0, 0.95, 0.84, 0.70, 0.56])  # brightness of the crowns; cheeks shade the back ones
-TOOTH, TOOTH_DARK = np.array([0.955, 0.93, 0.875]), np.array([0.88, 0.82, 0.72])
+TOOTH, TOOTH_DARK = np.array([0.92, 0.895, 0.84]), np.array([0.86, 0.80, 0.71])
 GUM = np.array([0.68, 0.36, 0.36])
 BACK_Z, FRONT_Z, MOST_SHIFT_MM = -16.0, 14.0, 5.0  # molars stay; front teeth follow the lips
-COVER_MM = 2.2  # of skin in front of teeth and gums at rest
+COVER_MM = {"upper": 2.2, "lower": 3.8}  # of skin in front of teeth and gums at rest; a smile draws the lower lip back
+UPPER_PLATE_MM, LOWER_PLATE_MM = (
+    0.5,
+    -2.2,
+)  # of the gums near the roots, outwards: the chin's fold lies before the lower
 N_AROUND, LEVELS = 12, np.array([0.0, 0.04, 0.13, 0.45, 1.0])
 MATERIALS = {
     "teeth": {"specular": 0.5, "shininess": 60.0, "wrap": 0.3},
@@ -114,13 +118,13 @@ def follow_lips(points: Floats, default: Floats, ahead: float) -> Floats:
     return moved
 
 
-def keep_behind(points: Floats, skin: Floats) -> Floats:
-    """Points (N, 3) at least `COVER_MM` behind the foremost of the skin's vertices (S, 3) nearby, in front view."""
+def keep_behind(points: Floats, skin: Floats, cover: float) -> Floats:
+    """Points (N, 3) at least `cover` mm behind the foremost of the skin's vertices (S, 3) nearby, in front view."""
     from scipy.spatial import cKDTree
 
     near = cKDTree(skin[:, :2]).query(points[:, :2], 8)[1]
     moved = points.copy()
-    moved[:, 2] = np.minimum(points[:, 2], skin[near, 2].max(axis=1) - COVER_MM)
+    moved[:, 2] = np.minimum(points[:, 2], skin[near, 2].max(axis=1) - cover)
     return moved
 
 
@@ -206,8 +210,9 @@ def _gum(path: ArchPath, arch: Arch) -> Floats:
     depth = np.interp(np.abs(along), middles, arch.depths)
     line = height * (0.80 + 0.20 * np.abs(np.sin(np.pi * within)) ** 0.8)
     one = np.ones_like(line)
+    plate = UPPER_PLATE_MM if arch.up > 0 else LOWER_PLATE_MM
     ring = [  # height, outwards
-        (line, -0.5 * one), (line + 0.8, 0.45 * one), (height + 3.0, 0.5 * one), (height + 6.5, -1.8 * one),
+        (line, -0.5 * one), (line + 0.8, 0.45 * one), (height + 3.0, plate * one), (height + 6.5, (plate - 2.3) * one),
         (height + 7.0, -depth - 1), (height + 3.0, -depth - 2.5), (line + 0.8, -depth - 1.0), (line, -depth + 0.3),
     ]  # fmt: skip
     place, normal = path.at(along)

@@ -28,7 +28,7 @@ class HeadColours:
 
     skin: tuple[float, float, float] = (0.81, 0.615, 0.52)
     lips: tuple[float, float, float] = (0.695, 0.385, 0.36)
-    cavity: tuple[float, float, float] = (0.40, 0.16, 0.155)
+    cavity: tuple[float, float, float] = (0.66, 0.30, 0.29)
     brows: tuple[float, float, float] = BROW_COLOUR
     variation: float = 1.0
 
@@ -48,6 +48,7 @@ TINTS = (
 FOLD = np.array([(16, -43), (22, -52), (27, -61), (29, -69)])  # from the nose to beside the mouth: |x|, y in mm
 N_FRECKLES = 240
 UPPER_LINE, LOWER_LINE, LINE_MM = 0.72, 0.30, 1.15  # dark roots of the lashes at the lids: strengths, half width
+INNER_LIP_Z, THROAT_Z, THROAT_DARKER = (20.0, 28.0), (-12.0, 25.0), 0.5  # z in mm of the default head
 LINE_TINT = np.array([0.90, 1.0, 1.0])
 
 
@@ -62,7 +63,7 @@ def paint_texture(
     lips = _sample_mask(gaussian_filter(source.mask("lips"), 2.5), where)
     colour += _lip_share(lips)[:, None] * (_lip_colour(place, palette, generator) - colour)
     inside = np.maximum(_sample_mask(gaussian_filter(source.mask("inside-mouth"), 2.0), where), _in_mouth(where))
-    colour += smoothstep(inside, 0.15, 0.95)[:, None] * (np.array(palette.cavity) - colour)
+    colour += smoothstep(inside, 0.15, 0.95)[:, None] * (_cavity_colour(place, palette) - colour)
     for edge in lids:
         colour *= 1 - UPPER_LINE * _beside(place, skin.vertices[edge.upper])[:, None] * LINE_TINT
         colour *= 1 - LOWER_LINE * _beside(place, skin.vertices[edge.lower])[:, None] * LINE_TINT
@@ -118,6 +119,13 @@ def _lip_colour(place: Floats, palette: HeadColours, generator: np.random.Genera
     lines = value_noise(place * np.array([1.0, 0.22, 0.3]), 0.9, generator)  # fine creases from edge to edge
     colour = np.tile(np.array(palette.lips), (len(place), 1))
     return colour * (1 + palette.variation * (0.035 * lines + 0.03 * value_noise(place, 4.0, generator))[:, None])
+
+
+def _cavity_colour(place: Floats, palette: HeadColours) -> Floats:
+    """Colour of the lips at their inner edge, that of the cavity at the cheeks, darker towards the throat."""
+    inner = np.array(palette.cavity) * (1 - THROAT_DARKER * smoothstep(-place[:, 2], *THROAT_Z))[:, None]
+    near = smoothstep(place[:, 2], *INNER_LIP_Z)[:, None]
+    return inner + near * (np.array(palette.lips) - inner)
 
 
 def _beside(place: Floats, line: Floats) -> Floats:

@@ -18,11 +18,11 @@ FORWARD_MM, RAISED_MM = 4.0, 0.8  # displacement of the tip: it rests behind the
 FLATTENING = 0.72  # of the body, whose back otherwise hides the upper teeth
 GROOVE_MM, GROOVE_WIDTH_MM = 0.8, 2.4
 OUT_RISE_MM = 2.2  # the tip that is put out passes over the lower incisors
-UP_MM, UP_FREE_MM = 12.5, 26.0  # rise of the tip to the alveolar ridge with a jawOpen of about 0.25
+UP_MM, UP_FREE_MM = 11.0, 26.0  # rise of the tip to the alveolar ridge with a jawOpen of about 0.25
 COLOUR, ROOT_COLOUR, TIP_COLOUR = (
-    np.array([0.73, 0.37, 0.37]),
-    np.array([0.40, 0.13, 0.14]),
-    np.array([0.78, 0.43, 0.42]),
+    np.array([0.70, 0.34, 0.34]),
+    np.array([0.56, 0.22, 0.22]),
+    np.array([0.74, 0.39, 0.38]),
 )
 MATERIAL = {"specular": 0.35, "shininess": 30.0, "wrap": 0.3}
 
@@ -36,7 +36,7 @@ def tongue_piece(cage: Cage, jaw: Jaw) -> Piece:
     out = matrix @ cage.units["tongueOut"][used]
     out[:, 1] += OUT_RISE_MM * tip
     near = smoothstep(points[:, 2], points[:, 2].max() - UP_FREE_MM, points[:, 2].max())
-    up = near[:, None] ** 1.4 * np.array([0.0, UP_MM, 1.5])
+    up = near[:, None] ** 1.4 * np.array([0.0, UP_MM, 3.0])
     depth = np.clip((points[:, 2].max() - points[:, 2]) / 45.0, 0, 1)[:, None]
     colour = COLOUR + (ROOT_COLOUR - COLOUR) * depth
     colour += (tip**2)[:, None] * (TIP_COLOUR - colour)

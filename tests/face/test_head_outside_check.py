@@ -60,3 +60,15 @@ def test_the_resting_mouth_is_closed_and_the_eyes_are_open(scores):
     assert rest["jawOpen"] < 0.1
     assert rest["eyeBlinkLeft"] < 0.4
     assert rest["eyeBlinkRight"] < 0.4
+
+
+def test_the_default_head_neither_smiles_nor_frowns_at_rest(networks):
+    tracker, reader = networks
+    face = load_face("head")
+    at_rest = np.zeros(len(face.shape_names), np.float32)
+    views = [mesh_renderer(face, Picture(size="640x640", camera=f"{yaw},3")).draw(at_rest) for yaw in (-8, 0, 8)]
+    read = np.mean([reader.blendshape_scores(tracker.read(view)[0]) for view in views], axis=0)
+    found = dict(zip(BLENDSHAPES, read.tolist(), strict=True))
+    for side in ("Left", "Right"):
+        assert found[f"mouthSmile{side}"] <= 0.08
+        assert found[f"mouthFrown{side}"] <= 0.05
