@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from tts2face.speech.text_fit import TextMismatch
     from tts2face.synthesis.clip_stream import Piece
     from tts2face.synthesis.prepared_request import PreparedRequest
+    from tts2face.voice.pool import VoicePool
 
 EXPLANATION_SUFFIXES = (".json", ".txt")
 
@@ -52,9 +53,15 @@ def run_request(request: Request, picture: Picture, options: SpeakOptions) -> No
     """Write, explain or show a clip."""
     _check_options(request, picture, options)
     from tts2face.synthesis.prepared_request import prepare
+    from tts2face.synthesis.voice_preload import preload_voice
+    from tts2face.voice.pool import VoicePool
 
     prepared = prepare(request)  # a wrong request is refused before anything is loaded
-    session = _open_session(options)
+    voices = VoicePool()
+    preload_voice(
+        voices, prepared.request
+    )  # its models load beside the imports of the session, the talker and the face
+    session = _open_session(options, voices)
     explanations: list[PhoneExplanation] = []
 
     def collect(piece: "Piece") -> None:
@@ -155,13 +162,13 @@ def _warn_mismatches(mismatches: "Sequence[TextMismatch]") -> None:
         write_message(f"tts2face: warning: {mismatch.sentence}")
 
 
-def _open_session(options: SpeakOptions) -> "Session":
+def _open_session(options: SpeakOptions, voices: "VoicePool") -> "Session":
     from tts2face.render.output_path import check_output
     from tts2face.synthesis.warm_up import compile_kernels, kernels_are_compiled
 
     if options.out is not None:
         check_output(options.out)
-    session = options.models.open_session()
+    session = options.models.open_session(voices)
     if not kernels_are_compiled():
         if not options.quiet:
             write_message("first run on this machine: compiling kernels (about ten seconds, once)")

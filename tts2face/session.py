@@ -310,7 +310,7 @@ class Session:
         on_piece: Callable[[Piece], None] | None,
     ) -> WrittenClip:
         has_gestures = prepared.request.has_gestures
-        self._models.preload_voice(prepared)
+        self._models.preload_voice(prepared.request)
         renderer = None if outputs.out is None else self.renderer(picture, has_gestures=has_gestures)
         progress = RequestSteps(prepared.n_steps, on_progress)
         with outputs.open(self._models.face(has_gestures=has_gestures), renderer, progress.report_frames) as files:

@@ -70,6 +70,6 @@ def test_a_cache_that_is_older_than_its_source_is_compiled_once_only(monkeypatch
     os.utime(index, (0, 0))  # numba still uses it if the source has the same content as before
     monkeypatch.setattr(raster, "draw_band", SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path))))
     monkeypatch.setattr(warm_up, "draw", lambda *arguments, **options: None)
-    monkeypatch.setattr(warm_up, "COMPILE_MOTION_CODE", "")
+    monkeypatch.setattr(warm_up, "COMPILE_CHILD_CODE", "")
     warm_up.compile_kernels()
     assert kernels_are_compiled()

@@ -49,9 +49,7 @@ def find_edges(centres: tuple[Any, Any], n_layers: int, part_of: Array, mm: floa
                     upper[x] |= bends
                     lower[x] |= bends
                 for x in range(1, width - 1):
-                    bent[x] = (
-                        abs(value[x - 1] - value[x] - value[x] + value[x + 1]) > value[x] * value[x] * depth_step
-                    )
+                    bent[x] = abs(value[x - 1] - value[x] - value[x] + value[x + 1]) > value[x] * value[x] * depth_step
                 for x in range(1, width - 1):
                     own[x] |= bent[x - 1] | bent[x] | bent[x + 1]
                 own[0] |= bent[1]

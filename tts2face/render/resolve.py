@@ -14,7 +14,7 @@ Array = NDArray[Any]
 
 
 @inlined_kernel
-def write_pixel(light: tuple[Any, Any, Any], cover: float, tables: tuple[Any, Any], picture: Array, at: Any) -> None:
+def write_pixel(light: tuple[Any, Any, Any], cover: Any, tables: tuple[Any, Any], picture: Array, at: Any) -> None:
     """Composite light and coverage over a pixel (y, x); a picture of four channels stores the coverage."""
     linear, encoded = tables
     y, x = at

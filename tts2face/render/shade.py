@@ -137,7 +137,7 @@ def kept_hue(red: float, green: float, blue: float) -> Any:
 
     The curve of the strongest channel scales all of them where it is dark; bright light fades to white by channel.
     """
-    strongest = max(max(red, green), max(blue, np.float32(1e-6)))
+    strongest: Any = max(red, green, blue, np.float32(1e-6))
     display = tone_curve(strongest)
     share = KEPT_HUE * (np.float32(1) - display)
     return share, share * display / strongest

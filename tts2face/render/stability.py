@@ -31,11 +31,8 @@ def part_masks(scene: Scene, weights: NDArray[np.floating]) -> Masks:
     names = sorted(
         {part.name for part in face.parts if part.kind == "strands" or part.name.startswith(("lash", "brow"))}
     )
-    owner = _owners(scene, weights)
     masks = {name: _projected(scene, weights, face, name) for name in names}
-    part_of = np.append(scene.surface.part_of, -1)[
-        np.where(owner == NO_TRIANGLE, -1, np.where(owner < 0, ~owner, owner))
-    ]
+    part_of = np.append(scene.surface.part_of, -1)[visible_triangles(scene, weights)]
     is_skin = np.isin(part_of, [at for at, part in enumerate(face.parts) if part.name.startswith("skin")])
     edge = np.zeros((picture.height, picture.width), bool)
     for axis in (0, 1):
@@ -46,8 +43,8 @@ def part_masks(scene: Scene, weights: NDArray[np.floating]) -> Masks:
     return masks | {"edges of skin": edge}
 
 
-def _owners(scene: Scene, weights: NDArray[np.floating]) -> NDArray[np.int32]:
-    """Visible triangle of each pixel (H, W)."""
+def visible_triangles(scene: Scene, weights: NDArray[np.floating]) -> NDArray[np.int32]:
+    """Visible triangle (H, W) at the centre of each pixel, front or back; -1 without."""
     picture, side = scene.picture, scene.picture.samples_per_side
     size = (picture.width * side, picture.height * side)
     buffers = allocate_buffers(scene.surface, size, 1)
@@ -57,7 +54,9 @@ def _owners(scene: Scene, weights: NDArray[np.floating]) -> NDArray[np.int32]:
     for first in range(0, size[1], buffers.band_rows):
         draw_samples(scene.surface, scene.optics.lens, members, first, buffers)
         bands.append(buffers.owner[0].copy())
-    return np.concatenate(bands)[: size[1]][side // 2 :: side, side // 2 :: side]
+    owner = np.concatenate(bands)[: size[1]][side // 2 :: side, side // 2 :: side]
+    triangles: NDArray[np.int32] = np.where(owner == NO_TRIANGLE, -1, np.where(owner < 0, ~owner, owner))
+    return triangles
 
 
 def _projected(scene: Scene, weights: NDArray[np.floating], face: Face, name: str) -> NDArray[np.bool_]:

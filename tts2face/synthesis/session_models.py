@@ -3,7 +3,6 @@
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -25,6 +24,7 @@ from tts2face.synthesis.gesture_layer import GestureLayer
 from tts2face.synthesis.mesh_face import mesh_face
 from tts2face.synthesis.own_appearance_face import own_appearance_face
 from tts2face.synthesis.prepared_request import PreparedRequest
+from tts2face.synthesis.voice_preload import preload_voice
 from tts2face.voice.engine import Voice
 from tts2face.voice.pool import VoicePool
 
@@ -90,7 +90,6 @@ class SessionModels:
         self._cache: dict[Hashable, Any] = {}
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
         self._voices = voices or VoicePool()
-        self._voice_loading: Future[Voice] | None = None
         self.speech_face: AnimatedFace = self._prepare_face(None)
 
     @property
@@ -145,23 +144,15 @@ class SessionModels:
         dictionary = read_dictionary(request.dictionary).entries if request.dictionary else {}
 
         def load_voice(name: str | None, language: str) -> Voice:
-            if self._voice_loading is not None:
-                wait([self._voice_loading])  # an error of it is raised by the next line
             return self._voices.voice(name, language, dictionary, keeps_utterances=keeps_utterances)
 
         face = self.face(has_gestures=request.has_gestures)
         face.check_articulation(request.articulation_factor)
         return SynthesisModels(self.talker, self._exemplars, face, load_voice, self._voices.give_way)
 
-    def preload_voice(self, prepared: PreparedRequest) -> None:
+    def preload_voice(self, request: Request) -> None:
         """Load the voice of a request's text in a thread, while the face is prepared."""
-        request = prepared.request
-        if request.audio or not request.text:
-            return
-        dictionary = read_dictionary(request.dictionary).entries if request.dictionary else {}
-        pool = ThreadPoolExecutor(1, "voice")
-        self._voice_loading = pool.submit(self._voices.voice, request.voice, request.language, dictionary)
-        pool.shutdown(wait=False)
+        preload_voice(self._voices, request)
 
     def pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
         """Synthesise the clip of a request piece by piece."""

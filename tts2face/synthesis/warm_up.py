@@ -1,7 +1,7 @@
 """Compilation of all kernels at the first run on a machine; later runs load them from the disk cache.
 
-Motion kernels are compiled in a child process while this process compiles the drawing kernels, because numba compiles
-one kernel at a time in each process.
+The kernels of strands and those of motion are compiled in child processes while this process compiles the other
+drawing kernels, because numba compiles one kernel at a time in each process.
 """
 
 import subprocess
@@ -13,18 +13,26 @@ import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.face_loading import load_face
+from tts2face.models.face_parts import keep_parts
 from tts2face.models.talker import Talker
 from tts2face.render import raster
+from tts2face.render.camera import camera_matrices
 from tts2face.render.draw import draw
+from tts2face.render.materials import STRANDS
 from tts2face.render.picture import Picture
+from tts2face.render.picture_kernels import allocate_buffers, arrange_cards, blend_strands
+from tts2face.render.strand_light import light_strands
+from tts2face.render.studio_light import FIRST_LIGHT_ROW, LAMPS
+from tts2face.render.surface import build_surface
 
-COMPILE_MOTION_CODE = """
+COMPILE_CHILD_CODE = """
 import os
 from tts2face.child_process import exit_after
 exit_after(lambda: os.read(0, 1))
-from tts2face.synthesis.warm_up import compile_motion
-compile_motion()
+from tts2face.synthesis import warm_up
+warm_up.{}()
 """
+CHILD_WORK = ("compile_motion", "compile_strands")
 COMPILE_TIMEOUT_S = 120.0
 
 
@@ -37,35 +45,53 @@ def kernels_are_compiled() -> bool:
 def compile_kernels() -> None:
     """Compile all kernels that a clip needs, and mark the disk cache as new.
 
-    If the child process fails, the motion kernels are compiled at their first use. numba keeps cached code whose source
+    If a child process fails, its kernels are compiled at their first use. numba keeps cached code whose source
     file was replaced by one of the same content, so that the age of the cache does not show by itself that it is valid.
     """
-    face = load_face("head")
-    child = subprocess.Popen(
-        [sys.executable, "-c", COMPILE_MOTION_CODE],
-        stdin=subprocess.PIPE,  # closes when this process ends, which ends the child
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+    face = keep_parts(load_face("head"), lambda part: part.kind != STRANDS)
+    children = [_start_child(work) for work in CHILD_WORK]
     try:
         draw(face, np.zeros(len(face.shape_names), np.float32), picture=Picture(size="64x64"))
-        child.wait(COMPILE_TIMEOUT_S)
+        for child in children:
+            child.wait(COMPILE_TIMEOUT_S)
     except subprocess.TimeoutExpired:
-        child.kill()
+        pass
     finally:
-        if child.poll() is None:
-            child.kill()
-        child.wait()
-        if child.stdin is not None:
-            child.stdin.close()
+        for child in children:
+            if child.poll() is None:
+                child.kill()
+            child.wait()
+            if child.stdin is not None:
+                child.stdin.close()
     for index in _cache_indexes():
         with suppress(OSError):  # a cache that this user may only read
             index.touch()
 
 
+def _start_child(work: str) -> "subprocess.Popen[bytes]":
+    return subprocess.Popen(
+        [sys.executable, "-c", COMPILE_CHILD_CODE.format(work)],
+        stdin=subprocess.PIPE,  # closes when this process ends, which ends the child
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
 def _cache_indexes() -> list[Path]:
     folder = Path(str(raster.draw_band.stats.cache_path))  # type: ignore[attr-defined]
     return list(folder.glob("raster.draw_band-*.nbi"))
+
+
+def compile_strands() -> None:
+    """Compile the kernels of hair, lashes and brows, a quarter of the drawing kernels' time, without the others."""
+    face, picture = load_face("head"), Picture(size="16x16")
+    surface, optics = build_surface(face), camera_matrices(picture.view, face, (16, 16))
+    buffers, cards = allocate_buffers(surface, (16, 16), picture.samples_per_side), surface.strands
+    lights = np.zeros((FIRST_LIGHT_ROW + len(LAMPS), 6), np.float32)
+    exposure, turn = np.zeros((len(face.vertices), 1 + len(LAMPS)), np.float32), np.eye(3, dtype=np.float32)
+    light = (exposure, lights, optics.lens)
+    light_strands(cards.vertices, cards.outward @ turn, cards.tangents @ turn, light, buffers.vertex, buffers.strands)
+    blend_strands(surface, arrange_cards(cards, buffers.strands), 0, lights, buffers)
 
 
 def compile_motion() -> None:

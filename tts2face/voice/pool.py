@@ -3,6 +3,7 @@
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -34,6 +35,7 @@ class VoicePool:
         self._lock = threading.Lock()
         self._unused: list[tuple[Hashable, Voice]] = []  # the newest at the end
         self._kept: OrderedDict[Hashable, Speech] = OrderedDict()
+        self._loading: dict[Hashable, Future[None]] = {}
 
     def voice(
         self, name: str | None, language: str, dictionary: PronunciationMap, *, keeps_utterances: bool = False
@@ -57,6 +59,18 @@ class VoicePool:
         with self.borrow(key, shared.load):  # an unknown voice is refused at once
             return shared
 
+    def preload(self, name: str | None, language: str, dictionary: PronunciationMap) -> None:
+        """Load a voice in a thread; `voice` waits for it. An error is raised by `voice`."""
+        key = (name, language, frozenset(dictionary.items()))
+        with self._lock:
+            if key in self._loading or any(kept == key for kept, _ in self._unused):
+                return
+            thread = ThreadPoolExecutor(1, "voice")
+            self._loading[key] = thread.submit(
+                lambda: self._put_back(key, load_voice(name, language, dictionary, self._aligner, self._native_run))
+            )
+            thread.shutdown(wait=False)
+
     def give_way(self) -> None:
         """Let other requests take their turn, between two steps of a synthesis."""
         if self._native_run is not None:
@@ -65,7 +79,11 @@ class VoicePool:
     @contextmanager
     def borrow(self, key: Hashable, load: Callable[[], Voice]) -> Iterator[Voice]:
         """A loaded voice for exclusive use within a ``with`` block."""
+        loading = self._loading.get(key)
+        if loading is not None:
+            wait([loading])
         with self._lock:
+            self._loading.pop(key, None)
             found = next((at for at, (kept, _) in enumerate(self._unused) if kept == key), None)
             voice = None if found is None else self._unused.pop(found)[1]
         voice = voice or load()
