@@ -22,7 +22,7 @@ STEP_SHARE = 0.5  # of each step: full steps oscillate, because scores are steep
 BLOCK = 256  # frames solved together, which bounds the memory
 GRID = np.linspace(0.0, 1.0, 51)  # weights at which a shape's own score is tabulated
 # Of the squared error of a logit, relative to a landmark of the cheek (1 / mm^2), in the order of `SCORE_SHAPES`.
-SCORE_WEIGHTS = np.array([3e6, 1e5, 1e6, 1e5, 1e6, 1e5, 1e5])
+SCORE_WEIGHTS = np.array([4e6, 1e5, 1e6, 1e5, 1e6, 1e5, 1e5])
 # Pull of a score's shapes to the weight that gives the score, as a share of the curvature along the shape.
 PRIOR_SHARES = np.array([0.1, 0.3, 0.1, 0.3, 1.0, 0.1, 0.3])
 # The prior weight of a score minimises its squared error over this one, plus the squared weight times a cost: a shape

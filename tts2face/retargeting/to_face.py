@@ -49,9 +49,9 @@ FULL_GAP_MM = 3.0  # gap beyond contact from which it is reproduced in full
 GAP_WEIGHT = 300.0  # of a lip gap, relative to a landmark of the cheek: contact is the most visible
 # With score rows, whose logits weigh as much: gaps, width and chin must hold against them.
 SCORED_GAP_WEIGHT = 50_000.0
-SCORED_GAP_GAIN = 1.1  # of target gaps: the ridge and the other rows make them smaller
+SCORED_GAP_GAIN = 1.08  # of target gaps: the ridge and the other rows make them smaller
 SCORED_DEPTH_WEIGHT = 3000.0  # of the depth between facing lip points
-SCORED_MOUTH = MouthWeights(width=200_000.0, chin=3000.0)
+SCORED_MOUTH = MouthWeights(width=400_000.0, chin=3000.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
