@@ -35,6 +35,7 @@ SIDEWAYS_SHARE = 1.0
 JAW = tuple(SCORE_SHAPES).index("jawOpen")
 # Of a lip gap where the lips touch, in addition to that of `curvature`; it falls to 0 at `FREE_GAP_MM`.
 CLOSED_GAP_WEIGHT, FREE_GAP_MM = 3e6, 3.0
+JAW_GAIN = 1.2  # of the jaw's target score, which the rows of landmarks and gaps miss on one side
 JAW_GAP_MM = 3.0  # lip gap from which the jaw follows its score in full; on closed lips the tracker sees no jaw
 # Scores between which the weight of a logit grows with its precision, s (1 - s): where a score hardly responds to the
 # shapes, as that of the jaw behind nearly closed lips, a logit of it would move them without limit.
@@ -91,6 +92,7 @@ class ScoreMatching:
             Distance of the person's mouth from rest in standard deviations of speech.
         """
         targets = self.face_scores(scores, distance)
+        targets[:, JAW] = np.minimum(JAW_GAIN * targets[:, JAW], SCORE_LIMITS[1])
         weights: FloatArray = np.zeros(linear.shape)
         for first in range(0, len(linear), BLOCK):
             block = slice(first, first + BLOCK)
