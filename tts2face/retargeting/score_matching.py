@@ -152,7 +152,7 @@ def build_score_matching(
     for score, names in enumerate(SCORE_SHAPES.values()):
         shapes = np.isin(response.inputs, names)
         owner[shapes] = score
-        own_scores.append(response.scores(GRID[:, None] * shapes)[:, score])
+        own_scores.append(np.clip(response.scores(GRID[:, None] * shapes)[:, score], *SCORE_LIMITS))
     along = np.diag(curvature)
     shares = np.where(np.isin(response.inputs, SIDEWAYS), SIDEWAYS_SHARE, OTHER_SHARE)
     prior = np.where(owner < 0, shares * np.median(along), PRIOR_SHARES[owner] * along)
