@@ -5,6 +5,7 @@ from pathlib import Path
 from corpus_tools.training.calibrate_face import calibrate_face
 from tts2face.models import face_file
 from tts2face.models.face_layout import SCORE_INPUTS
+from tts2face.models.face_loading import load_face
 from tts2face.models.score_map import SCORE_MAP_PREFIX, ScoreMap, score_map_arrays
 from tts2face.models.talker import load_talker
 from tts2face.storage.files import find_file
@@ -15,7 +16,7 @@ from tts2face.types import Progress
 def calibrate_face_file(
     face: str, out: Path, *, source: str = "grid_s1", model: Path | None = None, on_progress: Progress | None = None
 ) -> None:
-    """Write a face file with its score map, which replaces one that it has.
+    """Write a face file with its score map, which replaces one that it has; pictures show the face's own haircut.
 
     Parameters
     ----------
@@ -34,7 +35,7 @@ def calibrate_face_file(
         The face tracker or its models are missing, or the file cannot be written.
     """
     path = find_file(face, face_file.KIND)
-    calibrated = calibrate_face(face_file.read_face(path), load_talker(source), model=model, on_progress=on_progress)
+    calibrated = calibrate_face(load_face(str(path)), load_talker(source), model=model, on_progress=on_progress)
     if calibrated.scores is not None:
         _replace_score_map(path, out, calibrated.scores)
 

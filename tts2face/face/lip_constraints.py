@@ -4,7 +4,7 @@ Ju and Lee 2008, section 7, warn that an expression with an open mouth opens plo
 are target values of the least-squares problem that combines an expression with speech.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,7 @@ from tts2face.numeric import ordered_product, smoothstep
 FULL_EXPRESSION_GAP_MM = 4.0  # gap from which lips follow an expression in full; touching lips do not follow it
 MIN_GAP_SHARE = 0.5  # least share of the speech gap that an expression leaves open
 GAP_CONSTRAINT_WEIGHT = 1e5  # relative to a landmark of the cheek; 300 in retargeting, where gaps may deviate a little
-# Of changes of the weights, relative to the median curvature; without it, opposite shapes take turns near the corners.
-CHANGE_COST = 0.5
+CHANGE_COST = 0.5  # of changes of the weights in contacts, relative to the median curvature
 FULL_GROWTH_GAP_MM = 1.5  # gaps smaller than this are amplified by less than the gain
 GAP_TOLERANCE_MM = 0.01  # largest gap of closed lips
 FULL_ROUNDING_MM = 8.0  # a mouth this much narrower than at rest is fully rounded
@@ -44,7 +43,7 @@ class LipConstraints:
     moving : (k,)
         Indices of the shapes that speech moves.
     curvature : (k, k)
-        Normal matrix of the visible changes of the mouth without its gaps, and of the changes of weights.
+        Normal matrix of the visible changes of the mouth without its gaps.
     gaps : (P, K)
         Widening of the gap between facing inner lip points per weight, mm.
     width : (K,)
@@ -58,6 +57,11 @@ class LipConstraints:
     gaps: FloatArray
     width: FloatArray
     limits: FloatArray
+
+    def with_change_cost(self) -> "LipConstraints":
+        """The constraints with a cost of changes of the weights, so that opposite shapes do not act together."""
+        cost = CHANGE_COST * np.median(np.diag(self.curvature))
+        return replace(self, curvature=self.curvature + cost * np.eye(len(self.curvature)))
 
     def combine(self, speech: FloatArray, added: FloatArray) -> FloatArray:
         """Weights (T, K) of speech weights `speech` (T, K) with gesture weights `added` (T, K), lips constrained.
@@ -134,10 +138,9 @@ def build_lip_constraints(face: Face) -> LipConstraints:
     require_lips(face, moving)
     motion = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))
     common = [landmark for landmark in MOUTH_REGION if np.isfinite(motion[landmark]).all()]
-    curvature = mouth_curvature(motion[common][:, :, moving], common)
     return LipConstraints(
         moving=moving,
-        curvature=curvature + CHANGE_COST * np.median(np.diag(curvature)) * np.eye(len(moving)),
+        curvature=mouth_curvature(motion[common][:, :, moving], common),
         gaps=motion[list(INNER_LIP_UPPER), 1] - motion[list(INNER_LIP_LOWER), 1],
         width=motion[MOUTH_CORNER_LEFT, 0] - motion[MOUTH_CORNER_RIGHT, 0],
         limits=face.limits[moving].astype(np.float64),

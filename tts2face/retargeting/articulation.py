@@ -60,8 +60,8 @@ class Articulator:
 
     Parameters
     ----------
-    mouth
-        Lip gaps, mouth width and cost of a change.
+    mouth, contact
+        Lip gaps, mouth width and cost of a change; in contacts, changes of the weights cost as well.
     protrusion : (K,)
         Forward motion of the lips' outer edges per weight, mm.
     rest_width, rest_gaps : (), (P,)
@@ -76,6 +76,7 @@ class Articulator:
     """
 
     mouth: LipConstraints
+    contact: LipConstraints
     protrusion: FloatArray
     rest_width: float
     rest_gaps: FloatArray
@@ -105,7 +106,7 @@ class Articulator:
         pauses = pause_closure(phones, times)
         for _ in range(N_CLOSURE_ROUNDS):
             values = limit_speed(values, weights.fps)
-            values = close_lips(self.mouth, values, self.rest_gaps, bounds, pauses)
+            values = close_lips(self.contact, values, self.rest_gaps, bounds, pauses)
         gap = ordered_product(values, self.mouth.gaps[MIDDLE_PAIR])
         values = self.tongue.move(values, gap, tracks)
         tongue = np.setdiff1d(np.arange(values.shape[1]), self.mouth.moving)
@@ -188,6 +189,7 @@ def build_articulator(face: Face) -> Articulator:
         The face lacks landmarks of the lips, or has no shape that speech moves.
     """
     mouth = build_lip_constraints(face)
+    contact = mouth.with_change_cost()
     places = scatter_landmarks(face, landmark_positions(face))
     motion = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shape_names))))
     rest_width = float(np.linalg.norm(places[MOUTH_CORNER_LEFT] - places[MOUTH_CORNER_RIGHT]))
@@ -198,6 +200,7 @@ def build_articulator(face: Face) -> Articulator:
         tables["flared"] = ROUND_SHAPES
     return Articulator(
         mouth=mouth,
+        contact=contact,
         protrusion=(motion[OUTER_UPPER_MID, 2] + motion[OUTER_LOWER_MID, 2]) / 2,
         rest_width=rest_width,
         rest_gaps=np.clip(inner_lip_gaps(places), 0.0, LARGEST_REST_GAP_SHARE * rest_width),
@@ -205,5 +208,5 @@ def build_articulator(face: Face) -> Articulator:
             kind: np.array([table.get(name, 0.0) for name in face.shape_names]) for kind, table in tables.items()
         },
         tongue=build_tongue(face, edge, rest_width),
-        incisors=build_incisor_contact(face.shape_names, mouth, edge, places=places, motion=motion, width=rest_width),
+        incisors=build_incisor_contact(face.shape_names, contact, edge, places=places, motion=motion, width=rest_width),
     )

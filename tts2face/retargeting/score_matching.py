@@ -22,16 +22,20 @@ STEP_SHARE = 0.5  # of each step: full steps oscillate, because scores are steep
 BLOCK = 256  # frames solved together, which bounds the memory
 GRID = np.linspace(0.0, 1.0, 51)  # weights at which a shape's own score is tabulated
 # Of the squared error of a logit, relative to a landmark of the cheek (1 / mm^2), in the order of `SCORE_SHAPES`.
-SCORE_WEIGHTS = np.array([3e6, 1e5, 1e6, 1e5, 1e6, 1e5, 1e5])
+SCORE_WEIGHTS = np.array([5e6, 1e5, 1e6, 1e5, 3e6, 1e5, 1e5])
 # Pull of a score's shapes to the weight that gives the score, as a share of the curvature along the shape.
 PRIOR_SHARES = np.array([0.1, 0.3, 0.1, 0.3, 1.0, 0.1, 0.3])
 # The prior weight of a score minimises its squared error over this one, plus the squared weight times a cost: a shape
 # that hardly changes its score is not used for it.
 PRIOR_SCORE_ERROR, PRIOR_WEIGHT_COST = 0.05, 0.3
 OTHER_SHARE = 0.1  # pull of all other shapes to 0, as a share of the median curvature
+# Pull of the shapes that move the mouth sideways: two opposite ones would act together otherwise.
+SIDEWAYS = ("jawLeft", "jawRight", "mouthLeft", "mouthRight")
+SIDEWAYS_SHARE = 1.0
 JAW = tuple(SCORE_SHAPES).index("jawOpen")
 # Of a lip gap where the lips touch, in addition to that of `curvature`; it falls to 0 at `FREE_GAP_MM`.
-CLOSED_GAP_WEIGHT, FREE_GAP_MM = 1e6, 3.0
+CLOSED_GAP_WEIGHT, FREE_GAP_MM = 3e6, 3.0
+JAW_GAIN = 1.2  # of the jaw's target score, which the rows of landmarks and gaps miss on one side
 JAW_GAP_MM = 3.0  # lip gap from which the jaw follows its score in full; on closed lips the tracker sees no jaw
 # Scores between which the weight of a logit grows with its precision, s (1 - s): where a score hardly responds to the
 # shapes, as that of the jaw behind nearly closed lips, a logit of it would move them without limit.
@@ -88,6 +92,7 @@ class ScoreMatching:
             Distance of the person's mouth from rest in standard deviations of speech.
         """
         targets = self.face_scores(scores, distance)
+        targets[:, JAW] = np.minimum(JAW_GAIN * targets[:, JAW], SCORE_LIMITS[1])
         weights: FloatArray = np.zeros(linear.shape)
         for first in range(0, len(linear), BLOCK):
             block = slice(first, first + BLOCK)
@@ -147,9 +152,10 @@ def build_score_matching(
     for score, names in enumerate(SCORE_SHAPES.values()):
         shapes = np.isin(response.inputs, names)
         owner[shapes] = score
-        own_scores.append(response.scores(GRID[:, None] * shapes)[:, score])
+        own_scores.append(np.clip(response.scores(GRID[:, None] * shapes)[:, score], *SCORE_LIMITS))
     along = np.diag(curvature)
-    prior = np.where(owner < 0, OTHER_SHARE * np.median(along), PRIOR_SHARES[owner] * along)
+    shares = np.where(np.isin(response.inputs, SIDEWAYS), SIDEWAYS_SHARE, OTHER_SHARE)
+    prior = np.where(owner < 0, shares * np.median(along), PRIOR_SHARES[owner] * along)
     return ScoreMatching(response, curvature, limits, opened, owner, np.array(own_scores), prior, rest_scores)
 
 

@@ -48,10 +48,10 @@ MAX_CONTACT_MM = 1.5  # upper limit of the tracked gap of touching lips; larger 
 FULL_GAP_MM = 3.0  # gap beyond contact from which it is reproduced in full
 GAP_WEIGHT = 300.0  # of a lip gap, relative to a landmark of the cheek: contact is the most visible
 # With score rows, whose logits weigh as much: gaps, width and chin must hold against them.
-SCORED_GAP_WEIGHT = 50_000.0
-SCORED_GAP_GAIN = 1.1  # of target gaps: the ridge and the other rows make them smaller
+SCORED_GAP_WEIGHT = 70_000.0
+SCORED_GAP_GAIN = 1.06  # of target gaps: the ridge and the other rows make them smaller
 SCORED_DEPTH_WEIGHT = 3000.0  # of the depth between facing lip points
-SCORED_MOUTH = MouthWeights(width=200_000.0, chin=3000.0)
+SCORED_MOUTH = MouthWeights(width=800_000.0, chin=3000.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
