@@ -30,7 +30,8 @@ Floats = NDArray[np.float64]
 
 SKIN_MATERIAL = {"specular": 0.16, "shininess": 14.0, "wrap": 0.35, "texture": 0, "kind": "skin"}
 
-SMILE, SMILE_COVER_MM = {"mouthSmileLeft": 1.0, "mouthSmileRight": 1.0, "jawOpen": 0.3}, 1.6
+SMILE = {"mouthSmileLeft": 1.0, "mouthSmileRight": 1.0}
+COVERED_POSES = {"upper": (SMILE, 3.2), "lower": (SMILE | {"jawOpen": 0.3}, 1.6)}  # and mm of skin ahead of them there
 PIVOT = np.array([0.0, -75.0, -95.0])  # where the skull meets the neck
 ADULT = {
     "macrodetails/caucasian-female-young": 1.0,
@@ -119,16 +120,16 @@ def _teeth_pieces(cage: Cage, skin: Skin, reference: ReferenceHead, jaw: Jaw) ->
         piece = arch_piece(arch, name)
         points = fit_teeth(piece.vertices, reference.cage.vertices[strip], cage.vertices[strip])
         points = keep_behind(follow_lips(points, piece.vertices, ahead), skin.vertices, COVER_MM[name])
-        if name == "lower":
-            points = _cover_in_smile(points, skin, jaw)
+        pose, cover = COVERED_POSES[name]
+        points = _cover_in_pose(points, skin, jaw, pose, cover)
         moved = jaw.shapes(points) if name == "lower" else {}
         pieces.append(Piece(points, piece.spans, piece.colours, moved))
     return pieces[0], pieces[1]
 
 
-def _cover_in_smile(points: Floats, skin: Skin, jaw: Jaw) -> Floats:
-    """Lower teeth and gums (N, 3) that stay behind the skin when a smile draws it back over the open jaw."""
-    posed = skin.vertices + sum(weight * skin.shapes[name] for name, weight in SMILE.items())
-    opened = SMILE["jawOpen"] * jaw.shapes(points)["jawOpen"]
-    covered: Floats = keep_behind(points + opened, posed, SMILE_COVER_MM) - opened
+def _cover_in_pose(points: Floats, skin: Skin, jaw: Jaw, pose: Mapping[str, float], cover: float) -> Floats:
+    """Teeth and gums (N, 3) that stay `cover` mm behind the skin in a pose; the lower ones move with the jaw."""
+    posed = skin.vertices + sum(weight * skin.shapes[name] for name, weight in pose.items())
+    opened = pose.get("jawOpen", 0.0) * jaw.shapes(points)["jawOpen"]
+    covered: Floats = keep_behind(points + opened, posed, cover) - opened
     return covered

@@ -18,12 +18,14 @@ FORWARD_MM, RAISED_MM = 4.0, 0.8  # displacement of the tip: it rests behind the
 FLATTENING = 0.72  # of the body, whose back otherwise hides the upper teeth
 GROOVE_MM, GROOVE_WIDTH_MM = 0.8, 2.4
 OUT_RISE_MM = 2.2  # the tip that is put out passes over the lower incisors
-UP_MM, UP_FREE_MM = 11.0, 26.0  # rise of the tip to the alveolar ridge with a jawOpen of about 0.25
+UP_MM, UP_FREE_MM = 12.2, 15.0  # rise of the tip's upper side, to the ridge with a jawOpen of 0.25, and its length
 COLOUR, ROOT_COLOUR, TIP_COLOUR = (
     np.array([0.70, 0.34, 0.34]),
     np.array([0.56, 0.22, 0.22]),
     np.array([0.74, 0.39, 0.38]),
 )
+UNDERSIDE_LAG = 0.75  # of the rise that the lowest vertices lack: the underside of a raised tip faces forward
+UNDERSIDE_COLOUR = np.array([0.92, 0.52, 0.50])  # seen in the shade, when the tip is up
 MATERIAL = {"specular": 0.35, "shininess": 30.0, "wrap": 0.3}
 
 
@@ -36,10 +38,13 @@ def tongue_piece(cage: Cage, jaw: Jaw) -> Piece:
     out = matrix @ cage.units["tongueOut"][used]
     out[:, 1] += OUT_RISE_MM * tip
     near = smoothstep(points[:, 2], points[:, 2].max() - UP_FREE_MM, points[:, 2].max())
-    up = near[:, None] ** 1.4 * np.array([0.0, UP_MM, 3.0])
+    height = _height_in_tongue(points)
+    up = np.outer(near * (1 - UNDERSIDE_LAG * (1 - height) / 2), [0.0, UP_MM, 2.0])
     depth = np.clip((points[:, 2].max() - points[:, 2]) / 45.0, 0, 1)[:, None]
     colour = COLOUR + (ROOT_COLOUR - COLOUR) * depth
     colour += (tip**2)[:, None] * (TIP_COLOUR - colour)
+    below = smoothstep(-height, 0.0, 1.0) * tip
+    colour += below[:, None] * (UNDERSIDE_COLOUR - colour)
     groove = np.exp(-((points[:, 0] / GROOVE_WIDTH_MM) ** 2)) * (tip < 0.9)
     return Piece(
         points,
@@ -47,6 +52,15 @@ def tongue_piece(cage: Cage, jaw: Jaw) -> Piece:
         colour * (1 - 0.12 * groove[:, None]),
         {**jaw.shapes(points), "tongueOut": out, TONGUE_UP: up},
     )
+
+
+def _height_in_tongue(points: Floats) -> Floats:
+    """(N,) height of vertices above the middle of the tongue's cross-section, -1 lowest to 1 highest."""
+    bins = np.linspace(points[:, 2].min(), points[:, 2].max(), 40)
+    near = [points[np.abs(points[:, 2] - z) < 3.0, 1] for z in bins]
+    low, high = (np.interp(points[:, 2], bins, [pick(line) for line in near]) for pick in (np.min, np.max))
+    height: Floats = (2 * points[:, 1] - low - high) / np.maximum(high - low, 1e-9)
+    return height
 
 
 def shape_tip(source: Floats) -> tuple[Floats, Floats]:
