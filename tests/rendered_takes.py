@@ -86,6 +86,17 @@ def render_takes(folder: Path) -> None:
         csv.writer(file).writerows([("clip", "transcript", "speech_start_s", "speech_end_s"), *rows])
 
 
+def copy_takes(takes: Path, clips: tuple[str, ...], folder: Path) -> Path:
+    """Copy some of the takes to a folder in the layout of GRID."""
+    (folder / "clips").mkdir(parents=True, exist_ok=True)
+    for clip in clips:
+        shutil.copy(takes / "clips" / f"{clip}.mkv", folder / "clips")
+    lines = (takes / "manifest.csv").read_text().splitlines()
+    wanted = [line for line in lines if line.startswith(("clip,", *clips))]
+    (folder / "manifest.csv").write_text("\n".join(wanted) + "\n")
+    return folder
+
+
 def write_capture(folder: Path) -> None:
     """Write a Live Link Face capture of 52 ARKit weights and the head at 60 fps, and its sound, as a face speaks."""
     folder.mkdir(parents=True)

@@ -29,6 +29,13 @@ def smooth_gaussian(values: FloatArray, spread: float, reach: int) -> FloatArray
     return smooth
 
 
+def unit_vectors(vectors: NDArray[AnyFloat]) -> NDArray[AnyFloat]:
+    """Vectors (..., 3) of length one in the same directions; the zero vector stays zero."""
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    units: NDArray[AnyFloat] = vectors / np.maximum(lengths, np.finfo(vectors.dtype).tiny)
+    return units
+
+
 def nearest_rotation(matrix: NDArray[np.floating]) -> FloatArray:
     """The rotation (3, 3) nearest to a matrix (3, 3) in least squares; never a reflection (Kabsch 1976)."""
     left, _, right = np.linalg.svd(matrix)

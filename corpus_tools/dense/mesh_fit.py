@@ -7,18 +7,13 @@ from numpy.typing import NDArray
 
 from tts2face.face.rbf import Interpolant, fit_interpolant
 from tts2face.models.face import Eye, Face
-from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
+from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, LID_RINGS, N_MESH_LANDMARKS
 from tts2face.numeric import smoothstep
 from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
 
 OPEN_JAW_WEIGHT = 0.12  # weight of jawOpen at which the warp is fitted; with closed lips the mouth would tear
-# The edge of the lids, once around, from the outer corner; the person's right eye, then the left.
-LID_LANDMARKS = (
-    (33, 246, 161, 160, 159, 158, 157, 173, 133, 155, 154, 153, 145, 144, 163, 7),
-    (263, 466, 388, 387, 386, 385, 384, 398, 362, 382, 381, 380, 374, 373, 390, 249),
-)
 EYE_CORNERS = ((33, 133), (263, 362))
 EYE_SCALE_LIMITS = (0.92, 1.08)  # eyeballs of adults differ in size by less than this
 FULL_EYE_DISTANCE_MM, FREE_SKIN_DISTANCE_MM = (
@@ -118,7 +113,7 @@ def correct_lips_and_lids(rest: Floats, target: Floats) -> Floats:
     middle = (target[upper] + target[lower]) / 2
     half = (rest[upper] - rest[lower]) / 2
     placed[upper], placed[lower] = middle + half, middle - half
-    for lids in LID_LANDMARKS:
+    for lids in LID_RINGS:
         edge = list(lids)
         placed[edge, 2] = rest[edge, 2] + (target[edge, 2] - rest[edge, 2]).mean()
     return placed
@@ -137,7 +132,7 @@ def select_consistent_landmarks(rest: Floats, target: Floats) -> NDArray[np.bool
 def fit_eye_sockets(face: Face, rest: Floats, target: Floats) -> tuple[EyeSocket, ...]:
     """Eyeballs moved with the centres of their lids and scaled with the length of the eyes."""
     found = []
-    for eye, lids, (outer, inner) in zip(eyes_from_right(face), LID_LANDMARKS, EYE_CORNERS, strict=True):
+    for eye, lids, (outer, inner) in zip(eyes_from_right(face), LID_RINGS, EYE_CORNERS, strict=True):
         edge = list(lids)
         longer = np.linalg.norm(target[outer] - target[inner]) / np.linalg.norm(rest[outer] - rest[inner])
         scale = float(np.clip(longer, *EYE_SCALE_LIMITS))

@@ -13,7 +13,7 @@ from lexicon.errors import DataError
 from tts2face.face.rbf import DECAY_LENGTH, FACE_WIDTH, rbf_values
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
-from tts2face.numeric import smoothstep
+from tts2face.numeric import smoothstep, unit_vectors
 from tts2face.types import Progress
 from tts2face.video.media import read_frames
 from tts2face.video.pose import similarity_transforms
@@ -159,9 +159,3 @@ def vertex_normals(face: Face) -> Floats:
     for corner in range(3):
         np.add.at(total, place[face.triangles[:, corner]], across)
     return unit_vectors(total[place])
-
-
-def unit_vectors(vectors: Floats) -> Floats:
-    """Vectors (N, 3) of length 1."""
-    scaled: Floats = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
-    return scaled

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.mesh_fit import LID_LANDMARKS, OPEN_JAW_WEIGHT, face_landmarks
+from corpus_tools.dense.mesh_fit import OPEN_JAW_WEIGHT, face_landmarks
 from corpus_tools.dense.texels import ISLANDS_TOP, Texels, find_texels
 from lexicon.errors import DataError
 from tts2face.models.face import Face
-from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
+from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, LID_RINGS, N_MESH_LANDMARKS
 from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
@@ -79,7 +79,7 @@ def _front_share(face: Face, texels: Texels, opened: Floats) -> Floats:
     share[place[:, 2] < float(marks[list(FACE_OVAL), 2].min())] = 0.0
     share[_is_hidden(place)] = 0.0
     share *= smoothstep(-polygon_depth(place[:, :2], marks[list(INNER_LIPS), :2], LIP_MM[1] + 1), *LIP_MM)
-    for lids in LID_LANDMARKS:
+    for lids in LID_RINGS:
         share *= smoothstep(-polygon_depth(place[:, :2], marks[list(lids), :2], LID_MM[1] + 1), *LID_MM)
     return share
 

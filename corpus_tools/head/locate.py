@@ -22,7 +22,7 @@ from corpus_tools.head.skin import Skin, build_skin
 from corpus_tools.head.subdivide import triangulate
 from lexicon.errors import DataError
 from tts2face.models.face import Face
-from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LID_RINGS, N_MESH_LANDMARKS
 from tts2face.render.camera import camera_matrices
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import Picture
@@ -38,8 +38,6 @@ GRAZE_MM = (
     12.0,
 )  # a ray that passes the surface at up to 3 mm, at least 12 mm before its hit, hits it there
 LEAST_VIEWS = 6  # with reliable hits; with fewer the landmark lies on the outline of the face
-EYE_RIGHT = ((33, 246, 161, 160, 159, 158, 157, 173, 133), (33, 7, 163, 144, 145, 153, 154, 155, 133))
-EYE_LEFT = ((263, 466, 388, 387, 386, 385, 384, 398, 362), (263, 249, 390, 373, 374, 380, 381, 382, 362))
 EXPRESSIONS: tuple[dict[str, float], ...] = (
     {},
     {"jawOpen": 0.5},
@@ -63,9 +61,9 @@ def locate_landmarks(face: Face, skin: Skin, cage: Cage, tracker: FaceTracker) -
     places = np.einsum("pk,pkd->pd", weights, skin.base[triangles[number]])
     strips = EdgeRings(skin.quads, skin.base)
     _align_inner_lips(places, skin, strips)
-    for ball, lids in zip(fit_eyeballs(cage), (EYE_LEFT, EYE_RIGHT), strict=True):
+    for ball, lids in zip(fit_eyeballs(cage), LID_RINGS[::-1], strict=True):
         ring = find_narrowest_ring(strips, skin.vertices, ball.centre, EYE_REACH_MM, ball.radius)
-        for lid in {*lids[0], *lids[1]}:
+        for lid in lids:
             places[lid] = nearest_ring_point(skin, ring, on_face[lid])
     return dict(enumerate(symmetrise(places, mirrored)))
 

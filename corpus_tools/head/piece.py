@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.face import Eye, Face, Part, Texture
+from tts2face.numeric import unit_vectors
 
 Floats = NDArray[np.float64]
 
@@ -80,7 +81,7 @@ def assemble_face(
         if piece.uv is not None:
             uv[here] = piece.uv
         if piece.tangents is not None:
-            tangents[here] = piece.tangents / np.maximum(np.linalg.norm(piece.tangents, axis=1, keepdims=True), 1e-9)
+            tangents[here] = unit_vectors(piece.tangents)
     colours = np.concatenate([piece.colours for piece in built.pieces])
     return Face(
         vertices=stack_vertices(built).astype(np.float32),

@@ -9,6 +9,7 @@ from scipy.ndimage import gaussian_filter, zoom
 from scipy.sparse.csgraph import connected_components
 
 from tts2face.colour import decode_srgb
+from tts2face.numeric import unit_vectors
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -133,7 +134,7 @@ def strand_tangents(cards: Cards, angles: Floats) -> Floats:
     along_v = (two * first[:, :1] - one * second[:, :1]) / determinant
     texel = np.clip((uv[triangles].mean(axis=1) * [width, height]).astype(np.int64), 0, [width - 1, height - 1])
     angle = angles[texel[:, 1], texel[:, 0]][:, None]
-    flow = _unit(along_u * np.cos(angle) + along_v * np.sin(angle))
+    flow = unit_vectors(along_u * np.cos(angle) + along_v * np.sin(angle))
     flow *= np.where(flow[:, 1:2] > 0, -1.0, 1.0)
     tangents = np.zeros_like(vertices)
     for corner in triangles.T:
@@ -151,12 +152,7 @@ def strand_tangents(cards: Cards, angles: Floats) -> Floats:
 def _weld_mean(vectors: Floats, weld: Ints) -> Floats:
     total = np.zeros((int(weld.max()) + 1, 3))
     np.add.at(total, weld, vectors)
-    return _unit(total[weld])
-
-
-def _unit(vectors: Floats) -> Floats:
-    unit: Floats = vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9)
-    return unit
+    return unit_vectors(total[weld])
 
 
 def number_islands(n: int, triangles: Ints) -> Ints:

@@ -1,6 +1,5 @@
 """A made corpus with a known answer, and a small folder of takes."""
 
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import pytest
 
 from corpus_tools.recordings.observation import Observation, Quality
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tests.rendered_takes import copy_takes
 from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
 
 CLIPS = ("bbaf2n", "bbaf3s", "bbaf5a")
@@ -18,14 +18,7 @@ FPS = 25.0
 @pytest.fixture
 def few_takes(tmp_path: Path, takes: Path) -> Path:
     """Three takes in the layout of GRID."""
-    folder = tmp_path / "recordings"
-    (folder / "clips").mkdir(parents=True)
-    for clip in CLIPS:
-        shutil.copy(takes / "clips" / f"{clip}.mkv", folder / "clips")
-    lines = (takes / "manifest.csv").read_text().splitlines()
-    wanted = [line for line in lines if line.startswith(("clip,", *CLIPS))]
-    (folder / "manifest.csv").write_text("\n".join(wanted) + "\n")
-    return folder
+    return copy_takes(takes, CLIPS, tmp_path / "recordings")
 
 
 def made_observation(name: str, seed: int, n_frames: int = 60) -> Observation:

@@ -1,27 +1,19 @@
 """``tts2face report retarget`` on rendered takes: every kind of file, every refusal."""
 
 import json
-import shutil
 from pathlib import Path
 
 import pytest
 
 from cli.main import run
-from tests.rendered_takes import ONLY_RENDERED
+from tests.rendered_takes import ONLY_RENDERED, copy_takes
 
 CLIPS = ("bbaf2n", "bgim1n")
 
 
 @pytest.fixture(scope="module")
 def recordings(takes: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("recordings")
-    (folder / "clips").mkdir()
-    for clip in CLIPS:
-        shutil.copy(takes / "clips" / f"{clip}.mkv", folder / "clips")
-    lines = (takes / "manifest.csv").read_text().splitlines()
-    wanted = [line for line in lines if line.startswith(("clip,", *CLIPS))]
-    (folder / "manifest.csv").write_text("\n".join(wanted) + "\n")
-    return folder
+    return copy_takes(takes, CLIPS, tmp_path_factory.mktemp("recordings"))
 
 
 @ONLY_RENDERED

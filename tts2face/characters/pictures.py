@@ -14,6 +14,7 @@ from tts2face.models.landmarks import (
     FACE_OVAL,
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
+    LID_RINGS,
     OUTER_LIP_LOWER,
     OUTER_LIP_UPPER,
 )
@@ -22,13 +23,9 @@ from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import Picture
 from tts2face.types import Progress
 
-LID_LINES = (
-    (33, 246, 161, 160, 159, 158, 157, 173, 133, 155, 154, 153, 145, 144, 163, 7, 33),
-    (263, 466, 388, 387, 386, 385, 384, 398, 362, 382, 381, 380, 374, 373, 390, 249, 263),
-)
 # Lines through landmarks and their sRGB colours: lids, inner lips, outer lips, outline.
 LINES = (
-    *((line, (70, 190, 255)) for line in LID_LINES),
+    *(((*ring, ring[0]), (70, 190, 255)) for ring in LID_RINGS),
     (INNER_LIP_UPPER, (255, 70, 70)),
     (INNER_LIP_LOWER, (255, 200, 40)),
     (OUTER_LIP_UPPER, (255, 120, 200)),

@@ -22,6 +22,7 @@ from tts2face.models.face import Face
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
+    LID_RINGS,
     N_MESH_LANDMARKS,
     OUTER_LIP_LOWER,
     OUTER_LIP_UPPER,
@@ -37,10 +38,7 @@ SPEECH_GAINS = ("jaw", "lips")
 GAIN_NAMES = (*FEATURES, *SPEECH_GAINS)  # whose motion has a gain
 MAX_MODE_MM = 10.0  # largest displacement of a landmark by one mode: brows rise up to 10 mm
 # Landmarks that stay still while a region moves: rims of the lids, and lips, which have features of their own.
-LID_LANDMARKS = (
-    33, 246, 161, 160, 159, 158, 157, 173, 133, 155, 154, 153, 145, 144, 163, 7,
-    263, 466, 388, 387, 386, 385, 384, 398, 362, 382, 381, 380, 374, 373, 390, 249,
-)  # fmt: skip
+LID_LANDMARKS = (*LID_RINGS[0], *LID_RINGS[1])
 LIP_LANDMARKS = (*OUTER_LIP_UPPER, *OUTER_LIP_LOWER, *INNER_LIP_UPPER, *INNER_LIP_LOWER)
 # Landmarks added to a region for the fit of its size: corners of the eyes, root and base of the nose.
 FIT_LANDMARKS = (33, 133, 362, 263, 168, 6, 2)

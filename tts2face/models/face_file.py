@@ -11,14 +11,20 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Hairdo, Part, Texture
 from tts2face.models.face_layout import MAX_TEXTURES, SCORE_INPUTS, WIDE_OPEN, check_face, texture_number
+from tts2face.models.mesh_coding import decode_tangents, decode_uv, encode_tangents, encode_uv
 from tts2face.models.occlusion_coding import decode_occlusion, encode_occlusion
-from tts2face.models.picture_coding import decode_colours, decode_coverage, encode_colours, encode_coverage
+from tts2face.models.picture_coding import (
+    decode_colours,
+    decode_coverage,
+    encode_colours,
+    encode_coverage,
+    texture_tensors,
+)
 from tts2face.models.score_map import score_map_arrays, score_map_from_arrays
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 KIND = "face"
 FORMAT_VERSION = 1
-TANGENT_STEPS = 127.0
 STEPS_PER_SHAPE = 32000.0  # 16-bit steps of a shape's largest displacement: below 0.002 mm for 60 mm
 MAX_BRIGHTENED_LEVEL = 150  # upper limit of texels brightened by a tint: keeps skin colours at the edge of dark hair
 
@@ -59,13 +65,14 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
     }
     arrays |= _pack_shapes(face.shapes)
     if face.uv is not None and face.textures:
-        arrays["uv"] = np.rint(np.clip(face.uv, 0, 1) * 65535).astype(np.uint16)
+        arrays["uv"] = encode_uv(face.uv)
     for number, texture in enumerate(face.textures):
-        arrays[f"texture{number or ''}"] = encode_colours(texture.pixels)
+        pixels, alpha = texture_tensors(number)
+        arrays[pixels] = encode_colours(texture.pixels)
         if texture.alpha is not None:
-            arrays[f"alpha{number or ''}"] = encode_coverage(texture.alpha)
+            arrays[alpha] = encode_coverage(texture.alpha)
     if face.tangents is not None:
-        arrays["tangents"] = np.rint(face.tangents * TANGENT_STEPS).astype(np.int8)
+        arrays["tangents"] = encode_tangents(face.tangents)
     if face.occlusion is not None:
         arrays["occlusion"] = encode_occlusion(face.occlusion)
     presets = dict(identities or {})
@@ -179,7 +186,7 @@ def _read_occlusion(
 def _read_textures(arrays: Mapping[str, NDArray[Any]], path: Path) -> tuple[Texture, ...]:
     textures = []
     for number in range(MAX_TEXTURES):
-        name, coverage = f"texture{number or ''}", f"alpha{number or ''}"
+        name, coverage = texture_tensors(number)
         if name not in arrays:
             break
         pixels = decode_colours(arrays[name], path)
@@ -211,9 +218,9 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
         limits=arrays["limits"],
         eyes=tuple(eyes),
         colours=arrays["colours"],
-        uv=(arrays["uv"] / 65535).astype(np.float32) if "uv" in arrays else None,
+        uv=decode_uv(arrays["uv"]) if "uv" in arrays else None,
         textures=textures,
-        tangents=(arrays["tangents"] / TANGENT_STEPS).astype(np.float32) if "tangents" in arrays else None,
+        tangents=decode_tangents(arrays["tangents"]) if "tangents" in arrays else None,
         hairdo=None if hairdo is None else Hairdo(*hairdo),
         occlusion=_read_occlusion(arrays, header, path),
         landmarks=arrays["landmarks"],

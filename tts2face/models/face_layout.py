@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from tts2face.models.face import PART_KINDS
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.occlusion_coding import MAX_OCCLUSION_BYTES
+from tts2face.models.picture_coding import texture_tensors
 from tts2face.models.score_map import check_score_map
 from tts2face.storage.schema import (
     MAX_MM,
@@ -105,9 +106,9 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
     contents.tensors({f"identity{n}_step": Tensor("float32", (1,), 0.0, MAX_STEP_MM) for n in presets})
     contents.tensors(
         {
-            f"{kind}{at or ''}": Tensor("uint8", (f"bytes of {kind} {at}",), is_optional=True)
+            name: Tensor("uint8", (f"bytes of {name}",), is_optional=True)
             for at in range(MAX_TEXTURES)
-            for kind in ("texture", "alpha")
+            for name in texture_tensors(at)
         }
     )
     _check_scores(contents)
@@ -126,16 +127,16 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
 
 def _check_textures(contents: Contents) -> None:
     arrays = contents.arrays
-    n_textures = sum(f"texture{at or ''}" in arrays for at in range(MAX_TEXTURES))
+    n_textures = sum(texture_tensors(at)[0] in arrays for at in range(MAX_TEXTURES))
     contents.require(("uv" in arrays) == (n_textures > 0), "has only one of uv and texture")
     for at in range(MAX_TEXTURES):
-        has_texture, has_alpha = f"texture{at or ''}" in arrays, f"alpha{at or ''}" in arrays
+        has_texture, has_alpha = (name in arrays for name in texture_tensors(at))
         contents.require(has_texture == (at < n_textures), f"lacks the texture before texture{at}")
         contents.require(has_texture or not has_alpha, "has alpha, but no texture")
     for part in contents.header["parts"]:
         own = texture_number(part)
         contents.require(own < n_textures or own <= 0, f"the part {part['name']!r} has no texture {own}")
-        has_alpha = own >= 0 and f"alpha{own or ''}" in arrays
+        has_alpha = own >= 0 and texture_tensors(own)[1] in arrays
         contents.require(has_alpha or not part.get("cutout", False), "has a part with cutout, but no alpha")
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.hair import BALD, Hair
+from tts2face.models.mesh_coding import decode_tangents, decode_uv, encode_tangents, encode_uv
 from tts2face.models.occlusion_coding import MAX_OCCLUSION_BYTES, decode_occlusion, encode_occlusion
 from tts2face.models.picture_coding import decode_colours, decode_coverage, encode_colours, encode_coverage
 from tts2face.storage.files import SHIPPED_FOLDER, find_file
@@ -17,8 +18,6 @@ from tts2face.storage.tensors import read_tensors, write_tensors
 
 KIND = "hair"
 FORMAT_VERSION = 1
-UNIT_STEPS = 127.0
-UV_STEPS = 65535.0
 
 METADATA: Mapping[str, Check] = {"n_face_vertices": whole(1, 2**31 - 1), "metadata": free}
 OCCLUSION_BYTES = whole(0, MAX_OCCLUSION_BYTES)
@@ -43,8 +42,8 @@ def write_hair(path: Path, hair: Hair) -> None:
     arrays: dict[str, NDArray[Any]] = {
         "vertices": hair.vertices.astype(np.float32),
         "triangles": hair.triangles.astype(np.int32),
-        "uv": np.rint(np.clip(hair.uv, 0, 1) * UV_STEPS).astype(np.uint16),
-        "tangents": np.rint(hair.tangents * UNIT_STEPS).astype(np.int8),
+        "uv": encode_uv(hair.uv),
+        "tangents": encode_tangents(hair.tangents),
         "relief": encode_colours(hair.relief),
         "alpha": encode_coverage(hair.alpha),
         "anchors": hair.anchors.astype(np.int32),
@@ -79,8 +78,8 @@ def read_hair(path: Path) -> Hair:
     return Hair(
         vertices=arrays["vertices"],
         triangles=arrays["triangles"],
-        uv=(arrays["uv"] / np.float32(UV_STEPS)).astype(np.float32),
-        tangents=(arrays["tangents"] / np.float32(UNIT_STEPS)).astype(np.float32),
+        uv=decode_uv(arrays["uv"]),
+        tangents=decode_tangents(arrays["tangents"]),
         relief=relief,
         alpha=alpha,
         anchors=arrays["anchors"],

@@ -25,6 +25,12 @@ INNER_LIP_LOWER = (78, 95, 88, 178, 87, 14, 317, 402, 318, 324, 308)
 OUTER_LIP_UPPER = (61, 185, 40, 39, 37, 0, 267, 269, 270, 409, 291)
 OUTER_LIP_LOWER = (61, 146, 91, 181, 84, 17, 314, 405, 321, 375, 291)
 
+# Margins of the lids (upper, lower), each from the outer corner of the eye to the inner one.
+RIGHT_LIDS = ((33, 246, 161, 160, 159, 158, 157, 173, 133), (33, 7, 163, 144, 145, 153, 154, 155, 133))
+LEFT_LIDS = ((263, 466, 388, 387, 386, 385, 384, 398, 362), (263, 249, 390, 373, 374, 380, 381, 382, 362))
+# The same once around each eye from its outer corner, over the upper lid; the person's right eye, then the left.
+LID_RINGS = tuple((*upper, *lower[-2:0:-1]) for upper, lower in (RIGHT_LIDS, LEFT_LIDS))
+
 # Once around the face, from the top of the forehead over the person's left cheek and the chin.
 FACE_OVAL = (
     10, 338, 297, 332, 284, 251, 389, 356, 454, 323, 361, 288, 397, 365, 379, 378, 400, 377, 152, 148, 176, 149, 150,

@@ -13,6 +13,11 @@ JPEG_QUALITY = 92
 MAX_TEXTURE_SIDE_PX = 8192  # pixels per side: 200 MB when decoded
 
 
+def texture_tensors(number: int) -> tuple[str, str]:
+    """Names of the tensors that hold the colours and the alpha of a face's texture."""
+    return f"texture{number or ''}", f"alpha{number or ''}"
+
+
 def encode_colours(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """JPEG, as bytes (N,), of pixels (H, W, 3) or (H, W)."""
     return _encode(pixels, "JPEG", quality=JPEG_QUALITY, **({"subsampling": 0} if pixels.ndim == 3 else {}))

@@ -15,7 +15,7 @@ from tts2face.face.gesture_transfer import LID_LANDMARKS, LIP_LANDMARKS, NO_GAIN
 from tts2face.face.landmark_fit import axis_scales, landmark_positions, procrustes_rotation, scatter_landmarks
 from tts2face.face.shape_transfer import SCALE_LIMITS, SUPPORT, default_head
 from tts2face.models.appearance import Appearance
-from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LID_RINGS
 from tts2face.models.palette import EXPRESSIONS, REGION_FEATURES, Palette
 from tts2face.models.talker import ShapeModel, Talker, require_appearance
 from tts2face.numeric import ordered_product, smoothstep
@@ -193,7 +193,7 @@ def _lid_pixel_weights(appearance: Appearance) -> Float32Array:
     width = appearance.face.size[0]
     places = np.stack([appearance.face.pixels % width, appearance.face.pixels // width], axis=1)
     share = np.zeros(len(places))
-    for rim in (LID_LANDMARKS[:16], LID_LANDMARKS[16:]):
+    for rim in LID_RINGS:
         around = appearance.face.reference[list(rim)]
         size = float(around[:, 0].max() - around[:, 0].min())
         distance = np.linalg.norm(places - around.mean(axis=0), axis=1) / size

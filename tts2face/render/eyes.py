@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 from tts2face.compilation import kernel
 from tts2face.face.deformation import FaceRig, eye_rotations, head_transform
 from tts2face.models.face import Face
+from tts2face.models.landmarks import LEFT_LIDS, RIGHT_LIDS
 from tts2face.render.fragment_rows import AT_ALBEDO, AT_DIFFUSE, AT_EXPOSURE, AT_GLOW, AT_NORMAL, N_EXPOSURES
 
 Array = NDArray[Any]
 
-# Lid margins from the person's right to left, landmarks of `tts2face.models.landmarks`.
-RIGHT_UPPER, RIGHT_LOWER = (33, 246, 161, 160, 159, 158, 157, 173, 133), (33, 7, 163, 144, 145, 153, 154, 155, 133)
-LEFT_UPPER, LEFT_LOWER = (362, 398, 384, 385, 386, 387, 388, 466, 263), (362, 382, 381, 380, 374, 373, 390, 249, 263)
 N_LID = 9
 RADIUS_MM = 12.0  # radius of a human eyeball
 IRIS_COSINE = 0.868  # of the angle between gaze and limbus: an iris of 11.9 mm
@@ -75,7 +73,7 @@ def eye_geometry(face: Face, rig: FaceRig) -> EyeGeometry:
         ball = face.vertices[eye.first : eye.first + eye.count] - eye.centre
         length = np.linalg.norm(ball, axis=1)
         radius[number] = max(float(np.median(length)), 1e-3)
-        names = (RIGHT_UPPER, RIGHT_LOWER) if eye.centre[0] < 0 else (LEFT_UPPER, LEFT_LOWER)
+        names = RIGHT_LIDS if eye.centre[0] < 0 else [lid[::-1] for lid in LEFT_LIDS]  # towards the person's left
         if all(name in rows for lid in names for name in lid):
             lids[number] = [[rows[name] for name in lid] for lid in names]
         for part in face.parts:

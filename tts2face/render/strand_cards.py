@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.face import Face
+from tts2face.numeric import unit_vectors
 from tts2face.render.tone_tables import linear_light
 
 SKULL_CENTRE_MM = np.array([0.0, 20.0, -75.0])  # middle of the skull, from midway between the eyes
@@ -62,9 +63,9 @@ def find_strands(
         neighbours=card_neighbours(points, rows),
         texture=texture.astype(np.int32),
         gloss=gloss.astype(np.float32),
-        tangents=_unit(along),
+        tangents=unit_vectors(along).astype(np.float32),
         uv=np.array(uv, np.float32),
-        outward=_unit(outward),
+        outward=unit_vectors(outward).astype(np.float32),
         mean_light=means,
     )
 
@@ -95,9 +96,3 @@ def card_tangents(points: NDArray[np.floating], triangles: NDArray[np.int32], uv
     for k in range(3):
         np.add.at(tangents, triangles[:, k], along)
     return tangents
-
-
-def _unit(vectors: NDArray[np.floating]) -> NDArray[np.float32]:
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    unit: NDArray[np.float32] = (vectors / np.maximum(length, 1e-9)).astype(np.float32)
-    return unit
