@@ -103,7 +103,7 @@ def lip_triangles(face: Face) -> NDArray[np.int32]:
     near = np.linalg.norm(face.vertices - lip, axis=1) < 12
     near &= (np.abs(face.vertices[:, 0]) < 6) & (jaw > 0.4 * jaw.max())
     skin = face.triangles[face.parts[0].first : face.parts[0].first + face.parts[0].count]
-    return skin[near[skin].all(axis=1)]
+    return np.asarray(skin[near[skin].all(axis=1)], np.int32)
 
 
 def tooth_distance(face: Face, weights: NDArray[np.float32]) -> float:
