@@ -39,6 +39,7 @@ CARTOON_TARGETS = {
     "macrodetails/caucasian-female-young": 0.55, "macrodetails/caucasian-female-child": 0.45,
     "macrodetails/universal-female-young-averagemuscle-averageweight": 0.55,
     "macrodetails/universal-female-child-averagemuscle-averageweight": 0.45,
+    "mouth/mouth-angles-up": 0.7,
 }  # fmt: skip
 CARTOON_STYLE = HeadStyle(
     palette=HeadColours(

@@ -95,7 +95,7 @@ PRESETS: dict[str, Preset] = {
     ),
     "walter": Preset(
         "man, about 65, European", "male", OLD, {"caucasian": 1}, Hairdo("cropped", "#6e6862"),
-        (0.98, 0.93, 0.91), GREY,
+        (0.98, 0.93, 0.91), GREY, more={"mouth/mouth-angles-up": 0.7},
     ),
     "nia": Preset(
         "child, about 9, mixed ancestry", "female", CHILD, {"caucasian": 0.4, "african": 0.4, "asian": 0.2},
