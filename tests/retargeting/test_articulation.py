@@ -11,13 +11,13 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tests.face.posing import posed_vertices
 from tts2face.catalogue import identities
 from tts2face.exemplar.options import THEOBALD_2007, SynthesisOptions
-from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model, select_tokens
+from tts2face.exemplar.synthesis import ExemplarModel, select_tokens
 from tts2face.face.landmark_fit import landmark_positions, scatter_landmarks
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, inner_lip_gaps
-from tts2face.models.talker import Talker, load_talker
+from tts2face.models.talker import Talker
 from tts2face.retargeting.articulation import build_articulator
 from tts2face.retargeting.incisor_contact import incisor_edge, upper_teeth
 from tts2face.retargeting.phone_tracks import articulation_tracks, pause_closure, seconds_from_closure
@@ -34,16 +34,6 @@ def sequence(words: str, phone_s: float = 0.1, pause_s: float = LONG_PAUSE_S) ->
     labels = [SILENCE, *words.split(), SILENCE]
     durations = [pause_s if label == SILENCE else phone_s for label in labels]
     return PhoneSequence(labels, np.concatenate([[0.0], np.cumsum(durations)]))
-
-
-@pytest.fixture(scope="module")
-def talker() -> Talker:
-    return load_talker("grid_s1")
-
-
-@pytest.fixture(scope="module")
-def exemplars(talker: Talker) -> ExemplarModel:
-    return build_exemplar_model(talker)
 
 
 @cache

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.catalogue import identities
 from tts2face.exemplar.options import SynthesisOptions
-from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model, select_tokens
+from tts2face.exemplar.synthesis import ExemplarModel, select_tokens
 from tts2face.face.gesture_transfer import gesture_face
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.lip_constraints import build_lip_constraints
@@ -15,7 +15,7 @@ from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import inner_lip_gaps
 from tts2face.models.palette import EXPRESSIONS, load_palette
-from tts2face.models.talker import Talker, load_talker
+from tts2face.models.talker import Talker
 from tts2face.retargeting.lip_closure import LARGEST_SPEED_PER_S, close_lips, largest_gaps, limit_speed
 from tts2face.retargeting.phone_tracks import MIN_CLOSURE_S, seconds_from_closure
 from tts2face.synthesis.mesh_face import mesh_face
@@ -37,16 +37,6 @@ def sequence(words: str, phone_s: float) -> PhoneSequence:
     labels = [SILENCE, *words.split(), SILENCE]
     spans = [0.4 if label == SILENCE else phone_s * (0.5 if label in "pbm" else 1.0) for label in labels]
     return PhoneSequence(labels, np.concatenate([[0.0], np.cumsum(spans)]))
-
-
-@pytest.fixture(scope="module")
-def talker() -> Talker:
-    return load_talker("grid_s1")
-
-
-@pytest.fixture(scope="module")
-def exemplars(talker: Talker) -> ExemplarModel:
-    return build_exemplar_model(talker)
 
 
 def speak(

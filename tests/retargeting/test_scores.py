@@ -12,7 +12,7 @@ from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, UPPER_LIP_INNER_MID
 from tts2face.models.score_map import N_SCORES, SCORE_SHAPES, ScoreMap, logistic, mouth_scores
-from tts2face.models.talker import Talker, load_talker, read_talker, speech_channels, write_talker
+from tts2face.models.talker import Talker, read_talker, speech_channels, write_talker
 from tts2face.retargeting.score_matching import REST_TOLERANCE, build_score_matching, scaled_scores
 from tts2face.retargeting.to_face import BILABIALS, Retargeter, build_retargeter
 from tts2face.storage.files import find_file
@@ -33,14 +33,9 @@ def head() -> Face:
 
 
 @pytest.fixture(scope="module")
-def starter() -> Talker:
-    return load_talker("grid_s1")
-
-
-@pytest.fixture(scope="module")
-def speech(starter: Talker) -> Trajectory:
-    values = np.concatenate([utterance.shape[:, : starter.model.n_speech] for utterance in starter.utterances[::100]])
-    return Trajectory(speech_channels(starter.model), values, starter.fps)
+def speech(talker: Talker) -> Trajectory:
+    values = np.concatenate([utterance.shape[:, : talker.model.n_speech] for utterance in talker.utterances[::100]])
+    return Trajectory(speech_channels(talker.model), values, talker.fps)
 
 
 def moving_weights(retargeter: Retargeter, speech: Trajectory) -> np.ndarray:
@@ -78,9 +73,9 @@ def test_mouth_scores_average_both_sides() -> None:
     assert scores[0] == pytest.approx([0, 0.05, 0.1, 0.175, 0.275, 0.375, 0.475])
 
 
-def test_maps_return_from_files(tmp_path: Path, starter: Talker, head: Face) -> None:
-    small = replace(starter, utterances=starter.utterances[:2])
-    scores = made_map(speech_channels(starter.model))
+def test_maps_return_from_files(tmp_path: Path, talker: Talker, head: Face) -> None:
+    small = replace(talker, utterances=talker.utterances[:2])
+    scores = made_map(speech_channels(talker.model))
     write_talker(tmp_path / "a.talker", replace(small, scores=scores))
     again = read_talker(tmp_path / "a.talker").scores
     assert again is not None
@@ -106,13 +101,13 @@ def test_each_row_may_have_a_matrix_of_its_own() -> None:
     assert together == pytest.approx(np.array(apart), abs=1e-9)
 
 
-def test_scores_of_the_person_are_read_on_the_head(starter: Talker, head: Face, speech: Trajectory) -> None:
+def test_scores_of_the_person_are_read_on_the_head(talker: Talker, head: Face, speech: Trajectory) -> None:
     """Jaw instead of upper lip: the tracker's scores by the head's own map, with and without score rows."""
-    assert starter.scores is not None
+    assert talker.scores is not None
     assert head.scores is not None
-    person = starter.scores.scores(speech.values.astype(np.float64))
-    plain = moving_weights(build_retargeter(replace(starter, scores=None), head), speech)
-    matched = moving_weights(build_retargeter(starter, head), speech)
+    person = talker.scores.scores(speech.values.astype(np.float64))
+    plain = moving_weights(build_retargeter(replace(talker, scores=None), head), speech)
+    matched = moving_weights(build_retargeter(talker, head), speech)
     open_ = person[:, JAW] > 0.2
     before, after = ((head.scores.scores(weights) - person)[open_] for weights in (plain, matched))
     assert before[:, JAW].mean() < -0.08  # today's head drops the jaw too little
@@ -122,15 +117,15 @@ def test_scores_of_the_person_are_read_on_the_head(starter: Talker, head: Face, 
     assert np.abs(after.mean(axis=0))[:-1].max() < 0.08  # the last is the smile: this head's rest reads as one
 
 
-def test_bilabials_stay_closed(starter: Talker, head: Face) -> None:
-    retargeter = build_retargeter(starter, head)
-    at, fps = INNER_LIP_UPPER.index(UPPER_LIP_INNER_MID), starter.fps
-    model, n_speech = starter.model, starter.model.n_speech
+def test_bilabials_stay_closed(talker: Talker, head: Face) -> None:
+    retargeter = build_retargeter(talker, head)
+    at, fps = INNER_LIP_UPPER.index(UPPER_LIP_INNER_MID), talker.fps
+    model, n_speech = talker.model, talker.model.n_speech
     apart = model.basis[:n_speech, INNER_LIP_UPPER[at], 1] - model.basis[:n_speech, INNER_LIP_LOWER[at], 1]
     mean = model.mean[INNER_LIP_UPPER[at], 1] - model.mean[INNER_LIP_LOWER[at], 1]
     closed = []
-    for utterance in starter.utterances[::20]:
-        gaps = lip_gaps(head, retargeter.retarget(starter.speech_trajectory(utterance)).values)[:, at]
+    for utterance in talker.utterances[::20]:
+        gaps = lip_gaps(head, retargeter.retarget(talker.speech_trajectory(utterance)).values)[:, at]
         own = utterance.shape[:, :n_speech] @ apart + mean
         phones = utterance.phones
         for phone, start, end in zip(phones.phones, phones.edges[:-1], phones.edges[1:], strict=True):
@@ -142,15 +137,15 @@ def test_bilabials_stay_closed(starter: Talker, head: Face) -> None:
     assert max(closed) < 0.3
 
 
-def test_rest_stays_at_rest(starter: Talker, head: Face) -> None:
-    still = Trajectory(speech_channels(starter.model), starter.model.rest[None, : starter.model.n_speech], 25.0)
-    weights = build_retargeter(starter, head).retarget(still).values
+def test_rest_stays_at_rest(talker: Talker, head: Face) -> None:
+    still = Trajectory(speech_channels(talker.model), talker.model.rest[None, : talker.model.n_speech], 25.0)
+    weights = build_retargeter(talker, head).retarget(still).values
     assert np.abs(lip_gaps(head, weights)).max() < 0.4
     assert weights.max() < 0.15
 
 
-def test_frames_are_independent_and_within_limits(starter: Talker, head: Face, speech: Trajectory) -> None:
-    retargeter = build_retargeter(starter, head)
+def test_frames_are_independent_and_within_limits(talker: Talker, head: Face, speech: Trajectory) -> None:
+    retargeter = build_retargeter(talker, head)
     weights = retargeter.retarget(speech).values
     assert weights.min() >= 0.0
     assert weights.max() <= 1.0
@@ -159,10 +154,10 @@ def test_frames_are_independent_and_within_limits(starter: Talker, head: Face, s
     assert shuffled == pytest.approx(weights[order], abs=1e-5)
 
 
-def test_given_scores_replace_those_of_the_map(starter: Talker, head: Face, speech: Trajectory) -> None:
-    retargeter = build_retargeter(starter, head)
-    assert starter.scores is not None
-    own = starter.scores.scores(speech.values.astype(np.float64))
+def test_given_scores_replace_those_of_the_map(talker: Talker, head: Face, speech: Trajectory) -> None:
+    retargeter = build_retargeter(talker, head)
+    assert talker.scores is not None
+    own = talker.scores.scores(speech.values.astype(np.float64))
     assert np.array_equal(retargeter.retarget(speech, own).values, retargeter.retarget(speech).values)
     rounder = own.copy()
     rounder[:, list(SCORE_SHAPES).index("mouthPucker")] += 0.2
@@ -170,12 +165,12 @@ def test_given_scores_replace_those_of_the_map(starter: Talker, head: Face, spee
     assert (retargeter.retarget(speech, rounder).values - retargeter.retarget(speech).values)[:, column].mean() > 0.05
 
 
-def test_a_map_of_other_shapes_or_parameters_is_not_used(starter: Talker, head: Face) -> None:
+def test_a_map_of_other_shapes_or_parameters_is_not_used(talker: Talker, head: Face) -> None:
     other = replace(head, scores=made_map(("jawOpen", "mouthPucker")))
-    assert build_retargeter(starter, other).matching is None
-    grown = replace(starter, scores=made_map(("shape0", "shape1")))
+    assert build_retargeter(talker, other).matching is None
+    grown = replace(talker, scores=made_map(("shape0", "shape1")))
     assert build_retargeter(grown, head).matching is None
-    assert build_retargeter(starter, head).matching is not None
+    assert build_retargeter(talker, head).matching is not None
 
 
 def test_scores_at_rest_become_those_of_the_face() -> None:

@@ -1,0 +1,16 @@
+"""The starter talker and its exemplars."""
+
+import pytest
+
+from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model
+from tts2face.models.talker import Talker, load_talker
+
+
+@pytest.fixture(scope="session")
+def talker() -> Talker:
+    return load_talker("grid_s1")
+
+
+@pytest.fixture(scope="session")
+def exemplars(talker: Talker) -> ExemplarModel:
+    return build_exemplar_model(talker)
