@@ -51,7 +51,12 @@ def test_stripes_between_holes_stay_stripes(mode: str, tmp_path: Path) -> None:
     imported = import_face(character, landmarks=write_landmarks(tmp_path / "landmarks.tsv"))
     save_face(tmp_path / "me.face", imported.face)
     face = read_face(tmp_path / "me.face")
-    assert [part.name for part in face.parts if part.cutout] == ["hair:HairCard"]
+    assert {part.name for part in face.parts if part.cutout} == {
+        "brows:brows",
+        "lashes:lashes",
+        "hair:hair",
+        "hair:HairCard",
+    }
     pixels = draw(face, np.zeros(len(face.shape_names)), picture=Picture(size="512x512", camera="0,0,900"))
     red = pixels[:, :, 0].astype(int) - pixels[:, :, 1:].max(axis=2) > 80
     rows = np.flatnonzero(red.sum(axis=1) > 40)

@@ -22,6 +22,7 @@ from tts2face.render.fragment_rows import (
 from tts2face.render.shade import (
     DARK_ALBEDO,
     INTERREFLECTION,
+    KEPT_HUE,
     LIGHT_ALBEDO,
     N_SCATTER_PASSES,
     N_SCRATCH_ROWS,
@@ -73,8 +74,15 @@ def expected(row, lights):
         shadow = (towards * (1 - depth) + depth) * (facing * (1 - depth) + depth)
         both = (lobes[0] + row[AT_SECOND_LOBE] * lobes[1]) / shadow
         shine = shine + lamp[3:] * gloss * fresnel * towards * both * reached * min(1.3 * seen[0], 1)
-    matt = row[AT_DIFFUSE : AT_DIFFUSE + 3] * albedo / (1 - (1 - seen[0]) * albedo * INTERREFLECTION)
-    return row[AT_OPACITY] * tone(matt + shine)
+    matt = row[AT_DIFFUSE : AT_DIFFUSE + 3] * albedo / (1 - (1 - seen[0]) ** 2 * albedo * INTERREFLECTION)
+    return row[AT_OPACITY] * shown(matt + shine)
+
+
+def shown(light):
+    """Tone curve of (3,) light: by channel where it is bright, of the strongest channel where it is dark."""
+    strongest = light.max()
+    kept = KEPT_HUE * (1 - tone(strongest))
+    return kept * tone(strongest) * light / strongest + (1 - kept) * tone(light)
 
 
 def test_the_highlights_and_the_tone_curve_are_the_formula():
