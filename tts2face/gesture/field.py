@@ -4,6 +4,7 @@ The next frame is sampled from the recorded frames ("moments") whose preceding m
 frames just generated; the probability of each candidate decreases with its distance.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,12 +13,16 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.gesture.field_kernels import MIN_MOMENT_GAP, SEARCH_SLACK, generate_frames, nearest_distances
-from tts2face.gesture.kd_tree import KdTree, build_tree
+from tts2face.gesture.kd_tree import KdTree, build_tree, tree_levels
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.numeric import principal_axes
+from tts2face.storage.disk_cache import fingerprint, read_cached, write_cached
 
 N_SEARCH_AXES = 8  # principal axes of the windows in which the search tree is built
 AXES_STRIDE = 8  # the axes are computed from every eighth window; all windows give the same axes
+CACHE_KIND, CACHE_VERSION = "field", 1  # raised when the index of the same recordings changes
+MIN_CACHED_MOMENTS = 5000  # fewer are indexed as fast as a file is read
+TREE_ARRAYS = ("places", "order", "spans", "axes", "cuts")
 N_DISTANCE_SAMPLES = 200  # moments from which the median nearest distance is estimated
 Float32Array = NDArray[np.float32]
 
@@ -120,6 +125,12 @@ class Field:
     options: FieldOptions
 
 
+NO_AXES = np.zeros((0, 0), np.float32)
+NO_TREE = KdTree(
+    NO_AXES, np.zeros(0, np.int32), np.zeros((0, 2), np.int32), np.zeros(0, np.int32), np.zeros(0, np.float32)
+)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FieldState:
     """State of the sampling of a field.
@@ -183,13 +194,58 @@ def build_field(
     weights = (np.sqrt(np.array(options.alpha[: prosody.shape[1]])) / spread).astype(np.float32)
     scaled = np.ascontiguousarray(values / np.float32(scale), np.float32)
     weighted = np.ascontiguousarray(prosody * weights, np.float32)
-    windows = _history_windows(scaled, weighted, usable[::AXES_STRIDE], options.history)
+    unindexed = Field(scaled, weighted, starts, NO_AXES, NO_TREE, scale, weights, 1.0, options)
+    if len(usable) < MIN_CACHED_MOMENTS:
+        return _index_field(unindexed, usable)
+    name = fingerprint([scaled, weighted, lengths, repr(options)])
+    kept = read_cached(CACHE_KIND, CACHE_VERSION, name)
+    if kept is None or not _is_index(kept, unindexed, usable):
+        made = _index_field(unindexed, usable)
+        write_cached(CACHE_KIND, CACHE_VERSION, name, _index_arrays(made))
+        return made
+    tree = KdTree(*(np.array(kept[f"tree_{name}"]) for name in TREE_ARRAYS))
+    return replace(unindexed, axes=np.array(kept["axes"]), tree=tree, median_distance=float(kept["median_distance"][0]))
+
+
+def _index_field(field: Field, usable: NDArray[np.int64]) -> Field:
+    """A field with the search tree of its usable moments."""
+    history = field.options.history
+    windows = _history_windows(field.values, field.prosody, usable[::AXES_STRIDE], history)
     away = (windows - windows.mean(axis=0)).astype(np.float64)
     axes = np.ascontiguousarray(principal_axes(away.T @ away, N_SEARCH_AXES)[1], np.float32)
-    tree = build_tree(_history_windows(scaled, weighted, usable, options.history) @ axes.T)
+    tree = build_tree(_history_windows(field.values, field.prosody, usable, history) @ axes.T)
     tree.order[:] = usable[tree.order]
-    made = Field(scaled, weighted, starts, axes, tree, scale, weights, 1.0, options)
+    made = replace(field, axes=axes, tree=tree)
     return replace(made, median_distance=_median_nearest_distance(made, usable))
+
+
+def _index_arrays(field: Field) -> dict[str, NDArray[Any]]:
+    tree = {f"tree_{name}": getattr(field.tree, name) for name in TREE_ARRAYS}
+    return tree | {"axes": field.axes, "median_distance": np.array([field.median_distance])}
+
+
+def _is_index(kept: Mapping[str, NDArray[Any]], field: Field, usable: NDArray[np.int64]) -> bool:
+    """Whether arrays of a file are an index of the field's usable moments, which the kernels read without checks."""
+    width = field.options.history * (field.values.shape[1] + field.prosody.shape[1])
+    n_axes, n_nodes = min(N_SEARCH_AXES, width), 2 ** (tree_levels(len(usable)) + 1) - 1
+    wanted = {
+        "axes": ("<f4", (n_axes, width)),
+        "median_distance": ("<f8", (1,)),
+        "tree_places": ("<f4", (len(usable), n_axes)),
+        "tree_order": ("<i4", (len(usable),)),
+        "tree_spans": ("<i4", (n_nodes, 2)),
+        "tree_axes": ("<i4", (n_nodes,)),
+        "tree_cuts": ("<f4", (n_nodes,)),
+    }
+    if {name: (array.dtype.str, array.shape) for name, array in kept.items()} != wanted:
+        return False
+    spans, axes = kept["tree_spans"], kept["tree_axes"]
+    return bool(
+        np.array_equal(np.sort(kept["tree_order"]), usable)
+        and 0 <= spans.min() <= spans.max() <= len(usable)
+        and -1 <= axes.min() <= axes.max() < n_axes
+        and (axes[len(axes) // 2 :] == -1).all()
+    )
 
 
 def _median_nearest_distance(field: Field, usable: NDArray[np.int64]) -> float:

@@ -5,17 +5,15 @@ the face's file, haircuts add theirs (`bake_hair`). For a face without it, it is
 cache folder. Drawing needs no more than the bits: the shadow of a lamp in any direction is a sum over them.
 """
 
-import hashlib
 import math
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, DataError, InputError
+from lexicon.errors import InputError
 from tts2face.compilation import kernel
 from tts2face.models.face import Face
 from tts2face.models.hair import Hair, attach_hair
@@ -24,8 +22,7 @@ from tts2face.render.fragments import face_normals, vertex_normals
 from tts2face.render.picture_kernels import allocate_buffers, draw_samples, project_surface
 from tts2face.render.raster import GRID_SHIFT, HOLES, NOT_DRAWN, transform_to_camera
 from tts2face.render.surface import Surface, build_surface
-from tts2face.storage.tensors import read_tensors, write_tensors
-from tts2face.storage.user_folders import user_cache
+from tts2face.storage.disk_cache import fingerprint, read_cached, write_cached
 
 N_DIRECTIONS = 128  # docs/decisions/112-occlusion.md: more change the light by less than its smoothing
 VIEW_SAMPLES = 192  # samples along a side of the views: 1.5 mm each on a head
@@ -60,27 +57,25 @@ def occlusion_of(face: Face, surface: Surface, threads: int) -> Bits:
         return face.occlusion
     if len(face.vertices) < MIN_CACHED_VERTICES:
         return _trace(face, surface, threads, N_DIRECTIONS)
-    path = user_cache() / CACHE_KIND / f"{_fingerprint(face)}.bits"
-    with suppress(InputError, DataError):
-        kept = read_tensors(path, CACHE_KIND, CACHE_VERSION)[0]["bits"]
-        if kept.dtype == np.uint8 and kept.shape[:2] == (len(occlusion_poses(face)), len(face.vertices)):
-            return np.asarray(kept, np.uint8)
+    name = _fingerprint(face)
+    kept = (read_cached(CACHE_KIND, CACHE_VERSION, name) or {}).get("bits")
+    if (
+        kept is not None
+        and kept.dtype == np.uint8
+        and kept.shape[:2] == (len(occlusion_poses(face)), len(face.vertices))
+    ):
+        return np.asarray(kept, np.uint8)
     bits = _trace(face, surface, threads, N_DIRECTIONS)
-    with suppress(BackendError, OSError):  # a folder that cannot be written costs the next run the same time
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_tensors(path, CACHE_KIND, CACHE_VERSION, {"bits": bits}, {})
+    write_cached(CACHE_KIND, CACHE_VERSION, name, {"bits": bits})
     return bits
 
 
 def _fingerprint(face: Face) -> str:
     """Name of a face's geometry: vertices, triangles, jaw, and what of its parts is drawn."""
-    content = hashlib.sha256(face.vertices.tobytes() + face.triangles.tobytes() + occlusion_poses(face).tobytes())
-    if "jawOpen" in face.shape_names:
-        content.update(np.ascontiguousarray(face.shapes[face.shape_names.index("jawOpen")]).tobytes())
-    content.update(repr([(part.count, part.opacity, part.cutout, part.kind) for part in face.parts]).encode())
-    for texture in face.textures:
-        content.update(b"" if texture.alpha is None else texture.alpha.tobytes())
-    return content.hexdigest()
+    jaw = [face.shapes[face.shape_names.index("jawOpen")]] if "jawOpen" in face.shape_names else []
+    parts = repr([(part.count, part.opacity, part.cutout, part.kind) for part in face.parts])
+    alphas = ["" if texture.alpha is None else texture.alpha for texture in face.textures]
+    return fingerprint([face.vertices, face.triangles, occlusion_poses(face), *jaw, parts, *alphas])
 
 
 def occlusion_poses(face: Face) -> NDArray[np.float32]:
