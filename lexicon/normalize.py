@@ -28,6 +28,7 @@ _TAIL = r"[^\s,;!]{0,500}[^\s,;!.:?]"
 _HALF = r"(?:[aApP]\.[mM]\.?|[aApP][mM]\b)"
 _START, _STOP = r"(?<![^\W\d_])", r"(?![^\W\d_])"  # no letter before, after
 _LETTERS = r"[^\W\d_]+"
+_SINGLE_LETTER = re.compile(rf"{_START}[^\W\d_]{_STOP}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,10 +162,17 @@ def split_tokens(text: str) -> Iterator[WrittenForm]:
     pattern, readers = _scanner()
     previous = ""
     for match in pattern.finditer(name_letters_in_words(canonical_text(text))):
-        spoken = readers[match.lastgroup or ""](match, previous)
+        spoken = _name_letters(readers[match.lastgroup or ""](match, previous))
         if spoken:
             yield WrittenForm(match.group(), spoken)
             previous = spoken[-1] if spoken[-1] in MARKS else spoken.rpartition(" ")[2]
+
+
+def _name_letters(spoken: str) -> str:
+    """Words of a form, with the names of foreign letters that became single ones (#Ͱ, A.Ͱ)."""
+    if spoken.isascii():
+        return spoken
+    return _SINGLE_LETTER.sub(lambda letter: forms.read_letter(letter, ""), name_letters_in_words(spoken))
 
 
 def join_words(words: list[str]) -> str:

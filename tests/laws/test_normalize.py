@@ -85,6 +85,8 @@ TEXTS = st.one_of(st.text(), st.lists(FORMS, max_size=12).map("".join), st.lists
 @example('E.g."I."A')
 @example("5\u0301 km")
 @example("\ud800")
+@example("#\u0370")
+@example("A.\u0370")
 def test_normalising_twice_is_normalising_once(text: str) -> None:
     once = normalize(text)
     assert normalize(once) == once
