@@ -58,9 +58,7 @@ def run_request(request: Request, picture: Picture, options: SpeakOptions) -> No
 
     prepared = prepare(request)  # a wrong request is refused before anything is loaded
     voices = VoicePool()
-    preload_voice(
-        voices, prepared.request
-    )  # its models load beside the imports of the session, the talker and the face
+    preload_voice(voices, prepared.request)  # beside the imports of the session, and loading of talker and face
     session = _open_session(options, voices)
     explanations: list[PhoneExplanation] = []
 

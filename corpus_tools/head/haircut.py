@@ -18,7 +18,7 @@ from corpus_tools.head.skin import Skin, vertex_normals
 from corpus_tools.head.strands import Cards, StrandStyle, bake_strands, edge_graph, number_islands, strand_tangents
 from corpus_tools.head.subdivide import triangulate
 from tts2face.models.hair import Hair
-from tts2face.numeric import smoothstep
+from tts2face.numeric import smoothstep, unit_vectors
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -68,9 +68,8 @@ def smooth_sheet(cards: Cards) -> Cards:
 def sink_strands(cards: Cards) -> Cards:
     """Cards whose small ones lie below the largest sheet, which they would cut through."""
     islands = number_islands(int(cards.weld.max()) + 1, cards.weld[cards.triangles])[cards.weld]
-    inwards = MIDDLE - cards.vertices
-    inwards /= np.linalg.norm(inwards, axis=1, keepdims=True)
-    moved = cards.vertices + SUNK_MM * inwards * (islands != np.bincount(islands).argmax())[:, None]
+    is_small = islands != np.bincount(islands).argmax()
+    moved = cards.vertices + SUNK_MM * unit_vectors(MIDDLE - cards.vertices) * is_small[:, None]
     return Cards(moved, cards.triangles, cards.uv, cards.weld)
 
 
@@ -121,8 +120,7 @@ def finish_curls(cards: Cards, alpha: NDArray[np.uint8], tangents: Floats) -> tu
     low = 1 - smoothstep(height + ragged, *CURL_ROOT)
     side = smoothstep(np.minimum(across, 1 - across) + ragged, 0.0, CURL_SIDE)
     thinned = alpha * np.where(is_card, low * side, 1.0)
-    outwards = cards.vertices - MIDDLE
-    outwards /= np.linalg.norm(outwards, axis=1, keepdims=True)
+    outwards = unit_vectors(cards.vertices - MIDDLE)
     return (np.rint(thinned / 8) * 8).clip(0, 255).astype(np.uint8), outwards
 
 

@@ -28,10 +28,7 @@ BACKGROUND = "#8a8f98"
 OPENINGS = (0.5, 0.8)  # weights of the opening shape at which the inner lips are read
 OPENING_SHAPES = ("jawOpen", f"{VISEME_PREFIX}aa", f"{VISEME_PREFIX}oh")
 SKIN, EYES = "skin", "eyes"  # beginnings of the names of parts on which landmarks lie
-BEHIND_LIPS = (
-    "teeth",
-    "tongue",
-)  # parts that the views leave out: the tracker reads the upper teeth as a part of the lip
+BEHIND_LIPS = ("teeth", "tongue")  # not in the views: the tracker reads the upper teeth as a part of the lip
 
 FloatArray = NDArray[np.float64]
 

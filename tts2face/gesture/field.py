@@ -5,7 +5,7 @@ frames just generated; the probability of each candidate decreases with its dist
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.gesture.field_kernels import MIN_MOMENT_GAP, SEARCH_SLACK, generate_frames, nearest_distances
-from tts2face.gesture.kd_tree import KdTree, build_tree, tree_levels
+from tts2face.gesture.kd_tree import KdTree, build_tree, count_nodes
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.numeric import principal_axes
 from tts2face.storage.disk_cache import fingerprint, read_cached, write_cached
@@ -22,7 +22,7 @@ N_SEARCH_AXES = 8  # principal axes of the windows in which the search tree is b
 AXES_STRIDE = 8  # the axes are computed from every eighth window; all windows give the same axes
 CACHE_KIND, CACHE_VERSION = "field", 1  # raised when the index of the same recordings changes
 MIN_CACHED_MOMENTS = 5000  # fewer are indexed as fast as a file is read
-TREE_ARRAYS = ("places", "order", "spans", "axes", "cuts")
+TREE_ARRAYS = tuple(field.name for field in fields(KdTree))
 N_DISTANCE_SAMPLES = 200  # moments from which the median nearest distance is estimated
 Float32Array = NDArray[np.float32]
 
@@ -227,7 +227,7 @@ def _index_arrays(field: Field) -> dict[str, NDArray[Any]]:
 def _is_index(kept: Mapping[str, NDArray[Any]], field: Field, usable: NDArray[np.int64]) -> bool:
     """Whether arrays of a file are an index of the field's usable moments, which the kernels read without checks."""
     width = field.options.history * (field.values.shape[1] + field.prosody.shape[1])
-    n_axes, n_nodes = min(N_SEARCH_AXES, width), 2 ** (tree_levels(len(usable)) + 1) - 1
+    n_axes, n_nodes = min(N_SEARCH_AXES, width), count_nodes(len(usable))
     wanted = {
         "axes": ("<f4", (n_axes, width)),
         "median_distance": ("<f8", (1,)),

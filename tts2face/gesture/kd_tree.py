@@ -36,14 +36,15 @@ class KdTree:
     cuts: NDArray[np.float32]
 
 
-def tree_levels(n_points: int) -> int:
-    """Number of levels of inner nodes of the tree of a number of points."""
-    return max(0, int(np.ceil(np.log2(max(n_points / MAX_LEAF_SIZE, 1.0)))))
+def count_nodes(n_points: int) -> int:
+    """Number of nodes of the tree of a number of points."""
+    n_levels = max(0, int(np.ceil(np.log2(max(n_points / MAX_LEAF_SIZE, 1.0)))))
+    return int(2 ** (n_levels + 1) - 1)
 
 
 def build_tree(places: NDArray[np.float32]) -> KdTree:
     """Build the tree of (N, p) points, N at least 1. O(N log N) time, O(N p) memory."""
-    n_nodes = 2 ** (tree_levels(len(places)) + 1) - 1
+    n_nodes = count_nodes(len(places))
     order = np.arange(len(places), dtype=np.int32)
     spans = np.zeros((n_nodes, 2), np.int32)
     axes, cuts = np.full(n_nodes, -1, np.int32), np.zeros(n_nodes, np.float32)
