@@ -83,6 +83,11 @@ def _used_cards(cards: Cards, is_kept: NDArray[np.bool_]) -> Cards:
     return Cards(cards.vertices[used], packed.reshape(-1, 3), cards.uv[used], cards.weld[used])
 
 
+def coverage_levels(coverage: Floats) -> NDArray[np.uint8]:
+    """Coverage of 0 to 255 in steps of 8, which compress well."""
+    return (np.rint(coverage / 8) * 8).clip(0, 255).astype(np.uint8)
+
+
 def thin_roots(cards: Cards, alpha: NDArray[np.uint8], tangents: Floats) -> tuple[NDArray[np.uint8], Floats]:
     """Coverage that falls off in single strands towards the edge of the cards above the forehead."""
     side = len(alpha)
@@ -95,7 +100,7 @@ def thin_roots(cards: Cards, alpha: NDArray[np.uint8], tangents: Floats) -> tupl
     share = smoothstep(distance + ROOT_SPREAD_MM * streak, 0.0, ROOT_MM)
     thinned = alpha.astype(np.float64)
     thinned[texels.rows, texels.columns] *= share
-    return (np.rint(thinned / 8) * 8).clip(0, 255).astype(np.uint8), tangents
+    return coverage_levels(thinned), tangents
 
 
 def border_points(cards: Cards) -> Floats:
@@ -121,7 +126,7 @@ def finish_curls(cards: Cards, alpha: NDArray[np.uint8], tangents: Floats) -> tu
     side = smoothstep(np.minimum(across, 1 - across) + ragged, 0.0, CURL_SIDE)
     thinned = alpha * np.where(is_card, low * side, 1.0)
     outwards = unit_vectors(cards.vertices - MIDDLE)
-    return (np.rint(thinned / 8) * 8).clip(0, 255).astype(np.uint8), outwards
+    return coverage_levels(thinned), outwards
 
 
 @dataclass(frozen=True, slots=True)
