@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from corpus_tools.dense.texels import find_texels
 from corpus_tools.head.assets import PACKAGE, Asset, read_asset
 from corpus_tools.head.cage import Cage
-from corpus_tools.head.hairline import MIDDLE, covered_share, hair_share, paint_scalp, paint_stubble
+from corpus_tools.head.hairline import MIDDLE, covered_share, hair_share, paint_scalp, paint_stubble, share_levels
 from corpus_tools.head.noise import value_noise
 from corpus_tools.head.skin import Skin, vertex_normals
 from corpus_tools.head.strands import Cards, StrandStyle, bake_strands, edge_graph, number_islands, strand_tangents
@@ -83,9 +83,10 @@ def _used_cards(cards: Cards, is_kept: NDArray[np.bool_]) -> Cards:
     return Cards(cards.vertices[used], packed.reshape(-1, 3), cards.uv[used], cards.weld[used])
 
 
-def coverage_levels(coverage: Floats) -> NDArray[np.uint8]:
+def coverage_levels(coverage: NDArray[np.floating]) -> NDArray[np.uint8]:
     """Coverage of 0 to 255 in steps of 8, which compress well."""
-    return (np.rint(coverage / 8) * 8).clip(0, 255).astype(np.uint8)
+    levels: NDArray[np.uint8] = (np.rint(coverage / 8) * 8).clip(0, 255).astype(np.uint8)
+    return levels
 
 
 def thin_roots(cards: Cards, alpha: NDArray[np.uint8], tangents: Floats) -> tuple[NDArray[np.uint8], Floats]:
@@ -124,7 +125,7 @@ def finish_curls(cards: Cards, alpha: NDArray[np.uint8], tangents: Floats) -> tu
     is_card = height > CURL_TOP
     low = 1 - smoothstep(height + ragged, *CURL_ROOT)
     side = smoothstep(np.minimum(across, 1 - across) + ragged, 0.0, CURL_SIDE)
-    thinned = alpha * np.where(is_card, low * side, 1.0)
+    thinned: Floats = alpha.astype(np.float64) * np.where(is_card, low * side, 1.0)
     outwards = unit_vectors(cards.vertices - MIDDLE)
     return coverage_levels(thinned), outwards
 
@@ -238,8 +239,7 @@ def paint_fuzz(places: Floats, triangles: Ints, uv: Floats, generator: np.random
     cover = FUZZ * hair_share(place) ** 2 * np.clip(1 + value_noise(place, 0.9, generator), 0, 3)
     alpha = np.zeros((FUZZ_SIDE, FUZZ_SIDE))
     alpha[texels.rows, texels.columns] = np.clip(cover, 0, 1)
-    painted: NDArray[np.uint8] = np.rint(alpha * 31).astype(np.uint8) * np.uint8(8)
-    return painted
+    return share_levels(alpha)
 
 
 def flatten_skull(places: Floats) -> Floats:

@@ -81,8 +81,13 @@ def _fill_gaps(texels: Texels, cover: Floats, side: int) -> NDArray[np.uint8]:
     picture, is_gap = np.zeros((side, side)), np.ones((side, side), bool)
     picture[texels.rows, texels.columns], is_gap[texels.rows, texels.columns] = cover, False
     nearest = distance_transform_edt(is_gap, return_distances=False, return_indices=True)
-    steps: NDArray[np.uint8] = np.rint(picture[tuple(nearest)] * 31).astype(np.uint8) * np.uint8(8)
-    return steps
+    return share_levels(picture[tuple(nearest)])
+
+
+def share_levels(share: Floats) -> NDArray[np.uint8]:
+    """Shares of 0 to 1 in 32 levels of coverage, which compress well."""
+    levels: NDArray[np.uint8] = np.rint(share * 31).astype(np.uint8) * np.uint8(8)
+    return levels
 
 
 def strand_field(places: Floats, width_mm: float, length_mm: float) -> Floats:
