@@ -134,6 +134,20 @@ def test_a_smile_keeps_rounded_lips_round() -> None:
 
 
 @pytest.mark.parametrize("name", FACES)
+def test_a_smile_lasts_while_lips_close_and_round(name: str) -> None:
+    face, speech = prepared_face(name), speech_motion(name, "clear")
+    smiles = [face.face.shape_names.index(shape) for shape in ("mouthSmileLeft", "mouthSmileRight")]
+    spoken = face.perform(speech, {}).motion.values
+    moved = face.perform(speech, expression_gestures(len(speech), happy=1)).motion.values
+    alone = face.perform(silence(load_face(name)), expression_gestures(1, happy=1)).motion.values[0, smiles].mean()
+    smile = moved[:, smiles].mean(axis=1)
+    assert smile.min() > 0.7 * alone
+    assert smile.max() < alone + 0.5 * spoken[:, smiles].mean(axis=1).max() + 0.05
+    mouth = face.mouth.moving
+    assert np.abs(np.diff(moved[:, mouth], axis=0)).max() < 1.15 * np.abs(np.diff(spoken[:, mouth], axis=0)).max()
+
+
+@pytest.mark.parametrize("name", FACES)
 def test_without_gestures_speech_passes_unchanged(name: str) -> None:
     face, speech = prepared_face(name), speech_motion(name)
     performed = face.perform(speech, {})

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.compilation import kernel
+from tts2face.face.eyeball_clearance import EyeballClearance, build_clearance
 from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN
 from tts2face.numeric import smoothstep
@@ -33,6 +34,8 @@ class FaceRig:
         The point about which the head turns.
     follow : (V,)
         Share of the head motion that each vertex follows: 1 down to the chin, falling to 0 at the end of the neck.
+    clearance
+        Skin that stays outside the eyeballs.
     """
 
     rest: NDArray[np.float32]
@@ -44,6 +47,7 @@ class FaceRig:
     eye_turns: NDArray[np.float32]
     pivot: NDArray[np.float32]
     follow: NDArray[np.float32]
+    clearance: EyeballClearance
 
     def pose(self, weights: NDArray[np.floating], head: NDArray[np.floating] = REST_HEAD) -> NDArray[np.float32]:
         """Vertices (V, 3), mm, for shape weights (K,) and a head pose (6,) of `HEAD_CHANNELS`."""
@@ -52,6 +56,8 @@ class FaceRig:
         eyes = eye_rotations(self.eye_turns, np.asarray(weights))
         _apply_shapes(self.rest, self.starts, self.indices, self.deltas, np.asarray(weights, np.float32), vertices)
         _turn_eyes(self.eye_spans, self.eye_centres, eyes, vertices)
+        centres = self.clearance.centres(self.eye_centres, np.asarray(weights, np.float32))
+        self.clearance.enforce(centres, eyes, vertices)
         if np.asarray(head).any():
             _move_head(transform, self.follow, vertices)
         return vertices
@@ -76,6 +82,7 @@ def build_rig(face: Face) -> FaceRig:
         eye_turns=turns,
         pivot=np.array(face.pivot, np.float32),
         follow=head_share(face),
+        clearance=build_clearance(face),
     )
 
 

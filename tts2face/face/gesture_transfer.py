@@ -138,7 +138,7 @@ class GestureFace:
             added += ordered_product(features["expression"], self.expressions)
             lips = self.mouth.moving
             added[:, lips] = ordered_product(mouth_response(features["expression"]), self.expressions[:, lips])
-            added = self.mouth.attenuate_on_rounded_lips(speech, added)
+            added = self.mouth.attenuate_on_rounded_lips(speech, self.mouth.attenuate_on_moved_lips(speech, added))
         if "gaze" in features:
             down, left = features["gaze"].T
             turned = np.stack([np.maximum(down, 0), np.maximum(-down, 0), np.maximum(left, 0), np.maximum(-left, 0)])
@@ -218,7 +218,7 @@ def gesture_face(face: Face, palette: Palette) -> GestureFace:
         expressions=expression_weights(extended_face, mouth),
         regions=regions,
         gaze=gaze_weights(extended_face),
-        mouth=mouth,
+        mouth=mouth.with_gesture_cost(),
         lids=build_eyelid_model(extended_face),
     )
 

@@ -26,10 +26,12 @@ FULL_EXPRESSION_GAP_MM = 4.0  # gap from which lips follow an expression in full
 MIN_GAP_SHARE = 0.5  # least share of the speech gap that an expression leaves open
 GAP_CONSTRAINT_WEIGHT = 1e5  # relative to a landmark of the cheek; 300 in retargeting, where gaps may deviate a little
 CHANGE_COST = 0.5  # of changes of the weights in contacts, relative to the median curvature
+# Of changes of a smile by gestures: lips close by pressing and rolling; a smaller smile is seen as another mood.
+SMILE_COST, SMILE_PREFIX = 5.0, "mouthSmile"
 FULL_GROWTH_GAP_MM = 1.5  # gaps smaller than this are amplified by less than the gain
 GAP_TOLERANCE_MM = 0.01  # largest gap of closed lips
 FULL_ROUNDING_MM = 8.0  # a mouth this much narrower than at rest is fully rounded
-ROUNDING_ATTENUATION = 0.6  # reduction of an expression on a fully rounded mouth: keeps /u w/ round
+ROUNDING_ATTENUATION = 0.25  # reduction of an expression on a fully rounded mouth, which is still seen to smile
 
 FloatArray = NDArray[np.float64]
 
@@ -50,6 +52,8 @@ class LipConstraints:
         Widening of the mouth per weight, mm.
     limits : (k, 2)
         Least and greatest weight of the `moving` shapes.
+    is_smile : (k,)
+        Whether each of the `moving` shapes smiles.
     """
 
     moving: NDArray[np.int64]
@@ -57,11 +61,19 @@ class LipConstraints:
     gaps: FloatArray
     width: FloatArray
     limits: FloatArray
+    is_smile: NDArray[np.bool_]
 
     def with_change_cost(self) -> "LipConstraints":
         """The constraints with a cost of changes of the weights, so that opposite shapes do not act together."""
-        cost = CHANGE_COST * np.median(np.diag(self.curvature))
-        return replace(self, curvature=self.curvature + cost * np.eye(len(self.curvature)))
+        return self._with_costs(np.full(len(self.moving), CHANGE_COST))
+
+    def with_gesture_cost(self) -> "LipConstraints":
+        """The constraints with a cost of changes of the weights, the largest of a smile's."""
+        return self._with_costs(np.where(self.is_smile, CHANGE_COST + SMILE_COST, CHANGE_COST))
+
+    def _with_costs(self, costs: FloatArray) -> "LipConstraints":
+        """The constraints with costs (k,) of changes of the weights, relative to the median curvature."""
+        return replace(self, curvature=self.curvature + np.diag(costs * np.median(np.diag(self.curvature))))
 
     def combine(self, speech: FloatArray, added: FloatArray) -> FloatArray:
         """Weights (T, K) of speech weights `speech` (T, K) with gesture weights `added` (T, K), lips constrained.
@@ -123,6 +135,14 @@ class LipConstraints:
         softened[:, self.moving] *= factor[:, None]
         return softened
 
+    def attenuate_on_moved_lips(self, speech: FloatArray, added: FloatArray) -> FloatArray:
+        """Gesture weights (T, K), of which each shape has less where speech moves it already: none at its limit."""
+        lips, high = self.moving, self.limits[:, 1]
+        used = np.divide(speech[:, lips], high, out=np.zeros((len(speech), len(lips))), where=high > 0)
+        softened = added.copy()
+        softened[:, lips] *= np.where(added[:, lips] > 0, 1.0 - np.clip(used, 0.0, 1.0), 1.0)
+        return softened
+
 
 def build_lip_constraints(face: Face) -> LipConstraints:
     """Lip constraints of a face.
@@ -144,4 +164,5 @@ def build_lip_constraints(face: Face) -> LipConstraints:
         gaps=motion[list(INNER_LIP_UPPER), 1] - motion[list(INNER_LIP_LOWER), 1],
         width=motion[MOUTH_CORNER_LEFT, 0] - motion[MOUTH_CORNER_RIGHT, 0],
         limits=face.limits[moving].astype(np.float64),
+        is_smile=np.array([face.shape_names[i].startswith(SMILE_PREFIX) for i in moving]),
     )
