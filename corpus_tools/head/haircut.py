@@ -12,7 +12,15 @@ from scipy.spatial import cKDTree
 from corpus_tools.dense.texels import find_texels
 from corpus_tools.head.assets import PACKAGE, Asset, read_asset
 from corpus_tools.head.cage import Cage
-from corpus_tools.head.hairline import MIDDLE, covered_share, hair_share, paint_scalp, paint_stubble, share_levels
+from corpus_tools.head.hairline import (
+    MIDDLE,
+    covered_share,
+    hair_share,
+    paint_scalp,
+    paint_stubble,
+    share_levels,
+    stubble_share,
+)
 from corpus_tools.head.noise import value_noise
 from corpus_tools.head.skin import Skin, vertex_normals
 from corpus_tools.head.strands import Cards, StrandStyle, bake_strands, edge_graph, number_islands, strand_tangents
@@ -29,9 +37,13 @@ Finish = Callable[[Cards, NDArray[np.uint8], Floats], tuple[NDArray[np.uint8], F
 AXIS_Z, FRONT_DEG = -60.0, (36.0, 60.0)  # the vertical axis of the head; a fringe lies in front of these angles
 FRINGE_TOP, BROW_Y = 62.0, 25.0  # heights between which a fringe ends up
 BUST_Y, SUNK_MM = -335.0, 3.0
+LOCK_DEG, LOCK_Y, LOCK_SHARE = (36.0, 53.0), (36.0, 46.0), 0.1  # the lock ahead of the temple, below these heights
 ROOTS_Y, ROOTS_Z = 46.0, -40.0  # above the forehead
 ROOT_MM, ROOT_SPREAD_MM = 7.0, 2.2  # width of a hairline, and that of its raggedness
+# Half width of a parting in the middle, heights between which it begins, and share of the direction of its roots.
+PARTING_MM, PARTING_Y, ROOT_TURN = 9.0, (50.0, 75.0), 1.0
 CURL_TOP, CURL_ROOT, CURL_SIDE, CURL_SPREAD = 0.68, (0.86, 0.98), 0.08, 0.03  # shares of the texture
+CURL_HAZE, CURL_SOLID, CURL_TURN = 70.0, 190.0, 0.24  # coverage of haze and of curls, of 255; spread of directions
 CROWN_Y, N_CROWN_MEANS = (40.0, 80.0), 12  # heights between which the crown begins
 
 
@@ -73,6 +85,19 @@ def sink_strands(cards: Cards) -> Cards:
     return Cards(moved, cards.triangles, cards.uv, cards.weld)
 
 
+def tuck_lock(cards: Cards) -> Cards:
+    """Cards without the pointed lock ahead of the left temple, which a shortened fringe leaves: it turns backwards."""
+    off = cards.vertices - [0.0, 0.0, AXIS_Z]
+    angle = np.degrees(np.arctan2(off[:, 0], off[:, 2]))
+    is_lock = (off[:, 0] > 0) & (angle > LOCK_DEG[0]) & (angle < LOCK_DEG[1])
+    share = is_lock * (1 - smoothstep(off[:, 1], *LOCK_Y)) * (1 - LOCK_SHARE)
+    turn = np.radians(share * (LOCK_DEG[1] - angle))
+    moved = cards.vertices.copy()
+    moved[:, 0] = off[:, 0] * np.cos(turn) + off[:, 2] * np.sin(turn)
+    moved[:, 2] = off[:, 2] * np.cos(turn) - off[:, 0] * np.sin(turn) + AXIS_Z
+    return Cards(moved, cards.triangles, cards.uv, cards.weld)
+
+
 def cut_at_bust(cards: Cards) -> Cards:
     """Cards without what hangs below the bust."""
     return _used_cards(cards, (cards.vertices[cards.triangles, 1] > BUST_Y).any(axis=1))
@@ -101,7 +126,14 @@ def thin_roots(cards: Cards, alpha: NDArray[np.uint8], tangents: Floats) -> tupl
     share = smoothstep(distance + ROOT_SPREAD_MM * streak, 0.0, ROOT_MM)
     thinned = alpha.astype(np.float64)
     thinned[texels.rows, texels.columns] *= share
-    return coverage_levels(thinned), tangents
+    return coverage_levels(thinned), raise_roots(cards, tangents)
+
+
+def raise_roots(cards: Cards, tangents: Floats) -> Floats:
+    """Tangents (N, 3) that point into the head at the parting, where strands rise from it and no highlight lies."""
+    x, y, _ = cards.vertices.T
+    near = np.exp(-((x / PARTING_MM) ** 2)) * smoothstep(y, *PARTING_Y)
+    return unit_vectors(tangents + ROOT_TURN * near[:, None] * unit_vectors(MIDDLE - cards.vertices))
 
 
 def border_points(cards: Cards) -> Floats:
@@ -118,16 +150,18 @@ def border_points(cards: Cards) -> Floats:
 
 
 def finish_curls(cards: Cards, alpha: NDArray[np.uint8], tangents: Floats) -> tuple[NDArray[np.uint8], Floats]:
-    """Curls point away from the head, so that no card shines as a whole, and have no straight lower edge."""
+    """Curls point away from the head, each its own way, so that single ones shine; no haze, no straight lower edge."""
     height = np.linspace(0, 1, len(alpha))[:, None]
     across = np.linspace(0, 1, len(alpha))[None]
     ragged = CURL_SPREAD * np.random.default_rng(SEED).standard_normal(alpha.shape)
     is_card = height > CURL_TOP
     low = 1 - smoothstep(height + ragged, *CURL_ROOT)
     side = smoothstep(np.minimum(across, 1 - across) + ragged, 0.0, CURL_SIDE)
-    thinned: Floats = alpha.astype(np.float64) * np.where(is_card, low * side, 1.0)
+    solid = np.clip((alpha.astype(np.float64) - CURL_HAZE) * 255 / (CURL_SOLID - CURL_HAZE), 0, 255)
+    thinned: Floats = solid * np.where(is_card, low * side, 1.0)
     outwards = unit_vectors(cards.vertices - MIDDLE)
-    return coverage_levels(thinned), outwards
+    turned = np.random.default_rng(SEED).standard_normal((int(cards.weld.max()) + 1, 3))[cards.weld]
+    return coverage_levels(thinned), unit_vectors(outwards + CURL_TURN * turned)
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,11 +188,11 @@ HAIRCUTS: Mapping[str, Haircut] = {
         "chin-length bob with a long side fringe",
         896,
         StrandStyle(10.0, 0.6, contrast=0.6, broad=0.12),
-        (trim_fringe, sink_strands),
+        (trim_fringe, tuck_lock, sink_strands),
     ),
     "ponytail01": Haircut("combed back into a ponytail", 768, StrandStyle(9.0, contrast=0.6)),
     "braid01": Haircut("side fringe and a braid at the back", 640, StrandStyle(contrast=0.3), (trim_fringe,)),
-    "afro01": Haircut("rounded afro", 640, StrandStyle(contrast=0.8), finish=finish_curls),
+    "afro01": Haircut("rounded afro", 640, StrandStyle(contrast=1.5), finish=finish_curls),
     "short01": Haircut("short, tousled on top", 640),
     "short02": Haircut("short with a full fringe", 896, StrandStyle(12.0, contrast=0.5, broad=0.12)),
     "short03": Haircut("short bob with a side fringe", edits=(trim_fringe,)),
@@ -236,7 +270,7 @@ def paint_fuzz(places: Floats, triangles: Ints, uv: Floats, generator: np.random
     """(FUZZ_SIDE, FUZZ_SIDE) coverage of a layer with vertices above `places` (N, 3): none at the hairline."""
     texels = find_texels(uv, triangles, FUZZ_SIDE)
     place = texels.interpolate(places)
-    cover = FUZZ * hair_share(place) ** 2 * np.clip(1 + value_noise(place, 0.9, generator), 0, 3)
+    cover = FUZZ * stubble_share(place) ** 2 * np.clip(1 + value_noise(place, 0.9, generator), 0, 3)
     alpha = np.zeros((FUZZ_SIDE, FUZZ_SIDE))
     alpha[texels.rows, texels.columns] = np.clip(cover, 0, 1)
     return share_levels(alpha)

@@ -23,16 +23,19 @@ EAR = (np.array([80.0, -8.0, -72.0]), np.array([26.0, 30.0, 17.0]))  # |x|, y, z
 SOFT_MM = 15.0  # width of the hairline, over which strands get denser
 REACH_MM, STEP_MM, BESIDE_MM = 40.0, 4.0, 5.0  # hair up to so far above the skin, and beside its normal, covers it
 SMOOTH_MM = 7.0  # gaps such as a parting are closed, and the edge of the cover is smoothed, over this distance
-STUBBLE, STUBBLE_MM = 0.55, 0.7  # coverage, and size of the grain
+# Cropped hair: coverage at the sides and what the top has more, contrast and size of the grain; width of its hairline,
+# spread and size of its irregularities.
+STUBBLE, STUBBLE_TOP, GRAIN, STUBBLE_MM = 0.46, 0.24, 0.20, 0.7
+STUBBLE_SOFT_MM, RAGGED_MM, RAGGED_SIZE_MM, TOP_Y = 34.0, 3.5, 8.0, (0.0, 75.0)
 STRAND_MM = 0.55  # width of a painted strand
 
 
-def hair_share(places: Floats) -> Floats:
+def hair_share(places: Floats, soft_mm: float = SOFT_MM) -> Floats:
     """(P,) 1 where hair grows, 0 where it does not, for positions (P, 3) on the default skin, mm."""
     off = places - MIDDLE
     angle = np.degrees(np.arctan2(np.abs(off[:, 0]), off[:, 2]))
     line = np.interp(angle, LINE_DEG, LINE_Y)
-    share = smoothstep(places[:, 1] - line, -0.35 * SOFT_MM, 0.65 * SOFT_MM)
+    share = smoothstep(places[:, 1] - line, -0.35 * SOFT_MM, soft_mm - 0.35 * SOFT_MM)
     mirrored = np.column_stack([np.abs(places[:, 0]), places[:, 1:]])
     ear = np.linalg.norm((mirrored - EAR[0]) / EAR[1], axis=1)
     grown: Floats = share * smoothstep(ear, 0.92, 1.12)
@@ -73,7 +76,14 @@ def paint_stubble(skin: Skin, side: int, generator: np.random.Generator) -> NDAr
     texels = find_texels(layout_coordinates(skin.source_uv), triangulate(skin.quads), side)
     place = texels.interpolate(skin.vertices)
     grain = value_noise(place, STUBBLE_MM, generator)
-    return _fill_gaps(texels, hair_share(place) * np.clip(STUBBLE + 0.11 * grain, 0, 1), side)
+    ragged = place + np.outer(RAGGED_MM * value_noise(place, RAGGED_SIZE_MM, generator), [0.0, 1.0, 0.0])
+    share = stubble_share(ragged) * (STUBBLE + STUBBLE_TOP * smoothstep(place[:, 1], *TOP_Y))
+    return _fill_gaps(texels, np.clip(share * (1 + grain * GRAIN / np.sqrt(share + 0.05)), 0, 1), side)
+
+
+def stubble_share(places: Floats) -> Floats:
+    """`hair_share` of cropped hair, which gets denser over a longer distance from the hairline."""
+    return hair_share(places, STUBBLE_SOFT_MM)
 
 
 def _fill_gaps(texels: Texels, cover: Floats, side: int) -> NDArray[np.uint8]:

@@ -19,6 +19,7 @@ from corpus_tools.head.layout import layout_coordinates
 from corpus_tools.head.lids import LidEdge, find_lid_edges, wet_piece
 from corpus_tools.head.lips import close_lips, lip_front, lip_ring
 from corpus_tools.head.piece import HeadPieces, MaterialSpan, Piece
+from corpus_tools.head.retreat import add_retreat
 from corpus_tools.head.shapes import clear_eyeballs, correct_shapes
 from corpus_tools.head.skin import Skin, build_shoulders, build_skin
 from corpus_tools.head.subdivide import triangulate
@@ -122,7 +123,7 @@ def _teeth_pieces(cage: Cage, skin: Skin, reference: ReferenceHead, jaw: Jaw) ->
         points = keep_behind(follow_lips(points, piece.vertices, ahead), skin.vertices, COVER_MM[name])
         pose, cover = COVERED_POSES[name]
         points = _cover_in_pose(points, skin, jaw, pose, cover)
-        moved = jaw.shapes(points) if name == "lower" else {}
+        moved = add_retreat(points, jaw.shapes(points), skin, reference.lips) if name == "lower" else {}
         pieces.append(Piece(points, piece.spans, piece.colours, moved))
     return pieces[0], pieces[1]
 

@@ -15,7 +15,12 @@ from tts2face.models.face_file import Identity
 
 Tint = tuple[float, float, float]
 PLAIN: Tint = (1.0, 1.0, 1.0)
-FRIENDLY: Mapping[str, float] = {"mouth/mouth-angles-up": 0.3}
+FRIENDLY: Mapping[str, float] = {
+    "mouth/mouth-angles-up": 0.35, "eyebrows/eyebrows-trans-up": 0.25, "eyebrows/eyebrows-angle-up": 0.2,
+}  # fmt: skip
+OPEN_BROWS: Mapping[str, float] = FRIENDLY | {  # angle-up lowers the outer half of the brow
+    "mouth/mouth-angles-up": 0.4, "eyebrows/eyebrows-trans-up": 0.6, "eyebrows/eyebrows-angle-up": 0.5,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +67,7 @@ YOUNG, OLD, CHILD = {"young": 1.0}, {"old": 1.0}, {"child": 0.85, "young": 0.15}
 PRESETS: dict[str, Preset] = {
     "erik": Preset(
         "man, about 30, European", "male", YOUNG, {"caucasian": 1}, Hairdo("short02", "dark-blond"),
-        (0.98, 0.95, 0.93), BLOND, (0.85, 0.93, 1.02), (1.2, 0.9, 0.8),
+        (0.98, 0.95, 0.93), BLOND, (0.85, 0.93, 1.02), (1.2, 0.9, 0.8), more=OPEN_BROWS,
     ),
     "amara": Preset(
         "woman, about 30, West African", "female", YOUNG, {"african": 1}, Hairdo("afro01", "black"),
@@ -71,6 +76,7 @@ PRESETS: dict[str, Preset] = {
     "kofi": Preset(
         "man, about 35, West African", "male", {"young": 0.85, "old": 0.15}, {"african": 1},
         Hairdo("short04", "black"), (0.43, 0.43, 0.405), BLACK, DARK, brows="eyebrow008", sclera=DARK_SCLERA,
+        more=OPEN_BROWS,
     ),
     "mei": Preset(
         "woman, about 28, East Asian", "female", YOUNG, {"asian": 1}, Hairdo("long01", "black"),
@@ -88,6 +94,7 @@ PRESETS: dict[str, Preset] = {
     "ravi": Preset(
         "man, about 30, mixed ancestry", "male", YOUNG, {"caucasian": 0.5, "african": 0.2, "asian": 0.3},
         Hairdo("short02", "black"), (0.69, 0.68, 0.62), BLACK, DARK, (1.7, 1.7, 1.6), sclera=DARK_SCLERA,
+        more=OPEN_BROWS,
     ),
     "ingrid": Preset(
         "woman, about 70, European", "female", OLD, {"caucasian": 1}, Hairdo("bob02", "white"),
@@ -95,7 +102,7 @@ PRESETS: dict[str, Preset] = {
     ),
     "walter": Preset(
         "man, about 65, European", "male", OLD, {"caucasian": 1}, Hairdo("cropped", "#6e6862"),
-        (0.98, 0.93, 0.91), GREY, more={"mouth/mouth-angles-up": 0.7},
+        (0.98, 0.93, 0.91), GREY, more=OPEN_BROWS | {"mouth/mouth-angles-up": 0.7},
     ),
     "nia": Preset(
         "child, about 9, mixed ancestry", "female", CHILD, {"caucasian": 0.4, "african": 0.4, "asian": 0.2},

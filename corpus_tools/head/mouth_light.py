@@ -11,7 +11,7 @@ from tts2face.render.occlusion import sphere_directions
 
 MOUTH_PARTS = ("teeth_upper", "teeth_lower", "gums_upper", "gums_lower", "tongue")
 AHEAD_Z = 0.2  # directions from which light enters the mouth, by their z
-LIT_SHARE, TONGUE_LIT_SHARE = 0.35, 0.7  # of these directions, open to each vertex in addition to those seen from it
+LIT_SHARE, TONGUE_LIT_SHARE = 0.45, 0.7  # of these directions, open to each vertex in addition to those seen from it
 MOUTH_U, MOUTH_V = (0.75, 0.93), 0.14  # MakeHuman's island of the mouth's cavity
 SEED = 5
 

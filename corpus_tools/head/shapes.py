@@ -22,8 +22,18 @@ SHAPE_GAINS = {  # brows of MakeHuman hardly rise; its upper lids hardly follow 
     "eyeLookUpLeft": 1.7,
     "eyeLookUpRight": 1.7,
 }
+BROW_DOWN = ("browDownLeft", "browDownRight")
+# MakeHuman lowers the outer half of a brow most, which is seen as sadness: gain by the distance from the middle, mm.
+BROW_X_MM, BROW_GAINS = (8.0, 20.0, 32.0, 48.0), (1.8, 1.25, 0.85, 0.55)
+ROUND_SHAPES, N_ROUND_MEANS = ("mouthPucker", "mouthFunnel"), 8  # smoothed above the upper lip, where they crease
+LIP_NEAR_MM, LIP_FAR_MM, LIP_TOP = (
+    (4.5, 8.0),
+    (18.0, 26.0),
+    6.60,
+)  # distances of that skin from the lips, and its height
 N_MEANS = 14  # averages over neighbours; removes folds narrower than about 10 mm
 MOUTH = np.array([0.0, 6.585, 1.50])  # on the source's base mesh, its units
+UPPER_LIP = np.array([0.0, 6.64, 1.60])
 NEAR, FAR = 0.30, 0.46  # distance from the mouth where smoothing begins (lips keep their shape) and is full (cheeks)
 BELOW_EYES = 7.10
 
@@ -42,7 +52,21 @@ def correct_shapes(skin: Skin) -> Skin:
         shapes[name] = shapes[name] + share[:, None] * (smooth - shapes[name])
     for name, factor in SHAPE_GAINS.items():
         shapes[name] = factor * shapes[name]
+    for name in BROW_DOWN:
+        shapes[name] = np.interp(np.abs(skin.vertices[:, 0]), BROW_X_MM, BROW_GAINS)[:, None] * shapes[name]
+    _smooth_rounding(skin, shapes, means)
     return replace(skin, shapes=shapes)
+
+
+def _smooth_rounding(skin: Skin, shapes: dict[str, Floats], means: sparse.csr_array) -> None:
+    """Smooth the shapes of rounding on the skin above the upper lip, in place."""
+    off = 100.0 * np.linalg.norm((skin.base - UPPER_LIP) * [0.45, 1.0, 0.6], axis=1)
+    share = smoothstep(off, *LIP_NEAR_MM) * (1 - smoothstep(off, *LIP_FAR_MM)) * (skin.base[:, 1] > LIP_TOP)
+    for name in ROUND_SHAPES:
+        smooth = shapes[name]
+        for _ in range(N_ROUND_MEANS):
+            smooth = 0.3 * smooth + 0.7 * (means @ smooth)
+        shapes[name] = shapes[name] + share[:, None] * (smooth - shapes[name])
 
 
 def neighbour_means(skin: Skin) -> sparse.csr_array:

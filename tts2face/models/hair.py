@@ -17,7 +17,7 @@ BALD = "bald"  # haircut without hair
 MEAN_RELIEF = 128.0  # relief at which a strand has the colour of the hair
 HAIR_COLOURS: Mapping[str, str] = {
     "black": "14100e", "dark-brown": "2b1d14", "brown": "463326", "light-brown": "66503d", "auburn": "5a2a1a",
-    "red": "8a3f1d", "dark-blond": "7f6950", "blond": "a69378", "grey": "8f8c89", "white": "c6c3be",
+    "red": "8a3f1d", "dark-blond": "7f6950", "blond": "a69378", "grey": "8f8c89", "white": "a29e98",
 }  # fmt: skip  # sRGB
 MATERIAL = Part(HAIR_PART, 0, 0, specular=0.3, shininess=24.0, wrap=0.3, cutout=True, kind="strands")
 
