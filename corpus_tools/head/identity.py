@@ -18,8 +18,8 @@ PLAIN: Tint = (1.0, 1.0, 1.0)
 FRIENDLY: Mapping[str, float] = {
     "mouth/mouth-angles-up": 0.35, "eyebrows/eyebrows-trans-up": 0.25, "eyebrows/eyebrows-angle-up": 0.2,
 }  # fmt: skip
-OPEN_BROWS: Mapping[str, float] = FRIENDLY | {  # angle-up lowers the outer half of the brow
-    "mouth/mouth-angles-up": 0.4, "eyebrows/eyebrows-trans-up": 0.6, "eyebrows/eyebrows-angle-up": 0.5,
+OPEN_BROWS: Mapping[str, float] = {  # angle-up lowers the outer half of the brow
+    **FRIENDLY, "mouth/mouth-angles-up": 0.4, "eyebrows/eyebrows-trans-up": 0.6, "eyebrows/eyebrows-angle-up": 0.5,
 }  # fmt: skip
 
 
@@ -102,7 +102,7 @@ PRESETS: dict[str, Preset] = {
     ),
     "walter": Preset(
         "man, about 65, European", "male", OLD, {"caucasian": 1}, Hairdo("cropped", "#6e6862"),
-        (0.98, 0.93, 0.91), GREY, more=OPEN_BROWS | {"mouth/mouth-angles-up": 0.7},
+        (0.98, 0.93, 0.91), GREY, more={**OPEN_BROWS, "mouth/mouth-angles-up": 0.7},
     ),
     "nia": Preset(
         "child, about 9, mixed ancestry", "female", CHILD, {"caucasian": 0.4, "african": 0.4, "asian": 0.2},
