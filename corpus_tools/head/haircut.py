@@ -43,7 +43,7 @@ ROOT_MM, ROOT_SPREAD_MM = 7.0, 2.2  # width of a hairline, and that of its ragge
 # Half width of a parting in the middle, heights between which it begins, and share of the direction of its roots.
 PARTING_MM, PARTING_Y, ROOT_TURN = 9.0, (50.0, 75.0), 1.0
 CURL_TOP, CURL_ROOT, CURL_SIDE, CURL_SPREAD = 0.68, (0.86, 0.98), 0.08, 0.03  # shares of the texture
-CURL_HAZE, CURL_SOLID, CURL_TURN = 70.0, 190.0, 0.24  # coverage of haze and of curls, of 255; spread of directions
+CURL_HAZE, CURL_SOLID, CURL_TURN = 70.0, 190.0, 0.42  # coverage of haze and of curls, of 255; spread of directions
 CROWN_Y, N_CROWN_MEANS = (40.0, 80.0), 12  # heights between which the crown begins
 
 
@@ -192,7 +192,7 @@ HAIRCUTS: Mapping[str, Haircut] = {
     ),
     "ponytail01": Haircut("combed back into a ponytail", 768, StrandStyle(9.0, contrast=0.6)),
     "braid01": Haircut("side fringe and a braid at the back", 640, StrandStyle(contrast=0.3), (trim_fringe,)),
-    "afro01": Haircut("rounded afro", 640, StrandStyle(contrast=1.5), finish=finish_curls),
+    "afro01": Haircut("rounded afro", 640, StrandStyle(contrast=1.3), finish=finish_curls),
     "short01": Haircut("short, tousled on top", 640),
     "short02": Haircut("short with a full fringe", 896, StrandStyle(12.0, contrast=0.5, broad=0.12)),
     "short03": Haircut("short bob with a side fringe", edits=(trim_fringe,)),

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from corpus_tools.head.lips import ring_arcs
 from corpus_tools.head.skin import Skin
@@ -11,7 +12,10 @@ from corpus_tools.head.subdivide import triangulate
 
 Floats = NDArray[np.float64]
 
-COVER_MM = 1.3  # of skin ahead of teeth and gums below the lip
+COVER_MM = (
+    2.4  # of skin ahead of teeth and gums below the lip, for all people, whose shapes are those of the default one
+)
+CROWN_MM = 3.0  # half the size of a crown: it retreats as a whole
 BELOW_LIP_MM = 1.0  # what is higher than this below the edge of the lower lip is seen in the open mouth
 LARGEST_MM = 8.0
 OPENINGS = (0.5, 0.7, 0.85, 1.0)  # weights of jawOpen with which a smile is corrected
@@ -41,8 +45,14 @@ def add_retreat(points: Floats, shapes: Mapping[str, Floats], skin: Skin, lips: 
         depth = place[:, 2] - front_depth(place[:, :2], posed, triangulate(skin.quads)) + COVER_MM
         return np.where(is_below & (points[:, 2] > 0), np.clip(depth, 0.0, LARGEST_MM), 0.0)
 
-    moved["jawOpen"] = moved["jawOpen"] + np.outer(lacking(1.0, 0.0), BACKWARDS)
-    most = np.max([lacking(opening, 1.0) for opening in OPENINGS], axis=0)
+    beside = cKDTree(points[:, [0, 2]]).query_ball_point(points[:, [0, 2]], CROWN_MM)
+
+    def whole(depth: Floats) -> Floats:
+        """(N,) largest retreat of the vertices above, below and beside each one."""
+        return np.array([depth[near].max() for near in beside])
+
+    moved["jawOpen"] = moved["jawOpen"] + np.outer(whole(lacking(1.0, 0.0)), BACKWARDS)
+    most = whole(np.max([lacking(opening, 1.0) for opening in OPENINGS], axis=0))
     for name in SMILES:
         is_own = points[:, 0] > 0 if name.endswith("Left") else points[:, 0] <= 0
         moved[name] = np.outer(most * is_own, BACKWARDS)
