@@ -215,7 +215,7 @@ def gesture_face(face: Face, palette: Palette) -> GestureFace:
     return GestureFace(
         face=extended_face,
         n_speech_shapes=len(face.shape_names),
-        expressions=expression_weights(extended_face, mouth),
+        expressions=expression_weights(extended_face, mouth.with_smile_cost()),
         regions=regions,
         gaze=gaze_weights(extended_face),
         mouth=mouth.with_gesture_cost(),

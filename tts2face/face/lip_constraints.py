@@ -28,6 +28,8 @@ GAP_CONSTRAINT_WEIGHT = 1e5  # relative to a landmark of the cheek; 300 in retar
 CHANGE_COST = 0.5  # of changes of the weights in contacts, relative to the median curvature
 # Of changes of a smile by gestures: lips close by pressing and rolling; a smaller smile is seen as another mood.
 SMILE_COST, SMILE_PREFIX = 5.0, "mouthSmile"
+GESTURE_COST = 1.0  # of changes of all weights by gestures
+CLOSED_SMILE_COST = 0.3  # of the smile of a basis expression, whose lips are closed
 FULL_GROWTH_GAP_MM = 1.5  # gaps smaller than this are amplified by less than the gain
 GAP_TOLERANCE_MM = 0.01  # largest gap of closed lips
 FULL_ROUNDING_MM = 8.0  # a mouth this much narrower than at rest is fully rounded
@@ -69,7 +71,11 @@ class LipConstraints:
 
     def with_gesture_cost(self) -> "LipConstraints":
         """The constraints with a cost of changes of the weights, the largest of a smile's."""
-        return self._with_costs(np.where(self.is_smile, CHANGE_COST + SMILE_COST, CHANGE_COST))
+        return self._with_costs(np.where(self.is_smile, GESTURE_COST + SMILE_COST, GESTURE_COST))
+
+    def with_smile_cost(self) -> "LipConstraints":
+        """The constraints with a cost of changes of a smile, for basis expressions."""
+        return self._with_costs(np.where(self.is_smile, CLOSED_SMILE_COST, 0.0))
 
     def _with_costs(self, costs: FloatArray) -> "LipConstraints":
         """The constraints with costs (k,) of changes of the weights, relative to the median curvature."""

@@ -18,7 +18,7 @@ from tts2face.models.palette import GESTURE_FPS
 SMOOTHING_STAGES = 4  # low-pass stages in series: 80 dB per decade, so that scaled motion adds nothing above 6 Hz
 LOUD_DB = 0.0  # intensity relative to the mean level of speech at which the loudness is 1
 # Emphasis of a mood's expression: share in silence, gain with the smoothed loudness, and spread of a slow random part.
-SILENT_EMPHASIS, LOUDNESS_EMPHASIS, RANDOM_EMPHASIS = 0.885, 0.21, 0.07
+SILENT_EMPHASIS, LOUDNESS_EMPHASIS, RANDOM_EMPHASIS = 0.86, 0.21, 0.07
 EMPHASIS_HZ, RANDOM_HZ = 0.9, 0.25
 EMPHASIS_LIMITS = (0.6, 1.35)
 
