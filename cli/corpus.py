@@ -50,6 +50,7 @@ def build(  # noqa: PLR0913 - one parameter a flag
         Path | None,
         Parameter(help="Write an HTML report: pictures, curves, measures, rejected recordings and reasons."),
     ] = None,
+    strict: Annotated[bool, switch("Reject recordings with warnings, too.")] = False,
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
@@ -74,8 +75,11 @@ def build(  # noqa: PLR0913 - one parameter a flag
             run_options=RunOptions(cache, jobs, model),
             consent=consent_fields,
             report=report,
+            is_strict=strict,
             stages=stages or ignore_stage,
         )
+    for warning in result.warnings:
+        write_message(f"warning about {warning.name}: {warning.message}")
     for refusal in result.refused:
         write_message(f"rejected {refusal.name}: {refusal.reason}")
     write_message(

@@ -9,7 +9,7 @@ from typing import Any
 
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.recordings.observe import Refusal, check_any_kept, observe
+from corpus_tools.recordings.observe import QualityWarning, Refusal, check_any_kept, observe
 from corpus_tools.report.drawing import load_matplotlib
 from corpus_tools.report.recordings import recordings_page
 from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
@@ -39,11 +39,12 @@ CONTENT = "motion only: landmark shapes, head pose, phones and loudness; no imag
 
 @dataclass(frozen=True, slots=True)
 class BuiltTalker:
-    """Result of a build: number and minutes of kept recordings, and refusals."""
+    """Result of a build: number and minutes of kept recordings, refusals, and warnings about kept ones."""
 
     n_kept: int
     minutes: float
     refused: tuple[Refusal, ...]
+    warnings: tuple[QualityWarning, ...] = ()
 
 
 def build_talker(  # noqa: PLR0913 - run options and the date change no motion
@@ -56,6 +57,7 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
     created: str | None = None,
     consent: Mapping[str, str] | None = None,
     report: Path | None = None,
+    is_strict: bool = False,
     stages: StageCallback = ignore_stage,
 ) -> BuiltTalker:
     """Observe recordings, learn a talker and write it; apart from `created` the bytes are reproducible.
@@ -72,6 +74,8 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
         Consent of the person shown, from `consent_record`; required for an appearance model.
     report
         HTML page about the recordings to write, also if none could be used.
+    is_strict
+        Whether recordings with warnings are refused.
     stages
         Called with the name of each stage at its start.
 
@@ -87,7 +91,7 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
     if report is not None:
         load_matplotlib()  # reports a missing package before the recordings are read
     stated = read_provenance(provenance or recordings / PROVENANCE, must_exist=provenance is not None)
-    observations = observe(recordings, run_options=run_options, on_progress=stages(READING_STAGE))
+    observations = observe(recordings, is_strict=is_strict, run_options=run_options, on_progress=stages(READING_STAGE))
     talker_name = name or stated.get("name") or recordings.resolve().stem
     if report is not None:
         write_atomically(report, recordings_page(talker_name, observations).encode())
@@ -114,7 +118,7 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
         )
     write_talker(out, talker)
     seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
-    return BuiltTalker(len(talker.utterances), seconds / 60.0, observations.refused)
+    return BuiltTalker(len(talker.utterances), seconds / 60.0, observations.refused, observations.warnings)
 
 
 def add_appearance(
