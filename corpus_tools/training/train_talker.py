@@ -17,6 +17,7 @@ from tts2face.video.pose import head_angles
 REST_MARGIN_S = 0.2  # lips start to move this long before the first sound
 # Of the distance of the outer eye corners: the inner lips' gap below which the mouth counts as closed.
 CLOSED_GAP = 0.01
+CLOSED_SHARE = 0.05  # of the frames, with the smallest openings, where no resting frame is found
 
 
 def learn_talker(
@@ -83,11 +84,18 @@ def learn_shapes(observations: Sequence[Observation], n_speech: int, n_other: in
 
 
 def resting_parameters(observations: Sequence[Observation], model: ShapeModel) -> NDArray[np.float32]:
-    """(M,) mean parameters of the silent frames with closed lips before speech; zeros if there are none."""
+    """(M,) mean parameters of the silent frames with closed lips before speech.
+
+    Lips of some people are tracked farther apart; without such frames, those of the person's smallest openings rest.
+    """
     total = np.zeros(len(model.spread))
     n_frames = 0
-    for observation in observations:
-        still = resting_frames(observation)
+    chosen = [resting_frames(observation) for observation in observations]
+    if not any(still.any() for still in chosen):
+        openings = [lip_opening(observation.landmarks) for observation in observations]
+        closed = np.quantile(np.concatenate(openings), CLOSED_SHARE)
+        chosen = [opening <= closed for opening in openings]
+    for observation, still in zip(observations, chosen, strict=True):
         parameters = model.parameters(observation.landmarks[still])
         total += parameters.sum(axis=0)
         n_frames += len(parameters)
