@@ -258,7 +258,7 @@ def _rest_of_model(model: ShapeModel) -> FloatArray:
     if deviations[furthest] > MAX_REST_DEVIATIONS:
         raise DataError(
             f"the rest of a talker lies {deviations[furthest]:.3g} standard deviations from its mean "
-            f"in mode {furthest}, limit {MAX_REST_DEVIATIONS:g}; build it again from recordings that begin with closed lips"
+            f"in mode {furthest}, limit {MAX_REST_DEVIATIONS:g}; build it from recordings that begin with closed lips"
         )
     return rest_with_open_lips(model, parameter_limits(model))
 
