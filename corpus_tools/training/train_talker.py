@@ -46,9 +46,13 @@ def learn_talker(
         if observation.fps != fps:
             raise DataError(f"{observation.name} has {observation.fps:g} frames per second, others {fps:g}; convert it")
     model = learn_shapes(observations, n_speech, n_other)
+    return Talker(fps, model, build_utterances(observations, model), dict(metadata))
+
+
+def build_utterances(observations: Sequence[Observation], model: ShapeModel) -> tuple[Utterance, ...]:
+    """The observations as utterances in the parameters of a model, with head angles relative to their mean."""
     turn = mean_rotation(observations)
-    utterances = tuple(_build_utterance(observation, model, turn) for observation in observations)
-    return Talker(fps, model, utterances, dict(metadata))
+    return tuple(_build_utterance(observation, model, turn) for observation in observations)
 
 
 def learn_shapes(observations: Sequence[Observation], n_speech: int, n_other: int) -> ShapeModel:
