@@ -50,6 +50,9 @@ def build(  # noqa: PLR0913 - one parameter a flag
         Path | None,
         Parameter(help="Write an HTML report: pictures, curves, measures, rejected recordings and reasons."),
     ] = None,
+    base: Annotated[
+        str, Parameter(help="Talker that completes recordings of less than 10 minutes, or none: recordings only.")
+    ] = "grid_s1",
     strict: Annotated[bool, switch("Reject recordings with warnings, too.")] = False,
     jobs: Jobs = None,
     cache: Cache = None,
@@ -75,6 +78,7 @@ def build(  # noqa: PLR0913 - one parameter a flag
             run_options=RunOptions(cache, jobs, model),
             consent=consent_fields,
             report=report,
+            base=base,
             is_strict=strict,
             stages=stages or ignore_stage,
         )
@@ -85,6 +89,8 @@ def build(  # noqa: PLR0913 - one parameter a flag
     write_message(
         f"wrote {out}: {result.n_kept} recordings, {result.minutes:.1f} minutes, {len(result.refused)} rejected"
     )
+    for note in result.notes:
+        write_message(note)
 
 
 def check_suffix(out: Path, kind: str) -> None:

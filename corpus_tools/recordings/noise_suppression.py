@@ -44,10 +44,11 @@ def suppress_noise(sound: Waveform) -> Waveform:
         return sound
     from scipy.signal import istft, stft
 
-    options = {"fs": sound.rate, "nperseg": WINDOW, "noverlap": WINDOW - STEP}
-    spectrum = stft(sound.samples.astype(np.float64), **options)[2]
-    _, cleaned = istft(spectrum * wiener_gains(np.square(np.abs(spectrum))), **options)
-    return Waveform(np.clip(cleaned[: len(sound.samples)], -1.0, 1.0).astype(np.float32), sound.rate)
+    samples, overlap = sound.samples.astype(np.float64), WINDOW - STEP
+    spectrum = stft(samples, fs=sound.rate, nperseg=WINDOW, noverlap=overlap)[2]
+    gains = wiener_gains(np.square(np.abs(spectrum)))
+    cleaned = np.real(istft(spectrum * gains, fs=sound.rate, nperseg=WINDOW, noverlap=overlap)[1])
+    return Waveform(np.clip(cleaned[: len(samples)], -1.0, 1.0).astype(np.float32), sound.rate)
 
 
 def wiener_gains(power: Floats) -> Floats:

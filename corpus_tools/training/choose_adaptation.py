@@ -75,8 +75,9 @@ def choose_adaptation(
     if len(observations) < 2:
         return ChosenAdaptation(BASE_ONLY, None, {})
     lips = {one.name: base_lips(base, one) for one in observations}
+    models: dict[tuple[str, ...], ShapeModel] = {}  # of each fold
     learners: dict[str, Learner] = {
-        _name(adaptation): _adapted_learner(base, adaptation, lips) for adaptation in ADAPTATIONS
+        _name(adaptation): _adapted_learner(base, adaptation, lips, models) for adaptation in ADAPTATIONS
     }
     learners |= {name: _own_learner(method) for name, method in OWN_METHODS.items()}
     scores = {}
@@ -112,9 +113,15 @@ def _name(adaptation: Adaptation) -> str:
     return f"base, trust {adaptation.trust:g}, penalty {adaptation.penalty:g}"
 
 
-def _adapted_learner(base: Base, adaptation: Adaptation, lips: Mapping[str, NDArray[np.float32]]) -> Learner:
+def _adapted_learner(
+    base: Base,
+    adaptation: Adaptation,
+    lips: Mapping[str, NDArray[np.float32]],
+    models: dict[tuple[str, ...], ShapeModel],
+) -> Learner:
     def learn(known: Sequence[Observation]) -> Synthesis:
-        model = combined_shapes(base.talker.model, known)
+        names = tuple(one.name for one in known)
+        model = models[names] = models.get(names) or combined_shapes(base.talker.model, known)
         mapped = learn_base_map(base, known, model, adaptation, lips)
 
         def synthesise(one: Observation) -> Landmarks:
