@@ -30,10 +30,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Adaptation:
-    """How own material changes a base: arguments of `fit_base_map`; with a `NO_CHANGE` penalty only the mean pose."""
+    """How own material changes a base: arguments of `fit_base_map`; with a `NO_CHANGE` penalty only the mean pose.
+
+    ``gain`` multiplies the motion about the mean pose, because predictions by regression are smaller than the motion.
+    """
 
     trust: float
     penalty: float
+    gain: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,9 +99,9 @@ def learn_base_map(
         np.maximum(part.spread[: part.n_speech].astype(np.float64), 1e-6) for part in (base.talker.model, model)
     )
     penalty = adaptation.penalty * observations[0].fps / REFERENCE_FPS
-    return fit_base_map(
-        together, np.concatenate(targets), prior, (scales[0], scales[1]), trust=adaptation.trust, penalty=penalty
-    )
+    own = np.concatenate(targets)
+    mapped = fit_base_map(together, own, prior, (scales[0], scales[1]), trust=adaptation.trust, penalty=penalty)
+    return mapped.amplified(adaptation.gain, own.mean(axis=0))
 
 
 def map_inventory(base: Base, observations: Sequence[Observation]) -> tuple[str, ...]:

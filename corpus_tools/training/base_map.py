@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lexicon.phones import nearest_phones, phone_features
 from lexicon.sequence import PhoneSequence
 from tts2face.models.audio_map import AudioMap
-from tts2face.models.phone_network import PHONE_WINDOW_S, STEP_S, PhoneNetwork, window_features
+from tts2face.models.phone_network import N_PLACE, PHONE_WINDOW_S, STEP_S, PhoneNetwork, window_features
 
 N_OFFSETS = 2 * round(PHONE_WINDOW_S / STEP_S) + 1  # leading columns of `window_features`
 KERNEL_CENTRES_S = (-0.2, -0.1, 0.0, 0.1, 0.2)  # of the Gaussian windows through which phones are seen
@@ -63,6 +63,12 @@ class BaseMap:
             moved += self.window[offset, terms.labels[:, offset]]
         return np.asarray(moved)
 
+    def amplified(self, gain: float, about: Floats) -> "BaseMap":
+        """The map with its motion about a pose (D,) multiplied by `gain`."""
+        return BaseMap(
+            self.inventory, gain * self.matrix, gain * self.offset + (1.0 - gain) * about, gain * self.window
+        )
+
     def network(self, network: PhoneNetwork) -> PhoneNetwork:
         """The network of the new person.
 
@@ -72,13 +78,12 @@ class BaseMap:
         known = {label: at for at, label in enumerate(network.inventory)}
         rows = np.array([known[nearest_phones(label, network.inventory)[0]] for label in self.inventory])
         first = network.weights[0]
-        n_place = first.shape[1] % len(known)
-        shown = first[:, : first.shape[1] - n_place].reshape(len(first), -1, len(known), first.shape[2])
+        shown = first[:, : first.shape[1] - N_PLACE].reshape(len(first), -1, len(known), first.shape[2])
         linear = np.zeros((shown.shape[1], len(self.inventory), 2 * n_outputs))
         linear[:N_OFFSETS, :, :n_outputs] = self.window
         linear[:, :, n_outputs:] = -linear[:, :, :n_outputs]
         phones = np.concatenate([shown[:, :, rows], np.broadcast_to(linear, (len(first), *linear.shape))], axis=3)
-        place = _pad_columns(first[:, first.shape[1] - n_place :], 2 * n_outputs)
+        place = _pad_columns(first[:, first.shape[1] - N_PLACE :], 2 * n_outputs)
         weights = [np.concatenate([phones.reshape(len(first), -1, phones.shape[3]), place], axis=1)]
         weights += [_with_identity(inner, 2 * n_outputs) for inner in network.weights[1:-1]]
         signs = np.concatenate([np.eye(n_outputs), -np.eye(n_outputs)])

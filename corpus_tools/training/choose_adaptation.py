@@ -1,13 +1,13 @@
 """Choice of how far own material changes a base talker, by cross-validation on the person's own sentences."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.evaluation.evaluate import SpeakerScale
-from corpus_tools.evaluation.measures import DTW_BAND_S, correlation, speech_frames, warping_cost
+from corpus_tools.evaluation.measures import DTW_BAND_S, correlation, range_ratio, speech_frames, warping_cost
 from corpus_tools.evaluation.methods import build_methods
 from corpus_tools.evaluation.reference import LipCurves
 from corpus_tools.recordings.observation import Observation
@@ -18,6 +18,9 @@ from tts2face.models.talker import ShapeModel
 from tts2face.types import Progress
 
 MAX_FOLDS = 5
+# Wanted deviation of the opening over the real one: larger motion costs little up to here (docs/decisions/131-base.md).
+RANGE_RATIO = 0.85
+MAX_GAIN = 1.5
 BASE_ONLY = Adaptation(trust=1.0, penalty=NO_CHANGE)
 # Trust and penalty that were best from 10 s on in another speaker's learning curve, and more careful ones
 # (docs/decisions/131-base.md); trust of 0 ignores the base where own material is.
@@ -38,11 +41,15 @@ Learner = Callable[[Sequence[Observation]], Synthesis]
 
 @dataclass(frozen=True, slots=True)
 class HeldOutScore:
-    """Correlations of opening and width with held-out sentences, and their warping cost; all of z-scored curves."""
+    """Correlations of opening and width with held-out sentences, and their warping cost; all of z-scored curves.
+
+    ``range_ratio`` is the deviation of the synthesised opening over that of the real one.
+    """
 
     opening: float
     width: float
     cost: float
+    range_ratio: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,7 +93,9 @@ def choose_adaptation(
         if on_progress:
             on_progress(done, len(learners))
     best = min(ADAPTATIONS, key=lambda adaptation: scores[_name(adaptation)].cost)
-    return ChosenAdaptation(best, scores[_name(best)], scores)
+    score = scores[_name(best)]
+    gain = float(np.clip(RANGE_RATIO / max(score.range_ratio, 1e-9), 1.0, MAX_GAIN))
+    return ChosenAdaptation(replace(best, gain=gain), score, scores)
 
 
 def cross_validate(learner: Learner, observations: Sequence[Observation]) -> HeldOutScore:
@@ -104,7 +113,7 @@ def cross_validate(learner: Learner, observations: Sequence[Observation]) -> Hel
             costs.append(warping_cost(real[-1], made[-1], np.ones(2), round(DTW_BAND_S * one.fps)))
     pooled, predicted = np.concatenate(real), np.concatenate(made)
     opening, width = (correlation(pooled[:, at], predicted[:, at]) for at in range(2))
-    return HeldOutScore(opening, width, float(np.mean(costs)))
+    return HeldOutScore(opening, width, float(np.mean(costs)), range_ratio(pooled[:, 0], predicted[:, 0]))
 
 
 def _name(adaptation: Adaptation) -> str:

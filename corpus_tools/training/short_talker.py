@@ -17,6 +17,15 @@ MIN_OWN_MINUTES = 10.0  # from here on a talker is learnt from its own recording
 NO_BASE = "none"
 MIN_TOKENS = 3  # of a phone; with fewer it is recommended for recording
 MIN_CONTEXTS = 3  # different pairs of neighbours of a phone, likewise
+MAX_LISTED = 12  # phones recommended at once, the rarest first
+# Words with each phone, by its ARPABET name.
+EXAMPLES = {
+    "AA": "father", "AE": "cat", "AH": "cup", "AO": "law", "AW": "how", "AY": "my", "B": "bee", "CH": "chair",
+    "D": "do", "DH": "this", "EH": "bed", "ER": "bird", "EY": "day", "F": "fee", "G": "go", "HH": "he", "IH": "sit",
+    "IY": "see", "JH": "joy", "K": "key", "L": "low", "M": "me", "N": "no", "NG": "sing", "OW": "go", "OY": "boy",
+    "P": "pea", "R": "red", "S": "so", "SH": "she", "T": "tea", "TH": "think", "UH": "book", "UW": "two", "V": "van",
+    "W": "we", "Y": "yes", "Z": "zoo", "ZH": "vision",
+}  # fmt: skip
 STATED_BY_BOTH = ("sources", "licence", "attribution")
 NOT_STATED = "not stated"
 
@@ -78,13 +87,12 @@ def recording_advice(observations: Sequence[Observation]) -> tuple[str, ...]:
         for before, label, behind in zip(labels, labels[1:], labels[2:], strict=False):
             counts[label] += 1
             contexts.setdefault(label, set()).add((before, behind))
-    rare = {name: counts[label] for name, label in ARPABET.items() if counts[label] < MIN_TOKENS}
-    narrow = [
-        name for name, label in ARPABET.items() if name not in rare and len(contexts.get(label, ())) < MIN_CONTEXTS
-    ]
+    spoken = {name: counts[ARPABET[name]] for name in EXAMPLES}
+    rare = sorted((name for name in EXAMPLES if spoken[name] < MIN_TOKENS), key=lambda name: (spoken[name], name))
+    narrow = [name for name in EXAMPLES if name not in rare and len(contexts.get(ARPABET[name], ())) < MIN_CONTEXTS]
     advice = []
     if rare:
-        listed = ", ".join(f"{name} ({count})" for name, count in sorted(rare.items(), key=lambda item: item[1]))
+        listed = ", ".join(f"{name} as in {EXAMPLES[name]} ({spoken[name]})" for name in rare[:MAX_LISTED])
         advice.append(f"record words with these phones next (times spoken so far): {listed}")
     if narrow:
         advice.append(f"record these phones between other phones: {', '.join(narrow)}")
@@ -107,5 +115,6 @@ def _base_metadata(base: Base, chosen: ChosenAdaptation) -> dict[str, Any]:
         "name": base.talker.metadata.get("name", NOT_STATED),
         "trust": chosen.adaptation.trust,
         "penalty": chosen.adaptation.penalty,
+        "gain": round(chosen.adaptation.gain, 4),
         "held_out": held_out,
     }
