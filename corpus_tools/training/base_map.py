@@ -18,10 +18,10 @@ from tts2face.models.audio_map import AudioMap
 from tts2face.models.phone_network import N_PLACE, PHONE_WINDOW_S, STEP_S, PhoneNetwork, window_features
 
 N_OFFSETS = 2 * round(PHONE_WINDOW_S / STEP_S) + 1  # leading columns of `window_features`
-KERNEL_CENTRES_S = (-0.2, -0.1, 0.0, 0.1, 0.2)  # of the Gaussian windows through which phones are seen
-KERNEL_S = 0.05  # their standard deviation
+KERNEL_CENTRES_S = (-0.08, 0.0, 0.08)  # of the Gaussian windows through which phones are seen
+KERNEL_S = 0.06  # their standard deviation
 # Scales of the terms before the ridge penalty; larger terms are penalised less (docs/decisions/131-base.md).
-LABEL_SCALE, BASE_SCALE = 3.0, 0.5
+LABEL_SCALE, BASE_SCALE = 2.5, 0.5
 
 Floats = NDArray[np.float64]
 
@@ -159,7 +159,7 @@ def _without_means(values: Floats, utterance: NDArray[np.int64]) -> Floats:
 
 
 def _window_codes(inventory: Sequence[str]) -> Floats:
-    """(`N_OFFSETS`, P, K) terms of each phone at each offset: its label, and its features in five Gaussian windows."""
+    """(`N_OFFSETS`, P, K) terms of each phone at each offset: its label, and its features in all Gaussian windows."""
     times = (np.arange(N_OFFSETS) - N_OFFSETS // 2) * STEP_S
     kernels = np.exp(-0.5 * ((times[:, None] - np.array(KERNEL_CENTRES_S)) / KERNEL_S) ** 2)
     kernels /= kernels.sum(axis=0)

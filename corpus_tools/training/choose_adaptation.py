@@ -23,13 +23,13 @@ RANGE_RATIO = 0.85
 MAX_GAIN = 1.5
 BASE_ONLY = Adaptation(trust=1.0, penalty=NO_CHANGE)
 # Trust and penalty that were best from 10 s on in another speaker's learning curve, and more careful ones
-# (docs/decisions/131-base.md); trust of 0 ignores the base where own material is.
+# (docs/decisions/131-base.md).
 ADAPTATIONS = (
     BASE_ONLY,
     Adaptation(trust=1.0, penalty=300.0),
-    Adaptation(trust=0.6, penalty=100.0),
-    Adaptation(trust=0.6, penalty=30.0),
-    Adaptation(trust=0.0, penalty=30.0),
+    Adaptation(trust=0.6, penalty=60.0),
+    Adaptation(trust=0.3, penalty=60.0),
+    Adaptation(trust=0.3, penalty=30.0),
 )
 OWN_METHODS = {"mean face": "mean face", "mean pose": "mean phone pose", "own examples": "exemplar"}
 
@@ -43,13 +43,20 @@ Learner = Callable[[Sequence[Observation]], Synthesis]
 class HeldOutScore:
     """Correlations of opening and width with held-out sentences, and their warping cost; all of z-scored curves.
 
-    ``range_ratio`` is the deviation of the synthesised opening over that of the real one.
+    ``range_ratio`` is the deviation of the synthesised opening over that of the real one, ``costs`` are those of the
+    single sentences.
     """
 
     opening: float
     width: float
     cost: float
     range_ratio: float
+    costs: tuple[float, ...]
+
+    def is_surely_better(self, other: "HeldOutScore") -> bool:
+        """Whether the costs are lower by more than the standard error of the differences, sentence by sentence."""
+        gains = np.subtract(other.costs, self.costs)
+        return bool(gains.mean() > gains.std(ddof=1) / np.sqrt(len(gains)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +82,9 @@ class ChosenAdaptation:
 def choose_adaptation(
     base: Base, observations: Sequence[Observation], *, on_progress: Progress | None = None
 ) -> ChosenAdaptation:
-    """The adaptation with the least warping cost on held-out sentences of the person; the base alone for one sentence.
+    """The adaptation with the least warping cost on held-out sentences of the person.
+
+    The base alone for one sentence, or if no adaptation is better by more than the standard error.
 
     The cost of exemplars is not included: the map alone is applied to what the base synthesises.
     """
@@ -93,6 +102,8 @@ def choose_adaptation(
         if on_progress:
             on_progress(done, len(learners))
     best = min(ADAPTATIONS, key=lambda adaptation: scores[_name(adaptation)].cost)
+    if not scores[_name(best)].is_surely_better(scores[_name(BASE_ONLY)]):
+        best = BASE_ONLY
     score = scores[_name(best)]
     gain = float(np.clip(RANGE_RATIO / max(score.range_ratio, 1e-9), 1.0, MAX_GAIN))
     return ChosenAdaptation(replace(best, gain=gain), score, scores)
@@ -113,7 +124,8 @@ def cross_validate(learner: Learner, observations: Sequence[Observation]) -> Hel
             costs.append(warping_cost(real[-1], made[-1], np.ones(2), round(DTW_BAND_S * one.fps)))
     pooled, predicted = np.concatenate(real), np.concatenate(made)
     opening, width = (correlation(pooled[:, at], predicted[:, at]) for at in range(2))
-    return HeldOutScore(opening, width, float(np.mean(costs)), range_ratio(pooled[:, 0], predicted[:, 0]))
+    ratio = range_ratio(pooled[:, 0], predicted[:, 0])
+    return HeldOutScore(opening, width, float(np.mean(costs)), ratio, tuple(costs))
 
 
 def _name(adaptation: Adaptation) -> str:

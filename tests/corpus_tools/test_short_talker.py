@@ -9,7 +9,7 @@ import pytest
 from corpus_tools.clone_talker import transfer_talker
 from corpus_tools.recordings.observation import Observation, Quality
 from corpus_tools.training.adapt_talker import Base, adapted_talker
-from corpus_tools.training.choose_adaptation import ADAPTATIONS, BASE_ONLY, choose_adaptation
+from corpus_tools.training.choose_adaptation import ADAPTATIONS, BASE_ONLY, HeldOutScore, choose_adaptation
 from corpus_tools.training.short_talker import learn_short_talker, needs_base, recording_advice
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar.synthesis import build_exemplar_model, speech_trajectory
@@ -79,15 +79,22 @@ def test_a_base_of_another_frame_rate_is_resampled(base: Base, person: list[Obse
         assert len(after.shape) == 2 * len(before.shape) - 1
 
 
-def test_the_choice_is_never_worse_than_the_base(base: Base, person: list[Observation]) -> None:
+def test_the_choice_is_better_than_the_base_on_held_out_sentences(base: Base, person: list[Observation]) -> None:
     chosen = choose_adaptation(base, person)
     assert chosen.score is not None
+    assert chosen.adaptation.penalty < BASE_ONLY.penalty
     assert 1.0 <= chosen.adaptation.gain <= 1.5
-    assert chosen.score.cost == min(
-        score.cost for name, score in chosen.alternatives.items() if name.startswith("base")
-    )
+    of_bases = [score for name, score in chosen.alternatives.items() if name.startswith("base")]
+    assert chosen.score.cost == min(score.cost for score in of_bases)
+    assert chosen.score.is_surely_better(chosen.alternatives["base alone"])
     assert {"base alone", "mean face", "mean pose", "own examples"} <= set(chosen.alternatives)
     assert chosen.message.startswith(f"held-out r opening {chosen.score.opening:.2f}, width {chosen.score.width:.2f};")
+
+
+def test_a_difference_within_its_standard_error_is_no_improvement() -> None:
+    base = HeldOutScore(0.5, 0.4, 0.9, 0.8, (1.0, 0.8, 0.9))
+    assert not replace(base, costs=(0.7, 1.0, 0.9)).is_surely_better(base)
+    assert replace(base, costs=(0.8, 0.7, 0.7)).is_surely_better(base)
 
 
 def test_a_single_recording_keeps_the_base(base: Base, person: list[Observation]) -> None:
