@@ -81,13 +81,13 @@ def test_a_phone_of_the_person_takes_over_as_it_is_spoken_more_often() -> None:
     b = INVENTORY.index("b")
     targets = terms.base[:, :2] - 2.0 * np.outer(terms.labels[:, N_OFFSETS // 2] == b, [0.0, 1.0])
     shifts = []
-    for n in (100, 400, 4000):
+    for n in (20, 100, 4000):
         part = FrameTerms(terms.labels[:n], terms.base[:n], terms.utterance[:n])
         found = fit_base_map(part, targets[:n], PRIOR, UNIT, trust=1.0, penalty=30.0)
         steady = found.window.sum(axis=0)[:, 1]
         shifts.append(steady[b] - np.delete(steady, b).mean())
-    assert 0 > shifts[0] > shifts[1] > shifts[2]
-    assert shifts[2] == pytest.approx(-2.0, abs=0.3)
+    assert 0 > shifts[0] > shifts[1] + 0.3
+    assert shifts[1:] == pytest.approx([-2.0, -2.0], abs=0.4)
 
 
 def test_the_resting_position_of_single_utterances_is_no_evidence() -> None:
