@@ -103,7 +103,7 @@ def choose_adaptation(
             on_progress(done, len(learners))
     best = min(ADAPTATIONS, key=lambda adaptation: scores[_name(adaptation)].cost)
     if not scores[_name(best)].is_surely_better(scores[_name(BASE_ONLY)]):
-        best = BASE_ONLY
+        return ChosenAdaptation(BASE_ONLY, scores[_name(BASE_ONLY)], scores)
     score = scores[_name(best)]
     gain = float(np.clip(RANGE_RATIO / max(score.range_ratio, 1e-9), 1.0, MAX_GAIN))
     return ChosenAdaptation(replace(best, gain=gain), score, scores)
