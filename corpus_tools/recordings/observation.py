@@ -27,6 +27,9 @@ from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose
 TIME_TOLERANCE_S = 1e-6  # seconds
 N_NEIGHBOUR_FRAMES = 2.0  # frames around a span that are used to interpolate those in it
 MIN_FRAMES = 2
+MAX_OUTSIDE_S = (
+    0.08  # a phone may end this long after the picture; in noise, aligned words last to the end of the sound
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,15 +178,20 @@ def trim_to_picture(sound: AlignedSpeech, begin: float, stop: float) -> tuple[Ph
     Raises
     ------
     DataError
-        Speech lies outside.
+        Speech begins before, or ends more than `MAX_OUTSIDE_S` later, or a whole phone lies outside.
     """
     phones = list(sound.phones.phones)
     edges = sound.phones.edges.copy()
     lead = 1 if phones[0] == SILENCE and edges[1] <= begin else 0
     tail = len(phones) - (1 if phones[-1] == SILENCE and edges[-2] >= stop else 0)
-    phones, edges = phones[lead:tail], np.clip(edges[lead : tail + 1], None, stop)
+    phones, edges = phones[lead:tail], edges[lead : tail + 1]
     spoken = [i for i, phone in enumerate(phones) if phone != SILENCE]
-    if edges[spoken[0]] < begin or sound.phones.edges[lead + spoken[-1] + 1] > stop:
+    first, last = spoken[0], spoken[-1] + 1
+    if 0 < edges[last] - stop <= MAX_OUTSIDE_S and edges[last - 1] < stop:
+        edges[last] = stop
+    is_outside = edges[first] < begin or edges[last] > stop
+    edges = np.clip(edges, None, stop)
+    if is_outside:
         raise DataError(
             f"there is speech while no face is visible (visible: {begin:.2f} s to {stop:.2f} s); cut the video"
         )
