@@ -11,6 +11,7 @@ import argparse
 import io
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import av
@@ -46,6 +47,7 @@ Samples = NDArray[np.float32]
 Pictures = list[NDArray[np.uint8]]
 RNG = np.random.default_rng(0)
 EVERY_PICTURE = 8
+MIN_FOR_TALKER = 20  # recordings, below which no talker is learnt of them
 LAGS_MS = (-400, -200, -80, -40, 40, 80, 200, 400)
 ECHO_S, ECHO_LEVEL = 0.6, 0.7  # reverberation time of a room, level of its echo over the direct sound
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
@@ -181,7 +183,7 @@ def sound_rows(recordings: dict[str, Recording], seen: Sequence[Observation]) ->
                 learnt.append(again)
                 measured.append(measures)
                 fit = confidence_measure(measures["confidence"], measures["snr_db"], is_recognised=False)
-                check_limits({**measures, **fit})
+                check_limits({name: value for name, value in measures.items() if name != "confidence"} | fit)
             except DataError:
                 refused += 1
         curves = np.array([lag_correlations(one, shipped_talker_opening) for one in learnt])
@@ -191,7 +193,7 @@ def sound_rows(recordings: dict[str, Recording], seen: Sequence[Observation]) ->
             f"| {quantiles([one['confidence'] for one in measured], 0)} "
             f"| {np.mean([one['clipped'] for one in measured]):.1%} | {quantiles(near, 2)} "
             f"| {curves.mean(axis=0).max():.2f} | {refused} of {len(seen)} "
-            f"| {effect(learnt, seen) if len(seen) > 20 else ''} |"
+            f"| {effect(learnt, seen) if len(seen) > MIN_FOR_TALKER else ''} |"
         )
 
 
@@ -217,6 +219,28 @@ def sync_rows(name: str, seen: Sequence[Observation]) -> Iterator[str]:
         curve = np.array([lag_correlations(one, shipped_talker_opening) for one in late]).mean(axis=0)
         shifted.append(f"{lag:+d}: {1000 * LAGS_S[curve.argmax()]:+.0f}")
     yield f"{name}, known and estimated lags in ms: {', '.join(shifted)}"
+
+
+def harm_rows(seen: Sequence[Observation]) -> Iterator[str]:
+    """What a talker loses by recordings with the sound of others, and by delayed ones."""
+    others = [
+        next(
+            other
+            for other in (*seen[at + 1 :], *seen)
+            if other.phones.phones != one.phones.phones and other.phones.end < one.phones.end + 0.2
+        )
+        for at, one in enumerate(seen)
+    ]
+    for share in (0.1, 0.3, 1.0):
+        is_wrong = RNG.random(len(seen)) < share
+        mixed = [
+            replace(one, phones=other.phones, words=()) if wrong else one
+            for one, other, wrong in zip(seen, others, is_wrong, strict=True)
+        ]
+        yield f"{share:.0%} with another sentence's sound: {effect(mixed, seen)}"
+    for lag in (0.04, 0.08, 0.2, 0.4):
+        late = [replace(one, phones=delay_phones(one, lag)) for one in seen]
+        yield f"sound later by {1000 * lag:.0f} ms, not corrected: {effect(late, seen)}"
 
 
 def delay_phones(one: Observation, lag: float) -> PhoneSequence:
@@ -271,9 +295,9 @@ def main() -> None:
         recordings = {one.name: one for one in find_recordings(folder)}
         print(f"\n{folder.name}: quantiles 1, 5, 50, 95, 99 %", flush=True)
         pictures = seen[::EVERY_PICTURE] if len(seen) > EVERY_PICTURE else seen
-        for rows in (sync_rows(folder.name, seen), sound_rows(recordings, seen), picture_rows(recordings, pictures)):
-            for row in rows:
-                print(row, flush=True)
+        tables = [sync_rows(folder.name, seen), sound_rows(recordings, seen), picture_rows(recordings, pictures)]
+        for row in chain(*tables, harm_rows(seen) if len(seen) > MIN_FOR_TALKER else ()):
+            print(row, flush=True)
 
 
 if __name__ == "__main__":
