@@ -12,6 +12,7 @@ from corpus_tools.training.base_map import N_OFFSETS, BaseMap, FrameTerms, fit_b
 from corpus_tools.training.train_talker import build_utterances, resting_parameters
 from lexicon.phones import ARPABET
 from lexicon.sequence import SILENCE
+from tts2face.cloning.lip_gaps import UNBOUNDED_MM, facing_gaps, nearest_valid_parameters
 from tts2face.cloning.parameter_transfer import face_size
 from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model, speech_trajectory
 from tts2face.interpolation import interpolate_columns
@@ -170,7 +171,7 @@ def _carry_utterance(one: Utterance, base: Talker, model: ShapeModel, mapped: Ba
     before = np.arange(len(one.shape)) / base.fps
     times = np.arange(int(before[-1] * fps) + 1) / fps
     read = interpolate_columns(one.shape[:, : base.model.n_speech], before, times)
-    speech = mapped.parameters(frame_terms(one.phones, times, mapped.inventory, read))
+    speech = separate_lips(mapped.parameters(frame_terms(one.phones, times, mapped.inventory, read)), model)
     shape = np.repeat(model.rest[None].astype(np.float64), len(times), axis=0)
     shape[:, : model.n_speech] = speech
     head = interpolate_columns(one.head, before, times)
@@ -179,3 +180,19 @@ def _carry_utterance(one: Utterance, base: Talker, model: ShapeModel, mapped: Ba
     return Utterance(
         one.name, one.phones, one.words, shape.astype(np.float32), head.astype(np.float32), intensity.astype(np.float32)
     )
+
+
+def separate_lips(parameters: Floats, model: ShapeModel) -> Floats:
+    """Speech parameters (T, D); frames in which the lips would cross are replaced by the nearest without."""
+    gaps = facing_gaps(model)
+    n_speech = model.n_speech
+    constant = gaps[:, -1] + gaps[:, n_speech:-1] @ model.rest[n_speech:].astype(np.float64)
+    gaps = np.column_stack([gaps[:, :n_speech], constant])
+    crossed = (parameters @ gaps[:, :-1].T + gaps[:, -1] < 0.0).any(axis=1)
+    if not crossed.any():
+        return parameters
+    free = np.full(n_speech, UNBOUNDED_MM)
+    separated = parameters.copy()
+    any_gap = np.full((int(crossed.sum()), len(gaps)), UNBOUNDED_MM)
+    separated[crossed] = nearest_valid_parameters(parameters[crossed], free, gaps, any_gap)
+    return separated

@@ -8,10 +8,11 @@ import pytest
 
 from corpus_tools.clone_talker import transfer_talker
 from corpus_tools.recordings.observation import Observation, Quality
-from corpus_tools.training.adapt_talker import Base, adapted_talker
+from corpus_tools.training.adapt_talker import Adaptation, Base, adapted_talker, separate_lips
 from corpus_tools.training.choose_adaptation import ADAPTATIONS, BASE_ONLY, HeldOutScore, choose_adaptation
 from corpus_tools.training.short_talker import learn_short_talker, needs_base, recording_advice
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.cloning.lip_gaps import facing_gaps
 from tts2face.exemplar.synthesis import build_exemplar_model, speech_trajectory
 from tts2face.models.landmarks import lip_opening
 from tts2face.models.talker import Talker, load_talker, read_talker, write_talker
@@ -65,6 +66,15 @@ def test_carried_utterances_have_the_size_and_range_of_the_person(base: Base, pe
     carried = np.concatenate([lip_opening(made.model.shapes(one.shape)) for one in made.utterances[10:40]])
     before = np.concatenate([lip_opening(base.talker.model.shapes(one.shape)) for one in base.talker.utterances[:30]])
     assert 1.5 < carried.std() / before.std() < 2.2
+
+
+def test_lips_of_carried_utterances_do_not_cross(base: Base, person: list[Observation]) -> None:
+    made = adapted_talker(base, person[:3], Adaptation(trust=0.3, penalty=30.0, gain=1.5), METADATA)
+    gaps = facing_gaps(made.model)
+    frames = np.concatenate([one.shape for one in made.utterances[3:]]).astype(np.float64)
+    assert (frames @ gaps[:, :-1].T + gaps[:, -1]).min() > -1e-3  # mm; parameters are rounded to float32
+    plain = frames[:50, : made.model.n_speech]
+    assert separate_lips(plain, made.model) == pytest.approx(plain, abs=1e-3)
 
 
 def test_a_base_of_another_frame_rate_is_resampled(base: Base, person: list[Observation]) -> None:
