@@ -14,7 +14,7 @@ from lexicon.phones import ARPABET
 from lexicon.sequence import SILENCE
 from tts2face.cloning.lip_gaps import UNBOUNDED_MM, facing_gaps, nearest_valid_parameters
 from tts2face.cloning.parameter_transfer import face_size
-from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model, speech_trajectory
+from tts2face.exemplar.synthesis import DEFAULT_OPTIONS, ExemplarModel, build_exemplar_model, speech_trajectory
 from tts2face.interpolation import interpolate_columns
 from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
 from tts2face.models.talker import ShapeModel, Talker, Utterance
@@ -64,7 +64,7 @@ def adapted_talker(
     model = combined_shapes(base.talker.model, observations)
     own = build_utterances(observations, model)
     lips = {one.name: base_lips(base, one) for one in observations}
-    mapped = learn_base_map(base, observations, model, adaptation, lips)
+    mapped = learn_base_map(base, observations, model, adaptation, lips, amplitude=DEFAULT_OPTIONS.amplitude)
     fps = observations[0].fps
     carried = tuple(_carry_utterance(one, base.talker, model, mapped, fps) for one in base.talker.utterances)
     network = base.talker.network
@@ -84,6 +84,8 @@ def learn_base_map(
     model: ShapeModel,
     adaptation: Adaptation,
     lips: Mapping[str, NDArray[np.float32]],
+    *,
+    amplitude: float = 1.0,
 ) -> BaseMap:
     """Map from the base's speech parameters to those of the person.
 
@@ -91,6 +93,8 @@ def learn_base_map(
     ----------
     lips
         What the base synthesises for each utterance, by name, as `base_lips` returns it.
+    amplitude
+        By which motion is multiplied after the map.
     """
     inventory = map_inventory(base, observations)
     prior = _prior_map(base.talker.model, model, inventory)
@@ -102,7 +106,7 @@ def learn_base_map(
     penalty = adaptation.penalty * observations[0].fps / REFERENCE_FPS
     own = np.concatenate(targets)
     mapped = fit_base_map(together, own, prior, (scales[0], scales[1]), trust=adaptation.trust, penalty=penalty)
-    return mapped.amplified(adaptation.gain, own.mean(axis=0))
+    return mapped.amplified(adaptation.gain, own.mean(axis=0)).before_amplification(amplitude, together)
 
 
 def map_inventory(base: Base, observations: Sequence[Observation]) -> tuple[str, ...]:

@@ -58,16 +58,28 @@ class BaseMap:
 
     def parameters(self, terms: FrameTerms) -> Floats:
         """(T, D) parameters of the new person."""
-        moved = terms.base @ self.matrix.T + self.offset
+        return np.asarray(terms.base @ self.matrix.T + self.offset + self.phone_part(terms))
+
+    def phone_part(self, terms: FrameTerms) -> Floats:
+        """(T, D) part of the parameters that depends on the phones."""
+        part = np.zeros((len(terms.labels), len(self.offset)))
         for offset in range(N_OFFSETS):
-            moved += self.window[offset, terms.labels[:, offset]]
-        return np.asarray(moved)
+            part += self.window[offset, terms.labels[:, offset]]
+        return part
 
     def amplified(self, gain: float, about: Floats) -> "BaseMap":
         """The map with its motion about a pose (D,) multiplied by `gain`."""
         return BaseMap(
             self.inventory, gain * self.matrix, gain * self.offset + (1.0 - gain) * about, gain * self.window
         )
+
+    def before_amplification(self, amplitude: float, terms: FrameTerms) -> "BaseMap":
+        """The map for motion that synthesis multiplies by `amplitude` later; same mean over the given frames.
+
+        It was fitted on motion of the base that had been multiplied already, so that only the phones' part changes.
+        """
+        lost = (1.0 - 1.0 / amplitude) * self.phone_part(terms).mean(axis=0)
+        return BaseMap(self.inventory, self.matrix, self.offset + lost, self.window / amplitude)
 
     def network(self, network: PhoneNetwork) -> PhoneNetwork:
         """The network of the new person.

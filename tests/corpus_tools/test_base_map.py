@@ -104,3 +104,13 @@ def test_a_gain_multiplies_the_motion_about_a_pose() -> None:
     terms, mapped, pose = many_frames(100), made_map(), np.array([1.0, -2.0])
     expected = pose + 1.3 * (mapped.parameters(terms) - pose)
     assert mapped.amplified(1.3, pose).parameters(terms) == pytest.approx(expected, abs=1e-9)
+
+
+def test_motion_that_is_amplified_later_is_the_same_after_it() -> None:
+    """Base frames come before amplification, too; the map was fitted behind it."""
+    terms, mapped, amplitude = many_frames(500), made_map(), 1.14
+    middle = terms.base.mean(axis=0)
+    before = FrameTerms(terms.labels, middle + (terms.base - middle) / amplitude, terms.utterance)
+    moved = mapped.before_amplification(amplitude, terms).parameters(before)
+    pose = moved.mean(axis=0)
+    assert pose + amplitude * (moved - pose) == pytest.approx(mapped.parameters(terms), abs=1e-9)
