@@ -272,9 +272,6 @@ def picture_rows(recordings: dict[str, Recording], seen: Sequence[Observation]) 
             measures = landmark_measures(filled, landmarks)
             rows.append((measures["eye_px"], measures["jitter"], *found, float(lip_opening(landmarks).min())))
         table = np.array(rows)
-        if not len(table):
-            yield f"| {name} | | | | | | {lost} of {len(seen)} |"
-            continue
         low, median, high = np.quantile(table, [0, 0.5, 1], axis=0)
         yield (
             f"| {name} | {median[0]:.0f} | {median[1]:.2f}, {high[1]:.2f} | {median[2]:.3f}, {low[2]:.3f} "

@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cli.main import run
 from corpus_tools.clone_talker import transfer_talker
 from corpus_tools.recordings.observation import Observation, Quality
+from corpus_tools.recordings.observe import Observations, QualityWarning
 from corpus_tools.training.adapt_talker import Adaptation, Base, adapted_talker, separate_lips
 from corpus_tools.training.choose_adaptation import ADAPTATIONS, BASE_ONLY, HeldOutScore, choose_adaptation
 from corpus_tools.training.short_talker import learn_short_talker, needs_base, recording_advice
@@ -131,6 +133,30 @@ def test_a_short_talker_is_written_and_cloned_both_ways(base: Base, person: list
     few = replace(base.talker, utterances=base.talker.utterances[:2])
     assert len(transfer_talker(few, read).talker.utterances) == 2
     assert len(transfer_talker(read, few).talker.utterances) == 68
+
+
+def test_the_build_tells_what_to_expect_and_what_to_record_next(
+    base: Base, person: list[Observation], face_model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    write_talker(tmp_path / "base.talker", base.talker)
+    warned = QualityWarning(person[0].name, "it is weak")
+    monkeypatch.setattr(
+        "corpus_tools.build_talker.observe", lambda *_, **__: Observations(tuple(person[:4]), (), (warned,))
+    )
+    command = ["corpus", "build", str(tmp_path / "recordings"), "--model", str(face_model), "--out"]
+    assert run([*command, str(tmp_path / "me.talker"), "--base", str(tmp_path / "base.talker")]) == 0
+    messages = capsys.readouterr().err
+    assert f"warning about {person[0].name}: it is weak" in messages
+    assert "me.talker: 4 recordings, 0.2 minutes, 0 rejected" in messages
+    assert "held-out r opening 0." in messages
+    assert "record words with these phones next (times spoken so far): " in messages
+    assert len(read_talker(tmp_path / "me.talker").utterances) == 64
+    assert run([*command, str(tmp_path / "alone.talker"), "--base", "none"]) == 0
+    assert "held-out" not in capsys.readouterr().err
+    alone = read_talker(tmp_path / "alone.talker")
+    assert [one.name for one in alone.utterances] == [one.name for one in person[:4]]
+    assert "base" not in alone.metadata
 
 
 def test_ten_minutes_need_no_base(person: list[Observation]) -> None:
