@@ -62,6 +62,27 @@ def words_with_given_phones(written: str, phones: Sequence[PhoneMark], language:
     return tuple(words)
 
 
+def pronounce_words(words: Sequence[TextWord], language: str, dictionary: Dictionary | None = None) -> tuple[Word, ...]:
+    """Pronounced words of a text, of which some have given phones.
+
+    Raises
+    ------
+    InputError, BackendError
+        As `lexicon.pronounce.pronounce`.
+    """
+    written = " ".join(word.text for word in words)
+    given = [word for word in words if word.segments]
+    names = iter(_placeholders(written, len(given)))
+    by_name = {next(names): word for word in given}
+    named = iter(by_name)
+    pieces = [_as_capitalised(next(named), word.text) if word.segments else word.text for word in words]
+    text = " ".join(piece + word.after for piece, word in zip(pieces, words, strict=True))
+    known = dict(dictionary.entries) if dictionary else {}
+    known |= {name: word.segments for name, word in by_name.items()}
+    spoken = pronounce(text, language, Dictionary(MappingProxyType(known))).words
+    return tuple(_restore_spelling(word, {name: given.text for name, given in by_name.items()}) for word in spoken)
+
+
 def pronounce_marked(
     text: MarkedText, language: str = DEFAULT_LANGUAGE, dictionary: Dictionary | None = None
 ) -> Pronunciation:
@@ -94,6 +115,10 @@ def _restore_spelling(word: Word, written: dict[str, str]) -> Word:
     return word if name is None else replace(word, text=name, source=name)
 
 
+def _as_capitalised(name: str, spelling: str) -> str:
+    return name.capitalize() if spelling[:1].isupper() else name
+
+
 def _placeholder_stem(written: str) -> str:
     stem, lower = _STEM, written.lower()
     while stem in lower:
@@ -117,7 +142,7 @@ def _pieces(written: str, phones: Sequence[PhoneMark], names: Sequence[str]) -> 
     at = 0
     for mark, name in zip(phones, names, strict=True):
         before = written[at : mark.at]
-        placeholder = name.capitalize() if written[mark.at : mark.at + 1].isupper() else name
+        placeholder = _as_capitalised(name, written[mark.at : mark.at + 1])
         yield before + " " * before[-1:].isalnum() + placeholder + " " * written[mark.end : mark.end + 1].isalnum()
         at = mark.end
     yield written[at:]

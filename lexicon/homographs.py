@@ -7,24 +7,26 @@ table is read so only where it is capitalised (Polish).
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 
-from lexicon.dictionary import arpabet_segments
+from lexicon.dictionary import arpabet_segments, word_set
+from lexicon.english import add_s
 from lexicon.ipa import Segment
 from lexicon.part_of_speech import tag_words
 
 NEAR_WORDS = 9  # words on each side that are searched for evidence
-# Weights of the evidence, chosen on tests/lexicon/homographs.tsv: a neighbour outweighs the tag, which outweighs the topic.
+# Weights of the evidence: a neighbour outweighs the tag, which outweighs the topic.
 _TAG_WEIGHT, _NEIGHBOUR_WEIGHT, _NEAR_WEIGHT = 2.0, 3.0, 1.5
 _MOST_NEAR = 2  # words of the topic that count
 # Before a verb, whatever the tagger says: it takes many verbs of this list for nouns (to object).
-_BEFORE_VERB = frozenset(
-    "i we they he she will would can could should must may might shall cannot can't couldn't won't wouldn't shouldn't "
-    "don't doesn't didn't i'll we'll you'll they'll he'll she'll it'll let's please i'd we'd they'd he'd she'd who to".split()
+_BEFORE_VERB = word_set(
+    "i we they he she who will would can could should must may might shall cannot can't couldn't won't wouldn't "
+    "shouldn't don't doesn't didn't i'll we'll you'll they'll he'll she'll it'll i'd we'd they'd he'd she'd let's "
+    "please to"
 )
-_BEFORE_NOUN = frozenset("the a an this these those my your his her its our their every each no any some".split())
-_AFTER_DATIVE = frozenset("from due thanks according access addition next close back of".split())  # not an infinitive's to
+_BEFORE_NOUN = word_set("the a an this these those my your his her its our their every each no any some")
+_BEFORE_PREPOSITION = word_set("from due thanks according access addition next close back of")  # to is no infinitive's
 _MARKS = frozenset(".,;:!?")
 
 
@@ -52,7 +54,17 @@ def _readings() -> dict[str, tuple[Reading, ...]]:
 
 def is_homograph(word: str) -> bool:
     """Whether the table has readings of a word in this spelling or in lower case."""
-    return word in _readings() or word.lower() in _readings()
+    return bool(_readings_of(word))
+
+
+def _readings_of(word: str) -> tuple[Reading, ...]:
+    """Readings of a spelling, or of its stem with the ending -s."""
+    table = _readings()
+    own = table.get(word) or table.get(word.lower())
+    if own or not word.endswith("s") or word.endswith("ss"):
+        return own or ()
+    stem = table.get(word[:-1]) or table.get(word[:-1].lower()) or ()
+    return tuple(replace(reading, segments=add_s(reading.segments)) for reading in stem)
 
 
 def homograph_segments(words: Sequence[str], at: int) -> tuple[Segment, ...] | None:
@@ -70,9 +82,8 @@ def homograph_segments(words: Sequence[str], at: int) -> tuple[Segment, ...] | N
     BackendError, DataError
         The tagger is missing or damaged.
     """
-    table = _readings()
-    readings = table.get(words[at]) or table.get(words[at].lower())
-    if readings is None:
+    readings = _readings_of(words[at])
+    if not readings:
         return None
     if len(readings) == 1:
         return readings[0].segments
@@ -87,16 +98,22 @@ def _likely_tag(words: Sequence[str], lower: Sequence[str], at: int) -> str:
     before = lower[at - 1] if at else ""
     if before.endswith("ly") and at > 1:
         before = lower[at - 2]
-    is_infinitive = before != "to" or (at > 1 and lower[at - 2] not in _AFTER_DATIVE)
+    is_infinitive = before != "to" or (at > 1 and lower[at - 2] not in _BEFORE_PREPOSITION)
     if before in _BEFORE_VERB and is_infinitive and not tag.startswith("VB"):
         return "VB"
     return "NN" if before in _BEFORE_NOUN and tag in {"VB", "VBP", "VBZ"} else tag
 
 
 def _evidence(reading: Reading, lower: Sequence[str], at: int, tag: str) -> float:
-    score = _TAG_WEIGHT * any(tag.startswith(own) for own in reading.tags)
+    score = _TAG_WEIGHT * any(_is_tag(tag, own) for own in reading.tags)
     before = lower[at - 1] if at else "."
     after = lower[at + 1] if at + 1 < len(lower) else "."
-    score += _NEIGHBOUR_WEIGHT * ((before in reading.before) + ((after if after not in _MARKS else ".") in reading.after))
+    score += _NEIGHBOUR_WEIGHT * (
+        (before in reading.before) + ((after if after not in _MARKS else ".") in reading.after)
+    )
     around = [*lower[max(at - NEAR_WORDS, 0) : at], *lower[at + 1 : at + 1 + NEAR_WORDS]]
     return score + _NEAR_WEIGHT * min(sum(word in reading.near for word in around), _MOST_NEAR)
+
+
+def _is_tag(tag: str, pattern: str) -> bool:
+    return tag == pattern[:-1] if pattern.endswith(".") else tag.startswith(pattern)

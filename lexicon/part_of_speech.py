@@ -1,7 +1,7 @@
 """Parts of speech of English words: an averaged perceptron with the weights of hibari-tts.
 
-The model is read when a text first contains a word whose pronunciation depends on its part of speech. Its tags are those
-of the Penn Treebank (Marcus, Marcinkiewicz and Santorini 1993).
+The model is read when a text first contains a word whose pronunciation depends on its part of speech. Its tags are
+those of the Penn Treebank (Marcus, Marcinkiewicz and Santorini 1993).
 """
 
 import functools
@@ -87,13 +87,16 @@ def _class_of(word: str, known: frozenset[str]) -> str:
 
 
 def _features(at: int, word: str, classes: Sequence[str], before: tuple[str, str]) -> Iterable[str]:
-    """Features of the word at an index, given the tags of the two words before it; `classes` has two more at each end."""
+    """Features of the word at an index, given the tags of the two words before it.
+
+    `classes` has two more entries than words at each end.
+    """
     two_back, back, own, after, two_after = classes[at : at + 5]
     second, first = before
     return (
         "b", f"s3={word[-3:]}", f"p1={word[0]}", f"w={own}", f"sh={_shape(word)}", "i0" if at == 0 else "i+",
-        f"t-1={first}", f"t-2={second}", f"t-12={first},{second}", f"w-1={back}", f"s3-1={back[-3:]}", f"w-2={two_back}",
-        f"w+1={after}", f"s3+1={after[-3:]}", f"w+2={two_after}",
+        f"t-1={first}", f"t-2={second}", f"t-12={first},{second}", f"w-1={back}", f"s3-1={back[-3:]}",
+        f"w-2={two_back}", f"w+1={after}", f"s3+1={after[-3:]}", f"w+2={two_after}",
     )  # fmt: skip
 
 
@@ -130,4 +133,5 @@ def tag_words(words: tuple[str, ...]) -> tuple[str, ...]:
     """
     parts = [[part for part in _PARTS.findall(word) if part] or [word] for word in words]
     tags = iter(_tag_tokens([part for word in parts for part in word]))
-    return tuple([next(tags) for _ in word][0] for word in parts)
+    groups = [[next(tags) for _ in word] for word in parts]
+    return tuple(group[0] for group in groups)
