@@ -8,10 +8,9 @@ from types import MappingProxyType
 
 from lexicon.dictionary import Dictionary
 from lexicon.errors import InputError
-from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.ipa import Segment
-from lexicon.marked_text import MarkedText, PhoneMark
-from lexicon.pronounce import Pronunciation, Word, pronounce
+from lexicon.marked_text import PhoneMark
+from lexicon.pronounce import Word, pronounce
 from lexicon.spoken_form import spoken_form
 
 _STEM = "qzx"  # of the placeholders of given words during normalisation; not a word of any language
@@ -81,33 +80,6 @@ def pronounce_words(words: Sequence[TextWord], language: str, dictionary: Dictio
     known |= {name: word.segments for name, word in by_name.items()}
     spoken = pronounce(text, language, Dictionary(MappingProxyType(known))).words
     return tuple(_restore_spelling(word, {name: given.text for name, given in by_name.items()}) for word in spoken)
-
-
-def pronounce_marked(
-    text: MarkedText, language: str = DEFAULT_LANGUAGE, dictionary: Dictionary | None = None
-) -> Pronunciation:
-    """As `lexicon.pronounce.pronounce`, with the phones given in the text.
-
-    Raises
-    ------
-    InputError, BackendError
-        As there.
-    """
-    phones = [mark for mark in text.marks if isinstance(mark, PhoneMark)]
-    if not phones:
-        return pronounce(text.text, language, dictionary)
-    names = _placeholders(text.text, len(phones))
-    known = dict(dictionary.entries) if dictionary else {}
-    known |= {name: mark.segments for name, mark in zip(names, phones, strict=True)}
-    written = {name: text.text[mark.at : mark.end] for name, mark in zip(names, phones, strict=True)}
-    pronunciation = pronounce(
-        _insert_placeholders(text.text, phones, names), language, Dictionary(MappingProxyType(known))
-    )
-    return replace(
-        pronunciation,
-        text=text.text,
-        words=tuple(_restore_spelling(word, written) for word in pronunciation.words),
-    )
 
 
 def _restore_spelling(word: Word, written: dict[str, str]) -> Word:

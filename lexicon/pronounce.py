@@ -217,7 +217,7 @@ def pronounce(text: str, language: str = DEFAULT_LANGUAGE, dictionary: Dictionar
         words = _split_words((piece, piece) for piece in canonical_text(spoken, keep_marks=True).split())
         words = [word for word in words if any(letter.isalnum() for letter in word.text)]
     if not words:
-        raise InputError("the text contains no word to speak; add at least one word or number")
+        raise InputError("there is nothing to say in the text; add at least one word or number")
     if language == DEFAULT_LANGUAGE:
         spoken_segments = english_segments([word.text for word in words], [word.mark for word in words], own)
         for word, segments in zip(words, spoken_segments, strict=True):
