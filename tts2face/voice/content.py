@@ -1,5 +1,6 @@
 """Pronunciation of what a voice is given: text, or words some of which have phones."""
 
+from collections.abc import Iterator, Sequence
 from types import MappingProxyType
 
 from lexicon.dictionary import Dictionary
@@ -8,6 +9,8 @@ from lexicon.ipa import Segment
 from lexicon.phones import PHONES
 from lexicon.pronounce import Word, pronounce
 from tts2face.voice.engine import PronunciationMap, SpeechInput
+
+SENTENCE_MARKS = frozenset(".!?")
 
 
 def pronounce_content(content: SpeechInput, language: str, own_words: PronunciationMap) -> tuple[Word, ...]:
@@ -32,3 +35,12 @@ def word_segments(word: Word) -> tuple[Segment, ...]:
         Segment(phone, stress, is_syllabic=PHONES[phone].is_vowel)
         for phone, stress in zip(word.phones, word.stress, strict=True)
     )
+
+
+def split_spoken_sentences(words: Sequence[Word]) -> Iterator[Sequence[Word]]:
+    """Words of each sentence: after a full stop, question or exclamation mark, unless a small letter follows."""
+    first = 0
+    for at, (word, following) in enumerate(zip(words, [*words[1:], None], strict=True), start=1):
+        if following is None or (word.mark in SENTENCE_MARKS and not following.text[:1].islower()):
+            yield words[first:at]
+            first = at

@@ -14,12 +14,11 @@ from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.speech.forced_alignment import Aligner, SpeechAligner, enforce_increasing
 from tts2face.telemetry import disable_telemetry
 from tts2face.types import Speech, Waveform, concatenate_speech
-from tts2face.voice.content import pronounce_content
+from tts2face.voice.content import pronounce_content, split_spoken_sentences
 from tts2face.voice.engine import NativeRun, PronunciationMap, SpeechInput, apply_volume
 from tts2face.voice.voice_alphabet import voice_phones, word_letters
 
 LANGUAGE = "en-us"
-SENTENCE_MARKS = frozenset(".!?")
 CLAUSE_MARKS = frozenset({",", ";", ":"})
 MAX_LETTERS = 400  # the model accepts at most this many letters in one call
 DURATION_STEP_S = 0.025  # length of one step of the model's durations
@@ -79,7 +78,7 @@ class NeuralVoice:
     def _spoken_parts(self, content: SpeechInput) -> list[list[_Token]]:
         """Tokens of each part that the model synthesises in one call."""
         words = pronounce_content(content, LANGUAGE, self._own_words)
-        return [part for sentence in _split_sentences(words) for part in _cut_tokens([*map(_token, sentence)])]
+        return [part for sentence in split_spoken_sentences(words) for part in _cut_tokens([*map(_token, sentence)])]
 
     def _speak_tokens(self, tokens: Sequence[_Token], rate: float, seed: int) -> Speech:
         sound = self._sound_of(tokens, rate, seed)
@@ -170,15 +169,6 @@ def _joined_letters(tokens: Sequence[_Token]) -> str:
 def _token(word: Word) -> _Token:
     letters, places = word_letters(word.phones, word.stress)
     return _Token(word.text, tuple(voice_phones(word.phones)), letters + word.mark, places)
-
-
-def _split_sentences(words: Sequence[Word]) -> Iterator[Sequence[Word]]:
-    """Words of each sentence: after a full stop, question or exclamation mark, unless a small letter follows."""
-    first = 0
-    for at, (word, following) in enumerate(zip(words, [*words[1:], None], strict=True), start=1):
-        if following is None or (word.mark in SENTENCE_MARKS and not following.text[:1].islower()):
-            yield words[first:at]
-            first = at
 
 
 def _cut_tokens(tokens: Sequence[_Token]) -> Iterator[list[_Token]]:
