@@ -45,6 +45,9 @@ def _replacement(code: int) -> int | str:
         return " " if not 0x1F3FB <= code <= 0x1F3FF else ""
     if category[0] in "CM":
         return "" if category[0] == "C" or 0xFE00 <= code <= 0xFE0F else code
+    if category == "No" and unicodedata.normalize("NFKC", chr(code)) == chr(code):
+        value = unicodedata.numeric(chr(code))
+        return f" {value:.0f} " if value.is_integer() else code  # circled and other digits
     return str(unicodedata.digit(chr(code))) if category == "Nd" and code > 127 else code
 
 

@@ -124,10 +124,12 @@ def look_up_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[Segment, .
         letters = _spell_letters(word[:-1])
         return None if letters is None else add_s(letters)
     stem = word[:-2] if word[-2:] in {"'s", "'S"} else ""
-    own_stem = own_pronunciation(stem) if stem else None
-    if own_stem is not None:
-        return add_s(own_stem)
-    entry = own_pronunciation(word) or cmudict_lookup(word) or _look_up_without_accents(word)
+    own_stem = own_pronunciation(stem)
+    entry = (
+        (add_s(own_stem) if own_stem else own_pronunciation(word))
+        or cmudict_lookup(word)
+        or _look_up_without_accents(word)
+    )
     if entry is not None:
         return entry
     if "-" in word:

@@ -25,6 +25,8 @@ _BEFORE_VERB = word_set(
     "shouldn't don't doesn't didn't i'll we'll you'll they'll he'll she'll it'll i'd we'd they'd he'd she'd let's "
     "please to"
 )
+_ADVERBS = word_set("never always ever just not also still already often sometimes")
+_PRONOUNS, _HAVE = word_set("i you he she it we they"), word_set("have has had haven't hasn't hadn't")
 _BEFORE_NOUN = word_set("the a an this these those my your his her its our their every each no any some")
 _BEFORE_PREPOSITION = word_set("from due thanks according access addition next close back of")  # to is no infinitive's
 _MARKS = frozenset(".,;:!?")
@@ -95,10 +97,13 @@ def homograph_segments(words: Sequence[str], at: int) -> tuple[Segment, ...] | N
 def _likely_tag(words: Sequence[str], lower: Sequence[str], at: int) -> str:
     """The tagger's tag, corrected where the word before allows only a verb or only a noun."""
     tag = tag_words(tuple(words))[at]
-    before = lower[at - 1] if at else ""
-    if before.endswith("ly") and at > 1:
-        before = lower[at - 2]
-    is_infinitive = before != "to" or (at > 1 and lower[at - 2] not in _BEFORE_PREPOSITION)
+    place = at - 1
+    while place > 0 and (lower[place] in _ADVERBS or lower[place].endswith("ly")):
+        place -= 1
+    before, two_before = (lower[place] if place >= 0 else ""), (lower[place - 1] if place > 0 else "")
+    if before in _HAVE or (before in _PRONOUNS and two_before in _HAVE):  # have never read, have you read
+        return "VBN" if tag.startswith("VB") else tag
+    is_infinitive = before != "to" or two_before not in _BEFORE_PREPOSITION
     if before in _BEFORE_VERB and is_infinitive and not tag.startswith("VB"):
         return "VB"
     return "NN" if before in _BEFORE_NOUN and tag in {"VB", "VBP", "VBZ"} else tag

@@ -266,7 +266,7 @@ def test_documents_may_name_the_voices_that_need_no_file() -> None:
         ('<phoneme ph="a" type="x">a</phoneme>', "<phoneme> does not support the attribute 'type'"),
         ("<say-as>1</say-as>", "a <say-as> needs interpret-as; write"),
         ('<say-as interpret-as="ssn">1</say-as>', "no kind 'ssn'"),
-        ('<voice name="en-US-JennyNeural">a</voice>', "no voice 'en-US-JennyNeural'; use heart, espeak"),
+        ('<voice name="en-US-JennyNeural">a</voice>', "no voice 'en-US-JennyNeural'; use heart, joe, espeak"),
         ('<voice name="/etc/x.onnx">a</voice>', "no voice '/etc/x.onnx'"),
         ('<voice gender="robot">a</voice>', "no gender 'robot'"),
         ('<voice age="9">a</voice>', "<voice> does not support the attribute 'age'"),

@@ -169,7 +169,7 @@ def test_nothing_to_say_is_refused(voice: Voice, text: str) -> None:
 
 
 def test_text_that_the_neural_voice_cannot_speak_is_refused() -> None:
-    with pytest.raises(InputError, match="cannot say '你好'"):
+    with pytest.raises(InputError, match="cannot read 你好"):
         load_voice("heart", "en-us").speak("Hello 你好 there.")
 
 

@@ -105,7 +105,7 @@ def speak_sentence(
         speaker = speaker_of(part, voice, request, voices)
         delivery = delivery_of(part, sentence.runs, request)
         rate = request.rate * part.rate * delivery.rate
-        speech = speaker.speak(_content(part), rate=rate, seed=request.seed)
+        speech = speaker.speak(phrase_content(part), rate=rate, seed=request.seed)
         speech = _ended(resampled_speech(speech, voice.sample_rate), sentence, part)
         language = part.language or request.language
         times_of_part = WordTimes(part.source, speech.phones, speech.words, language=language, first=part.first)
@@ -132,7 +132,7 @@ def sentence_sound(voice: Voice, sentence: Sentence, request: Request, voices: V
     speaker = speaker_of(part, voice, request, voices)
     delivery = delivery_of(part, sentence.runs, request)
     rate = request.rate * part.rate * delivery.rate
-    sound = speaker.sound(_content(part), rate=rate, seed=request.seed)
+    sound = speaker.sound(phrase_content(part), rate=rate, seed=request.seed)
     whole = Speech(sound, PhoneSequence([SILENCE], [0.0, sound.duration]), ())
     whole = _ended(resampled_speech(whole, voice.sample_rate), sentence, part)
     levelled = level_speech([whole], [request.volume * delivery.volume * np.ones(1)])
@@ -144,7 +144,7 @@ def _ended(speech: Speech, sentence: Sentence, part: Phrase) -> Speech:
     return trim_end(speech) if sentence.is_cut and part is sentence.utterances[-1] else speech
 
 
-def _content(part: Phrase) -> SpeechInput:
+def phrase_content(part: Phrase) -> SpeechInput:
     """Words of a phrase with their phones, or its text."""
     return [SpokenWord(word.text, word.segments, word.after) for word in part.words] or part.text
 
