@@ -39,15 +39,7 @@ def test_every_word_of_cmudict_is_found() -> None:
             missing.append(word)
     assert set(missing) <= {"stilton"}  # out of order in CMUdict; pronunciations.tsv has it
     assert dictionary._cmudict_names("no-such-word") is None
-    assert [segment.phone for segment in dictionary.own_pronunciation("Stilton") or ()] == [
-        "s",
-        "t",
-        "ɪ",
-        "l",
-        "t",
-        "ə",
-        "n",
-    ]
+    assert "".join(segment.phone for segment in dictionary.own_pronunciation("Stilton") or ()) == "stɪltən"
 
 
 def test_user_entries() -> None:

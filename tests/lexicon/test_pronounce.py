@@ -27,7 +27,7 @@ def _arpabet(text: str) -> list[str]:
         ("A dog", ["AH0", "D AO1 G"]),
         ("STOP THAT NOW", ["S T AA1 P", "DH AE2 T", "N AW1"]),
         ("it's THE END", ["IH0 T S", "DH IY0", "EH1 N D"]),
-        ("well-known", ["W EH2 L N OW1 N"]),
+        ("red-brown", ["R EH2 D B R AW1 N"]),
         ("an X-ray", ["AH0 N", "EH1 K S R EY2"]),
         ("Bob's", ["B AA1 B Z"]),
         ("$5", ["F AY1 V", "D AA1 L ER0 Z"]),

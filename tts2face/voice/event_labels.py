@@ -22,7 +22,7 @@ def match_phones(given: Sequence[str], reported: Sequence[str]) -> tuple[tuple[i
     pairs of indices
         From (0, 0) to (N - 1, M - 1), neither falling.
     """
-    cost = np.array([[phone_distance(own, other) for other in reported] for own in given])
+    cost = np.array([[_cost(own, other) for other in reported] for own in given])
     total = np.full((len(given) + 1, len(reported) + 1), np.inf)
     total[0, 0] = 0.0
     for i in range(len(given)):
@@ -35,6 +35,11 @@ def match_phones(given: Sequence[str], reported: Sequence[str]) -> tuple[tuple[i
         _, i, k = min(step for step in steps if step[1] >= 0 and step[2] >= 0)
         path.append((i, k))
     return tuple(reversed(path))
+
+
+def _cost(given: str, reported: str) -> float:
+    """Distance of two phones; none between a rhotic vowel and the ɹ that is reported as its second half."""
+    return 0.0 if given in {"ɝ", "ɚ"} and reported == "ɹ" else phone_distance(given, reported)
 
 
 def given_starts(given: Sequence[str], reported: Sequence[str], starts: Sequence[float], end: float) -> list[float]:

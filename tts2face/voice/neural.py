@@ -60,6 +60,7 @@ class NeuralVoice:
         session = _session_without_arena(self._model.model_path)
         self._model.sess = session if run is None else _OwnRun(session, run)
         self._aligner: SpeechAligner = aligner or Aligner()
+        pronounce_content("Hello.", LANGUAGE, {})  # reads the dictionary while other models are loaded
 
     @property
     def sample_rate(self) -> int:
