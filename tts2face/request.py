@@ -61,7 +61,7 @@ class Request:
         None, "Voice: heart or joe (English), espeak or espeak-female (every language), or a Piper voice (x.onnx)."
     )
     rate: float = option(1.0, "Speaking rate as a factor, 0.5 to 2.")
-    plain_voice: bool = option(
+    plain_delivery: bool = option(
         False, "Keep the voice's rate and loudness under every style; --rate and --volume do so for themselves."
     )
     volume: float = option(1.0, "Loudness as a factor, 0 to 2; 1 is -16 LUFS, or the original level of a recording.")

@@ -34,7 +34,7 @@ def test_a_style_of_the_request_or_of_most_letters() -> None:
 
 
 def test_what_the_user_sets_replaces_the_style() -> None:
-    assert delivery(style="depressed", plain_voice=True) == PLAIN
+    assert delivery(style="depressed", plain_delivery=True) == PLAIN
     assert delivery(style="depressed", rate=1.2) == Delivery(1.0, -2.0)
     assert delivery(style="depressed", volume=0.5) == Delivery(0.9, 0.0)
 

@@ -197,7 +197,7 @@ def test_a_crash_of_espeak_is_reported() -> None:
 @pytest.mark.parametrize(
     ("name", "language", "reason"),
     [
-        ("nobody", "en-us", "no voice 'nobody'; give heart, espeak"),
+        ("nobody", "en-us", "no voice 'nobody'; give heart, joe, espeak"),
         ("heart", "de", "speaks English, not de"),
         ("espeak", "xx", "no language 'xx'"),
         ("missing.onnx", "en-us", r"no Piper voice missing\.onnx"),

@@ -43,7 +43,7 @@ def delivery_of(part: Phrase, runs: Sequence[StyleRun], request: Request) -> Del
 
     A rate or volume that the request or a mark sets replaces that of the style.
     """
-    if request.plain_voice:
+    if request.plain_delivery:
         return PLAIN
     found = DELIVERIES.get(_whole_style(request.style, _longest_run(part, runs).styles), PLAIN)
     has_volume = request.volume != 1.0 or any(run.volume != 1.0 for run in runs)
