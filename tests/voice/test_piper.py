@@ -1,19 +1,21 @@
 """Piper voices, tested by a generated voice whose sound encodes its letters."""
 
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lexicon.errors import DataError, InputError
+from lexicon.errors import BackendError, DataError, InputError
 from lexicon.ipa import parse_ipa
+from lexicon.phones import PHONES
 from tts2face.voice.engine import SpokenWord
 from tts2face.voice.loading import load_voice
 from tts2face.voice.piper import PiperVoice
+from tts2face.voice.piper_network import english_letters
 
-pytest.importorskip("piper", reason="needs `pip install 'tts2face[piper]'`")
 onnx = pytest.importorskip("onnx", reason="needs `pip install onnx`")
 
 RATE = 22_050
@@ -92,6 +94,50 @@ def test_a_text_is_spoken_with_the_phones_of_espeak(voice_file: Path) -> None:
     spoken = ["".join(speech.phones.phones[word.first : word.last]) for word in speech.words]
     assert spoken == ["bɑb", "meɪ"]
     assert speech.phones.end == speech.waveform.duration
+
+
+@pytest.fixture
+def german_voice_file(voice_file: Path) -> Path:
+    voice_file.with_name("tiny.onnx.json").write_text(json.dumps(settings() | {"espeak": {"voice": "de"}}))
+    return voice_file
+
+
+def test_other_languages_are_read_by_piper(german_voice_file: Path) -> None:
+    pytest.importorskip("piper", reason="needs `pip install 'tts2face[piper]'`")
+    voice = load_voice(str(german_voice_file), "de", {"tag": parse_ipa("ʃˈiː")})
+    assert synthesised_letters(voice, "Guten Abend.") == "ɡˈuːtən ˈɑːbənt."
+    assert synthesised_letters(voice, "Guten Tag.") == "ɡˈuːtən ʃˈi."
+    words = [SpokenWord("guten", parse_ipa("kˈæt"), ","), SpokenWord("Abend", ())]
+    assert synthesised_letters(voice, words).split()[0] == "kˈæt,"
+    assert [word.text for word in voice.speak("Guten Abend.").words] == ["Guten", "Abend"]
+
+
+def test_damaged_settings_of_another_language_are_refused(german_voice_file: Path) -> None:
+    pytest.importorskip("piper", reason="needs `pip install 'tts2face[piper]'`")
+    content = settings() | {"espeak": {"voice": "de"}, "vowel_clusters": 1}
+    german_voice_file.with_name("tiny.onnx.json").write_text(json.dumps(content))
+    with pytest.raises(DataError, match="not those of a Piper voice"):
+        load_voice(str(german_voice_file), "de")
+
+
+def test_another_language_needs_piper_tts(german_voice_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "piper.config", None)
+    with pytest.raises(BackendError, match=r"needs piper-tts; run: pip install 'tts2face\[piper\]'"):
+        load_voice(str(german_voice_file), "de")
+
+
+def test_american_english_needs_no_piper_tts(voice_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "piper", None)
+    voice = load_voice(str(voice_file), "en-us")
+    assert synthesised_letters(voice, "Bob may.") == "bˈɑːb mˈeɪ."
+
+
+@pytest.mark.parametrize(
+    ("ipa", "written"),
+    [("sˈɪti", "sˈɪɾi"), ("bˈʌtən", "bˈʌtən"), ("ə", "ɐ"), ("ən", "ɐn"), ("əɡˈoʊ", "əɡˈoʊ"), ("bˈɝd", "bˈɜːd")],
+)
+def test_english_is_written_as_espeak_writes_it(ipa: str, written: str) -> None:
+    assert english_letters(parse_ipa(ipa), PHONES, "".join(LETTERS)) == written
 
 
 def test_rate_acts_and_seed_does_not(voice_file: Path) -> None:
