@@ -22,9 +22,9 @@ N_RANDOM = 300  # 2,000 others were run once
 PIECES = re.split(
     " ",
     "[pause 0.3] $ % ° 1/2 10⁶ 1e-9 C# A4 ... — – “ ” ' ’ ( ) [ { } & @ # http://x.y é ñ ß Ω μ ½ ³ 🙂 👍🏽 "
-    "\u200b \u00a0 read lead a ﬁ Ǆ ａｂｃ ① ❽ Ⅳ ٣ ʼ ˈ ː ə Ж π 中 가 א !! ?! ;; - -- + = < > | \\ ^2 ~5 No. St. Mr. e.g. U.S. IV II "
-    "IT 5 lb. 3x4 10/10 0/0 99999999999999999999 007 1.2.3 12:99 31/31/2020 'tis can't've O' 's a-b X- A- A qzxaaa hmm pst I'm I a "
-    "read lead",
+    "\u200b \u00a0 read lead a ﬁ Ǆ ａｂｃ ① ❽ Ⅳ ٣ ʼ ˈ ː ə Ж π 中 가 א !! ?! ;; - -- + = < > | \\ ^2 ~5 No. St. Mr. "
+    "e.g. U.S. IV II IT 5 lb. 3x4 10/10 0/0 99999999999999999999 007 1.2.3 12:99 31/31/2020 'tis can't've O' 's a-b "
+    "X- A- A qzxaaa hmm pst I'm I",
 )
 
 

@@ -73,7 +73,10 @@ def test_tags_are_those_of_the_tagger_of_hibari() -> None:
     package = util.find_spec("hibari")
     assert package is not None
     folder = Path((package.submodule_search_locations or [])[0])
-    own = tagger.Tagger(json.loads(gzip.decompress((folder / "assets" / "tagger.json.gz").read_bytes())))
+    content = json.loads(gzip.decompress((folder / "assets" / "tagger.json.gz").read_bytes()))
+    own = tagger.Tagger(content)
+    names = [*list(content["weights"])[::50], "w=°", 's3="']
+    assert all(part_of_speech._model().weights(name) == content["weights"].get(name, {}) for name in names)
     for text in (
         "The old lead pipe burst , and Metals contract when they cool .",
         'In 1984 a well-known élan \\ of " quoted frobnicators - 7 é .',
