@@ -140,6 +140,13 @@ def test_english_is_written_as_espeak_writes_it(ipa: str, written: str) -> None:
     assert english_letters(parse_ipa(ipa), PHONES, "".join(LETTERS)) == written
 
 
+def test_sound_that_cannot_be_aligned_gets_nominal_durations(voice_file: Path) -> None:
+    speech = load_voice(str(voice_file), "en-us").speak("x " * 60)
+    assert [word.text for word in speech.words] == ["x"] * 60
+    assert speech.phones.end == pytest.approx(speech.waveform.duration)
+    assert speech.phones.phones[:3] == ("ɛ", "k", "s")
+
+
 def test_rate_acts_and_seed_does_not(voice_file: Path) -> None:
     voice = load_voice(str(voice_file), "en-us")
     usual, fast = voice.speak("Bob."), voice.speak("Bob.", rate=2.0)

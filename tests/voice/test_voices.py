@@ -191,7 +191,14 @@ def test_the_longest_words_of_a_dictionary_are_spoken(language: str) -> None:
 def test_a_crash_of_espeak_is_reported() -> None:
     words = [SpokenWord("bob", (Segment("b"),) * 300)]
     with pytest.raises(BackendError, match=r"espeak-ng crashed \(signal 11\) on '\[\[bbb.*change the spelling"):
-        load_voice("espeak", "en-us").speak(words)
+        load_voice("espeak", "de").speak(words)
+
+
+@pytest.mark.parametrize("name", ["heart", "espeak"])
+def test_very_long_words_are_spoken_in_english(name: str) -> None:
+    speech = load_voice(name, "en-us").speak("-".join(["straightforwardness"] * 14) + " may")
+    assert len(speech.phones) >= 200
+    assert speech.words[-1].text == "may"
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,7 @@ from lexicon.ipa import Segment
 from lexicon.japanese import has_kanji, to_kana
 from lexicon.languages import language_code
 from lexicon.phones import PHONES, nearest_phones
+from lexicon.pronounce import Word
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from lexicon.writing_systems import check_script
 from tts2face.speech.forced_alignment import enforce_increasing
@@ -41,6 +42,7 @@ CLOSED_LEVEL = 0.006  # relative to full scale; closures are digital silence aft
 QUIET_LEVEL = 0.03  # relative to full scale; residual level of the previous phone in a pause
 LEVEL_WINDOW_S = 0.001
 MIN_EVENT_PAUSE_S = 0.03
+MAX_WORD_PHONES = 80  # espeak-ng crashes on words of 300
 EDGE_SILENCE_S = 0.25  # silence added at both ends, because lips start to move before the sound does
 # espeak-ng's phoneme mnemonics for [[...]] input (docs/phonemes.md of espeak-ng).
 MNEMONICS = MappingProxyType({
@@ -104,7 +106,7 @@ class EspeakVoice:
         """
         if self._language == DEFAULT_LANGUAGE:
             spoken = pronounce_content(content, self._language, self._own_words)
-            words = [SpokenWord(word.text, word_segments(word), word.mark) for word in spoken]
+            words = [part for word in spoken for part in _short_words(word)]
             return " ".join(_word_mnemonic(word) for word in words), words
         if isinstance(content, str):
             check_script(content, self._language)
@@ -187,6 +189,14 @@ def _drop_false_silences(found: Sequence[_PhonemeEvent], sound: NDArray[np.float
         if event.phones != (SILENCE,)
         or float(np.abs(sound[round(event.start * rate) : round(end * rate)]).max(initial=0.0)) < QUIET_LEVEL
     ]
+
+
+def _short_words(word: Word) -> list[SpokenWord]:
+    """A word, or its parts if espeak-ng cannot store it."""
+    segments = word_segments(word)
+    starts = range(0, len(segments), MAX_WORD_PHONES)
+    parts = [SpokenWord(word.text, segments[start : start + MAX_WORD_PHONES]) for start in starts]
+    return [*parts[:-1], replace(parts[-1], after=word.mark)]
 
 
 def _without_brackets(text: str) -> str:

@@ -11,8 +11,10 @@ from lexicon.errors import DataError, InputError
 from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize
 from lexicon.inputs import read_json
 from lexicon.languages import language_code
+from lexicon.nominal_durations import NOMINAL_S
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.pronounce import Word
+from lexicon.sequence import PhoneSequence, WordSpan
 from lexicon.writing_systems import check_script
 from tts2face.speech.forced_alignment import Aligner, SpeechAligner
 from tts2face.types import Speech, Waveform
@@ -73,7 +75,10 @@ class PiperVoice:
         """Synthesise a sentence; see `tts2face.voice.engine.Voice`. The model runs without noise: `seed` is unused."""
         words, sentences = self._spoken(content)
         sound = self._synthesise(sentences, rate)
-        found = self._aligner.align(sound, words)
+        try:
+            found = self._aligner.align(sound, words)
+        except DataError:
+            return Speech(sound, *nominal_phones_in(words, sound.duration))
         return Speech(sound, found.phones, found.words)
 
     def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
@@ -143,6 +148,17 @@ class PiperVoice:
         )
         marks = "".join(mark for mark in word.after if mark in self._network.letters)
         return f"[[{written}{marks}]]"  # Piper omits punctuation that follows the brackets
+
+
+def nominal_phones_in(words: Sequence[AlignedWord], seconds: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+    """Phones with nominal durations scaled to a sound, for sound that cannot be aligned (hundreds of equal words)."""
+    labels = [phone for _, (phones,) in words for phone in phones]
+    shares = np.cumsum([0.0, *(NOMINAL_S[PHONES[phone].kind] for phone in labels)])
+    spans, first = [], 0
+    for text, (phones,) in words:
+        spans.append(WordSpan(text, first, first + len(phones)))
+        first += len(phones)
+    return PhoneSequence(labels, seconds * shares / shares[-1]), tuple(spans)
 
 
 def _check_settings(path: Path, content: Any) -> None:
