@@ -226,6 +226,11 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
         Path | None,
         Parameter(help="Test on recordings of another talker, or a Live Link Face .csv with its sound; z-scored."),
     ] = None,
+    people: Annotated[
+        list[Path] | None,
+        Parameter(help="Test --talker on a folder of landmark tracks of one person (.npz); z-scored; can be repeated."),
+    ] = None,
+    talker: Annotated[str | None, Parameter(help="Finished talker that --people tests; by default grid_s1.")] = None,
     own_durations: Annotated[
         bool, switch("Also evaluate synthesis from text with the durations of the default English voice.")
     ] = False,
@@ -242,8 +247,13 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Compare synthesised lip motion with held-out recordings."""
     from cli.evaluation import ComparisonFlags, SplitFlags, run_evaluation
+    from cli.people import DEFAULT_TALKER, run_people_evaluation
 
     folders = {"--recordings": recordings, "--train": train, "--test": test}
     refuse_overwriting({"--out": out}, folders | {"--cross-talker": cross_talker, "--tracks": tracks, "--model": model})
     split_flags = SplitFlags(recordings, hold_out, seed, folds, hold_out_words, train, test, cross_talker)
+    if people or talker is not None:
+        split_flags.check_people(people or [], own_durations=own_durations)
+        run_people_evaluation(talker or DEFAULT_TALKER, people or [], tracks, out)
+        return
     run_evaluation(split_flags, ComparisonFlags(tracks, own_durations), out, (cache, jobs, model))

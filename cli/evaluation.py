@@ -49,6 +49,17 @@ class SplitFlags:
                 "--folds and --hold-out-words cannot be combined with --train and --test; use them with --recordings"
             )
 
+    def check_people(self, people: list[Path], *, own_durations: bool) -> None:
+        """Refuse flags that contradict --people."""
+        if not people:
+            raise InputError("--talker has no effect without --people; give a folder of tracks, or remove it")
+        chosen = (self.recordings, self.train, self.test, self.folds, self.words, self.cross_talker)
+        if own_durations or any(value is not None for value in chosen):
+            raise InputError(
+                "--people tests a finished talker and can be combined only with --talker, --tracks and --out; "
+                "remove the other flags"
+            )
+
     def _check_cross_talker(self) -> None:
         if (self.recordings is None) == (self.train is None):
             raise InputError(

@@ -15,9 +15,10 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairedCurves:
-    """Curves of a method on U utterances: ``moments`` (U, 2, 6) of real and synthesised opening and width, ``costs`` (U,).
+    """Statistics of a method on U utterances: ``moments`` (U, 2, 6) of opening and width, warping ``costs`` (U,).
 
-    The moments are n, sum a, sum b, sum aa, sum bb, sum ab, from which Pearson's r of pooled frames follows.
+    The moments of a real curve a and a synthesised one b are n, sum a, sum b, sum aa, sum bb and sum ab, from which
+    Pearson's r of pooled frames follows.
     """
 
     moments: Floats
@@ -34,7 +35,7 @@ class PairedCurves:
         return cls(np.array(moments), np.asarray(costs, np.float64))
 
     def figures(self, weights: Floats) -> Mapping[str, Floats]:
-        """r of opening, r of width and mean cost for each row of utterance weights (W, U)."""
+        """Correlations of opening and width and mean cost for each row of utterance weights (W, U)."""
         opening, width = (_pooled_correlation(weights @ self.moments[:, at]) for at in range(2))
         return {"r_opening": opening, "r_width": width, "dtw_cost": weights @ self.costs / weights.sum(axis=1)}
 

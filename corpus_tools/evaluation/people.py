@@ -1,7 +1,8 @@
 """Evaluation of a finished talker on other people: their phones and edges, curves z-scored per person.
 
-A talker is synthesised from the phones of each test person. Faces differ in size and range of motion, so the opening and
-the width of the lips are z-scored: real curves by that person's speech, synthesised curves by the talker's own recordings.
+A talker is synthesised from the phones of each test person. Faces differ in size and range of motion, so the opening
+and the width of the lips are z-scored: real curves by that person's speech, synthesised ones by the talker's own
+recordings.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -12,16 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.evaluation.measures import DTW_BAND_S, speech_frames, warping_cost
-from corpus_tools.evaluation.methods import SynthesisMethod
+from corpus_tools.evaluation.methods import SynthesisMethod, build_methods
 from corpus_tools.evaluation.paired_bootstrap import PairedCurves, estimate, estimate_difference
-from corpus_tools.evaluation.reference import LipCurves
+from corpus_tools.evaluation.reference import LipCurves, ReferenceUtterance
 from corpus_tools.evaluation.scores import IntervalEstimate
+from corpus_tools.evaluation.tracks import ExternalTrack, map_tracks
 from corpus_tools.recordings.observation import Observation
 from lexicon.errors import InputError
-from lexicon.sequence import SILENCE
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import ShapeModel, Talker
 
 FIGURE_HEADS = (("r_opening", "r opening"), ("r_width", "r width"), ("dtw_cost", "DTW cost"))
+NETWORKS_METHOD, TRACKS_METHOD = "networks alone", "tracks"
 Floats = NDArray[np.float64]
 
 
@@ -105,6 +109,38 @@ class PeopleEvaluation:
             "phones": [asdict(one) for one in self.phones],
             "heard": {name: list(values) for name, values in self.heard.items()},
         }
+
+
+def evaluate_people(
+    talker: Talker, people: Sequence[Sequence[Observation]], tracks: Mapping[str, ExternalTrack] | None = None
+) -> PeopleEvaluation:
+    """Figures of a finished talker's methods, and of external tracks, on test people.
+
+    Tracks are mapped to the talker's parameters by a regression on those of its own utterances that they hold.
+
+    Raises
+    ------
+    InputError
+        A person has no utterance, or tracks lack a test utterance or hold too few of the talker's.
+    """
+    tests = z_score_people(people)
+    methods = dict(build_methods(talker))
+    if talker.network is not None:
+        methods[NETWORKS_METHOD] = _networks_method(talker.network)
+    curves = synthesise_people(talker, methods, tests)
+    if tracks is not None:
+        real = [ReferenceUtterance.of(one.observation, talker.model) for one in tests]
+        mapped = iter(map_tracks(tracks, talker, real))
+        curves |= synthesise_people(talker, {TRACKS_METHOD: lambda *_: next(mapped)}, tests)
+    heard = {label for one in talker.utterances for label in one.phones.phones}
+    return compare_people(tests, curves, n_people=len(people), heard=heard)
+
+
+def _networks_method(network: PhoneNetwork) -> SynthesisMethod:
+    def motion(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
+        return network.parameters(phones, np.arange(n_frames) / fps)
+
+    return motion
 
 
 def z_score_people(people: Sequence[Sequence[Observation]]) -> tuple[TestUtterance, ...]:

@@ -22,8 +22,8 @@ def read_person(folder: Path) -> tuple[Observation, ...]:
     """Utterances of one person, in the order of their file names.
 
     Each file holds pose-free ``landmarks`` (T, 478, 3) in mm, ``fps``, ``phones`` (N,) in IPA with *sil* for silence,
-    ``edges`` (N + 1,) in seconds, and optionally ``head`` (T, 6), ``intensity`` (T,), ``words`` (W,) with ``word_first``
-    and ``word_last``.
+    ``edges`` (N + 1,) in seconds, and optionally ``head`` (T, 6), ``intensity`` (T,), and ``words`` (W,) with
+    ``word_first`` and ``word_last``.
 
     Raises
     ------
