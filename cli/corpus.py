@@ -206,6 +206,26 @@ def show(talker: TalkerName, /) -> None:
 
 
 @corpus.command
+def pool(
+    talker: TalkerName,
+    tracks: Annotated[Path, Parameter(help="Folder of lip tracks: NAME.npz and NAME.phones.tsv.")],
+    /,
+    *,
+    source: Annotated[str, Parameter(help="The recordings of the tracks and their licence, for the metadata.")],
+    out: OutTalker,
+) -> None:
+    """Train a talker's networks again, together with lip tracks of another speaker of free speech."""
+    check_suffix(out, "talker")
+    refuse_overwriting({"--out": out}, {"TRACKS": tracks})
+    from corpus_tools.pool_talker import pool_talker
+    from corpus_tools.run_options import ignore_stage
+
+    with stage_bar() as stages:
+        found = pool_talker(talker, tracks, out, source=source, stages=stages or ignore_stage)
+    write_message(f"wrote {out}: networks pooled with {found.n_tracks} tracks, {found.minutes:.1f} minutes of speech")
+
+
+@corpus.command
 def evaluate(  # noqa: PLR0913 - one parameter a flag
     *,
     recordings: Annotated[

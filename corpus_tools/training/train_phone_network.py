@@ -49,7 +49,7 @@ def add_phone_network(
     networks = []
     for seed, table in enumerate(tables):
         weights = train_network(samples, table, importance, options=TRAINING, seed=seed)
-        networks.append(_expand_to_phones(weights, table, n_speech, spread))
+        networks.append(expand_to_phones(weights, table, n_speech, spread))
         if on_progress:
             on_progress(seed + 1, len(tables))
     layers, biases = (tuple(map(np.stack, zip(*some, strict=True))) for some in zip(*networks, strict=True))
@@ -112,7 +112,7 @@ def _join(
     return WindowSamples(shown.astype(np.int32), position, targets, speaker), importance
 
 
-def _expand_to_phones(
+def expand_to_phones(
     weights: Weights, table: Floats, n_speech: int, spread: Floats
 ) -> tuple[list[Floats], list[Floats]]:
     """Layers and biases of the talker's network for one-hot phones, with its parameters in mm."""

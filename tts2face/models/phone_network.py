@@ -57,10 +57,10 @@ class PhoneNetwork:
         output = np.zeros((len(times), self.weights[-1].shape[2]), np.float32)
         for member in range(len(self.weights[0]))[members]:
             weights, biases = (tuple(layer[member] for layer in layers) for layers in (self.weights, self.biases))
-            hidden = np.maximum(_first_layer(rows, position, weights[0], biases[0]), np.float32(0.0))
-            for inner, bias in zip(weights[1:-1], biases[1:-1], strict=True):
-                hidden = np.maximum(_hidden_layer(hidden, inner, bias), np.float32(0.0))
-            output += _hidden_layer(hidden, weights[-1], biases[-1])
+            hidden = _first_layer(rows, position, weights[0], biases[0])
+            for inner, bias in zip(weights[1:], biases[1:], strict=True):
+                hidden = _next_layer(hidden, inner, bias)
+            output += hidden
         return output / np.float32(len(range(len(self.weights[0]))[members]))
 
 
@@ -74,23 +74,29 @@ def _first_layer(rows, position, weights, biases):  # type: ignore[no-untyped-de
     output = np.zeros((len(rows), weights.shape[1]), np.float32)
     for t in range(len(rows)):
         output[t] = biases
-        for row in rows[t]:
-            output[t] += weights[row]
+        for c in range(rows.shape[1]):
+            _add_scaled(output[t], np.float32(1.0), weights[rows[t, c]])
         for k in range(position.shape[1]):
-            output[t] += position[t, k] * weights[first + k]
+            _add_scaled(output[t], position[t, k], weights[first + k])
     return output
 
 
 @kernel
-def _hidden_layer(inputs, weights, biases):  # type: ignore[no-untyped-def]
-    """Layer (T, H') of inputs (T, H), summed in a fixed order."""
+def _next_layer(inputs, weights, biases):  # type: ignore[no-untyped-def]
+    """Layer (T, H') of rectified inputs (T, H), summed in a fixed order."""
     output = np.zeros((len(inputs), weights.shape[1]), np.float32)
     for t in range(len(inputs)):
         output[t] = biases
         for k in range(len(weights)):
-            if inputs[t, k] != 0.0:
-                output[t] += inputs[t, k] * weights[k]
+            if inputs[t, k] > 0.0:
+                _add_scaled(output[t], inputs[t, k], weights[k])
     return output
+
+
+@kernel
+def _add_scaled(total, factor, values):  # type: ignore[no-untyped-def]
+    for j in range(len(total)):
+        total[j] += factor * values[j]
 
 
 def window_features(
