@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.pooling.lip_features import track_features
+from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
 from lexicon.phones import arpabet_to_ipa
 from lexicon.sequence import SILENCE
@@ -15,6 +16,9 @@ from lexicon.sequence import SILENCE
 N_POINTS = 68
 PHONE_COLUMNS = ["start_s", "end_s", "phone", "word"]
 ARPABET_SILENCE = "SIL"
+# ARPABET names without a stress digit do not tell reduced vowels from full ones.
+UNREDUCED = {arpabet_to_ipa("AH0"): arpabet_to_ipa("AH"), arpabet_to_ipa("ER0"): arpabet_to_ipa("ER")}
+MAX_VARIANTS = 9  # pronunciations of a word in CMUdict; the most has 5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,21 +77,45 @@ def _read_track(path: Path) -> LipTrack:
 def _spoken_phones(table: Path, rows: Sequence[Sequence[str]], length_s: float) -> tuple[SpokenPhone, ...]:
     """The phones of the text: silence, then words, each followed by an optional silence."""
     found: list[SpokenPhone] = []
-    word = None
+    for word, spoken in _group_words(table, rows):
+        found.append(SpokenPhone(SILENCE, spoken[0][1], bool(found)))
+        labels = _reduced_vowels(word, tuple(label for label, _, _ in spoken))
+        found += [SpokenPhone(label, end, is_optional=False) for label, (_, _, end) in zip(labels, spoken, strict=True)]
+    if not found:
+        raise DataError(f"{table} holds no phones; add them")
+    return (*found, SpokenPhone(SILENCE, length_s, is_optional=False))
+
+
+def _group_words(table: Path, rows: Sequence[Sequence[str]]) -> list[tuple[str, list[tuple[str, float, float]]]]:
+    """Words in order, each with the label, start and end of its phones."""
+    words: list[tuple[str, list[tuple[str, float, float]]]] = []
+    is_begun = False
     for number, row in enumerate(rows, start=2):
         if len(row) != len(PHONE_COLUMNS):
             raise DataError(f"{table}, line {number}: {len(row)} columns, not {len(PHONE_COLUMNS)}; correct the line")
         start, end = _seconds(table, number, row[0]), _seconds(table, number, row[1])
         if row[2] == ARPABET_SILENCE:
-            word = None
+            is_begun = False
             continue
-        if row[3] != word:
-            found.append(SpokenPhone(SILENCE, start, bool(found)))
-        word = row[3]
-        found.append(SpokenPhone(_phone(table, number, row[2]), end, is_optional=False))
-    if not found:
-        raise DataError(f"{table} holds no phones; add them")
-    return (*found, SpokenPhone(SILENCE, length_s, is_optional=False))
+        if not is_begun or row[3] != words[-1][0]:
+            words.append((row[3], []))
+        is_begun = True
+        words[-1][1].append((_phone(table, number, row[2]), start, end))
+    return words
+
+
+def _reduced_vowels(word: str, phones: tuple[str, ...]) -> tuple[str, ...]:
+    """The phones of a word with its unstressed vowels as such: the tracks carry no stress, CMUdict does."""
+    key = "".join(letter for letter in word if letter.isalpha() or letter == "'")
+    merged = tuple(UNREDUCED.get(label, label) for label in phones)
+    for number in range(1, MAX_VARIANTS):
+        variant = cmudict_lookup(key if number == 1 else f"{key}({number})")
+        if variant is None:
+            break
+        labels = tuple(segment.phone for segment in variant)
+        if tuple(UNREDUCED.get(label, label) for label in labels) == merged:
+            return labels
+    return phones
 
 
 def _seconds(table: Path, line: int, text: str) -> float:
