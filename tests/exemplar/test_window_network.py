@@ -11,10 +11,11 @@ from tts2face.exemplar.options import SynthesisOptions
 from tts2face.exemplar.phone_substitution import Targets, target_phones
 from tts2face.exemplar.synthesis import (
     FAR_CONTEXT,
+    FAR_GAIN,
     NEAR_CONTEXT,
     ExemplarModel,
-    interpolated_shares,
-    network_shares,
+    context_farness,
+    interpolated_farness,
     select_tokens,
     speech_trajectory,
 )
@@ -110,8 +111,14 @@ def test_the_share_of_the_networks_is_that_of_the_nearest_target(voice: Exemplar
     none, half, whole = (moved(knowing, share) for share in (0.0, 0.5, 1.0))
     np.testing.assert_array_equal(none, moved(voice, 0.5))
     selection = select_tokens(PHONES, knowing, replace(plain, network=0.5))
-    shares = interpolated_shares(selection.targets, network_shares(selection), 100)[35:65, None]
-    np.testing.assert_allclose(half, (1 - shares) * none + shares * whole, atol=1e-4)
+    farness = interpolated_farness(selection.targets, context_farness(selection), 100)[35:65, None]
+    assert 0 < farness.min() < farness.max()
+    gain = 1 + (FAR_GAIN - 1) * farness
+    middle = knowing.mean_speaking_pose
+    moved_far = middle + (whole - middle) / gain
+    share = 0.5 + 0.5 * farness
+    expected = middle + gain * ((1 - share) * (none - middle) + share * (moved_far - middle))
+    np.testing.assert_allclose(half, expected, atol=1e-3)
     with pytest.raises(InputError, match="from 0 to 1"):
         SynthesisOptions(network=1.5)
 
@@ -121,16 +128,16 @@ def test_networks_take_over_where_contexts_are_far_and_phones_unrecorded(voice: 
     recorded = select_tokens(PHONES, voice, options)
     highest = 2 * context_weights(options.context).sum()
 
-    def shares(distance: float) -> np.ndarray:
+    def farness(distance: float) -> np.ndarray:
         scores = np.full_like(recorded.found.scores, highest - distance)
-        return network_shares(replace(recorded, found=replace(recorded.found, scores=scores)))
+        return context_farness(replace(recorded, found=replace(recorded.found, scores=scores)))
 
-    np.testing.assert_allclose(shares(0.0), 0.4)
-    np.testing.assert_allclose(shares(NEAR_CONTEXT), 0.4)
-    np.testing.assert_allclose(shares(FAR_CONTEXT), 1.0)
-    assert (np.diff([shares(distance)[0] for distance in np.linspace(NEAR_CONTEXT, FAR_CONTEXT, 9)]) > 0).all()
+    np.testing.assert_array_equal(farness(0.0), 0.0)
+    np.testing.assert_allclose(farness(NEAR_CONTEXT), 0.0, atol=1e-12)
+    np.testing.assert_allclose(farness(FAR_CONTEXT), 1.0, atol=1e-12)
+    assert (np.diff([farness(distance)[0] for distance in np.linspace(NEAR_CONTEXT, FAR_CONTEXT, 9)]) > 0).all()
     unrecorded = select_tokens(PhoneSequence([SILENCE, "v", SILENCE], [0.0, 0.3, 0.5, 1.0]), voice, options)
-    assert network_shares(unrecorded)[unrecorded.targets.source == 1] == pytest.approx(1.0)
+    assert context_farness(unrecorded)[unrecorded.targets.source == 1] == pytest.approx(1.0)
 
 
 def test_networks_know_phones_that_were_not_recorded(voice: ExemplarModel) -> None:
@@ -146,7 +153,9 @@ def test_networks_know_phones_that_were_not_recorded(voice: ExemplarModel) -> No
         return speech_trajectory(phones, knowing, fps=100.0, n_frames=100, options=options).values[50]
 
     phones = PhoneSequence([SILENCE, "v", SILENCE], [0.0, 0.3, 0.7, 1.0])
-    np.testing.assert_allclose(moved("v"), wider.parameters(phones, np.array([0.5]))[0], atol=1e-4)
+    predicted = wider.parameters(phones, np.array([0.5]))[0]
+    middle = knowing.mean_speaking_pose
+    np.testing.assert_allclose(moved("v"), middle + FAR_GAIN * (predicted - middle), atol=1e-3)
 
 
 def test_time_that_belongs_to_no_target_is_silence() -> None:

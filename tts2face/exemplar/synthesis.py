@@ -32,9 +32,10 @@ from tts2face.types import GiveWay, Trajectory, keep_on
 RELEASE_FROM_S = 0.08  # distance from speech at which the transition to rest begins
 REST_FROM_S = 0.20  # distance from speech at which the face is at rest; recorded lips settle within 0.2 s
 NETWORK_HZ = 50.0  # rate at which the networks are evaluated; their input changes in steps of 40 ms
-# Distances of contexts (largest score less the best token's) between which the networks take over from the exemplars;
-# learnt on held-out words (docs/decisions/125-share-of-networks.md).
-NEAR_CONTEXT, FAR_CONTEXT = 0.6, 1.5
+# Distances of contexts (largest score less the best token's) between which the networks take over from the exemplars,
+# and the gain of far contexts: networks shrink what they do not know. Learnt on held-out words and on held-out tracks
+# of another speaker (docs/decisions/125-share-of-networks.md).
+NEAR_CONTEXT, FAR_CONTEXT, FAR_GAIN = 0.1, 1.0, 1.1
 MIN_EASE_S = 0.06  # transition from and to rest if a clip begins or ends within speech
 DEFAULT_OPTIONS = SynthesisOptions()
 
@@ -194,12 +195,14 @@ def _blend_motion(
     joined, is_covered = blending.join_averages(pieces, targets, n_instants, options)
     speech = joined * exemplars.spread
     give_way()
+    gain: NDArray[np.float32] | float = options.amplitude
     if exemplars.network is not None and options.network > 0:
+        farness = interpolated_farness(targets, context_farness(selection), n_instants)[:, None]
         predicted = _network_motion(exemplars.network, selection.phones, n_instants)
-        share = interpolated_shares(targets, network_shares(selection), n_instants)[:, None]
-        speech = (1 - share) * speech + share * predicted
+        speech = speech + (options.network + (1 - options.network) * farness) * (predicted - speech)
+        gain = options.amplitude * (1 + (FAR_GAIN - 1) * farness)
         give_way()
-    speech = exemplars.mean_speaking_pose + options.amplitude * (speech - exemplars.mean_speaking_pose)
+    speech = exemplars.mean_speaking_pose + gain * (speech - exemplars.mean_speaking_pose)
     motion = np.where(is_covered[:, None], speech, exemplars.rest).astype(np.float32)
     motion = blending.gaussian_smooth(motion, options.smoothing_s, blending.CLOCK_HZ)
     if not options.contacts:
@@ -220,26 +223,23 @@ def _network_motion(network: PhoneNetwork, phones: PhoneSequence, n_instants: in
     return interpolate_columns(sampled, times, np.arange(n_instants) / blending.CLOCK_HZ).astype(np.float32)
 
 
-def network_shares(selection: TokenSelection) -> NDArray[np.float64]:
-    """(N,) weights of the networks against the exemplars for N targets, by the distance of the nearest context.
+def context_farness(selection: TokenSelection) -> NDArray[np.float64]:
+    """(N,) how far the nearest recorded context of N targets is: 0 near, 1 far or the phone itself was not recorded.
 
-    A context that was recorded, with the same phones and durations, has the share `options.network`; one farther than
-    `FAR_CONTEXT`, or a phone that was not recorded, is the networks' alone.
+    Where contexts are near, the networks have the share `options.network` of the motion; where they are far, all of it.
     """
-    targets, options = selection.targets, selection.options
-    distance = 2.0 * context_weights(options.context).sum() - selection.found.scores[:, 0]
-    farness = smoothstep(distance, NEAR_CONTEXT, FAR_CONTEXT)
-    requested = selection.phones.phones
+    targets, requested = selection.targets, selection.phones.phones
+    distance = 2.0 * context_weights(selection.options.context).sum() - selection.found.scores[:, 0]
     is_replaced = np.array(
         [label != requested[source] for label, source in zip(targets.labels, targets.source, strict=True)]
     )
-    return np.asarray(options.network + (1.0 - options.network) * np.where(is_replaced, 1.0, farness))
+    return np.asarray(np.where(is_replaced, 1.0, smoothstep(distance, NEAR_CONTEXT, FAR_CONTEXT)))
 
 
-def interpolated_shares(targets: Targets, shares: NDArray[np.float64], n_instants: int) -> NDArray[np.float32]:
-    """(n,) shares (N,) of targets at the instants of the clock, linear between the middles of the targets."""
+def interpolated_farness(targets: Targets, farness: NDArray[np.float64], n_instants: int) -> NDArray[np.float32]:
+    """(n,) farness (N,) of targets at the instants of the clock, linear between the middles of the targets."""
     middles = targets.spans[:, 1:3].mean(axis=1)
-    return np.interp(np.arange(n_instants) / blending.CLOCK_HZ, middles, shares).astype(np.float32)
+    return np.interp(np.arange(n_instants) / blending.CLOCK_HZ, middles, farness).astype(np.float32)
 
 
 def rest_weights(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[np.float64]:
