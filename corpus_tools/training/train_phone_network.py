@@ -1,7 +1,7 @@
 """Networks from phones to speech parameters, trained on a talker's utterances, with or without another speaker's lips.
 
-The input of the first is a one-hot code of phones. The inputs of the others are articulatory features
-(`lexicon.phones.phone_features`), which generalise to unseen phone contexts; their first layer is multiplied by the
+The inputs of some are one-hot codes of phones, those of the others articulatory features
+(`lexicon.phones.phone_features`), which generalise to unseen phones; their first layer is multiplied by the
 feature table, so that the talker's file holds all networks in the same form.
 
 With pooled speech, the networks have further outputs, the lip features of `corpus_tools.pooling`, z-scored per speaker.
@@ -26,7 +26,8 @@ from tts2face.types import Progress
 
 SILENCE_MARGIN_S = 0.2  # of silence around speech in the training data
 TRAINING = TrainingOptions(hidden=(96, 96), n_epochs=10, weight_decay=1e-5)
-N_BY_LABEL, N_BY_FEATURES = 1, 3  # networks; features are better on unseen words, labels on seen ones (accuracy.md)
+N_BY_LABEL, N_BY_FEATURES = 1, 3  # networks of one speaker; features are better on unseen words (accuracy.md)
+N_POOLED_BY_LABEL, N_POOLED_BY_FEATURES = 3, 1  # with pooled speech, which holds every phone, labels are better
 MIN_FRAMES = 3000  # two minutes; networks from less are no better than exemplars
 Floats = NDArray[np.float32]
 
@@ -45,7 +46,8 @@ def add_phone_network(
     own = _talker_samples(talker, inventory, spread, with_features=bool(pooled))
     samples, importance = _join(own, _pooled_samples(pooled, inventory, n_speech), n_speech)
     ones = np.eye(len(inventory), dtype=np.float32)
-    tables = [ones] * N_BY_LABEL + [feature_table(inventory)] * N_BY_FEATURES
+    by_label, by_features = (N_POOLED_BY_LABEL, N_POOLED_BY_FEATURES) if pooled else (N_BY_LABEL, N_BY_FEATURES)
+    tables = [ones] * by_label + [feature_table(inventory)] * by_features
     networks = []
     for seed, table in enumerate(tables):
         weights = train_network(samples, table, importance, options=TRAINING, seed=seed)

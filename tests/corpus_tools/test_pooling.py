@@ -23,7 +23,7 @@ from tests.corpus_tools.speaking import FPS, observation
 from tts2face.models.landmarks import CHIN
 from tts2face.models.talker import Talker, read_talker, write_talker
 
-ERROR_BEFORE_S = 0.15  # of the times given with a track
+ERROR_BEFORE_S = 0.3  # of the times given with a track
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,8 @@ def test_alignment_finds_the_edges_without_sound(talker: Talker) -> None:
     found = align_lip_tracks(tracks, talker)
     errors = np.concatenate([np.abs(one.phones.edges[1:-1] - ends[:-1]) for one, ends in zip(found, true, strict=True)])
     given = np.concatenate([[phone.end for phone in one.phones] - ends for one, ends in zip(tracks, true, strict=True)])
-    assert np.median(errors) < 0.04 < np.median(np.abs(given))
+    assert np.median(errors) < 0.07
+    assert np.median(errors) < 0.5 * np.median(np.abs(given))
     for one in found:
         np.testing.assert_allclose(one.features[one.is_used].mean(axis=0), 0.0, atol=1e-9)
         np.testing.assert_allclose(one.features[one.is_used].std(axis=0)[:2], 1.0, rtol=1e-9)
