@@ -156,7 +156,7 @@ def align_phones(
         costs = _window_costs(features, means, silent, low, high, model)
         ends, cost = _search_edges(costs, low, high, (log_durations, is_optional, silent, longest))
         if cost < UNREACHED:
-            return ends[1:] / RATE_HZ, cost / n_frames
+            return (ends[1:] - 0.5) / RATE_HZ, cost / n_frames  # an edge lies halfway between two frames
     raise DataError(f"{len(labels)} phones do not fit into {n_frames / RATE_HZ:.1f} s of lips; check the text")
 
 
