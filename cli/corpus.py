@@ -258,6 +258,9 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
         Path | None,
         Parameter(help="Also evaluate external trajectories: CSV with utterance, time and one column per channel."),
     ] = None,
+    pool: Annotated[
+        Path | None, Parameter(help="Train the networks also with lip tracks of this folder, as `corpus pool` does.")
+    ] = None,
     out: Annotated[
         Path | None, Parameter(help="Write measures and plots (.html) or measures only (.json, .csv).", alias="-o")
     ] = None,
@@ -272,8 +275,9 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     folders = {"--recordings": recordings, "--train": train, "--test": test}
     refuse_overwriting({"--out": out}, folders | {"--cross-talker": cross_talker, "--tracks": tracks, "--model": model})
     split_flags = SplitFlags(recordings, hold_out, seed, folds, hold_out_words, train, test, cross_talker)
+    comparison = ComparisonFlags(tracks, own_durations, pool)
     if people or talker is not None:
-        split_flags.check_people(people or [], own_durations=own_durations)
+        split_flags.check_people(people or [], comparison)
         run_people_evaluation(talker or DEFAULT_TALKER, people or [], tracks, out)
         return
-    run_evaluation(split_flags, ComparisonFlags(tracks, own_durations), out, (cache, jobs, model))
+    run_evaluation(split_flags, comparison, out, (cache, jobs, model))
