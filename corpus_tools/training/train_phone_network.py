@@ -25,9 +25,9 @@ from tts2face.models.talker import Talker
 from tts2face.types import Progress
 
 SILENCE_MARGIN_S = 0.2  # of silence around speech in the training data
-TRAINING = TrainingOptions(hidden=(96, 96), n_epochs=10, weight_decay=1e-5)
+TRAINING = TrainingOptions(hidden=(96, 96), n_epochs=10, weight_decay=1e-4)
 N_BY_LABEL, N_BY_FEATURES = 1, 3  # networks of one speaker; features are better on unseen words (accuracy.md)
-N_POOLED_BY_LABEL, N_POOLED_BY_FEATURES = 3, 1  # with pooled speech, which holds every phone, labels are better
+N_POOLED_BY_LABEL, N_POOLED_BY_FEATURES = 2, 2  # with pooled speech, which holds every phone (accuracy.md)
 MIN_FRAMES = 3000  # two minutes; networks from less are no better than exemplars
 Floats = NDArray[np.float32]
 

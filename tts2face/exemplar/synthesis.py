@@ -32,10 +32,9 @@ from tts2face.types import GiveWay, Trajectory, keep_on
 RELEASE_FROM_S = 0.08  # distance from speech at which the transition to rest begins
 REST_FROM_S = 0.20  # distance from speech at which the face is at rest; recorded lips settle within 0.2 s
 NETWORK_HZ = 50.0  # rate at which the networks are evaluated; their input changes in steps of 40 ms
-# Distances of contexts (largest score less the best token's) between which the networks take over from the exemplars,
-# and the gain of far contexts: networks shrink what they do not know. Learnt on held-out words and on held-out tracks
-# of another speaker (docs/decisions/125-share-of-networks.md).
-NEAR_CONTEXT, FAR_CONTEXT, FAR_GAIN = 0.1, 1.0, 1.1
+# Distances of contexts (largest score less the best token's) between which the networks take over from the exemplars;
+# learnt on held-out words and on held-out tracks of another speaker (docs/decisions/125-share-of-networks.md).
+NEAR_CONTEXT, FAR_CONTEXT = 0.2, 1.1
 MIN_EASE_S = 0.06  # transition from and to rest if a clip begins or ends within speech
 DEFAULT_OPTIONS = SynthesisOptions()
 
@@ -195,14 +194,12 @@ def _blend_motion(
     joined, is_covered = blending.join_averages(pieces, targets, n_instants, options)
     speech = joined * exemplars.spread
     give_way()
-    gain: NDArray[np.float32] | float = options.amplitude
     if exemplars.network is not None and options.network > 0:
         farness = interpolated_farness(targets, context_farness(selection), n_instants)[:, None]
         predicted = _network_motion(exemplars.network, selection.phones, n_instants)
         speech = speech + (options.network + (1 - options.network) * farness) * (predicted - speech)
-        gain = options.amplitude * (1 + (FAR_GAIN - 1) * farness)
         give_way()
-    speech = exemplars.mean_speaking_pose + gain * (speech - exemplars.mean_speaking_pose)
+    speech = exemplars.mean_speaking_pose + options.amplitude * (speech - exemplars.mean_speaking_pose)
     motion = np.where(is_covered[:, None], speech, exemplars.rest).astype(np.float32)
     motion = blending.gaussian_smooth(motion, options.smoothing_s, blending.CLOCK_HZ)
     if not options.contacts:
