@@ -25,7 +25,11 @@ def kernel(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]
 
 
 def vectorized_kernel(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """Compile a kernel with `fastmath`, which vectorises loops over long arrays by reordering sums."""
+    """Compile a kernel with `fastmath`, which vectorises loops over long arrays by reordering sums.
+
+    Such a kernel calls only inlined ones: which others the compiler inlines depends on what is in the cache, and with
+    `fastmath` the result would, too.
+    """
     compiled: Callable[Arguments, Result] = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=True)(
         function
     )

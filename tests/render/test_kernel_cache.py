@@ -4,10 +4,11 @@ import os
 from types import SimpleNamespace
 
 import pytest
+from numba.core.dispatcher import Dispatcher
 
 from tts2face import compilation
 from tts2face.compilation import CACHE_VARIABLE, cache_folder
-from tts2face.render import raster
+from tts2face.render import raster, shade, strand_light, strands
 from tts2face.synthesis import warm_up
 from tts2face.synthesis.warm_up import kernels_are_compiled
 
@@ -73,3 +74,16 @@ def test_a_cache_that_is_older_than_its_source_is_compiled_once_only(monkeypatch
     monkeypatch.setattr(warm_up, "COMPILE_CHILD_CODE", "")
     warm_up.compile_kernels()
     assert kernels_are_compiled()
+
+
+@pytest.mark.parametrize("module", [raster, shade, strand_light, strands], ids=lambda module: module.__name__)
+def test_kernels_that_may_reorder_sums_call_inlined_ones_only(module):
+    for found in vars(module).values():
+        if isinstance(found, Dispatcher) and found.targetoptions.get("fastmath"):
+            called = [found.py_func.__globals__.get(name) for name in found.py_func.__code__.co_names]
+            kernels = [kernel for kernel in called if isinstance(kernel, Dispatcher)]
+            assert all(kernel.targetoptions.get("inline") == "always" for kernel in kernels)
+
+
+def test_some_kernels_may_reorder_sums():
+    assert shade.shade_fragments.targetoptions["fastmath"]

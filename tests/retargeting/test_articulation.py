@@ -46,7 +46,7 @@ class Spoken:
 
     def __init__(self, face: Face, talker: Talker, exemplars: ExemplarModel, phones: PhoneSequence) -> None:
         self.face, self.phones, self.articulator = face, phones, build_articulator(face)
-        animated = mesh_face(talker, exemplars, face, None)
+        animated = mesh_face(talker, exemplars, face)
         n_frames = int(phones.end * FPS)
         self.times = np.arange(n_frames) / FPS
 
@@ -213,7 +213,7 @@ def test_weights_are_smooth_and_within_their_limits(spoken: Spoken) -> None:
 def test_natural_changes_neither_vowels_nor_consonants_without_a_contact(
     spoken: Spoken, talker: Talker, exemplars: ExemplarModel
 ) -> None:
-    animated = mesh_face(talker, exemplars, spoken.face, None)
+    animated = mesh_face(talker, exemplars, spoken.face)
     selection = select_tokens(spoken.phones, exemplars)
     retargeted = animated.retargeter.retarget(
         Trajectory(exemplars.channels, lips_of(selection, exemplars, len(spoken.times)), FPS)
@@ -237,7 +237,7 @@ def lips_of(selection: object, exemplars: ExemplarModel, n_frames: int) -> NDArr
 
 
 def test_the_published_method_is_not_changed(spoken: Spoken, talker: Talker, exemplars: ExemplarModel) -> None:
-    animated = mesh_face(talker, exemplars, spoken.face, None)
+    animated = mesh_face(talker, exemplars, spoken.face)
     selection = select_tokens(spoken.phones, exemplars, THEOBALD_2007)
     motion = animated.motion_of_tokens(selection, fps=FPS, n_frames=60)
     lips = Trajectory(exemplars.channels, lips_of(selection, exemplars, 60), FPS)

@@ -42,7 +42,7 @@ def sequence(words: str, phone_s: float) -> PhoneSequence:
 def speak(
     face: Face, models: tuple[Talker, ExemplarModel], phones: PhoneSequence, factor: float, fps: float
 ) -> Trajectory:
-    animated = mesh_face(*models, face, None)
+    animated = mesh_face(*models, face)
     selection = select_tokens(phones, models[1], SynthesisOptions(articulation=factor))
     return animated.motion_of_tokens(selection, fps=fps, n_frames=int(phones.end * fps))
 

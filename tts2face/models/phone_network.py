@@ -59,44 +59,62 @@ class PhoneNetwork:
             weights, biases = (tuple(layer[member] for layer in layers) for layers in (self.weights, self.biases))
             hidden = _first_layer(rows, position, weights[0], biases[0])
             for inner, bias in zip(weights[1:], biases[1:], strict=True):
-                hidden = _next_layer(hidden, inner, bias)
+                hidden = _hidden_layer(hidden, inner, bias)
             output += hidden
         return output / np.float32(len(range(len(self.weights[0]))[members]))
 
 
 @kernel
-def _first_layer(rows, position, weights, biases):  # type: ignore[no-untyped-def]
-    """First layer (T, H) for one-hot inputs at `rows` (T, C) of the weights and values (T, 4) for the last rows.
-
-    The order of the sums is fixed, so that results do not depend on the machine or the number of threads.
-    """
+def _first_layer(rows: Any, position: Any, weights: Any, biases: Any) -> Any:
+    """First layer (T, H) for one-hot inputs at `rows` (T, C) of the weights and values (T, 4) for the last rows."""
     first = len(weights) - position.shape[1]
     output = np.zeros((len(rows), weights.shape[1]), np.float32)
+    values = np.ones(rows.shape[1] + position.shape[1], np.float32)
+    used = np.zeros(len(values), np.int64)
     for t in range(len(rows)):
-        output[t] = biases
         for c in range(rows.shape[1]):
-            _add_scaled(output[t], np.float32(1.0), weights[rows[t, c]])
+            used[c] = rows[t, c]
         for k in range(position.shape[1]):
-            _add_scaled(output[t], position[t, k], weights[first + k])
+            used[rows.shape[1] + k], values[rows.shape[1] + k] = first + k, position[t, k]
+        _add_rows(weights, used, values, biases, output[t])
     return output
 
 
 @kernel
-def _next_layer(inputs, weights, biases):  # type: ignore[no-untyped-def]
-    """Layer (T, H') of rectified inputs (T, H), summed in a fixed order."""
+def _hidden_layer(inputs: Any, weights: Any, biases: Any) -> Any:
+    """Layer (T, H') of rectified inputs (T, H)."""
     output = np.zeros((len(inputs), weights.shape[1]), np.float32)
+    values, used = np.zeros(len(weights), np.float32), np.zeros(len(weights), np.int64)
     for t in range(len(inputs)):
-        output[t] = biases
+        n_used = 0
         for k in range(len(weights)):
-            if inputs[t, k] > 0.0:
-                _add_scaled(output[t], inputs[t, k], weights[k])
+            if inputs[t, k] > np.float32(0):
+                used[n_used], values[n_used] = k, inputs[t, k]
+                n_used += 1
+        _add_rows(weights, used[:n_used], values[:n_used], biases, output[t])
     return output
 
 
 @kernel
-def _add_scaled(total, factor, values):  # type: ignore[no-untyped-def]
-    for j in range(len(total)):
-        total[j] += factor * values[j]
+def _add_rows(weights: Any, used: Any, values: Any, biases: Any, total: Any) -> None:
+    """Write the biases (H,) plus the sum of `values` (N,) times the rows `used` (N,) of the weights (K, H).
+
+    The order of the sum is fixed, so that results do not depend on the machine or the number of threads; four rows at
+    a time keep a part of the total in a register.
+    """
+    n_outputs, n_used = len(total), len(used)
+    for h in range(n_outputs):
+        total[h] = biases[h]
+    whole = n_used - n_used % 4
+    for at in range(0, whole, 4):
+        first, second, third, fourth = used[at], used[at + 1], used[at + 2], used[at + 3]
+        a, b, c, d = values[at], values[at + 1], values[at + 2], values[at + 3]
+        for h in range(n_outputs):
+            part = total[h] + a * weights[first, h] + b * weights[second, h]
+            total[h] = part + c * weights[third, h] + d * weights[fourth, h]
+    for at in range(whole, n_used):
+        for h in range(n_outputs):
+            total[h] += values[at] * weights[used[at], h]
 
 
 def window_features(

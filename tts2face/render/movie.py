@@ -78,7 +78,9 @@ class MovieWriter:
         `notice` becomes the comment in its metadata.
         """
         import av
+        from av.video.reformatter import VideoReformatter
 
+        self._reformatter = VideoReformatter()  # one for all pictures: making one takes as long as a conversion
         self._has_alpha = shape[2] == 4
         self._fps, self._rate = clock
         fps = self._fps
@@ -108,9 +110,15 @@ class MovieWriter:
 
         if self._has_alpha:
             pixels = self._fill_transparent(pixels)
-        frame = av.VideoFrame.from_ndarray(pixels, format="rgba" if self._has_alpha else "rgb24")
-        frame = frame.reformat(
-            format=self._video.pix_fmt, dst_colorspace="ITU709", src_color_range="JPEG", dst_color_range="MPEG"
+        from av.video.reformatter import ColorRange, Colorspace
+
+        rgb = np.ascontiguousarray(pixels)
+        frame = self._reformatter.reformat(
+            av.VideoFrame.from_numpy_buffer(rgb, format="rgba" if self._has_alpha else "rgb24"),
+            format=self._video.pix_fmt,
+            dst_colorspace=Colorspace.ITU709,
+            src_color_range=ColorRange.JPEG,
+            dst_color_range=ColorRange.MPEG,
         )
         frame.pts, frame.time_base = self._n_frames, 1 / self._fps
         self._n_frames += 1

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.compilation import vectorized_kernel
+from tts2face.compilation import kernel, vectorized_kernel
 from tts2face.render.fragment_rows import NORMAL
 from tts2face.render.shade import kept_hue, tone_curve
 from tts2face.render.studio_light import FIRST_LIGHT_ROW, FLOOR_ROW, SKY_ROW, UP_ROW
@@ -27,7 +27,7 @@ FIRST_STRENGTH, SECOND_STRENGTH = np.float32(0.085), np.float32(0.80)  # colourl
 CARD_NORMAL = np.float32(0.55)  # share of the card's normal; the rest points away from the middle of the skull
 
 
-@vectorized_kernel
+@kernel
 def light_strands(vertices: Array, normals: Array, tangents: Array, light: Any, vertex: Array, table: Array) -> None:
     """Write the light of the vertices of strands.
 

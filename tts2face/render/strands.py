@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.compilation import inlined_kernel, kernel, vectorized_kernel
+from tts2face.compilation import inlined_kernel, kernel
 from tts2face.render.strand_light import AT_NEAR, AT_U, AT_V, AT_X, AT_Y, TEXTURE_SHIFT, shade_strands
 from tts2face.render.textures import mip_level, read_texel
 
@@ -22,7 +22,7 @@ SOLID = np.float32(1 / 40)  # passing light below which a sample is full
 TILE_PX = 8  # pixels along a side of the tiles in which cards behind everything are skipped
 
 
-@vectorized_kernel
+@kernel
 def row_range(plane: Array, low: Any, high: Any, limits: tuple[Any, Any]) -> tuple[Any, Any]:
     """Range of x within `limits` where three half planes (3, 3), a x + b y + c >= 0, hold for some y in a range."""
     least, most = limits
@@ -135,7 +135,7 @@ def set_planes(a: Array, b: Array, c: Array, planes: Array) -> float:
     return float(area)
 
 
-@vectorized_kernel
+@kernel
 def draw_strands(strands: Any, order: Array, scene: Any, band: Any, fragments: Any, out: tuple[Any, Any]) -> None:
     """Blend the cards of a band of pixels.
 

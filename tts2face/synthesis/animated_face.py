@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tts2face.exemplar.synthesis import TokenSelection
 from tts2face.models.face import Face
+from tts2face.models.palette import Palette
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
 from tts2face.types import GiveWay, Trajectory, keep_on
@@ -104,6 +105,9 @@ class AnimatedFace(Protocol):
         InputError
             The face cannot move a feature of `gains`.
         """
+
+    def with_gestures_of(self, palette: Palette) -> "AnimatedFace":
+        """The face with the channels that the gestures of a palette need."""
 
     def add_gestures(self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float]) -> FaceMotion:
         """Add gestures to speech motion.

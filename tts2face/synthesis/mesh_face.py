@@ -1,7 +1,7 @@
 """A mesh face prepared for one talker; implements `tts2face.synthesis.animated_face.AnimatedFace`."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import ClassVar
 
@@ -80,6 +80,10 @@ class MeshFace:
     def check_gains(self, gains: Mapping[str, float]) -> None:
         """Accept all gains: a mesh can move every feature."""
 
+    def with_gestures_of(self, palette: Palette) -> "MeshFace":
+        """The face with the shapes that a palette's gestures need."""
+        return replace(self, gestures=gesture_face(self.face, palette))
+
     def add_gestures(self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float]) -> FaceMotion:
         """Add gestures to speech motion; closed lips stay closed."""
         if self.gestures is None:
@@ -92,13 +96,12 @@ class MeshFace:
         return mesh_renderer(self.mesh, picture)
 
 
-def mesh_face(talker: Talker, exemplars: ExemplarModel, face: Face, palette: Palette | None) -> MeshFace:
-    """Prepare a mesh for a talker and, if given, for the gestures of a palette.
+def mesh_face(talker: Talker, exemplars: ExemplarModel, face: Face) -> MeshFace:
+    """Prepare a mesh for a talker, without gestures.
 
     Raises
     ------
     DataError
         The face lacks landmarks of the lips or eyes, or shapes that speech can move.
     """
-    gestures = None if palette is None else gesture_face(face, palette)
-    return MeshFace(face, exemplars, build_retargeter(talker, face), build_articulator(face), gestures)
+    return MeshFace(face, exemplars, build_retargeter(talker, face), build_articulator(face), None)

@@ -107,6 +107,10 @@ class OwnAppearanceFace:
                     f"gain of {name}"
                 )
 
+    def with_gestures_of(self, palette: Palette) -> "OwnAppearanceFace":
+        """The face with the parameters of lids, brows, cheeks and expression that a palette's gestures need."""
+        return replace(self, gestures=build_own_face_gestures(self.talker, palette))
+
     def add_gestures(self, speech: Trajectory, gestures: Gestures, gains: Mapping[str, float]) -> FaceMotion:
         """Add gestures of lids, brows, cheeks and expression; all head channels are 0."""
         if self.gestures is None:
@@ -118,14 +122,13 @@ class OwnAppearanceFace:
         return own_face_renderer(self.talker, picture, self.gestures)
 
 
-def own_appearance_face(talker: Talker, exemplars: ExemplarModel, palette: Palette | None) -> OwnAppearanceFace:
-    """Prepare a talker's own face and, if given, the gestures of a palette.
+def own_appearance_face(talker: Talker, exemplars: ExemplarModel) -> OwnAppearanceFace:
+    """Prepare a talker's own face, without gestures.
 
     Raises
     ------
     InputError
         The talker has no appearance model.
     """
-    gestures = None if palette is None else build_own_face_gestures(talker, palette)
     appearance = build_appearance_exemplars(talker, exemplars)
-    return OwnAppearanceFace(talker, exemplars, appearance, fit_appearance_regression(talker), gestures)
+    return OwnAppearanceFace(talker, exemplars, appearance, fit_appearance_regression(talker), None)

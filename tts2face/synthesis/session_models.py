@@ -90,7 +90,11 @@ class SessionModels:
         self._cache: dict[Hashable, Any] = {}
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
         self._voices = voices or VoicePool()
-        self.speech_face: AnimatedFace = self._prepare_face(None)
+        self.speech_face: AnimatedFace = (
+            own_appearance_face(self.talker, self._exemplars)
+            if mesh is None
+            else mesh_face(self.talker, self._exemplars, mesh)
+        )
 
     @property
     def palette(self) -> Palette | None:
@@ -108,7 +112,9 @@ class SessionModels:
     def face(self, *, has_gestures: bool = True) -> AnimatedFace:
         """Face with the channels of speech, and with those of the palette's gestures if there is a palette."""
         palette = self.palette if has_gestures else None
-        return self.speech_face if palette is None else self._once("face", lambda: self._prepare_face(palette))
+        if palette is None:
+            return self.speech_face
+        return self._once("face", lambda: self.speech_face.with_gestures_of(palette))
 
     def renderer(self, picture: Picture, *, has_gestures: bool) -> FrameRenderer:
         """Renderer of the face for drawing options; the last `MAX_RENDERERS` renderers are cached."""
@@ -169,11 +175,6 @@ class SessionModels:
         return self._once(
             key, lambda: GestureFields(palette, FIELD_OPTIONS[method], request.pitch, has_presentation=not is_published)
         )
-
-    def _prepare_face(self, palette: Palette | None) -> AnimatedFace:
-        if self._mesh is None:
-            return own_appearance_face(self.talker, self._exemplars, palette)
-        return mesh_face(self.talker, self._exemplars, self._mesh, palette)
 
     def _once(self, key: Hashable, make: Callable[[], Value]) -> Value:
         """Cached value of a key, computed at the first call by one thread only."""
