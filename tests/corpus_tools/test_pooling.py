@@ -105,7 +105,14 @@ def test_an_optional_silence_is_skipped_where_there_is_none(talker: Talker) -> N
     (found,) = align_lip_tracks([replace(one, phones=tuple(padded))], talker)
     n_sounding = sum(label != SILENCE for label in found.phones.phones)
     assert n_sounding == sum(phone.label != SILENCE for phone in one.phones)
-    assert len(found.phones) < len(one.phones) + n_sounding / 4
+    labels = (SILENCE, *found.phones.phones, SILENCE)
+    apart = [
+        at
+        for at in range(2, len(labels) - 2)
+        if labels[at] == SILENCE and not {"p", "b", "m"} & {labels[at - 1], labels[at + 1]}
+    ]
+    n_pauses = sum(phone.label == SILENCE for phone in one.phones[1:-1])
+    assert len(apart) <= n_pauses  # closed lips beside a bilabial may be read as a pause
     assert found.phones.end == pytest.approx(true[-1], abs=0.1)
 
 
