@@ -50,6 +50,10 @@ def build(  # noqa: PLR0913 - one parameter a flag
         Path | None,
         Parameter(help="Write an HTML report: pictures, curves, measures, rejected recordings and reasons."),
     ] = None,
+    base: Annotated[
+        str, Parameter(help="Talker that completes recordings of less than 10 minutes, or none: recordings only.")
+    ] = "grid_s1",
+    strict: Annotated[bool, switch("Reject recordings with warnings, too.")] = False,
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
@@ -74,13 +78,19 @@ def build(  # noqa: PLR0913 - one parameter a flag
             run_options=RunOptions(cache, jobs, model),
             consent=consent_fields,
             report=report,
+            base=base,
+            is_strict=strict,
             stages=stages or ignore_stage,
         )
+    for warning in result.warnings:
+        write_message(f"warning about {warning.name}: {warning.message}")
     for refusal in result.refused:
         write_message(f"rejected {refusal.name}: {refusal.reason}")
     write_message(
         f"wrote {out}: {result.n_kept} recordings, {result.minutes:.1f} minutes, {len(result.refused)} rejected"
     )
+    for note in result.notes:
+        write_message(note)
 
 
 def check_suffix(out: Path, kind: str) -> None:
@@ -206,6 +216,26 @@ def show(talker: TalkerName, /) -> None:
 
 
 @corpus.command
+def pool(
+    talker: TalkerName,
+    tracks: Annotated[Path, Parameter(help="Folder of lip tracks: NAME.npz and NAME.phones.tsv.")],
+    /,
+    *,
+    source: Annotated[str, Parameter(help="The recordings of the tracks and their licence, for the metadata.")],
+    out: OutTalker,
+) -> None:
+    """Train a talker's networks again, together with lip tracks of another speaker of free speech."""
+    check_suffix(out, "talker")
+    refuse_overwriting({"--out": out}, {"TRACKS": tracks})
+    from corpus_tools.pool_talker import pool_talker
+    from corpus_tools.run_options import ignore_stage
+
+    with stage_bar() as stages:
+        found = pool_talker(talker, tracks, out, source=source, stages=stages or ignore_stage)
+    write_message(f"wrote {out}: networks pooled with {found.n_tracks} tracks, {found.minutes:.1f} minutes of speech")
+
+
+@corpus.command
 def evaluate(  # noqa: PLR0913 - one parameter a flag
     *,
     recordings: Annotated[
@@ -226,12 +256,20 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
         Path | None,
         Parameter(help="Test on recordings of another talker, or a Live Link Face .csv with its sound; z-scored."),
     ] = None,
+    people: Annotated[
+        list[Path] | None,
+        Parameter(help="Test --talker on a folder of landmark tracks of one person (.npz); z-scored; can be repeated."),
+    ] = None,
+    talker: Annotated[str | None, Parameter(help="Finished talker that --people tests; by default grid_s1.")] = None,
     own_durations: Annotated[
         bool, switch("Also evaluate synthesis from text with the durations of the default English voice.")
     ] = False,
     tracks: Annotated[
         Path | None,
         Parameter(help="Also evaluate external trajectories: CSV with utterance, time and one column per channel."),
+    ] = None,
+    pool: Annotated[
+        Path | None, Parameter(help="Train the networks also with lip tracks of this folder, as `corpus pool` does.")
     ] = None,
     out: Annotated[
         Path | None, Parameter(help="Write measures and plots (.html) or measures only (.json, .csv).", alias="-o")
@@ -242,8 +280,14 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Compare synthesised lip motion with held-out recordings."""
     from cli.evaluation import ComparisonFlags, SplitFlags, run_evaluation
+    from cli.people import DEFAULT_TALKER, run_people_evaluation
 
     folders = {"--recordings": recordings, "--train": train, "--test": test}
     refuse_overwriting({"--out": out}, folders | {"--cross-talker": cross_talker, "--tracks": tracks, "--model": model})
     split_flags = SplitFlags(recordings, hold_out, seed, folds, hold_out_words, train, test, cross_talker)
-    run_evaluation(split_flags, ComparisonFlags(tracks, own_durations), out, (cache, jobs, model))
+    comparison = ComparisonFlags(tracks, own_durations, pool)
+    if people or talker is not None:
+        split_flags.check_people(people or [], comparison)
+        run_people_evaluation(talker or DEFAULT_TALKER, people or [], tracks, out)
+        return
+    run_evaluation(split_flags, comparison, out, (cache, jobs, model))

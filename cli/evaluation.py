@@ -49,6 +49,17 @@ class SplitFlags:
                 "--folds and --hold-out-words cannot be combined with --train and --test; use them with --recordings"
             )
 
+    def check_people(self, people: list[Path], comparison: "ComparisonFlags") -> None:
+        """Refuse flags that contradict --people."""
+        if not people:
+            raise InputError("--talker has no effect without --people; give a folder of tracks, or remove it")
+        chosen = (self.recordings, self.train, self.test, self.folds, self.words, self.cross_talker)
+        if comparison.own_durations or comparison.pool is not None or any(value is not None for value in chosen):
+            raise InputError(
+                "--people tests a finished talker and can be combined only with --talker, --tracks and --out; "
+                "remove the other flags"
+            )
+
     def _check_cross_talker(self) -> None:
         if (self.recordings is None) == (self.train is None):
             raise InputError(
@@ -64,6 +75,7 @@ class ComparisonFlags:
 
     tracks: Path | None
     own_durations: bool
+    pool: Path | None
 
 
 def run_evaluation(
@@ -96,18 +108,20 @@ def _evaluate(
 ) -> "tuple[Evaluation, tuple[SplitResult, ...]]":
     from corpus_tools.evaluation.evaluate import evaluate, evaluate_across_talkers
     from corpus_tools.evaluation.tracks import read_tracks
+    from corpus_tools.pooling.lip_tracks import read_lip_tracks
 
+    lips = read_lip_tracks(comparison.pool) if comparison.pool is not None else ()
     training_folder = split_flags.recordings or split_flags.train
     if split_flags.cross_talker is not None and training_folder is not None:
         train = _read_observations(training_folder, run_options)
         others = _observe_other_talker(split_flags.cross_talker, run_options)
         with progress_bar("evaluating") as on_progress:
-            return evaluate_across_talkers(train, others, on_progress=on_progress)
+            return evaluate_across_talkers(train, others, lips=lips, on_progress=on_progress)
     tracks = read_tracks(comparison.tracks) if comparison.tracks is not None else None
     voice = _load_default_voice() if comparison.own_durations else None
     parts = _make_splits(split_flags, run_options)
     with progress_bar("evaluating") as on_progress:
-        return evaluate(parts, tracks=tracks, voice=voice, on_progress=on_progress)
+        return evaluate(parts, tracks=tracks, voice=voice, lips=lips, on_progress=on_progress)
 
 
 def _load_default_voice() -> "Voice":

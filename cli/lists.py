@@ -15,15 +15,24 @@ EMPTY_CELL = "-"
 
 
 def voices(*, as_json: AsJson = False) -> None:
-    """List the voices (`--voice`), the languages they speak, and whether they are installed."""
+    """List the voices (`--voice`): sex, engine, languages, whether they are installed, and licence."""
     from tts2face.catalogue import voices
 
     entries = voices()
     rows = (
-        (one.name, one.engine, _languages_text(one.languages), "yes" if one.is_installed else "no", one.summary)
+        (
+            one.name,
+            one.sex,
+            one.engine,
+            _languages_text(one.languages),
+            "yes" if one.is_installed else "no",
+            one.licence,
+            one.summary,
+        )
         for one in entries
     )
-    _print(entries, ("voice", "engine", "languages", "installed", "summary"), rows, as_json)
+    titles = ("voice", "sex", "engine", "languages", "installed", "licence", "summary")
+    _print(entries, titles, rows, as_json)
 
 
 def languages(*, as_json: AsJson = False) -> None:

@@ -75,8 +75,8 @@ def phones(
 ) -> None:
     """Print the words of a text and their phones, in ARPABET and IPA, with stress and syllables."""
     from lexicon.dictionary import read_dictionary
-    from lexicon.given_pronunciations import pronounce_marked
     from lexicon.mark_parser import parse_marks
+    from lexicon.spoken_words import pronounce_marked
     from tts2face.exports.text import FORMATS
 
     pronunciation = pronounce_marked(

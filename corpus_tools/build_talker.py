@@ -7,13 +7,15 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from corpus_tools.clone_talker import appearance_from_lips
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.recordings.observe import Refusal, check_any_kept, observe
+from corpus_tools.recordings.observe import QualityWarning, Refusal, check_any_kept, observe
 from corpus_tools.report.drawing import load_matplotlib
 from corpus_tools.report.recordings import recordings_page
 from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.pose_correction import correct_pose
+from corpus_tools.training.short_talker import NO_BASE, ShortTalker, learn_short_talker, needs_base, recording_advice
 from corpus_tools.training.train_audio_map import learn_audio_maps
 from corpus_tools.training.train_phone_network import add_phone_network
 from corpus_tools.training.train_score_map import add_score_map
@@ -39,11 +41,16 @@ CONTENT = "motion only: landmark shapes, head pose, phones and loudness; no imag
 
 @dataclass(frozen=True, slots=True)
 class BuiltTalker:
-    """Result of a build: number and minutes of kept recordings, and refusals."""
+    """Result of a build: number and minutes of kept recordings, refusals, and warnings about kept ones.
+
+    ``notes`` state what to expect of a talker with a base, and what to record next.
+    """
 
     n_kept: int
     minutes: float
     refused: tuple[Refusal, ...]
+    warnings: tuple[QualityWarning, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def build_talker(  # noqa: PLR0913 - run options and the date change no motion
@@ -56,6 +63,8 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
     created: str | None = None,
     consent: Mapping[str, str] | None = None,
     report: Path | None = None,
+    base: str = "grid_s1",
+    is_strict: bool = False,
     stages: StageCallback = ignore_stage,
 ) -> BuiltTalker:
     """Observe recordings, learn a talker and write it; apart from `created` the bytes are reproducible.
@@ -72,6 +81,10 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
         Consent of the person shown, from `consent_record`; required for an appearance model.
     report
         HTML page about the recordings to write, also if none could be used.
+    base
+        Talker that completes recordings of less than `MIN_OWN_MINUTES`; `NO_BASE` for none.
+    is_strict
+        Whether recordings with warnings are refused.
     stages
         Called with the name of each stage at its start.
 
@@ -87,7 +100,7 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
     if report is not None:
         load_matplotlib()  # reports a missing package before the recordings are read
     stated = read_provenance(provenance or recordings / PROVENANCE, must_exist=provenance is not None)
-    observations = observe(recordings, run_options=run_options, on_progress=stages(READING_STAGE))
+    observations = observe(recordings, is_strict=is_strict, run_options=run_options, on_progress=stages(READING_STAGE))
     talker_name = name or stated.get("name") or recordings.resolve().stem
     if report is not None:
         write_atomically(report, recordings_page(talker_name, observations).encode())
@@ -104,8 +117,13 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
         **_reading_metadata(observations.kept),
     }
     steady = correct_pose(observations.kept)
-    talker = add_phone_network(learn_talker(steady, metadata=metadata), on_progress=stages("learning phone network"))
-    talker = replace(talker, audio_maps=learn_audio_maps(steady, talker, stages=stages))
+    short = _learn_with_base(steady, base, metadata, stages)
+    talker = (
+        short.talker
+        if short
+        else add_phone_network(learn_talker(steady, metadata=metadata), on_progress=stages("learning phone network"))
+    )
+    talker = replace(talker, audio_maps={**talker.audio_maps, **learn_audio_maps(steady, talker, stages=stages)})
     talker = add_score_map(talker, BlendshapeReader((run_options or RunOptions()).model))
     if consent is not None:
         on_frames = stages("learning appearance")
@@ -113,8 +131,18 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
             talker, observations.kept, run_options=run_options or RunOptions(), on_progress=on_frames
         )
     write_talker(out, talker)
-    seconds = sum(len(utterance.shape) for utterance in talker.utterances) / talker.fps
-    return BuiltTalker(len(talker.utterances), seconds / 60.0, observations.refused)
+    minutes = sum(len(one.landmarks) / one.fps for one in steady) / 60.0
+    notes = (short.chosen.message, *recording_advice(steady)) if short else ()
+    return BuiltTalker(len(steady), minutes, observations.refused, observations.warnings, notes)
+
+
+def _learn_with_base(
+    observations: Sequence[Observation], base: str, metadata: Mapping[str, Any], stages: StageCallback
+) -> ShortTalker | None:
+    """The talker with a base, or None if there is none or enough material without it."""
+    if base == NO_BASE or not needs_base(observations):
+        return None
+    return learn_short_talker(observations, base, metadata=metadata, on_progress=stages("adapting the base"))
 
 
 def add_appearance(
@@ -125,7 +153,8 @@ def add_appearance(
     Parameters
     ----------
     observations
-        Training observations of the talker, in the order of its utterances.
+        Training observations of the talker, in the order of its first utterances; the appearance of further ones,
+        which are those of a base, is predicted from the lips.
 
     Raises
     ------
@@ -138,16 +167,22 @@ def add_appearance(
     from corpus_tools.aam.train_appearance import learn_appearance
 
     tracker = CachedTracker(run_options.folder(), find_bundle(run_options.model))
+    own, carried = talker.utterances[: len(observations)], talker.utterances[len(observations) :]
     recordings = [
         build_appearance_recording(observation, utterance.shape, tracker)
-        for observation, utterance in zip(observations, talker.utterances, strict=True)
+        for observation, utterance in zip(observations, own, strict=True)
     ]
     learnt = learn_appearance(recordings, on_progress=on_progress)
     utterances = tuple(
         replace(utterance, appearance_parameters=parameters)
-        for utterance, parameters in zip(talker.utterances, learnt.parameters, strict=True)
+        for utterance, parameters in zip(own, learnt.parameters, strict=True)
     )
-    return replace(talker, utterances=utterances, appearance=learnt.appearance)
+    talker = replace(talker, utterances=utterances, appearance=learnt.appearance)
+    if not carried:
+        return talker
+    predict = appearance_from_lips(talker)
+    predicted = (replace(one, appearance_parameters=predict(one.shape, talker.fps)) for one in carried)
+    return replace(talker, utterances=(*utterances, *predicted))
 
 
 def add_audio_maps(

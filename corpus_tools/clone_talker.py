@@ -177,13 +177,21 @@ def _appearance_function(source: Talker, target: Talker, gain: float) -> Appeara
             if spoken.appearance_parameters is None
             else transfer.parameters(spoken.appearance_parameters, gain=gain)
         )
-    own, channels = fit_appearance_regression(target), speech_channels(target.model)
+    predict = appearance_from_lips(target)
+    return lambda _spoken, shape: predict(shape, source.fps)
 
-    def with_lips(_spoken: Utterance, shape: NDArray[np.float32]) -> NDArray[np.float32]:
-        lips = Trajectory(channels, shape[:, : len(channels)], source.fps)
+
+def appearance_from_lips(
+    talker: Talker,
+) -> Callable[[NDArray[np.float32], float], NDArray[np.float32]]:
+    """Function from shape parameters (T, M) at a frame rate to a talker's appearance parameters, fitted on its own."""
+    own, channels = fit_appearance_regression(talker), speech_channels(talker.model)
+
+    def predict(shape: NDArray[np.float32], fps: float) -> NDArray[np.float32]:
+        lips = Trajectory(channels, shape[:, : len(channels)], fps)
         return np.asarray(own.motion(lips).values[:, len(channels) :], np.float32)
 
-    return with_lips
+    return predict
 
 
 def _transfer_utterance(utterance: Utterance, ready: ParameterTransfer, appearance: AppearanceFunction) -> Utterance:

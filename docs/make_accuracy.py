@@ -1,6 +1,7 @@
 """Measure the default synthesis on held-out recordings and write the tables of accuracy.md.
 
-Run: python docs/make_accuracy.py ../shared/recordings/grid_s1 ../shared/recordings/livelink/testset_arkit61_60fps.csv
+Run: python docs/make_accuracy.py ../shared/recordings/grid_s1 ../shared/recordings/livelink/testset_arkit61_60fps.csv \
+    ../shared/recordings/address_tracks
 """
 
 import argparse
@@ -15,6 +16,7 @@ from corpus_tools.evaluation.livelink_reference import observe_livelink
 from corpus_tools.evaluation.scores import FIGURES, Scores
 from corpus_tools.evaluation.splits import split_by_words, split_randomly
 from corpus_tools.evaluation.tables import Evaluation
+from corpus_tools.pooling.lip_tracks import read_lip_tracks
 from corpus_tools.recordings.observe import observe
 from corpus_tools.run_options import RunOptions
 from tts2face.exemplar.options import METHOD_OPTIONS
@@ -27,12 +29,14 @@ LANGUAGE = "en-us"
 TABLES = ("utterances", "own durations", "words", "another talker")
 
 
-def measured(recordings: Path, other: Path, run_options: RunOptions) -> dict[str, Any]:
+def measured(recordings: Path, other: Path, tracks: Path, run_options: RunOptions) -> dict[str, Any]:
     """The figures of both splits and of another talker, and the options that were measured."""
     kept = observe(recordings, run_options=run_options).kept
-    utterances, _ = evaluate([split_randomly(kept, hold_out=HELD_OUT, seed=SEED)], voice=load_voice(None, LANGUAGE))
-    words, _ = evaluate([split_by_words(kept, WORDS)])
-    across, _ = evaluate_across_talkers(kept, observe_livelink(other, run_options))
+    lips = read_lip_tracks(tracks)
+    split, voice = split_randomly(kept, hold_out=HELD_OUT, seed=SEED), load_voice(None, LANGUAGE)
+    utterances, _ = evaluate([split], voice=voice, lips=lips)
+    words, _ = evaluate([split_by_words(kept, WORDS)], lips=lips)
+    across, _ = evaluate_across_talkers(kept, observe_livelink(other, run_options), lips=lips)
     return {
         "options": {name: asdict(options) for name, options in METHOD_OPTIONS.items()},
         "utterances": _plain(utterances.scores, utterances),
@@ -80,9 +84,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("recordings", type=Path)
     parser.add_argument("other", type=Path)
+    parser.add_argument("tracks", type=Path)
     parser.add_argument("--cache", type=Path)
     arguments = parser.parse_args()
-    figures = measured(arguments.recordings, arguments.other, RunOptions(arguments.cache))
+    figures = measured(arguments.recordings, arguments.other, arguments.tracks, RunOptions(arguments.cache))
     FIGURES_FILE.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
     PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8"), figures), encoding="utf-8")
 

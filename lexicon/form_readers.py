@@ -16,13 +16,15 @@ def _word_set(written: str) -> frozenset[str]:
 
 
 _MARKS = frozenset(".,;:!?")
+_NEVER_LETTERS = frozenset({"II", "III", "VII", "VIII"})  # Roman numerals that abbreviate nothing
 _BEFORE_YEAR = _word_set(
     "in since of by from until till before after during early late mid circa around year copyright to and between "
     "summer winter spring fall autumn class"
 )
 _BEFORE_ROMAN = _word_set(
     "chapter part volume act scene section book war phase type level class appendix article figure table episode "
-    "season stage grade title rocky unit version schedule group tier bowl fantasy"
+    "season stage grade title rocky unit version schedule group tier bowl fantasy "
+    "apollo gemini round"
 )
 _RULERS = _word_set(
     "henry louis elizabeth george edward charles william james richard mary philip pius benedict paul francis "
@@ -100,8 +102,11 @@ def read_money_after(m: re.Match[str], _: str) -> str:
     return readings.money_words(m["moneyb"], m["sign2"] or m["sign3"], m["mag2"] or "")
 
 
-def read_measure(m: re.Match[str], _: str) -> str:
-    """5 km is five kilometers."""
+def read_measure(m: re.Match[str], previous: str) -> str:
+    """5 km is five kilometers, a 5 km run a five kilometer run."""
+    is_attribute = previous.lower() in {"a", "an"} and _BEFORE_LETTER.match(m.string, m.end())
+    if is_attribute:
+        return f"{readings.signed_number_words(m['amount'])} {readings.read_table('units.tsv')[m['unit']][0]}"
     return readings.measure_words(m["amount"], m["unit"])
 
 
@@ -187,6 +192,8 @@ def _number(written: str, previous: str) -> str:
 def read_fraction(m: re.Match[str], _: str) -> str:
     """3/4 is three quarters."""
     known = {"24/7": "twenty-four seven", "9/11": "nine eleven", "50/50": "fifty fifty"}.get(m["frac"])
+    if m["top"] == m["bottom"] and not m["whole"]:
+        return f"{number_words(m['top'])} out of {number_words(m['bottom'])}"
     return known or readings.ratio_words(m["top"], m["bottom"], m["whole"] or "")
 
 
@@ -202,12 +209,13 @@ def read_roman_numeral(m: re.Match[str], previous: str) -> str:
         return m.group()
     if value and before in _RULERS and value < 40:
         return f"the {ordinal_words(value)}"
-    if value and before in _BEFORE_ROMAN:
+    if value and (before in _BEFORE_ROMAN or m.group() in _NEVER_LETTERS):
         return cardinal_words(value)
     return m.group()
 
 
 _BEFORE_NAME = re.compile(r" [A-Z]")
+_BEFORE_LETTER = re.compile(r" [a-z]")
 _BEFORE_NUMBER = re.compile(r" ?[0-9]")
 _NO_NAMES = _word_set("The On In At And But When Dear I If As To From Near")
 _AT_END = re.compile(r"\s*$")
@@ -249,6 +257,42 @@ def read_hashtag(m: re.Match[str], _: str) -> str:
     """#MachineLearning is hashtag machine learning."""
     words = readings.hashtag_words(m.group())
     return f"{'hashtag' if m.group()[0] == '#' else 'at'} {words}".strip()
+
+
+def read_scientific(m: re.Match[str], _: str) -> str:
+    """1e-9 is one times ten to the minus nine."""
+    power = readings.signed_number_words(m["exponent"].removeprefix("+"))
+    return f"{readings.signed_number_words(m['mantissa'])} times ten to the {power}{_unit_words(m['sunit'])}"
+
+
+def read_feet_inches(m: re.Match[str], _: str) -> str:
+    """6 ft 2 in is six feet two inches."""
+    return f"{readings.measure_words(m['ft'], 'ft')} {readings.measure_words(m['ftin'], 'inch')}"
+
+
+def read_inches(m: re.Match[str], _: str) -> str:
+    """3 in. is three inches."""
+    return readings.measure_words(m["inchamount"], "inch")
+
+
+def read_dimensions(m: re.Match[str], _: str) -> str:
+    """3x4 is three by four."""
+    return f"{number_words(m['across'])} by {number_words(m['down'])}{_unit_words(m['gunit'])}"
+
+
+def _unit_words(unit: str | None) -> str:
+    """Plural of a unit after a space; empty for none."""
+    return f" {readings.read_table('units.tsv')[unit][1]}" if unit else ""
+
+
+def read_sharp(m: re.Match[str], _: str) -> str:
+    """C# is C sharp."""
+    return f"{m['note']} sharp"
+
+
+def read_letter_a(m: re.Match[str], _: str) -> str:
+    """A4 is A-four; with a space the letter would be an article."""
+    return f"A-{number_words(m['sheet']).replace(' ', '-')}"
 
 
 def read_feet(m: re.Match[str], _: str) -> str:

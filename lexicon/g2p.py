@@ -140,3 +140,19 @@ def parse_espeak_word(written: str, language: str) -> tuple[Segment, ...]:
     for pattern, ipa in (*_TONE_SPELLINGS, *_SPELLINGS) if is_tonal else _SPELLINGS:
         written = pattern.sub(ipa, written)
     return parse_ipa(written)
+
+
+def segments_by_rules(words: Sequence[str], language: str) -> tuple[tuple[Segment, ...], ...]:
+    """Phones of words by espeak-ng, each word by itself; empty for a word that it does not read.
+
+    Raises
+    ------
+    InputError
+        The language does not exist.
+    BackendError
+        espeak-ng is not installed.
+    """
+    return tuple(
+        tuple(segment for part in written for segment in parse_espeak_word(part, language))
+        for written in phonemize(words, language)
+    )

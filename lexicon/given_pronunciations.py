@@ -8,10 +8,9 @@ from types import MappingProxyType
 
 from lexicon.dictionary import Dictionary
 from lexicon.errors import InputError
-from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.ipa import Segment
-from lexicon.marked_text import MarkedText, PhoneMark
-from lexicon.pronounce import Pronunciation, Word, pronounce
+from lexicon.marked_text import PhoneMark
+from lexicon.pronounce import Word, pronounce
 from lexicon.spoken_form import spoken_form
 
 _STEM = "qzx"  # of the placeholders of given words during normalisation; not a word of any language
@@ -62,36 +61,34 @@ def words_with_given_phones(written: str, phones: Sequence[PhoneMark], language:
     return tuple(words)
 
 
-def pronounce_marked(
-    text: MarkedText, language: str = DEFAULT_LANGUAGE, dictionary: Dictionary | None = None
-) -> Pronunciation:
-    """As `lexicon.pronounce.pronounce`, with the phones given in the text.
+def pronounce_words(words: Sequence[TextWord], language: str, dictionary: Dictionary | None = None) -> tuple[Word, ...]:
+    """Pronounced words of a text, of which some have given phones.
 
     Raises
     ------
     InputError, BackendError
-        As there.
+        As `lexicon.pronounce.pronounce`.
     """
-    phones = [mark for mark in text.marks if isinstance(mark, PhoneMark)]
-    if not phones:
-        return pronounce(text.text, language, dictionary)
-    names = _placeholders(text.text, len(phones))
+    written = " ".join(word.text for word in words)
+    given = [word for word in words if word.segments]
+    names = iter(_placeholders(written, len(given)))
+    by_name = {next(names): word for word in given}
+    named = iter(by_name)
+    pieces = [_as_capitalised(next(named), word.text) if word.segments else word.text for word in words]
+    text = " ".join(piece + word.after for piece, word in zip(pieces, words, strict=True))
     known = dict(dictionary.entries) if dictionary else {}
-    known |= {name: mark.segments for name, mark in zip(names, phones, strict=True)}
-    written = {name: text.text[mark.at : mark.end] for name, mark in zip(names, phones, strict=True)}
-    pronunciation = pronounce(
-        _insert_placeholders(text.text, phones, names), language, Dictionary(MappingProxyType(known))
-    )
-    return replace(
-        pronunciation,
-        text=text.text,
-        words=tuple(_restore_spelling(word, written) for word in pronunciation.words),
-    )
+    known |= {name: word.segments for name, word in by_name.items()}
+    spoken = pronounce(text, language, Dictionary(MappingProxyType(known))).words
+    return tuple(_restore_spelling(word, {name: given.text for name, given in by_name.items()}) for word in spoken)
 
 
 def _restore_spelling(word: Word, written: dict[str, str]) -> Word:
     name = written.get(word.text.lower())
     return word if name is None else replace(word, text=name, source=name)
+
+
+def _as_capitalised(name: str, spelling: str) -> str:
+    return name.capitalize() if spelling[:1].isupper() else name
 
 
 def _placeholder_stem(written: str) -> str:
@@ -117,7 +114,7 @@ def _pieces(written: str, phones: Sequence[PhoneMark], names: Sequence[str]) -> 
     at = 0
     for mark, name in zip(phones, names, strict=True):
         before = written[at : mark.at]
-        placeholder = name.capitalize() if written[mark.at : mark.at + 1].isupper() else name
+        placeholder = _as_capitalised(name, written[mark.at : mark.at + 1])
         yield before + " " * before[-1:].isalnum() + placeholder + " " * written[mark.end : mark.end + 1].isalnum()
         at = mark.end
     yield written[at:]

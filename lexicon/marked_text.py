@@ -202,7 +202,7 @@ class MarkedTextBuilder:
         if last.kind != kind:
             raise InputError(f"{shown} comes before the end of {last.shown}; close {last.shown} first")
         if self._length == last.start and self._runs[-1].styles != last.before.styles:
-            raise InputError(f"{last.shown} contains no text; add words before its end")
+            raise InputError(f"{last.shown[:200]} contains no text; add words before its end")
         self._start_run(replace(last.before, start=self._length))
 
     def build(self, language: str | None = None, *, base_language: str | None = None) -> MarkedText:

@@ -89,6 +89,12 @@ def _form_table() -> tuple[tuple[str, str, forms.Reader], ...]:
             r"(?![\w/-]|\.[0-9])",
             forms.read_numeric_date,
         ),
+        (
+            "scientific",
+            r"(?P<mantissa>(?<![\w.])[+-]?[0-9]{1,9}(?:\.[0-9]{1,9})?)[eE](?P<exponent>[+-]?[0-9]{1,3})(?![\w.])"
+            rf"(?: ?(?P<sunit>{unit}))?",
+            forms.read_scientific,
+        ),
         ("version", r"[0-9]{1,4}(?:\.[0-9]{1,4}){2,6}(?!\w)", forms.read_version),
         (
             "clock",
@@ -115,6 +121,23 @@ def _form_table() -> tuple[tuple[str, str, forms.Reader], ...]:
             r"|\+[0-9]{1,3}(?:[ .-][0-9]{2,4}){2,5}(?![\w-])|(?<![\w-])[0-9]{3}-[0-9]{4}(?![\w-])|\+[0-9]{8,15}(?!\w)",
             forms.read_telephone,
         ),
+        (
+            "feetinches",
+            r"(?P<ft>[0-9]{1,3}) ?(?:ft\b\.?|feet|foot) (?P<ftin>[0-9]{1,2}(?:\.[0-9]{1,2})?) ?in\b"
+            r"(?:\.(?=[,;]| [a-z]))?",
+            forms.read_feet_inches,
+        ),
+        (
+            "inches",
+            rf"(?P<inchamount>{_AMOUNT})[ -]in"
+            r"(?:\.(?=[,;]| [a-z])|(?= ?(?:long|wide|tall|high|deep|thick|across|by(?= [0-9])|x)\b))",
+            forms.read_inches,
+        ),
+        (
+            "grid",
+            rf"(?P<across>[0-9]{{1,5}}) ?[xX] ?(?P<down>[0-9]{{1,5}})(?![\w.])(?: ?(?P<gunit>{unit}))?",
+            forms.read_dimensions,
+        ),
         ("feet", r"(?P<feet>[1-9])'(?P<inches>[0-9]{1,2})?(?![\w'])", forms.read_feet),
         ("decade", r"'?(?P<decade>[1-9]0|[12][0-9]{2}0)'?s\b", forms.read_decade),
         ("ordinal", r"(?P<ord>[0-9]{1,3}(?:,[0-9]{3}){1,5}|[0-9]{1,15})(?:st|nd|rd|th)\b", forms.read_ordinal),
@@ -128,10 +151,12 @@ def _form_table() -> tuple[tuple[str, str, forms.Reader], ...]:
             rf"(?P<from>{_AMOUNT})[–-](?P<sign4>[$£€])?(?P<to>{_AMOUNT})(?![\w-])(?: ?(?P<runit>{unit}))?",
             forms.read_range,
         ),
-        ("measure", rf"(?P<amount>{_SIGNED})[ -]?(?P<unit>{unit})", forms.read_measure),
+        ("measure", rf"(?P<amount>{_SIGNED})[ -]?(?P<unit>{unit})(?:\.(?= [a-z]))?", forms.read_measure),
         ("power", r"\^(?P<power>-?[0-9]{1,3})(?![0-9])", forms.read_power),
         ("kilo", rf"(?P<kilo>{_AMOUNT})k\b", forms.read_thousands),
         ("number", _SIGNED, forms.read_plain_number),
+        ("sharp", rf"{_START}(?P<note>[A-G])#(?![\w#])", forms.read_sharp),
+        ("sheet", rf"{_START}A(?P<sheet>[0-9]{{1,4}})(?![\w.-])", forms.read_letter_a),
         ("abbreviation", rf"{_START}{_abbreviation_pattern()}{_STOP}", forms.read_abbreviation),
         (
             "dotted",

@@ -8,9 +8,10 @@ from types import MappingProxyType
 
 from lexicon.cleaning import canonical_text
 from lexicon.dictionary import Dictionary
-from lexicon.english import CAPITALISED_WORDS, fold_to_arpabet, look_up_word
+from lexicon.english import fold_to_arpabet
+from lexicon.english_text import english_segments
 from lexicon.errors import InputError
-from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize
+from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize, segments_by_rules
 from lexicon.ipa import Segment
 from lexicon.languages import language_code
 from lexicon.normalize import MARKS, split_tokens
@@ -115,40 +116,10 @@ def _split_words(forms: Iterator[tuple[str, str]]) -> list[_WordDraft]:
     return words
 
 
-def _are_all_capitals(words: Sequence[_WordDraft]) -> bool:
-    """Whether all words are capitals, as in a heading, rather than initialisms."""
-    long = [word.text for word in words if len(word.text) > 1]
-    return len(long) > 1 and all(text.isupper() for text in long) and any(len(text) > 3 for text in long)
-
-
-def _lookup_forms(words: Sequence[_WordDraft]) -> list[str]:
-    """Lookup forms of words: words in capitals that are not initialisms become lower case."""
-    texts = ["", *(word.text for word in words), ""]
-    if _are_all_capitals(words):
-        return [text.lower() for text in texts[1:-1]]
-    return [
-        text.lower() if len(text) > 1 and CAPITALISED_WORDS & {before, text, after} and text.isupper() else text
-        for before, text, after in zip(texts, texts[1:], texts[2:], strict=False)
-    ]
-
-
-def _pronounce_english(words: list[_WordDraft], own: Dictionary) -> None:
-    """Assign CMUdict's phones to English words, and espeak-ng's to the others in one call."""
-    for word, text, following in zip(words, _lookup_forms(words), [*words[1:], None], strict=True):
-        is_article = text == "A" and not word.mark and following is not None and following.text[:1].islower()
-        word.segments = look_up_word(text, is_letter=text.isupper() and not is_article, own=own.lookup)
-    _pronounce_by_rules([word for word in words if word.segments is None], DEFAULT_LANGUAGE)
-    for word, following in pairwise(words):
-        first = (following.segments or ())[:1]
-        if word.text.lower() == "the" and first and first[0].is_syllabic and own.lookup("the") is None:
-            word.segments = (Segment("ð"), Segment("i", is_syllabic=True))
-
-
 def _pronounce_by_rules(words: Sequence[_WordDraft], language: str) -> None:
     """Phones by espeak-ng, word by word."""
-    for word, written in zip(words, phonemize([word.text for word in words], language), strict=True):
-        segments = tuple(segment for part in written for segment in parse_espeak_word(part, language))
-        word.segments = fold_to_arpabet(segments) if language == DEFAULT_LANGUAGE else segments
+    for word, segments in zip(words, segments_by_rules([word.text for word in words], language), strict=True):
+        word.segments = segments
 
 
 def _pronounce_in_context(words: list[_WordDraft], language: str) -> None:
@@ -225,7 +196,7 @@ def pronounce(text: str, language: str = DEFAULT_LANGUAGE, dictionary: Dictionar
     Parameters
     ----------
     language
-        An espeak-ng code; ``en-us`` looks words up in CMUdict first.
+        An espeak-ng code; ``en-us`` is pronounced by dictionaries and context, and where they fail by espeak-ng.
     dictionary
         The user's entries, which take precedence.
 
@@ -246,9 +217,11 @@ def pronounce(text: str, language: str = DEFAULT_LANGUAGE, dictionary: Dictionar
         words = _split_words((piece, piece) for piece in canonical_text(spoken, keep_marks=True).split())
         words = [word for word in words if any(letter.isalnum() for letter in word.text)]
     if not words:
-        raise InputError("the text contains no word to speak; add at least one word or number")
+        raise InputError("there is nothing to say in the text; add at least one word or number")
     if language == DEFAULT_LANGUAGE:
-        _pronounce_english(words, own)
+        spoken_segments = english_segments([word.text for word in words], [word.mark for word in words], own)
+        for word, segments in zip(words, spoken_segments, strict=True):
+            word.segments = segments
     else:
         _pronounce_in_context(words, language)
         for word in words:

@@ -14,7 +14,8 @@ ALPHABETS: Mapping[str, Callable[[str], tuple[Segment, ...]]] = MappingProxyType
     "ipa": parse_ipa, "x-arpabet": arpabet_segments, "arpabet": arpabet_segments, "x-cmu": arpabet_segments,
 })  # fmt: skip
 # Voices that a document may name, as in tts2face.voice; Piper voices are files, which a document cannot open.
-VOICES = ("heart", "espeak", "espeak-female")
+VOICES = ("heart", "joe", "espeak", "espeak-female")
+_ENGLISH_VOICES = frozenset({"heart", "joe"})
 GENDERS = ("female", "male", "neutral")
 MAX_PHONES_CHARACTERS = 500  # characters of ``ph``
 MAX_WORD_CHARACTERS = 60  # characters of a word with given phones
@@ -78,6 +79,6 @@ def choose_voice(attributes: Mapping[str, str], language: str) -> tuple[str | No
     name = next((name for name in attributes["name"].split() if name in VOICES), None)
     if name is None:
         raise InputError(f"there is no voice {attributes['name'][:40]!r}; use {', '.join(VOICES)}, or a gender")
-    if name == "heart" and not (spoken or language).startswith("en"):
-        raise InputError(f"the voice heart speaks English, not {spoken or language}; use espeak")
+    if name in _ENGLISH_VOICES and not (spoken or language).startswith("en"):
+        raise InputError(f"the voice {name} speaks English, not {spoken or language}; use espeak")
     return name, spoken

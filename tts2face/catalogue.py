@@ -24,6 +24,8 @@ class VoiceEntry:
     languages: tuple[str, ...]
     is_installed: bool
     summary: str
+    sex: str
+    licence: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,17 +117,32 @@ def voices() -> tuple[VoiceEntry, ...]:
     BackendError
         espeak-ng is not installed or does not start.
     """
-    from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES
+    from tts2face.voice.engine import ENGLISH_CODES, ENGLISH_VOICES, VOICE_PROFILES
 
     codes = tuple(language.code for language in languages())
     english = tuple(code for code in codes if code in ENGLISH_CODES)
     return (
-        VoiceEntry("heart", "hibari", english, _is_installed("hibari"), VOICE_NAMES["heart"]),
         *(
-            VoiceEntry(name, "espeak-ng", codes, _is_installed("espeakng_loader"), VOICE_NAMES[name])
-            for name in ("espeak", "espeak-female")
+            VoiceEntry(
+                name,
+                voice.engine,
+                english if name in ENGLISH_VOICES else codes,
+                _is_installed(voice.package),
+                voice.summary,
+                voice.sex,
+                voice.licence,
+            )
+            for name, voice in VOICE_PROFILES.items()
         ),
-        VoiceEntry("FILE.onnx", "piper", (), _is_installed("piper"), "any Piper voice by its path (extra [piper])"),
+        VoiceEntry(
+            "FILE.onnx",
+            "piper",
+            (),
+            _is_installed("onnxruntime"),
+            "a Piper voice by its path (extra [piper] for other languages than English)",
+            "-",
+            "see its model card",
+        ),
     )
 
 

@@ -58,9 +58,12 @@ class Request:
         "lists all. Chinese characters in Japanese text need the extra japanese.",
     )
     voice: str | None = option(
-        None, "Voice: heart (English), espeak or espeak-female (every language), or a Piper voice (x.onnx)."
+        None, "Voice: heart or joe (English), espeak or espeak-female (every language), or a Piper voice (x.onnx)."
     )
     rate: float = option(1.0, "Speaking rate as a factor, 0.5 to 2.")
+    plain_delivery: bool = option(
+        False, "Keep the voice's rate and loudness under every style; --rate and --volume do so for themselves."
+    )
     volume: float = option(1.0, "Loudness as a factor, 0 to 2; 1 is -16 LUFS, or the original level of a recording.")
     seed: int = option(0, "Seed of all random numbers; the same seed gives the same sound and motion.")
     dictionary: Path | None = option(None, "Pronunciation dictionary that takes precedence over the built-in one.")

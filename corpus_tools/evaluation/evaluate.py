@@ -15,6 +15,8 @@ from corpus_tools.evaluation.scores import Scores, UtteranceComparison, compute_
 from corpus_tools.evaluation.splits import Split, check_disjoint
 from corpus_tools.evaluation.tables import Evaluation, Fold
 from corpus_tools.evaluation.tracks import ExternalTrack, map_tracks
+from corpus_tools.pooling.lip_tracks import LipTrack
+from corpus_tools.pooling.pooled_speech import align_lip_tracks
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.training.pose_correction import correct_pose, fit_pose_correction
 from corpus_tools.training.train_phone_network import add_phone_network
@@ -98,6 +100,7 @@ def evaluate(
     options: Mapping[str, SynthesisOptions] | None = None,
     tracks: Mapping[str, ExternalTrack] | None = None,
     voice: Voice | None = None,
+    lips: Sequence[LipTrack] = (),
     on_progress: Progress | None = None,
 ) -> tuple[Evaluation, tuple[SplitResult, ...]]:
     """Scores of every method on held-out utterances with their true phone edges.
@@ -113,20 +116,22 @@ def evaluate(
         External tracks by utterance, evaluated as a further method.
     voice
         Voice that speaks the words of the held-out utterances with its own durations, for a second table.
+    lips
+        Lip tracks of another speaker with which the networks of each split are trained.
 
     Raises
     ------
     InputError
         A part is empty, an utterance is in both parts, or no words are known for the voice.
-    BackendError
-        scikit-learn is missing.
     """
     runs = []
     for number, (train, test) in enumerate(parts):
         check_disjoint(train, test)
         on_split_progress = _split_progress(on_progress, number, len(parts))
         runs.append(
-            evaluate_split(train, test, options=options, tracks=tracks, voice=voice, on_progress=on_split_progress)
+            evaluate_split(
+                train, test, options=options, tracks=tracks, voice=voice, lips=lips, on_progress=on_split_progress
+            )
         )
     limits = Thresholds.of([one for each in runs for one in each.real])
     n_train = len(parts[0][0]) if len(parts) == 1 else min(len(train) for train, _ in parts)
@@ -140,19 +145,20 @@ def evaluate(
     return result, tuple(runs)
 
 
-def evaluate_split(
+def evaluate_split(  # noqa: PLR0913 - those of `evaluate`, for one split
     train: Sequence[Observation],
     test: Sequence[Observation],
     *,
     options: Mapping[str, SynthesisOptions] | None = None,
     tracks: Mapping[str, ExternalTrack] | None = None,
     voice: Voice | None = None,
+    lips: Sequence[LipTrack] = (),
     on_progress: Progress | None = None,
 ) -> SplitResult:
     """Learn a talker from `train` and synthesise the motion of `test` by every method."""
     leak = fit_pose_correction(train)
     train, test = ([leak.apply(observation) for observation in part] for part in (train, test))
-    talker = _train_talker(train)
+    talker = _train_talker(train, lips)
     methods = build_methods(talker, options)
     real = tuple(ReferenceUtterance.of(observation, talker.model) for observation in test)
     voiced = speak_references(voice, real) if voice is not None else ()
@@ -173,6 +179,7 @@ def evaluate_across_talkers(
     train: Sequence[Observation],
     others: Sequence[Observation],
     *,
+    lips: Sequence[LipTrack] = (),
     on_progress: Progress | None = None,
 ) -> tuple[Evaluation, tuple[SplitResult, ...]]:
     """Scores of every method, learnt from one person, on utterances of another with the latter's phone edges.
@@ -183,12 +190,10 @@ def evaluate_across_talkers(
     ------
     InputError
         A part is empty, or an utterance is in both parts.
-    BackendError
-        scikit-learn is missing.
     """
     check_disjoint(train, others)
     train, others = correct_pose(train), correct_pose(others)
-    talker = _train_talker(train)
+    talker = _train_talker(train, lips)
     own_scale, other_scale = SpeakerScale.of(train), SpeakerScale.of(others)
     real = tuple(
         standardise_reference(ReferenceUtterance.of(observation, talker.model), other_scale) for observation in others
@@ -216,8 +221,9 @@ def evaluate_across_talkers(
     return result, (SplitResult(talker, real, synthesised, synthesis_s, scale=own_scale),)
 
 
-def _train_talker(train: Sequence[Observation]) -> Talker:
-    return add_phone_network(learn_talker(train, metadata=EVALUATION_METADATA))
+def _train_talker(train: Sequence[Observation], lips: Sequence[LipTrack]) -> Talker:
+    talker = learn_talker(train, metadata=EVALUATION_METADATA)
+    return add_phone_network(talker, align_lip_tracks(lips, talker) if lips else ())
 
 
 def _synthesise(

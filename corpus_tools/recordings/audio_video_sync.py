@@ -1,67 +1,100 @@
-"""Audio-video synchronisation: the lag of the sound, and the most common frame rate.
+"""Audio-video synchronisation: the lag of the sound, whether the lips follow it, and the most common frame rate.
 
-The lag is estimated from the derivatives of lip opening and loudness. The signals themselves correlate at many lags
-because speech is rhythmic: over 51 s of GRID s1 they give lags from -0.26 to 0.3 s, their derivatives -0.02 to 0.05 s.
+The speed of the lips is correlated with the speed that a shipped talker shows for the phones aligned to the sound. For
+other people this separates right from wrong sound and finds lags far better than the change of loudness
+(docs/decisions/129-recording-limits.md).
 """
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.recordings.expected_lips import EXPECTED_RATE_HZ, ExpectedOpening, shipped_talker_opening
+from corpus_tools.recordings.limits import check_limits, limit_warnings
 from corpus_tools.recordings.observation import Observation, Timing
-from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
+from lexicon.errors import DataError
+from tts2face.models.landmarks import lip_opening
 
-MAX_LAG_S = 0.3  # lags between minus and plus this are compared
+MAX_LAG_S = 0.5  # lags between minus and plus this are compared
 LAG_STEP_S = 0.01
 LAGS_S = np.arange(-round(MAX_LAG_S / LAG_STEP_S), round(MAX_LAG_S / LAG_STEP_S) + 1) * LAG_STEP_S
-MIN_FRAMES = 25  # common to sound and picture
-# Lip motion precedes the sound by this in GRID s1, whose sound and picture are assumed to be synchronous.
-LIP_LEAD_S = 0.01
-# Standard error of the lag in sequences of GRID s1: 15 ms from 51 s, 14 ms from 96 s.
-MIN_DURATION_S = 48.0
-MIN_LAG_S = 0.045  # three standard errors for `MIN_DURATION_S`; it falls with the square root of the duration
-# 1 % of 400 samples of 51 s of GRID s1 lie below 0.38; with the sound of other sentences 1 % lie above 0.21.
-MIN_CORRELATION = 0.28
+MIN_FRAMES = 25
+MIN_DURATION_S = 12.0  # shorter videos take the lag of all short ones: of 3 s it has an error of 25 ms, of 12 s 10 ms
+NEAR_S = 0.05  # a short video may differ from this lag by as much
+# Lags found in five synchronous talkers lie from -0.04 to 0 s.
+MIN_LAG_S = 0.045
+RELIABLE_S = 8.0  # duration from which lags of `MIN_LAG_S` are significant; in less they must be larger
 
 
 @dataclass(frozen=True, slots=True)
 class SyncEstimate:
-    """Estimated ``lag`` of the sound in seconds, correlation of lips and loudness at it, and duration of the data."""
+    """Estimated ``lag`` of the sound in seconds, and correlations of the lips with the expected ones at it.
+
+    ``correlation`` and ``seconds`` are those of the video, ``pooled`` and ``pooled_seconds`` those of the material
+    from which the lag was estimated.
+    """
 
     lag: float
     correlation: float
     seconds: float
+    pooled: float
+    pooled_seconds: float
 
     @property
     def lag_correction_s(self) -> float:
         """The lag to correct: 0 if it is not significant."""
-        least = MIN_LAG_S * np.sqrt(MIN_DURATION_S / self.seconds) if self.seconds >= MIN_DURATION_S else np.inf
+        if self.pooled_seconds <= 0 or self.problem:
+            return 0.0
+        least = MIN_LAG_S * np.sqrt(max(1.0, RELIABLE_S / self.pooled_seconds))
         return round(self.lag, 3) if abs(self.lag) >= least else 0.0
 
     @property
+    def measures(self) -> dict[str, float]:
+        """The correlations, under the names of the limits that apply to the durations."""
+        long = {"sync": self.pooled} if self.pooled_seconds >= MIN_DURATION_S else {}
+        return {**long, **({"sync_of_short": self.correlation} if 0 < self.seconds < MIN_DURATION_S else {})}
+
+    @property
     def problem(self) -> str | None:
-        """Why sound and picture do not match; None if they do or if there is too little data."""
-        if self.seconds < MIN_DURATION_S:
-            return None
-        if self.correlation < MIN_CORRELATION:
-            return f"lip motion does not match the sound (correlation {self.correlation:.2f}); give the original sound"
+        """Why sound and picture do not match; None if they do or if there is no motion to compare."""
+        try:
+            check_limits(self.measures)
+        except DataError as reason:
+            return str(reason)
         if abs(self.lag) > MAX_LAG_S - 2 * LAG_STEP_S:
             return f"sound and picture are out of sync by {MAX_LAG_S:g} s or more; synchronise them with an editor"
         return None
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Messages about weak agreement, and about material that is too short for a comparison."""
+        if not self.seconds:
+            return (f"it has fewer than {MIN_FRAMES} frames, too few to compare lips and sound; record longer parts",)
+        return limit_warnings(self.measures)
 
-def estimate_sync_by_video(observations: Sequence[Observation]) -> Mapping[Path, SyncEstimate]:
-    """Synchronisation of each video; videos shorter than `MIN_DURATION_S` are pooled."""
-    together: dict[Path, list[Observation]] = {}
-    for observation in observations:
-        together.setdefault(observation.video, []).append(observation)
-    short = [video for video, group in together.items() if _total_duration(group) < MIN_DURATION_S]
-    of_short = estimate_sync([observation for video in short for observation in together[video]])
-    return {video: of_short if video in short else estimate_sync(group) for video, group in together.items()}
+
+def estimate_sync_by_video(
+    observations: Sequence[Observation], expected: ExpectedOpening = shipped_talker_opening
+) -> Mapping[Path, SyncEstimate]:
+    """Synchronisation of each video; videos shorter than `MIN_DURATION_S` are pooled, and compared at their lag.
+
+    Parameters
+    ----------
+    expected
+        Lip opening for phones, as `corpus_tools.recordings.expected_lips.shipped_talker_opening` returns it.
+    """
+    together: dict[Path, list[tuple[NDArray[np.float64], float]]] = {one.video: [] for one in observations}
+    for one in observations:
+        curve = lag_correlations(one, expected)
+        if curve is not None:
+            together[one.video].append((curve, len(one.landmarks) / one.fps))
+    short = [video for video, group in together.items() if _total_seconds(group) < MIN_DURATION_S]
+    pool = [part for video in short for part in together[video]]
+    return {video: _estimate(group, pool if video in short else group) for video, group in together.items()}
 
 
 def corrected_timings(observations: Sequence[Observation], found: Mapping[Path, SyncEstimate]) -> Mapping[Path, Timing]:
@@ -78,46 +111,54 @@ def corrected_timings(observations: Sequence[Observation], found: Mapping[Path, 
     return {video: timing for video, timing in wanted.items() if timing != Timing()}
 
 
-def estimate_sync(observations: Iterable[Observation]) -> SyncEstimate:
-    """Lag of the highest correlation of lips and loudness; lag and correlation are 0 without motion."""
-    found = [
-        (curve, observation) for observation in observations if (curve := lag_correlations(observation)) is not None
-    ]
-    if not found:
-        return SyncEstimate(0.0, 0.0, 0.0)
-    lengths = [len(observation.landmarks) for _, observation in found]
-    total = np.average([curve for curve, _ in found], axis=0, weights=lengths)
-    at = int(total.argmax())
-    offset = 0.0
-    if 0 < at < len(LAGS_S) - 1:
-        before, peak, behind = total[at - 1 : at + 2]
-        bend = before - 2 * peak + behind
-        offset = 0.5 * (before - behind) / bend if bend else 0.0
-    return SyncEstimate(
-        float(LAGS_S[at] + offset * LAG_STEP_S - LIP_LEAD_S),
-        float(total[at]),
-        _total_duration([observation for _, observation in found]),
-    )
+def lag_correlations(observation: Observation, expected: ExpectedOpening) -> NDArray[np.float64] | None:
+    """Correlations of the lips' speed with the expected one `LAGS_S` later; None with too few frames.
 
-
-def lag_correlations(observation: Observation) -> NDArray[np.float64] | None:
-    """Correlations of the lips' speed with the change of loudness `LAGS_S` later; None with too few frames."""
-    opening = observation.landmarks[:, UPPER_LIP_INNER_MID] - observation.landmarks[:, LOWER_LIP_INNER_MID]
-    times = np.arange(len(opening)) / observation.fps
-    within = (times >= MAX_LAG_S) & (times <= times[-1] - MAX_LAG_S)
-    if within.sum() < MIN_FRAMES:
+    Beyond the phones the expected lips are at rest. Lips that do not move correlate by 0.
+    """
+    n_frames = len(observation.landmarks)
+    if n_frames < MIN_FRAMES:
         return None
-    speed = np.gradient(np.linalg.norm(opening.astype(np.float64), axis=1))
-    rise = np.gradient(observation.intensity.astype(np.float64))
-    if speed[within].std() == 0:
-        return None
-    rows = np.array([np.interp(times[within] + lag, times, rise) for lag in LAGS_S])
+    times = np.arange(n_frames) / observation.fps
+    speed = np.gradient(lip_opening(observation.landmarks).astype(np.float64))
+    wanted = np.gradient(expected(observation.phones))
+    known = np.arange(len(wanted)) / EXPECTED_RATE_HZ
+    rows = np.array([np.interp(times + lag, known, wanted, left=0.0, right=0.0) for lag in LAGS_S])
     rows -= rows.mean(axis=1, keepdims=True)
-    lips = speed[within] - speed[within].mean()
-    size = np.linalg.norm(rows, axis=1) * np.linalg.norm(lips)
-    correlations: NDArray[np.float64] = rows @ lips / np.maximum(size, 1e-9)
+    speed -= speed.mean()
+    size = np.linalg.norm(rows, axis=1) * np.linalg.norm(speed)
+    correlations: NDArray[np.float64] = rows @ speed / np.maximum(size, 1e-9)
     return correlations
 
 
-def _total_duration(observations: Sequence[Observation]) -> float:
-    return float(sum(len(observation.landmarks) / observation.fps for observation in observations))
+Parts = Sequence[tuple[NDArray[np.float64], float]]  # correlations at `LAGS_S`, and seconds of each observation
+
+
+def _estimate(own: Parts, pool: Parts) -> SyncEstimate:
+    if not pool:
+        return SyncEstimate(0.0, 0.0, 0.0, 0.0, 0.0)
+    total = _mean_curve(pool)
+    lag = _peak_lag(total)
+    near = np.abs(LAGS_S - lag) <= NEAR_S
+    correlation = float(_mean_curve(own)[near].max()) if own else 0.0
+    return SyncEstimate(lag, correlation, _total_seconds(own), float(total.max()), _total_seconds(pool))
+
+
+def _mean_curve(parts: Parts) -> NDArray[np.float64]:
+    return np.asarray(np.average([curve for curve, _ in parts], axis=0, weights=[seconds for _, seconds in parts]))
+
+
+def _peak_lag(curve: NDArray[np.float64]) -> float:
+    """Lag of the highest correlation, interpolated by a parabola; 0 for lips that do not move."""
+    if not curve.any():
+        return 0.0
+    at, offset = int(curve.argmax()), 0.0
+    if 0 < at < len(LAGS_S) - 1:
+        before, peak, behind = curve[at - 1 : at + 2]
+        bend = before - 2 * peak + behind
+        offset = 0.5 * (before - behind) / bend if bend else 0.0
+    return float(LAGS_S[at] + offset * LAG_STEP_S)
+
+
+def _total_seconds(parts: Parts) -> float:
+    return float(sum(seconds for _, seconds in parts))

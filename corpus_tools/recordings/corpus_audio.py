@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from corpus_tools.recordings.corpus_video import content_key
 from corpus_tools.recordings.folder import PronouncedTranscript
+from corpus_tools.recordings.noise_suppression import suppress_noise
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.speech.pauses import Span, cut_at_pauses, cut_sound
@@ -27,6 +28,7 @@ ALIGNMENT_VERSION = 4  # increased when alignment gives other edges, which inval
 RECOGNITION_KIND = "hearing"
 RECOGNITION_VERSION = 1  # increased when other phones are recognised
 SOUND_RATE = 16_000  # Hz; input of the aligner and the recogniser
+SUPPRESSED = "n"  # in names of cache entries: of the sound after suppression of noise
 MAX_UTTERANCE_S = 20.0  # longer recordings are cut at pauses
 
 
@@ -45,13 +47,16 @@ class AlignedSpeech:
 
 
 class CachedAligner:
-    """Aligner of recordings with a cache; models are loaded on first use, and the last file's sound stays in memory."""
+    """Aligner of recordings with a cache; models are loaded on first use, and the last file's sound stays in memory.
+
+    In noisy files, words and phones are found after `suppress_noise`; the sound that is returned is that of the file.
+    """
 
     def __init__(self, cache: Path) -> None:
         self._cache = cache
         self._aligner: Aligner | None = None
         self._recogniser: PhoneRecogniser | None = None
-        self._last: tuple[str, Waveform] | None = None
+        self._last: tuple[str, Waveform, Waveform] | None = None  # key, sound, sound without noise
 
     def sound(self, video: Path, span: Span | None = None) -> Waveform:
         """Sound of a file, or of a span of its seconds.
@@ -61,12 +66,17 @@ class CachedAligner:
         DataError
             There is no sound, or it cannot be decoded.
         """
+        whole = self._read(video)[0]
+        return whole if span is None else cut_sound(whole, span)
+
+    def _read(self, video: Path) -> tuple[Waveform, Waveform]:
+        """Sound of a file, and the same with noise suppressed: the same object if there is little noise."""
         key = content_key(video)
         if self._last is None or self._last[0] != key:
             self._last = None  # frees the memory before the next sound is read
-            self._last = key, read_sound(video, SOUND_RATE)
-        whole = self._last[1]
-        return whole if span is None else cut_sound(whole, span)
+            sound = read_sound(video, SOUND_RATE)
+            self._last = key, sound, suppress_noise(sound)
+        return self._last[1:]
 
     def align(self, video: Path, words: PronouncedTranscript | None, span: Span | None = None) -> AlignedSpeech:
         """Phones of a recording's sound, from the cache if the same sound and words have been aligned.
@@ -86,10 +96,14 @@ class CachedAligner:
             No phone recogniser is installed.
         """
         sound = self.sound(video, span)
-        request = hashlib.sha256(json.dumps([words, span]).encode()).hexdigest()[:8]
+        whole, clean = self._read(video)
+        asked: list[object] = [words, span, *([SUPPRESSED] if clean is not whole else [])]
+        request = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:8]
         cached = self._cache / f"{content_key(video)}-{request}-{ALIGNMENT_VERSION}.{ALIGNMENT_KIND}"
         found = _read_cached_alignment(cached, sound, is_recognised=words is None)
-        return found or self._align_words(sound, words, cached)
+        return found or replace(
+            self._align_words(clean if span is None else cut_sound(clean, span), words, cached), sound=sound
+        )
 
     def utterances(
         self, video: Path, words: PronouncedTranscript | None
@@ -105,7 +119,7 @@ class CachedAligner:
         """
         from tts2face.speech.transcript_placement import assign_words
 
-        spans = cut_at_pauses(self.sound(video), MAX_UTTERANCE_S)
+        spans = cut_at_pauses(self._read(video)[1], MAX_UTTERANCE_S)
         if words is None:
             return tuple((span, None) for span in spans)
 
@@ -140,7 +154,9 @@ class CachedAligner:
 
     def _recognise_spans(self, video: Path, spans: Sequence[Span]) -> list[list[tuple[str, ...]]]:
         """Recognised phones of the words in each span, from the cache if available."""
-        cached = self._cache / f"{content_key(video)}-{RECOGNITION_VERSION}.{RECOGNITION_KIND}"
+        whole, clean = self._read(video)
+        kind = f"{RECOGNITION_VERSION}{'' if clean is whole else SUPPRESSED}"
+        cached = self._cache / f"{content_key(video)}-{kind}.{RECOGNITION_KIND}"
         if cached.is_file():
             try:
                 stored = read_tensors(cached, RECOGNITION_KIND, RECOGNITION_VERSION)[1]["words"]
@@ -148,7 +164,7 @@ class CachedAligner:
                     return [[tuple(word) for word in words] for words in stored]
             except (DataError, KeyError):
                 pass  # a damaged file is written again
-        found = [list(self._recognise_words(self.sound(video, span))) for span in spans]
+        found = [list(self._recognise_words(cut_sound(clean, span))) for span in spans]
         write_tensors(cached, RECOGNITION_KIND, RECOGNITION_VERSION, {"spans": np.array(spans)}, {"words": found})
         return found
 

@@ -135,7 +135,10 @@ def _recordings_from_manifest(folder: Path, manifest: Path) -> tuple[Recording, 
     transcripts = {row["clip"]: row.get("transcript") for row in rows if "clip" in row}
     clips = folder / "clips"
     videos = _list_videos(clips if clips.is_dir() else folder)
-    return tuple(Recording(video.stem, video, transcripts.get(video.stem), is_spelling=True) for video in videos)
+    return tuple(
+        Recording(video.stem, video, transcripts.get(video.name, transcripts.get(video.stem)), is_spelling=True)
+        for video in videos
+    )
 
 
 def _recordings_without_manifest(folder: Path) -> tuple[Recording, ...]:

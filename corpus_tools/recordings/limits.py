@@ -1,6 +1,7 @@
-"""Quality measures of recordings and their limits.
+"""Quality measures of recordings and their limits: a warning beyond the first, a refusal beyond the second.
 
-Each limit is listed with the median and the worst value of 804 recordings of GRID s1, all of which are suitable.
+`tests/bench/bench_recording_limits.py` measures their distributions in good, damaged and desynchronised recordings;
+docs/recordings.md has the table, docs/decisions/129-recording-limits.md the reasons.
 """
 
 from collections.abc import Mapping
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from corpus_tools.recordings.corpus_video import NOT_COUNTED
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, lip_opening
 from tts2face.speech.pauses import sound_windows
 from tts2face.speech.text_fit import LEAST_CONFIDENCE
 from tts2face.types import Waveform
@@ -20,46 +22,89 @@ CLIPPED_LEVEL = 0.999  # amplitude from which a sample counts as clipped
 MIN_PICTURE_CHANGE = 0.02  # of an 8-bit step: frames that differ by less are equal; camera noise is above
 LEVEL_WINDOW_S = 0.02
 NOISE_QUANTILE = 0.1  # of the windows without speech; excludes footsteps and breaths
+NOISY_DB = 20.0  # ratio of speech to noise below which alignment fits worse although the words are right
+MEDIAN_TO_DEVIATION = 1.4826  # of a normal distribution
+SECOND_DIFFERENCE_GAIN = np.sqrt(6.0)  # of white noise: 1 + 4 + 1 variances
 
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """A bound of a measure, and the message if it is exceeded."""
+    """Bounds of a measure for a warning and for a refusal, and the message, with ``{value}`` and ``{bound}``."""
 
     measure: str
-    bound: float
+    warning: float
+    refusal: float
     is_minimum: bool
     sentence: str
 
-    def is_broken_by(self, value: float) -> bool:
-        """Whether a value exceeds the bound."""
-        return value < self.bound if self.is_minimum else value > self.bound
+    def message(self, value: float, bound: float) -> str | None:
+        """The message if a value exceeds a bound, otherwise None."""
+        is_broken = value < bound if self.is_minimum else value > bound
+        return self.sentence.format(value=value, bound=bound) if is_broken else None
 
 
+WORDS = "the sound does not match the transcript (confidence {value:.0f}, limit {bound:.0f}); correct the words"
+PHONES = (
+    "its phones could not be recognised well (confidence {value:.0f}, limit {bound:.0f}); "
+    "write the transcript into a .txt beside it"
+)
+LIPS = "lip motion does not match the sound (correlation {value:.2f}, limit {bound:.2f}); give the original sound"
 LIMITS = (
     # The median is -7300 for other sentences of GRID's small grammar, -10500 for unrelated text if it aligns at all.
+    Limit("confidence", -6000.0, LEAST_CONFIDENCE, True, WORDS),
+    Limit("confidence_in_noise", LEAST_CONFIDENCE, -8500.0, True, WORDS),
+    Limit("recognised", -6000.0, LEAST_CONFIDENCE, True, PHONES),
+    Limit("recognised_in_noise", LEAST_CONFIDENCE, -8500.0, True, PHONES),
     Limit(
-        "confidence",
-        LEAST_CONFIDENCE,
-        True,
-        "the sound does not match the transcript (confidence {value:.0f}); correct the words",
+        "clipped",
+        0.005,
+        0.3,
+        False,
+        "{value:.1%} of the speech is clipped, limit {bound:.1%}; record it again with less gain",
     ),
     Limit(
-        "recognised",
-        LEAST_CONFIDENCE,
+        "snr_db",
+        NOISY_DB,
+        6.0,
         True,
-        "its phones could not be recognised well (confidence {value:.0f}); write the transcript into a .txt beside it",
+        "speech is {value:.0f} dB above the noise, limit {bound:.0f} dB; record in a quieter room",
     ),
-    Limit("clipped", 0.005, False, "{value:.1%} of the speech is clipped; record it again with less gain"),
-    Limit("snr_db", 10.0, True, "speech is {value:.0f} dB above the noise; record in a quieter room"),
-    Limit("crowded", 0.25, False, "{value:.0%} of the frames show more than one face; crop them to one person"),
-    Limit("turn_deg", 30.0, False, "the face is turned away by {value:.0f} degrees; film it from the front"),
-    Limit("frozen_s", 0.2, False, "the picture is frozen for {value:.2f} s; record it again"),
+    Limit(
+        "crowded",
+        0.02,
+        0.25,
+        False,
+        "{value:.0%} of the frames show more than one face, limit {bound:.0%}; crop them to one person",
+    ),
+    Limit(
+        "turn_deg",
+        20.0,
+        30.0,
+        False,
+        "the face is turned away by {value:.0f} degrees, limit {bound:.0f} degrees; film it from the front",
+    ),
+    Limit("frozen_s", 0.1, 0.3, False, "the picture is frozen for {value:.2f} s, limit {bound:.2f} s; record it again"),
+    Limit(
+        "eye_px",
+        30.0,
+        12.0,
+        True,
+        "the outer eye corners are {value:.0f} px apart, limit {bound:.0f} px; film the face larger",
+    ),
+    Limit(
+        "jitter",
+        0.2,
+        0.5,
+        False,
+        "tracked lips jitter by {value:.2f} of their motion, limit {bound:.2f}; record with more light",
+    ),
+    Limit("sync", 0.35, 0.25, True, LIPS),
+    Limit("sync_of_short", 0.3, 0.15, True, LIPS),
 )
 
 
 def check_limits(measured: Mapping[str, float]) -> None:
-    """Check measures against their limits; measures without a limit are ignored.
+    """Check measures against the limits of refusal; measures without a limit are ignored.
 
     Raises
     ------
@@ -68,8 +113,20 @@ def check_limits(measured: Mapping[str, float]) -> None:
     """
     for limit in LIMITS:
         value = measured.get(limit.measure)
-        if value is not None and limit.is_broken_by(value):
-            raise DataError(limit.sentence.format(value=value))
+        if value is not None and (message := limit.message(value, limit.refusal)):
+            raise DataError(message)
+
+
+def limit_warnings(measured: Mapping[str, float]) -> tuple[str, ...]:
+    """Messages about the measures that exceed the limits of warnings."""
+    found = (limit.message(measured[limit.measure], limit.warning) for limit in LIMITS if limit.measure in measured)
+    return tuple(message for message in found if message)
+
+
+def confidence_measure(confidence: float, snr_db: float, *, is_recognised: bool) -> dict[str, float]:
+    """The confidence of an alignment under the name of the limit that applies to it."""
+    name = "recognised" if is_recognised else "confidence"
+    return {name if snr_db >= NOISY_DB else f"{name}_in_noise": confidence}
 
 
 def sound_measures(sound: Waveform, phones: PhoneSequence) -> dict[str, float]:
@@ -113,3 +170,19 @@ def head_turn_deg(angles: NDArray[np.floating]) -> float:
     """Median angle in degrees between a face and the camera, from (T, 3) pitch, yaw and roll."""
     angle = np.arccos(np.clip(np.cos(angles[:, 0]) * np.cos(angles[:, 1]), -1.0, 1.0))
     return float(np.degrees(np.median(angle)))
+
+
+def landmark_measures(points: NDArray[np.floating], landmarks: NDArray[np.floating]) -> dict[str, float]:
+    """Median distance ``eye_px`` of the outer eye corners, and ``jitter``: noise of the lip opening over its deviation.
+
+    Parameters
+    ----------
+    points, landmarks : (T, 478, 3)
+        In pixels, and pose-free in mm. The noise is that of white noise with the median second difference.
+    """
+    apart = np.linalg.norm(points[:, EYE_OUTER_LEFT, :2] - points[:, EYE_OUTER_RIGHT, :2], axis=1)
+    opening = lip_opening(landmarks).astype(np.float64)
+    bends = np.diff(opening, 2)
+    spread = float(opening.std())
+    noise = MEDIAN_TO_DEVIATION * float(np.median(np.abs(bends))) / SECOND_DIFFERENCE_GAIN if len(bends) else 0.0
+    return {"eye_px": float(np.median(apart)), "jitter": noise / spread if spread > 0 else 0.0}

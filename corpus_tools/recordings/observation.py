@@ -1,6 +1,6 @@
 """Observation of one recording: pose-free landmarks, head pose, phones and loudness on one time axis."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +9,15 @@ from numpy.typing import NDArray
 from corpus_tools.recordings.corpus_audio import AlignedSpeech, CachedAligner
 from corpus_tools.recordings.corpus_video import CachedTracker, TrackedVideo
 from corpus_tools.recordings.folder import Recording, pronounce_recording
-from corpus_tools.recordings.limits import check_limits, head_turn_deg, picture_measures, sound_measures
+from corpus_tools.recordings.limits import (
+    check_limits,
+    confidence_measure,
+    head_turn_deg,
+    landmark_measures,
+    limit_warnings,
+    picture_measures,
+    sound_measures,
+)
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.speech.loudness import intensity
@@ -19,6 +27,9 @@ from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose
 TIME_TOLERANCE_S = 1e-6  # seconds
 N_NEIGHBOUR_FRAMES = 2.0  # frames around a span that are used to interpolate those in it
 MIN_FRAMES = 2
+MAX_OUTSIDE_S = (
+    0.08  # a phone may end this long after the picture; in noise, aligned words last to the end of the sound
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +47,8 @@ class Quality:
     ``confidence`` of the alignment (0 is perfect, log likelihood per second), lowest face ``score``, ``n_filled``
     interpolated frames, seconds ``cut`` from the video's start, corrected ``lag`` in seconds, share of ``clipped``
     speech, ``snr_db`` of speech over noise, share of ``crowded`` frames, ``turn_deg`` away from the camera,
-    ``frozen_s`` without a change.
+    ``frozen_s`` without a change, median distance ``eye_px`` of the outer eye corners, ``jitter`` of the lip opening
+    relative to its deviation.
     """
 
     confidence: float
@@ -49,6 +61,8 @@ class Quality:
     crowded: float = 0.0
     turn_deg: float = 0.0
     frozen_s: float = 0.0
+    eye_px: float = np.inf
+    jitter: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,6 +92,14 @@ class Observation:
     video: Path
     is_recognised: bool = False
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Messages about measures beyond the limits of warnings."""
+        quality = self.quality
+        measured = {field.name: getattr(quality, field.name) for field in fields(quality) if field.name != "confidence"}
+        fit = confidence_measure(quality.confidence, quality.snr_db, is_recognised=self.is_recognised)
+        return limit_warnings({**measured, **fit})
+
 
 def observe_recording(
     recording: Recording, tracker: CachedTracker, aligner: CachedAligner, timing: Timing
@@ -90,9 +112,9 @@ def observe_recording(
         The recording is unsuitable; the message states the reason.
     """
     sound = aligner.align(recording.video, pronounce_recording(recording), recording.span)
-    check_limits({"recognised" if sound.is_recognised else "confidence": sound.confidence})
     measures = sound_measures(sound.sound, sound.phones)
     check_limits(measures)
+    check_limits(confidence_measure(sound.confidence, measures["snr_db"], is_recognised=sound.is_recognised))
     tracked = tracker.track(recording.video)
     filled, first, n_filled = _span_landmarks(tracked, recording.span, timing)
     fps = timing.fps or tracked.fps
@@ -103,6 +125,7 @@ def observe_recording(
     here = (tracked.times > begin - TIME_TOLERANCE_S) & (tracked.times < begin + len(filled) / fps - TIME_TOLERANCE_S)
     measures |= picture_measures(tracked.n_faces[here], tracked.changes[here], tracked.times[here])
     measures["turn_deg"] = head_turn_deg(head_angles(posed.rotations))
+    measures |= landmark_measures(filled, posed.landmarks)
     check_limits(measures)
     return Observation(
         name=recording.name,
@@ -155,15 +178,20 @@ def trim_to_picture(sound: AlignedSpeech, begin: float, stop: float) -> tuple[Ph
     Raises
     ------
     DataError
-        Speech lies outside.
+        Speech begins before, or ends more than `MAX_OUTSIDE_S` later, or a whole phone lies outside.
     """
     phones = list(sound.phones.phones)
     edges = sound.phones.edges.copy()
     lead = 1 if phones[0] == SILENCE and edges[1] <= begin else 0
     tail = len(phones) - (1 if phones[-1] == SILENCE and edges[-2] >= stop else 0)
-    phones, edges = phones[lead:tail], np.clip(edges[lead : tail + 1], None, stop)
+    phones, edges = phones[lead:tail], edges[lead : tail + 1]
     spoken = [i for i, phone in enumerate(phones) if phone != SILENCE]
-    if edges[spoken[0]] < begin or sound.phones.edges[lead + spoken[-1] + 1] > stop:
+    first, last = spoken[0], spoken[-1] + 1
+    if 0 < edges[last] - stop <= MAX_OUTSIDE_S and edges[last - 1] < stop:
+        edges[last] = stop
+    is_outside = edges[first] < begin or edges[last] > stop
+    edges = np.clip(edges, None, stop)
+    if is_outside:
         raise DataError(
             f"there is speech while no face is visible (visible: {begin:.2f} s to {stop:.2f} s); cut the video"
         )

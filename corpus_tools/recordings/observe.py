@@ -30,12 +30,21 @@ class Refusal:
     at: float
 
 
+@dataclass(frozen=True, slots=True)
+class QualityWarning:
+    """A weakness of a kept recording."""
+
+    name: str
+    message: str
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Observations:
-    """Observations and refusals of a folder of recordings, sorted by name."""
+    """Observations and refusals of a folder of recordings, and warnings about kept ones, sorted by name."""
 
     kept: tuple[Observation, ...]
     refused: tuple[Refusal, ...]
+    warnings: tuple[QualityWarning, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +65,11 @@ ShareCallback = Callable[[float], None]  # called with the finished share of a t
 
 
 def observe(
-    recordings: Path, *, run_options: RunOptions | None = None, on_progress: Progress | None = None
+    recordings: Path,
+    *,
+    is_strict: bool = False,
+    run_options: RunOptions | None = None,
+    on_progress: Progress | None = None,
 ) -> Observations:
     """Observations of a folder at one frame rate with sound and picture synchronised, and reasons for refusals.
 
@@ -64,6 +77,8 @@ def observe(
     ----------
     recordings
         A folder, or a video, as `corpus_tools.recordings.folder.find_recordings` reads it.
+    is_strict
+        Whether recordings with warnings are refused.
     on_progress
         Called with steps done and of all, `STEPS_PER_VIDEO` for each video.
 
@@ -89,11 +104,22 @@ def observe(
         found[task.video] = outcomes
     for video, agreement in agreed.items():
         if agreement.problem:
-            found[video] = [_refuse_unsynchronised(outcome, agreement.problem) for outcome in found[video]]
+            found[video] = [_refuse(outcome, agreement.problem) for outcome in found[video]]
     every = [outcome for outcomes in found.values() for outcome in outcomes]
+    warnings = [
+        QualityWarning(one.name, message)
+        for one in every
+        if isinstance(one, Observation)
+        for message in (*one.warnings, *agreed[one.video].warnings)
+    ]
+    if is_strict:
+        reasons = {warning.name: warning.message for warning in reversed(warnings)}
+        every = [_refuse(outcome, reasons[outcome.name]) if outcome.name in reasons else outcome for outcome in every]
+        warnings = []
     return Observations(
         tuple(sorted((one for one in every if isinstance(one, Observation)), key=lambda one: one.name)),
         tuple(sorted((one for one in every if isinstance(one, Refusal)), key=lambda one: one.name)),
+        tuple(sorted(warnings, key=lambda warning: warning.name)),
     )
 
 
@@ -121,7 +147,7 @@ def _refusal(recording: Recording, reason: DataError) -> Refusal:
     return Refusal(recording.name, str(reason), recording.video, sum(recording.span or (0.0, 0.0)) / 2)
 
 
-def _refuse_unsynchronised(outcome: Observation | Refusal, fault: str) -> Refusal:
+def _refuse(outcome: Observation | Refusal, fault: str) -> Refusal:
     if isinstance(outcome, Refusal):
         return outcome
     return Refusal(outcome.name, fault, outcome.video, outcome.quality.cut)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.recordings.limits import LIMITS
+from corpus_tools.recordings.limits import LIMITS, Limit
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import Observations, Refusal
 from corpus_tools.report.drawing import FIRST, SECOND, draw_svg
@@ -39,6 +39,8 @@ MEASURES = {
     "crowded": ("frames with several faces", "%", 100.0),
     "turn_deg": ("head turn", "degrees", 1.0),
     "frozen_s": ("frozen picture", "s", 1.0),
+    "eye_px": ("distance of the outer eye corners", "px", 1.0),
+    "jitter": ("jitter of the lip opening", "of its deviation", 1.0),
 }
 
 
@@ -53,6 +55,8 @@ def recordings_page(name: str, found: Observations) -> str:
             _measures(found.kept),
             "<h2>Phones spoken</h2>",
             _phones(found.kept),
+            f"<h2>Warnings ({len(found.warnings)})</h2>",
+            *(paragraphs(f"{warning.name}: {warning.message}") for warning in found.warnings),
             f"<h2>Refused ({len(found.refused)})</h2>",
             *(_refused_item(refusal, pictures.get(refusal.name)) for refusal in found.refused),
             f"<h2>Kept ({len(found.kept)})</h2>",
@@ -109,9 +113,14 @@ def _measures(kept: Sequence[Observation]) -> str:
     for measure, (label, unit, factor) in MEASURES.items():
         values = factor * np.array([getattr(observation.quality, measure) for observation in kept], np.float64)
         limit = limits.get(measure)
-        bound = "" if limit is None else f"{'at least' if limit.is_minimum else 'at most'} {factor * limit.bound:g}"
+        bound = "" if limit is None else _limit_text(limit, factor)
         rows.append((label, unit, *(f"{value:.3g}" for value in np.quantile(values, [0, 0.5, 1])), bound))
     return table(("measure", "unit", "lowest", "median", "highest", "limit"), rows, numbers=(2, 3, 4))
+
+
+def _limit_text(limit: Limit, factor: float) -> str:
+    side = "at least" if limit.is_minimum else "at most"
+    return f"{side} {factor * limit.warning:g}, refused beyond {factor * limit.refusal:g}"
 
 
 def _phones(kept: Iterable[Observation]) -> str:

@@ -1,116 +1,125 @@
-"""Networks from phones to speech parameters, trained on a talker's utterances with scikit-learn.
+"""Networks from phones to speech parameters, trained on a talker's utterances, with or without another speaker's lips.
 
-The input of the first is a one-hot code of phones. The inputs of the others are articulatory features
-(`lexicon.phones.phone_features`), which generalise to unseen phone contexts; their first layer is multiplied by the
+The inputs of some are one-hot codes of phones, those of the others articulatory features
+(`lexicon.phones.phone_features`), which generalise to unseen phones; their first layer is multiplied by the
 feature table, so that the talker's file holds all networks in the same form.
+
+With pooled speech, the networks have further outputs, the lip features of `corpus_tools.pooling`, z-scored per speaker.
+Both speakers share all weights but the biases of the first layer; the talker's parameters are learnt from the talker
+only. What remains of the other speaker is his influence on the shared weights: his features and biases are not stored.
 """
 
-import warnings
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
-from lexicon.errors import BackendError
-from lexicon.phones import phone_features
+from corpus_tools.evaluation.measures import speech_frames
+from corpus_tools.pooling.pooled_speech import PooledSpeech, pooled_inventory, talker_features
+from corpus_tools.training.feature_table import feature_table
+from corpus_tools.training.network_training import TrainingOptions, Weights, WindowSamples, train_network
 from lexicon.sequence import SILENCE
 from tts2face.models.phone_network import PhoneNetwork, window_features
 from tts2face.models.talker import Talker
 from tts2face.types import Progress
 
 SILENCE_MARGIN_S = 0.2  # of silence around speech in the training data
-HIDDEN_UNITS = (128, 128)
-WEIGHT_DECAY = 1e-3
-MAX_EPOCHS = 60
-N_BY_LABEL, N_BY_FEATURES = 1, 3  # networks; features are better on unseen words, labels on seen ones (accuracy.md)
+TRAINING = TrainingOptions(hidden=(96, 96), n_epochs=10, weight_decay=1e-4)
+N_BY_LABEL, N_BY_FEATURES = 1, 3  # networks of one speaker; features are better on unseen words (accuracy.md)
+N_POOLED_BY_LABEL, N_POOLED_BY_FEATURES = 2, 2  # with pooled speech, which holds every phone (accuracy.md)
 MIN_FRAMES = 3000  # two minutes; networks from less are no better than exemplars
 Floats = NDArray[np.float32]
 
 
-def add_phone_network(talker: Talker, *, on_progress: Progress | None = None) -> Talker:
-    """The talker with networks trained on its utterances; unchanged if there are too few frames.
-
-    Raises
-    ------
-    BackendError
-        scikit-learn is missing.
-    """
+def add_phone_network(
+    talker: Talker, pooled: Sequence[PooledSpeech] = (), *, on_progress: Progress | None = None
+) -> Talker:
+    """The talker with networks trained on its utterances and on pooled speech; unchanged if it has too few frames."""
     if sum(len(utterance.shape) for utterance in talker.utterances) < MIN_FRAMES:
         return talker
-    inventory = tuple(
-        sorted({label for utterance in talker.utterances for label in utterance.phones.phones} | {SILENCE})
-    )
+    labels = {label for utterance in talker.utterances for label in utterance.phones.phones} | {SILENCE}
+    labels |= {label for one in pooled for label in one.phones.phones}
+    inventory = pooled_inventory(labels) if pooled else tuple(sorted(labels))
     n_speech = talker.model.n_speech
     spread = np.maximum(talker.model.spread[:n_speech], 1e-6)
-    shown, place, targets = [], [], []
-    for utterance in talker.utterances:
+    own = _talker_samples(talker, inventory, spread, with_features=bool(pooled))
+    samples, importance = _join(own, _pooled_samples(pooled, inventory, n_speech), n_speech)
+    ones = np.eye(len(inventory), dtype=np.float32)
+    by_label, by_features = (N_POOLED_BY_LABEL, N_POOLED_BY_FEATURES) if pooled else (N_BY_LABEL, N_BY_FEATURES)
+    tables = [ones] * by_label + [feature_table(inventory)] * by_features
+    networks = []
+    for seed, table in enumerate(tables):
+        weights = train_network(samples, table, importance, options=TRAINING, seed=seed)
+        networks.append(expand_to_phones(weights, table, n_speech, spread))
+        if on_progress:
+            on_progress(seed + 1, len(tables))
+    layers, biases = (tuple(map(np.stack, zip(*some, strict=True))) for some in zip(*networks, strict=True))
+    return replace(talker, network=PhoneNetwork(inventory, layers, biases))
+
+
+def _talker_samples(
+    talker: Talker, inventory: Sequence[str], spread: Floats, *, with_features: bool
+) -> tuple[NDArray[np.int64], Floats, Floats]:
+    """Phones (N, C), positions (N, Q) and targets (N, D): parameters in units of the spread, then lip features."""
+    n_speech, parts = talker.model.n_speech, []
+    features = [talker_features(talker, at) for at in range(len(talker.utterances))] if with_features else []
+    mean, deviation = _speech_statistics(talker, features) if features else (0.0, 1.0)
+    for at, utterance in enumerate(talker.utterances):
         times = np.arange(len(utterance.shape)) / talker.fps
         near = (times >= utterance.phones.edges[1] - SILENCE_MARGIN_S) & (
             times <= utterance.phones.edges[-2] + SILENCE_MARGIN_S
         )
-        labels, where = window_features(utterance.phones, times[near], inventory)
-        shown.append(labels)
-        place.append(where)
-        targets.append(utterance.shape[near, :n_speech] / spread)
-    windows = np.concatenate(shown), np.concatenate(place)
-    tables = [np.eye(len(inventory), dtype=np.float32)] * N_BY_LABEL + [feature_table(inventory)] * N_BY_FEATURES
-    networks = []
-    for seed, table in enumerate(tables):
-        networks.append(_train_network(*windows, np.concatenate(targets), table, seed))
-        if on_progress:
-            on_progress(seed + 1, len(tables))
-    weights, biases = (_stack_layers(layers) for layers in zip(*networks, strict=True))
-    weights[-1], biases[-1] = weights[-1] * spread, biases[-1] * spread
-    return replace(talker, network=PhoneNetwork(inventory, tuple(weights), tuple(biases)))
+        values = [utterance.shape[near, :n_speech] / spread]
+        values += [(features[at][near] - mean) / deviation] if features else []
+        parts.append((*window_features(utterance.phones, times[near], inventory), np.concatenate(values, axis=1)))
+    shown, position, targets = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return shown, position, targets.astype(np.float32)
 
 
-def feature_table(inventory: Iterable[str]) -> Floats:
-    """(P, K) articulatory features of P phones, for their first and their second half."""
-    return np.array([[*first, *last] for first, last in map(phone_features, inventory)], np.float32)
+def _speech_statistics(
+    talker: Talker, features: Sequence[NDArray[np.float64]]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    here = [speech_frames(one.phones, len(one.shape), talker.fps) for one in talker.utterances]
+    speech = np.concatenate([values[span] for values, span in zip(features, here, strict=True)])
+    return speech.mean(axis=0), np.maximum(speech.std(axis=0), 1e-9)
 
 
-def encode_windows(shown: NDArray[np.integer], place: Floats, table: Floats) -> Any:
-    """Sparse inputs (T, C K + 4): for each of the phones (T, C) its row of the table (P, K), then its place (T, 4)."""
-    lines = sparse.csr_matrix(table)
-    return sparse.hstack([*(lines[column] for column in shown.T), sparse.csr_matrix(place)]).tocsr()
+def _pooled_samples(
+    pooled: Sequence[PooledSpeech], inventory: Sequence[str], n_speech: int
+) -> tuple[NDArray[np.int64], Floats, Floats] | None:
+    if not pooled:
+        return None
+    parts = []
+    for one in pooled:
+        times = np.arange(len(one.features))[one.is_used] / one.fps
+        values = one.features[one.is_used]
+        targets = np.concatenate([np.zeros((len(values), n_speech)), values], axis=1)
+        parts.append((*window_features(one.phones, times, inventory), targets))
+    shown, position, values = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return shown, position, values.astype(np.float32)
 
 
-def expand_to_phones(weights: Floats, table: Floats, n_shown: int) -> Floats:
-    """First-layer weights (C P + 4, H) for C one-hot phones that equal (C K + 4, H) for `encode_windows` inputs."""
-    n_features = table.shape[1]
-    phone_weights, place = weights[: n_shown * n_features], weights[n_shown * n_features :]
-    return np.concatenate([*(table @ each for each in np.split(phone_weights, n_shown)), place])
+def _join(
+    own: tuple[NDArray[np.int64], Floats, Floats],
+    pooled: tuple[NDArray[np.int64], Floats, Floats] | None,
+    n_speech: int,
+) -> tuple[WindowSamples, Floats]:
+    """Samples of both speakers, and the importance (G, D) of each output."""
+    groups = [own] if pooled is None else [own, pooled]
+    importance = np.ones((len(groups), own[2].shape[1]), np.float32)
+    importance[1:, :n_speech] = 0.0
+    shown, position, targets = (np.concatenate(column) for column in zip(*groups, strict=True))
+    speaker = np.repeat(np.arange(len(groups)), [len(one[0]) for one in groups])
+    return WindowSamples(shown.astype(np.int32), position, targets, speaker), importance
 
 
-def _stack_layers(members: Iterable[Iterable[Floats]]) -> list[Floats]:
-    return [np.stack(layer).astype(np.float32) for layer in zip(*members, strict=True)]
-
-
-def _train_network(
-    shown: NDArray[np.integer], place: Floats, targets: Floats, table: Floats, seed: int
+def expand_to_phones(
+    weights: Weights, table: Floats, n_speech: int, spread: Floats
 ) -> tuple[list[Floats], list[Floats]]:
-    """Weights and biases of one network for one-hot phones, trained on phones coded by the table."""
-    fitted = _fit_regressor(encode_windows(shown, place, table), targets, seed)
-    return [expand_to_phones(fitted.coefs_[0], table, shown.shape[1]), *fitted.coefs_[1:]], fitted.intercepts_
-
-
-def _fit_regressor(inputs: Any, targets: Any, seed: int) -> Any:
-    try:
-        from sklearn.exceptions import ConvergenceWarning
-        from sklearn.neural_network import MLPRegressor
-    except ImportError as missing:
-        raise BackendError("learning from recordings needs scikit-learn: pip install 'tts2face[capture]'") from missing
-    network = MLPRegressor(
-        hidden_layer_sizes=HIDDEN_UNITS,
-        alpha=WEIGHT_DECAY,
-        early_stopping=True,
-        max_iter=MAX_EPOCHS,
-        batch_size=256,
-        random_state=seed,
-    )
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ConvergenceWarning)  # training ends after `MAX_EPOCHS`
-        return network.fit(inputs, targets)
+    """Layers and biases of the talker's network for one-hot phones, with its parameters in mm."""
+    phone_weights, place, biases, inner, inner_biases, outer, outer_biases = weights
+    first = np.concatenate([*(table @ each for each in phone_weights), place])
+    layers = [first, inner, outer[:, :n_speech] * spread]
+    every = [layers, [biases[0], inner_biases, outer_biases[:n_speech] * spread]]
+    return [one.astype(np.float32) for one in every[0]], [one.astype(np.float32) for one in every[1]]

@@ -17,6 +17,7 @@ from tts2face.video.pose import head_angles
 REST_MARGIN_S = 0.2  # lips start to move this long before the first sound
 # Of the distance of the outer eye corners: the inner lips' gap below which the mouth counts as closed.
 CLOSED_GAP = 0.01
+CLOSED_SHARE = 0.05  # of the frames, with the smallest openings, where no resting frame is found
 
 
 def learn_talker(
@@ -45,9 +46,13 @@ def learn_talker(
         if observation.fps != fps:
             raise DataError(f"{observation.name} has {observation.fps:g} frames per second, others {fps:g}; convert it")
     model = learn_shapes(observations, n_speech, n_other)
+    return Talker(fps, model, build_utterances(observations, model), dict(metadata))
+
+
+def build_utterances(observations: Sequence[Observation], model: ShapeModel) -> tuple[Utterance, ...]:
+    """The observations as utterances in the parameters of a model, with head angles relative to their mean."""
     turn = mean_rotation(observations)
-    utterances = tuple(_build_utterance(observation, model, turn) for observation in observations)
-    return Talker(fps, model, utterances, dict(metadata))
+    return tuple(_build_utterance(observation, model, turn) for observation in observations)
 
 
 def learn_shapes(observations: Sequence[Observation], n_speech: int, n_other: int) -> ShapeModel:
@@ -83,11 +88,18 @@ def learn_shapes(observations: Sequence[Observation], n_speech: int, n_other: in
 
 
 def resting_parameters(observations: Sequence[Observation], model: ShapeModel) -> NDArray[np.float32]:
-    """(M,) mean parameters of the silent frames with closed lips before speech; zeros if there are none."""
+    """(M,) mean parameters of the silent frames with closed lips before speech.
+
+    Lips of some people are tracked farther apart; without such frames, those of the person's smallest openings rest.
+    """
     total = np.zeros(len(model.spread))
     n_frames = 0
-    for observation in observations:
-        still = resting_frames(observation)
+    chosen = [resting_frames(observation) for observation in observations]
+    if not any(still.any() for still in chosen):
+        openings = [lip_opening(observation.landmarks) for observation in observations]
+        closed = np.quantile(np.concatenate(openings), CLOSED_SHARE)
+        chosen = [opening <= closed for opening in openings]
+    for observation, still in zip(observations, chosen, strict=True):
         parameters = model.parameters(observation.landmarks[still])
         total += parameters.sum(axis=0)
         n_frames += len(parameters)

@@ -149,6 +149,24 @@ def test_no_parameter_leaves_three_spreads(seed: int, gain: float, narrow: float
 
 
 @some
+@given(seeds)
+def test_a_rest_beyond_three_spreads_extends_the_limit_of_its_mode(seed: int) -> None:
+    """As of talkers of few sentences, in both roles."""
+    source, far = model_of(seed), model_of(seed + 1)
+    rest = far.rest.copy()
+    rest[2] = -4.5 * far.spread[2]
+    far = replace(far, rest=rest)
+    limits = parameter_limits(far)
+    assert limits[2] == -rest[2]
+    assert np.delete(limits, 2) == pytest.approx(np.delete(3 * far.spread, 2))
+    mapped = build_parameter_transfer(source, far).parameters(np.stack([source.rest, *motion_of(source, spreads=4)]))
+    assert mapped[0] == pytest.approx(rest, abs=1e-5)
+    assert (np.abs(mapped) <= limits).all()
+    back = build_parameter_transfer(far, source).parameters(rest[None])
+    assert back[0] == pytest.approx(source.rest, abs=1e-5)
+
+
+@some
 @given(seeds, st.floats(0.2, 3.0))
 def test_the_gain_scales_the_displacement_from_rest(seed: int, gain: float) -> None:
     source, target = model_of(seed), model_of(seed + 1)
@@ -275,7 +293,9 @@ def test_invalid_input_is_refused() -> None:
         build_parameter_transfer(few, target)
     with pytest.raises(DataError, match="68 landmarks, not 478"):
         append_missing_components(source, few)
-    with pytest.raises(DataError, match="rest of a talker exceeds 3 standard deviations in mode 2"):
+    with pytest.raises(
+        DataError, match=r"rest of a talker lies .* standard deviations from its mean in mode 2, limit 20"
+    ):
         build_parameter_transfer(source, replace(target, rest=np.array([0, 0, 9e9, 0, 0, 0], np.float32)))
     with pytest.raises(InputError, match="6 components of the source are missing in the target, not 13"):
         append_missing_components(source, target, 13)

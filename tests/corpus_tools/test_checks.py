@@ -4,12 +4,24 @@ import numpy as np
 import pytest
 
 from corpus_tools.recordings.corpus_video import NOT_COUNTED
-from corpus_tools.recordings.limits import LIMITS, check_limits, head_turn_deg, picture_measures, sound_measures
+from corpus_tools.recordings.limits import (
+    LIMITS,
+    check_limits,
+    confidence_measure,
+    head_turn_deg,
+    landmark_measures,
+    limit_warnings,
+    picture_measures,
+    sound_measures,
+)
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.types import Waveform
 
-GOOD = {"confidence": -3700.0, "clipped": 0.0, "snr_db": 30.0, "crowded": 0.0, "turn_deg": 6.0, "frozen_s": 0.04}
+GOOD = {
+    "confidence": -3700.0, "clipped": 0.0, "snr_db": 30.0, "crowded": 0.0, "turn_deg": 6.0, "frozen_s": 0.04,
+    "eye_px": 65.0, "jitter": 0.1, "sync": 0.7, "sync_of_short": 0.6,
+}  # fmt: skip
 PHONES = PhoneSequence([SILENCE, "a", SILENCE], [0.0, 1.0, 2.0, 3.0])
 RATE = 16_000
 
@@ -26,13 +38,19 @@ def test_good_measures_pass() -> None:
 @pytest.mark.parametrize(
     ("measure", "value", "reason"),
     [
-        ("confidence", -7300.0, "does not match the transcript"),
-        ("recognised", -7300.0, "could not be recognised well"),
-        ("clipped", 0.02, r"2\.0% of the speech is clipped"),
-        ("snr_db", 6.0, "speech is 6 dB above the noise"),
-        ("crowded", 0.5, "50% of the frames show more than one face"),
-        ("turn_deg", 60.0, "turned away by 60 degrees"),
-        ("frozen_s", 0.5, r"is frozen for 0\.50 s"),
+        ("confidence", -7300.0, r"does not match the transcript \(confidence -7300, limit -6500\)"),
+        ("confidence_in_noise", -9000.0, r"does not match the transcript \(confidence -9000, limit -8500\)"),
+        ("recognised", -7300.0, r"could not be recognised well \(confidence -7300, limit -6500\)"),
+        ("recognised_in_noise", -9000.0, r"could not be recognised well \(confidence -9000, limit -8500\)"),
+        ("clipped", 0.35, r"35\.0% of the speech is clipped, limit 30\.0%"),
+        ("snr_db", 4.0, "speech is 4 dB above the noise, limit 6 dB"),
+        ("crowded", 0.5, "50% of the frames show more than one face, limit 25%"),
+        ("turn_deg", 60.0, "turned away by 60 degrees, limit 30 degrees"),
+        ("frozen_s", 0.5, r"is frozen for 0\.50 s, limit 0\.30 s"),
+        ("eye_px", 9.0, "eye corners are 9 px apart, limit 12 px"),
+        ("jitter", 0.7, r"jitter by 0\.70 of their motion, limit 0\.50"),
+        ("sync", 0.1, r"correlation 0\.10, limit 0\.25"),
+        ("sync_of_short", 0.1, r"correlation 0\.10, limit 0\.15"),
     ],
 )
 def test_a_measure_beyond_its_limit_is_refused(measure: str, value: float, reason: str) -> None:
@@ -40,8 +58,38 @@ def test_a_measure_beyond_its_limit_is_refused(measure: str, value: float, reaso
         check_limits({**GOOD, measure: value})
 
 
-def test_every_limit_is_checked() -> None:
-    assert {limit.measure for limit in LIMITS} == {*GOOD, "recognised"}
+@pytest.mark.parametrize(
+    ("measure", "value", "reason"),
+    [
+        ("snr_db", 10.0, "speech is 10 dB above the noise, limit 20 dB; record in a quieter room"),
+        ("clipped", 0.02, "2.0% of the speech is clipped, limit 0.5%; record it again with less gain"),
+        ("turn_deg", 25.0, "the face is turned away by 25 degrees, limit 20 degrees; film it from the front"),
+    ],
+)
+def test_a_measure_between_its_limits_is_a_warning(measure: str, value: float, reason: str) -> None:
+    assert limit_warnings(GOOD) == ()
+    check_limits({**GOOD, measure: value})
+    assert limit_warnings({**GOOD, measure: value}) == (reason,)
+
+
+def test_every_limit_is_checked_and_warns_before_it_refuses() -> None:
+    assert {limit.measure for limit in LIMITS} == {*GOOD, "recognised", "confidence_in_noise", "recognised_in_noise"}
+    assert all((limit.warning > limit.refusal) == limit.is_minimum for limit in LIMITS)
+
+
+def test_noise_lowers_the_confidence_that_is_expected() -> None:
+    assert confidence_measure(-7000.0, 12.0, is_recognised=False) == {"confidence_in_noise": -7000.0}
+    assert confidence_measure(-7000.0, 25.0, is_recognised=True) == {"recognised": -7000.0}
+
+
+def test_jitter_is_the_noise_over_the_motion() -> None:
+    """10 %: a median of 400 second differences. Noise .1 of the deviation of a slow opening."""
+    times = np.arange(400) / 25
+    opening = np.sin(2 * np.pi * 0.5 * times) / np.sqrt(0.5) + np.random.default_rng(0).normal(0, 0.1, 400)
+    landmarks = np.zeros((400, 478, 3))
+    landmarks[:, 33, 0], landmarks[:, 263, 0], landmarks[:, 13, 1] = -45, 45, 20 + opening
+    found = landmark_measures(0.5 * landmarks, landmarks)
+    assert found == {"eye_px": 45.0, "jitter": pytest.approx(0.1, rel=0.1)}
 
 
 @pytest.mark.parametrize(("noise", "expected"), [(0.001, 40.0), (0.01, 20.0), (0.1, 0.0)])

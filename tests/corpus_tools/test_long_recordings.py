@@ -71,7 +71,8 @@ def test_without_a_transcript_phones_are_recognised_and_marked(
 ) -> None:
     report = tmp_path / "report.html"
     out = tmp_path / "take.talker"
-    built = build_talker(folder, out, run_options=RunOptions(cache, 1, face_model), created="2000-01-01", report=report)
+    run_options = RunOptions(cache, 1, face_model)
+    built = build_talker(folder, out, run_options=run_options, created="2000-01-01", report=report, base="none")
     assert built.n_kept == len(read.kept)
     talker = read_talker(out)
     assert talker.metadata["phones_recognised"] == [seen.name for seen in read.kept]

@@ -83,3 +83,10 @@ def test_a_removed_silence_has_no_phone():
 def test_words_without_a_face(begin, stop):
     with pytest.raises(DataError, match="there is speech while no face is visible"):
         trim_to_picture(_aligned_speech(), begin, stop)
+
+
+def test_a_last_phone_slightly_longer_than_the_picture_is_cut():
+    phones, words = trim_to_picture(_aligned_speech(), 1.0, 1.45)
+    assert phones.phones == ("b", "i")
+    np.testing.assert_allclose(phones.edges, [0, 0.1, 0.45])
+    assert words == (WordSpan("b", 0, 2),)

@@ -164,7 +164,9 @@ def test_a_talker_is_built_with_its_provenance(few_takes, cache, tmp_path, face_
         return lambda done, of: stages_seen.update({name: (done, of)})
 
     run_options = RunOptions(cache, 1, face_model)
-    built = build_talker(few_takes, out, name="s1", run_options=run_options, created="2000-01-01", stages=stages)
+    built = build_talker(
+        few_takes, out, name="s1", run_options=run_options, created="2000-01-01", base="none", stages=stages
+    )
     assert stages_seen["reading recordings"] == (400, 400)
     assert list(stages_seen) == ["reading recordings", "learning phone network"]  # too few recordings for audio maps
     n_frames = sum(len(one.landmarks) for one in observe(few_takes, run_options=run_options).kept)

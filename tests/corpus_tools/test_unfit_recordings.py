@@ -14,8 +14,7 @@ from tts2face.video.media import read_frames, read_sound
 REASONS = {
     "crowd": "show more than one face",
     "frozen": "the picture is frozen for",
-    "clipped": "of the speech is clipped",
-    "noisy": "dB above the noise",
+    "noisy": "dB above the noise, limit 6 dB",
     "away": "no face is visible",
     "wrong": "check the transcript",
     "dark": "no frame shows a face",
@@ -34,8 +33,9 @@ def found(rendered_takes: Path, face_model: Path, tmp_path_factory: pytest.TempP
     folder = tmp_path_factory.mktemp("unfit")
     write_video([mirrored_pair(pixels) for pixels in pictures], sound, folder / "crowd.mp4")
     write_video([*pictures[:30], *[pictures[30]] * 12, *pictures[42:]], sound, folder / "frozen.mp4")
-    write_video(pictures, np.clip(8 * sound / loud, -1, 1), folder / "clipped.mp4")
-    write_video(pictures, sound + noise, folder / "noisy.mp4")
+    write_video(pictures, np.clip(5 * sound / loud, -1, 1), folder / "clipped.mp4")
+    write_video(pictures, sound + 1.5 * noise, folder / "noisy.mp4")
+    write_video(pictures, sound + noise / 3, folder / "hiss.mp4")
     write_video([*pictures[:35], *[grey] * 8, *pictures[43:]], sound, folder / "away.mp4")
     write_video([grey] * len(pictures), sound, folder / "dark.mp4")
     write_video(pictures, sound, folder / "good.mp4")
@@ -56,13 +56,20 @@ def test_every_refusal_names_its_reason(found: Observations) -> None:
     assert [name for name, reason in REASONS.items() if reason not in reasons[name]] == []
 
 
+def test_weaknesses_that_do_not_hurt_are_warnings(found: Observations) -> None:
+    messages = {warning.name: warning.message for warning in found.warnings}
+    assert "of the speech is clipped, limit 0.5%" in messages["clipped"]
+    assert "dB above the noise, limit 20 dB" in messages["hiss"]
+    assert "good" not in messages
+
+
 def test_the_other_recordings_use_the_most_frequent_frame_rate(found: Observations) -> None:
-    assert [seen.name for seen in found.kept] == ["faster", "good", "second"]
+    assert [seen.name for seen in found.kept] == ["clipped", "faster", "good", "hiss", "second"]
     assert {seen.fps for seen in found.kept} == {25.0}
-    faster, good, _ = found.kept
+    _, faster, good, _, _ = found.kept
     n_frames = min(len(faster.landmarks), len(good.landmarks))
     gaps = [
-        np.linalg.norm(one.landmarks[:n_frames, 13] - one.landmarks[:n_frames, 14], axis=1) for one in found.kept[:2]
+        np.linalg.norm(one.landmarks[:n_frames, 13] - one.landmarks[:n_frames, 14], axis=1) for one in (faster, good)
     ]
     assert np.corrcoef(gaps[0], gaps[1])[0, 1] > 0.98
     np.testing.assert_allclose(faster.phones.edges[1:-1], good.phones.edges[1:-1], atol=0.02)

@@ -56,11 +56,12 @@ def test_all_listed_entries_exist() -> None:
 
 
 def test_voices_list_their_languages_and_whether_they_are_installed() -> None:
-    heart, espeak, female, piper = catalogue.voices()
+    heart, joe, espeak, female, piper = catalogue.voices()
     assert (heart.name, heart.languages, heart.is_installed) == ("heart", ("en-gb", "en-us"), True)
     assert (espeak.name, len(espeak.languages), espeak.is_installed) == ("espeak", len(catalogue.languages()), True)
     assert (piper.engine, piper.languages) == ("piper", ())
     assert (female.name, female.languages) == ("espeak-female", espeak.languages)
+    assert (joe.languages, joe.sex, joe.engine) == (heart.languages, "male", "piper")
     for voice in (heart, espeak, female):
         for language in voice.languages[:2]:
             assert load_voice(voice.name, language).sample_rate > 0

@@ -47,8 +47,8 @@ def digest(clip: Clip) -> str:
     return hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
 
 
-# tests/doors/test_audio.py changes these; idle animation below
-ELSEWHERE = {"audio", "audio_map", "idle"}
+# tests/doors/test_audio.py changes these; idle animation and delivery below
+ELSEWHERE = {"audio", "audio_map", "idle", "plain_delivery"}
 
 
 @pytest.mark.parametrize("name", [option.name for option in fields(Request) if option.name not in ELSEWHERE])
@@ -60,6 +60,12 @@ def test_every_option_changes_the_clip(name: str, clip: Clip, session: Session, 
     value = {"dictionary": own, "timeline": plan}.get(name) or CHANGES[name]
     changed = session.clip(replace(Request(text=TEXT), **{name: value}))
     assert digest(changed) != digest(clip)
+
+
+def test_a_plain_delivery_changes_the_clip_of_a_style(session: Session) -> None:
+    plain, styled = (session.clip(Request(text=TEXT, style="depressed", plain_delivery=on)) for on in (True, False))
+    assert styled.speech.waveform.duration > plain.speech.waveform.duration
+    assert plain.speech.waveform.samples.tobytes() == session.clip(TEXT).speech.waveform.samples.tobytes()
 
 
 def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip) -> None:

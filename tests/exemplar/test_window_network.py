@@ -9,7 +9,16 @@ from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.exemplar.phone_substitution import Targets, target_phones
-from tts2face.exemplar.synthesis import ExemplarModel, speech_trajectory
+from tts2face.exemplar.synthesis import (
+    FAR_CONTEXT,
+    NEAR_CONTEXT,
+    ExemplarModel,
+    context_farness,
+    interpolated_farness,
+    select_tokens,
+    speech_trajectory,
+)
+from tts2face.exemplar.token_search import context_weights
 from tts2face.models.phone_network import PhoneNetwork, window_features
 from tts2face.models.talker import Talker, read_talker, write_talker
 
@@ -90,7 +99,7 @@ def test_a_talker_keeps_its_networks(talker: Talker, tmp_path) -> None:
     assert read_talker(tmp_path / "b.talker").network is None
 
 
-def test_the_share_of_the_networks_equals_its_parameter(voice: ExemplarModel) -> None:
+def test_the_share_of_the_networks_is_that_of_the_nearest_target(voice: ExemplarModel) -> None:
     knowing = replace(voice, network=random_network(len(voice.spread)))
     plain = SynthesisOptions(network=0.0, amplitude=1.0, smoothing_s=0.0, contacts=False)
 
@@ -100,9 +109,47 @@ def test_the_share_of_the_networks_equals_its_parameter(voice: ExemplarModel) ->
 
     none, half, whole = (moved(knowing, share) for share in (0.0, 0.5, 1.0))
     np.testing.assert_array_equal(none, moved(voice, 0.5))
-    np.testing.assert_allclose(half, (none + whole) / 2, atol=1e-4)
+    selection = select_tokens(PHONES, knowing, replace(plain, network=0.5))
+    farness = interpolated_farness(selection.targets, context_farness(selection), 100)[35:65, None]
+    assert 0 < farness.min() < farness.max()
+    share = 0.5 + 0.5 * farness
+    np.testing.assert_allclose(half, (1 - share) * none + share * whole, atol=1e-4)
     with pytest.raises(InputError, match="from 0 to 1"):
         SynthesisOptions(network=1.5)
+
+
+def test_networks_take_over_where_contexts_are_far_and_phones_unrecorded(voice: ExemplarModel) -> None:
+    options = SynthesisOptions(network=0.4)
+    recorded = select_tokens(PHONES, voice, options)
+    highest = 2 * context_weights(options.context).sum()
+
+    def farness(distance: float) -> np.ndarray:
+        scores = np.full_like(recorded.found.scores, highest - distance)
+        return context_farness(replace(recorded, found=replace(recorded.found, scores=scores)))
+
+    np.testing.assert_array_equal(farness(0.0), 0.0)
+    np.testing.assert_allclose(farness(NEAR_CONTEXT), 0.0, atol=1e-12)
+    np.testing.assert_allclose(farness(FAR_CONTEXT), 1.0, atol=1e-12)
+    assert (np.diff([farness(distance)[0] for distance in np.linspace(NEAR_CONTEXT, FAR_CONTEXT, 9)]) > 0).all()
+    unrecorded = select_tokens(PhoneSequence([SILENCE, "v", SILENCE], [0.0, 0.3, 0.5, 1.0]), voice, options)
+    assert context_farness(unrecorded)[unrecorded.targets.source == 1] == pytest.approx(1.0)
+
+
+def test_networks_know_phones_that_were_not_recorded(voice: ExemplarModel) -> None:
+    network = random_network(len(voice.spread))
+    wider = PhoneNetwork(
+        (*KNOWN, "v"), (np.repeat(network.weights[0], 2, axis=1)[:, : 21 * 5 + 4], *network.weights[1:]), network.biases
+    )
+    knowing = replace(voice, network=wider)
+    options = SynthesisOptions(smoothing_s=0.0, contacts=False, amplitude=1.0)
+
+    def moved(label: str) -> np.ndarray:
+        phones = PhoneSequence([SILENCE, label, SILENCE], [0.0, 0.3, 0.7, 1.0])
+        return speech_trajectory(phones, knowing, fps=100.0, n_frames=100, options=options).values[50]
+
+    phones = PhoneSequence([SILENCE, "v", SILENCE], [0.0, 0.3, 0.7, 1.0])
+    predicted = wider.parameters(phones, np.array([0.5]))[0]
+    np.testing.assert_allclose(moved("v"), predicted, atol=1e-4)
 
 
 def test_time_that_belongs_to_no_target_is_silence() -> None:

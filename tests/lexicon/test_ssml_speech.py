@@ -9,13 +9,14 @@ from hypothesis import strategies as st
 
 from lexicon.dictionary import arpabet_segments, parse_dictionary
 from lexicon.errors import InputError
-from lexicon.given_pronunciations import pronounce_marked, words_with_given_phones
+from lexicon.given_pronunciations import words_with_given_phones
 from lexicon.ipa import parse_ipa
 from lexicon.languages import language_code
 from lexicon.mark_parser import parse_marks
 from lexicon.marked_text import MarkedText, PhoneMark, StyleRun
 from lexicon.say_as import KINDS, say_as
 from lexicon.sentences import split_sentences
+from lexicon.spoken_words import pronounce_marked
 from lexicon.ssml_speech import VOICES
 from lexicon.ssml_values import MAX_ATTRIBUTE_CHARACTERS
 from lexicon.writing_systems import check_readable
@@ -265,7 +266,7 @@ def test_documents_may_name_the_voices_that_need_no_file() -> None:
         ('<phoneme ph="a" type="x">a</phoneme>', "<phoneme> does not support the attribute 'type'"),
         ("<say-as>1</say-as>", "a <say-as> needs interpret-as; write"),
         ('<say-as interpret-as="ssn">1</say-as>', "no kind 'ssn'"),
-        ('<voice name="en-US-JennyNeural">a</voice>', "no voice 'en-US-JennyNeural'; use heart, espeak"),
+        ('<voice name="en-US-JennyNeural">a</voice>', "no voice 'en-US-JennyNeural'; use heart, joe, espeak"),
         ('<voice name="/etc/x.onnx">a</voice>', "no voice '/etc/x.onnx'"),
         ('<voice gender="robot">a</voice>', "no gender 'robot'"),
         ('<voice age="9">a</voice>', "<voice> does not support the attribute 'age'"),

@@ -20,6 +20,7 @@ from tests.rendered_takes import transcript
 from tests.service.conftest import RunningService
 from tests.service.job_requests import finished, wait_for_database
 from tests.service.test_resource_check import WORDS
+from tts2face.models.talker import load_talker
 from tts2face.service.access.keys import add_key
 from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import read_sound
@@ -125,7 +126,10 @@ def test_a_recording_becomes_a_talker_that_speaks(
     assert "reading recordings" in events
     assert '"n_kept": 1' in events
     shown = client.get("/v1/talkers/anna").json()
-    assert (shown["about"]["n_utterances"], shown["about"]["licence"], shown["owner"]) == (1, "CC0-1.0", "ann")
+    base = load_talker("grid_s1")  # completes a short recording
+    about = shown["about"]
+    assert (about["n_utterances"], shown["owner"]) == (1 + len(base.utterances), "ann")
+    assert about["licence"] == f"recordings: CC0-1.0; base: {base.metadata['licence']}"
     assert client.get("/v1/talkers/anna/picture").headers["content-type"] == "image/png"
     assert [one["name"] for one in client.get("/v1/talkers").json()["data"]] == ["grid_s1", "anna"]
     result = next(one for one in job["results"] if one["name"] == "anna.talker")
@@ -228,4 +232,4 @@ def test_a_real_recording_becomes_a_talker(clients: dict[str, httpx.Client], bui
     assert queued.status_code == 202, queued.text
     job = finished(clients["ann"], queued.json())
     assert (job["state"], job["error"]) == ("done", None), job
-    assert clients["ann"].get("/v1/talkers/real").json()["about"]["n_utterances"] == 1
+    assert clients["ann"].get("/v1/talkers/real").json()["about"]["n_utterances"] > 1  # its own, and the base's

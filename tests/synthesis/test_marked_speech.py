@@ -16,12 +16,11 @@ from lexicon.sequence import SILENCE
 from tests.synthesis.fake_voice import LEAD, LETTER, LEVEL, RATE, TRAIL, FakeVoice
 from tts2face.gesture.spans import Nod, StyleSpan
 from tts2face.request import Request
+from tts2face.synthesis.mark_styles import check_marks, marked_styles
 from tts2face.synthesis.marked_speech import (
     MIN_UTTERANCE_GAP_S,
     MarkTime,
     SpokenSentence,
-    check_marks,
-    marked_styles,
     resolve_recording_marks,
     speak_sentence,
     voice_in,

@@ -169,7 +169,7 @@ def test_nothing_to_say_is_refused(voice: Voice, text: str) -> None:
 
 
 def test_text_that_the_neural_voice_cannot_speak_is_refused() -> None:
-    with pytest.raises(InputError, match="cannot say '你好'"):
+    with pytest.raises(InputError, match="cannot read 你好"):
         load_voice("heart", "en-us").speak("Hello 你好 there.")
 
 
@@ -191,13 +191,20 @@ def test_the_longest_words_of_a_dictionary_are_spoken(language: str) -> None:
 def test_a_crash_of_espeak_is_reported() -> None:
     words = [SpokenWord("bob", (Segment("b"),) * 300)]
     with pytest.raises(BackendError, match=r"espeak-ng crashed \(signal 11\) on '\[\[bbb.*change the spelling"):
-        load_voice("espeak", "en-us").speak(words)
+        load_voice("espeak", "de").speak(words)
+
+
+@pytest.mark.parametrize("name", ["heart", "espeak"])
+def test_very_long_words_are_spoken_in_english(name: str) -> None:
+    speech = load_voice(name, "en-us").speak("-".join(["straightforwardness"] * 14) + " may")
+    assert len(speech.phones) >= 200
+    assert speech.words[-1].text == "may"
 
 
 @pytest.mark.parametrize(
     ("name", "language", "reason"),
     [
-        ("nobody", "en-us", "no voice 'nobody'; give heart, espeak"),
+        ("nobody", "en-us", "no voice 'nobody'; give heart, joe, espeak"),
         ("heart", "de", "speaks English, not de"),
         ("espeak", "xx", "no language 'xx'"),
         ("missing.onnx", "en-us", r"no Piper voice missing\.onnx"),

@@ -28,8 +28,8 @@ from tts2face.synthesis.prepared_request import prepare
 
 MAX_IDLE_S = 20.0  # of one segment of silence
 MARGIN_S = 0.5  # around a cue, for speech of a dubbing track that begins early or ends late; half of shorter gaps
-NOT_WHEN_SILENT = ("text", "audio", "audio_map", "voice", "rate", "volume", "dictionary", "language")
-NOT_WITH_AUDIO = ("voice", "rate")
+NOT_WHEN_SILENT = ("text", "audio", "audio_map", "voice", "rate", "volume", "plain_delivery", "dictionary", "language")
+NOT_WITH_AUDIO = ("voice", "rate", "plain_delivery")
 
 
 def plan_batch(

@@ -91,7 +91,8 @@ def nearest_valid_parameters(target: FloatArray, limits: FloatArray, gaps: Float
         multipliers, residual_norm = nnls(system, unit_target)
         if residual_norm < 1e-9:
             raise DataError(
-                "no parameters within the target's limits satisfy its lip gap limits; build the target talker again"
+                "no parameters within the target's limits keep its lips from overlapping; "
+                "build the target talker from more recordings"
             )
         residual = system @ multipliers - unit_target
         parameters[frame] = start - residual[:-1] / residual[-1]

@@ -29,6 +29,8 @@ from tts2face.types import Trajectory
 FloatArray = NDArray[np.float64]
 
 MAX_STANDARD_DEVIATIONS = 3.0  # limit of a mapped parameter about the target's mean; T07, section 3.1
+# Of the rest. Talkers of eight sentences have few resting frames, and rest at up to 4.5 deviations of all their frames.
+MAX_REST_DEVIATIONS = 20.0
 MIN_COMPONENT_MM = 0.5  # root of the sum of squares over all landmarks: about 0.02 mm per landmark
 
 MIN_REAL_MOTION_MM = 1e-4  # above the rounding errors of a float32 basis, below any measured motion
@@ -129,7 +131,7 @@ def build_parameter_transfer(source: ShapeModel, target: ShapeModel, *, gain: fl
     InputError
         The gain is negative or not finite.
     DataError
-        A model does not have 478 landmarks, its rest is outside its limits, or its lips overlap at all parameters.
+        A model does not have 478 landmarks, its rest is far from its mean, or its lips overlap at all parameters.
     """
     if not (math.isfinite(gain) and gain >= 0.0):
         raise InputError(f"the gain must be 0 or more, not {gain}; 1 keeps the size of the motion")
@@ -243,21 +245,22 @@ def face_size(model: ShapeModel) -> float:
 
 
 def parameter_limits(model: ShapeModel) -> NDArray[np.float32]:
-    """Largest float32 values (M,) that do not exceed `MAX_STANDARD_DEVIATIONS` times the spread."""
+    """Largest float32 values (M,) that do not exceed `MAX_STANDARD_DEVIATIONS` times the spread, or those at rest."""
     exact = MAX_STANDARD_DEVIATIONS * model.spread.astype(np.float64)
     rounded = exact.astype(np.float32)
-    return np.where(rounded > exact, np.nextafter(rounded, np.float32(0)), rounded)
+    within = np.where(rounded > exact, np.nextafter(rounded, np.float32(0)), rounded)
+    return np.maximum(within, np.abs(model.rest))
 
 
 def _rest_of_model(model: ShapeModel) -> FloatArray:
-    limits = parameter_limits(model)
-    beyond = np.flatnonzero(np.abs(model.rest) > limits)
-    if len(beyond):
+    deviations = np.abs(model.rest) / np.maximum(model.spread, np.finfo(np.float32).tiny)
+    furthest = int(deviations.argmax())
+    if deviations[furthest] > MAX_REST_DEVIATIONS:
         raise DataError(
-            f"the rest of a talker exceeds {MAX_STANDARD_DEVIATIONS:g} standard deviations in mode {beyond[0]}; "
-            "build it again"
+            f"the rest of a talker lies {deviations[furthest]:.3g} standard deviations from its mean "
+            f"in mode {furthest}, limit {MAX_REST_DEVIATIONS:g}; build it from recordings that begin with closed lips"
         )
-    return rest_with_open_lips(model, limits)
+    return rest_with_open_lips(model, parameter_limits(model))
 
 
 def _channels(n_modes: int) -> tuple[str, ...]:

@@ -18,9 +18,11 @@ from tts2face.exemplar.token_search import (
     TokenRanking,
     best_tokens,
     context_index,
+    context_weights,
     log_durations,
 )
 from tts2face.exemplar.tokens import Tokens, collect_tokens, phone_contexts
+from tts2face.interpolation import interpolate_columns
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker, speech_channels
@@ -29,6 +31,10 @@ from tts2face.types import GiveWay, Trajectory, keep_on
 
 RELEASE_FROM_S = 0.08  # distance from speech at which the transition to rest begins
 REST_FROM_S = 0.20  # distance from speech at which the face is at rest; recorded lips settle within 0.2 s
+NETWORK_HZ = 50.0  # rate at which the networks are evaluated; their input changes in steps of 40 ms
+# Distances of contexts (largest score less the best token's) between which the networks take over from the exemplars;
+# learnt on held-out words and on held-out tracks of another speaker (docs/decisions/125-share-of-networks.md).
+NEAR_CONTEXT, FAR_CONTEXT = 0.2, 1.1
 MIN_EASE_S = 0.06  # transition from and to rest if a clip begins or ends within speech
 DEFAULT_OPTIONS = SynthesisOptions()
 
@@ -189,9 +195,9 @@ def _blend_motion(
     speech = joined * exemplars.spread
     give_way()
     if exemplars.network is not None and options.network > 0:
-        instants = np.arange(n_instants) / blending.CLOCK_HZ
-        predicted = exemplars.network.parameters(target_phones(targets), instants)
-        speech = (1 - options.network) * speech + options.network * predicted
+        farness = interpolated_farness(targets, context_farness(selection), n_instants)[:, None]
+        predicted = _network_motion(exemplars.network, selection.phones, n_instants)
+        speech = speech + (options.network + (1 - options.network) * farness) * (predicted - speech)
         give_way()
     speech = exemplars.mean_speaking_pose + options.amplitude * (speech - exemplars.mean_speaking_pose)
     motion = np.where(is_covered[:, None], speech, exemplars.rest).astype(np.float32)
@@ -204,6 +210,33 @@ def _blend_motion(
     kept = [rule for rule in rules if rule is not None]
     contacts = find_contacts(chosen, exemplars.lip_gap, targets.spans[touching, 1:3], kept)
     return enforce_contacts(motion, contacts, exemplars.lip_gap, blending.CLOCK_HZ)
+
+
+def _network_motion(network: PhoneNetwork, phones: PhoneSequence, n_instants: int) -> NDArray[np.float32]:
+    """(n, D) motion of the networks at the instants of the clock, interpolated between samples at `NETWORK_HZ`."""
+    shown = target_phones(build_targets(phones, network.inventory))
+    times = np.arange(int(np.ceil(n_instants * NETWORK_HZ / blending.CLOCK_HZ)) + 1) / NETWORK_HZ
+    sampled = network.parameters(shown, times)
+    return interpolate_columns(sampled, times, np.arange(n_instants) / blending.CLOCK_HZ).astype(np.float32)
+
+
+def context_farness(selection: TokenSelection) -> NDArray[np.float64]:
+    """(N,) how far the nearest recorded context of N targets is: 0 near, 1 far or the phone itself was not recorded.
+
+    Where contexts are near, the networks have the share `options.network` of the motion; where they are far, all of it.
+    """
+    targets, requested = selection.targets, selection.phones.phones
+    distance = 2.0 * context_weights(selection.options.context).sum() - selection.found.scores[:, 0]
+    is_replaced = np.array(
+        [label != requested[source] for label, source in zip(targets.labels, targets.source, strict=True)]
+    )
+    return np.asarray(np.where(is_replaced, 1.0, smoothstep(distance, NEAR_CONTEXT, FAR_CONTEXT)))
+
+
+def interpolated_farness(targets: Targets, farness: NDArray[np.float64], n_instants: int) -> NDArray[np.float32]:
+    """(n,) farness (N,) of targets at the instants of the clock, linear between the middles of the targets."""
+    middles = targets.spans[:, 1:3].mean(axis=1)
+    return np.interp(np.arange(n_instants) / blending.CLOCK_HZ, middles, farness).astype(np.float32)
 
 
 def rest_weights(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -46,6 +46,7 @@ OPTIONAL_METADATA: Mapping[str, Check] = {
     "phones_recognised": list_of(text),
     "consent": record({"name": anything, "statement": text, "date": text}),
     "network_inventory": list_of(text),
+    "pooled": text,
 }
 TENSORS: Mapping[str, Tensor] = {
     "mean": millimetres(N_LANDMARKS, 3),

@@ -20,7 +20,7 @@ MAX_STRETCH_S = 20.0  # longest part into which longer recordings are divided
 
 
 def pronounce_transcript(text: str, language: str, own: Dictionary | None = None) -> PronouncedTranscript:
-    """Words of a text with their pronunciations; English words with all alternatives of the dictionary.
+    """Words of a text with their pronunciations; English words also with those of the dictionary (full forms, ...).
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ def _pronunciations(word: Word, language: str, own: Dictionary | None) -> Pronun
     if not language.startswith("en") or (own is not None and own.lookup(word.text) is not None):
         return (word.phones,)
     alternatives = [word.phones]
-    for number in count(2):
-        found = cmudict_lookup(f"{word.text}({number})")
+    for number in count(1):
+        found = cmudict_lookup(word.text if number == 1 else f"{word.text}({number})")
         if found is None:
             break
         alternatives.append(tuple(segment.phone for segment in found))

@@ -10,7 +10,7 @@ from tts2face.gesture.perlin_noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import Palette
 from tts2face.synthesis.animated_face import AnimatedFace
-from tts2face.synthesis.marked_speech import marked_styles
+from tts2face.synthesis.mark_styles import marked_styles
 from tts2face.synthesis.prepared_request import PreparedRequest
 from tts2face.types import Clip, GiveWay, Speech, Trajectory, keep_on
 

@@ -1,31 +1,38 @@
 """Synthesis of sentences with marks: sound with pauses, and the times of the marks."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from lexicon.languages import language_code
 from lexicon.marked_text import Mark, MarkedText, NameMark, NodMark, StyleRun
 from lexicon.pronounce import PAUSES_S
 from lexicon.sentences import Phrase, Sentence, index_by_letters, n_letters
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.clock import first_sample
 from tts2face.gesture.easing import span_weights
-from tts2face.gesture.notation import parse_style
 from tts2face.gesture.spans import Nod, StyleSpan
 from tts2face.gesture.timeline import Timeline
-from tts2face.request import RATE_LIMITS, VOLUME_LIMITS, Request
+from tts2face.request import Request
+from tts2face.synthesis.mark_styles import innermost_styles
 from tts2face.synthesis.speech_joining import join_utterances, resampled_speech, silent_speech, trim_end
+from tts2face.synthesis.style_voice import delivery_of
 from tts2face.synthesis.word_times import LetterTimes, SentenceTimes, WordTimes
 from tts2face.types import GiveWay, Speech, Waveform, concatenate_speech, frame_count, keep_on
-from tts2face.voice.engine import ENGLISH_CODES, VOICE_NAMES, SpeechInput, SpokenWord, Voice, apply_volume
+from tts2face.voice.engine import (
+    ENGLISH_CODES,
+    ENGLISH_VOICES,
+    VOICE_NAMES,
+    SpeechInput,
+    SpokenWord,
+    Voice,
+    apply_volume,
+)
 from tts2face.voice.level import level_speech
 
 MIN_UTTERANCE_GAP_S = 0.02  # between utterances of a sentence; less would cut into speech (edges are exact to 16 ms)
@@ -93,19 +100,23 @@ def speak_sentence(
     spoken: list[Speech] = []
     word_times: list[WordTimes] = []
     gains: list[Floats] = []
+    volumes: list[float] = []  # of the sound; motion follows the voice's own loudness
     for part in sentence.utterances:
         speaker = speaker_of(part, voice, request, voices)
-        speech = speaker.speak(_content(part), rate=request.rate * part.rate, seed=request.seed)
+        delivery = delivery_of(part, sentence.runs, request)
+        rate = request.rate * part.rate * delivery.rate
+        speech = speaker.speak(phrase_content(part), rate=rate, seed=request.seed)
         speech = _ended(resampled_speech(speech, voice.sample_rate), sentence, part)
         language = part.language or request.language
         times_of_part = WordTimes(part.source, speech.phones, speech.words, language=language, first=part.first)
         spoken.append(speech)
         word_times.append(times_of_part)
         gains.append(_gain(speech.waveform, sentence.runs, part, times_of_part))
+        volumes.append(request.volume * delivery.volume)
     scaled = [_scale_speech(speech, request.volume, gain) for speech, gain in zip(spoken, gains, strict=True)]
     speech, begins = _join_sentence(scaled, sentence, voice.sample_rate)
     give_way()
-    levelled = level_speech(spoken, [request.volume * gain for gain in gains], give_way)
+    levelled = level_speech(spoken, [volume * gain for volume, gain in zip(volumes, gains, strict=True)], give_way)
     sound = _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
     times = SentenceTimes(tuple(part.first for part in sentence.utterances), tuple(word_times), tuple(begins))
     return SpokenSentence(
@@ -119,10 +130,12 @@ def sentence_sound(voice: Voice, sentence: Sentence, request: Request, voices: V
     if len(sentence.utterances) > 1 or any(run.volume != 1.0 for run in sentence.runs):
         return speak_sentence(voice, sentence, request, voices).sound
     speaker = speaker_of(part, voice, request, voices)
-    sound = speaker.sound(_content(part), rate=request.rate * part.rate, seed=request.seed)
+    delivery = delivery_of(part, sentence.runs, request)
+    rate = request.rate * part.rate * delivery.rate
+    sound = speaker.sound(phrase_content(part), rate=rate, seed=request.seed)
     whole = Speech(sound, PhoneSequence([SILENCE], [0.0, sound.duration]), ())
     whole = _ended(resampled_speech(whole, voice.sample_rate), sentence, part)
-    levelled = level_speech([whole], [request.volume * np.ones(1)])
+    levelled = level_speech([whole], [request.volume * delivery.volume * np.ones(1)])
     return _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
 
 
@@ -131,7 +144,7 @@ def _ended(speech: Speech, sentence: Sentence, part: Phrase) -> Speech:
     return trim_end(speech) if sentence.is_cut and part is sentence.utterances[-1] else speech
 
 
-def _content(part: Phrase) -> SpeechInput:
+def phrase_content(part: Phrase) -> SpeechInput:
     """Words of a phrase with their phones, or its text."""
     return [SpokenWord(word.text, word.segments, word.after) for word in part.words] or part.text
 
@@ -153,7 +166,7 @@ def speaker_of(part: Phrase, voice: Voice, request: Request, voices: Voices | No
 
 def voice_in(name: str | None, language: str | None) -> str | None:
     """`name` if that voice speaks `language` (None: the language of the text), else None for the default voice."""
-    if language is None or (name in VOICE_NAMES and (name != "heart" or language in ENGLISH_CODES)):
+    if language is None or (name in VOICE_NAMES and (name not in ENGLISH_VOICES or language in ENGLISH_CODES)):
         return name
     return None
 
@@ -214,55 +227,6 @@ def resolve_recording_marks(
     indexed = index_by_letters(text)
     times = WordTimes(text.text, phones, words, language=language)
     return resolve_marks(indexed.runs, indexed.marks, times, (0, n_letters(text.text)))
-
-
-@lru_cache(maxsize=1000)
-def innermost_styles(nested: tuple[str, ...]) -> Mapping[str, str]:
-    """Style of each feature under nested marks; the innermost mark of a feature applies."""
-    chosen: dict[str, str] = {}
-    for written in nested:
-        chosen |= parse_style(written)
-    return chosen
-
-
-def marked_styles(text: MarkedText) -> tuple[str, ...]:
-    """Names of all styles in the marks of a text, in order of first use; raises as `check_marks`."""
-    runs = dict.fromkeys(run.styles for run in text.runs)
-    return tuple(dict.fromkeys(style for styles in runs for style in innermost_styles(styles).values()))
-
-
-def check_marks(text: MarkedText, request: Request) -> None:
-    """Reject marks that are invalid or cannot be combined with the request, in time linear in the length of the text.
-
-    Raises
-    ------
-    InputError
-        A style cannot be parsed, the product of a speed or loudness with the request's is out of range, the text names
-        another language, or the text of a recording has marks that change pauses or the voice.
-    """
-    if request.audio is not None and text.has_voice_changes:
-        raise InputError(
-            "[pause], <break>, <prosody>, <emphasis>, <voice> and <lang> have no effect on a recording; remove them or "
-            "--audio"
-        )
-    if text.language is not None and _primary(language_code(text.language)) != _primary(request.language):
-        raise InputError(f"the text names the language {text.language}, not {request.language}; choose one of them")
-    marked_styles(text)
-    for what, marked, requested, (low, high) in (
-        ("speed", {run.rate for run in text.runs}, request.rate, RATE_LIMITS),
-        ("loudness", {run.volume for run in text.runs}, request.volume, VOLUME_LIMITS),
-    ):
-        for factor in marked:
-            if not low <= factor * requested <= high:
-                raise InputError(
-                    f"a {what} of {factor:g} in the text times {requested:g} of the request lies outside "
-                    f"{low:g} to {high:g}; change one of them"
-                )
-
-
-def _primary(language: str) -> str:
-    """Primary language of a code: ``en`` of ``en-gb``."""
-    return language.partition("-")[0]
 
 
 def _pause_after(utterance: Phrase) -> float:

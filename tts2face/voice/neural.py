@@ -1,56 +1,39 @@
 """The neural English voice ``heart`` of hibari-tts, with phone edges by forced alignment of its sound."""
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, DataError, InputError
-from lexicon.ipa import Segment
-from lexicon.phones import nearest_phones
+from lexicon.errors import BackendError, DataError
+from lexicon.pronounce import Word
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.speech.forced_alignment import Aligner, SpeechAligner, enforce_increasing
 from tts2face.telemetry import disable_telemetry
 from tts2face.types import Speech, Waveform, concatenate_speech
-from tts2face.voice.engine import NativeRun, PronunciationMap, SpeechInput, SpokenWord, apply_volume
+from tts2face.voice.content import pronounce_content, split_spoken_sentences
+from tts2face.voice.engine import NativeRun, PronunciationMap, SpeechInput, apply_volume
+from tts2face.voice.voice_alphabet import voice_phones, word_letters
 
+LANGUAGE = "en-us"
+CLAUSE_MARKS = frozenset({",", ";", ":"})
 MAX_LETTERS = 400  # the model accepts at most this many letters in one call
 DURATION_STEP_S = 0.025  # length of one step of the model's durations
 BOUNDARY_DELAY_S = 0.045  # delay of the model's own boundaries against its sound (41-51 ms)
 DURATION_TENSOR = "/Cast_32_output_0"  # internal tensor of the ONNX graph: steps of 25 ms for each letter
-NO_LETTER = re.compile(r"[^\w'’-]+")  # characters that hibari does not accept in bracketed words
-WORD_CHARACTER = re.compile(r"[^\W_]")  # a letter or a digit, which must have a pronunciation
-# Letters of the misaki alphabet, in which the voice was trained, to phones of the table.
-PHONE_OF_LETTER = MappingProxyType({
-    "A": "eɪ", "I": "aɪ", "O": "oʊ", "Q": "oʊ", "W": "aʊ", "Y": "ɔɪ", "ʤ": "dʒ", "ʧ": "tʃ", "ə": "ə", "ɐ": "ə",
-    "ᵊ": "ə", "ᵻ": "ɪ", "ɪ": "ɪ", "i": "i", "ɛ": "ɛ", "æ": "æ", "a": "æ", "ɑ": "ɑ", "ɒ": "ɑ", "ɔ": "ɔ", "ʊ": "ʊ",
-    "u": "u", "ʌ": "ʌ", "ɜ": "ɝ", "ɚ": "ɚ", "e": "ɛ", "o": "ɔ", "ɹ": "ɹ", "r": "ɹ", "ð": "ð", "θ": "θ", "ʃ": "ʃ",
-    "ʒ": "ʒ", "ŋ": "ŋ", "j": "j", "ɡ": "ɡ", "T": "t", "ɾ": "t", "ʔ": "t", "h": "h", "x": "k", "b": "b", "d": "d",
-    "f": "f", "k": "k", "l": "l", "m": "m", "n": "n", "p": "p", "s": "s", "t": "t", "v": "v", "w": "w", "z": "z",
-})  # fmt: skip
-LETTERS_OF_PHONE = MappingProxyType({
-    "eɪ": "A", "aɪ": "I", "oʊ": "O", "aʊ": "W", "ɔɪ": "Y", "dʒ": "ʤ", "tʃ": "ʧ", "ə": "ə", "ɪ": "ɪ", "i": "i",
-    "ɛ": "ɛ", "æ": "æ", "ɑ": "ɑ", "ɔ": "ɔ", "ʊ": "ʊ", "u": "u", "ʌ": "ʌ", "ɝ": "ɜɹ", "ɚ": "əɹ", "ɹ": "ɹ", "ð": "ð",
-    "θ": "θ", "ʃ": "ʃ", "ʒ": "ʒ", "ŋ": "ŋ", "j": "j", "ɡ": "ɡ", "h": "h", "b": "b", "d": "d", "f": "f", "k": "k",
-    "l": "l", "m": "m", "n": "n", "p": "p", "s": "s", "t": "t", "v": "v", "w": "w", "z": "z",
-})  # fmt: skip
-RHOTIC_VOWELS = MappingProxyType({"ə": "ɚ", "ɝ": "ɝ", "ɚ": "ɚ"})  # vowels that merge with a following ɹ
-VOWELS = frozenset(phone for letter, phone in PHONE_OF_LETTER.items() if letter in "AIOQWYəɐᵊᵻɪiɛæaɑɒɔʊuʌɜɚeo")
-STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
 
 
 @dataclass(frozen=True, slots=True)
 class _Token:
-    """A written word or punctuation, its letters in the voice's alphabet, and whether a space follows."""
+    """A spoken word with its phones, and its letters in the voice's alphabet with the punctuation after it."""
 
     text: str
+    phones: tuple[str, ...]
     letters: str
-    has_space: bool
+    places: tuple[int, ...]  # index of the letter of each phone
 
 
 class NeuralVoice:
@@ -67,7 +50,7 @@ class NeuralVoice:
     def __init__(
         self, own_words: PronunciationMap, aligner: SpeechAligner | None = None, run: NativeRun | None = None
     ) -> None:
-        self._own_words = {word: segments_to_letters(segments) for word, segments in own_words.items()}
+        self._own_words = own_words
         disable_telemetry()
         try:
             from hibari import Hibari
@@ -77,6 +60,7 @@ class NeuralVoice:
         session = _session_without_arena(self._model.model_path)
         self._model.sess = session if run is None else _OwnRun(session, run)
         self._aligner: SpeechAligner = aligner or Aligner()
+        pronounce_content("Hello.", LANGUAGE, {})  # reads the dictionary while other models are loaded
 
     @property
     def sample_rate(self) -> int:
@@ -92,72 +76,10 @@ class NeuralVoice:
         sounds = [self._sound_of(part, rate, seed).samples for part in self._spoken_parts(content)]
         return Waveform(np.concatenate(sounds), self.sample_rate)
 
-    def _spoken_parts(self, content: SpeechInput) -> "list[list[_Token]]":
-        """Tokens of each part.
-
-        Raises
-        ------
-        InputError
-            No part has a word.
-        """
-        parts = list(self._parts(content))
-        if not any(letters_to_phones(token.letters)[0] for part in parts for token in part):
-            raise InputError("there is nothing to say in the text; give at least one word")
-        return parts
-
-    def _parts(self, content: SpeechInput) -> Iterator[list[_Token]]:
-        """Yield the tokens of each part that the model synthesises in one call."""
-        if isinstance(content, str):
-            split = self._model.split_sentences(content)
-            sentences = [self._tokens(self._insert_own_words(sentence)) for sentence in split]
-        elif all(word.segments for word in content):
-            sentences = [[_token_from_word(word) for word in content]]
-        else:
-            sentences = [self._tokens(" ".join(self._bracketed_word(word) for word in content))]
-        for sentence in sentences:
-            for part in _cut_tokens(sentence):
-                if any(token.letters.strip() for token in part):
-                    yield part
-
-    def _tokens(self, sentence: str) -> list[_Token]:
-        from hibari.g2p.normalize import normalize
-
-        g2p = self._model.g2p
-        phonemized = g2p.phonemize_tokens(g2p.tokenize(normalize(sentence)))
-        tokens = [
-            _Token(token.text, self._known_phones(token.phonemes), bool(token.whitespace)) for token in phonemized
-        ]
-        unpronounced = [
-            token.text
-            for token in tokens
-            if WORD_CHARACTER.search(token.text) and not letters_to_phones(token.letters)[0]
-        ]
-        if unpronounced:
-            raise InputError(
-                f"the voice heart cannot say {unpronounced[0]!r}; write it in English words, or choose another voice"
-            )
-        return tokens
-
-    def _insert_own_words(self, sentence: str) -> str:
-        """Replace a user's words by ``[word](/letters/)``, hibari's notation for given pronunciations."""
-
-        def add_brackets(match: "re.Match[str]") -> str:
-            letters = self._own_words.get(match[0].lower())
-            return match[0] if letters is None else f"[{match[0]}](/{letters}/)"
-
-        plain = re.sub(r"[\[\]]", " ", sentence)
-        return re.sub(r"[^\W_]+(?:['’-][^\W_]+)*", add_brackets, plain) if self._own_words else plain
-
-    def _bracketed_word(self, word: SpokenWord) -> str:
-        """A word in hibari's notation, with its phones if it has any."""
-        if not word.segments:
-            return self._insert_own_words(word.text) + word.after
-        label = NO_LETTER.sub("", word.text) or "word"
-        return f"[{label}](/{segments_to_letters(word.segments)}/){word.after}"
-
-    def _known_phones(self, letters: str | None) -> str:
-        """The letters that belong to the model's vocabulary."""
-        return "".join(letter for letter in letters or "" if letter in self._model.vocab)
+    def _spoken_parts(self, content: SpeechInput) -> list[list[_Token]]:
+        """Tokens of each part that the model synthesises in one call."""
+        words = pronounce_content(content, LANGUAGE, self._own_words)
+        return [part for sentence in split_spoken_sentences(words) for part in _cut_tokens([*map(_token, sentence)])]
 
     def _speak_tokens(self, tokens: Sequence[_Token], rate: float, seed: int) -> Speech:
         sound = self._sound_of(tokens, rate, seed)
@@ -172,24 +94,24 @@ class NeuralVoice:
         return Waveform(apply_volume(samples), self.sample_rate)
 
     def _align(self, tokens: Sequence[_Token], sound: Waveform) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
-        words = [(str(owner), [phones]) for owner, phones, _ in _spoken_words(tokens)]
-        found = self._aligner.align(sound, words)
-        return found.phones, _token_spans(found.words, tokens)
+        found = self._aligner.align(sound, [(token.text, [token.phones]) for token in tokens])
+        return found.phones, found.words
 
     def _predict_phones(
         self, tokens: Sequence[_Token], letters: str, rate: float, sound: Waveform
     ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
         """Phone edges from the model's durations, corrected for its delay, for sound that cannot be aligned."""
         begins = np.concatenate([[0.0], np.cumsum(self._durations(letters, rate) * DURATION_STEP_S)])[1:]
-        labels, starts, spans = [SILENCE], [0.0], []
-        for owner, phones, places in _spoken_words(tokens):
-            spans.append(WordSpan(str(owner), len(labels), len(labels) + len(phones)))
-            labels += phones
-            starts += [float(begins[place]) - BOUNDARY_DELAY_S for place in places]
+        labels, starts, spans, at = [SILENCE], [0.0], [], 0
+        for token in tokens:
+            spans.append(WordSpan(token.text, len(labels), len(labels) + len(token.phones)))
+            labels += token.phones
+            starts += [float(begins[at + place]) - BOUNDARY_DELAY_S for place in token.places]
+            at += len(token.letters) + 1
         labels.append(SILENCE)
         starts.append(min(float(begins[len(letters)]) - BOUNDARY_DELAY_S, sound.duration))
         edges = enforce_increasing(np.array([*starts, sound.duration]))
-        return PhoneSequence(labels, edges), _token_spans(spans, tokens)
+        return PhoneSequence(labels, edges), tuple(spans)
 
     def _durations(self, letters: str, rate: float) -> NDArray[np.float64]:
         """(L + 2,) durations in steps of `DURATION_STEP_S` of L letters and the padding at both ends."""
@@ -242,11 +164,12 @@ def _session_without_arena(path: str) -> Any:
 
 
 def _joined_letters(tokens: Sequence[_Token]) -> str:
-    return "".join(token.letters + " " * token.has_space for token in tokens).strip()
+    return " ".join(token.letters for token in tokens)
 
 
-def _token_from_word(word: SpokenWord) -> _Token:
-    return _Token(word.text, segments_to_letters(word.segments) + word.after, True)
+def _token(word: Word) -> _Token:
+    letters, places = word_letters(word.phones, word.stress)
+    return _Token(word.text, tuple(voice_phones(word.phones)), letters + word.mark, places)
 
 
 def _cut_tokens(tokens: Sequence[_Token]) -> Iterator[list[_Token]]:
@@ -255,7 +178,7 @@ def _cut_tokens(tokens: Sequence[_Token]) -> Iterator[list[_Token]]:
     length = 0
     for token in tokens:
         if part and length + len(token.letters) + 1 > MAX_LETTERS:
-            marks = [at for at, earlier in enumerate(part) if earlier.letters[-1:] in {",", ";", ":", "—"}]
+            marks = [at for at, earlier in enumerate(part) if earlier.letters[-1:] in CLAUSE_MARKS]
             keep = marks[-1] + 1 if marks else len(part)
             yield part[:keep]
             part = part[keep:]
@@ -264,29 +187,6 @@ def _cut_tokens(tokens: Sequence[_Token]) -> Iterator[list[_Token]]:
         length += len(token.letters) + 1
     if part:
         yield part
-
-
-def _spoken_words(tokens: Sequence[_Token]) -> Iterator[tuple[int, tuple[str, ...], tuple[int, ...]]]:
-    """Yield for each spoken word the index of its token, its phones, and their positions in the joined letters.
-
-    A token such as a number consists of several spoken words.
-    """
-    at = 0
-    for number, token in enumerate(tokens):
-        for word in re.finditer(r"\S+", token.letters):
-            phones, places = letters_to_phones(word[0])
-            if phones:
-                yield number, phones, tuple(at + word.start() + place for place in places)
-        at += len(token.letters) + token.has_space
-
-
-def _token_spans(spans: Sequence[WordSpan], tokens: Sequence[_Token]) -> tuple[WordSpan, ...]:
-    """Merge the spans of each token, labelled by token index, into one span labelled by the token's text."""
-    joined: dict[str, WordSpan] = {}
-    for span in spans:
-        first = joined[span.text].first if span.text in joined else span.first
-        joined[span.text] = WordSpan(span.text, first, span.last)
-    return tuple(WordSpan(tokens[int(span.text)].text, span.first, span.last) for span in joined.values())
 
 
 def add_graph_output(model: bytes, tensor: str) -> bytes:
@@ -306,39 +206,3 @@ def _length_delimited(field: int, content: bytes) -> bytes:
 def _encode_varint(number: int) -> bytes:
     low, rest = number & 0x7F, number >> 7
     return bytes([low | 0x80]) + _encode_varint(rest) if rest else bytes([low])
-
-
-def letters_to_phones(letters: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
-    """Phones of a word's letters, and the position of each phone's first letter.
-
-    əɹ is one phone (ɚ) unless a vowel follows; ɜɹ is always one (ɝ). Stress marks and length signs are skipped.
-    """
-    candidates = [(PHONE_OF_LETTER[letter], at) for at, letter in enumerate(letters) if letter in PHONE_OF_LETTER]
-    phones: list[str] = []
-    places: list[int] = []
-    for number, (phone, at) in enumerate(candidates):
-        follows = candidates[number + 1][0] if number + 1 < len(candidates) else ""
-        is_rhotic = phone == "ɹ" and phones and phones[-1] in RHOTIC_VOWELS
-        if is_rhotic and (phones[-1] != "ə" or follows not in VOWELS):
-            phones[-1] = RHOTIC_VOWELS[phones[-1]]
-            continue
-        phones.append(phone)
-        places.append(at)
-    return tuple(phones), tuple(places)
-
-
-def segments_to_letters(segments: Sequence[Segment]) -> str:
-    """Letters of phones in the voice's alphabet; a phone that the alphabet lacks is replaced by the nearest one.
-
-    Raises
-    ------
-    InputError
-        `segments` is empty.
-    """
-    if not segments:
-        raise InputError("a spoken word needs at least one phone")
-    letters = ""
-    for segment in segments:
-        for phone in nearest_phones(segment.phone, LETTERS_OF_PHONE.keys()):
-            letters += STRESS_MARKS.get(segment.stress, "") + LETTERS_OF_PHONE[phone]
-    return letters

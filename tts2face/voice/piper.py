@@ -1,36 +1,39 @@
-"""Piper voices from files (extra ``[piper]``), with phone edges by forced alignment of their sound."""
+"""Piper voices from files, with phone edges by forced alignment of their sound."""
 
 import re
-import unicodedata
 from collections.abc import Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, DataError, InputError
-from lexicon.g2p import parse_espeak_word, phonemize
+from lexicon.errors import DataError, InputError
+from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize
 from lexicon.inputs import read_json
 from lexicon.languages import language_code
+from lexicon.nominal_durations import NOMINAL_S
 from lexicon.phones import PHONES, nearest_phones
+from lexicon.pronounce import Word
+from lexicon.sequence import PhoneSequence, WordSpan
 from lexicon.writing_systems import check_script
 from tts2face.speech.forced_alignment import Aligner, SpeechAligner
-from tts2face.telemetry import disable_telemetry
 from tts2face.types import Speech, Waveform
+from tts2face.voice.content import pronounce_content, split_spoken_sentences, word_segments
 from tts2face.voice.engine import PronunciationMap, SpeechInput, SpokenWord, apply_volume
+from tts2face.voice.piper_network import STRESS_MARKS, PiperNetwork, PiperTextReader, english_letters, phone_letters
 
 WORD = re.compile(r"[^\W_]+(?:['’-][^\W_]+)*")
 WORD_AND_MARKS = re.compile(rf"({WORD.pattern})([.,;:!?]*)")
-STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
 ESPEAK_PHONES = "espeak"  # type of the supported voices; others need letters, or models that piper downloads
-MODEL_INPUTS = frozenset({"input", "input_lengths", "scales"})
+AlignedWord = tuple[str, list[tuple[str, ...]]]  # a written word with its phones, for the aligner
 SAMPLE_RATES_HZ = (8_000, 48_000)
 
 
 class PiperVoice:
     """A Piper voice (VITS in ONNX) with its settings file ``NAME.onnx.json`` in the same folder.
+
+    American English is spoken by the phones of `lexicon`; in other languages the text is spoken by piper-tts, whose
+    phones are those of espeak-ng.
 
     Raises
     ------
@@ -39,7 +42,7 @@ class PiperVoice:
     DataError
         The settings are missing, or a file is damaged.
     BackendError
-        piper-tts is not installed.
+        The voice speaks another language than English, and piper-tts is not installed.
     """
 
     def __init__(
@@ -50,49 +53,63 @@ class PiperVoice:
         settings = path.with_name(path.name + ".json")
         if not settings.is_file():
             raise DataError(f"the Piper voice {path} lacks its settings; put {settings.name} into the same folder")
-        disable_telemetry()
         try:
             content = read_json(settings)  # checks size and nesting, which piper does not limit
         except OSError as refused:
             raise DataError(f"{settings} cannot be read ({refused.strerror}); check the file") from refused
         _check_settings(settings, content)
-        self._language = content["espeak"]["voice"]
-        _check_language(path, self._language, language)
-        self._path, self._model = path, _load_model(path, settings)
-        self._letters = frozenset(content["phoneme_id_map"])
-        self._phones = tuple(phone for phone in PHONES if self._letters.issuperset(_letters(phone)))
+        _check_language(path, content["espeak"]["voice"], language)
+        self._language = language_code(content["espeak"]["voice"])
+        self._network = PiperNetwork(path, content)
+        self._text_reader = None if self._language == DEFAULT_LANGUAGE else PiperTextReader(self._network, content)
+        self._phones = tuple(phone for phone in PHONES if self._network.letters.issuperset(phone_letters(phone)))
         self._own_words = own_words
         self._aligner: SpeechAligner = aligner or Aligner()
 
     @property
     def sample_rate(self) -> int:
         """Sample rate in Hz."""
-        return int(self._model.config.sample_rate)
+        return self._network.sample_rate
 
     def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
         """Synthesise a sentence; see `tts2face.voice.engine.Voice`. The model runs without noise: `seed` is unused."""
-        words = self._spoken_words(content)
-        sound = self._speak_words(content, words, rate)
-        pronunciations = [(word.text, [tuple(segment.phone for segment in word.segments)]) for word in words]
-        found = self._aligner.align(sound, pronunciations)
+        words, sentences = self._spoken(content)
+        sound = self._synthesise(sentences, rate)
+        try:
+            found = self._aligner.align(sound, words)
+        except DataError:
+            return Speech(sound, *nominal_phones_in(words, sound.duration))
         return Speech(sound, found.phones, found.words)
 
     def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
         """Sound without the alignment of its phones."""
-        return self._speak_words(content, self._spoken_words(content), rate)
+        return self._synthesise(self._spoken(content)[1], rate)
 
-    def _spoken_words(self, content: SpeechInput) -> list[SpokenWord]:
-        words = self._words(content)
-        if not words:
+    def _spoken(self, content: SpeechInput) -> tuple[list[AlignedWord], list[list[str]]]:
+        """Words with their phones, and the letters of each sentence in Piper's alphabet."""
+        if self._text_reader is None:
+            words = pronounce_content(content, self._language, self._own_words)
+            sentences = [self._sentence_letters(sentence) for sentence in split_spoken_sentences(words)]
+            return [(word.text, [tuple(word.phones)]) for word in words], sentences
+        spoken = self._words(content)
+        if not spoken:
             raise InputError("there is nothing to say in the text; give at least one word")
-        return words
-
-    def _speak_words(self, content: SpeechInput, words: Sequence[SpokenWord], rate: float) -> Waveform:
         if isinstance(content, str):
             text = self._insert_own_words(content)
         else:
-            text = " ".join(self._bracketed_ipa(word) for word in words)
-        return Waveform(apply_volume(self._synthesise(text, rate)), self.sample_rate)
+            text = " ".join(map(self._bracketed_ipa, spoken))
+        aligned = [(word.text, [tuple(segment.phone for segment in word.segments)]) for word in spoken]
+        return aligned, self._text_reader.letters(text)
+
+    def _synthesise(self, sentences: Sequence[Sequence[str]], rate: float) -> Waveform:
+        parts = [self._network.run(letters, rate) for letters in sentences if letters]
+        return Waveform(apply_volume(np.concatenate(parts)), self.sample_rate)
+
+    def _sentence_letters(self, words: Sequence[Word]) -> list[str]:
+        """Letters of a sentence; phones that the voice does not have are replaced by the nearest ones."""
+        spoken = (english_letters(word_segments(word), self._phones, self._network.letters) for word in words)
+        marks = ("".join(mark for mark in word.mark if mark in self._network.letters) for word in words)
+        return list(" ".join(letters + mark for letters, mark in zip(spoken, marks, strict=True)))
 
     def _words(self, content: SpeechInput) -> list[SpokenWord]:
         """Words with phones: those given, of the user's dictionary, or of espeak-ng."""
@@ -125,24 +142,23 @@ class PiperVoice:
     def _bracketed_ipa(self, word: SpokenWord) -> str:
         """A word in Piper's notation; phones that the voice does not have are replaced by the nearest ones."""
         written = "".join(
-            STRESS_MARKS.get(segment.stress, "") + "".join(map(_letters, nearest_phones(segment.phone, self._phones)))
+            STRESS_MARKS.get(segment.stress, "")
+            + "".join(map(phone_letters, nearest_phones(segment.phone, self._phones)))
             for segment in word.segments
         )
-        marks = "".join(mark for mark in word.after if mark in self._letters)
+        marks = "".join(mark for mark in word.after if mark in self._network.letters)
         return f"[[{written}{marks}]]"  # Piper omits punctuation that follows the brackets
 
-    def _synthesise(self, text: str, rate: float) -> NDArray[np.float32]:
-        from piper import SynthesisConfig
 
-        config = SynthesisConfig(length_scale=1.0 / rate, noise_scale=0.0, noise_w_scale=0.0)
-        try:
-            chunks = [chunk.audio_float_array for chunk in self._model.synthesize(text, syn_config=config)]
-            samples = np.concatenate([np.zeros(0), *chunks]).astype(np.float32)
-        except _piper_errors() as broken:
-            raise DataError(f"{self._path} cannot speak {text!r} ({broken}); download the voice again") from broken
-        if not np.isfinite(samples).all() or not samples.any():
-            raise DataError(f"{self._path} returned no sound for {text!r}; download the voice again")
-        return samples
+def nominal_phones_in(words: Sequence[AlignedWord], seconds: float) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+    """Phones with nominal durations scaled to a sound, for sound that cannot be aligned (hundreds of equal words)."""
+    labels = [phone for _, (phones,) in words for phone in phones]
+    shares = np.cumsum([0.0, *(NOMINAL_S[PHONES[phone].kind] for phone in labels)])
+    spans, first = [], 0
+    for text, (phones,) in words:
+        spans.append(WordSpan(text, first, first + len(phones)))
+        first += len(phones)
+    return PhoneSequence(labels, seconds * shares / shares[-1]), tuple(spans)
 
 
 def _check_settings(path: Path, content: Any) -> None:
@@ -181,31 +197,3 @@ def _check_language(path: Path, spoken: str, wanted: str) -> None:
         raise DataError(f"the Piper voice {path} names no language of espeak-ng ({unknown})") from unknown
     if code.partition("-")[0] != wanted.partition("-")[0]:
         raise InputError(f"the Piper voice {path} speaks {code}, not {wanted}; use --language {code} or another voice")
-
-
-def _load_model(path: Path, settings: Path) -> Any:
-    try:
-        from piper import PiperVoice as Loaded
-    except ImportError as missing:
-        raise BackendError("a Piper voice needs piper-tts; run: pip install 'tts2face[piper]'") from missing
-    try:
-        model = Loaded.load(str(path), config_path=str(settings))
-        inputs = {tensor.name for tensor in model.session.get_inputs()}
-    except _piper_errors() as broken:
-        raise DataError(f"{path} is not a Piper voice ({broken}); download it again") from broken
-    if not inputs >= MODEL_INPUTS:
-        raise DataError(f"{path} is not a Piper voice: its inputs are {', '.join(sorted(inputs))}; download it again")
-    return model
-
-
-def _piper_errors() -> tuple[type[Exception], ...]:
-    """Exceptions of Piper for damaged files, and those of ONNX Runtime, which have no common base but Exception."""
-    from onnxruntime.capi import onnxruntime_pybind11_state as state
-
-    runtime = [error for error in vars(state).values() if isinstance(error, type) and issubclass(error, Exception)]
-    return TypeError, ValueError, KeyError, AttributeError, *runtime
-
-
-def _letters(phone: str) -> str:
-    """Characters of a phone in the alphabet of Piper, which separates diacritics."""
-    return unicodedata.normalize("NFD", phone) if phone != "ç" else phone

@@ -33,6 +33,9 @@ class ClipOptions(BaseModel):
     voice: Annotated[str | None, Field(description="A voice of GET /v1/voices.", examples=["heart"])] = None
     rate: Annotated[float, Field(ge=0.5, le=2.0, description="Factor of the speaking rate.")] = 1.0
     volume: Annotated[float, Field(ge=0.0, le=2.0, description="Factor of the loudness.")] = 1.0
+    plain_delivery: Annotated[bool, Field(description="The style leaves rate and loudness of the voice unchanged.")] = (
+        False
+    )
     seed: Annotated[int, Field(ge=0, le=2**31 - 1, description="Seed of gestures and voice.")] = 0
     synthesis: Annotated[Literal["exemplar", "theobald2007"], Field(description="Method of lip motion.")] = "exemplar"
     articulation: Annotated[

@@ -108,6 +108,11 @@ def models(request: HttpRequest) -> dict[str, Any]:
 def voices() -> dict[str, Any]:
     """The voices with their languages."""
     return {"voices": [
-        {"id": voice.name, "name": voice.name, "description": voice.summary, "languages": list(voice.languages)}
+        {
+            "id": voice.name,
+            "name": voice.name,
+            "description": f"{voice.summary}, {voice.sex}; licence {voice.licence}",
+            "languages": list(voice.languages),
+        }
         for voice in catalogue.voices()
     ]}  # fmt: skip

@@ -1,0 +1,84 @@
+"""Intervals of a method's figures over utterances, and of the difference of two methods on the same utterances."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.evaluation.scores import CONFIDENCE, IntervalEstimate
+from lexicon.errors import InputError
+
+N_DRAWS = 2000  # resamples of utterances with replacement (Efron 1979)
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairedCurves:
+    """Statistics of a method on U utterances: ``moments`` (U, 2, 6) of opening and width, warping ``costs`` (U,).
+
+    The moments of a real curve a and a synthesised one b are n, sum a, sum b, sum aa, sum bb and sum ab, from which
+    Pearson's r of pooled frames follows.
+    """
+
+    moments: Floats
+    costs: Floats
+
+    @classmethod
+    def of(
+        cls, real: Sequence[NDArray[np.floating]], synthesised: Sequence[NDArray[np.floating]], costs: Sequence[float]
+    ) -> "PairedCurves":
+        """Of real and synthesised curves (T, 2), one pair for each utterance, and their warping costs."""
+        moments = [
+            [_curve_moments(a[:, at], b[:, at]) for at in range(2)] for a, b in zip(real, synthesised, strict=True)
+        ]
+        return cls(np.array(moments), np.asarray(costs, np.float64))
+
+    def figures(self, weights: Floats) -> Mapping[str, Floats]:
+        """Correlations of opening and width and mean cost for each row of utterance weights (W, U)."""
+        opening, width = (_pooled_correlation(weights @ self.moments[:, at]) for at in range(2))
+        return {"r_opening": opening, "r_width": width, "dtw_cost": weights @ self.costs / weights.sum(axis=1)}
+
+
+def draw_weights(n_utterances: int) -> Floats:
+    """(N_DRAWS + 1, U) number of times each utterance is drawn; every utterance once in the first row."""
+    draws = np.random.default_rng(0).multinomial(n_utterances, np.full(n_utterances, 1 / n_utterances), N_DRAWS)
+    return np.concatenate([np.ones((1, n_utterances)), draws])
+
+
+def estimate(one: PairedCurves) -> Mapping[str, IntervalEstimate]:
+    """Each figure with its interval."""
+    figures = one.figures(draw_weights(len(one.costs)))
+    return {name: _interval(values) for name, values in figures.items()}
+
+
+def estimate_difference(one: PairedCurves, other: PairedCurves) -> Mapping[str, IntervalEstimate]:
+    """Figures of `one` minus those of `other` on the same utterances; both are resampled together.
+
+    Raises
+    ------
+    InputError
+        The two have other numbers of utterances.
+    """
+    if len(one.costs) != len(other.costs):
+        raise InputError(f"{len(one.costs)} utterances cannot be paired with {len(other.costs)}; use the same ones")
+    weights = draw_weights(len(one.costs))
+    ours, theirs = one.figures(weights), other.figures(weights)
+    return {name: _interval(ours[name] - theirs[name]) for name in ours}
+
+
+def _interval(values: Floats) -> IntervalEstimate:
+    low, high = np.quantile(values[1:], (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2))
+    return IntervalEstimate(float(values[0]), float(low), float(high))
+
+
+def _curve_moments(a: NDArray[np.floating], b: NDArray[np.floating]) -> list[float]:
+    return [len(a), a.sum(), b.sum(), a @ a, b @ b, a @ b]
+
+
+def _pooled_correlation(moments: Floats) -> Floats:
+    """(W,) Pearson's r for moments (W, 6); 0 where a curve is constant."""
+    n, a, b, aa, bb, ab = moments.T
+    norm = np.sqrt(np.maximum(aa - a * a / n, 0.0) * np.maximum(bb - b * b / n, 0.0))
+    moves = norm > 1e-9 * n
+    return np.where(moves, (ab - a * b / n) / np.where(moves, norm, 1.0), 0.0)

@@ -1,0 +1,56 @@
+"""Words of a marked text as the voices speak them: sentence by sentence, phrase by phrase."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from lexicon.dictionary import Dictionary
+from lexicon.errors import InputError
+from lexicon.g2p import DEFAULT_LANGUAGE
+from lexicon.given_pronunciations import pronounce_words
+from lexicon.languages import language_code
+from lexicon.marked_text import MarkedText
+from lexicon.normalize import split_tokens
+from lexicon.pronounce import Pronunciation, Word, pronounce
+from lexicon.sentences import Phrase, split_sentences
+
+
+def pronounce_marked(
+    text: MarkedText, language: str = DEFAULT_LANGUAGE, dictionary: Dictionary | None = None
+) -> Pronunciation:
+    """Words of a text with the phones that a voice of its language speaks.
+
+    Raises
+    ------
+    InputError, BackendError
+        As `lexicon.pronounce.pronounce`.
+    """
+    language = language_code(language)
+    words: list[Word] = []
+    for sentence in split_sentences(text, language):
+        for phrase in sentence.utterances:
+            words += pronounce_phrase(phrase, phrase.language or language, dictionary)
+    if not words:
+        raise InputError("there is nothing to say in the text; add at least one word or number")
+    return Pronunciation(text.text, language, tuple(words))
+
+
+def pronounce_phrase(phrase: Phrase, language: str, dictionary: Dictionary | None = None) -> tuple[Word, ...]:
+    """Words of a phrase, with their written forms; raises as `lexicon.pronounce.pronounce`."""
+    if phrase.words:
+        return pronounce_words(phrase.words, language, dictionary)
+    return _with_sources(pronounce(phrase.text, language, dictionary).words, phrase.source, language)
+
+
+def _with_sources(words: Sequence[Word], written: str, language: str) -> tuple[Word, ...]:
+    """Words with the written forms ($5) of which they are parts, where these are known."""
+    if not language.startswith("en"):
+        return tuple(words)
+    sources = [
+        token.source.strip(" .,;:!?") or piece
+        for token in split_tokens(written)
+        for piece in token.spoken.split()
+        if any(letter.isalnum() for letter in piece)
+    ]
+    if len(sources) != len(words):
+        return tuple(words)
+    return tuple(replace(word, source=source) for word, source in zip(words, sources, strict=True))
