@@ -47,7 +47,7 @@ class SyncEstimate:
     @property
     def lag_correction_s(self) -> float:
         """The lag to correct: 0 if it is not significant."""
-        if self.pooled_seconds <= 0 or self.problem:
+        if self.pooled_seconds <= 0 or self.problem or self._has_no_peak:
             return 0.0
         least = MIN_LAG_S * np.sqrt(max(1.0, RELIABLE_S / self.pooled_seconds))
         return round(self.lag, 3) if abs(self.lag) >= least else 0.0
@@ -65,7 +65,7 @@ class SyncEstimate:
             check_limits(self.measures)
         except DataError as reason:
             return str(reason)
-        if abs(self.lag) > MAX_LAG_S - 2 * LAG_STEP_S:
+        if self._has_no_peak and self.pooled_seconds >= MIN_DURATION_S:
             return f"sound and picture are out of sync by {MAX_LAG_S:g} s or more; synchronise them with an editor"
         return None
 
@@ -74,7 +74,19 @@ class SyncEstimate:
         """Messages about weak agreement, and about material that is too short for a comparison."""
         if not self.seconds:
             return (f"it has fewer than {MIN_FRAMES} frames, too few to compare lips and sound; record longer parts",)
-        return limit_warnings(self.measures)
+        found = limit_warnings(self.measures)
+        if self._has_no_peak and self.pooled_seconds < MIN_DURATION_S:
+            found = (
+                *found,
+                f"{self.pooled_seconds:.1f} s are too short to tell whether sound and picture are in step; record "
+                f"{MIN_DURATION_S:g} s or more",
+            )
+        return found
+
+    @property
+    def _has_no_peak(self) -> bool:
+        """Whether the correlation is highest at the end of the lags that are compared."""
+        return abs(self.lag) > MAX_LAG_S - 2 * LAG_STEP_S
 
 
 def estimate_sync_by_video(

@@ -149,3 +149,11 @@ def test_the_shipped_talker_closes_its_lips_for_bilabials() -> None:
     phones = PhoneSequence([SILENCE, "ɑ", "p", "ɑ", SILENCE], [0.0, 0.4, 0.6, 0.7, 0.9, 1.2])
     opening = shipped_talker_opening(phones)
     assert opening[64] < 0.5 * min(opening[50], opening[80])
+
+
+def test_a_few_seconds_are_not_refused_for_a_lag_that_they_cannot_show() -> None:
+    few = SyncEstimate(0.5, 0.4, 3.0, 0.4, 3.0)
+    assert few.problem is None
+    assert few.lag_correction_s == 0.0
+    assert any("3.0 s are too short" in warning for warning in few.warnings)
+    assert "out of sync" in str(SyncEstimate(0.5, 0.4, 30.0, 0.4, 30.0).problem)
