@@ -23,7 +23,12 @@ from tts2face.video.media import read_sound
 from tts2face.voice.loading import load_voice
 
 RIGHT = ("Please wait for the beep, then say your name.", "The young chef usually pushes five big maps before noon.")
-WRONG = "She sold seven old houses near the river."
+WRONG = (
+    "She sold seven old houses near the river.",
+    "A cold wind blew from the mountains all night.",
+    "Children like to jump over puddles.",
+    "The judge read the letter twice.",
+)
 WORD_S = 0.4
 
 
@@ -78,19 +83,21 @@ def test_another_text_for_the_project_s_own_voice() -> None:
     assert mismatch.end - mismatch.begin > 1.0
 
 
-def test_one_wrong_sentence_among_right_ones() -> None:
+def test_wrong_sentences_among_right_ones() -> None:
     voice = load_voice("heart", "en-us")
     said = [RIGHT[0], RIGHT[1], "It was a sunny day in the park.", "Nobody saw the dog again."]
     sounds = [voice.speak(text).waveform for text in said]
     sound = Waveform(np.concatenate([one.samples for one in sounds]), voice.sample_rate)
     assert align_recording(sound, pronounce_transcript(" ".join(said), "en-us"))[2] == ()
-    begin, end = sounds[0].duration, sounds[0].duration + sounds[1].duration
-    found = align_recording(sound, pronounce_transcript(" ".join([said[0], WRONG, *said[2:]]), "en-us"))[2]
-    assert found
-    assert min(abs(one.begin - begin) for one in found) < 1.0
-    assert all(begin - 1.5 < one.begin and one.end < end + 1.5 for one in found)
-    wrong = {word for one in found for word in one.words}
-    assert len(wrong & set(WRONG.rstrip(".").split())) >= 5
+    n_found = 0
+    for wrong in WRONG:
+        for at in (1, 2):
+            begin = sum(one.duration for one in sounds[:at])
+            text = " ".join([*said[:at], wrong, *said[at + 1 :]])
+            found = align_recording(sound, pronounce_transcript(text, "en-us"))[2]
+            assert all(one.begin < begin + sounds[at].duration and one.end > begin for one in found)
+            n_found += bool({word for one in found for word in one.words} & set(wrong.rstrip(".").split()))
+    assert n_found >= 6  # of 8
 
 
 @pytest.mark.parametrize("n_sentences", [1, 6])
