@@ -74,8 +74,10 @@ class Relay:
         try:
             while data := source.recv(65536):
                 self.n_bytes += len(data) if is_upload else 0
-                while is_upload and self.limit is not None and self.n_bytes > self.limit:
-                    time.sleep(0.05)
+                if is_upload and self.limit is not None and self.n_bytes > self.limit:
+                    while self.limit is not None:
+                        time.sleep(0.05)
+                    return  # what was held back, which the system's buffers may hold as a whole, is lost
                 target.sendall(data)
         except OSError:
             pass
