@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 import re
 import stat
 from collections.abc import Iterable
@@ -101,6 +102,23 @@ def read_table(path: Path, largest: int = LARGEST_TABLE_BYTES) -> list[list[str]
         raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
     except csv.Error as broken:
         raise DataError(f"{path} is not a CSV file ({broken}); export it again") from broken
+
+
+def parse_cell(text: str, path: Path, line: int, unit: str = "") -> float:
+    """Finite number in a cell of a table.
+
+    Raises
+    ------
+    DataError
+        It is none; the message names the line, and the unit if there is one.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise DataError(f"{path}, line {line}: {text!r} is not a number{unit and ' of ' + unit}; correct it")
+    return value
 
 
 def read_json(path: Path) -> Any:

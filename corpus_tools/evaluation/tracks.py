@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from corpus_tools.evaluation.reference import ReferenceUtterance
 from corpus_tools.training.ridge import fit_ridge
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import read_table
+from lexicon.inputs import parse_cell, read_table
 from tts2face.interpolation import interpolate_columns
 from tts2face.models.talker import Talker
 
@@ -49,22 +49,12 @@ def read_tracks(path: Path) -> Mapping[str, ExternalTrack]:
     for number, row in enumerate(lines, start=2):
         if len(row) != len(head):
             raise DataError(f"{path}, line {number}: {len(row)} columns, not {len(head)}; correct the line")
-        rows.setdefault(row[0], []).append([_parse_number(value, path, number) for value in row[1:]])
+        rows.setdefault(row[0], []).append([parse_cell(value, path, number) for value in row[1:]])
     tracks = {name: np.array(values) for name, values in rows.items()}
     for name, values in tracks.items():
         if (np.diff(values[:, 0]) <= 0).any():
             raise DataError(f"{path}: the times of {name} do not increase; sort them")
     return {name: ExternalTrack(values[:, 0], values[:, 1:]) for name, values in tracks.items()}
-
-
-def _parse_number(text: str, path: Path, line: int) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        raise DataError(f"{path}, line {line}: {text!r} is not a number; correct it")
-    return value
 
 
 def map_tracks(

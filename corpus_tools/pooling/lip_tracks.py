@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from corpus_tools.pooling.lip_features import track_features
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
+from lexicon.inputs import parse_cell
 from lexicon.phones import arpabet_to_ipa
 from lexicon.sequence import SILENCE
 
@@ -93,7 +94,7 @@ def _group_words(table: Path, rows: Sequence[Sequence[str]]) -> list[tuple[str, 
     for number, row in enumerate(rows, start=2):
         if len(row) != len(PHONE_COLUMNS):
             raise DataError(f"{table}, line {number}: {len(row)} columns, not {len(PHONE_COLUMNS)}; correct the line")
-        start, end = _seconds(table, number, row[0]), _seconds(table, number, row[1])
+        start, end = (parse_cell(cell, table, number, "seconds") for cell in row[:2])
         if row[2] == ARPABET_SILENCE:
             is_begun = False
             continue
@@ -116,16 +117,6 @@ def _reduced_vowels(word: str, phones: tuple[str, ...]) -> tuple[str, ...]:
         if tuple(UNREDUCED.get(label, label) for label in labels) == merged:
             return labels
     return phones
-
-
-def _seconds(table: Path, line: int, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        raise DataError(f"{table}, line {line}: {text!r} is not a number of seconds; correct it")
-    return value
 
 
 def _phone(table: Path, line: int, name: str) -> str:

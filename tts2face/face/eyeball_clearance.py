@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from tts2face.compilation import kernel
 from tts2face.models.face import Eye, Face, Part
@@ -133,8 +132,10 @@ def _bind_followers(
     edges = np.flatnonzero(beyond < ROOT_MM)
     if len(edges) < N_ROOTS or not len(followers):
         return np.zeros(0, np.int64), np.zeros((0, N_ROOTS), np.int64), np.zeros((0, N_ROOTS), np.float32)
-    found = cKDTree(face.vertices[lids[edges]]).query(face.vertices[followers], N_ROOTS)
-    distance, nearest = np.asarray(found[0], np.float64), np.asarray(found[1], np.int64)
+    off = face.vertices[followers].astype(np.float64)[:, None] - face.vertices[lids[edges]]
+    apart = np.sqrt(off[..., 0] ** 2 + off[..., 1] ** 2 + off[..., 2] ** 2)  # a tree costs more to import than this
+    nearest = np.argsort(apart, axis=1, kind="stable")[:, :N_ROOTS]
+    distance = np.take_along_axis(apart, nearest, axis=1)
     is_near = distance[:, 0] < FOLLOWER_REACH_MM
     share = 1.0 / np.maximum(distance[is_near], 0.05) ** 2
     share /= share.sum(axis=1, keepdims=True)
