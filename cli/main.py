@@ -27,6 +27,7 @@ from cli.process import (
     signal_exit_code,
     write_message,
 )
+from cli.render import render
 from cli.report import report
 from cli.serve import keys, serve
 from lexicon.errors import DataError, InputError, Tts2faceError
@@ -48,6 +49,7 @@ app = App(
 )
 app.command(mimic)
 app.command(convert)
+app.command(render)
 app.command(batch)
 app.command(worker)
 app.command(jobs)

@@ -50,15 +50,21 @@ class SpeakOptions:
 
 
 def run_request(request: Request, picture: Picture, options: SpeakOptions) -> None:
-    """Write, explain or show a clip."""
+    """Write, explain or show a clip of a request."""
     _check_options(request, picture, options)
     from tts2face.synthesis.prepared_request import prepare
+
+    run_prepared(prepare(request), picture, options)  # a wrong request is refused before anything is loaded
+
+
+def run_prepared(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions) -> None:
+    """Write, explain or show a clip of a prepared request."""
+    _check_options(prepared.request, picture, options)
     from tts2face.synthesis.voice_preload import preload_voice
     from tts2face.voice.pool import VoicePool
 
-    prepared = prepare(request)  # a wrong request is refused before anything is loaded
     voices = VoicePool()
-    preload_voice(voices, prepared.request)  # beside the imports of the session, and loading of talker and face
+    preload_voice(voices, prepared)  # beside the imports of the session, and loading of talker and face
     session = _open_session(options, voices)
     explanations: list[PhoneExplanation] = []
 

@@ -83,6 +83,18 @@ class Sentence:
         """Index of the letter after it."""
         return self.utterances[-1].last
 
+    def relative(self) -> "Sentence":
+        """The sentence with positions counted from its first letter: equal for equal sentences anywhere in a text."""
+        first = self.first
+        return replace(
+            self,
+            utterances=tuple(
+                replace(part, first=part.first - first, last=part.last - first) for part in self.utterances
+            ),
+            runs=tuple(replace(run, start=run.start - first) for run in self.runs),
+            marks=tuple(replace(mark, at=mark.at - first) for mark in self.marks),
+        )
+
 
 def split_sentences(text: MarkedText, language: str) -> Iterator[Sentence]:
     """Sentences that contain words, lazily and in linear time.

@@ -49,6 +49,9 @@ if TYPE_CHECKING:
     from tts2face.models.palette import load_palette as load_palette
     from tts2face.models.talker import Talker as Talker
     from tts2face.models.talker import load_talker as load_talker
+    from tts2face.project.project import Project as Project
+    from tts2face.project.project_file import load_project as load_project
+    from tts2face.project.project_file import save_project as save_project
     from tts2face.render.picture import Picture as Picture
     from tts2face.request import Request as Request
     from tts2face.session import Session as Session
@@ -87,6 +90,7 @@ __all__ = [
     "Picture",
     "Piece",
     "Plan",
+    "Project",
     "Request",
     "Session",
     "Speech",
@@ -110,12 +114,14 @@ __all__ = [
     "load_clip",
     "load_face",
     "load_palette",
+    "load_project",
     "load_talker",
     "plan_batch",
     "read_cast",
     "read_subtitles",
     "run_batch",
     "save_face",
+    "save_project",
     "styles",
     "talkers",
     "voices",
@@ -150,6 +156,8 @@ _MODULES = {
     "tts2face.models.face_loading": ("load_face",),
     "tts2face.models.palette": ("Palette", "load_palette"),
     "tts2face.models.talker": ("Talker", "load_talker"),
+    "tts2face.project.project": ("Project",),
+    "tts2face.project.project_file": ("load_project", "save_project"),
     "tts2face.render.picture": ("Picture",),
     "tts2face.request": ("Request",),
     "tts2face.session": ("Session",),

@@ -21,6 +21,7 @@ from tts2face.synthesis.output_files import OutputFiles, plan_outputs
 from tts2face.synthesis.performance import Performance
 from tts2face.synthesis.performance_output import write_take
 from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare_request, split_picture
+from tts2face.synthesis.sentence_memory import SentenceMemory
 from tts2face.synthesis.session_models import SessionModels, shown_face
 from tts2face.synthesis.written_clip import RequestSteps, WrittenClip, write_pieces
 from tts2face.types import Chunk, Clip, Progress, concatenate_clips
@@ -48,6 +49,9 @@ class Session:
         Name of a shipped palette, path of a .palette file, or a `Palette`; None for clips without gestures.
     voices
         Loaded voices shared with other sessions; None for those of this session.
+    memory_mb
+        Megabytes of finished sentences to keep: a request that is changed and made again, as in an editor, repeats only
+        what has changed. The result is the same.
 
     Raises
     ------
@@ -72,8 +76,10 @@ class Session:
         hair: str | None = None,
         hair_color: str | None = None,
         voices: VoicePool | None = None,
+        memory_mb: float = 0.0,
     ) -> None:
-        self._models = SessionModels(talker, shown_face(face, identity, hair, hair_color), palette, voices)
+        memory = SentenceMemory(round(memory_mb * 1e6))
+        self._models = SessionModels(talker, shown_face(face, identity, hair, hair_color), palette, voices, memory)
 
     @property
     def talker(self) -> Talker:
@@ -132,7 +138,7 @@ class Session:
         The last utterances are kept, so that a following `stream` of the same text does not speak it again.
         """
         prepared = prepare_request(text, options)
-        return measure_speech(prepared, self._models.for_request(prepared.request, keeps_utterances=True))
+        return measure_speech(prepared, self._models.for_request(prepared, keeps_utterances=True))
 
     def stream_to_length(self, text: str | Request | PreparedRequest, n_frames: int, **options: Any) -> Iterator[Clip]:
         """Synthesise the clip of a text or request in pieces with `n_frames` frames in total.
@@ -151,7 +157,7 @@ class Session:
         Arguments and errors as `clip`; a recording is refused.
         """
         prepared = prepare_request(text, options)
-        return timed_speech(prepared, self._models.for_request(prepared.request))
+        return timed_speech(prepared, self._models.for_request(prepared))
 
     def live(self, **options: Any) -> LiveSpeech:
         """A clip without an end, extended by `say` and `idle` of the result; options and errors as `clip`."""
@@ -310,7 +316,7 @@ class Session:
         on_piece: Callable[[Piece], None] | None,
     ) -> WrittenClip:
         has_gestures = prepared.request.has_gestures
-        self._models.preload_voice(prepared.request)
+        self._models.preload_voice(prepared)
         renderer = None if outputs.out is None else self.renderer(picture, has_gestures=has_gestures)
         progress = RequestSteps(prepared.n_steps, on_progress)
         with outputs.open(self._models.face(has_gestures=has_gestures), renderer, progress.report_frames) as files:

@@ -24,13 +24,13 @@ class Models:
     hair: str | None = None
     hair_color: str | None = None
 
-    def open_session(self, voices: "VoicePool | None" = None) -> "Session":
+    def open_session(self, voices: "VoicePool | None" = None, *, memory_mb: float = 0.0) -> "Session":
         """Session of these models; raises as `Session`."""
         from tts2face.session import Session  # a second of imports
 
         return Session(
             self.talker, self.face, identity=self.identity, palette=self.palette, hair=self.hair,
-            hair_color=self.hair_color, voices=voices,
+            hair_color=self.hair_color, voices=voices, memory_mb=memory_mb,
         )  # fmt: skip
 
 

@@ -31,7 +31,7 @@ from tests.docs.blocks import (
     reason_not_executed,
     shell_lines,
 )
-from tts2face import export, import_face, save_face, session
+from tts2face import Picture, Project, Request, export, import_face, save_face, save_project, session
 from tts2face.jobs.database import prepare_database
 from tts2face.models.palette import Palette, load_palette, write_palette
 from tts2face.storage.files import SHIPPED_FOLDER
@@ -53,7 +53,7 @@ LISTS = {
     "serve",
     "keys",
 }
-TOOLS = {"corpus", "report", "convert", "face"}
+TOOLS = {"corpus", "report", "convert", "render", "face"}
 OWN_LINES = [(page.name, line) for page in PAGES for line in shell_lines(page) if own_commands(line)]
 EXECUTED = [
     line
@@ -87,6 +87,10 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "chapter.txt").write_text("Chapter one. It was late.", encoding="utf-8")
     (folder / "speech.txt").write_text("Hello there.", encoding="utf-8")
     (folder / "words.txt").write_text("gif  JH IH1 F\n", encoding="utf-8")
+    save_project(
+        Project(request=Request(text="Hello.", voice="espeak", fps=5), picture=Picture(size="64x64")),
+        folder / "scene.json",
+    )
     (folder / "timeline.json").write_text('{"style": "delighted", "nods": [{"time": 0.2}]}', encoding="utf-8")
     (folder / "one.srt").write_text("1\n00:00:00,000 --> 00:00:01,000\nANN: Hello.\n", encoding="utf-8")
     (folder / "cast.toml").write_text('[[role]]\nspeaker = "ANN"\nvoice = "espeak"\n', encoding="utf-8")

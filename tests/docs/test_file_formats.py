@@ -1,5 +1,6 @@
 """The examples of docs/file-formats.md are read by the readers of the files that they describe."""
 
+import json
 import re
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from tests.docs.blocks import DOCS, code_blocks
 from tts2face.gesture.notation import parse_style
 from tts2face.gesture.timeline_file import parse_timeline
 from tts2face.models.palette import Palette, load_palette
+from tts2face.models.talker import load_talker
+from tts2face.project.project_file import load_project, project_json
 from tts2face.request import Request
 from tts2face.synthesis.prepared_request import prepare
 
@@ -24,12 +27,24 @@ def palette() -> Palette:
 
 
 def test_timelines_are_read_and_name_styles_that_exist(palette: Palette) -> None:
-    examples = code_blocks(PAGE, "json")
+    examples = [example for example in code_blocks(PAGE, "json") if '"format"' not in example]
     assert examples
     for example in examples:
         named = parse_timeline(example).style_names
         assert named
         assert set(named) <= set(palette.names)
+
+
+def test_a_project_is_read_and_prepared(tmp_path: Path) -> None:
+    (example,) = (example for example in code_blocks(PAGE, "json") if '"format"' in example)
+    (tmp_path / "scene.json").write_text(example, encoding="utf-8")
+    project = load_project(tmp_path / "scene.json")
+    assert project.prepare().dictionary["maps"]
+    assert project.excluded[0].utterance in {utterance.name for utterance in load_talker("grid_s1").utterances}
+    written = project_json(project, tmp_path)
+    assert {key: written[key] for key in json.loads(example) if key != "timeline"} == {
+        key: value for key, value in json.loads(example).items() if key != "timeline"
+    }
 
 
 def test_marks_name_styles_that_exist(palette: Palette) -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from lexicon.errors import InputError
 from tts2face.request import Request
+from tts2face.synthesis.prepared_request import prepare
 from tts2face.synthesis.voice_preload import preload_voice
 from tts2face.voice import pool
 from tts2face.voice.pool import VoicePool
@@ -57,8 +58,8 @@ def test_an_unknown_voice_is_refused_when_it_is_used(loading: CountedLoading) ->
 def test_only_text_loads_a_voice(loading: CountedLoading) -> None:
     loading.done.set()
     voices = VoicePool()
-    preload_voice(voices, Request(idle=1.0))
+    preload_voice(voices, prepare(Request(idle=1.0)))
     assert loading.names == []
-    preload_voice(voices, Request(text="Hello."))
+    preload_voice(voices, prepare(Request(text="Hello.")))
     voices.voice(None, Request(text="Hello.").language, {})
     assert loading.names == [None]

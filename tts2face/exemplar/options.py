@@ -5,6 +5,14 @@ from dataclasses import dataclass
 from lexicon.errors import InputError
 
 
+@dataclass(frozen=True, slots=True)
+class ExcludedToken:
+    """A recorded token that is not used: its utterance, and the seconds of the utterance at which it begins."""
+
+    utterance: str
+    start: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SynthesisOptions:
     """Options of text-driven synthesis.

@@ -57,11 +57,15 @@ def log_durations(spans: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.log(np.maximum(np.diff(spans, axis=1), 0.01))
 
 
-def context_index(tokens: Tokens, similarity: NDArray[np.float64]) -> ContextIndex:
-    """Index of a talker's tokens for the (P, P) similarity of its phones."""
+def context_index(
+    tokens: Tokens, similarity: NDArray[np.float64], is_kept: NDArray[np.bool_] | None = None
+) -> ContextIndex:
+    """Index of a talker's tokens, or of those that are kept (N,), for the (P, P) similarity of its phones."""
     near = tokens.context[:, : 2 * N_GROUP_CONTEXT]
     durations = log_durations(tokens.spans)
     order = np.lexsort((durations[:, 1], *near.T[::-1], tokens.phone)).astype(np.int32)
+    if is_kept is not None:
+        order = order[is_kept[order]]
     keys = np.column_stack([tokens.phone, near])[order]
     firsts = np.flatnonzero(np.concatenate([[True], (keys[1:] != keys[:-1]).any(1)]))
     likeness = [np.maximum.reduceat(similarity[column[order]], firsts, axis=0) for column in tokens.context.T]

@@ -23,6 +23,7 @@ from tts2face.types import GiveWay, Waveform, keep_on
 
 N_LOOKAHEAD_FRAMES = 2  # frames after a time that cubic interpolation needs
 NO_CHANGE = FeatureChange()
+NO_SEEDS: Mapping[str, int] = MappingProxyType({})
 # Tuned on three quarters of the recordings of GRID s1 (docs/gestures.md); all other features use the defaults.
 OPTIONS: Mapping[str, FieldOptions] = MappingProxyType(
     {
@@ -120,14 +121,16 @@ class GestureFields:
 class GestureStream:
     """Gestures of one clip, generated piece by piece; the result is independent of the division into pieces.
 
-    The random stream of each feature is seeded by the seed and the feature's name, so that a change of one feature does
-    not affect the others.
+    The random stream of each feature is seeded by the seed (or the feature's own one of `seeds`) and the feature's
+    name, so that a change of one feature does not affect the others.
     """
 
-    def __init__(self, fields: GestureFields, *, style: str, seed: int, fps: float) -> None:
+    def __init__(
+        self, fields: GestureFields, *, style: str, seed: int, fps: float, seeds: Mapping[str, int] = NO_SEEDS
+    ) -> None:
         fields.palette.require(style)
         self._fields, self._fps = fields, fps
-        self._tracks = {name: _FeatureTrack(fields, name, style, seed) for name in fields.features}
+        self._tracks = {name: _FeatureTrack(fields, name, style, seeds.get(name, seed)) for name in fields.features}
         self._n_frames = 0
 
     def copy(self) -> "GestureStream":
@@ -160,10 +163,12 @@ class GestureStream:
 
 
 def apply_timeline(feature: str, values: Float32Array, times: NDArray[np.float64], timeline: Timeline) -> Float32Array:
-    """Apply the gain, expressions and nods of a timeline to values (T, k) of a feature."""
-    values = np.asarray(values * np.float32(timeline.gains.of(feature)), np.float32)
+    """Apply the strength, expressions, gaze targets and nods of a timeline to values (T, k) of a feature."""
+    values = np.asarray(values * timeline.strength(feature, times).astype(np.float32)[:, None], np.float32)
     if feature == "expression":
         values = values + timeline.expression_weights(times).astype(np.float32)
+    elif feature == "gaze":
+        values = timeline.apply_gaze(times, values).astype(np.float32)
     elif feature == "head":
         values[:, 0] += timeline.nod_pitch(times).astype(np.float32)
     return values

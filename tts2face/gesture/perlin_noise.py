@@ -3,13 +3,14 @@
 Amplitudes and blink rates are those of the recordings; the timing is independent of the sound.
 """
 
+from collections.abc import Mapping
 from copy import copy
 from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.gesture.gesture_stream import GestureFields, GestureValues, apply_timeline, style_median
+from tts2face.gesture.gesture_stream import NO_SEEDS, GestureFields, GestureValues, apply_timeline, style_median
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.types import GiveWay, Waveform, keep_on
@@ -24,8 +25,11 @@ Float32Array = NDArray[np.float32]
 class NoiseStream:
     """Gestures of one clip from noise, piece by piece, as `GestureStream` gives them."""
 
-    def __init__(self, fields: GestureFields, *, style: str, seed: int, fps: float) -> None:
-        self._fields, self._style, self._seed, self._fps = fields, fields.palette.require(style), seed, fps
+    def __init__(
+        self, fields: GestureFields, *, style: str, seed: int, fps: float, seeds: Mapping[str, int] = NO_SEEDS
+    ) -> None:
+        self._fields, self._style, self._fps = fields, fields.palette.require(style), fps
+        self._seeds = {name: seeds.get(name, seed) for name in fields.features}
         self._n_frames = 0
 
     def copy(self) -> "NoiseStream":
@@ -42,7 +46,7 @@ class NoiseStream:
 
     def _values(self, feature: str, times: NDArray[np.float64]) -> Float32Array:
         style = self._fields.palette.styles[self._fields.source(self._style, feature)]
-        motion, key = style.motion[feature], (self._seed << 32) + crc32(feature.encode())
+        motion, key = style.motion[feature], (self._seeds[feature] << 32) + crc32(feature.encode())
         if feature == "blink":
             shut = blink_closure(times, blinks_per_second(motion), key)
             return np.repeat(shut[:, None], motion.shape[1], axis=1).astype(np.float32)

@@ -17,6 +17,7 @@ from tts2face.models.palette import EXPRESSIONS, FEATURES
 EXPRESSION_WEIGHT_LIMITS = (-0.5, 1.5)  # -e to 1 + e with e = 0.5, the middle of what Ju and Lee 2008 (section 4) allow
 GAIN_LIMITS = (0.0, 3.0)  # beyond three times as far, lids and brows of any face are at their limits
 GAIN_NAMES = (*FEATURES, "jaw", "lips")
+GAZE_LIMITS_DEG = (-35.0, 35.0)  # farther, people turn the head (Stahl 1999, Experimental Brain Research 126)
 NOD_SIZE_LIMITS = (0.1, 2.0)  # above 12 degrees a nod is a bow
 
 
@@ -65,10 +66,7 @@ class ExpressionSpan:
 
     def __post_init__(self) -> None:
         """Refuse unknown expressions, weights out of range, and times that do not run forward."""
-        if self.expression == "neutral":
-            raise InputError("the expression neutral has no effect because it is the face at rest; remove it")
-        if self.expression not in EXPRESSIONS:
-            raise InputError(f"there is no expression {self.expression!r}; choose {', '.join(EXPRESSIONS)}")
+        check_expression(self.expression)
         check_limits(f"the weight of {self.expression}", self.weight, EXPRESSION_WEIGHT_LIMITS)
         _check_span(f"the span of {self.expression}", self.start, self.end)
 
@@ -76,6 +74,30 @@ class ExpressionSpan:
     def lane(self) -> str:
         """Key by which overlaps are rejected: the expression."""
         return self.expression
+
+
+@dataclass(frozen=True, slots=True)
+class GazeTarget:
+    """The eyes look in one direction of the scene in [start, end), while the head moves; `end` may be infinite.
+
+    Degrees down and to the person's own left; 0 and 0 is the viewer in front of the resting head.
+    """
+
+    down_deg: float
+    left_deg: float
+    start: float
+    end: float
+
+    def __post_init__(self) -> None:
+        """Refuse directions beyond the eyes' range and times that do not run forward."""
+        for name, angle in (("down", self.down_deg), ("left", self.left_deg)):
+            check_limits(f"the gaze {name} in degrees", angle, GAZE_LIMITS_DEG)
+        _check_span("the gaze", self.start, self.end)
+
+    @property
+    def lane(self) -> str:
+        """Key by which overlaps are rejected: there is one gaze."""
+        return "the gaze"
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +132,15 @@ class Gains:
         return self.factors.get(check_feature(feature, GAIN_NAMES), 1.0)
 
 
-AnySpan = TypeVar("AnySpan", StyleSpan, ExpressionSpan)
+AnySpan = TypeVar("AnySpan", StyleSpan, ExpressionSpan, GazeTarget)
+
+
+def check_expression(expression: str) -> None:
+    """Refuse unknown expressions, and the neutral one."""
+    if expression == "neutral":
+        raise InputError("the expression neutral has no effect because it is the face at rest; remove it")
+    if expression not in EXPRESSIONS:
+        raise InputError(f"there is no expression {expression!r}; choose {', '.join(EXPRESSIONS)}")
 
 
 def check_style(style: str) -> None:

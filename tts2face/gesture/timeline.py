@@ -9,13 +9,23 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
 from tts2face.gesture.easing import FloatArray, interpolate_keys, span_weights
+from tts2face.gesture.key_curves import (
+    ChannelEdit,
+    ExpressionCurve,
+    StrengthCurve,
+    check_lanes,
+    curve_values,
+    override_curves,
+    shift_keys,
+)
 from tts2face.gesture.spans import (
     ExpressionSpan,
     Gains,
+    GazeTarget,
     Nod,
     StyleSpan,
     check_feature,
@@ -35,6 +45,7 @@ ONSET_S = 0.6
 # speakers (1.8-3.7 Hz: Hadar et al. 1983, Human Movement Science 2); seconds, and shares of NOD_RAD.
 NOD_KEYS = ((0.0, 0.0), (0.18, 1.0), (0.42, -0.1), (0.55, 0.0))
 NOD_RAD = math.radians(6.0)  # of a nod of size 1; radians, as a head moves with a stressed word
+SACCADE_S = 0.06  # transition to a gaze target; saccades of 10 degrees take 50 ms (Bahill et al. 1975)
 MAX_OVERRUN_S = 0.05  # tolerance for spans that end after the clip: times are often rounded to tenths of a second
 
 
@@ -52,11 +63,19 @@ class Timeline:
         Nods, sorted by time.
     gains
         Factors of the motion of features.
+    gaze
+        Directions in which the eyes look, sorted by time.
+    strengths, curves, edits
+        Strengths of features, weights of expressions, and offsets of finished channels through key points; one for each
+        feature, expression and channel.
+    seeds
+        Seeds of features that differ from the request's.
 
     Raises
     ------
     InputError
-        A feature is unknown, a style has no name, or spans overlap.
+        A feature is unknown, a style has no name, spans overlap, a seed is negative, or one feature, expression or
+        channel has two curves.
     """
 
     style: Mapping[str, str] = field(default_factory=dict)
@@ -64,6 +83,11 @@ class Timeline:
     expressions: tuple[ExpressionSpan, ...] = ()
     nods: tuple[Nod, ...] = ()
     gains: Gains = field(default_factory=Gains)
+    gaze: tuple[GazeTarget, ...] = ()
+    strengths: tuple[StrengthCurve, ...] = ()
+    curves: tuple[ExpressionCurve, ...] = ()
+    edits: tuple[ChannelEdit, ...] = ()
+    seeds: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Refuse unknown features and overlapping spans; put the rest in order of time."""
@@ -74,6 +98,15 @@ class Timeline:
         object.__setattr__(self, "spans", sort_spans(self.spans))
         object.__setattr__(self, "expressions", sort_spans(self.expressions))
         object.__setattr__(self, "nods", tuple(sorted(self.nods, key=lambda nod: nod.time)))
+        object.__setattr__(self, "gaze", sort_spans(self.gaze))
+        for feature, seed in self.seeds.items():
+            check_feature(feature)
+            if seed < 0:
+                raise InputError(f"the seed of {feature} must be 0 or more, not {seed}")
+        object.__setattr__(self, "seeds", MappingProxyType(dict(self.seeds)))
+        check_lanes(self.strengths)
+        check_lanes(self.curves)
+        check_lanes(self.edits)
 
     @property
     def style_names(self) -> tuple[str, ...]:
@@ -87,8 +120,8 @@ class Timeline:
         return max([0.0, *ends, *(nod.time for nod in self.nods)])
 
     @property
-    def _all_spans(self) -> tuple[StyleSpan | ExpressionSpan, ...]:
-        return (*self.spans, *self.expressions)
+    def _all_spans(self) -> tuple[StyleSpan | ExpressionSpan | GazeTarget, ...]:
+        return (*self.spans, *self.expressions, *self.gaze)
 
     def style_at(self, feature: str, times: ArrayLike, *, default: str) -> tuple[str, ...]:
         """Style of a feature at each of T times, without blending; `default` if none is requested."""
@@ -123,7 +156,25 @@ class Timeline:
         for span in self.expressions:
             column = EXPRESSIONS.index(span.expression)
             weights[:, column] += span.weight * span_weights(seconds, span.start, span.end, ONSET_S)
+        for curve in self.curves:
+            weights[:, EXPRESSIONS.index(curve.expression)] += curve_values(seconds, curve.keys)
         return weights
+
+    def strength(self, feature: str, times: ArrayLike) -> FloatArray:
+        """(T,) factors of a feature's motion at T times: its gain times its strength."""
+        seconds, gain = np.atleast_1d(np.asarray(times, np.float64)), self.gains.of(feature)
+        for curve in self.strengths:
+            if curve.feature == feature:
+                return gain * curve_values(seconds, curve.keys)
+        return np.full(len(seconds), gain)
+
+    def apply_gaze(self, times: ArrayLike, gaze: NDArray[np.floating]) -> FloatArray:
+        """(T, 2) gaze at T times, in radians down and left of the scene, moved to the targets within `SACCADE_S`."""
+        moved = np.array(gaze, np.float64)
+        for target in self.gaze:
+            share = span_weights(times, target.start, target.end, SACCADE_S)[:, None]
+            moved += share * (np.radians([target.down_deg, target.left_deg]) - gaze)
+        return moved
 
     def nod_pitch(self, times: ArrayLike) -> FloatArray:
         """Radians (T,) by which nods turn the head down at T times; of overlapping nods the deeper one applies."""
@@ -142,6 +193,11 @@ class Timeline:
             overlay_spans(self.expressions, later.expressions),
             self.nods + later.nods,
             Gains({**self.gains.factors, **later.gains.factors}),
+            overlay_spans(self.gaze, later.gaze),
+            override_curves(self.strengths, later.strengths),
+            override_curves(self.curves, later.curves),
+            override_curves(self.edits, later.edits),
+            {**self.seeds, **later.seeds},
         )
 
     def shift(self, seconds: float) -> "Timeline":
@@ -151,14 +207,19 @@ class Timeline:
             spans=tuple(shift_span(span, seconds) for span in self.spans),
             expressions=tuple(shift_span(span, seconds) for span in self.expressions),
             nods=tuple(replace(nod, time=nod.time + seconds) for nod in self.nods),
+            gaze=tuple(shift_span(span, seconds) for span in self.gaze),
+            strengths=tuple(shift_keys(curve, seconds) for curve in self.strengths),
+            curves=tuple(shift_keys(curve, seconds) for curve in self.curves),
+            edits=tuple(shift_keys(curve, seconds) for curve in self.edits),
         )
 
     def restrict(self, start: float, end: float) -> "Timeline":
-        """The elements within [start, end), with spans cut to this range; times are unchanged."""
+        """The elements within [start, end), with spans cut to this range and whole curves; times are unchanged."""
         return replace(
             self,
             spans=cut_spans(self.spans, start, end),
             expressions=cut_spans(self.expressions, start, end),
+            gaze=cut_spans(self.gaze, start, end),
             nods=tuple(nod for nod in self.nods if start <= nod.time < end),
         )
 

@@ -1,4 +1,4 @@
-"""Reader of timeline files in JSON (docs/file-formats.md)."""
+"""Timeline files in JSON (docs/file-formats.md)."""
 
 import json
 import math
@@ -6,16 +6,28 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from itertools import chain
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
+from tts2face.gesture.key_curves import AnyCurve, ChannelEdit, ExpressionCurve, StrengthCurve
 from tts2face.gesture.notation import ALL_FEATURES, expand_feature, parse_style
-from tts2face.gesture.spans import ExpressionSpan, Gains, Nod, StyleSpan, check_feature
+from tts2face.gesture.spans import ExpressionSpan, Gains, GazeTarget, Nod, StyleSpan, check_feature
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import FEATURES
 
-TIMELINE_KEYS = ("style", "spans", "expressions", "nods", "gains")
+TIMELINE_KEYS = (
+    "style", "spans", "expressions", "nods", "gains", "gaze", "strengths", "curves", "edits", "seeds",
+)  # fmt: skip
+
+CURVE_KINDS: Mapping[str, tuple[Callable[[str, Any], Any], str]] = MappingProxyType(
+    {
+        "strengths": (StrengthCurve, "feature"),
+        "curves": (ExpressionCurve, "expression"),
+        "edits": (ChannelEdit, "channel"),
+    }
+)  # constructor, and what the curve belongs to
 
 Made = TypeVar("Made")
 
@@ -39,16 +51,59 @@ def read_timeline(path: Path) -> Timeline:
 
 def parse_timeline(content: str, name: str = "timeline") -> Timeline:
     """A timeline from the text of a JSON file; errors as `read_timeline`."""
-    data = parse_json(content, name)
+    return parse_timeline_object(parse_json(content, name), name)
+
+
+def parse_timeline_object(data: Any, name: str = "timeline") -> Timeline:
+    """A timeline from its object of JSON; errors as `read_timeline`."""
     parts = _add_place_to_errors(name, lambda: _check_object(data, {}, dict.fromkeys(TIMELINE_KEYS)))
     spans = _parse_each(f"{name}, spans", parts["spans"], _parse_spans)
     expressions = _parse_each(f"{name}, expressions", parts["expressions"], _parse_expression)
     nods = _parse_each(f"{name}, nods", parts["nods"], _parse_nod)
     style = _add_place_to_errors(f"{name}, style", lambda: _parse_styles(parts["style"]))
     gains = _add_place_to_errors(f"{name}, gains", lambda: _parse_gains(parts["gains"]))
-    return _add_place_to_errors(
-        name, lambda: Timeline(style, tuple(chain(*spans)), tuple(expressions), tuple(nods), gains)
+    gaze = _parse_each(f"{name}, gaze", parts["gaze"], _parse_gaze)
+    strengths, curves, edits = (
+        _parse_each(f"{name}, {key}", parts[key], partial(_parse_curve, kind, owner))
+        for key, (kind, owner) in CURVE_KINDS.items()
     )
+    seeds = _add_place_to_errors(f"{name}, seeds", lambda: _parse_seeds(parts["seeds"]))
+    return _add_place_to_errors(
+        name,
+        lambda: Timeline(
+            style, tuple(chain(*spans)), tuple(expressions), tuple(nods), gains,
+            tuple(gaze), tuple(strengths), tuple(curves), tuple(edits), seeds,
+        ),
+    )  # fmt: skip
+
+
+def timeline_json(timeline: Timeline) -> dict[str, Any]:
+    """The timeline as an object of JSON without empty parts; `parse_timeline` reads it back as an equal timeline."""
+    parts: dict[str, Any] = {
+        "style": dict(timeline.style),
+        "spans": [_span_json(span, {"feature": span.feature, "style": span.style}) for span in timeline.spans],
+        "expressions": [
+            _span_json(span, {"expression": span.expression, "weight": span.weight}) for span in timeline.expressions
+        ],
+        "nods": [{"time": nod.time, "size": nod.size} for nod in timeline.nods],
+        "gains": dict(timeline.gains.factors),
+        "gaze": [
+            _span_json(target, {"down_deg": target.down_deg, "left_deg": target.left_deg}) for target in timeline.gaze
+        ],
+        "strengths": [_curve_json("feature", curve) for curve in timeline.strengths],
+        "curves": [_curve_json("expression", curve) for curve in timeline.curves],
+        "edits": [_curve_json("channel", curve) for curve in timeline.edits],
+        "seeds": dict(timeline.seeds),
+    }
+    return {key: part for key, part in parts.items() if part}
+
+
+def _curve_json(owner: str, curve: StrengthCurve | ExpressionCurve | ChannelEdit) -> dict[str, Any]:
+    return {owner: curve.lane, "keys": [list(pair) for pair in curve.keys]}
+
+
+def _span_json(span: StyleSpan | ExpressionSpan | GazeTarget, content: dict[str, Any]) -> dict[str, Any]:
+    return {**content, "start": span.start, **({} if math.isinf(span.end) else {"end": span.end})}
 
 
 def _add_place_to_errors(place: str, make: Callable[[], Made]) -> Made:
@@ -83,6 +138,31 @@ def _parse_expression(content: Any) -> ExpressionSpan:
 def _parse_nod(content: Any) -> Nod:
     parts = _check_object(content, {"time": float}, {"size": 1.0})
     return Nod(parts["time"], _check_type("size", parts["size"], float))
+
+
+def _parse_gaze(content: Any) -> GazeTarget:
+    parts = _check_object(content, {"down_deg": float, "left_deg": float}, {"start": 0.0, "end": math.inf})
+    start, end = (_check_type(name, parts[name], float) for name in ("start", "end"))
+    return GazeTarget(parts["down_deg"], parts["left_deg"], start, end)
+
+
+def _parse_curve(kind: Callable[[str, Any], AnyCurve], owner: str, content: Any) -> AnyCurve:
+    parts = _check_object(content, {owner: str}, {"keys": None})
+    keys = parts["keys"]
+    if not isinstance(keys, list) or not all(isinstance(key, list) and len(key) == 2 for key in keys):
+        raise InputError(f"keys must be a list of [seconds, value], not {_format_value(keys)}")
+    return kind(parts[owner], tuple(tuple(_check_type("a number of a key", one, float) for one in key) for key in keys))
+
+
+def _parse_seeds(content: Any) -> Mapping[str, int]:
+    if content is None:
+        return {}
+    if not isinstance(content, dict):
+        raise InputError(f"give a seed for each feature, not {_format_value(content)}")
+    for name, seed in content.items():
+        if not isinstance(seed, int) or isinstance(seed, bool):
+            raise InputError(f"the seed of {name} must be a whole number, not {_format_value(seed)}")
+    return content
 
 
 def _parse_styles(content: Any) -> Mapping[str, str]:

@@ -44,6 +44,10 @@ class AnimatedFace(Protocol):
         """Names of all channels. The motion of a clip has all of them, or the first ones."""
 
     @property
+    def limits(self) -> NDArray[np.float32]:
+        """(K, 2) least and largest values of all channels; infinite where nothing limits them."""
+
+    @property
     def mesh(self) -> Face:
         """Mesh with the shapes of all channels.
 

@@ -4,7 +4,7 @@ Long recordings are read in blocks, once each for their level, their features an
 use is bounded.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.dictionary import read_dictionary
+from lexicon.dictionary import Dictionary
 from lexicon.errors import DataError, InputError
+from lexicon.ipa import Segment
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.clock import exact_rate, first_sample
 from tts2face.interpolation import interpolate_cubic
@@ -68,8 +69,10 @@ def select_audio_map(request: Request, talker: Talker) -> AudioMap:
     return talker.audio_maps[name]
 
 
-def align_transcript(request: Request, path: Path) -> TimedTranscript:
-    """Align the text of a request with a recording.
+def align_transcript(
+    text: str, language: str, path: Path, dictionary: Mapping[str, tuple[Segment, ...]]
+) -> TimedTranscript:
+    """Align a text with a recording of it; `dictionary` holds the user's pronunciations by `word_key`.
 
     Raises
     ------
@@ -78,10 +81,9 @@ def align_transcript(request: Request, path: Path) -> TimedTranscript:
     BackendError
         The recording is longer than a minute and the phone recogniser is not installed.
     """
-    own = read_dictionary(request.dictionary) if request.dictionary else None
-    words = pronounce_transcript(request.text, request.language, own)
+    words = pronounce_transcript(text, language, Dictionary(dictionary) if dictionary else None)
     sound = Waveform(np.concatenate(list(_read_audible_blocks(path))), FEATURE_RATE)
-    return TimedTranscript(*align_recording(sound, words, is_english=request.language.startswith("en")))
+    return TimedTranscript(*align_recording(sound, words, is_english=language.startswith("en")))
 
 
 def map_audio_to_motion(

@@ -66,7 +66,7 @@ def encode_stream(prepared: PreparedRequest, models: SessionModels, format: Stre
         return encode_movie(clips, renderer, name, threads=format.threads)
     if name in SOUND_KINDS:
         if request.audio is None:
-            return encode_sound(sounds(prepared, models.for_request(request)), name)
+            return encode_sound(sounds(prepared, models.for_request(prepared)), name)
         return encode_sound((piece.clip.speech.waveform for piece in models.pieces(prepared)), name)
     if name not in LINE_FORMATS:
         return encode_whole(models.pieces(prepared), name, models.face(has_gestures=request.has_gestures).mesh)

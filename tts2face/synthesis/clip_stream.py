@@ -1,16 +1,18 @@
 """Synthesis of a prepared request piece by piece: text, a recording, or idle animation."""
 
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import TypeVar
+from types import MappingProxyType
+from typing import Any, TypeVar
 
 import numpy as np
 
 from lexicon.errors import InputError
 from lexicon.sentences import Sentence
-from lexicon.sequence import SILENCE
+from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.clock import first_sample, pad_to_frame
 from tts2face.exemplar.explanation import PhoneExplanation, explain_selection
 from tts2face.exemplar.synthesis import ExemplarModel, TokenSelection, select_tokens
@@ -36,11 +38,18 @@ from tts2face.synthesis.marked_speech import (
     silent_sentences,
     speak_sentence,
 )
+from tts2face.synthesis.phone_edges import RECORDING, correct_phones
 from tts2face.synthesis.prepared_request import IDLE_STEPS, RECORDING_STEPS, PreparedRequest
+from tts2face.synthesis.sentence_memory import NO_MEMORY, SentenceMemory
 from tts2face.types import Clip, GiveWay, Speech, Trajectory, Waveform, frame_count, keep_on, resting_head
 from tts2face.voice.engine import Voice
 
 Spoken = TypeVar("Spoken")
+TRANSCRIPT_BYTES = 10_000  # of a transcript besides its phones
+# Options of a request that do not affect the speech of its sentences.
+NOT_SPOKEN: Mapping[str, Any] = MappingProxyType(
+    {"expression": None, "gain": None, "timeline": None, "pitch": False, "context": None, "exemplars": None}
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +89,8 @@ class Piece:
 class SynthesisModels:
     """Models from which clips are synthesised: talker, the talker's exemplars, face, and voices.
 
-    ``voice`` returns the voice of a name and a language; ``give_way`` is called between the steps of a piece.
+    ``voice`` returns the voice of a name and a language; ``give_way`` is called between the steps of a piece;
+    ``memory`` keeps the speech and the lip motion of sentences.
     """
 
     talker: Talker
@@ -88,6 +98,7 @@ class SynthesisModels:
     face: AnimatedFace
     voice: Voices
     give_way: GiveWay = keep_on
+    memory: SentenceMemory = NO_MEMORY
 
 
 def pieces(prepared: PreparedRequest, models: SynthesisModels, layer: GestureLayer | None) -> Iterator[Piece]:
@@ -142,14 +153,31 @@ def pieces_from(
         timeline = spoken.timeline.restrict(0.0, speech.waveform.duration).shift(begin)
         n_frames = frame_count(speech.waveform.duration, float(fps))
         models.give_way()
-        selection = select_tokens(speech.phones, models.exemplars, prepared.options)
-        models.give_way()
-        lips = models.face.motion_of_tokens(selection, fps=float(fps), n_frames=n_frames, give_way=models.give_way)
+        selection, lips = _sentence_lips(speech.phones, n_frames, prepared, models)
         models.give_way()
         clip = _with_sound(_with_gestures(speech, lips, timeline, layer), spoken.sound)
         first_frame += n_frames
         explain = _explanation(selection, models.exemplars, begin)
         yield Piece(clip, begin, n_steps, timeline, _shifted(spoken.marks, begin), explain, text=text)
+
+
+def _sentence_lips(
+    phones: PhoneSequence, n_frames: int, prepared: PreparedRequest, models: SynthesisModels
+) -> tuple[TokenSelection, Trajectory]:
+    """Selected tokens of a sentence and their lip motion (n_frames, K)."""
+    fps = float(prepared.fps)
+
+    def key() -> Hashable:
+        timed = (phones.phones, phones.edges.tobytes(), n_frames, fps)
+        return ("lips", timed, prepared.options, prepared.excluded, prepared.request.has_gestures)
+
+    def make() -> tuple[TokenSelection, Trajectory]:
+        selection = select_tokens(phones, models.exemplars, prepared.options)
+        models.give_way()
+        lips = models.face.motion_of_tokens(selection, fps=fps, n_frames=n_frames, give_way=models.give_way)
+        return selection, lips
+
+    return models.memory.recall(key, make, lambda made: made[1].values.nbytes + made[0].found.tokens.nbytes * 3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -214,12 +242,30 @@ def _sentences(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[t
         yield from ((silent, steps, "") for silent, steps in silent_sentences(request.idle, prepared.fps, IDLE_STEPS))
         return
 
+    said: Counter[str] = Counter()
+
     def speak(voice: Voice, sentence: Sentence, request: Request, voices: Voices) -> tuple[SpokenSentence, int, str]:
         text = " ".join(phrase.source for phrase in sentence.utterances)
-        spoken = speak_sentence(voice, sentence, request, voices, models.give_way)
-        return spoken, sentence.n_characters, text
+        spoken = models.memory.recall(
+            lambda: ("speech", sentence.relative(), replace(request, text="", **NOT_SPOKEN), _entries(prepared)),
+            lambda: speak_sentence(voice, sentence, request, voices, models.give_way),
+            lambda made: made.sound.samples.nbytes + made.speech.waveform.samples.nbytes,
+        )
+        speech = spoken.speech
+        phones = correct_phones(speech.phones, text, said[text], prepared.edges)
+        said[text] += 1
+        return replace(spoken, speech=replace(speech, phones=phones)), sentence.n_characters, text
 
     yield from _spoken(prepared, models, speak)
+
+
+def _file_identity(path: Path) -> Hashable:
+    found = path.stat()
+    return (str(path.resolve()), found.st_mtime_ns, found.st_size)
+
+
+def _entries(prepared: PreparedRequest) -> Hashable:
+    return frozenset(prepared.dictionary.items())
 
 
 def _recording_pieces(
@@ -255,9 +301,13 @@ def _recording_motion(
         audio_map = select_audio_map(request, models.talker)
         transcript, lips = map_audio_to_motion(audio, audio_map, models.talker, fps)
         return transcript, models.face.motion_of_parameters(lips), tuple
-    transcript = align_transcript(replace(request, text=prepared.text.text), audio)
-    selection = select_tokens(transcript.phones, models.exemplars, prepared.options)
-    motion = models.face.motion_of_tokens(selection, fps=fps, n_frames=frame_count(transcript.duration, fps))
+    transcript = models.memory.recall(
+        lambda: ("transcript", _file_identity(audio), prepared.text.text, request.language, _entries(prepared)),
+        lambda: align_transcript(prepared.text.text, request.language, audio, prepared.dictionary),
+        lambda made: TRANSCRIPT_BYTES + made.phones.edges.nbytes * 8,
+    )
+    transcript = replace(transcript, phones=correct_phones(transcript.phones, RECORDING, 0, prepared.edges))
+    selection, motion = _sentence_lips(transcript.phones, frame_count(transcript.duration, fps), prepared, models)
     return transcript, motion, _explanation(selection, models.exemplars, 0.0)
 
 

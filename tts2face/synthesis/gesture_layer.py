@@ -1,20 +1,28 @@
 """Gestures of a request, added to the speech motion of its clip."""
 
+from collections.abc import Hashable
 from concurrent.futures import Future, ThreadPoolExecutor
+from hashlib import blake2b
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tts2face.face.gesture_transfer import SPEECH_GAINS
 from tts2face.gesture.gesture_stream import GestureFields, GestureStream, GestureValues
+from tts2face.gesture.key_curves import curve_values
 from tts2face.gesture.perlin_noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import Palette
 from tts2face.synthesis.animated_face import AnimatedFace
+from tts2face.synthesis.channel_edits import ChannelEdits
 from tts2face.synthesis.mark_styles import marked_styles
 from tts2face.synthesis.prepared_request import PreparedRequest
-from tts2face.types import Clip, GiveWay, Speech, Trajectory, keep_on
+from tts2face.synthesis.sentence_memory import NO_MEMORY, SentenceMemory
+from tts2face.types import Clip, GiveWay, Speech, Trajectory, Waveform, keep_on
 
 DEFAULT_STYLE = "neutral"
+REACH_S = 2.0  # s around a piece within which elements of the timeline affect it: nods last .6 s, fades .6 s
+STATE_BYTES = 200_000  # of a stream between two pieces
 
 
 def default_style(palette: Palette) -> str:
@@ -29,6 +37,8 @@ class GestureLayer:
     ----------
     give_way
         Called between the steps of a piece.
+    memory
+        Keeps the motion of pieces, so that a changed timeline repeats only the pieces from the change on.
 
     Raises
     ------
@@ -42,18 +52,26 @@ class GestureLayer:
         fields: GestureFields,
         face: AnimatedFace,
         give_way: GiveWay = keep_on,
+        memory: SentenceMemory = NO_MEMORY,
     ) -> None:
         self._requested = Timeline(style=face.default_styles).merge(prepared.timeline)
-        self._face, self._give_way = face, give_way
+        self._face, self._give_way, self._memory = face, give_way, memory
+        self._history: Hashable = ("gestures", prepared.request.seed, prepared.request.gestures, prepared.request.pitch)
         palette, request = fields.palette, prepared.request
         self._requested.check_styles(palette)
         for style in marked_styles(prepared.text):
             palette.require(style)
         face.check_gains(self._requested.gains.factors)
+        self._edits = ChannelEdits(self._requested.edits, face)
         kind: type[NoiseStream] | type[GestureStream] = NoiseStream if request.gestures == "noise" else GestureStream
         executor = ThreadPoolExecutor(1)  # building the fields takes 0.5 s, in parallel with loading the voice
         self._first: Future[GestureStream | NoiseStream] = executor.submit(
-            kind, fields, style=default_style(palette), seed=request.seed, fps=float(prepared.fps)
+            kind,
+            fields,
+            style=default_style(palette),
+            seed=request.seed,
+            fps=float(prepared.fps),
+            seeds=self._requested.seeds,
         )
         executor.shutdown(wait=False)
         self._stream: GestureStream | NoiseStream | None = None  # after the last piece
@@ -75,12 +93,29 @@ class GestureLayer:
         recent = self._marked.restrict(self._seconds - 1.0, np.inf)  # a nod of the last piece lasts half a second
         marked = recent.merge(marks)
         timeline = self._requested.merge(marked)
-        stream = (self._stream or self._first.result()).copy()
-        gestures = _gaze_relative_to_head(stream.next(speech.waveform, len(lips), timeline, self._give_way))
-        gains = {name: timeline.gains.of(name) for name in SPEECH_GAINS}
-        moved = self._face.add_gestures(lips, gestures, gains)
+        times = self._seconds + np.arange(len(lips)) / lips.fps
+        if self._memory.is_used:
+            self._history = _digest(self._history, times, speech.waveform, timeline)
+        gestures, stream = self._memory.recall(
+            lambda: self._history,
+            lambda: self._next(speech.waveform, len(lips), timeline),
+            lambda made: STATE_BYTES + sum(values.nbytes for values in made[0].values()),
+        )
+        moved = self._memory.recall(
+            lambda: (self._history, lips.values.tobytes()),
+            lambda: self._face.add_gestures(lips, gestures, {name: timeline.gains.of(name) for name in SPEECH_GAINS}),
+            lambda made: made.face.values.nbytes + lips.values.nbytes,
+        )
+        moved = self._edits.apply(moved, round(self._seconds * lips.fps))
         self._stream, self._marked, self._seconds = stream, marked, self._seconds + len(lips) / lips.fps
         return Clip(moved.face, moved.head, speech)
+
+    def _next(
+        self, sound: Waveform, n_frames: int, timeline: Timeline
+    ) -> tuple[GestureValues, GestureStream | NoiseStream]:
+        """Gestures of the next piece, and the stream for the piece after it."""
+        stream = (self._stream or self._first.result()).copy()
+        return _gaze_relative_to_head(stream.next(sound, n_frames, timeline, self._give_way)), stream
 
     def finish(self) -> None:
         """Reject requested gestures beyond the end of the clip.
@@ -91,6 +126,18 @@ class GestureLayer:
             A span or nod of the request begins after the end.
         """
         self._requested.check_duration(self._seconds)
+
+
+def _digest(history: Hashable, times: NDArray[np.float64], sound: Waveform, timeline: Timeline) -> bytes:
+    """Digest of everything on which the gestures of a piece, after those before it, depend."""
+    here = timeline.restrict(times[0] - REACH_S, times[-1] + REACH_S)
+    curves = [(one.feature, curve_values(times, one.keys).tobytes()) for one in here.strengths]
+    curves += [(one.expression, curve_values(times, one.keys).tobytes()) for one in here.curves]
+    elements = (dict(here.style), here.spans, here.expressions, here.nods, here.gaze, dict(here.gains.factors))
+    found = blake2b(repr((history, elements, curves, sorted(here.seeds.items()))).encode())
+    found.update(times.tobytes())
+    found.update(sound.samples.tobytes())
+    return found.digest()
 
 
 def _gaze_relative_to_head(gestures: GestureValues) -> GestureValues:

@@ -51,7 +51,7 @@ class LiveSpeech:
 
     def _append(self, request: Request) -> Iterator[Piece]:
         prepared = prepare(request)
-        for piece in pieces_from(prepared, self._models.for_request(request), self._layer, self._n_frames):
+        for piece in pieces_from(prepared, self._models.for_request(prepared), self._layer, self._n_frames):
             self._n_frames += len(piece.clip.motion)
             yield piece
 

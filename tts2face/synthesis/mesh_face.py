@@ -5,6 +5,9 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lexicon.errors import InputError
 from tts2face.exemplar.synthesis import ExemplarModel, TokenSelection, blend_trajectory
 from tts2face.face.gesture_transfer import GestureFace, gesture_face
@@ -38,6 +41,11 @@ class MeshFace:
     def channels(self) -> tuple[str, ...]:
         """Names of the face's own shapes, then of those that the palette adds."""
         return self.mesh.shape_names
+
+    @property
+    def limits(self) -> NDArray[np.float32]:
+        """(K, 2) limits of the shapes."""
+        return self.mesh.limits
 
     @property
     def mesh(self) -> Face:

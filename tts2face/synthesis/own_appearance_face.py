@@ -6,6 +6,7 @@ from types import MappingProxyType
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.cloning.parameter_transfer import build_parameter_transfer, extend_talker
@@ -50,6 +51,11 @@ class OwnAppearanceFace:
         """Names of the speech parameters, the appearance parameters, and the gesture parameters of the palette."""
         added = () if self.gestures is None else self.gestures.channels
         return self.regression.speech_channels + self.regression.appearance_channels + added
+
+    @property
+    def limits(self) -> NDArray[np.float32]:
+        """(K, 2) infinite limits: the parameters of a talker's own face have none."""
+        return np.tile(np.array([-np.inf, np.inf], np.float32), (len(self.channels), 1))
 
     @property
     def mesh(self) -> Face:

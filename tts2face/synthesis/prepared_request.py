@@ -1,17 +1,19 @@
 """Parsing and checking of a request's text, marks and timeline file."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from typing import Any
 
+from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
+from lexicon.ipa import Segment
 from lexicon.mark_parser import parse_marks
 from lexicon.marked_text import MarkedText
 from lexicon.sentences import Sentence, split_sentences
 from lexicon.writing_systems import check_readable
 from tts2face.clock import exact_rate
-from tts2face.exemplar.options import METHOD_OPTIONS, SynthesisOptions
+from tts2face.exemplar.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
 from tts2face.gesture.notation import parse_expressions, parse_gains, parse_style
 from tts2face.gesture.spans import Gains
 from tts2face.gesture.timeline import Timeline
@@ -20,6 +22,7 @@ from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.storage.overwrite import AnyPath
 from tts2face.synthesis.mark_styles import check_marks
+from tts2face.synthesis.phone_edges import SentenceEdges
 
 RECORDING_STEPS = 1000  # steps of progress of a recording
 IDLE_STEPS = 1000  # steps of progress of idle animation
@@ -37,12 +40,21 @@ class PreparedRequest:
         Gestures requested by the flags and the timeline file.
     options
         Options of lip synthesis from exemplars.
+    dictionary
+        The user's pronunciations by `lexicon.dictionary.word_key`.
+    edges
+        Corrected phone edges of sentences.
+    excluded
+        Recorded tokens that are not used.
     """
 
     request: Request
     text: MarkedText
     timeline: Timeline
     options: SynthesisOptions
+    dictionary: Mapping[str, tuple[Segment, ...]] = field(default_factory=dict)
+    edges: tuple[SentenceEdges, ...] = ()
+    excluded: tuple[ExcludedToken, ...] = ()
 
     @property
     def fps(self) -> Fraction:
@@ -70,7 +82,7 @@ def prepare(request: Request) -> PreparedRequest:
         The text has no word or characters that the language does not read, a mark or a gesture option is invalid, or
         the recording does not exist.
     DataError
-        The timeline file is invalid.
+        The timeline file or the dictionary is invalid.
     """
     if request.audio is not None and not request.audio.is_file():
         raise InputError(f"there is no recording {request.audio}; check the path")
@@ -79,6 +91,7 @@ def prepare(request: Request) -> PreparedRequest:
         parse_marks(request.text, request.language),
         build_request_timeline(request),
         synthesis_options(request),
+        read_dictionary(request.dictionary).entries if request.dictionary else {},
     )
     if not request.text.strip() and (request.audio is not None or request.idle is not None):
         return prepared

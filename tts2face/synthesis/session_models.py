@@ -6,8 +6,9 @@ from collections.abc import Callable, Hashable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
-from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
+from tts2face.exemplar.exclusion import exclude_tokens
+from tts2face.exemplar.options import ExcludedToken
 from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model
 from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.gesture.ju2008 import FIELD_OPTIONS
@@ -24,6 +25,7 @@ from tts2face.synthesis.gesture_layer import GestureLayer
 from tts2face.synthesis.mesh_face import mesh_face
 from tts2face.synthesis.own_appearance_face import own_appearance_face
 from tts2face.synthesis.prepared_request import PreparedRequest
+from tts2face.synthesis.sentence_memory import NO_MEMORY, SentenceMemory
 from tts2face.synthesis.voice_preload import preload_voice
 from tts2face.voice.engine import Voice
 from tts2face.voice.pool import VoicePool
@@ -69,6 +71,8 @@ class SessionModels:
         As for `tts2face.Session`.
     mesh
         Face to show; None for the talker's own face.
+    memory
+        Speech and lip motion of finished sentences.
 
     Raises
     ------
@@ -82,14 +86,16 @@ class SessionModels:
         mesh: Face | None,
         palette: str | Path | Palette | None,
         voices: VoicePool | None = None,
+        memory: SentenceMemory = NO_MEMORY,
     ) -> None:
         self.talker: Talker = talker if isinstance(talker, Talker) else load_talker(str(talker))
-        self._mesh = mesh
+        self._mesh, self._memory = mesh, memory
         self._palette = palette
         self._lock = threading.RLock()
         self._cache: dict[Hashable, Any] = {}
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
         self._voices = voices or VoicePool()
+        self._without: tuple[tuple[ExcludedToken, ...], ExemplarModel] | None = None
         self.speech_face: AnimatedFace = (
             own_appearance_face(self.talker, self._exemplars)
             if mesh is None
@@ -132,10 +138,10 @@ class SessionModels:
         palette = self.palette if request.has_gestures else None
         if palette is None:
             return None
-        return GestureLayer(prepared, self._fields(palette, request), self.face(), self._voices.give_way)
+        return GestureLayer(prepared, self._fields(palette, request), self.face(), self._voices.give_way, self._memory)
 
-    def for_request(self, request: Request, *, keeps_utterances: bool = False) -> SynthesisModels:
-        """Models of a request with its own dictionary.
+    def for_request(self, prepared: PreparedRequest, *, keeps_utterances: bool = False) -> SynthesisModels:
+        """Models of a request with its own dictionary and without the tokens that it excludes.
 
         Parameters
         ----------
@@ -145,28 +151,36 @@ class SessionModels:
         Raises
         ------
         InputError
-            The face does not have the articulation of the request.
+            The face does not have the articulation of the request, or an excluded token does not exist.
         """
-        dictionary = read_dictionary(request.dictionary).entries if request.dictionary else {}
+        request = prepared.request
 
         def load_voice(name: str | None, language: str) -> Voice:
-            return self._voices.voice(name, language, dictionary, keeps_utterances=keeps_utterances)
+            return self._voices.voice(name, language, prepared.dictionary, keeps_utterances=keeps_utterances)
 
+        exemplars = self._exemplars if not prepared.excluded else self._exemplars_without(prepared.excluded)
         face = self.face(has_gestures=request.has_gestures)
         face.check_articulation(request.articulation_factor)
-        return SynthesisModels(self.talker, self._exemplars, face, load_voice, self._voices.give_way)
+        return SynthesisModels(self.talker, exemplars, face, load_voice, self._voices.give_way, self._memory)
 
-    def preload_voice(self, request: Request) -> None:
+    def preload_voice(self, prepared: PreparedRequest) -> None:
         """Load the voice of a request's text in a thread, while the face is prepared."""
-        preload_voice(self._voices, request)
+        preload_voice(self._voices, prepared)
 
     def pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
         """Synthesise the clip of a request piece by piece."""
-        return pieces(prepared, self.for_request(prepared.request), self.gesture_layer(prepared))
+        return pieces(prepared, self.for_request(prepared), self.gesture_layer(prepared))
 
     @property
     def _exemplars(self) -> ExemplarModel:
         return self._once("exemplars", lambda: build_exemplar_model(self.talker))
+
+    def _exemplars_without(self, excluded: tuple[ExcludedToken, ...]) -> ExemplarModel:
+        """The exemplars without some tokens; those of the last call are cached."""
+        with self._lock:
+            if self._without is None or self._without[0] != excluded:
+                self._without = (excluded, exclude_tokens(self._exemplars, excluded))
+            return self._without[1]
 
     def _fields(self, palette: Palette, request: Request) -> GestureFields:
         method = request.gestures if request.gestures in FIELD_OPTIONS else DEFAULT_FIELDS  # noise has no options

@@ -1,0 +1,100 @@
+"""Project files: everything is written and read back, and what is wrong is named."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from lexicon.errors import DataError, InputError
+from tests.gesture.test_key_curves import WHOLE
+from tts2face.exemplar.options import ExcludedToken
+from tts2face.gesture.timeline_file import timeline_json
+from tts2face.project.project import Project
+from tts2face.project.project_file import load_project, project_json, save_project
+from tts2face.render.picture import Picture
+from tts2face.request import Request
+from tts2face.session_cache import Models
+from tts2face.synthesis.phone_edges import SentenceEdges
+
+
+@pytest.fixture
+def whole(tmp_path: Path) -> Project:
+    (tmp_path / "speech.wav").write_bytes(b"RIFF")
+    return Project(
+        name="Scène 1",
+        request=Request(text="Tea for two.", audio=tmp_path / "speech.wav", seed=3, style="delighted"),
+        models=Models(face="cartoon", hair="bob02"),
+        picture=Picture(size="320x320"),
+        timeline=WHOLE,
+        pronunciations={"two": "T UW1", "tea": "/tiː/"},
+        edges=(SentenceEdges("", 0, ("t", "i"), (0.0, 0.1, 0.3)),),
+        excluded=(ExcludedToken("bbaf2n", 0.48),),
+        muted=frozenset({"brows"}),
+        solo=frozenset({"head", "brows"}),
+    )
+
+
+def test_a_project_is_read_back_as_it_was(whole: Project, tmp_path: Path) -> None:
+    save_project(whole, tmp_path / "one.json")
+    back = load_project(tmp_path / "one.json")
+    for name in ("name", "request", "models", "picture", "pronunciations", "edges", "excluded", "muted", "solo"):
+        assert getattr(back, name) == getattr(whole, name), name
+    assert timeline_json(back.timeline) == timeline_json(whole.timeline)
+
+
+def test_paths_are_relative_to_the_folder_of_the_project(whole: Project, tmp_path: Path) -> None:
+    save_project(whole, tmp_path / "one.json")
+    assert json.loads((tmp_path / "one.json").read_text(encoding="utf-8"))["request"]["audio"] == "speech.wav"
+    moved = tmp_path / "elsewhere"
+    moved.mkdir()
+    for name in ("one.json", "speech.wav"):
+        (tmp_path / name).rename(moved / name)
+    assert load_project(moved / "one.json").request.audio == moved / "speech.wav"
+
+
+def test_defaults_are_not_written(tmp_path: Path) -> None:
+    assert project_json(Project(request=Request(text="Hi.")), tmp_path) == {
+        "format": "tts2face project",
+        "version": 1,
+        "name": "untitled",
+        "request": {"text": "Hi."},
+    }
+
+
+def test_silent_features_are_the_muted_and_those_that_are_not_solo(whole: Project) -> None:
+    assert whole.silent_features == {"expression", "brows", "blink", "cheeks", "gaze"}
+    assert Project(muted=frozenset({"gaze"})).silent_features == {"gaze"}
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"format": "x"}, "is not a project"),
+        ({"version": 2}, "has version 2; this program reads version 1"),
+        ({"colour": 1}, "there is no 'colour' in a project; choose format, version"),
+        ({"name": ""}, "name: a project needs a name of 1 to 200 characters"),
+        ({"request": {"speed": 2}}, "request: there is no option 'speed'; choose"),
+        ({"request": {"rate": 9}}, "request: rate must lie between 0.5 and 2, not 9"),
+        ({"request": {"rate": "fast"}}, "request: an option has a value of the wrong kind"),
+        ({"request": {"timeline": "t.json"}}, "name: a project has its own timeline"),
+        ({"models": []}, r"models: give an object in curly brackets, not \[\]"),
+        ({"picture": {"size": "9"}}, "picture: "),
+        ({"timeline": {"nods": [{"time": -1}]}}, r"timeline: timeline, nods\[0\]: a nod needs a time of 0 s or more"),
+        ({"pronunciations": {"two": "XX"}}, "pronunciations of untitled, line 1"),
+        ({"pronunciations": {"two words": "T UW1"}}, "a pronunciation is for one word, not for 'two words'"),
+        ({"edges": [{"phones": ["t"], "edges": [0, 0]}]}, "edges: "),
+        ({"edges": [{"phones": ["t"], "edges": [0, 1], "at": 1}]}, "edges: there is no 'at' in corrected edges"),
+        ({"excluded": [{"utterance": "u"}]}, "excluded: give a number, not null"),
+        ({"muted": ["ears"]}, "name: there is no feature 'ears'"),
+    ],
+)
+def test_projects_that_are_wrong_are_refused(change: dict, reason: str, tmp_path: Path) -> None:
+    path = tmp_path / "wrong.json"
+    path.write_text(json.dumps({"format": "tts2face project", "version": 1} | change), encoding="utf-8")
+    with pytest.raises(DataError, match=reason):
+        load_project(path)
+
+
+def test_a_missing_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot read the project"):
+        load_project(tmp_path / "none.json")

@@ -1,0 +1,201 @@
+"""Project files: one JSON object with everything that makes a clip (docs/file-formats.md)."""
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+from lexicon.errors import DataError, InputError
+from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
+from tts2face.exemplar.options import ExcludedToken
+from tts2face.gesture.timeline_file import parse_timeline_object, timeline_json
+from tts2face.project.project import Project
+from tts2face.render.picture import Picture
+from tts2face.request import Request
+from tts2face.session_cache import Models
+from tts2face.storage.files import write_atomically
+from tts2face.synthesis.phone_edges import SentenceEdges
+
+FORMAT, VERSION = "tts2face project", 1
+PROJECT_SUFFIX = ".json"
+# Options that name files; their paths are relative to the folder of the project.
+REQUEST_FILES, MODEL_FILES, PICTURE_FILES = (
+    ("audio", "dictionary", "voice"),
+    ("talker", "face", "palette"),
+    ("background",),
+)
+KEYS = (
+    "format", "version", "name", "request", "models", "picture", "timeline", "pronunciations", "edges", "excluded",
+    "muted", "solo",
+)  # fmt: skip
+
+Options = TypeVar("Options", Request, Models, Picture)
+Made = TypeVar("Made")
+
+
+def load_project(path: str | Path) -> Project:
+    """A project from its file; paths in it are relative to its folder.
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    DataError
+        It is not JSON or not a project; the message names the place and the value.
+    """
+    file = Path(path)
+    try:
+        content = read_text(file, LARGEST_JSON_BYTES)
+    except OSError as refused:
+        raise InputError(f"cannot read the project {file}: {refused.strerror}; check the path") from refused
+    return parse_project(parse_json(content, str(file)), str(file), file.parent)
+
+
+def parse_project(content: Any, name: str, folder: Path) -> Project:
+    """A project from its object of JSON; errors as `load_project`."""
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise DataError(f'{name} is not a project: "format" is not {FORMAT!r}; choose a file written by the studio')
+    if content.get("version") != VERSION:
+        raise DataError(
+            f"{name} has version {content.get('version')!r}; this program reads version {VERSION}; update it"
+        )
+    for key in content:
+        if key not in KEYS:
+            raise DataError(f"{name}: there is no {key!r} in a project; choose {', '.join(KEYS)}")
+
+    def part(key: str, make: Callable[[Any], Made], empty: Any) -> Made:
+        try:
+            return make(content.get(key, empty))
+        except (InputError, DataError) as wrong:
+            raise DataError(f"{name}, {key}: {wrong}") from wrong
+
+    return part(
+        "name",
+        lambda title: Project(
+            _text(title),
+            part("request", lambda given: _options(Request, given, folder, REQUEST_FILES), {}),
+            part("models", lambda given: _options(Models, given, folder, MODEL_FILES), {}),
+            part("picture", lambda given: _options(Picture, given, folder, PICTURE_FILES), {}),
+            part("timeline", lambda given: parse_timeline_object(_object(given)), {}),
+            part(
+                "pronunciations", lambda given: {word: _text(written) for word, written in _object(given).items()}, {}
+            ),
+            part("edges", lambda given: tuple(_sentence_edges(one) for one in _list(given)), []),
+            part("excluded", lambda given: tuple(_excluded(one) for one in _list(given)), []),
+            part("muted", lambda given: frozenset(map(_text, _list(given))), []),
+            part("solo", lambda given: frozenset(map(_text, _list(given))), []),
+        ),
+        "untitled",
+    )
+
+
+def project_json(project: Project, folder: Path) -> dict[str, Any]:
+    """The project as an object of JSON without parts that have their defaults; paths relative to a folder."""
+    parts: dict[str, Any] = {
+        "request": _options_json(project.request, Request(text=""), folder, REQUEST_FILES),
+        "models": _options_json(project.models, Models(), folder, MODEL_FILES),
+        "picture": _options_json(project.picture, Picture(), folder, PICTURE_FILES),
+        "timeline": timeline_json(project.timeline),
+        "pronunciations": dict(project.pronunciations),
+        "edges": [
+            {"text": one.text, "occurrence": one.occurrence, "phones": list(one.phones), "edges": list(one.edges)}
+            for one in project.edges
+        ],
+        "excluded": [{"utterance": one.utterance, "start": one.start} for one in project.excluded],
+        "muted": sorted(project.muted),
+        "solo": sorted(project.solo),
+    }
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "name": project.name,
+        **{key: value for key, value in parts.items() if value},
+    }
+
+
+def save_project(project: Project, path: str | Path) -> None:
+    """Write a project to its file, which appears when it is complete; an earlier one is replaced.
+
+    Raises
+    ------
+    BackendError
+        The file cannot be written.
+    """
+    file = Path(path)
+    content = json.dumps(project_json(project, file.parent), ensure_ascii=False, indent=1)
+    write_atomically(file, f"{content}\n".encode())
+
+
+def _options(kind: type[Options], given: Any, folder: Path, files: tuple[str, ...]) -> Options:
+    known = {option.name for option in fields(kind)}
+    chosen = dict(_object(given))
+    for name in chosen:
+        if name not in known:
+            raise InputError(f"there is no option {name!r}; choose {', '.join(sorted(known))}")
+    for name in files:
+        value = chosen.get(name)
+        if isinstance(value, str) and (folder / value).is_file():
+            chosen[name] = str(folder / value)
+    try:
+        return kind(**chosen)
+    except TypeError as wrong:
+        raise InputError(f"an option has a value of the wrong kind ({wrong}); compare `tts2face --help`") from wrong
+
+
+def _options_json(options: Options, default: Options, folder: Path, files: tuple[str, ...]) -> dict[str, Any]:
+    chosen = {}
+    for option in fields(options):
+        value = getattr(options, option.name)
+        if value == getattr(default, option.name):
+            continue
+        if option.name in files and Path(value).is_file():
+            value = os.path.relpath(value, folder)
+        chosen[option.name] = str(value) if isinstance(value, Path) else value
+    return chosen
+
+
+def _sentence_edges(given: Any) -> SentenceEdges:
+    parts = _object(given)
+    for name in parts:
+        if name not in {"text", "occurrence", "phones", "edges"}:
+            raise InputError(f"there is no {name!r} in corrected edges; choose text, occurrence, phones, edges")
+    occurrence = parts.get("occurrence", 0)
+    if not isinstance(occurrence, int) or isinstance(occurrence, bool):
+        raise InputError(f"occurrence must be a whole number, not {occurrence!r}")
+    return SentenceEdges(
+        _text(parts.get("text", "")),
+        occurrence,
+        tuple(map(_text, _list(parts.get("phones")))),
+        tuple(map(_number, _list(parts.get("edges")))),
+    )
+
+
+def _excluded(given: Any) -> ExcludedToken:
+    parts = _object(given)
+    return ExcludedToken(_text(parts.get("utterance")), _number(parts.get("start")))
+
+
+def _object(given: Any) -> Mapping[str, Any]:
+    if not isinstance(given, dict):
+        raise InputError(f"give an object in curly brackets, not {json.dumps(given)[:40]}")
+    return given
+
+
+def _list(given: Any) -> list[Any]:
+    if not isinstance(given, list):
+        raise InputError(f"give a list in square brackets, not {json.dumps(given)[:40]}")
+    return given
+
+
+def _text(given: Any) -> str:
+    if not isinstance(given, str):
+        raise InputError(f"give a text in quotes, not {json.dumps(given)[:40]}")
+    return given
+
+
+def _number(given: Any) -> float:
+    if not isinstance(given, int | float) or isinstance(given, bool):
+        raise InputError(f"give a number, not {json.dumps(given)[:40]}")
+    return float(given)
