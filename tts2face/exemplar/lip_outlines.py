@@ -1,0 +1,48 @@
+"""Outlines of the recorded lips of tokens, for drawing."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from tts2face.exemplar.explanation import UsedToken
+from tts2face.interpolation import interpolate_columns
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LIP_LOWER, OUTER_LIP_UPPER
+from tts2face.models.talker import Talker
+
+OUTER = (*OUTER_LIP_UPPER, *reversed(OUTER_LIP_LOWER[1:-1]))  # from the person's right corner over the upper lip
+INNER = (*INNER_LIP_UPPER, *reversed(INNER_LIP_LOWER[1:-1]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LipOutline:
+    """Closed outlines (20, 2) of the lips at one instant, seen from the front: mm to the right and down."""
+
+    outer: NDArray[np.float32]
+    inner: NDArray[np.float32]
+
+
+def token_outlines(talker: Talker, token: UsedToken, n_instants: int = 5) -> tuple[LipOutline, ...]:
+    """Outlines at equally spaced instants of a recorded token, from its beginning to its end.
+
+    The middle is that of the corners of the talker's mean mouth, so that outlines of several tokens can be compared.
+
+    Raises
+    ------
+    InputError
+        The talker has no such utterance.
+    """
+    utterance = next((one for one in talker.utterances if one.name == token.utterance), None)
+    if utterance is None:
+        raise InputError(f"the talker has no recording {token.utterance!r}; build the explanation with the same talker")
+    times = np.linspace(token.start, token.end, n_instants)
+    frames = np.arange(len(utterance.shape)) / talker.fps
+    shape = interpolate_columns(utterance.shape, frames, np.clip(times, 0.0, frames[-1]))
+    points = talker.model.shapes(shape)[:, :, :2] * np.array([1.0, -1.0])  # y is up in the model
+    corners = talker.model.mean[list(OUTER), :2] * np.array([1.0, -1.0])
+    middle = (corners[0] + corners[len(OUTER_LIP_UPPER) - 1]) / 2
+    return tuple(
+        LipOutline((face[list(OUTER)] - middle).astype(np.float32), (face[list(INNER)] - middle).astype(np.float32))
+        for face in points
+    )
