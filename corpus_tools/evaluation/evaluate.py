@@ -73,13 +73,15 @@ def compare_across_talkers(
 class SplitResult:
     """Results of one split: the talker, the real utterances, and the parameters (T, S) of each method, by name.
 
-    ``own`` are comparisons with a voice's own durations; ``scale`` is the talker's if curves are z-scored.
+    ``tracked`` are the real utterances before their landmarks were corrected for the head's pose, none without
+    correction. ``own`` are comparisons with a voice's own durations; ``scale`` is the talker's if curves are z-scored.
     """
 
     talker: Talker
     real: tuple[ReferenceUtterance, ...]
     synthesised: Mapping[str, tuple[NDArray[np.float32], ...]]
     seconds: Mapping[str, float]
+    tracked: tuple[ReferenceUtterance, ...] = ()
     own: Mapping[str, tuple[UtteranceComparison, ...]] = field(default_factory=dict)
     scale: SpeakerScale | None = None
 
@@ -139,6 +141,7 @@ def evaluate(
         n_train,
         sum(len(one.real) for one in runs),
         _pooled_scores(runs, limits),
+        as_tracked=_tracked_scores(runs, limits),
         own=_pooled_own_scores(runs, limits),
         folds=_score_folds(parts, runs, limits) if len(runs) > 1 else (),
     )
@@ -157,10 +160,11 @@ def evaluate_split(  # noqa: PLR0913 - those of `evaluate`, for one split
 ) -> SplitResult:
     """Learn a talker from `train` and synthesise the motion of `test` by every method."""
     leak = fit_pose_correction(train)
-    train, test = ([leak.apply(observation) for observation in part] for part in (train, test))
-    talker = _train_talker(train, lips)
+    talker = _train_talker([leak.apply(observation) for observation in train], lips)
     methods = build_methods(talker, options)
-    real = tuple(ReferenceUtterance.of(observation, talker.model) for observation in test)
+    real = tuple(ReferenceUtterance.of(leak.apply(observation), talker.model) for observation in test)
+    is_corrected = leak.offsets.any()
+    tracked = tuple(ReferenceUtterance.of(observation, talker.model) for observation in test if is_corrected)
     voiced = speak_references(voice, real) if voice is not None else ()
     synthesised, synthesis_s, own = {}, {}, {}
     for number, (name, method) in enumerate(methods.items()):
@@ -172,7 +176,7 @@ def evaluate_split(  # noqa: PLR0913 - those of `evaluate`, for one split
     if tracks is not None:
         synthesised[TRACKS_METHOD], synthesis_s[TRACKS_METHOD] = map_tracks(tracks, talker, real), 0.0
     synthesised[CEILING_METHOD], synthesis_s[CEILING_METHOD] = tuple(one.parameters for one in real), 0.0
-    return SplitResult(talker, real, synthesised, synthesis_s, own)
+    return SplitResult(talker, real, synthesised, synthesis_s, tracked, own)
 
 
 def evaluate_across_talkers(
@@ -253,6 +257,16 @@ def _pooled_scores(runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Sco
             limits,
             sum(r.seconds[name] for r in runs),
         )
+        for name in runs[0].synthesised
+    )
+
+
+def _tracked_scores(runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Scores, ...]:
+    """Scores of each method against the landmarks as tracked, not corrected for the head's pose, where they differ."""
+    if not all(each.tracked for each in runs):
+        return ()
+    return tuple(
+        score_splits(name, [(each.model, each.tracked, each.synthesised[name]) for each in runs], limits)
         for name in runs[0].synthesised
     )
 

@@ -10,7 +10,7 @@ import pytest
 from corpus_tools.evaluation.evaluate import CEILING_METHOD, SplitResult, evaluate
 from corpus_tools.evaluation.scores import FIGURES
 from corpus_tools.evaluation.splits import split_by_words, split_into_folds, split_randomly
-from corpus_tools.evaluation.tables import Evaluation, figure_rows
+from corpus_tools.evaluation.tables import AS_TRACKED, Evaluation, figure_rows
 from corpus_tools.evaluation.tracks import ExternalTrack, read_tracks
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.report.evaluation import evaluation_page
@@ -83,6 +83,25 @@ def test_the_page_shows_all_figures_and_loads_nothing(measured: tuple[Evaluation
     assert "http" not in html
     worst = max(measured[0].scores[2].utterances, key=lambda one: one.dtw_cost)
     assert f"<h3>{worst.name} (DTW cost {worst.dtw_cost:.2f})</h3>" in html
+
+
+def test_the_recorded_face_as_tracked_has_a_table_of_its_own(observations: list[Observation]):
+    """Landmarks that move with the head's yaw are corrected for the first table, and not for the second."""
+    turned = []
+    for number, one in enumerate(observations):
+        yaw = np.random.default_rng(number).uniform(-0.3, 0.3)
+        head = one.head.copy()
+        head[:, 1] = yaw
+        landmarks = one.landmarks.copy()
+        landmarks[:, 291, 0] += 20.0 * yaw
+        turned.append(replace(one, head=head, landmarks=landmarks))
+    result, runs = evaluate([split_randomly(turned, hold_out=8, seed=0)])
+    at_ceiling = {name: scores[-1] for name, scores in result.tables()}
+    corrected, tracked = at_ceiling["true durations"], at_ceiling[AS_TRACKED]
+    assert corrected["dtw_cost"] == 0.0
+    assert tracked["dtw_cost"] > 0.5
+    assert tracked["r_width"] < corrected["r_width"] - 0.05
+    assert "<h2>Recorded face as tracked</h2>" in evaluation_page(result, runs)
 
 
 def test_folds_hold_out_every_utterance_once(observations: list[Observation]):
