@@ -131,7 +131,7 @@ def observe_recording(
         name=recording.name,
         fps=fps,
         landmarks=posed.landmarks,
-        head=_head_motion(posed),
+        head=head_motion(posed),
         phones=phones,
         words=spans,
         intensity=intensity(sound.sound, start + np.arange(len(filled)) / fps),
@@ -203,7 +203,8 @@ def trim_to_picture(sound: AlignedSpeech, begin: float, stop: float) -> tuple[Ph
     return PhoneSequence(phones, edges - begin), words
 
 
-def _head_motion(posed: PoseFreeLandmarks) -> NDArray[np.float32]:
+def head_motion(posed: PoseFreeLandmarks) -> NDArray[np.float32]:
+    """(T, 6) head pose as in `Observation`."""
     place = posed.translations - np.median(posed.translations, axis=0)
     return np.column_stack([head_angles(posed.rotations), place]).astype(np.float32)
 
