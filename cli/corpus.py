@@ -53,7 +53,11 @@ def build(  # noqa: PLR0913 - one parameter a flag
         Parameter(help="Write an HTML report: pictures, curves, measures, rejected recordings and reasons."),
     ] = None,
     base: Annotated[
-        str, Parameter(help="Talker that completes recordings of less than 10 minutes, or none: recordings only.")
+        str,
+        Parameter(
+            help="Talker that completes recordings of less than 10 minutes, and whose networks supply phones that "
+            "longer ones lack, or none: recordings only."
+        ),
     ] = "grid_s1",
     strict: Annotated[bool, switch("Reject recordings with warnings, too.")] = False,
     jobs: Jobs = None,

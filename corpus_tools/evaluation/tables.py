@@ -27,8 +27,8 @@ class Evaluation:
 
     ``as_tracked`` are the scores against recorded faces whose landmarks are not corrected for the head's pose; ``own``
     those with a voice's own durations, empty without a voice; ``folds`` those of each split if there are several. If
-    the evaluation ``is_across`` talkers, all scores use z-scored curves. ``warnings`` are about names that occur in both
-    parts.
+    the evaluation ``is_across`` talkers, all scores use z-scored curves. ``warnings`` are about names that occur in
+    both parts.
     """
 
     n_train: int

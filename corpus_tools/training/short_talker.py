@@ -14,7 +14,7 @@ from lexicon.sequence import SILENCE
 from tts2face.models.talker import Talker, load_talker
 from tts2face.types import Progress
 
-MIN_OWN_MINUTES = 10.0  # from here on a talker is learnt from its own recordings alone
+MIN_OWN_MINUTES = 10.0  # from here on a talker needs only the networks of a base
 NO_BASE = "none"
 MIN_TOKENS = 3  # of a phone; with fewer it is recommended for recording
 MIN_CONTEXTS = 3  # different pairs of neighbours of a phone, likewise
@@ -78,7 +78,7 @@ def learn_short_talker(
     talker = adapted_talker(indexed, observations, chosen.adaptation, metadata)
     stated = {
         **metadata,
-        **_statements_of_both(metadata, indexed.talker.metadata),
+        **statements_of_both(metadata, indexed.talker.metadata),
         "base": _base_metadata(indexed, chosen),
     }
     return ShortTalker(replace(talker, metadata=stated), len(observations), chosen)
@@ -105,7 +105,7 @@ def recording_advice(observations: Sequence[Observation]) -> tuple[str, ...]:
     return tuple(advice)
 
 
-def _statements_of_both(own: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, str]:
+def statements_of_both(own: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, str]:
     """Sources, licence and attribution of the recordings and of the base."""
     return {
         name: f"recordings: {own.get(name, NOT_STATED)}; base: {base.get(name, NOT_STATED)}" for name in STATED_BY_BOTH

@@ -1,10 +1,11 @@
-"""Networks from phones to speech parameters, trained on a talker's utterances, with or without another speaker's lips.
+"""Networks from phones to speech parameters, trained on a talker's utterances, with or without other lips.
 
 The inputs of some are one-hot codes of phones, those of the others articulatory features
 (`lexicon.phones.phone_features`), which generalise to unseen phones; their first layer is multiplied by the
 feature table, so that the talker's file holds all networks in the same form.
 
-With pooled speech, the networks have further outputs, the lip features of `corpus_tools.pooling`, z-scored per speaker.
+With pooled speech, which is that of another speaker or of a base talker's networks, they have further outputs, the lip
+features of `corpus_tools.pooling`, z-scored per speaker.
 Both speakers share all weights but the biases of the first layer; the talker's parameters are learnt from the talker
 only. What remains of the other speaker is his influence on the shared weights: his features and biases are not stored.
 """
@@ -18,7 +19,13 @@ from numpy.typing import NDArray
 from corpus_tools.evaluation.measures import speech_frames
 from corpus_tools.pooling.pooled_speech import PooledSpeech, pooled_inventory, talker_features
 from corpus_tools.training.feature_table import feature_table
-from corpus_tools.training.network_training import TrainingOptions, Weights, WindowSamples, train_network
+from corpus_tools.training.network_training import (
+    TrainingOptions,
+    Weights,
+    WindowSamples,
+    phone_layer,
+    train_network,
+)
 from lexicon.sequence import SILENCE
 from tts2face.models.phone_network import PhoneNetwork, window_features
 from tts2face.models.talker import Talker
@@ -118,8 +125,8 @@ def expand_to_phones(
     weights: Weights, table: Floats, n_speech: int, spread: Floats
 ) -> tuple[list[Floats], list[Floats]]:
     """Layers and biases of the talker's network for one-hot phones, with its parameters in mm."""
-    phone_weights, place, biases, inner, inner_biases, outer, outer_biases = weights
-    first = np.concatenate([*(table @ each for each in phone_weights), place])
+    _, place, biases, inner, inner_biases, outer, outer_biases = weights
+    first = np.concatenate([*phone_layer(weights, table), place])
     layers = [first, inner, outer[:, :n_speech] * spread]
     every = [layers, [biases[0], inner_biases, outer_biases[:n_speech] * spread]]
     return [one.astype(np.float32) for one in every[0]], [one.astype(np.float32) for one in every[1]]

@@ -10,7 +10,7 @@ from cli.main import run
 from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
 from corpus_tools.pool_talker import pool_talker
 from corpus_tools.pooling.lip_alignment import LipSpeech, align_phones, alignment_features, fit_part_model
-from corpus_tools.pooling.lip_features import FEATURES, landmark_features, track_features
+from corpus_tools.pooling.lip_features import FEATURES, landmark_features, parameter_features, track_features
 from corpus_tools.pooling.lip_tracks import LipTrack, SpokenPhone, read_lip_tracks
 from corpus_tools.pooling.pooled_speech import align_lip_tracks, spoken_sequence
 from corpus_tools.training.feature_table import feature_table
@@ -164,6 +164,12 @@ def test_both_schemes_measure_the_same_distances() -> None:
     np.testing.assert_allclose(features[:, 3], -one.landmarks[:, CHIN, 1] / eyes, rtol=1e-5)
     width = np.linalg.norm(one.landmarks[:, 61] - one.landmarks[:, 291], axis=1) / eyes
     np.testing.assert_allclose(features[:, 1], width, rtol=1e-5)
+
+
+def test_features_of_parameters_are_those_of_their_landmarks(talker: Talker) -> None:
+    parameters = talker.utterances[0].shape[:, : talker.model.n_speech]
+    expected = landmark_features(talker.model.shapes(parameters), talker.model.mean)
+    np.testing.assert_allclose(parameter_features(parameters, talker.model), expected, atol=1e-6)  # float32 landmarks
 
 
 PHONE_ROWS = "\n".join(
