@@ -36,7 +36,7 @@ def gain_rows(curve: LearningCurve) -> list[tuple[str, ...]]:
 
 def monotony(curve: LearningCurve) -> str:
     """Sentence: whether a figure becomes worse from one amount to the next by more than its interval."""
-    names = [name for name in curve.methods if any(one.method == name for one in curve.steps)]
+    names = curve.methods
     worse = [_step_text(one) for name in names for one in curve.steps if one.method == name and one.surely_worse()]
     if not worse:
         return "No figure becomes worse from one amount to the next by more than its 95 % interval."
