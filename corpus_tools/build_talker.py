@@ -138,7 +138,7 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
         )
     write_talker(out, talker)
     minutes = sum(len(one.landmarks) / one.fps for one in steady) / 60.0
-    notes = (short.chosen.message, *recording_advice(steady)) if short else ()
+    notes = (*short.notes, *recording_advice(steady)) if short else ()
     return BuiltTalker(len(steady), minutes, observations.refused, observations.warnings, notes)
 
 

@@ -171,10 +171,13 @@ def z_score_people(people: Sequence[Sequence[Observation]]) -> tuple[TestUtteran
 
 
 def synthesise_people(
-    talker: Talker, methods: Mapping[str, SynthesisMethod], tests: Sequence[TestUtterance]
+    talker: Talker,
+    methods: Mapping[str, SynthesisMethod],
+    tests: Sequence[TestUtterance],
+    scale: CurveScale | None = None,
 ) -> dict[str, tuple[Floats, ...]]:
-    """Curves (T, 2) of every method on the evaluated frames, z-scored by the talker's own recordings."""
-    scale = CurveScale.of_talker(talker)
+    """Curves (T, 2) of every method on the evaluated frames, z-scored by `scale`: by default its recordings."""
+    scale = scale or CurveScale.of_talker(talker)
 
     def curves(method: SynthesisMethod, one: TestUtterance) -> Floats:
         seen = one.observation
@@ -203,7 +206,7 @@ def compare_people(
     baselines
         Methods with which every other one is compared; by default all.
     """
-    paired = {name: _pair(tests, values) for name, values in curves.items()}
+    paired = {name: pair_curves(tests, values) for name, values in curves.items()}
     others = paired.keys() if baselines is None else baselines
     return PeopleEvaluation(
         n_people,
@@ -220,7 +223,8 @@ def compare_people(
     )
 
 
-def _pair(tests: Sequence[TestUtterance], curves: Sequence[Floats]) -> PairedCurves:
+def pair_curves(tests: Sequence[TestUtterance], curves: Sequence[Floats]) -> PairedCurves:
+    """Statistics of a method whose z-scored curves (T, 2) are given for each utterance."""
     costs = [
         warping_cost(one.real, made, np.ones(2), round(DTW_BAND_S * one.observation.fps))
         for one, made in zip(tests, curves, strict=True)

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from corpus_tools.evaluation.fingerprints import check_no_same, fingerprint_observations, fingerprint_talker
+from corpus_tools.evaluation.fingerprints import find_same, fingerprint_observations, fingerprint_talker
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.training.adapt_talker import Base, adapted_talker
 from corpus_tools.training.choose_adaptation import ChosenAdaptation, choose_adaptation
@@ -33,11 +33,15 @@ NOT_STATED = "not stated"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShortTalker:
-    """A talker with the utterances of the recordings first (``n_own``) and those of the base behind them."""
+    """A talker with the utterances of the recordings first (``n_own``) and those of the base behind them.
+
+    ``notes`` state what to expect of it.
+    """
 
     talker: Talker
     n_own: int
     chosen: ChosenAdaptation
+    notes: tuple[str, ...]
 
 
 def needs_base(observations: Sequence[Observation]) -> bool:
@@ -64,15 +68,11 @@ def learn_short_talker(
     Raises
     ------
     InputError
-        There is no such talker, or it was learnt from one of the recordings: held-out figures would be too good.
+        There is no such talker.
     DataError
         The base is damaged.
     """
     known = load_talker(base)
-    check_no_same(
-        fingerprint_talker(known), fingerprint_observations(observations), f"the base {base} and the recordings",
-        f"give another base, or `--base {NO_BASE}`",
-    )  # fmt: skip
     indexed = Base.of(known)
     chosen = choose_adaptation(indexed, observations, on_progress=on_progress)
     talker = adapted_talker(indexed, observations, chosen.adaptation, metadata)
@@ -81,7 +81,19 @@ def learn_short_talker(
         **statements_of_both(metadata, indexed.talker.metadata),
         "base": _base_metadata(indexed, chosen),
     }
-    return ShortTalker(replace(talker, metadata=stated), len(observations), chosen)
+    notes = (chosen.message, *_known_recordings(known, base, observations))
+    return ShortTalker(replace(talker, metadata=stated), len(observations), chosen, notes)
+
+
+def _known_recordings(known: Talker, base: str, observations: Sequence[Observation]) -> tuple[str, ...]:
+    """A note if the base was learnt from some of the recordings, whose held-out figures are then too good."""
+    same = find_same(fingerprint_talker(known), fingerprint_observations(observations))
+    if not same:
+        return ()
+    return (
+        f"the base {base} was learnt from {len(same)} of these recordings ({same[0][0]}, there as {same[0][1]}): the "
+        f"expected figures are too high; give another base, or `--base {NO_BASE}`",
+    )
 
 
 def recording_advice(observations: Sequence[Observation]) -> tuple[str, ...]:
