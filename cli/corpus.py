@@ -10,10 +10,13 @@ from cyclopts import App, Parameter
 from cli.flags import Cache, Jobs, Model, switch, whole_number
 from cli.process import write_message
 from cli.progress import progress_bar, stage_bar
+from cli.recording_check import check
+from lexicon.errors import InputError
 from tts2face.storage.output_names import check_file_name
 from tts2face.storage.overwrite import refuse_overwriting
 
 corpus = App(name="corpus", help="Build, show and evaluate talkers.")
+corpus.command(check)
 
 OutTalker = Annotated[Path, Parameter(help="Output talker (.talker).", alias="-o")]
 TalkerName = Annotated[str, Parameter(help="A shipped talker or a .talker file.")]
@@ -51,7 +54,11 @@ def build(  # noqa: PLR0913 - one parameter a flag
         Parameter(help="Write an HTML report: pictures, curves, measures, rejected recordings and reasons."),
     ] = None,
     base: Annotated[
-        str, Parameter(help="Talker that completes recordings of less than 10 minutes, or none: recordings only.")
+        str,
+        Parameter(
+            help="Talker that completes recordings of less than 10 minutes, and whose networks supply phones that "
+            "longer ones lack, or none: recordings only."
+        ),
     ] = "grid_s1",
     strict: Annotated[bool, switch("Reject recordings with warnings, too.")] = False,
     jobs: Jobs = None,
@@ -271,8 +278,22 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     pool: Annotated[
         Path | None, Parameter(help="Train the networks also with lip tracks of this folder, as `corpus pool` does.")
     ] = None,
+    learning_curve: Annotated[
+        str | None,
+        Parameter(
+            help="Learn from parts of --recordings of so many seconds, e.g. 10,20,40, or auto: 10 s to 40 minutes."
+        ),
+    ] = None,
+    base: Annotated[
+        str | None,
+        Parameter(help="With --learning-curve: as --base of corpus build; by default grid_s1."),
+    ] = None,
     out: Annotated[
-        Path | None, Parameter(help="Write measures and plots (.html) or measures only (.json, .csv).", alias="-o")
+        Path | None,
+        Parameter(
+            help="Write measures and plots (.html), measures (.json, .csv), or a learning curve (.svg, .png, too).",
+            alias="-o",
+        ),
     ] = None,
     jobs: Jobs = None,
     cache: Cache = None,
@@ -280,12 +301,19 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Compare synthesised lip motion with held-out recordings."""
     from cli.evaluation import ComparisonFlags, SplitFlags, run_evaluation
+    from cli.learning_curve import run_learning_curve
     from cli.people import DEFAULT_TALKER, run_people_evaluation
 
     folders = {"--recordings": recordings, "--train": train, "--test": test}
     refuse_overwriting({"--out": out}, folders | {"--cross-talker": cross_talker, "--tracks": tracks, "--model": model})
     split_flags = SplitFlags(recordings, hold_out, seed, folds, hold_out_words, train, test, cross_talker)
     comparison = ComparisonFlags(tracks, own_durations, pool)
+    if learning_curve is not None and not people and talker is None:
+        run_learning_curve(learning_curve, split_flags, comparison, base, out, (cache, jobs, model))
+        return
+    if base is not None or learning_curve is not None:
+        reason = "--base has no effect without --learning-curve" if base else "--learning-curve tests no --talker"
+        raise InputError(f"{reason}; remove it")
     if people or talker is not None:
         split_flags.check_people(people or [], comparison)
         run_people_evaluation(talker or DEFAULT_TALKER, people or [], tracks, out)

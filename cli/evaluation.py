@@ -60,6 +60,18 @@ class SplitFlags:
                 "remove the other flags"
             )
 
+    def curve_recordings(self, comparison: "ComparisonFlags") -> Path:
+        """The folder of recordings of a learning curve; refuse flags that contradict --learning-curve."""
+        chosen = (self.train, self.test, self.folds, self.words, self.cross_talker, comparison.tracks, comparison.pool)
+        if self.recordings is None:
+            raise InputError("--learning-curve needs the recordings of one person; give --recordings")
+        if comparison.own_durations or any(value is not None for value in chosen):
+            raise InputError(
+                "--learning-curve can be combined only with --recordings, --hold-out, --seed, --base and --out; "
+                "remove the other flags"
+            )
+        return self.recordings
+
     def _check_cross_talker(self) -> None:
         if (self.recordings is None) == (self.train is None):
             raise InputError(
@@ -96,6 +108,8 @@ def run_evaluation(
     if out is not None and out.suffix == ".html":
         load_matplotlib()  # a missing package is reported before the measurement
     result, runs = _evaluate(split_flags, comparison, RunOptions(*run_options))
+    for warning in result.warnings:
+        write_message(f"warning: {warning}")
     print(f"{result.table()}\n\n{result.class_table()}")  # noqa: T201 - the result
     if out is not None:
         _write_evaluation(out, result, runs)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from corpus_tools.clone_talker import appearance_from_lips
+from corpus_tools.pooling.base_phrases import base_speech
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import QualityWarning, Refusal, check_any_kept, observe
@@ -15,14 +16,21 @@ from corpus_tools.report.drawing import load_matplotlib
 from corpus_tools.report.recordings import recordings_page
 from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.pose_correction import correct_pose
-from corpus_tools.training.short_talker import NO_BASE, ShortTalker, learn_short_talker, needs_base, recording_advice
+from corpus_tools.training.short_talker import (
+    NO_BASE,
+    ShortTalker,
+    learn_short_talker,
+    needs_base,
+    recording_advice,
+    statements_of_both,
+)
 from corpus_tools.training.train_audio_map import learn_audio_maps
 from corpus_tools.training.train_phone_network import add_phone_network
 from corpus_tools.training.train_score_map import add_score_map
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_json
-from tts2face.models.talker import Talker, write_talker
+from tts2face.models.talker import Talker, load_talker, write_talker
 from tts2face.storage.files import write_atomically
 from tts2face.types import Progress
 from tts2face.video.blendshapes import BlendshapeReader
@@ -33,6 +41,7 @@ PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
 MIN_STATEMENT_WORDS = 3  # shorter statements are treated as typing errors
 NOT_STATED = "not stated"
 READING_STAGE = "reading recordings"  # name of the first stage
+NETWORK_STAGE = "learning phone network"
 CONTENT_WITH_PICTURES = (
     "landmark shapes, head pose, phones, loudness, and with the stated consent pictures of the person's face; no sound"
 )
@@ -82,7 +91,8 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
     report
         HTML page about the recordings to write, also if none could be used.
     base
-        Talker that completes recordings of less than `MIN_OWN_MINUTES`; `NO_BASE` for none.
+        Talker that completes recordings of less than `MIN_OWN_MINUTES`, and whose networks are evidence of rare phones
+        for the networks of any talker; `NO_BASE` for none.
     is_strict
         Whether recordings with warnings are refused.
     stages
@@ -118,11 +128,7 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
     }
     steady = correct_pose(observations.kept)
     short = _learn_with_base(steady, base, metadata, stages)
-    talker = (
-        short.talker
-        if short
-        else add_phone_network(learn_talker(steady, metadata=metadata), on_progress=stages("learning phone network"))
-    )
+    talker = short.talker if short else _learn_from_recordings(steady, base, metadata, stages)
     talker = replace(talker, audio_maps={**talker.audio_maps, **learn_audio_maps(steady, talker, stages=stages)})
     talker = add_score_map(talker, BlendshapeReader((run_options or RunOptions()).model))
     if consent is not None:
@@ -132,7 +138,7 @@ def build_talker(  # noqa: PLR0913 - run options and the date change no motion
         )
     write_talker(out, talker)
     minutes = sum(len(one.landmarks) / one.fps for one in steady) / 60.0
-    notes = (short.chosen.message, *recording_advice(steady)) if short else ()
+    notes = (*short.notes, *recording_advice(steady)) if short else ()
     return BuiltTalker(len(steady), minutes, observations.refused, observations.warnings, notes)
 
 
@@ -143,6 +149,21 @@ def _learn_with_base(
     if base == NO_BASE or not needs_base(observations):
         return None
     return learn_short_talker(observations, base, metadata=metadata, on_progress=stages("adapting the base"))
+
+
+def _learn_from_recordings(
+    observations: Sequence[Observation], base: str, metadata: Mapping[str, Any], stages: StageCallback
+) -> Talker:
+    """The talker of the recordings; its networks are also trained on phrases by those of the base, if there is one."""
+    learnt = learn_talker(observations, metadata=metadata)
+    if base == NO_BASE:
+        return add_phone_network(learnt, on_progress=stages(NETWORK_STAGE))
+    known = load_talker(base)
+    phrases = base_speech(known, on_progress=stages("synthesising phrases with the base"))
+    trained = add_phone_network(learnt, phrases, on_progress=stages(NETWORK_STAGE))
+    stated = {name: known.metadata[name] for name in ("name", "pooled") if name in known.metadata}
+    both = statements_of_both(metadata, known.metadata)
+    return replace(trained, metadata={**metadata, **both, "network_base": {**stated, "phrases": len(phrases)}})
 
 
 def add_appearance(

@@ -161,6 +161,12 @@ def cmudict_lookup(word: str) -> tuple[Segment, ...] | None:
     return None if names is None else arpabet_segments(_UNSTRESSED_TY.sub("T IY0", names.partition("#")[0].rstrip()))
 
 
+def cmudict_words() -> tuple[str, ...]:
+    """Words of CMUdict, sorted as in its file; without further pronunciations of a word."""
+    words = (line.partition(" ")[0] for line in _cmudict_text().splitlines())
+    return tuple(word for word in words if word and not word.endswith(")"))
+
+
 @functools.cache
 def _own_table() -> dict[str, str]:
     lines = resources.files("lexicon").joinpath("pronunciations.tsv").read_text(encoding="utf-8").splitlines()[1:]

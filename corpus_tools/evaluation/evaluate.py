@@ -73,13 +73,15 @@ def compare_across_talkers(
 class SplitResult:
     """Results of one split: the talker, the real utterances, and the parameters (T, S) of each method, by name.
 
-    ``own`` are comparisons with a voice's own durations; ``scale`` is the talker's if curves are z-scored.
+    ``tracked`` are the real utterances before their landmarks were corrected for the head's pose, none without
+    correction. ``own`` are comparisons with a voice's own durations; ``scale`` is the talker's if curves are z-scored.
     """
 
     talker: Talker
     real: tuple[ReferenceUtterance, ...]
     synthesised: Mapping[str, tuple[NDArray[np.float32], ...]]
     seconds: Mapping[str, float]
+    tracked: tuple[ReferenceUtterance, ...] = ()
     own: Mapping[str, tuple[UtteranceComparison, ...]] = field(default_factory=dict)
     scale: SpeakerScale | None = None
 
@@ -122,11 +124,11 @@ def evaluate(
     Raises
     ------
     InputError
-        A part is empty, an utterance is in both parts, or no words are known for the voice.
+        A part is empty, a recording is in both parts, or no words are known for the voice.
     """
+    warnings = check_disjoint(parts)
     runs = []
     for number, (train, test) in enumerate(parts):
-        check_disjoint(train, test)
         on_split_progress = _split_progress(on_progress, number, len(parts))
         runs.append(
             evaluate_split(
@@ -139,8 +141,10 @@ def evaluate(
         n_train,
         sum(len(one.real) for one in runs),
         _pooled_scores(runs, limits),
+        as_tracked=_tracked_scores(runs, limits),
         own=_pooled_own_scores(runs, limits),
         folds=_score_folds(parts, runs, limits) if len(runs) > 1 else (),
+        warnings=warnings,
     )
     return result, tuple(runs)
 
@@ -157,10 +161,11 @@ def evaluate_split(  # noqa: PLR0913 - those of `evaluate`, for one split
 ) -> SplitResult:
     """Learn a talker from `train` and synthesise the motion of `test` by every method."""
     leak = fit_pose_correction(train)
-    train, test = ([leak.apply(observation) for observation in part] for part in (train, test))
-    talker = _train_talker(train, lips)
+    talker = _train_talker([leak.apply(observation) for observation in train], lips)
     methods = build_methods(talker, options)
-    real = tuple(ReferenceUtterance.of(observation, talker.model) for observation in test)
+    real = tuple(ReferenceUtterance.of(leak.apply(observation), talker.model) for observation in test)
+    is_corrected = leak.offsets.any()
+    tracked = tuple(ReferenceUtterance.of(observation, talker.model) for observation in test if is_corrected)
     voiced = speak_references(voice, real) if voice is not None else ()
     synthesised, synthesis_s, own = {}, {}, {}
     for number, (name, method) in enumerate(methods.items()):
@@ -172,7 +177,7 @@ def evaluate_split(  # noqa: PLR0913 - those of `evaluate`, for one split
     if tracks is not None:
         synthesised[TRACKS_METHOD], synthesis_s[TRACKS_METHOD] = map_tracks(tracks, talker, real), 0.0
     synthesised[CEILING_METHOD], synthesis_s[CEILING_METHOD] = tuple(one.parameters for one in real), 0.0
-    return SplitResult(talker, real, synthesised, synthesis_s, own)
+    return SplitResult(talker, real, synthesised, synthesis_s, tracked, own)
 
 
 def evaluate_across_talkers(
@@ -189,9 +194,9 @@ def evaluate_across_talkers(
     Raises
     ------
     InputError
-        A part is empty, or an utterance is in both parts.
+        A part is empty, or a recording is in both parts.
     """
-    check_disjoint(train, others)
+    warnings = check_disjoint([(tuple(train), tuple(others))])
     train, others = correct_pose(train), correct_pose(others)
     talker = _train_talker(train, lips)
     own_scale, other_scale = SpeakerScale.of(train), SpeakerScale.of(others)
@@ -217,7 +222,7 @@ def evaluate_across_talkers(
         )
         for name in methods
     )
-    result = Evaluation(len(train), len(others), scores, is_across=True)
+    result = Evaluation(len(train), len(others), scores, is_across=True, warnings=warnings)
     return result, (SplitResult(talker, real, synthesised, synthesis_s, scale=own_scale),)
 
 
@@ -253,6 +258,16 @@ def _pooled_scores(runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Sco
             limits,
             sum(r.seconds[name] for r in runs),
         )
+        for name in runs[0].synthesised
+    )
+
+
+def _tracked_scores(runs: Sequence[SplitResult], limits: Thresholds) -> tuple[Scores, ...]:
+    """Scores of each method against the landmarks as tracked, not corrected for the head's pose, where they differ."""
+    if not all(each.tracked for each in runs):
+        return ()
+    return tuple(
+        score_splits(name, [(each.model, each.tracked, each.synthesised[name]) for each in runs], limits)
         for name in runs[0].synthesised
     )
 

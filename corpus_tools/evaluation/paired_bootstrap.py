@@ -49,7 +49,7 @@ def draw_weights(n_utterances: int) -> Floats:
 def estimate(one: PairedCurves) -> Mapping[str, IntervalEstimate]:
     """Each figure with its interval."""
     figures = one.figures(draw_weights(len(one.costs)))
-    return {name: _interval(values) for name, values in figures.items()}
+    return {name: interval_of(values) for name, values in figures.items()}
 
 
 def estimate_difference(one: PairedCurves, other: PairedCurves) -> Mapping[str, IntervalEstimate]:
@@ -64,10 +64,11 @@ def estimate_difference(one: PairedCurves, other: PairedCurves) -> Mapping[str, 
         raise InputError(f"{len(one.costs)} utterances cannot be paired with {len(other.costs)}; use the same ones")
     weights = draw_weights(len(one.costs))
     ours, theirs = one.figures(weights), other.figures(weights)
-    return {name: _interval(ours[name] - theirs[name]) for name in ours}
+    return {name: interval_of(ours[name] - theirs[name]) for name in ours}
 
 
-def _interval(values: Floats) -> IntervalEstimate:
+def interval_of(values: Floats) -> IntervalEstimate:
+    """The first of (W,) values, with the interval that holds `CONFIDENCE` of the others."""
     low, high = np.quantile(values[1:], (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2))
     return IntervalEstimate(float(values[0]), float(low), float(high))
 

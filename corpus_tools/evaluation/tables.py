@@ -9,6 +9,7 @@ import numpy as np
 from corpus_tools.evaluation.scores import FIGURES, Scores, available_figures
 
 TRUE_DURATIONS, OWN_DURATIONS, OTHER_TALKER = "true durations", "own durations", "another talker"
+AS_TRACKED = "true durations, recorded face not corrected for head pose"
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,16 +25,20 @@ class Fold:
 class Evaluation:
     """Scores of all methods on held-out utterances.
 
-    ``own`` are the scores with a voice's own durations, empty without a voice; ``folds`` those of each split if there
-    are several. If the evaluation ``is_across`` talkers, all scores use z-scored curves.
+    ``as_tracked`` are the scores against recorded faces whose landmarks are not corrected for the head's pose; ``own``
+    those with a voice's own durations, empty without a voice; ``folds`` those of each split if there are several. If
+    the evaluation ``is_across`` talkers, all scores use z-scored curves. ``warnings`` are about names that occur in
+    both parts.
     """
 
     n_train: int
     n_test: int
     scores: tuple[Scores, ...]
+    as_tracked: tuple[Scores, ...] = ()
     own: tuple[Scores, ...] = ()
     folds: tuple[Fold, ...] = ()
     is_across: bool = False
+    warnings: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Dictionary for JSON, including utterances."""
@@ -42,6 +47,8 @@ class Evaluation:
     def tables(self) -> Iterator[tuple[str, tuple[Scores, ...]]]:
         """The available tables, by name."""
         yield OTHER_TALKER if self.is_across else TRUE_DURATIONS, self.scores
+        if self.as_tracked:
+            yield AS_TRACKED, self.as_tracked
         if self.own:
             yield OWN_DURATIONS, self.own
 

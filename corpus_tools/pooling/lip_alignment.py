@@ -35,6 +35,7 @@ SILENCE_COST = 2.0  # of inserting a silence between words
 LONG_SILENCE_COST, LONG_SILENCE = 0.02, 10  # for each frame beyond the tenth
 WINDOWS_S = (0.8, 1.5, 3.0, 6.0)  # tried in turn, around the expected time of each edge
 TRAINING = TrainingOptions(hidden=(96, 64), n_epochs=8, weight_decay=1e-5)
+MIN_VARIANCE = 1e-6  # of residuals, of about unit variance: few silent parts have a singular covariance
 UNREACHED = 1e17
 # Durations in seconds of unstressed running speech, by class of phone; order of Crystal and House 1988.
 DURATIONS_S = {
@@ -96,7 +97,8 @@ def fit_part_model(
     silent = samples[-1][0][:, NEIGHBOURS] == number[SILENCE]
     precision, log_determinant = [], []
     for here in (~silent, silent):
-        inverse = np.linalg.inv(np.cov(residuals[here].T)) + 0.05 * np.eye(residuals.shape[1])
+        unit = np.eye(residuals.shape[1])
+        inverse = np.linalg.inv(np.cov(residuals[here].T) + MIN_VARIANCE * unit) + 0.05 * unit
         precision.append(inverse)
         log_determinant.append(-np.linalg.slogdet(inverse)[1])
     return PartModel(weights, table, inventory, np.array(precision), np.array(log_determinant))

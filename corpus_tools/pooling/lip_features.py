@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 
 from corpus_tools.training.ridge import fit_ridge
 from tts2face.models.landmarks import CHIN, EYE_OUTER_LEFT, EYE_OUTER_RIGHT
+from tts2face.models.talker import ShapeModel
 
 FEATURES = (
     "opening", "width", "lip height", "chin", "upper lip", "lower lip", "inner width", "corner height",
 )  # fmt: skip
+LANDMARKS = (0, 13, 14, 17, 61, 78, 82, 87, 291, 308, 312, 317, CHIN)  # that `landmark_features` reads
 DRIFT_S = 8.0  # slower changes are posture and camera, not speech
 DRIFT_SIGMA = 0.4  # standard deviation of the Gaussian of the drift, of `DRIFT_S`
 EYE_SIGMA_S = 0.4  # smoothing of the eye distance: dlib's landmarks jitter by 1.3 px
@@ -26,7 +28,7 @@ def landmark_features(landmarks: NDArray[np.floating], neutral: NDArray[np.float
 
     ``neutral`` (478, 3) gives the distance of the eyes.
     """
-    eyes = float(np.linalg.norm(neutral[EYE_OUTER_RIGHT] - neutral[EYE_OUTER_LEFT]))
+    eyes = float(np.sqrt(np.square(neutral[EYE_OUTER_RIGHT] - neutral[EYE_OUTER_LEFT], dtype=np.float64).sum()))
     y = -landmarks[..., 1].astype(np.float64) / eyes
 
     def distance(one: int, other: int) -> Floats:
@@ -38,6 +40,20 @@ def landmark_features(landmarks: NDArray[np.floating], neutral: NDArray[np.float
         opening, distance(61, 291), y[:, 17] - y[:, 0], y[:, CHIN], y[:, 0], y[:, 17], distance(78, 308), corners,
     )  # fmt: skip
     return np.stack(columns, axis=1)
+
+
+def parameter_features(parameters: NDArray[np.floating], model: ShapeModel) -> Floats:
+    """(T, 8) `FEATURES` of shape parameters (T, m) of the first m modes of a model.
+
+    Summed mode by mode instead of with BLAS, so that networks learnt from them have the same bytes with any number of
+    threads.
+    """
+    seen = list(LANDMARKS)
+    points = np.zeros((len(parameters), *model.mean.shape))
+    points[:, seen] = model.mean[seen]
+    for values, mode in zip(parameters.T.astype(np.float64), model.basis, strict=False):
+        points[:, seen] += values[:, None, None] * mode[seen]
+    return landmark_features(points, model.mean)
 
 
 def track_features(points: NDArray[np.floating], fps: float) -> Floats:

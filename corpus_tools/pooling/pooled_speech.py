@@ -13,7 +13,7 @@ from corpus_tools.pooling.lip_alignment import (
     alignment_features,
     fit_part_model,
 )
-from corpus_tools.pooling.lip_features import landmark_features
+from corpus_tools.pooling.lip_features import parameter_features
 from corpus_tools.pooling.lip_tracks import LipTrack
 from corpus_tools.training.feature_table import feature_table
 from lexicon.phones import ARPABET
@@ -92,7 +92,7 @@ def _talker_speech(talker: Talker) -> list[LipSpeech]:
 def talker_features(talker: Talker, at: int) -> NDArray[np.float64]:
     """(T, 8) lip features of a talker's utterance."""
     model = talker.model
-    return landmark_features(model.shapes(talker.utterances[at].shape[:, : model.n_speech]), model.mean)
+    return parameter_features(talker.utterances[at].shape[:, : model.n_speech], model)
 
 
 def _z_score(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -114,6 +114,17 @@ def draw_svg(draw: Draw, width: float, height: float, name: str) -> str:
     )
 
 
+def draw_svg_file(draw: Draw, width: float, height: float, name: str) -> bytes:
+    """A figure of a size in px as an SVG file on white; `name` is its accessible name."""
+    element = draw_svg(draw, width, height, name)
+    for colour, variable in THEME.items():
+        element = element.replace(variable, colour)
+    head, _, content = element.partition(">")
+    return (
+        f'{head} xmlns="http://www.w3.org/2000/svg"><rect width="100%" height="100%" fill="white"/>{content}'.encode()
+    )
+
+
 def draw_png(draw: Draw, width: float, height: float) -> bytes:
     """A figure of a size in px as PNG bytes, `PNG_SCALE` pixels per px, on white."""
     file = BytesIO()

@@ -30,6 +30,9 @@ ABOUT = {
     True: "{n_test} utterances of another talker with their own phone edges, {n_train} training utterances; each "
     "talker's curves are z-scored over the talker's speech.",
 }
+ABOUT_AS_TRACKED = (
+    "The same motion against landmarks that are not corrected for the head's pose; training uses corrected ones."
+)
 ABOUT_OWN = (
     "Words spoken by the default English voice with its own durations, mapped to the recorded times word by word. "
     "DTW cost, free: on the voice's own time axis, without a band."
@@ -47,6 +50,7 @@ def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
         [
             f"<p>{about} Parentheses: {CONFIDENCE:.0%} bootstrap intervals over utterances.</p>",
             _figures(result.scores),
+            *_as_tracked(result.as_tracked),
             *_own_durations(result.own),
             *_folds(result),
             "<h2>By class of phone</h2>",
@@ -67,6 +71,11 @@ def evaluation_page(result: Evaluation, runs: Sequence[SplitResult]) -> str:
 def _figures(scores: Sequence[Scores]) -> str:
     head, *rows = figure_rows(scores, intervals=True)
     return table(head, rows, numbers=range(1, len(head)))
+
+
+def _as_tracked(scores: Sequence[Scores]) -> Iterator[str]:
+    if scores:
+        yield f"<h2>Recorded face as tracked</h2>\n{paragraphs(ABOUT_AS_TRACKED)}\n{_figures(scores)}"
 
 
 def _own_durations(scores: Sequence[Scores]) -> Iterator[str]:

@@ -81,7 +81,7 @@ def picture_tag(pixels: NDArray[np.uint8], height: int) -> str:
 
 
 Writer = TypeVar("Writer")
-PLOT_SUFFIXES = (".html", ".png")  # kinds of file that hold plots
+PLOT_SUFFIXES = (".html", ".png", ".svg")  # kinds of file that hold plots
 
 
 def report_writer(out: Path, writers: Mapping[str, Writer]) -> Writer:

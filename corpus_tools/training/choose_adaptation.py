@@ -14,13 +14,16 @@ from corpus_tools.recordings.observation import Observation
 from corpus_tools.training.adapt_talker import NO_CHANGE, Adaptation, Base, base_lips, combined_shapes, learn_base_map
 from corpus_tools.training.base_map import frame_terms
 from corpus_tools.training.train_talker import learn_talker
-from tts2face.models.talker import ShapeModel
+from tts2face.models.talker import ShapeModel, Talker
 from tts2face.types import Progress
 
 MAX_FOLDS = 5
 # Wanted deviation of the opening over the real one: larger motion costs little up to here (docs/decisions/131-base.md).
 RANGE_RATIO = 0.85
 MAX_GAIN = 1.5
+# Power of the gain: maps of the folds are learnt from fewer sentences than the final one and move less; with the whole
+# gain, talkers of 10 to 25 s cost more than the base alone (docs/decisions/131-base.md).
+GAIN_POWER = 0.5
 BASE_ONLY = Adaptation(trust=1.0, penalty=NO_CHANGE)
 # Trust and penalty that were best from 10 s on in another speaker's learning curve, and more careful ones
 # (docs/decisions/131-base.md).
@@ -95,7 +98,8 @@ def choose_adaptation(
     learners: dict[str, Learner] = {
         _name(adaptation): _adapted_learner(base, adaptation, lips, models) for adaptation in ADAPTATIONS
     }
-    learners |= {name: _own_learner(method) for name, method in OWN_METHODS.items()}
+    talkers: dict[tuple[str, ...], Talker] = {}  # of each fold
+    learners |= {name: _own_learner(method, talkers) for name, method in OWN_METHODS.items()}
     scores = {}
     for done, (name, learner) in enumerate(learners.items(), start=1):
         scores[name] = cross_validate(learner, observations)
@@ -105,7 +109,7 @@ def choose_adaptation(
     if not scores[_name(best)].is_surely_better(scores[_name(BASE_ONLY)]):
         return ChosenAdaptation(BASE_ONLY, scores[_name(BASE_ONLY)], scores)
     score = scores[_name(best)]
-    gain = float(np.clip(RANGE_RATIO / max(score.range_ratio, 1e-9), 1.0, MAX_GAIN))
+    gain = float(np.clip(RANGE_RATIO / max(score.range_ratio, 1e-9), 1.0, MAX_GAIN)) ** GAIN_POWER
     return ChosenAdaptation(replace(best, gain=gain), score, scores)
 
 
@@ -155,9 +159,10 @@ def _adapted_learner(
     return learn
 
 
-def _own_learner(method: str) -> Learner:
+def _own_learner(method: str, talkers: dict[tuple[str, ...], Talker]) -> Learner:
     def learn(known: Sequence[Observation]) -> Synthesis:
-        talker = learn_talker(known, metadata={"name": "held out"})
+        names = tuple(one.name for one in known)
+        talker = talkers[names] = talkers.get(names) or learn_talker(known, metadata={"name": "held out"})
         motion = build_methods(talker)[method]
         model: ShapeModel = talker.model
         return lambda one: model.shapes(motion(one.phones, len(one.landmarks), one.fps))

@@ -83,11 +83,17 @@ def network_outputs(
     weights: Weights, table: Floats, shown: NDArray[np.int32], position: Floats, speaker: int
 ) -> Floats:
     """Outputs (N, D) for samples of one speaker."""
-    phone_rows = np.zeros((*shown.shape[1:], len(table), weights[0].shape[2]), np.float32)
-    _code_phones(table, weights[0], phone_rows)
+    phone_rows = phone_layer(weights, table)
     outputs = np.zeros((len(shown), weights[5].shape[1]), np.float32)
     _forward_all(shown, position, speaker, phone_rows, weights, outputs)
     return outputs
+
+
+def phone_layer(weights: Weights, table: Floats) -> Floats:
+    """(C, P, H) first layer for one-hot codes of the phones."""
+    phone_rows = np.zeros((len(weights[0]), len(table), weights[0].shape[2]), np.float32)
+    _code_phones(table, weights[0], phone_rows)
+    return phone_rows
 
 
 def _initial_weights(

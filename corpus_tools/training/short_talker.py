@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from corpus_tools.evaluation.fingerprints import find_same, fingerprint_observations, fingerprint_talker
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.training.adapt_talker import Base, adapted_talker
 from corpus_tools.training.choose_adaptation import ChosenAdaptation, choose_adaptation
@@ -13,7 +14,7 @@ from lexicon.sequence import SILENCE
 from tts2face.models.talker import Talker, load_talker
 from tts2face.types import Progress
 
-MIN_OWN_MINUTES = 10.0  # from here on a talker is learnt from its own recordings alone
+MIN_OWN_MINUTES = 10.0  # from here on a talker needs only the networks of a base
 NO_BASE = "none"
 MIN_TOKENS = 3  # of a phone; with fewer it is recommended for recording
 MIN_CONTEXTS = 3  # different pairs of neighbours of a phone, likewise
@@ -32,11 +33,15 @@ NOT_STATED = "not stated"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShortTalker:
-    """A talker with the utterances of the recordings first (``n_own``) and those of the base behind them."""
+    """A talker with the utterances of the recordings first (``n_own``) and those of the base behind them.
+
+    ``notes`` state what to expect of it.
+    """
 
     talker: Talker
     n_own: int
     chosen: ChosenAdaptation
+    notes: tuple[str, ...]
 
 
 def needs_base(observations: Sequence[Observation]) -> bool:
@@ -67,15 +72,28 @@ def learn_short_talker(
     DataError
         The base is damaged.
     """
-    indexed = Base.of(load_talker(base))
+    known = load_talker(base)
+    indexed = Base.of(known)
     chosen = choose_adaptation(indexed, observations, on_progress=on_progress)
     talker = adapted_talker(indexed, observations, chosen.adaptation, metadata)
     stated = {
         **metadata,
-        **_statements_of_both(metadata, indexed.talker.metadata),
+        **statements_of_both(metadata, indexed.talker.metadata),
         "base": _base_metadata(indexed, chosen),
     }
-    return ShortTalker(replace(talker, metadata=stated), len(observations), chosen)
+    notes = (chosen.message, *_known_recordings(known, base, observations))
+    return ShortTalker(replace(talker, metadata=stated), len(observations), chosen, notes)
+
+
+def _known_recordings(known: Talker, base: str, observations: Sequence[Observation]) -> tuple[str, ...]:
+    """A note if the base was learnt from some of the recordings, whose held-out figures are then too good."""
+    same = find_same(fingerprint_talker(known), fingerprint_observations(observations))
+    if not same:
+        return ()
+    return (
+        f"the base {base} was learnt from {len(same)} of these recordings ({same[0][0]}, there as {same[0][1]}): the "
+        f"expected figures are too high; give another base, or `--base {NO_BASE}`",
+    )
 
 
 def recording_advice(observations: Sequence[Observation]) -> tuple[str, ...]:
@@ -99,7 +117,7 @@ def recording_advice(observations: Sequence[Observation]) -> tuple[str, ...]:
     return tuple(advice)
 
 
-def _statements_of_both(own: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, str]:
+def statements_of_both(own: Mapping[str, Any], base: Mapping[str, Any]) -> dict[str, str]:
     """Sources, licence and attribution of the recordings and of the base."""
     return {
         name: f"recordings: {own.get(name, NOT_STATED)}; base: {base.get(name, NOT_STATED)}" for name in STATED_BY_BOTH

@@ -1,12 +1,14 @@
-"""Networks from phones to speech parameters, trained on a talker's utterances, with or without another speaker's lips.
+"""Networks from phones to speech parameters, trained on a talker's utterances, with or without other lips.
 
 The inputs of some are one-hot codes of phones, those of the others articulatory features
 (`lexicon.phones.phone_features`), which generalise to unseen phones; their first layer is multiplied by the
 feature table, so that the talker's file holds all networks in the same form.
 
-With pooled speech, the networks have further outputs, the lip features of `corpus_tools.pooling`, z-scored per speaker.
+With pooled speech, which is that of another speaker or of a base talker's networks, they have further outputs, the lip
+features of `corpus_tools.pooling`, z-scored per speaker.
 Both speakers share all weights but the biases of the first layer; the talker's parameters are learnt from the talker
-only. What remains of the other speaker is his influence on the shared weights: his features and biases are not stored.
+only, and then corrected to show the talker's opening and width as the network predicts them. What remains of the other
+speaker is his influence on the weights: his features and biases are not stored.
 """
 
 from collections.abc import Sequence
@@ -18,7 +20,13 @@ from numpy.typing import NDArray
 from corpus_tools.evaluation.measures import speech_frames
 from corpus_tools.pooling.pooled_speech import PooledSpeech, pooled_inventory, talker_features
 from corpus_tools.training.feature_table import feature_table
-from corpus_tools.training.network_training import TrainingOptions, Weights, WindowSamples, train_network
+from corpus_tools.training.network_training import (
+    TrainingOptions,
+    Weights,
+    WindowSamples,
+    phone_layer,
+    train_network,
+)
 from lexicon.sequence import SILENCE
 from tts2face.models.phone_network import PhoneNetwork, window_features
 from tts2face.models.talker import Talker
@@ -27,7 +35,10 @@ from tts2face.types import Progress
 SILENCE_MARGIN_S = 0.2  # of silence around speech in the training data
 TRAINING = TrainingOptions(hidden=(96, 96), n_epochs=10, weight_decay=1e-4)
 N_BY_LABEL, N_BY_FEATURES = 1, 3  # networks of one speaker; features are better on unseen words (accuracy.md)
-N_POOLED_BY_LABEL, N_POOLED_BY_FEATURES = 2, 2  # with pooled speech, which holds every phone (accuracy.md)
+N_POOLED_BY_LABEL, N_POOLED_BY_FEATURES = 4, 4  # with pooled speech, which holds every phone (accuracy.md)
+N_FOLLOWED = 2  # features that the parameters follow: opening and width; all eight cost more on held-out words
+FEATURE_NOISE = 0.1  # variance of the error of a predicted feature, of z-scored ones; .03 and 1 are similar
+LEAST_VARIANCE = 1e-9  # of the largest; a parameter that hardly varies explains no feature
 MIN_FRAMES = 3000  # two minutes; networks from less are no better than exemplars
 Floats = NDArray[np.float32]
 
@@ -51,6 +62,8 @@ def add_phone_network(
     networks = []
     for seed, table in enumerate(tables):
         weights = train_network(samples, table, importance, options=TRAINING, seed=seed)
+        if pooled:
+            weights = follow_features(weights, own[2], n_speech)
         networks.append(expand_to_phones(weights, table, n_speech, spread))
         if on_progress:
             on_progress(seed + 1, len(tables))
@@ -114,12 +127,40 @@ def _join(
     return WindowSamples(shown.astype(np.int32), position, targets, speaker), importance
 
 
+def follow_features(weights: Weights, targets: Floats, n_speech: int) -> Weights:
+    """Weights of a network whose speech parameters show the opening and width that it predicts for the talker.
+
+    Parameters
+    ----------
+    targets : (N, D)
+        The talker's parameters in units of the spread, then the lip features.
+
+    Notes
+    -----
+    Both speakers teach the features, the talker alone the parameters: in contexts that the talker lacks, the features
+    are the better prediction. They are linear in the parameters (regression on the targets), so that the difference of
+    the two predictions is linear in the last hidden layer. The regression of the parameters on the features turns it
+    into a correction of the parameters' weights. Where both predictions agree, nothing changes.
+    """
+    lips = slice(n_speech, n_speech + N_FOLLOWED)
+    covariance = np.cov(targets.T.astype(np.float64))
+    own, mixed = covariance[:n_speech, :n_speech], covariance[:n_speech, lips]
+    to_features = np.linalg.pinv(own, rcond=LEAST_VARIANCE, hermitian=True) @ mixed
+    to_parameters = np.linalg.solve(covariance[lips, lips] + FEATURE_NOISE * np.eye(N_FOLLOWED), mixed.T)
+    outputs = np.vstack([weights[5], weights[6] - targets.mean(axis=0, dtype=np.float64)])
+    correction = (outputs[:, lips] - outputs[:, :n_speech] @ to_features) @ to_parameters
+    outer, biases = weights[5].copy(), weights[6].copy()
+    outer[:, :n_speech] += correction[:-1].astype(np.float32)
+    biases[:n_speech] += correction[-1].astype(np.float32)
+    return (*weights[:5], outer, biases)
+
+
 def expand_to_phones(
     weights: Weights, table: Floats, n_speech: int, spread: Floats
 ) -> tuple[list[Floats], list[Floats]]:
     """Layers and biases of the talker's network for one-hot phones, with its parameters in mm."""
-    phone_weights, place, biases, inner, inner_biases, outer, outer_biases = weights
-    first = np.concatenate([*(table @ each for each in phone_weights), place])
+    _, place, biases, inner, inner_biases, outer, outer_biases = weights
+    first = np.concatenate([*phone_layer(weights, table), place])
     layers = [first, inner, outer[:, :n_speech] * spread]
     every = [layers, [biases[0], inner_biases, outer_biases[:n_speech] * spread]]
     return [one.astype(np.float32) for one in every[0]], [one.astype(np.float32) for one in every[1]]

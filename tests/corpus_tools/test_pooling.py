@@ -10,12 +10,12 @@ from cli.main import run
 from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
 from corpus_tools.pool_talker import pool_talker
 from corpus_tools.pooling.lip_alignment import LipSpeech, align_phones, alignment_features, fit_part_model
-from corpus_tools.pooling.lip_features import FEATURES, landmark_features, track_features
+from corpus_tools.pooling.lip_features import FEATURES, landmark_features, parameter_features, track_features
 from corpus_tools.pooling.lip_tracks import LipTrack, SpokenPhone, read_lip_tracks
 from corpus_tools.pooling.pooled_speech import align_lip_tracks, spoken_sequence
 from corpus_tools.training.feature_table import feature_table
 from corpus_tools.training.network_training import TrainingOptions
-from corpus_tools.training.train_phone_network import add_phone_network
+from corpus_tools.training.train_phone_network import FEATURE_NOISE, add_phone_network, follow_features
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE
@@ -166,6 +166,12 @@ def test_both_schemes_measure_the_same_distances() -> None:
     np.testing.assert_allclose(features[:, 1], width, rtol=1e-5)
 
 
+def test_features_of_parameters_are_those_of_their_landmarks(talker: Talker) -> None:
+    parameters = talker.utterances[0].shape[:, : talker.model.n_speech]
+    expected = landmark_features(talker.model.shapes(parameters), talker.model.mean)
+    np.testing.assert_allclose(parameter_features(parameters, talker.model), expected, atol=1e-6)  # float32 landmarks
+
+
 PHONE_ROWS = "\n".join(
     (
         "start_s\tend_s\tphone\tword",
@@ -229,6 +235,36 @@ def test_pooled_networks_know_phones_of_both_speakers(talker: Talker, monkeypatc
     assert again.network is not None
     for one, other in zip(trained.network.weights, again.network.weights, strict=True):
         assert one.tobytes() == other.tobytes()
+
+
+def test_parameters_follow_the_features_that_a_network_predicts() -> None:
+    """Two features that are linear in three parameters; the network's own prediction of them is drawn to the other.
+
+    The minimum of the sum of both errors in single frames cannot share a mistake with the folded weights.
+    """
+    stream = np.random.default_rng(4)
+    parameters = stream.normal(size=(4000, 3)) * [1.0, 0.7, 0.4] + [0.2, -0.1, 0.3]
+    to_features = stream.normal(size=(3, 2))
+    targets = np.hstack([parameters, parameters @ to_features, stream.normal(size=(4000, 6))]).astype(np.float32)
+    layers = [stream.normal(size=shape).astype(np.float32) for shape in ((1, 2, 5), (4, 5), (1, 5), (5, 6), (6,))]
+    outer, biases = (stream.normal(size=shape).astype(np.float32) for shape in ((6, 11), (11,)))
+    made = follow_features((*layers, outer, biases), targets, 3)
+    for before, after in zip(layers, made[:5], strict=True):
+        assert before is after
+    hidden = stream.uniform(size=(50, 6)).astype(np.float32)
+    plain, drawn = hidden @ outer + biases, hidden @ made[5] + made[6]
+    np.testing.assert_array_equal(drawn[:, 3:], plain[:, 3:])
+    precision = np.linalg.inv(np.cov(targets[:, :3].T.astype(np.float64)))
+    for one, other in zip(plain.astype(np.float64), drawn.astype(np.float64), strict=True):
+        offset = targets[:, 3:5].mean(axis=0) - targets[:, :3].mean(axis=0) @ to_features
+
+        def loss(change: np.ndarray, one: np.ndarray = one, offset: np.ndarray = offset) -> float:
+            apart = one[3:5] - ((one[:3] + change) @ to_features + offset)
+            return float(change @ precision @ change + apart @ apart / FEATURE_NOISE)
+
+        best = loss(other[:3] - one[:3])
+        for _ in range(10):
+            assert loss(other[:3] - one[:3] + stream.normal(size=3) * 0.02) > best
 
 
 def test_the_command_keeps_all_of_the_talker_but_its_networks(

@@ -13,13 +13,14 @@ from tts2face.exemplar.contacts import (
     contact_rule,
     enforce_contacts,
     find_contacts,
+    shown_contact,
 )
 from tts2face.exemplar.options import THEOBALD_2007, SynthesisOptions
 from tts2face.exemplar.phone_substitution import Targets
 from tts2face.exemplar.synthesis import ExemplarModel
 from tts2face.exemplar.tokens import spans_with_reach
 
-GAP = LipGap(np.zeros(3, np.float32), np.array([[0.0, 1.0, 0.0]], np.float32))
+GAP = LipGap.with_spread(np.zeros(3, np.float32), np.array([[0.0, 1.0, 0.0]], np.float32), np.ones(1))
 
 
 def targets(*edges):
@@ -113,7 +114,7 @@ def test_phones_with_lip_contact_are_found():
 def test_a_contact_closes_lips_that_averaging_opened():
     values = np.full((100, 1), 4.0, np.float32)
     values[45:56, 0] = 2.0
-    contact = Contacts(np.array([[0.46, 0.54]]), np.array([[0.1]], np.float32), np.array([0.1], np.float32))
+    contact = Contacts(np.array([[0.46, 0.54]]), np.array([[0.0, 0.1, 0.0]], np.float32), np.array([0.1], np.float32))
     kept = enforce_contacts(values, contact, GAP, 100.0)
     low = int(kept[:, 0].argmin())
     assert 43 <= low <= 57
@@ -125,7 +126,7 @@ def test_a_contact_closes_lips_that_averaging_opened():
 
 def test_a_closed_contact_is_not_changed():
     values = np.full((100, 1), 0.05, np.float32)
-    contact = Contacts(np.array([[0.46, 0.54]]), np.array([[0.1]], np.float32), np.array([0.1], np.float32))
+    contact = Contacts(np.array([[0.46, 0.54]]), np.array([[0.0, 0.1, 0.0]], np.float32), np.array([0.1], np.float32))
     assert (enforce_contacts(values, contact, GAP, 100.0) == values).all()
     beyond = replace(contact, spans=np.array([[5.0, 5.1]]), enough=np.zeros(1, np.float32))
     assert (enforce_contacts(values + 1, beyond, GAP, 100.0) == values + 1).all()
@@ -133,8 +134,45 @@ def test_a_closed_contact_is_not_changed():
     assert (enforce_contacts(values + 1, lenient, GAP, 100.0) == values + 1).all()
 
 
-def test_poses_are_taken_where_each_token_is_closest(voice: ExemplarModel):
-    """Two p tokens, and one that never closes: the pose is the weighted mean of the closed ones."""
+def test_a_contact_changes_the_gap_by_the_least_motion_and_nothing_else():
+    """Closed form for one axis: the change along ``spread**2 * basis`` that closes the gap; oracle: random changes."""
+    stream = np.random.default_rng(3)
+    basis, spread = stream.normal(size=(4, 3)), np.array([2.0, 1.0, 0.5, 0.2])
+    basis[:, ::2] = 0.0
+    gap = LipGap.with_spread(np.zeros(3, np.float32), basis.astype(np.float32), spread)
+    values = np.tile(stream.normal(size=4).astype(np.float32), (100, 1))
+    contact = Contacts(np.array([[0.46, 0.54]]), np.zeros((1, 3), np.float32), np.zeros(1, np.float32))
+    moved = (enforce_contacts(values, contact, gap, 100.0) - values).astype(np.float64)
+    at = int(np.abs(moved[:, 0]).argmax())
+    axis = basis[:, 1]
+    np.testing.assert_allclose(moved[at], -(values[0] @ axis) / (spread**2 @ axis**2) * spread**2 * axis, atol=1e-5)
+    for _ in range(20):  # any other change that closes the gap is larger in units of the spread
+        other = stream.normal(size=4)
+        other += (moved[at] - other) @ axis / (axis @ axis) * axis
+        assert np.linalg.norm(other / spread) > np.linalg.norm(moved[at] / spread)
+
+
+def test_directions_in_which_lips_hardly_move_are_not_corrected():
+    """Sideways a parameter moves the gap by 0.05 mm, in height another one by 1 mm."""
+    basis = np.array([[0.05, 0.0, 0.0], [0.0, 1.0, 0.0]], np.float32)
+    gap = LipGap.with_spread(np.array([0.3, 0.0, 0.0], np.float32), basis, np.ones(2))
+    values = np.tile(np.array([0.5, 2.0], np.float32), (100, 1))
+    contact = Contacts(np.array([[0.46, 0.54]]), np.zeros((1, 3), np.float32), np.zeros(1, np.float32))
+    kept = enforce_contacts(values, contact, gap, 100.0)
+    assert (kept[:, 0] == values[:, 0]).all()
+    np.testing.assert_allclose(kept[:, 1].min(), 0.0, atol=1e-6)
+
+
+def test_a_replaced_phone_has_only_contacts_of_its_own_kind():
+    assert shown_contact("m", "b") is CONTACT_RULES["bilabial"]
+    assert shown_contact("v", "f") is CONTACT_RULES["labiodental"]
+    assert shown_contact("pf", "p") is CONTACT_RULES["bilabial"]
+    assert shown_contact("f", "p") is None
+    assert shown_contact("t", "p") is None
+
+
+def test_gaps_are_taken_where_each_token_is_closest(voice: ExemplarModel):
+    """Two p tokens, and one that never closes: the gap is that of the weighted mean of the closed ones."""
     label = voice.tokens.inventory.index("p")
     p = np.flatnonzero(voice.tokens.phone == label)[:2]
     open_one = np.flatnonzero(voice.tokens.phone == voice.tokens.inventory.index("ɑ"))[0]
@@ -150,6 +188,8 @@ def test_poses_are_taken_where_each_token_is_closest(voice: ExemplarModel):
         times = np.arange(last - first) / voice.tokens.fps
         near = (times >= voice.tokens.spans[token, 1] - 0.03) & (times <= voice.tokens.spans[token, 2] + 0.03)
         least.append(np.abs(frames[first:last][near, 0]).min())
-    assert contacts_with(0.0).poses[0, 0] == pytest.approx(np.mean(least[:2]), abs=1e-5)
+    mean = np.zeros((1, frames.shape[1]), np.float32)
+    mean[0, 0] = np.mean(least[:2])
+    np.testing.assert_allclose(contacts_with(0.0).gaps, voice.lip_gap.vectors(mean), atol=1e-5)
     assert contacts_with(0.7).enough[0] == pytest.approx(max(least[:2]), abs=1e-5)
     assert contacts_with(0.9).enough[0] == pytest.approx(least[2], abs=1e-5)

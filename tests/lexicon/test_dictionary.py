@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lexicon import dictionary
-from lexicon.dictionary import cmudict_lookup, parse_dictionary, read_dictionary
+from lexicon.dictionary import cmudict_lookup, cmudict_words, parse_dictionary, read_dictionary
 from lexicon.errors import DataError
 
 
@@ -86,3 +86,10 @@ def test_files(tmp_path: Path) -> None:
     path.write_bytes(b"w\xff")
     with pytest.raises(DataError, match=r"is not UTF-8 text \(byte 1\)"):
         read_dictionary(path)
+
+
+def test_every_word_of_cmudict_is_found_in_it() -> None:
+    words = cmudict_words()
+    assert len(words) == len(set(words)) > 100_000
+    assert {"zoo", "measure", "o'neill"} < set(words)
+    assert all(cmudict_lookup(word) for word in words[::500])

@@ -37,19 +37,39 @@ CONTACT_RULES = {
 MANNERS_WITHOUT_CONTACT = frozenset({"approximant"})  # narrowed, not closed
 CONTACT_MARGIN_S = 0.03  # a closure may lie this far outside its phone's edges (video frames are 40 ms, edges +- 10 ms)
 CONTACT_HOLD_S = 0.03  # minimum duration of a contact; a shorter one can fall between two frames at 30 fps
+LEAST_MOBILITY = (
+    0.1  # of the largest; along other directions (sideways, in depth) lips hardly move and are not corrected
+)
 CONTACT_EASE_S = 0.05  # transition before and after; a longer one changes vowels (0.06: r of opening falls by .001)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LipGap:
-    """Distance between two landmarks under a linear model: ``|rest + parameters @ basis|``, (3,) and (D, 3)."""
+    """Vector between two landmarks under a linear model: ``rest + parameters @ basis``, (3,) and (D, 3), in mm.
+
+    ``change`` (3, D) is the least change of the parameters, in units of their spread, that changes the vector by 1 mm
+    along each axis, as far as the talker's lips move along it.
+    """
 
     rest: NDArray[np.float32]
     basis: NDArray[np.float32]
+    change: NDArray[np.float32]
+
+    @classmethod
+    def with_spread(
+        cls, rest: NDArray[np.float32], basis: NDArray[np.float32], spread: NDArray[np.floating]
+    ) -> "LipGap":
+        """The gap of parameters with standard deviations `spread` (D,)."""
+        change = np.linalg.pinv(spread[:, None].astype(np.float64) * basis, rcond=LEAST_MOBILITY) * spread
+        return cls(rest, basis, change.astype(np.float32))
+
+    def vectors(self, parameters: NDArray[np.floating]) -> NDArray[np.float32]:
+        """(T, 3) mm for (T, D) parameters."""
+        return np.asarray(self.rest + parameters.astype(np.float32) @ self.basis)
 
     def of(self, parameters: NDArray[np.floating]) -> NDArray[np.float32]:
-        """(T,) mm for (T, D) parameters."""
-        return np.asarray(np.linalg.norm(self.rest + parameters.astype(np.float32) @ self.basis, axis=1))
+        """(T,) lengths in mm for (T, D) parameters."""
+        return np.asarray(np.linalg.norm(self.vectors(parameters), axis=1))
 
 
 def contact_rule(label: str) -> ContactRule | None:
@@ -58,12 +78,19 @@ def contact_rule(label: str) -> ContactRule | None:
     return None if phone.manner in MANNERS_WITHOUT_CONTACT else CONTACT_RULES.get(phone.place)
 
 
+def shown_contact(requested: str, shown: str) -> ContactRule | None:
+    """Contact rule of the recorded phone that shows a requested one; None if the requested one has no such contact."""
+    parts = look_up_phone(requested).parts or (requested,)
+    rule = contact_rule(shown)
+    return rule if rule in [contact_rule(part) for part in parts] else None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Contacts:
-    """C lip contacts: spans (C, 2) of their phones in seconds, poses (C, D), and gap thresholds (C,) in mm."""
+    """C lip contacts: spans (C, 2) of their phones in seconds, gaps (C, 3), and gap thresholds (C,), both in mm."""
 
     spans: NDArray[np.float64]
-    poses: NDArray[np.float32]
+    gaps: NDArray[np.float32]
     enough: NDArray[np.float32]
 
 
@@ -81,8 +108,9 @@ def find_contacts(
 ) -> Contacts:
     """Contacts of N phones with spans (N, 2) in seconds and one rule each.
 
-    A pose averages the exemplars with the smallest gaps, each at its own frame of least gap. The other exemplars are
-    excluded because a tenth of the recorded contacts falls between two frames or is missed by the alignment.
+    The gap is that of the average of the exemplars with the smallest gaps, each at its own frame of least gap. The
+    other exemplars are excluded because a tenth of the recorded contacts falls between two frames or is missed by the
+    alignment.
     """
     tokens, chosen, weights = exemplars.tokens, exemplars.chosen, exemplars.weights
     rows, squared = np.zeros(chosen.shape, np.int64), np.full(chosen.shape, np.inf)
@@ -95,11 +123,11 @@ def find_contacts(
     is_used = closer_than < np.array([rule.pose_share for rule in rules])[:, None]
     np.put_along_axis(kept, order, np.where(is_used, sorted_weights, 0.0), axis=1)
     kept /= kept.sum(axis=1, keepdims=True)
-    poses = np.asarray(np.einsum("nk,nkd->nd", kept, tokens.frames[rows]), np.float32)
+    mean_gaps = gap.vectors(np.einsum("nk,nkd->nd", kept, tokens.frames[rows]))
     present = (closer_than <= np.array([rule.enough for rule in rules])[:, None]) & (sorted_weights > 0)
     gaps = np.sqrt(np.take_along_axis(squared, order, axis=1))
     enough = np.where(present, gaps, 0.0).max(axis=1).astype(np.float32)
-    return Contacts(spans, poses, np.maximum(enough, gap.of(poses)))
+    return Contacts(spans, mean_gaps, np.maximum(enough, np.linalg.norm(mean_gaps, axis=1)))
 
 
 @kernel
@@ -140,12 +168,13 @@ def enforce_contacts(
 ) -> NDArray[np.float32]:
     """(T, D) values at `rate_hz` with the lip gap reduced to the threshold of each contact.
 
-    Around the time of least gap, the motion is replaced by the pose of the contact for `CONTACT_HOLD_S`, with
-    transitions of `CONTACT_EASE_S`. Contacts whose gap is below the threshold are unchanged.
+    Around the time of least gap, the gap is that of the contact for `CONTACT_HOLD_S`, with transitions of
+    `CONTACT_EASE_S`; the parameters change as little as possible, so that the width of the lips follows the context.
+    Contacts whose gap is below the threshold are unchanged.
     """
     kept = values.copy()
     times = np.arange(len(values)) / rate_hz
-    for (start, end), pose, enough in zip(contacts.spans, contacts.poses, contacts.enough, strict=True):
+    for (start, end), closed, enough in zip(contacts.spans, contacts.gaps, contacts.enough, strict=True):
         low, high = np.searchsorted(times, (start - CONTACT_MARGIN_S, end + CONTACT_MARGIN_S))
         if low >= high:
             continue
@@ -157,5 +186,5 @@ def enforce_contacts(
         here = slice(max(0, at - reach), min(len(kept), at + reach + 1))
         distance = np.maximum(np.abs(times[here] - times[at]) - CONTACT_HOLD_S / 2, 0.0) / CONTACT_EASE_S
         pull = (0.5 + 0.5 * np.cos(np.pi * np.minimum(distance, 1.0)))[:, None].astype(np.float32)
-        kept[here] += pull * (pose - kept[here])
+        kept[here] += pull * ((closed - gap.vectors(kept[here])) @ gap.change)
     return kept

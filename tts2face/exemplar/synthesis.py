@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar import blending
-from tts2face.exemplar.contacts import ChosenExemplars, LipGap, contact_rule, enforce_contacts, find_contacts
+from tts2face.exemplar.contacts import ChosenExemplars, LipGap, enforce_contacts, find_contacts, shown_contact
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.exemplar.phone_substitution import Targets, build_targets, target_phones
 from tts2face.exemplar.similarity import PhoneSimilarity, phone_similarity, token_samples
@@ -73,9 +73,10 @@ def build_exemplar_model(talker: Talker) -> ExemplarModel:
         spread,
         model.rest[:n_speech].astype(np.float32),
         mean_speaking_pose(talker),
-        LipGap(
+        LipGap.with_spread(
             np.ascontiguousarray(model.mean[upper] - model.mean[lower]),
             np.ascontiguousarray(model.basis[:n_speech, upper] - model.basis[:n_speech, lower]),
+            spread,
         ),
         speech_channels(model),
         tuple(utterance.name for utterance in talker.utterances),
@@ -204,7 +205,8 @@ def _blend_motion(
     motion = blending.gaussian_smooth(motion, options.smoothing_s, blending.CLOCK_HZ)
     if not options.contacts:
         return motion
-    rules = [contact_rule(label) for label in targets.labels]
+    requested = [selection.phones.phones[at] for at in targets.source]
+    rules = [shown_contact(*pair) for pair in zip(requested, targets.labels, strict=True)]
     touching = np.array([rule is not None for rule in rules])
     chosen = ChosenExemplars(exemplars.tokens, found.tokens[touching], weights[touching])
     kept = [rule for rule in rules if rule is not None]

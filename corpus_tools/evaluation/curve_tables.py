@@ -1,0 +1,79 @@
+"""Learning curves as Markdown tables and as rows for a CSV file."""
+
+from collections.abc import Iterator
+
+from corpus_tools.evaluation.curve_figures import ChoiceEstimate, CurveDifference, LearningCurve
+from corpus_tools.evaluation.people import FIGURE_HEADS
+from corpus_tools.evaluation.scores import IntervalEstimate
+
+CSV_HEAD = ("table", "seconds", "method", "minus", "figure", "value", "low", "high", "deviation")
+HEADS = dict(FIGURE_HEADS)
+
+
+def curve_tables(curve: LearningCurve) -> str:
+    """Markdown: a table for each figure, the gains of the built talker, and a sentence on the steps."""
+    tables = [f"{head}\n\n{_markdown(figure_rows(curve, name))}" for name, head in FIGURE_HEADS]
+    return "\n\n".join([*tables, _markdown(gain_rows(curve)), monotony(curve)])
+
+
+def figure_rows(curve: LearningCurve, figure: str) -> list[tuple[str, ...]]:
+    """Heads, and a row for each amount: mean and standard deviation over the choices, one method a column."""
+    rows: list[tuple[str, ...]] = [("own material (s)", "choices", *curve.methods)]
+    for point in curve.points:
+        cells = (_estimate_text(point.figures[method][figure]) for method in curve.methods)
+        rows.append((f"{point.seconds:.0f}", str(point.n_choices), *cells))
+    return rows
+
+
+def gain_rows(curve: LearningCurve) -> list[tuple[str, ...]]:
+    """Heads, and a row for each amount and other method: differences of the first method with 95 % intervals."""
+    rows: list[tuple[str, ...]] = [("own material (s)", f"{curve.methods[0]} minus", *HEADS.values())]
+    for one in curve.gains:
+        cells = (_interval_text(one.figures[name]) for name in HEADS)
+        rows.append((f"{one.seconds:.0f}", one.minus, *cells))
+    return rows
+
+
+def monotony(curve: LearningCurve) -> str:
+    """Sentence: whether a figure becomes worse from one amount to the next by more than its interval."""
+    names = curve.methods
+    worse = [_step_text(one) for name in names for one in curve.steps if one.method == name and one.surely_worse()]
+    if not worse:
+        return "No figure becomes worse from one amount to the next by more than its 95 % interval."
+    return f"Worse than with less material by more than the 95 % interval: {'; '.join(worse)}."
+
+
+def curve_rows(curve: LearningCurve) -> Iterator[tuple[str, ...]]:
+    """All figures and differences; the first row names the columns."""
+    yield CSV_HEAD
+    for point in curve.points:
+        for method, figures in point.figures.items():
+            for name, one in figures.items():
+                deviation = "" if one.deviation is None else f"{one.deviation:.6g}"
+                numbers = (f"{one.value:.6g}", f"{one.low:.6g}", f"{one.high:.6g}", deviation)
+                yield "curve", f"{point.seconds:g}", method, "", name, *numbers
+    for table, differences in (("step", curve.steps), ("gain", curve.gains)):
+        for some in differences:
+            minus = f"{some.minus}, {some.minus_seconds:g} s"
+            for name, value in some.figures.items():
+                numbers = (f"{value.value:.6g}", f"{value.low:.6g}", f"{value.high:.6g}", "")
+                yield table, f"{some.seconds:g}", some.method, minus, name, *numbers
+
+
+def _step_text(one: CurveDifference) -> str:
+    figures = ", ".join(HEADS[name] for name in one.surely_worse())
+    return f"{one.method} at {one.seconds:.0f} s ({figures})"
+
+
+def _estimate_text(one: ChoiceEstimate) -> str:
+    value = f"{round(one.value, 3) + 0.0:.3f}"  # no minus before 0.000
+    return value if one.deviation is None else f"{value} ± {one.deviation:.3f}"
+
+
+def _interval_text(one: IntervalEstimate) -> str:
+    return f"{one.value:+.3f} ({one.low:+.3f} to {one.high:+.3f})"
+
+
+def _markdown(rows: list[tuple[str, ...]]) -> str:
+    lines = [f"| {' | '.join(row)} |" for row in rows]
+    return "\n".join([lines[0], "| --- |" + " --- |" * (len(rows[0]) - 1), *lines[1:]])
