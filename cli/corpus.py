@@ -248,7 +248,9 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     recordings: Annotated[
         Path | None, Parameter(help="Folder of recordings to split into training and held-out utterances.")
     ] = None,
-    hold_out: Annotated[int, whole_number("Number of utterances held out of --recordings.")] = 100,
+    hold_out: Annotated[
+        int | None, whole_number("Number of utterances held out of --recordings; by default a fifth, at most 100.")
+    ] = None,
     seed: Annotated[int, whole_number("Seed of the random choice of held-out utterances.")] = 0,
     folds: Annotated[int | None, whole_number("Number of folds for cross-validation, instead of --hold-out.")] = None,
     hold_out_words: Annotated[

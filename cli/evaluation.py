@@ -28,7 +28,7 @@ class SplitFlags:
     """The flags that select training and test recordings."""
 
     recordings: Path | None
-    hold_out: int
+    hold_out: int | None
     seed: int
     folds: int | None
     words: str | None

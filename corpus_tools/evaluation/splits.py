@@ -15,17 +15,25 @@ from lexicon.errors import InputError
 from tts2face.models.talker import Talker
 
 PARTS = "the training and the held-out part"
+HELD_OUT_ONE_IN, MAX_HELD_OUT = 5, 100  # held out by default: a fifth, enough for intervals of .02 of r at 100
 Split = tuple[tuple[Observation, ...], tuple[Observation, ...]]  # training, held out
 
 
-def split_randomly(observations: Sequence[Observation], *, hold_out: int, seed: int) -> Split:
+def split_randomly(observations: Sequence[Observation], *, hold_out: int | None = None, seed: int) -> Split:
     """Training and held-out utterances, drawn by a seed from the sorted names.
+
+    Parameters
+    ----------
+    hold_out
+        Number of held-out utterances; None: a fifth, at least 1 and at most `MAX_HELD_OUT`.
 
     Raises
     ------
     InputError
         `hold_out` is below 1 or not below the number of utterances.
     """
+    if hold_out is None:
+        hold_out = min(MAX_HELD_OUT, max(1, len(observations) // HELD_OUT_ONE_IN))
     if not 0 < hold_out < len(observations):
         raise InputError(
             f"of {len(observations)} utterances, 1 to {len(observations) - 1} can be held out, not {hold_out}"

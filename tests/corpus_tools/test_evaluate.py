@@ -125,6 +125,14 @@ def test_folds_hold_out_every_utterance_once(observations: list[Observation]):
     assert html.count("<td>2 (10 held out, 30 for training)</td>") == 5
 
 
+def test_a_fifth_is_held_out_by_default(observations: list[Observation]):
+    train, test = split_randomly(observations, seed=0)
+    assert (len(train), len(test)) == (32, 8)
+    assert len(split_randomly(observations[:3], seed=0)[1]) == 1
+    many = [replace(observations[0], name=f"v{number}") for number in range(600)]
+    assert len(split_randomly(many, seed=0)[1]) == 100
+
+
 @pytest.mark.parametrize("n_folds", [1, 41])
 def test_refuses_folds_that_cannot_be(observations: list[Observation], n_folds):
     with pytest.raises(InputError, match="40 utterances make 2 to 40 folds"):
