@@ -96,6 +96,8 @@ def run_evaluation(
     if out is not None and out.suffix == ".html":
         load_matplotlib()  # a missing package is reported before the measurement
     result, runs = _evaluate(split_flags, comparison, RunOptions(*run_options))
+    for warning in result.warnings:
+        write_message(f"warning: {warning}")
     print(f"{result.table()}\n\n{result.class_table()}")  # noqa: T201 - the result
     if out is not None:
         _write_evaluation(out, result, runs)

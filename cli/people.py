@@ -35,6 +35,8 @@ def run_people_evaluation(talker: str, people: list[Path], tracks: Path | None, 
     tests = [correct_pose(read_person(folder)) for folder in people]
     external = read_tracks(tracks) if tracks is not None else None
     found = evaluate_people(load_talker(talker), tests, external)
+    for warning in found.warnings:
+        write_message(f"warning: {warning}")
     methods = [name for name in SHOWN_METHODS if name in found.figures]
     tables = (people_table(found), difference_table(found, DEFAULT_METHOD), phone_table(found, methods))
     print("\n\n".join(tables))  # noqa: T201 - the result

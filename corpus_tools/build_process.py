@@ -2,7 +2,8 @@
 
 ``python -m corpus_tools.build_process``, started by `tts2face.jobs.talker_job`: standard input holds one line of JSON,
 fields of `BuildOrder`, and ends with the parent process; lines of JSON on standard output tell the progress (``stage``,
-``done``, ``of``) and at last the result (``n_kept``, ``minutes``, ``refused``) or the ``error`` and its ``message``.
+``done``, ``of``) and at last the result (``n_kept``, ``minutes``, ``refused``, ``warnings``, ``notes``) or the
+``error`` and its ``message``.
 """
 
 import json
@@ -79,8 +80,13 @@ def build(order: BuildOrder, out: TextIO) -> None:
 
 
 def _result(built: BuiltTalker) -> dict[str, Any]:
-    refused = [[refusal.name, refusal.reason] for refusal in built.refused]
-    return {"n_kept": built.n_kept, "minutes": round(built.minutes, 2), "refused": refused}
+    return {
+        "n_kept": built.n_kept,
+        "minutes": round(built.minutes, 2),
+        "refused": [[refusal.name, refusal.reason] for refusal in built.refused],
+        "warnings": [[warning.name, warning.message] for warning in built.warnings],
+        "notes": built.notes,
+    }
 
 
 def _progress(out: TextIO, stage: str) -> Progress:

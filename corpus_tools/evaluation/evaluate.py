@@ -122,11 +122,11 @@ def evaluate(
     Raises
     ------
     InputError
-        A part is empty, an utterance is in both parts, or no words are known for the voice.
+        A part is empty, a recording is in both parts, or no words are known for the voice.
     """
+    warnings = check_disjoint(parts)
     runs = []
     for number, (train, test) in enumerate(parts):
-        check_disjoint(train, test)
         on_split_progress = _split_progress(on_progress, number, len(parts))
         runs.append(
             evaluate_split(
@@ -141,6 +141,7 @@ def evaluate(
         _pooled_scores(runs, limits),
         own=_pooled_own_scores(runs, limits),
         folds=_score_folds(parts, runs, limits) if len(runs) > 1 else (),
+        warnings=warnings,
     )
     return result, tuple(runs)
 
@@ -189,9 +190,9 @@ def evaluate_across_talkers(
     Raises
     ------
     InputError
-        A part is empty, or an utterance is in both parts.
+        A part is empty, or a recording is in both parts.
     """
-    check_disjoint(train, others)
+    warnings = check_disjoint([(tuple(train), tuple(others))])
     train, others = correct_pose(train), correct_pose(others)
     talker = _train_talker(train, lips)
     own_scale, other_scale = SpeakerScale.of(train), SpeakerScale.of(others)
@@ -217,7 +218,7 @@ def evaluate_across_talkers(
         )
         for name in methods
     )
-    result = Evaluation(len(train), len(others), scores, is_across=True)
+    result = Evaluation(len(train), len(others), scores, is_across=True, warnings=warnings)
     return result, (SplitResult(talker, real, synthesised, synthesis_s, scale=own_scale),)
 
 

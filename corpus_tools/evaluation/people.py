@@ -6,7 +6,7 @@ recordings.
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from corpus_tools.evaluation.methods import SynthesisMethod, build_methods
 from corpus_tools.evaluation.paired_bootstrap import PairedCurves, estimate, estimate_difference
 from corpus_tools.evaluation.reference import LipCurves, ReferenceUtterance
 from corpus_tools.evaluation.scores import IntervalEstimate
+from corpus_tools.evaluation.splits import check_unknown
 from corpus_tools.evaluation.tracks import ExternalTrack, map_tracks
 from corpus_tools.recordings.observation import Observation
 from lexicon.errors import InputError
@@ -87,7 +88,7 @@ class PeopleEvaluation:
     """Figures of methods on test people: by method, between methods, and by phone.
 
     ``heard`` holds r of the opening for each method, in the frames of phones that the talker's recordings hold, and in
-    those of other phones (NaN if there are none).
+    those of other phones (NaN if there are none). ``warnings`` are about names that the talker's recordings share.
     """
 
     n_people: int
@@ -96,6 +97,7 @@ class PeopleEvaluation:
     differences: Mapping[tuple[str, str], Mapping[str, IntervalEstimate]]
     phones: tuple[PhoneFigures, ...]
     heard: Mapping[str, tuple[float, float]]
+    warnings: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Dictionary for JSON."""
@@ -108,6 +110,7 @@ class PeopleEvaluation:
             ],
             "phones": [asdict(one) for one in self.phones],
             "heard": {name: list(values) for name, values in self.heard.items()},
+            "warnings": list(self.warnings),
         }
 
 
@@ -121,9 +124,11 @@ def evaluate_people(
     Raises
     ------
     InputError
-        A person has no utterance, or tracks lack a test utterance or hold too few of the talker's.
+        A person has no utterance, an utterance is one of the talker's, or tracks lack a test utterance or hold too few
+        of the talker's.
     """
     tests = z_score_people(people)
+    warnings = check_unknown(talker, [one.observation for one in tests])
     methods = dict(build_methods(talker))
     if talker.network is not None:
         methods[NETWORKS_METHOD] = _networks_method(talker.network)
@@ -133,7 +138,7 @@ def evaluate_people(
         mapped = iter(map_tracks(tracks, talker, real))
         curves |= synthesise_people(talker, {TRACKS_METHOD: lambda *_: next(mapped)}, tests)
     heard = {label for one in talker.utterances for label in one.phones.phones}
-    return compare_people(tests, curves, n_people=len(people), heard=heard)
+    return replace(compare_people(tests, curves, n_people=len(people), heard=heard), warnings=warnings)
 
 
 def _networks_method(network: PhoneNetwork) -> SynthesisMethod:

@@ -4,9 +4,17 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from corpus_tools.evaluation.fingerprints import (
+    check_no_same,
+    fingerprint_observations,
+    fingerprint_talker,
+    same_name_warnings,
+)
 from corpus_tools.recordings.observation import Observation
 from lexicon.errors import InputError
+from tts2face.models.talker import Talker
 
+PARTS = "the training and the held-out part"
 Split = tuple[tuple[Observation, ...], tuple[Observation, ...]]  # training, held out
 
 
@@ -61,28 +69,43 @@ def split_by_words(observations: Sequence[Observation], words: Collection[str]) 
     return _split_at(ordered, held)
 
 
-def check_disjoint(train: Sequence[Observation], test: Sequence[Observation]) -> None:
-    """Check that no utterance is in both parts.
+def check_disjoint(splits: Sequence[Split]) -> tuple[str, ...]:
+    """Warnings about equal names in both parts of a split, once it is checked that no recording is in both.
+
+    A recording is found re-encoded or under another name (`corpus_tools.evaluation.fingerprints`).
 
     Raises
     ------
     InputError
-        There is such an utterance, or one of the parts is empty.
+        There is such a recording, or one of the parts is empty.
     """
-    if not test:
-        raise InputError("there is no utterance to test")
-    if not train:
-        raise InputError("there is no utterance to learn from")
-    known = {_content_identity(observation) for observation in train}
-    if both := sorted(observation.name for observation in test if _content_identity(observation) in known):
-        raise InputError(
-            f"{both[0]} is in both the training and the held-out part ({len(both)} in all); remove it from one"
-        )
+    for train, test in splits:
+        if not test:
+            raise InputError("there is no utterance to test")
+        if not train:
+            raise InputError("there is no utterance to learn from")
+    every = {id(one): one for split in splits for part in split for one in part}
+    prints = dict(zip(every, fingerprint_observations(tuple(every.values())), strict=True))
+    for train, test in splits:
+        known, tested = ([prints[id(one)] for one in part] for part in (train, test))
+        check_no_same(known, tested, PARTS, "remove it from one")
+    names = (([one.name for one in train], [one.name for one in test]) for train, test in splits)
+    found = (warning for known, tested in names for warning in same_name_warnings(known, tested, PARTS))
+    return tuple(dict.fromkeys(found))
 
 
-def _content_identity(observation: Observation) -> tuple[int, bytes]:
-    """Identity of an utterance's content, the same for copies under other names."""
-    return len(observation.landmarks), observation.landmarks[:: max(1, len(observation.landmarks) // 4), :20].tobytes()
+def check_unknown(talker: Talker, observations: Sequence[Observation]) -> tuple[str, ...]:
+    """Warnings about names that a talker's recordings share, once it is checked that it was not learnt from these.
+
+    Raises
+    ------
+    InputError
+        A recording is in the talker, re-encoded or under another name.
+    """
+    places = f"the talker {talker.metadata.get('name', '')} and the recordings"
+    known = fingerprint_talker(talker)
+    check_no_same(known, fingerprint_observations(observations), places, "give other recordings, or another talker")
+    return same_name_warnings([one.name for one in known], [one.name for one in observations], places)
 
 
 def _sort_by_name(observations: Sequence[Observation]) -> list[Observation]:

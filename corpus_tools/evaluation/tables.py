@@ -25,7 +25,8 @@ class Evaluation:
     """Scores of all methods on held-out utterances.
 
     ``own`` are the scores with a voice's own durations, empty without a voice; ``folds`` those of each split if there
-    are several. If the evaluation ``is_across`` talkers, all scores use z-scored curves.
+    are several. If the evaluation ``is_across`` talkers, all scores use z-scored curves. ``warnings`` are about
+    names that occur in both parts.
     """
 
     n_train: int
@@ -34,6 +35,7 @@ class Evaluation:
     own: tuple[Scores, ...] = ()
     folds: tuple[Fold, ...] = ()
     is_across: bool = False
+    warnings: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Dictionary for JSON, including utterances."""

@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.recordings.face_light import measure_light
 from lexicon.errors import DataError
 from lexicon.inputs import check_regular_file
 from tts2face.storage.tensors import read_tensors, write_tensors
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     from tts2face.video.streaming_tracker import StreamingTracker
 
 TRACKING_KIND = "tracking"
+LIGHT_KIND = "light"
+LIGHT_VERSION = 1  # increased when the measures of light change
 TRACKING_VERSION = 2  # increased when tracking gives other values, which invalidates cached ones
 NOT_COUNTED = -1
 
@@ -81,6 +85,23 @@ class CachedTracker:
                 _read_cached_tracking(cached) or self._track_and_cache(video, cached, on_share or (lambda share: None)),
             )
         return self._last[1]
+
+    def light(self, video: Path) -> NDArray[np.float32]:
+        """Light of the face (N, 5) as `measure_light` returns it, from the cache if its content has been measured.
+
+        Raises
+        ------
+        DataError
+            The video cannot be read or contains no frames.
+        """
+        cached = self._cache / f"{content_key(video)}-{MODEL_SHA256[:8]}-{LIGHT_VERSION}.{LIGHT_KIND}"
+        if cached.is_file():
+            with suppress(DataError, KeyError):
+                return np.asarray(read_tensors(cached, LIGHT_KIND, LIGHT_VERSION)[0]["light"], np.float32)
+        tracked = self.track(video)
+        found = measure_light(read_frames(video), tracked.tracking.points, tracked.times)
+        write_tensors(cached, LIGHT_KIND, LIGHT_VERSION, {"light": found}, {})
+        return found
 
     def _track_and_cache(self, video: Path, cached: Path, on_share: ShareCallback) -> TrackedVideo:
         from tts2face.video.streaming_tracker import StreamingTracker

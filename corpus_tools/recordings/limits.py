@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.recordings.corpus_video import NOT_COUNTED
+from corpus_tools.recordings.face_light import MEASURES
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, lip_opening
@@ -18,6 +19,8 @@ from tts2face.speech.pauses import sound_windows
 from tts2face.speech.text_fit import LEAST_CONFIDENCE
 from tts2face.types import Waveform
 
+WARNING, REFUSAL = "warning", "refusal"  # severities
+UNUSABLE, OUT_OF_SYNC = "unusable", "out_of_sync"  # codes of findings without a measure
 CLIPPED_LEVEL = 0.999  # amplitude from which a sample counts as clipped
 MIN_PICTURE_CHANGE = 0.02  # of an 8-bit step: frames that differ by less are equal; camera noise is above
 LEVEL_WINDOW_S = 0.02
@@ -83,6 +86,35 @@ LIMITS = (
         False,
         "the face is turned away by {value:.0f} degrees, limit {bound:.0f} degrees; film it from the front",
     ),
+    Limit(
+        "brightness",
+        50.0,
+        15.0,
+        True,
+        "the face is dark (brightness {value:.0f} of 255, limit {bound:.0f}); put a lamp or a window in front of you",
+    ),
+    Limit(
+        "glare",
+        0.1,
+        0.8,
+        False,
+        "{value:.0%} of the face is overexposed, limit {bound:.0%}; lower the exposure or move away from the lamp",
+    ),
+    Limit(
+        "contrast",
+        20.0,
+        5.0,
+        True,
+        "the face has little contrast ({value:.0f} of 255 levels, limit {bound:.0f}); move the light to one side and "
+        "away from behind you",
+    ),
+    Limit(
+        "sharpness",
+        0.03,
+        0.016,
+        True,
+        "the face is blurred (sharpness {value:.3f}, limit {bound:.3f}); wipe the lens and focus on the face",
+    ),
     Limit("frozen_s", 0.1, 0.3, False, "the picture is frozen for {value:.2f} s, limit {bound:.2f} s; record it again"),
     Limit(
         "eye_px",
@@ -103,6 +135,35 @@ LIMITS = (
 )
 
 
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A weakness of a recording.
+
+    ``severity`` is ``warning`` or ``refusal``; ``code`` names the measure, or is `UNUSABLE` or `OUT_OF_SYNC`;
+    ``message`` says what to do; ``value`` of the measure and the ``limit`` that it exceeds, None without a measure.
+    """
+
+    severity: str
+    code: str
+    message: str
+    value: float | None = None
+    limit: float | None = None
+
+
+def limit_findings(measured: Mapping[str, float]) -> tuple[Finding, ...]:
+    """A finding for each measure beyond a limit; measures without a limit are ignored."""
+    found = []
+    for limit in LIMITS:
+        value = measured.get(limit.measure)
+        if value is None:
+            continue
+        for severity, bound in ((REFUSAL, limit.refusal), (WARNING, limit.warning)):
+            if message := limit.message(value, bound):
+                found.append(Finding(severity, limit.measure, message, value, bound))
+                break
+    return tuple(found)
+
+
 def check_limits(measured: Mapping[str, float]) -> None:
     """Check measures against the limits of refusal; measures without a limit are ignored.
 
@@ -111,10 +172,9 @@ def check_limits(measured: Mapping[str, float]) -> None:
     DataError
         A measure exceeds its limit.
     """
-    for limit in LIMITS:
-        value = measured.get(limit.measure)
-        if value is not None and (message := limit.message(value, limit.refusal)):
-            raise DataError(message)
+    for finding in limit_findings(measured):
+        if finding.severity == REFUSAL:
+            raise DataError(finding.message)
 
 
 def limit_warnings(measured: Mapping[str, float]) -> tuple[str, ...]:
@@ -164,6 +224,20 @@ def picture_measures(
     borders = np.flatnonzero(np.diff(still.astype(np.int8))).reshape(-1, 2)
     frozen = max((float(times[last - 1] - times[max(first - 1, 0)]) for first, last in borders), default=0.0)
     return {"crowded": crowded, "frozen_s": frozen}
+
+
+def light_measures(light: NDArray[np.floating], begin: float, end: float) -> dict[str, float]:
+    """Medians of `corpus_tools.recordings.face_light.MEASURES` between two times in seconds; nothing without a face.
+
+    Parameters
+    ----------
+    light : (N, 5)
+        As `corpus_tools.recordings.face_light.measure_light` returns it.
+    """
+    here = light[(light[:, 0] >= begin) & (light[:, 0] < end)]
+    if not len(here):  # shorter than the interval of the measures
+        here = light[[np.abs(light[:, 0] - begin).argmin()]] if len(light) else light
+    return dict(zip(MEASURES, np.median(here[:, 1:], axis=0).tolist(), strict=True)) if len(here) else {}
 
 
 def head_turn_deg(angles: NDArray[np.floating]) -> float:

@@ -1,5 +1,6 @@
 """Observation of one recording: pose-free landmarks, head pose, phones and loudness on one time axis."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from corpus_tools.recordings.limits import (
     confidence_measure,
     head_turn_deg,
     landmark_measures,
+    light_measures,
     limit_warnings,
     picture_measures,
     sound_measures,
@@ -48,7 +50,8 @@ class Quality:
     interpolated frames, seconds ``cut`` from the video's start, corrected ``lag`` in seconds, share of ``clipped``
     speech, ``snr_db`` of speech over noise, share of ``crowded`` frames, ``turn_deg`` away from the camera,
     ``frozen_s`` without a change, median distance ``eye_px`` of the outer eye corners, ``jitter`` of the lip opening
-    relative to its deviation.
+    relative to its deviation; ``brightness``, ``glare``, ``contrast`` and ``sharpness`` as
+    `corpus_tools.recordings.face_light.face_light` returns them.
     """
 
     confidence: float
@@ -63,6 +66,10 @@ class Quality:
     frozen_s: float = 0.0
     eye_px: float = np.inf
     jitter: float = 0.0
+    brightness: float = np.inf
+    glare: float = 0.0
+    contrast: float = np.inf
+    sharpness: float = np.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,9 +109,19 @@ class Observation:
 
 
 def observe_recording(
-    recording: Recording, tracker: CachedTracker, aligner: CachedAligner, timing: Timing
+    recording: Recording,
+    tracker: CachedTracker,
+    aligner: CachedAligner,
+    timing: Timing,
+    *,
+    judge: Callable[[Mapping[str, float]], None] = check_limits,
 ) -> Observation:
     """Read and measure one recording.
+
+    Parameters
+    ----------
+    judge
+        Called with measures by name; by default it refuses those beyond their limits.
 
     Raises
     ------
@@ -113,8 +130,8 @@ def observe_recording(
     """
     sound = aligner.align(recording.video, pronounce_recording(recording), recording.span)
     measures = sound_measures(sound.sound, sound.phones)
-    check_limits(measures)
-    check_limits(confidence_measure(sound.confidence, measures["snr_db"], is_recognised=sound.is_recognised))
+    judge(measures)
+    judge(confidence_measure(sound.confidence, measures["snr_db"], is_recognised=sound.is_recognised))
     tracked = tracker.track(recording.video)
     filled, first, n_filled = _span_landmarks(tracked, recording.span, timing)
     fps = timing.fps or tracked.fps
@@ -126,12 +143,13 @@ def observe_recording(
     measures |= picture_measures(tracked.n_faces[here], tracked.changes[here], tracked.times[here])
     measures["turn_deg"] = head_turn_deg(head_angles(posed.rotations))
     measures |= landmark_measures(filled, posed.landmarks)
-    check_limits(measures)
+    measures |= light_measures(tracker.light(recording.video), begin, begin + len(filled) / fps)
+    judge(measures)
     return Observation(
         name=recording.name,
         fps=fps,
         landmarks=posed.landmarks,
-        head=_head_motion(posed),
+        head=head_motion(posed),
         phones=phones,
         words=spans,
         intensity=intensity(sound.sound, start + np.arange(len(filled)) / fps),
@@ -203,7 +221,8 @@ def trim_to_picture(sound: AlignedSpeech, begin: float, stop: float) -> tuple[Ph
     return PhoneSequence(phones, edges - begin), words
 
 
-def _head_motion(posed: PoseFreeLandmarks) -> NDArray[np.float32]:
+def head_motion(posed: PoseFreeLandmarks) -> NDArray[np.float32]:
+    """(T, 6) head pose as in `Observation`."""
     place = posed.translations - np.median(posed.translations, axis=0)
     return np.column_stack([head_angles(posed.rotations), place]).astype(np.float32)
 

@@ -191,7 +191,7 @@ class _VideoReader:
         """An observation, or the reason for its refusal, for each utterance of a video."""
         found: RecordingOutcomes = []
         try:
-            recordings = self._split_long_recording(task.recordings)
+            recordings = split_long_recording(task.recordings, self._aligner)
             self._tracker.track(task.video, lambda share: on_share(TRACKING_SHARE * share))
         except DataError as reason:
             recordings = ()
@@ -205,16 +205,23 @@ class _VideoReader:
         on_share(1.0)
         return found
 
-    def _split_long_recording(self, recordings: tuple[Recording, ...]) -> tuple[Recording, ...]:
-        """The recordings; a recording of a whole long video is cut into utterances at pauses."""
-        whole = recordings[0]
-        if whole.span is not None or self._aligner.sound(whole.video).duration <= MAX_UTTERANCE_S:
-            return recordings
-        utterances = self._aligner.utterances(whole.video, pronounce_recording(whole))
-        return tuple(
-            replace(whole, name=f"{whole.name}-{number:04d}", span=span, words=words)
-            for number, (span, words) in enumerate(utterances, start=1)
-        )
+
+def split_long_recording(recordings: tuple[Recording, ...], aligner: CachedAligner) -> tuple[Recording, ...]:
+    """The recordings of one video; a recording of a whole long one is cut into utterances at pauses.
+
+    Raises
+    ------
+    DataError
+        The video has no sound, or the transcript cannot be read.
+    """
+    whole = recordings[0]
+    if whole.span is not None or aligner.sound(whole.video).duration <= MAX_UTTERANCE_S:
+        return recordings
+    utterances = aligner.utterances(whole.video, pronounce_recording(whole))
+    return tuple(
+        replace(whole, name=f"{whole.name}-{number:04d}", span=span, words=words)
+        for number, (span, words) in enumerate(utterances, start=1)
+    )
 
 
 _worker: list[_VideoReader] = []  # of this process; filled once by the pool

@@ -41,6 +41,10 @@ MEASURES = {
     "frozen_s": ("frozen picture", "s", 1.0),
     "eye_px": ("distance of the outer eye corners", "px", 1.0),
     "jitter": ("jitter of the lip opening", "of its deviation", 1.0),
+    "brightness": ("brightness of the face", "of 255", 1.0),
+    "glare": ("overexposed part of the face", "%", 100.0),
+    "contrast": ("contrast of the face", "of 255", 1.0),
+    "sharpness": ("sharpness of the face", "detail over contrast", 1.0),
 }
 
 

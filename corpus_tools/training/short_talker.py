@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from corpus_tools.evaluation.fingerprints import check_no_same, fingerprint_observations, fingerprint_talker
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.training.adapt_talker import Base, adapted_talker
 from corpus_tools.training.choose_adaptation import ChosenAdaptation, choose_adaptation
@@ -63,11 +64,16 @@ def learn_short_talker(
     Raises
     ------
     InputError
-        There is no such talker.
+        There is no such talker, or it was learnt from one of the recordings: held-out figures would be too good.
     DataError
         The base is damaged.
     """
-    indexed = Base.of(load_talker(base))
+    known = load_talker(base)
+    check_no_same(
+        fingerprint_talker(known), fingerprint_observations(observations), f"the base {base} and the recordings",
+        f"give another base, or `--base {NO_BASE}`",
+    )  # fmt: skip
+    indexed = Base.of(known)
     chosen = choose_adaptation(indexed, observations, on_progress=on_progress)
     talker = adapted_talker(indexed, observations, chosen.adaptation, metadata)
     stated = {

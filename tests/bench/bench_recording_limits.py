@@ -249,6 +249,13 @@ def delay_phones(one: Observation, lag: float) -> PhoneSequence:
     return PhoneSequence(one.phones.phones, edges) if edges[1] > 0 else one.phones
 
 
+def lip_correlations(one: Observation, landmarks: NDArray[np.float32], first: int) -> list[float]:
+    """r of opening and width of landmarks that begin at a frame of a recording against those of the recording."""
+    n_frames = min(len(landmarks), len(one.landmarks) - first)
+    pair = [LipCurves.of(part).values() for part in (one.landmarks[first:][:n_frames], landmarks[:n_frames])]
+    return [correlation(pair[0][:, at], pair[1][:, at]) for at in range(2)]
+
+
 def picture_rows(recordings: dict[str, Recording], seen: Sequence[Observation]) -> Iterator[str]:
     """Rows of the table of damaged pictures."""
     tracker = StreamingTracker(find_bundle(None))
@@ -265,9 +272,7 @@ def picture_rows(recordings: dict[str, Recording], seen: Sequence[Observation]) 
                 lost += 1
                 continue
             landmarks = remove_pose(filled, one.fps).landmarks
-            n_frames = min(len(landmarks), len(one.landmarks) - first)
-            pair = [LipCurves.of(part).values() for part in (one.landmarks[first:][:n_frames], landmarks[:n_frames])]
-            found = [correlation(pair[0][:, at], pair[1][:, at]) for at in range(2)]
+            found = lip_correlations(one, landmarks, first)
             measures = landmark_measures(filled, landmarks)
             rows.append((measures["eye_px"], measures["jitter"], *found, float(lip_opening(landmarks).min())))
         table = np.array(rows)

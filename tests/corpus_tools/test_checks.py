@@ -10,6 +10,7 @@ from corpus_tools.recordings.limits import (
     confidence_measure,
     head_turn_deg,
     landmark_measures,
+    light_measures,
     limit_warnings,
     picture_measures,
     sound_measures,
@@ -21,6 +22,7 @@ from tts2face.types import Waveform
 GOOD = {
     "confidence": -3700.0, "clipped": 0.0, "snr_db": 30.0, "crowded": 0.0, "turn_deg": 6.0, "frozen_s": 0.04,
     "eye_px": 65.0, "jitter": 0.1, "sync": 0.7, "sync_of_short": 0.6,
+    "brightness": 120.0, "glare": 0.0, "contrast": 90.0, "sharpness": 0.04,
 }  # fmt: skip
 PHONES = PhoneSequence([SILENCE, "a", SILENCE], [0.0, 1.0, 2.0, 3.0])
 RATE = 16_000
@@ -46,6 +48,10 @@ def test_good_measures_pass() -> None:
         ("snr_db", 4.0, "speech is 4 dB above the noise, limit 6 dB"),
         ("crowded", 0.5, "50% of the frames show more than one face, limit 25%"),
         ("turn_deg", 60.0, "turned away by 60 degrees, limit 30 degrees"),
+        ("brightness", 10.0, r"the face is dark \(brightness 10 of 255, limit 15\)"),
+        ("glare", 0.9, "90% of the face is overexposed, limit 80%"),
+        ("contrast", 3.0, r"little contrast \(3 of 255 levels, limit 5\)"),
+        ("sharpness", 0.012, r"the face is blurred \(sharpness 0\.012, limit 0\.016\)"),
         ("frozen_s", 0.5, r"is frozen for 0\.50 s, limit 0\.30 s"),
         ("eye_px", 9.0, "eye corners are 9 px apart, limit 12 px"),
         ("jitter", 0.7, r"jitter by 0\.70 of their motion, limit 0\.50"),
@@ -107,6 +113,14 @@ def test_clipped_speech_is_counted_and_clipped_silence_is_not() -> None:
 
 def test_without_a_pause_the_signal_to_noise_ratio_is_infinite() -> None:
     assert sound_measures(sound(0.1, 0.1), PhoneSequence(["a"], [0.0, 3.0]))["snr_db"] == np.inf
+
+
+def test_the_light_of_a_recording_is_the_median_of_its_span() -> None:
+    light = np.array([[0.0, 10, 90, 0, 0.1], [0.5, 100, 90, 0, 0.1], [1.0, 120, 90, 0, 0.1], [1.5, 140, 90, 0, 0.1]])
+    found = light_measures(light, 0.4, 1.6)
+    assert found == {"brightness": 120.0, "contrast": 90.0, "glare": 0.0, "sharpness": 0.1}
+    assert light_measures(light, 1.1, 1.2)["brightness"] == 120.0  # shorter than the interval: the nearest
+    assert light_measures(light[:0], 0.0, 1.0) == {}
 
 
 def test_faces_and_still_pictures() -> None:

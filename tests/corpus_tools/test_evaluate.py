@@ -123,12 +123,6 @@ def test_words_are_held_out_with_every_utterance_that_holds_them(observations: l
         split_by_words(with_words, ["a", "b"])
 
 
-def test_refuses_an_utterance_on_both_sides(observations: list[Observation]):
-    renamed = replace(observations[0], name="another name")
-    with pytest.raises(InputError, match="another name is in both the training and the held-out part"):
-        evaluate([(tuple(observations), (renamed,))])
-
-
 def test_a_split_is_repeatable_and_keeps_every_utterance(observations: list[Observation]):
     names = [one.name for one in observations]
     train, test = split_randomly(observations[::-1], hold_out=8, seed=3)

@@ -24,6 +24,7 @@ NOT_EXECUTED = {  # beginning of a command line: why it is parsed only
     "jobs prune --store": "needs a finished batch",
     "corpus setup": "uses the network",
     "corpus build": PERSON,
+    "corpus check": PERSON,
     "corpus face": PERSON,
     "corpus gestures": PERSON,
     "report retarget": PERSON,

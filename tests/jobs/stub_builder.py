@@ -21,7 +21,14 @@ def main() -> None:
     checked.mkdir()
     write_made_talker(checked / "content", has_face=False)
     (checked / "description.json").write_text("{}")
-    sys.stdout.write(json.dumps({"n_kept": 6, "minutes": 0.1, "refused": [["a", "too dark"]]}) + "\n")
+    result = {
+        "n_kept": 6,
+        "minutes": 0.1,
+        "refused": [["a", "too dark"]],
+        "warnings": [["b", f"weakness {number}"] for number in range(30)],
+        "notes": ["record more"],
+    }
+    sys.stdout.write(json.dumps(result) + "\n")
 
 
 if __name__ == "__main__":

@@ -60,7 +60,14 @@ def test_a_talker_is_stored_once_however_often_its_job_runs(
     assert [one.name for one in first.files] == ["anna.talker"]
     assert events == [
         {"type": "progress", "stage": "reading recordings", "done": 1, "of": 2},
-        {"type": "built", "n_kept": 6, "minutes": 0.1, "refused": ["a: too dark"]},
+        {
+            "type": "built",
+            "n_kept": 6,
+            "minutes": 0.1,
+            "refused": ["a: too dark"],
+            "warnings": [f"b: weakness {number}" for number in range(20)],
+            "notes": ["record more"],
+        },
     ]
     run()
     assert stored(tmp_path) == ["anna"]

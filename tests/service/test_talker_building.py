@@ -125,6 +125,8 @@ def test_a_recording_becomes_a_talker_that_speaks(
     events = client.get(f"/v1/jobs/{job['id']}/events").text
     assert "reading recordings" in events
     assert '"n_kept": 1' in events
+    assert '"warnings": [' in events
+    assert "record words with these phones next" in events
     shown = client.get("/v1/talkers/anna").json()
     base = load_talker("grid_s1")  # completes a short recording
     about = shown["about"]

@@ -32,7 +32,7 @@ LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=0, file_bytes=2 << 30, n_file
 CPU_S, CPU_S_PER_S = 1200, 40  # of any recording, and for each of its seconds; 256 x 256 pixels take 1 s a second
 SLOWNESS = 5.0  # elapsed time in units of the processor time, on a machine that has other work
 LOOK_S, AWAY_S = 1.0, 2.0  # between two looks whether the job is wanted, and between tries to reach the database
-N_SHOWN = 20  # reasons of refused parts
+N_SHOWN = 20  # refused parts, and warnings, that are reported
 
 
 def run_talker(task: JobTask) -> Products:
@@ -48,8 +48,7 @@ def run_talker(task: JobTask) -> Products:
     for name, path in task.inputs.items():
         _place(path, recordings / name)
     result = _build(task)
-    refused = [f"{name}: {reason}" for name, reason in result["refused"][:N_SHOWN]]
-    task.report({"type": "built", "n_kept": result["n_kept"], "minutes": result["minutes"], "refused": refused})
+    task.report(_built_event(result))
     _store(task)
     products = [
         Product(task.folder / "checked" / "content", f"{task.request['name']}.talker", "application/octet-stream")
@@ -57,6 +56,11 @@ def run_talker(task: JobTask) -> Products:
     if (task.folder / "report.html").is_file():  # not as text/html: a page of this origin could use its keys
         products.append(Product(task.folder / "report.html", "report.html", "application/octet-stream"))
     return Products(tuple(products))
+
+
+def _built_event(result: dict[str, Any]) -> dict[str, Any]:
+    shown = {part: [f"{name}: {text}" for name, text in result[part][:N_SHOWN]] for part in ("refused", "warnings")}
+    return {"type": "built", **{name: result[name] for name in ("n_kept", "minutes", "notes")}, **shown}
 
 
 def _place(source: Path, target: Path) -> None:
