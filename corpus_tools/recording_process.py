@@ -13,11 +13,11 @@ the cache folder begin. Whatever cannot be answered gives ``error`` and ``messag
 import json
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from corpus_tools.prompts.coverage import Units
+from corpus_tools.prompts.coverage import RunningText, Units
 from corpus_tools.prompts.prompts import choose_prompts
 from corpus_tools.recordings.check_recording import RecordingChecker, recordings_to_check
 from corpus_tools.recordings.corpus_video import content_key
@@ -26,6 +26,13 @@ from lexicon.errors import Tts2faceError
 from tts2face.child_process import claim_standard_output, received_requests
 from tts2face.limited_process import ProcessLimits, limit_process
 
+IN_FRONT_OF_A_CAMERA = {  # parts of findings, and what a person can do who is just recording
+    "correct the words": "read exactly what is shown",
+    "check the transcript": "read exactly what is shown",
+    "give the original sound": "keep the mouth in view and read it again",
+    "cut the video": "stay in the picture",
+    "the transcript": "the prompt",
+}
 LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=100_000, file_bytes=1 << 30, n_files=256)
 
 
@@ -43,11 +50,13 @@ def answer(order: Mapping[str, Any], checkers: dict[Path, RecordingChecker]) -> 
 
 def _prompts(minutes: float, language: str, text: str | None) -> dict[str, Any]:
     chosen = choose_prompts(minutes, language=language, text=None if text is None else Path(text))
-    running = chosen.running
+    return prompts_answer(chosen.texts, chosen.units, chosen.running)
+
+
+def prompts_answer(texts: Sequence[str], units: Sequence[Units], running: RunningText) -> dict[str, Any]:
+    """The answer about prompts, as above."""
     return {
-        "prompts": [
-            {"text": prompt, **_units(units)} for prompt, units in zip(chosen.texts, chosen.units, strict=True)
-        ],
+        "prompts": [{"text": text, **_units(one)} for text, one in zip(texts, units, strict=True)],
         "running": {
             "phones": dict(running.phones),
             "triphones": {" ".join(triphone): n for triphone, n in running.triphones.items()},
@@ -66,9 +75,16 @@ def _findings(video: Path, text: str, cache: Path, checkers: dict[Path, Recordin
     cache.mkdir(parents=True, exist_ok=True)  # it may have been deleted with a recording
     (recording,) = recordings_to_check(video, text)
     return [
-        {"severity": found.severity, "code": found.code, "message": found.message.replace(f"{video.parent}/", "")}
+        {"severity": found.severity, "code": found.code, "message": _advice(found.message, video)}
         for found in checkers[cache].check(recording)
     ]
+
+
+def _advice(message: str, video: Path) -> str:
+    """A finding for a person who reads prompts in front of a camera."""
+    for written, spoken in IN_FRONT_OF_A_CAMERA.items():
+        message = message.replace(written, spoken)
+    return message.replace(f"{video.parent}/", "")
 
 
 def main() -> None:

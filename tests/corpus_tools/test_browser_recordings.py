@@ -40,7 +40,8 @@ def write_browser_file(
             frame.pts, frame.time_base = round(time * 1000), Fraction(1, 1000)
             container.mux(video.encode(frame))
             while heard / RATE < time and heard + step <= len(samples):
-                sound = av.AudioFrame.from_ndarray(samples[None, heard : heard + step].astype(np.float32), "flt", "mono")
+                block = samples[None, heard : heard + step].astype(np.float32)
+                sound = av.AudioFrame.from_ndarray(block, "flt", "mono")
                 sound.sample_rate, sound.pts, sound.time_base = RATE, heard, Fraction(1, RATE)
                 container.mux(audio.encode(sound))
                 heard += step

@@ -6,6 +6,7 @@ import shutil
 import socket
 import subprocess
 import time
+import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -40,7 +41,8 @@ class Browser:
             with urllib.request.urlopen(request, timeout=300) as answer:
                 return json.load(answer)["value"]
         except urllib.error.HTTPError as error:
-            raise AssertionError(json.load(error)["value"]["message"]) from error
+            with error:
+                raise AssertionError(json.load(error)["value"]["message"]) from error
 
     def open(self, url: str) -> None:
         self._send("POST", f"{self._session}/url", {"url": url})
@@ -76,7 +78,8 @@ class Browser:
         """Write into the input with a label."""
         script = """const one = document.querySelector(`input[aria-label="${arguments[0]}"]`);
             if (!one) return false; one.value = arguments[1];
-            one.dispatchEvent(new Event('input', {bubbles: true})); one.dispatchEvent(new Event('change')); return true"""
+            one.dispatchEvent(new Event('input', {bubbles: true})); one.dispatchEvent(new Event('change'));
+            return true"""
         self.wait(script, label, value)
 
     def picture(self, out: Path) -> None:
@@ -97,7 +100,8 @@ def chromium(arguments: list[str], log: Path) -> Iterator[Callable[[], Browser]]
     if not shutil.which("chromium") or not shutil.which("chromedriver"):
         pytest.skip("needs chromium and chromedriver")
     port = free_port()
-    driver = subprocess.Popen(["chromedriver", f"--port={port}"], stdout=log.open("w"), stderr=subprocess.STDOUT)
+    with log.open("w") as file:
+        driver = subprocess.Popen(["chromedriver", f"--port={port}"], stdout=file, stderr=subprocess.STDOUT)
     opened: list[Browser] = []
 
     def open_browser() -> Browser:

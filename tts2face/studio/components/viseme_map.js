@@ -10,8 +10,8 @@ export default {
         <text v-for="(name, n) in behind" :key="'t' + n" :x="left + (n + 0.5) * cell" :y="top - 8" text-anchor="middle">{{ name }}</text>
         <g v-for="(row, m) in rows" :key="row.name">
           <text :x="34" :y="top + (m + 0.7) * cell" text-anchor="end" class="viseme-name">{{ row.name }}</text>
-          <text :x="40" :y="top + (m + 0.7) * cell"><tspan v-for="phone in row.phones" :key="phone.name"
-            :class="phone.isCovered ? 'phone-covered' : 'phone-missing'">{{ phone.name }} </tspan></text>
+          <text :x="40" :y="top + (m + 0.7) * cell"><tspan v-for="phone in row.phones" :key="phone.name" dx="4"
+            :class="phone.isCovered ? 'phone-covered' : 'phone-missing'">{{ phone.name }}</tspan></text>
           <rect v-for="(cellOf, n) in row.cells" :key="n" v-show="cellOf.of" :x="left + n * cell + 1" :y="top + m * cell + 1"
             :width="cell - 2" :height="cell - 2" rx="3" :fill-opacity="0.08 + 0.92 * cellOf.share"><title>{{ row.name }} before {{ behind[n] }}: {{ Math.round(100 * cellOf.share) }} %</title></rect>
         </g>

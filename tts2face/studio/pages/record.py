@@ -15,6 +15,7 @@ from tts2face.studio.recordings import Recordings
 from tts2face.studio.talker_building import CLIP, REPORT, TALKER
 
 LIST_PAGE = "/studio/record"
+PRIMARY, NEGATIVE = "#0b5cb8", "#b3182a"  # white text on them has a contrast of 6 or more
 MAX_TEXT_BYTES = 2 << 20
 MINUTES = {2: "2 minutes, 25 prompts", 5: "5 minutes, 60 prompts", 10: "10 minutes, 120 prompts"}
 REFRESH_S = 0.4
@@ -48,6 +49,7 @@ def add_record_page(studio: RecordStudio) -> Recordings:
 
 def _page_head(title: str) -> None:
     ui.dark_mode(None)
+    ui.colors(primary=PRIMARY, negative=NEGATIVE)
     ui.add_css(STYLE.read_text(encoding="utf-8"), shared=False)
     ui.html(title, tag="h1", sanitize=False).classes("text-2xl m-0")
 
@@ -89,7 +91,7 @@ def _list_page(recordings: Recordings, owner: str) -> None:
                 )
             ui.navigate.to(f"{LIST_PAGE}/{recordings.store.create(owner, name.value, prompts)}")
 
-        ui.button("Start recording", on_click=_reporting(create)).props("no-caps")
+        ui.button("Start recording", on_click=_reporting(create)).props("no-caps").classes("self-start")
 
 
 def _reporting(action: Callable[[], Awaitable[None] | None]) -> Callable[[], Awaitable[None]]:
@@ -165,7 +167,9 @@ class _RecordingPage:
                 ).props("no-caps")
             self._clip = ui.element("video").props('controls aria-label="First sentence of the talker"')
             self._clip.classes("w-full max-w-md")
-        ui.button("Delete everything", on_click=self._confirm_deletion).props("no-caps outline color=negative")
+        ui.button("Delete everything", on_click=self._confirm_deletion).props("no-caps outline color=negative").classes(
+            "self-start"
+        )
 
     def _takes(self) -> dict[int, dict[str, str]]:
         takes = self._recordings.store.takes(self._number)
