@@ -42,7 +42,7 @@ def answer(order: Mapping[str, Any], checkers: dict[Path, RecordingChecker]) -> 
         if order["kind"] == "prompts":
             return _prompts(float(order["minutes"]), str(order["language"]), order["text"])
         video = Path(order["video"])
-        found = {"findings": _findings(video, str(order["text"]), Path(order["cache"]), checkers)}
+        found = {"findings": _findings(video, order["text"], Path(order["cache"]), checkers)}
         return {**found, "key": content_key(video)}
     except Tts2faceError as error:
         return {"error": type(error).__name__, "message": " ".join(str(error).split())}
@@ -50,7 +50,7 @@ def answer(order: Mapping[str, Any], checkers: dict[Path, RecordingChecker]) -> 
 
 def _prompts(minutes: float, language: str, text: str | None) -> dict[str, Any]:
     chosen = choose_prompts(minutes, language=language, text=None if text is None else Path(text))
-    return prompts_answer(chosen.texts, chosen.units, chosen.running)
+    return {"language": language, **prompts_answer(chosen.texts, chosen.units, chosen.running)}
 
 
 def prompts_answer(texts: Sequence[str], units: Sequence[Units], running: RunningText) -> dict[str, Any]:
@@ -68,7 +68,9 @@ def _units(units: Units) -> dict[str, list[str]]:
     return {"phones": sorted(set(units.phones)), "triphones": sorted({" ".join(one) for one in units.triphones})}
 
 
-def _findings(video: Path, text: str, cache: Path, checkers: dict[Path, RecordingChecker]) -> list[dict[str, str]]:
+def _findings(
+    video: Path, text: str | None, cache: Path, checkers: dict[Path, RecordingChecker]
+) -> list[dict[str, str]]:
     if cache not in checkers:
         checkers.clear()
         checkers[cache] = RecordingChecker(RunOptions(cache, 1))

@@ -23,18 +23,18 @@ from tts2face.video.media import read_frames, read_sound
 
 pytest.importorskip("nicegui", reason="needs `pip install 'tts2face[studio]'`")
 
-SAID, WRONG = "bin blue at f two now", "place green with q nine please"
-PROMPTS = (SAID, WRONG, SAID, SAID, SAID)
+WRONG = "place green with q nine please"
 SCREENSHOTS = Path(os.environ.get("TTS2FACE_SCREENSHOTS", tempfile.gettempdir()))
 QUIET_LEVEL = 45  # of 100, of the page's meter
 MODE = "return !!document.querySelector('.recorder-on')"
 
 
 @pytest.fixture
-def studio_folder(tmp_path: Path) -> Path:
-    folder = tmp_path / "studio"
-    units = [sentence_units(prompt, "en-us") for prompt in PROMPTS]
-    RecordingStore(folder).create("local", "Test person", prompts_answer(PROMPTS, units, count_units(units)))
+def studio_folder(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
+    """Folder of a studio with one recording; all of its prompts but the second are the test's parameter."""
+    folder, prompts = tmp_path / "studio", [request.param, WRONG, *[request.param] * 3]
+    units = [sentence_units(prompt, "en-us") for prompt in prompts]
+    RecordingStore(folder).create("local", "Test person", prompts_answer(prompts, units, count_units(units)))
     return folder
 
 
@@ -122,6 +122,7 @@ def delete_everything(browser: Browser) -> None:
     browser.wait("return location.pathname === '/studio/record'")
 
 
+@pytest.mark.parametrize("studio_folder", ["bin blue at f two now"], indirect=True)
 def test_prompts_are_recorded_refused_taken_again_after_a_reload_and_deleted(
     server, studio_folder, shared_recordings, face_model, tmp_path
 ):
@@ -158,11 +159,12 @@ def test_prompts_are_recorded_refused_taken_again_after_a_reload_and_deleted(
         assert browser.log() == []
 
 
+@pytest.mark.parametrize("studio_folder", ["bin red by k seven now"], indirect=True)
 def test_takes_become_a_talker_that_speaks(server, studio_folder, shared_recordings, face_model, tmp_path):
     (folder,) = (studio_folder / "recordings").iterdir()
     store, source = RecordingStore(studio_folder), shared_recordings / "grid_talkers" / "brbk7n.mpg"
     frames = list(read_frames(source))
-    for at in range(len(PROMPTS)):
+    for at in range(5):
         times = uneven_times(frames[-1].time, seed=at)
         nearest = [frames[int(np.argmin([abs(frame.time - time) for frame in frames]))].pixels for time in times]
         write_browser_file("vp8.webm", tmp_path / "upload", nearest, times, read_sound(source, RATE).samples)

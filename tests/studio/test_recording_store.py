@@ -132,3 +132,12 @@ def test_the_manifest_is_json_that_others_can_read(store):
     manifest = json.loads((store.folder(number, "ada") / "manifest.json").read_text())
     assert manifest["name"] == "Ada"
     assert list(manifest["takes"]) == ["0"]
+
+
+def test_only_english_takes_have_a_transcript(store):
+    for language, has_transcript in (("en-gb", True), ("de", False)):
+        number = store.create("ada", "Ada", {**PROMPTS, "language": language})
+        take = add(store, number, 0)
+        store.judge(number, 0, replace(take, state=GOOD))
+        names = {Path(name).suffix for name in files(store, number)}
+        assert names == ({".webm", ".txt"} if has_transcript else {".webm"})

@@ -29,6 +29,7 @@ FOLDERS = {
     CHECKING: UNCHECKED_FOLDER, GOOD: ACCEPTED_FOLDER, WEAK: ACCEPTED_FOLDER, REFUSED: REFUSED_FOLDER,
 }  # fmt: skip
 MAX_NAME_CHARACTERS = 60
+ENGLISH = "en"  # language of the transcripts that `tts2face corpus build` pronounces
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +155,9 @@ class RecordingStore:
                 return
             target = folder / FOLDERS[judged.state] / judged.file
             with translate_disk_errors(target):
-                target.with_suffix(".txt").write_text(self._text(number, at), encoding="utf-8")
+                text = self.transcript(number, at)
+                if text is not None:
+                    target.with_suffix(".txt").write_text(text, encoding="utf-8")
                 os.replace(folder / FOLDERS[current["state"]] / judged.file, target)
             manifest["takes"][str(at)] = asdict(judged)
             self._write(number, manifest)
@@ -187,8 +190,11 @@ class RecordingStore:
             if take.state == CHECKING
         ]
 
-    def _text(self, number: str, at: int) -> str:
-        return str(self.prompts(number)["prompts"][at]["text"])
+    def transcript(self, number: str, at: int) -> str | None:
+        """What is said in a take, in English; None in other languages, whose phones are recognised."""
+        prompts = self.prompts(number)
+        is_english = str(prompts.get("language", ENGLISH)).partition("-")[0] == ENGLISH
+        return str(prompts["prompts"][at]["text"]) if is_english else None
 
     def _remove_files(self, number: str, take: Take) -> None:
         """Remove a take, its transcript, and what its check cached."""

@@ -80,7 +80,7 @@ class TakeChecks:
         if not video.is_file() or take.state != CHECKING:
             return take  # recorded again, or deleted
         order = {
-            "kind": "check", "video": str(video), "text": self._store.prompts(number)["prompts"][at]["text"],
+            "kind": "check", "video": str(video), "text": self._store.transcript(number, at),
             "cache": str(video.parents[1] / CACHE),
         }  # fmt: skip
         try:

@@ -204,6 +204,7 @@ export default {
     select(n) {
       this.shown = null;
       this.at = n;
+      if ((this.takes[n] || {}).advice) this.told = n;
       this.$emit("select", n);
     },
     play() {

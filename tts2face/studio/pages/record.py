@@ -55,11 +55,12 @@ def _page_head(title: str) -> None:
 
 
 def _list_page(recordings: Recordings, owner: str) -> None:
-    with ui.element("main").classes("w-full max-w-4xl mx-auto flex flex-col gap-4"):
+    with ui.element("div").classes("w-full max-w-4xl mx-auto flex flex-col gap-4"):
         _page_head("Record your own talker")
         ui.label(
             "Read sentences aloud in front of the webcam. Each take is checked while you read the next one; from two "
-            "minutes on they become a talker with your lips and your face. Everything stays on this computer."
+            "minutes on they become a talker with your lips and your face. Everything stays on the computer that runs "
+            "the studio."
         )
         entries = recordings.store.entries(owner)
         if entries:
@@ -76,11 +77,12 @@ def _list_page(recordings: Recordings, owner: str) -> None:
 
         async def keep_text(upload: events.UploadEventArguments) -> None:
             text[:] = [await upload.file.read()]
+            chosen.text = f"Prompts are selected from {upload.file.name}, in the language above."
 
-        ui.upload(
-            label="Text in another language (UTF-8)", auto_upload=True, max_files=1, max_file_size=MAX_TEXT_BYTES,
-            on_upload=keep_text,
-        ).classes("w-80")  # fmt: skip
+        upload = ui.upload(auto_upload=True, max_file_size=MAX_TEXT_BYTES, on_upload=keep_text).classes("hidden")
+        choose = ui.button("Choose a text in another language", on_click=lambda: upload.run_method("pickFiles"))
+        choose.props("no-caps color=grey-8").classes("self-start")
+        chosen = ui.label().props("role=status")
 
         async def create() -> None:
             with tempfile.TemporaryDirectory() as folder:
@@ -119,7 +121,7 @@ class _RecordingPage:
     def show(self) -> None:
         """Build the page."""
         prompts = self._content["prompts"]
-        with ui.element("main").classes("w-full max-w-screen-xl mx-auto"):
+        with ui.element("div").classes("w-full max-w-screen-xl mx-auto"):
             with ui.row().classes("w-full items-baseline justify-between"):
                 _page_head(f"Record {_escaped(self._recordings.store.name(self._number))}")
                 ui.link("All recordings", LIST_PAGE)
@@ -150,7 +152,7 @@ class _RecordingPage:
                 on_click=_reporting(lambda: self._recordings.build(self._number, self._folder, consent.value or "")),
             ).props("no-caps")
             self._cancel = ui.button("Cancel", on_click=lambda: self._recordings.cancel(self._number))
-            self._cancel.props("no-caps outline")
+            self._cancel.props("no-caps color=grey-8")
         self._bar = ui.linear_progress(value=0, show_value=False).props('aria-label="Progress of the work"')
         self._status = ui.label().props("role=status").classes("w-full break-words")
         with ui.column().classes("w-full gap-2") as self._finished:
@@ -167,7 +169,7 @@ class _RecordingPage:
                 ).props("no-caps")
             self._clip = ui.element("video").props('controls aria-label="First sentence of the talker"')
             self._clip.classes("w-full max-w-md")
-        ui.button("Delete everything", on_click=self._confirm_deletion).props("no-caps outline color=negative").classes(
+        ui.button("Delete everything", on_click=self._confirm_deletion).props("no-caps color=negative").classes(
             "self-start"
         )
 
@@ -184,7 +186,7 @@ class _RecordingPage:
             ui.label("Delete all takes, the report and the talker of this recording? This cannot be undone.")
             with ui.row():
                 ui.button("Delete", on_click=lambda: dialog.submit(True)).props("no-caps color=negative")
-                ui.button("Keep", on_click=lambda: dialog.submit(False)).props("no-caps outline")
+                ui.button("Keep", on_click=lambda: dialog.submit(False)).props("no-caps color=grey-8")
         if await dialog:
             await self._recordings.delete(self._number)
             ui.navigate.to(LIST_PAGE)
