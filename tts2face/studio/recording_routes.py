@@ -2,21 +2,20 @@
 
 import os
 import secrets
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from pathlib import Path
-from typing import Protocol
 
-from fastapi import Request
+from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse, JSONResponse, Response
-from nicegui import app
 
 from lexicon.errors import InputError, Tts2faceError
 from tts2face.studio.recording_store import SUFFIXES, RecordingStore
 from tts2face.studio.recordings import Recordings
 from tts2face.studio.talker_building import CLIP, REPORT, TALKER
 
-API = "/studio/api/recordings"
-TAKE = API + "/{number}/takes/{at}"
+PAGES = "/studio"  # where the pages are mounted
+API = "/api/recordings"  # below it
+TAKE = "/{number}/takes/{at}"
 MAX_TAKE_BYTES = 64 << 20
 NO_STORE = {"Cache-Control": "no-store"}
 # The report holds a user's names and must not act as a page of this origin.
@@ -27,23 +26,17 @@ DOWNLOADS: Mapping[str, tuple[str, Mapping[str, str]]] = {
 }
 
 
-class RecordStudio(Protocol):
-    """What the pages need: the studio's folder, and for whom a request is."""
-
-    folder: Path
-
-    def owner(self, request: Request) -> str:
-        """Name of the key of a request."""
+Owner = Callable[[Request], str]  # name of the key of a request
 
 
-def add_recording_routes(studio: RecordStudio, recordings: Recordings) -> None:
-    """Add the routes to NiceGUI's app."""
-    store = recordings.store
+def recording_router(recordings: Recordings, owner: Owner) -> APIRouter:
+    """Routes of the takes and files of recordings."""
+    store, router = recordings.store, APIRouter(prefix=PAGES + API, include_in_schema=False)
 
-    @app.put(TAKE)
+    @router.put(TAKE)
     async def put_take(request: Request, number: str, at: int) -> Response:
         try:
-            folder = store.folder(number, studio.owner(request))
+            folder = store.folder(number, owner(request))
             upload = folder / f"upload-{secrets.token_hex(8)}"
             try:
                 await _receive(request.stream(), upload)
@@ -55,21 +48,23 @@ def add_recording_routes(studio: RecordStudio, recordings: Recordings) -> None:
         recordings.checks.add(number, at, take)
         return JSONResponse({"state": take.state}, 201)
 
-    @app.get(TAKE)
+    @router.get(TAKE)
     def get_take(request: Request, number: str, at: int) -> Response:
-        path = _take_path(store, number, studio.owner(request), at)
+        path = _take_path(store, number, owner(request), at)
         if path is None:
             return JSONResponse({"error": "there is no such take"}, 404)
         kinds = {suffix: kind for kind, suffix in SUFFIXES.items()}
         return FileResponse(path, media_type=kinds[path.suffix], headers=NO_STORE)
 
-    @app.get(API + "/{number}/files/{name}")
+    @router.get("/{number}/files/{name}")
     def get_file(request: Request, number: str, name: str) -> Response:
-        path = _download_path(store, number, studio.owner(request), name)
+        path = _download_path(store, number, owner(request), name)
         if path is None:
             return JSONResponse({"error": "there is no such file"}, 404)
         kind, headers = DOWNLOADS[name]
         return FileResponse(path, media_type=kind, headers={**NO_STORE, **headers})
+
+    return router
 
 
 async def _receive(parts: AsyncIterator[bytes], target: Path) -> None:

@@ -4,17 +4,17 @@ import tempfile
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
-from fastapi import Request
-from nicegui import app, events, ui
+from fastapi import FastAPI, Request
+from nicegui import events, ui
 
 from lexicon.errors import InputError, Tts2faceError
 from tts2face.exports.visemes import viseme_table
 from tts2face.studio.components.recorder import STYLE, Recorder, VisemeMap
-from tts2face.studio.recording_routes import API, RecordStudio, add_recording_routes
+from tts2face.studio.recording_routes import API, PAGES, Owner, recording_router
 from tts2face.studio.recordings import Recordings
 from tts2face.studio.talker_building import CLIP, REPORT, TALKER
 
-LIST_PAGE = "/studio/record"
+LIST_PAGE = "/record"
 PRIMARY, NEGATIVE = "#0b5cb8", "#b3182a"  # white text on them has a contrast of 6 or more
 MAX_TEXT_BYTES = 2 << 20
 MINUTES = {2: "2 minutes, 25 prompts", 5: "5 minutes, 60 prompts", 10: "10 minutes, 120 prompts"}
@@ -22,28 +22,34 @@ REFRESH_S = 0.4
 FIRST_SENTENCE = "Hello, this is my own face."
 
 
-def add_record_page(studio: RecordStudio) -> Recordings:
-    """Add the pages and their routes to NiceGUI's app; the caller stops the returned recordings at the end."""
-    recordings = Recordings(studio.folder)
-    add_recording_routes(studio, recordings)
+def add_record_page(app: FastAPI, folder: Path, owner: Owner) -> Recordings:
+    """Add the pages to NiceGUI, which is to be mounted at `PAGES`, and their routes to the application around it.
 
-    @ui.page(LIST_PAGE, title="Record - tts2face", language="en-US")
+    The caller calls ``checks.start`` of the returned recordings when the application begins, and ``stop`` when it ends.
+
+    Parameters
+    ----------
+    folder
+        Folder of the studio; recordings are in ``recordings/`` of it.
+    """
+    recordings = Recordings(folder)
+    app.include_router(recording_router(recordings, owner))
+
+    @ui.page(LIST_PAGE, title="Record - tts2face studio", language="en-US")
     def show_list(request: Request) -> None:
-        _list_page(recordings, studio.owner(request))
+        _list_page(recordings, owner(request))
 
-    @ui.page(LIST_PAGE + "/{number}", title="Record - tts2face", language="en-US")
+    @ui.page(LIST_PAGE + "/{number}", title="Record - tts2face studio", language="en-US")
     def show_recording(request: Request, number: str) -> None:
         try:
-            folder = recordings.store.folder(number, studio.owner(request))
+            here = recordings.store.folder(number, owner(request))
         except InputError as unknown:
             _page_head("Record your own talker")
             ui.label(str(unknown))
             ui.link("Recordings", LIST_PAGE)
             return
-        _RecordingPage(recordings, number, folder).show()
+        _RecordingPage(recordings, number, here).show()
 
-    app.on_startup(recordings.checks.start)
-    app.on_shutdown(recordings.stop)
     return recordings
 
 
@@ -51,11 +57,11 @@ def _page_head(title: str) -> None:
     ui.dark_mode(None)
     ui.colors(primary=PRIMARY, negative=NEGATIVE)
     ui.add_css(STYLE.read_text(encoding="utf-8"), shared=False)
-    ui.html(title, tag="h1", sanitize=False).classes("text-2xl m-0")
+    ui.html(title, tag="h1", sanitize=False)
 
 
 def _list_page(recordings: Recordings, owner: str) -> None:
-    with ui.element("div").classes("w-full max-w-4xl mx-auto flex flex-col gap-4"):
+    with ui.element("div").classes("record-page record-list"):
         _page_head("Record your own talker")
         ui.label(
             "Read sentences aloud in front of the webcam. Each take is checked while you read the next one; from two "
@@ -64,24 +70,24 @@ def _list_page(recordings: Recordings, owner: str) -> None:
         )
         entries = recordings.store.entries(owner)
         if entries:
-            ui.html("Recordings", tag="h2", sanitize=False).classes("text-xl m-0")
+            ui.html("Recordings", tag="h2", sanitize=False)
         for entry in entries:
-            with ui.row().classes("items-center"):
-                ui.link(entry.name, f"{LIST_PAGE}/{entry.id}").classes("text-lg")
+            with ui.row():
+                ui.link(entry.name, f"{LIST_PAGE}/{entry.id}")
                 ui.label(f"{entry.n_accepted} of {entry.n_prompts} prompts recorded")
-        ui.html("New recording", tag="h2", sanitize=False).classes("text-xl m-0")
-        name = ui.input("Name of the talker").classes("w-80")
-        minutes = ui.select(MINUTES, value=5, label="Length").classes("w-80")
-        language = ui.input("Language (an espeak-ng code)", value="en-us").classes("w-80")
+        ui.html("New recording", tag="h2", sanitize=False)
+        name = ui.input("Name of the talker").classes("record-field")
+        minutes = ui.select(MINUTES, value=5, label="Length").classes("record-field")
+        language = ui.input("Language (an espeak-ng code)", value="en-us").classes("record-field")
         text: list[bytes] = []
 
         async def keep_text(upload: events.UploadEventArguments) -> None:
             text[:] = [await upload.file.read()]
             chosen.text = f"Prompts are selected from {upload.file.name}, in the language above."
 
-        upload = ui.upload(auto_upload=True, max_file_size=MAX_TEXT_BYTES, on_upload=keep_text).classes("hidden")
+        upload = ui.upload(auto_upload=True, max_file_size=MAX_TEXT_BYTES, on_upload=keep_text).style("display: none")
         choose = ui.button("Choose a text in another language", on_click=lambda: upload.run_method("pickFiles"))
-        choose.props("no-caps color=grey-8").classes("self-start")
+        choose.props("no-caps color=grey-8")
         chosen = ui.label().props("role=status")
 
         async def create() -> None:
@@ -93,7 +99,7 @@ def _list_page(recordings: Recordings, owner: str) -> None:
                 )
             ui.navigate.to(f"{LIST_PAGE}/{recordings.store.create(owner, name.value, prompts)}")
 
-        ui.button("Start recording", on_click=_reporting(create)).props("no-caps").classes("self-start")
+        ui.button("Start recording", on_click=_reporting(create)).props("no-caps")
 
 
 def _reporting(action: Callable[[], Awaitable[None] | None]) -> Callable[[], Awaitable[None]]:
@@ -121,18 +127,18 @@ class _RecordingPage:
     def show(self) -> None:
         """Build the page."""
         prompts = self._content["prompts"]
-        with ui.element("div").classes("w-full max-w-screen-xl mx-auto"):
-            with ui.row().classes("w-full items-baseline justify-between"):
+        with ui.element("div").classes("record-page"):
+            with ui.element("div").classes("record-head"):
                 _page_head(f"Record {_escaped(self._recordings.store.name(self._number))}")
                 ui.link("All recordings", LIST_PAGE)
-            with ui.element("div").classes("grid grid-cols-1 lg:grid-cols-2 gap-6 w-full"):
+            with ui.element("div").classes("record-columns"):
                 takes = self._takes()
                 first = next((at for at in range(len(prompts)) if at not in takes), 0)
                 texts = [prompt["text"] for prompt in prompts]
-                self._recorder = Recorder(texts, takes, f"{API}/{self._number}/takes/", first)
+                self._recorder = Recorder(texts, takes, f"{PAGES}{API}/{self._number}/takes/", first)
                 self._recorder.on("remove", lambda event: self._delete_take(int(event.args)))
-                with ui.column().classes("w-full gap-3"):
-                    ui.html("What your takes cover", tag="h2", sanitize=False).classes("text-lg m-0")
+                with ui.element("div").classes("record-side"):
+                    ui.html("What your takes cover", tag="h2", sanitize=False)
                     running = self._content["running"]
                     visemes = {phone: viseme_table("oculus")[phone][0] for phone in running["phones"]}
                     self._map = VisemeMap(prompts, running, visemes)
@@ -141,12 +147,12 @@ class _RecordingPage:
         ui.timer(REFRESH_S, self._refresh)
 
     def _build_panel(self) -> None:
-        ui.html("Your talker", tag="h2", sanitize=False).classes("text-lg m-0")
+        ui.html("Your talker", tag="h2", sanitize=False)
         self._count = ui.label()
         consent = ui.input("Statement of consent", placeholder="I, NAME, agree that my face is used for ...").classes(
             "w-full"
         )
-        with ui.row().classes("items-center"):
+        with ui.row():
             self._build = ui.button(
                 "Build the talker",
                 on_click=_reporting(lambda: self._recordings.build(self._number, self._folder, consent.value or "")),
@@ -154,13 +160,13 @@ class _RecordingPage:
             self._cancel = ui.button("Cancel", on_click=lambda: self._recordings.cancel(self._number))
             self._cancel.props("no-caps color=grey-8")
         self._bar = ui.linear_progress(value=0, show_value=False).props('aria-label="Progress of the work"')
-        self._status = ui.label().props("role=status").classes("w-full break-words")
-        with ui.column().classes("w-full gap-2") as self._finished:
+        self._status = ui.label().props("role=status").classes("record-status")
+        with ui.element("div").classes("record-side") as self._finished:
             with ui.row():
                 ui.link("Report", f"{API}/{self._number}/files/{REPORT}", new_tab=True)
                 ui.link("Download the talker", f"{API}/{self._number}/files/{TALKER}")
-            with ui.row().classes("items-center w-full no-wrap"):
-                sentence = ui.input("First sentence", value=FIRST_SENTENCE).classes("grow")
+            with ui.element("div").classes("record-sentence"):
+                sentence = ui.input("First sentence", value=FIRST_SENTENCE).classes("record-wide")
                 ui.button(
                     "Speak",
                     on_click=_reporting(
@@ -168,7 +174,7 @@ class _RecordingPage:
                     ),
                 ).props("no-caps")
             self._clip = ui.element("video").props('controls aria-label="First sentence of the talker"')
-            self._clip.classes("w-full max-w-md")
+            self._clip.classes("record-clip")
         ui.button("Delete everything", on_click=self._confirm_deletion).props("no-caps color=negative").classes(
             "self-start"
         )
@@ -216,7 +222,7 @@ class _RecordingPage:
         self._finished.set_visibility((self._folder / TALKER).is_file())
         self._clip.set_visibility(bool(now[2]))
         if now[2]:
-            self._clip.props(f'src="{API}/{self._number}/files/{CLIP}?{now[2]}"')
+            self._clip.props(f'src="{PAGES}{API}/{self._number}/files/{CLIP}?{now[2]}"')
 
 
 def _escaped(text: str) -> str:
