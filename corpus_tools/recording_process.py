@@ -31,6 +31,8 @@ IN_FRONT_OF_A_CAMERA = {  # parts of findings, and what a person can do who is j
     "check the transcript": "read exactly what is shown",
     "give the original sound": "keep the mouth in view and read it again",
     "cut the video": "stay in the picture",
+    # Other words than the prompt's are aligned with pauses, which then count as speech.
+    "record in a quieter room": "record in a quieter room, and read exactly what is shown",
     "the transcript": "the prompt",
 }
 LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=100_000, file_bytes=1 << 30, n_files=256)

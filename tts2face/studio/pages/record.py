@@ -150,7 +150,7 @@ class _RecordingPage:
         ui.html("Your talker", tag="h2", sanitize=False)
         self._count = ui.label()
         consent = ui.input("Statement of consent", placeholder="I, NAME, agree that my face is used for ...").classes(
-            "w-full"
+            "record-wide"
         )
         with ui.row():
             self._build = ui.button(
