@@ -21,6 +21,7 @@ from corpus_tools.prompts.coverage import RunningText, Units
 from corpus_tools.prompts.prompts import choose_prompts
 from corpus_tools.recordings.check_recording import RecordingChecker, recordings_to_check
 from corpus_tools.recordings.corpus_video import content_key
+from corpus_tools.recordings.limits import OUT_OF_SYNC, WARNING
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import Tts2faceError
 from tts2face.child_process import claim_standard_output, received_requests
@@ -81,6 +82,7 @@ def _findings(
     return [
         {"severity": found.severity, "code": found.code, "message": _advice(found.message, video)}
         for found in checkers[cache].check(recording)
+        if (found.severity, found.code) != (WARNING, OUT_OF_SYNC)  # a take is too short to tell; the build pools them
     ]
 
 
