@@ -10,6 +10,7 @@ from cyclopts import App, Parameter
 from cli.flags import Cache, Jobs, Model, switch, whole_number
 from cli.process import write_message
 from cli.progress import progress_bar, stage_bar
+from cli.prompts import prompts
 from cli.recording_check import check
 from lexicon.errors import InputError
 from tts2face.storage.output_names import check_file_name
@@ -17,6 +18,7 @@ from tts2face.storage.overwrite import refuse_overwriting
 
 corpus = App(name="corpus", help="Build, show and evaluate talkers.")
 corpus.command(check)
+corpus.command(prompts)
 
 OutTalker = Annotated[Path, Parameter(help="Output talker (.talker).", alias="-o")]
 TalkerName = Annotated[str, Parameter(help="A shipped talker or a .talker file.")]

@@ -115,6 +115,14 @@ LIMITS = (
         True,
         "the face is blurred (sharpness {value:.3f}, limit {bound:.3f}); wipe the lens and focus on the face",
     ),
+    # A closure of the lips of 0.05 s is in one frame at 20 frames a second, and in every second one at 10.
+    Limit(
+        "frame_rate",
+        20.0,
+        10.0,
+        True,
+        "the camera gives {value:.0f} pictures a second, limit {bound:.0f}; add light and close other programs",
+    ),
     Limit("frozen_s", 0.1, 0.3, False, "the picture is frozen for {value:.2f} s, limit {bound:.2f} s; record it again"),
     Limit(
         "eye_px",
@@ -211,7 +219,9 @@ def sound_measures(sound: Waveform, phones: PhoneSequence) -> dict[str, float]:
 def picture_measures(
     n_faces: NDArray[np.int8], changes: NDArray[np.float32], times: NDArray[np.float64]
 ) -> dict[str, float]:
-    """Share of the counted frames with several faces (``crowded``), and ``frozen_s``: the longest time without change.
+    """Share of the counted frames with several faces (``crowded``), ``frozen_s``, ``frame_rate``.
+
+    ``frozen_s`` is the longest time without a change, ``frame_rate`` the number of pictures a second.
 
     Parameters
     ----------
@@ -223,7 +233,9 @@ def picture_measures(
     still = np.concatenate([[False], changes < MIN_PICTURE_CHANGE, [False]])
     borders = np.flatnonzero(np.diff(still.astype(np.int8))).reshape(-1, 2)
     frozen = max((float(times[last - 1] - times[max(first - 1, 0)]) for first, last in borders), default=0.0)
-    return {"crowded": crowded, "frozen_s": frozen}
+    seconds = float(times[-1] - times[0]) if len(times) else 0.0
+    rate = (len(times) - 1) / seconds if seconds > 0 else np.inf
+    return {"crowded": crowded, "frozen_s": frozen, "frame_rate": rate}
 
 
 def light_measures(light: NDArray[np.floating], begin: float, end: float) -> dict[str, float]:

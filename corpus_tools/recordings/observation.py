@@ -49,9 +49,9 @@ class Quality:
     ``confidence`` of the alignment (0 is perfect, log likelihood per second), lowest face ``score``, ``n_filled``
     interpolated frames, seconds ``cut`` from the video's start, corrected ``lag`` in seconds, share of ``clipped``
     speech, ``snr_db`` of speech over noise, share of ``crowded`` frames, ``turn_deg`` away from the camera,
-    ``frozen_s`` without a change, median distance ``eye_px`` of the outer eye corners, ``jitter`` of the lip opening
-    relative to its deviation; ``brightness``, ``glare``, ``contrast`` and ``sharpness`` as
-    `corpus_tools.recordings.face_light.face_light` returns them.
+    ``frozen_s`` without a change, pictures a second (``frame_rate``), median distance ``eye_px`` of the outer eye
+    corners, ``jitter`` of the lip opening relative to its deviation; ``brightness``, ``glare``, ``contrast`` and
+    ``sharpness`` as `corpus_tools.recordings.face_light.face_light` returns them.
     """
 
     confidence: float
@@ -64,6 +64,7 @@ class Quality:
     crowded: float = 0.0
     turn_deg: float = 0.0
     frozen_s: float = 0.0
+    frame_rate: float = np.inf
     eye_px: float = np.inf
     jitter: float = 0.0
     brightness: float = np.inf

@@ -39,6 +39,7 @@ MEASURES = {
     "crowded": ("frames with several faces", "%", 100.0),
     "turn_deg": ("head turn", "degrees", 1.0),
     "frozen_s": ("frozen picture", "s", 1.0),
+    "frame_rate": ("pictures", "a second", 1.0),
     "eye_px": ("distance of the outer eye corners", "px", 1.0),
     "jitter": ("jitter of the lip opening", "of its deviation", 1.0),
     "brightness": ("brightness of the face", "of 255", 1.0),

@@ -21,7 +21,7 @@ from tts2face.types import Waveform
 
 GOOD = {
     "confidence": -3700.0, "clipped": 0.0, "snr_db": 30.0, "crowded": 0.0, "turn_deg": 6.0, "frozen_s": 0.04,
-    "eye_px": 65.0, "jitter": 0.1, "sync": 0.7, "sync_of_short": 0.6,
+    "frame_rate": 25.0, "eye_px": 65.0, "jitter": 0.1, "sync": 0.7, "sync_of_short": 0.6,
     "brightness": 120.0, "glare": 0.0, "contrast": 90.0, "sharpness": 0.04,
 }  # fmt: skip
 PHONES = PhoneSequence([SILENCE, "a", SILENCE], [0.0, 1.0, 2.0, 3.0])
@@ -53,6 +53,7 @@ def test_good_measures_pass() -> None:
         ("contrast", 3.0, r"little contrast \(3 of 255 levels, limit 5\)"),
         ("sharpness", 0.012, r"the face is blurred \(sharpness 0\.012, limit 0\.016\)"),
         ("frozen_s", 0.5, r"is frozen for 0\.50 s, limit 0\.30 s"),
+        ("frame_rate", 7.5, r"gives 8 pictures a second, limit 10; add light"),
         ("eye_px", 9.0, "eye corners are 9 px apart, limit 12 px"),
         ("jitter", 0.7, r"jitter by 0\.70 of their motion, limit 0\.50"),
         ("sync", 0.1, r"correlation 0\.10, limit 0\.25"),
@@ -129,12 +130,12 @@ def test_faces_and_still_pictures() -> None:
     changes = np.full(20, 0.8, np.float32)
     changes[7:11] = 0.0  # five pictures alike
     found = picture_measures(counted, changes, np.arange(20) / 25)
-    assert found == {"crowded": 0.25, "frozen_s": pytest.approx(4 / 25)}
+    assert found == {"crowded": 0.25, "frozen_s": pytest.approx(4 / 25), "frame_rate": pytest.approx(25.0)}
 
 
 def test_a_picture_that_always_moves_is_not_frozen() -> None:
     found = picture_measures(np.full(3, NOT_COUNTED, np.int8), np.full(3, np.inf, np.float32), np.arange(3) / 25)
-    assert found == {"crowded": 0.0, "frozen_s": 0.0}
+    assert found == {"crowded": 0.0, "frozen_s": 0.0, "frame_rate": pytest.approx(25.0)}
 
 
 def test_the_angle_between_face_and_camera() -> None:

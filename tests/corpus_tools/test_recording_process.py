@@ -1,0 +1,39 @@
+from corpus_tools.recording_process import answer
+from corpus_tools.recordings.limits import OUT_OF_SYNC, REFUSAL, UNUSABLE, WARNING, Finding
+
+
+class KnownChecker:
+    """A checker with known findings."""
+
+    def __init__(self, *findings: Finding) -> None:
+        self._findings = findings
+
+    def check(self, recording):
+        return self._findings
+
+
+def asked(tmp_path, *findings):
+    video = tmp_path / "take-0001.webm"
+    video.write_bytes(b"video")
+    order = {"kind": "check", "video": str(video), "text": "Hello there.", "cache": str(tmp_path / "cache")}
+    return answer(order, {tmp_path / "cache": KnownChecker(*findings)})
+
+
+def test_findings_say_what_a_person_in_front_of_the_camera_can_do(tmp_path):
+    words = Finding(
+        REFUSAL, "confidence", "the sound does not match the transcript; correct the words", -7000.0, -6500.0
+    )
+    broken = Finding(REFUSAL, UNUSABLE, f"{tmp_path}/take-0001.webm is empty; record it again")
+    found = asked(tmp_path, words, broken)
+    assert [one["message"] for one in found["findings"]] == [
+        "the sound does not match the prompt; read exactly what is shown",
+        "take-0001.webm is empty; record it again",
+    ]
+    assert found["key"]
+
+
+def test_a_take_is_not_blamed_for_being_short(tmp_path):
+    short = Finding(WARNING, OUT_OF_SYNC, "5.0 s are too short to tell; record 12 s or more")
+    assert asked(tmp_path, short)["findings"] == []
+    late = Finding(REFUSAL, OUT_OF_SYNC, "sound and picture are out of sync")
+    assert len(asked(tmp_path, late, short)["findings"]) == 1

@@ -1,0 +1,229 @@
+"""Pages that record a person: prompts, takes, the coverage of phones, and the talker that is built of them."""
+
+import tempfile
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+from fastapi import FastAPI, Request
+from nicegui import events, ui
+
+from lexicon.errors import InputError, Tts2faceError
+from tts2face.exports.visemes import viseme_table
+from tts2face.studio.components.recorder import STYLE, Recorder, VisemeMap
+from tts2face.studio.recording_routes import API, PAGES, Owner, recording_router
+from tts2face.studio.recordings import Recordings
+from tts2face.studio.talker_building import CLIP, REPORT, TALKER
+
+LIST_PAGE = "/record"
+PRIMARY, NEGATIVE = "#0b5cb8", "#b3182a"  # white text on them has a contrast of 6 or more
+MAX_TEXT_BYTES = 2 << 20
+MINUTES = {2: "2 minutes, 25 prompts", 5: "5 minutes, 60 prompts", 10: "10 minutes, 120 prompts"}
+REFRESH_S = 0.4
+FIRST_SENTENCE = "Hello, this is my own face."
+
+
+def add_record_page(app: FastAPI, folder: Path, owner: Owner) -> Recordings:
+    """Add the pages to NiceGUI, which is to be mounted at `PAGES`, and their routes to the application around it.
+
+    The caller calls ``checks.start`` of the returned recordings when the application begins, and ``stop`` when it ends.
+
+    Parameters
+    ----------
+    folder
+        Folder of the studio; recordings are in ``recordings/`` of it.
+    """
+    recordings = Recordings(folder)
+    app.include_router(recording_router(recordings, owner))
+
+    @ui.page(LIST_PAGE, title="Record - tts2face studio", language="en-US")
+    def show_list(request: Request) -> None:
+        _list_page(recordings, owner(request))
+
+    @ui.page(LIST_PAGE + "/{number}", title="Record - tts2face studio", language="en-US")
+    def show_recording(request: Request, number: str) -> None:
+        try:
+            here = recordings.store.folder(number, owner(request))
+        except InputError as unknown:
+            _page_head("Record your own talker")
+            ui.label(str(unknown))
+            ui.link("Recordings", LIST_PAGE)
+            return
+        _RecordingPage(recordings, number, here).show()
+
+    return recordings
+
+
+def _page_head(title: str) -> None:
+    ui.dark_mode(None)
+    ui.colors(primary=PRIMARY, negative=NEGATIVE)
+    ui.add_css(STYLE.read_text(encoding="utf-8"), shared=False)
+    ui.html(title, tag="h1", sanitize=False)
+
+
+def _list_page(recordings: Recordings, owner: str) -> None:
+    with ui.element("div").classes("record-page record-list"):
+        _page_head("Record your own talker")
+        ui.label(
+            "Read sentences aloud in front of the webcam. Each take is checked while you read the next one; from two "
+            "minutes on they become a talker with your lips and your face. Everything stays on the computer that runs "
+            "the studio."
+        )
+        entries = recordings.store.entries(owner)
+        if entries:
+            ui.html("Recordings", tag="h2", sanitize=False)
+        for entry in entries:
+            with ui.row():
+                ui.link(entry.name, f"{LIST_PAGE}/{entry.id}")
+                ui.label(f"{entry.n_accepted} of {entry.n_prompts} prompts recorded")
+        ui.html("New recording", tag="h2", sanitize=False)
+        name = ui.input("Name of the talker").classes("record-field")
+        minutes = ui.select(MINUTES, value=5, label="Length").classes("record-field")
+        language = ui.input("Language (an espeak-ng code)", value="en-us").classes("record-field")
+        text: list[bytes] = []
+
+        async def keep_text(upload: events.UploadEventArguments) -> None:
+            text[:] = [await upload.file.read()]
+            chosen.text = f"Prompts are selected from {upload.file.name}, in the language above."
+
+        upload = ui.upload(auto_upload=True, max_file_size=MAX_TEXT_BYTES, on_upload=keep_text).style("display: none")
+        choose = ui.button("Choose a text in another language", on_click=lambda: upload.run_method("pickFiles"))
+        choose.props("no-caps color=grey-8")
+        chosen = ui.label().props("role=status")
+
+        async def create() -> None:
+            with tempfile.TemporaryDirectory() as folder:
+                path = Path(folder) / "text"
+                path.write_bytes(text[0] if text else b"")
+                prompts = await recordings.checks.prompts(
+                    float(minutes.value), language.value.strip(), str(path) if text else None
+                )
+            ui.navigate.to(f"{LIST_PAGE}/{recordings.store.create(owner, name.value, prompts)}")
+
+        ui.button("Start recording", on_click=_reporting(create)).props("no-caps")
+
+
+def _reporting(action: Callable[[], Awaitable[None] | None]) -> Callable[[], Awaitable[None]]:
+    """The action, which shows an error of the user's as one sentence."""
+
+    async def run() -> None:
+        try:
+            result = action()
+            if result is not None:
+                await result
+        except Tts2faceError as error:
+            ui.notify(str(error), type="negative", multi_line=True, close_button="Close", timeout=0)
+
+    return run
+
+
+class _RecordingPage:
+    """The page of one recording."""
+
+    def __init__(self, recordings: Recordings, number: str, folder: Path) -> None:
+        self._recordings, self._number, self._folder = recordings, number, folder
+        self._content = recordings.store.prompts(number)
+        self._shown: object = None
+
+    def show(self) -> None:
+        """Build the page."""
+        prompts = self._content["prompts"]
+        with ui.element("div").classes("record-page"):
+            with ui.element("div").classes("record-head"):
+                _page_head(f"Record {_escaped(self._recordings.store.name(self._number))}")
+                ui.link("All recordings", LIST_PAGE)
+            with ui.element("div").classes("record-columns"):
+                takes = self._takes()
+                first = next((at for at in range(len(prompts)) if at not in takes), 0)
+                texts = [prompt["text"] for prompt in prompts]
+                self._recorder = Recorder(texts, takes, f"{PAGES}{API}/{self._number}/takes/", first)
+                self._recorder.on("remove", lambda event: self._delete_take(int(event.args)))
+                with ui.element("div").classes("record-side"):
+                    ui.html("What your takes cover", tag="h2", sanitize=False)
+                    running = self._content["running"]
+                    visemes = {phone: viseme_table("oculus")[phone][0] for phone in running["phones"]}
+                    self._map = VisemeMap(prompts, running, visemes)
+                    self._build_panel()
+        self._refresh()
+        ui.timer(REFRESH_S, self._refresh)
+
+    def _build_panel(self) -> None:
+        ui.html("Your talker", tag="h2", sanitize=False)
+        self._count = ui.label()
+        consent = ui.input("Statement of consent", placeholder="I, NAME, agree that my face is used for ...").classes(
+            "record-wide"
+        )
+        with ui.row():
+            self._build = ui.button(
+                "Build the talker",
+                on_click=_reporting(lambda: self._recordings.build(self._number, self._folder, consent.value or "")),
+            ).props("no-caps")
+            self._cancel = ui.button("Cancel", on_click=lambda: self._recordings.cancel(self._number))
+            self._cancel.props("no-caps color=grey-8")
+        self._bar = ui.linear_progress(value=0, show_value=False).props('aria-label="Progress of the work"')
+        self._status = ui.label().props("role=status").classes("record-status")
+        with ui.element("div").classes("record-side") as self._finished:
+            with ui.row():
+                ui.link("Report", f"{API}/{self._number}/files/{REPORT}", new_tab=True)
+                ui.link("Download the talker", f"{API}/{self._number}/files/{TALKER}")
+            with ui.element("div").classes("record-sentence"):
+                sentence = ui.input("First sentence", value=FIRST_SENTENCE).classes("record-wide")
+                ui.button(
+                    "Speak",
+                    on_click=_reporting(
+                        lambda: self._recordings.speak(self._number, self._folder, sentence.value or "")
+                    ),
+                ).props("no-caps")
+            self._clip = ui.element("video").props('controls aria-label="First sentence of the talker"')
+            self._clip.classes("record-clip")
+        ui.button("Delete everything", on_click=self._confirm_deletion).props("no-caps color=negative").classes(
+            "self-start"
+        )
+
+    def _takes(self) -> dict[int, dict[str, str]]:
+        takes = self._recordings.store.takes(self._number)
+        return {at: {"state": take.state, "advice": take.advice.rstrip(".")} for at, take in takes.items()}
+
+    def _delete_take(self, at: int) -> None:
+        self._recordings.store.delete_take(self._number, at)
+        self._refresh()
+
+    async def _confirm_deletion(self) -> None:
+        with ui.dialog() as dialog, ui.card():
+            ui.label("Delete all takes, the report and the talker of this recording? This cannot be undone.")
+            with ui.row():
+                ui.button("Delete", on_click=lambda: dialog.submit(True)).props("no-caps color=negative")
+                ui.button("Keep", on_click=lambda: dialog.submit(False)).props("no-caps color=grey-8")
+        if await dialog:
+            await self._recordings.delete(self._number)
+            ui.navigate.to(LIST_PAGE)
+
+    def _refresh(self) -> None:
+        """Show what has changed."""
+        progress = self._recordings.progress(self._number)
+        clip = self._folder / CLIP
+        now = (
+            self._recordings.store.revision, progress and (progress.stage, progress.done, progress.is_running),
+            clip.stat().st_mtime_ns if clip.is_file() else 0,
+        )  # fmt: skip
+        if now == self._shown or not self._folder.is_dir():
+            return
+        self._shown = now
+        accepted = self._recordings.accepted(self._number)
+        self._recorder.set_takes(self._takes())
+        self._map.set_accepted(accepted)
+        self._count.text = f"{len(accepted)} of {len(self._content['prompts'])} prompts recorded and accepted."
+        is_running = progress is not None and progress.is_running
+        self._build.set_enabled(bool(accepted) and not is_running)
+        self._cancel.set_visibility(is_running)
+        self._bar.set_visibility(is_running)
+        if progress is not None:
+            self._bar.value = progress.done / progress.of if progress.of else 0
+            self._status.text = progress.stage if is_running else progress.error or progress.message
+        self._finished.set_visibility((self._folder / TALKER).is_file())
+        self._clip.set_visibility(bool(now[2]))
+        if now[2]:
+            self._clip.props(f'src="{PAGES}{API}/{self._number}/files/{CLIP}?{now[2]}"')
+
+
+def _escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

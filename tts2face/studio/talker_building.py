@@ -1,0 +1,115 @@
+"""A talker from the accepted takes of a recording, and its first sentence, each in a process of its own.
+
+The building is that of the service's jobs (`corpus_tools.build_process`), with its limits; the command `tts2face`
+makes the clip.
+"""
+
+import asyncio
+import json
+import os
+import shutil
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import BackendError, DataError
+from lexicon.inputs import parse_json
+from tts2face.batch.render_process import KINDS
+from tts2face.jobs.talker_job import BUILDER, CPU_S, CPU_S_PER_S, LIMITS, SLOWNESS
+from tts2face.limited_process import bare_environment
+
+TALKER, REPORT, CLIP = "talker.talker", "report.html", "first.mp4"  # files in the folder of a recording
+MADE, CHECKED = "made.talker", "checked"  # as the builder names them
+MAX_TALKER_BYTES = 500e6
+SECONDS_A_TAKE = 10.0  # at most, for the limit of time
+CLIP_S = 600.0  # limit of the first sentence
+N_SHOWN = 5  # refused takes
+MAX_REASON_CHARACTERS = 300
+
+
+async def build_talker(folder: Path, *, name: str, consent: str, n_takes: int, on_message: Callable[..., None]) -> str:
+    """Build the talker of a recording with its own face; one sentence about it.
+
+    Parameters
+    ----------
+    on_message
+        Called with the stage, and the steps done and of all.
+
+    Raises
+    ------
+    InputError, DataError, BackendError
+        As `tts2face corpus build` says.
+    """
+    for old in (TALKER, REPORT, CLIP, MADE):
+        (folder / old).unlink(missing_ok=True)
+    shutil.rmtree(folder / CHECKED, ignore_errors=True)
+    cpu_s = int(CPU_S + CPU_S_PER_S * SECONDS_A_TAKE * n_takes)
+    order = {
+        "folder": str(folder), "name": name, "provenance": {"name": name}, "consent": consent,
+        "with_appearance": True, "with_report": find_spec("matplotlib") is not None, "max_bytes": MAX_TALKER_BYTES,
+        "limits": asdict(replace(LIMITS, cpu_s=cpu_s)),
+    }  # fmt: skip
+    result = await asyncio.wait_for(_run_builder(order, on_message), SLOWNESS * cpu_s)
+    os.replace(folder / MADE, folder / TALKER)
+    shutil.rmtree(folder / CHECKED, ignore_errors=True)
+    refused = "; ".join(f"{take}: {reason}" for take, reason in result["refused"][:N_SHOWN])
+    minutes = f"{result['n_kept']} takes, {result['minutes']:.1f} minutes"
+    return f"The talker {name} is made of {minutes}." + (f" Refused: {refused}." if refused else "")
+
+
+async def _run_builder(order: dict[str, Any], on_message: Callable[..., None]) -> dict[str, Any]:
+    child = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", BUILDER, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
+        stderr=asyncio.subprocess.DEVNULL, env=bare_environment(),
+    )  # fmt: skip
+    assert child.stdin is not None
+    assert child.stdout is not None
+    try:
+        child.stdin.write(json.dumps(order).encode() + b"\n")
+        await child.stdin.drain()
+        while line := await child.stdout.readline():
+            content: dict[str, Any] = parse_json(line.decode(), "the builder")
+            if "error" in content:
+                raise KINDS.get(content["error"], BackendError)(content["message"])
+            if "n_kept" in content:
+                return content
+            on_message(content["stage"], content["done"], content["of"])
+    finally:
+        await _end(child)
+    raise DataError("the takes need too much memory or time; delete some, or record smaller pictures")
+
+
+async def speak(folder: Path, text: str) -> None:
+    """Write the clip of a sentence with the talker's own face.
+
+    Raises
+    ------
+    InputError
+        The sentence cannot be said.
+    BackendError
+        The clip could not be made in time.
+    """
+    child = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "tts2face", "--talker", str(folder / TALKER), "--face", "self",
+        "--out", str(folder / CLIP), "--", text, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.DEVNULL,
+        stderr=asyncio.subprocess.PIPE, env=bare_environment(),
+    )  # fmt: skip
+    try:
+        _, errors = await asyncio.wait_for(child.communicate(), CLIP_S)
+    except TimeoutError as late:
+        raise BackendError("the clip took too long; give a shorter sentence") from late
+    finally:
+        await _end(child)
+    if child.returncode:
+        reason = " ".join(errors.decode(errors="replace").split())[-MAX_REASON_CHARACTERS:]
+        raise BackendError(reason.removeprefix("tts2face: ") or "the clip could not be made; try again")
+
+
+async def _end(child: asyncio.subprocess.Process) -> None:
+    with suppress(ProcessLookupError):
+        child.kill()
+    await child.wait()
