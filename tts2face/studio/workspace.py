@@ -22,7 +22,6 @@ from tts2face.studio.store import ProjectStore
 SAVE_S = 0.5  # between an edit and the time at which it is on disk
 CONTINUE_S = 1.5  # within which edits of the same kind are one step of the history
 MOVE_S = 0.3  # within which an element that is removed and added has been moved
-MOVED = frozenset({"nod", "gaze"})
 LEASE_S = 45.0  # after the last sign of life of a tab, for which it stays the one that edits
 SHOWN_ONLY = frozenset({"name"})  # kinds of edits that change neither motion nor sound
 PICTURE_ONLY = frozenset({"picture"})  # kinds that change final pictures only
@@ -48,7 +47,7 @@ class Workspace:
         self.listeners: set[Listener] = set()
         self._save_task: asyncio.Task[None] | None = None
         self._saved: History = self.history
-        self._edited_at = -CONTINUE_S
+        self._edited_at, self._last_kind = -CONTINUE_S, ""
         self._editor, self._lease_until = "", 0.0
         self._turn = asyncio.Lock()
         self.used_at = self._now()
@@ -98,10 +97,10 @@ class Workspace:
             kind = str(edit.get("kind"))
             project = apply(self.project, edit, self.preview.current.sentences() if kind == "edge" else None)
             topic = kind + "".join(sorted(edit["options"])) if kind in OPTION_PARTS else kind.removeprefix("remove_")
-            within = CONTINUE_S if kind in OPTION_PARTS | SHOWN_ONLY else MOVE_S if kind in MOVED else 0.0
-            continues = self._now() < self._edited_at + within
-            self._edited_at = self._now()
-            self._set(self.history.add(project, topic, continues=continues), kind)
+            is_typing = kind in OPTION_PARTS | SHOWN_ONLY and self._now() < self._edited_at + CONTINUE_S
+            is_moving = self._last_kind == f"remove_{kind}" and self._now() < self._edited_at + MOVE_S
+            self._edited_at, self._last_kind = self._now(), kind
+            self._set(self.history.add(project, topic, continues=is_typing or is_moving), kind)
             if kind == "pronounce" and edit.get("keep"):
                 await asyncio.to_thread(
                     self._store.keep_word, self.key.name, str(edit["word"]).strip(), str(edit["phones"]).strip()

@@ -73,8 +73,6 @@ class AnimatePage:
 
     async def build(self, request: HttpRequest) -> None:
         """Build the page."""
-        self.workspace.listeners.add(self._on_change)
-        self.client.on_delete(self._leave)
         may_edit = self.workspace.claim(self.tab)
         self.bar, self.inspector = Bar(self, request), Inspector(self)
         self._banner()
@@ -95,6 +93,8 @@ class AnimatePage:
                 self.inspector.build(found)
         self._looks = self._shown_looks()
         self._set_enabled(may_edit)
+        self.workspace.listeners.add(self._on_change)
+        self.client.on_delete(self._leave)
         ui.timer(LEASE_S / 3, self._renew)
         self.workspace.show()
 
