@@ -3,14 +3,17 @@
 import asyncio
 import hashlib
 import json
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 
 from lexicon.errors import InputError
 from tts2face import __version__
 from tts2face.project.project import Project
-from tts2face.service.access.keys import ApiKey
+from tts2face.service.access.keys import LOCAL_KEY, ApiKey
+from tts2face.service.errors import RefusedError
 from tts2face.service.state import ServiceState
+from tts2face.service.synthesis.work import Work
 from tts2face.storage.files import translate_disk_errors, write_atomically
 from tts2face.studio.bundle import PieceMemory
 from tts2face.studio.renders import RenderQueue
@@ -34,6 +37,7 @@ class Studio:
         self.renders = RenderQueue(state)
         self._open: dict[tuple[str, str], Workspace] = {}
         self._opening = asyncio.Lock()
+        self._making: dict[str, asyncio.Lock] = {}  # of faces by name
 
     async def entries(self, key: ApiKey) -> list[ProjectEntry]:
         """Projects of a key, those changed last first."""
@@ -82,6 +86,13 @@ class Studio:
         self.renders.forget(number)
         await asyncio.to_thread(self.store.remove, number, key.name)
 
+    async def prepare(self) -> None:
+        """Make the face of new projects, so that the first one shows it at once."""
+        project = Project()
+        work = self.state.work(kind="face", models=asdict(project.models), request={"has_gestures": True})
+        with suppress(RefusedError):  # the first page says why
+            await self._face_file(project, work, LOCAL_KEY)
+
     async def face(self, workspace: Workspace) -> Path:
         """File of the face of a project for a page; made at its first use, and kept.
 
@@ -91,20 +102,20 @@ class Studio:
             It is a talker's own face, which has no mesh.
         """
         work = await workspace.work("face", has_gestures=workspace.project.request.has_gestures)
-        known = [
-            asdict(workspace.project.models),
-            dict(work.models),
-            workspace.project.request.has_gestures,
-            __version__,
-        ]
-        name = hashlib.sha256(json.dumps(known, default=str, sort_keys=True).encode()).hexdigest()[:24]
+        # In any process: making a face takes seconds, in which the project's own process makes its preview.
+        return await self._face_file(workspace.project, replace(work, affinity=""), workspace.key)
+
+    async def _face_file(self, project: Project, work: Work, key: ApiKey) -> Path:
+        looks = [asdict(project.models), dict(work.models), project.request.has_gestures, __version__]
+        name = hashlib.sha256(json.dumps(looks, default=str, sort_keys=True).encode()).hexdigest()[:24]
         path = self._folder / "faces" / f"{name}.glb"
-        if not path.is_file():
-            with translate_disk_errors(path):
-                path.parent.mkdir(parents=True, exist_ok=True)
-            content = await data_of(self.state, workspace.key, work)
-            await asyncio.to_thread(write_atomically, path, content)
-            await asyncio.to_thread(_keep_last, path.parent, MAX_FACES)
+        async with self._making.setdefault(name, asyncio.Lock()):
+            if not path.is_file():
+                with translate_disk_errors(path):
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                content = await data_of(self.state, key, work)
+                await asyncio.to_thread(write_atomically, path, content)
+                await asyncio.to_thread(_keep_last, path.parent, MAX_FACES)
         return path
 
     async def close(self) -> None:

@@ -4,12 +4,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from nicegui.element import Element
+from nicegui.events import GenericEventArguments, Handler
 
 from tts2face.studio.components.stage import COMPONENTS, MODULES
 
 
 class Timeline(Element, component="timeline.js", esm={MODULES: str(COMPONENTS)}):
-    """Timeline of a project; emits ``edit`` with an edit of `tts2face.studio.editing`.
+    """Timeline of a project.
 
     Parameters
     ----------
@@ -18,26 +19,43 @@ class Timeline(Element, component="timeline.js", esm={MODULES: str(COMPONENTS)})
     styles
         Styles with their colours: ``name``, ``color``.
     lanes
-        State of the lanes: ``muted`` and ``solo``, lists of features.
+        Features with ``feature``, ``muted``, ``solo`` and ``seed``.
+    on_edit
+        Called with an edit of `tts2face.studio.editing` as ``args``.
     """
 
     def __init__(
-        self, timeline: Mapping[str, Any], styles: Sequence[Mapping[str, str]], lanes: Mapping[str, Any]
+        self,
+        timeline: Mapping[str, Any],
+        *,
+        styles: Sequence[Mapping[str, str]],
+        lanes: Sequence[Mapping[str, Any]],
+        on_edit: Handler[GenericEventArguments],
     ) -> None:
         super().__init__()
         self._props.update(timeline=timeline, styles=styles, lanes=lanes, brush={"tool": "select", "style": ""})
+        self.on("edit", on_edit)
 
-    def set_timeline(self, timeline: Mapping[str, Any], lanes: Mapping[str, Any]) -> None:
+    def set_timeline(self, timeline: Mapping[str, Any]) -> None:
         """Show another state of the project."""
-        self._props.update(timeline=timeline, lanes=lanes)
-        self.update()
+        self._set(timeline=timeline)
 
     def set_styles(self, styles: Sequence[Mapping[str, str]]) -> None:
         """Offer other styles."""
-        self._props["styles"] = styles
-        self.update()
+        self._set(styles=styles)
 
     def set_brush(self, tool: str, style: str) -> None:
         """Choose a tool (brush, eraser, select) and its style."""
-        self._props["brush"] = {"tool": tool, "style": style}
+        self._set(brush={"tool": tool, "style": style})
+
+    def set_lanes(self, lanes: Sequence[Mapping[str, Any]]) -> None:
+        """Show which lanes are muted or solo, and their seeds."""
+        self._set(lanes=lanes)
+
+    def set_compare(self, url: str | None) -> None:
+        """Draw the curves of a second preview; None removes them."""
+        self._set(compare=url)
+
+    def _set(self, **props: Any) -> None:
+        self._props.update(props)
         self.update()

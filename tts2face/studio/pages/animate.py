@@ -1,12 +1,15 @@
 """The page on which a project is edited: stage, timeline, and panels around them."""
 
+import zlib
 from typing import Any
 
 from fastapi import Request as HttpRequest
 from nicegui import ui
 
 from lexicon.errors import Tts2faceError
+from tts2face import __version__
 from tts2face.gesture.timeline_file import timeline_json
+from tts2face.models.palette import FEATURES
 from tts2face.request import OWN_FACE
 from tts2face.service.access.page_headers import PAGES
 from tts2face.service.errors import RefusedError
@@ -64,8 +67,8 @@ class AnimatePage:
         project = self.workspace.project
         if project.models.face == OWN_FACE:
             return None
-        looks = (project.models, project.request.has_gestures)
-        return f"{self.address}/face.glb?look={abs(hash(looks)):x}"
+        looks = f"{__version__} {project.models} {project.request.has_gestures}"
+        return f"{self.address}/face.glb?look={zlib.crc32(looks.encode()):08x}"
 
     @property
     def _preview_address(self) -> str:
@@ -86,8 +89,10 @@ class AnimatePage:
                 self.stage.on("failed", lambda event: ui.notify(str(event.args), type="negative"))
             with ui.element("div").classes("time"):
                 found = await styles(self.studio.state.library, self.workspace.key, project.models.palette)
-                self.timeline = Timeline(timeline_json(project.timeline), found, self._lanes())
-                self.timeline.on("edit", lambda event: self.edit(event.args))
+                self.timeline = Timeline(
+                    timeline_json(project.timeline), styles=found, lanes=self._lanes(),
+                    on_edit=lambda event: self.edit(event.args),
+                )  # fmt: skip
                 self.timeline.on("pick", lambda event: self.inspector.show_item(event.args))
             with ui.element("section").classes("panel right").props('aria-label="Inspector"'):
                 self.inspector.build(found)
@@ -138,15 +143,23 @@ class AnimatePage:
     def refresh(self) -> None:
         """Show the project as it is now."""
         project = self.workspace.project
-        self.timeline.set_timeline(timeline_json(project.timeline), self._lanes())
+        self._show_timeline()
         self.stage.set_environment(project.picture.background)
         self.speech.refresh()
         self.inspector.refresh()
         self.bar.refresh()
 
-    def _lanes(self) -> dict[str, Any]:
+    def _show_timeline(self) -> None:
+        self.timeline.set_timeline(timeline_json(self.workspace.project.timeline))
+        self.timeline.set_lanes(self._lanes())
+
+    def _lanes(self) -> list[dict[str, Any]]:
         project = self.workspace.project
-        return {"muted": sorted(project.muted), "solo": sorted(project.solo)}
+        seeds = {**dict.fromkeys(FEATURES, project.request.seed), **project.timeline.seeds}
+        return [
+            {"feature": one, "muted": one in project.muted, "solo": one in project.solo, "seed": seeds[one]}
+            for one in FEATURES
+        ]
 
     def _shown_looks(self) -> tuple[str | None, str | None]:
         return self.face_address, self.workspace.project.models.palette
@@ -166,8 +179,7 @@ class AnimatePage:
 
     def _show_project(self) -> None:
         if self._is_own_edit:  # controls show already what was entered in them
-            project = self.workspace.project
-            self.timeline.set_timeline(timeline_json(project.timeline), self._lanes())
+            self._show_timeline()
             self.bar.refresh()
         else:
             self.refresh()

@@ -85,11 +85,11 @@ class Inspector:
     async def show_item(self, item: Mapping[str, Any]) -> None:
         """Show what a person has chosen on the timeline: a phone is explained, a word may get other phones."""
         if item.get("kind") == "word":
-            word = str(item.get("text", "")).strip(".,;:!?\"'()")
+            word = str(item.get("name", "")).strip(".,;:!?\"'()")
             self._word.value = word
             self._phones.value = self._page.workspace.project.pronunciations.get(word, "")
         elif item.get("kind") == "phone":
-            await self._explain((float(item["start"]) + float(item["end"])) / 2)
+            await self._explain((float(item["begin"]) + float(item["end"])) / 2)
 
     def show_notes(self) -> None:
         """Show what is known of the preview."""
