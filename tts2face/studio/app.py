@@ -38,17 +38,15 @@ def mount_studio(app: FastAPI, state: ServiceState) -> None:
 
 
 def _run_with(app: FastAPI, studio: Studio) -> None:
-    """Prepare the studio when the application begins; save all projects when it ends, while its processes still run."""
+    """Save all projects when the application ends, while its processes still run."""
     before = app.router.lifespan_context
 
     @asynccontextmanager
     async def lifespan(whole: FastAPI) -> AsyncIterator[Any]:
         async with before(whole) as state:
-            preparing = asyncio.create_task(studio.prepare())
             try:
                 yield state
             finally:
-                preparing.cancel()
                 await asyncio.shield(studio.close())
 
     app.router.lifespan_context = lifespan

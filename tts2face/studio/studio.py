@@ -37,6 +37,7 @@ class Studio:
         self.renders = RenderQueue(state)
         self._open: dict[tuple[str, str], Workspace] = {}
         self._opening = asyncio.Lock()
+        self._preparing: asyncio.Task[None] | None = None
         self._making: dict[str, asyncio.Lock] = {}  # of faces by name
 
     async def entries(self, key: ApiKey) -> list[ProjectEntry]:
@@ -86,8 +87,12 @@ class Studio:
         self.renders.forget(number)
         await asyncio.to_thread(self.store.remove, number, key.name)
 
-    async def prepare(self) -> None:
-        """Make the face of new projects, so that the first one shows it at once."""
+    def prepare(self) -> None:
+        """Begin to make the face of new projects, so that the first one shows it at once; only the first call does."""
+        if self._preparing is None:
+            self._preparing = asyncio.get_running_loop().create_task(self._prepare())
+
+    async def _prepare(self) -> None:
         project = Project()
         work = self.state.work(kind="face", models=asdict(project.models), request={"has_gestures": True})
         with suppress(RefusedError):  # the first page says why
@@ -120,6 +125,8 @@ class Studio:
 
     async def close(self) -> None:
         """Save all projects, and end what is being made."""
+        if self._preparing is not None:
+            self._preparing.cancel()
         await self.renders.close()
         for one in self._open.values():
             await one.close()

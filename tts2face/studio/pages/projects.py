@@ -43,6 +43,7 @@ class ProjectsPage:
 
     async def build(self, request: HttpRequest) -> None:
         """Build the page."""
+        self._studio.prepare()
         with ui.element("header").classes("bar"):
             heading(1, "tts2face studio")
             ui.element("span").classes("grow")
