@@ -1,6 +1,8 @@
 """``tts2face serve`` and ``tts2face keys``: the HTTP service."""
 
 import sys
+from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -12,23 +14,33 @@ from tts2face.service.settings import read_settings
 keys = App(name="keys", help="API keys of the service.")
 
 
-def serve(
+def serve(  # noqa: PLR0913 - one parameter a flag
     *,
     settings: Annotated[Path | None, Parameter(help="TOML file of settings.")] = None,
     host: Annotated[str | None, Parameter(help="Address to listen on (127.0.0.1).")] = None,
     port: Annotated[int | None, whole_number("Port (8880); 0: a free one.")] = None,
     keys: Annotated[Path | None, Parameter(help="File of API keys.")] = None,
     processes: Annotated[int | None, whole_number("Synthesis processes; by default one for each core.")] = None,
+    data: Annotated[Path | None, Parameter(help="Folder of jobs, uploads and the studio's projects.")] = None,
+    no_studio: Annotated[bool, switch("Leave the studio out, which is at /studio if NiceGUI is installed.")] = False,
     show_config: Annotated[bool, switch("Print the settings and exit.")] = False,
 ) -> None:
     """Serve speech, clips and curves over HTTP (docs/http.md)."""
-    chosen = read_settings(settings, {"host": host, "port": port, "keys": keys, "processes": processes})
+    flags = {
+        "host": host, "port": port, "keys": keys, "processes": processes, "data": data,
+        "studio": False if no_studio else None,
+    }  # fmt: skip
+    chosen = read_settings(settings, flags)
     if show_config:
         sys.stdout.write(chosen.as_toml())
         return
     from tts2face.service.server import serve as run_server
 
-    run_server(chosen)
+    if not chosen.studio or find_spec("nicegui") is None:
+        return run_server(replace(chosen, studio=False))
+    from tts2face.studio.app import mount_studio
+
+    return run_server(chosen, [mount_studio])
 
 
 @keys.command

@@ -45,25 +45,42 @@ class SessionCache:
         Loaded voices that all sessions share; None: each has its own.
     max_bytes
         Memory of this process beyond which the least recently used sessions are released, all but one; None: any.
+    memory_mb
+        Finished sentences that a session with an owner keeps, as for `Session`.
     """
 
-    def __init__(self, n_sessions: int = 1, *, voices: "VoicePool | None" = None, max_bytes: int | None = None) -> None:
+    def __init__(
+        self,
+        n_sessions: int = 1,
+        *,
+        voices: "VoicePool | None" = None,
+        max_bytes: int | None = None,
+        memory_mb: float = 0.0,
+    ) -> None:
         self._n_sessions, self._voices, self._max_bytes = n_sessions, voices, max_bytes
-        self._sessions: OrderedDict[Models, Session] = OrderedDict()
+        self._memory_mb = memory_mb
+        self._sessions: OrderedDict[tuple[Models, str], Session] = OrderedDict()
 
-    def get(self, models: Models) -> "Session":
-        """Session of these models; raises as `Session`."""
-        if models in self._sessions:
-            self._sessions.move_to_end(models)
+    def get(self, models: Models, owner: str = "") -> "Session":
+        """Session of these models; raises as `Session`.
+
+        Parameters
+        ----------
+        owner
+            For whom the session keeps finished sentences, and for nobody else; empty: it keeps none.
+        """
+        key = (models, owner)
+        if key in self._sessions:
+            self._sessions.move_to_end(key)
         else:
             while len(self._sessions) >= self._n_sessions:
                 self._sessions.popitem(last=False)
             gc.collect()  # sessions hold themselves in circles
-            self._sessions[models] = models.open_session(self._voices)
+            self._sessions[key] = models.open_session(self._voices, memory_mb=self._memory_mb if owner else 0.0)
         while self._max_bytes is not None and len(self._sessions) > 1 and resident_bytes() > self._max_bytes:
             self._sessions.popitem(last=False)
             gc.collect()
-        return self._sessions[models]
+        return self._sessions[key]
 
 
 def resident_bytes() -> int:

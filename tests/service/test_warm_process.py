@@ -17,7 +17,7 @@ def test_the_end_of_a_process_is_not_taken_from_asyncio(caplog: pytest.LogCaptur
 
     async def run() -> None:
         settings = {"core": None, "n_sessions": 1, "warm": [], "log_format": JSON_LINES, "log_text": False}
-        process = WarmProcess(settings | {"memory_mb": 0}, lambda: None)
+        process = WarmProcess(settings | {"memory_mb": 0, "sentences_mb": 0}, lambda: None)
         running = asyncio.create_task(process.run())
         async with asyncio.timeout(READY_TIMEOUT_S):
             for number in range(3):

@@ -1,7 +1,7 @@
 """The ASGI application of the service."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 
 from fastapi import FastAPI
@@ -23,8 +23,17 @@ from tts2face.service.state import ServiceState
 NO_TELEMETRY: TelemetryConfig = {"tracing": False, "metrics": False, "logs": False, "auto_configure": False}
 
 
-def create_app(settings: ServiceSettings) -> FastAPI:
-    """Application with the given settings; its synthesis processes run from startup to shutdown."""
+Mount = Callable[[FastAPI, ServiceState], None]
+
+
+def create_app(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> FastAPI:
+    """Application with the given settings; its synthesis processes run from startup to shutdown.
+
+    Parameters
+    ----------
+    mounts
+        Functions that add further parts to the application, behind the same checks.
+    """
     state = ServiceState(settings)
 
     @asynccontextmanager
@@ -55,6 +64,8 @@ def create_app(settings: ServiceSettings) -> FastAPI:
     app.add_exception_handler(RefusedError, _answer_refused)
     app.add_exception_handler(RequestValidationError, _answer_invalid)
     app.add_exception_handler(HTTPException, _answer_http)
+    for mount in mounts:
+        mount(app, state)
     app.add_middleware(Guard, state=state)
     return app
 

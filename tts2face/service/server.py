@@ -5,12 +5,14 @@ import signal
 import socket
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 
 import uvicorn
 
 from tts2face.service.access.connections import connection_classes
-from tts2face.service.app import create_app
+from tts2face.service.access.page_headers import PAGES
+from tts2face.service.app import Mount, create_app
 from tts2face.service.logs import configure_logs, log_event
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.state import ServiceState
@@ -21,7 +23,7 @@ FORCED_CODE = 143  # exit code after a second signal; 0 after the first
 CUT_S = 2  # in which requests that were cut release what they hold
 
 
-def serve(settings: ServiceSettings) -> None:
+def serve(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> None:
     """Serve until SIGTERM or SIGINT; running requests then have `drain_s` seconds to finish.
 
     Raises
@@ -34,10 +36,11 @@ def serve(settings: ServiceSettings) -> None:
     disable_telemetry()
     configure_logs(settings.log_format, with_text=settings.log_text)
     _allow_files(settings.connections)
-    app = create_app(settings)
+    app = create_app(settings, mounts)
     http, socket_class = connection_classes(settings)
     server = DrainingServer(uvicorn.Config(
         app, host=settings.host, port=settings.port, http=http, ws=socket_class,  # type: ignore[arg-type]
+        loop="asyncio",  # whatever else is installed
         log_config=None, log_level="warning", access_log=False, server_header=False, proxy_headers=False,
         timeout_graceful_shutdown=CUT_S, ws_max_size=1024 * settings.message_kb, lifespan="on",
         timeout_keep_alive=settings.keep_alive_s,  # type: ignore[arg-type]
@@ -63,7 +66,8 @@ class DrainingServer(uvicorn.Server):
         for server in self.servers:
             for one in server.sockets:
                 host, port = one.getsockname()[:2]
-                log_event("listening", url=f"http://{host}:{port}")
+                url = f"http://{host}:{port}"
+                log_event("listening", url=url, studio=f"{url}{PAGES}" if self._state.settings.studio else None)
 
     async def main_loop(self) -> None:
         """Serve until a signal comes, then until the running requests are complete, or `drain_s` seconds."""

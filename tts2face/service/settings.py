@@ -92,6 +92,13 @@ class ServiceSettings:
     upload_pixels: int = setting(40_000_000, "Largest picture that a request may send.", (1, 200_000_000))
     decode_s: float = setting(60.0, "Seconds that the decoding of an upload may take.", (1, 3600))
     drain_s: float = setting(30.0, "Seconds that running requests have to finish after SIGTERM.", (0, 3600))
+    studio: bool = setting(True, "Serve the studio at /studio, if NiceGUI is installed (extra studio).")
+    sentences_mb: int = setting(
+        100, "Finished sentences of the studio that each session of a synthesis process keeps, in MB.", (0, 1e5)
+    )
+    previews_mb: int = setting(
+        300, "Previews of the studio that the server keeps, in MB; those used last stay.", (1, 1e6)
+    )
     log_format: str = setting("json", "Form of the log: json or text.", choices=("json", "text"))
     log_text: bool = setting(False, "Write the texts of requests to the log.")
 

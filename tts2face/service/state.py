@@ -9,7 +9,7 @@ from contextlib import aclosing
 from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import Tts2faceError
-from tts2face.service.access.keys import ApiKey, read_keys
+from tts2face.service.access.keys import LOCAL_KEY, ApiKey, read_keys
 from tts2face.service.access.rate_limits import RateLimits
 from tts2face.service.errors import RefusedError, as_refused
 from tts2face.service.jobs.job_service import JobService
@@ -17,7 +17,7 @@ from tts2face.service.logs import log_event
 from tts2face.service.metrics import Metrics
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.synthesis.messages import Message, MessageKind
-from tts2face.service.synthesis.pool import Pool, PoolSettings
+from tts2face.service.synthesis.pool import STREAM_PRIORITY, Pool, PoolSettings
 from tts2face.service.synthesis.result_cache import CACHED_KINDS, ResultCache
 from tts2face.service.synthesis.words import check_words
 from tts2face.service.synthesis.work import Work
@@ -41,7 +41,7 @@ class ServiceState:
             settings.processes, settings.sessions, settings.waiting,
             (self.work(format="mp4", request={"text": WARM_TEXT}).as_json(),
              self.work(kind="speech", request={"text": WARM_TEXT}).as_json()),
-            settings.log_format, settings.log_text, settings.memory_mb,
+            settings.log_format, settings.log_text, settings.memory_mb, settings.sentences_mb,
         ))  # fmt: skip
         self.library, self.checks, self.video_checks = Library(settings), Checks(), Checks()
         self.jobs = JobService(settings, self.library)
@@ -66,12 +66,19 @@ class ServiceState:
     def work(self, *, models: dict[str, Any] | None = None, **fields: Any) -> Work:
         """A work with the models of the settings unless it names others."""
         defaults = {"talker": self.settings.talker, "face": self.settings.face, "palette": self.settings.palette}
-        return Work(models=defaults | (models or {}), **fields)
+        return Work(models=defaults | (models or {}), owner=self.common_owner, **fields)
+
+    @property
+    def common_owner(self) -> str:
+        """For whom processes keep finished sentences, whoever asks: the one user of a service without keys."""
+        return LOCAL_KEY.name if self.settings.studio and self.settings.keys is None else ""
 
     async def messages(
-        self, work: Work, key: ApiKey, inputs: "asyncio.Queue[Any] | None" = None
+        self, work: Work, key: ApiKey, inputs: "asyncio.Queue[Any] | None" = None, priority: int = STREAM_PRIORITY
     ) -> AsyncIterator[Message]:
         """Messages of a work, without the last one; counted in the metrics.
+
+        A work of a higher `priority` runs in its process when no other one can.
 
         Raises
         ------
@@ -90,7 +97,7 @@ class ServiceState:
             log_event("text", text=work.request["text"])
         try:
             check_words(str(work.request.get("text", "")))
-            async with aclosing(self._stream(work, key, inputs)) as stream:  # type: ignore[type-var]
+            async with aclosing(self._stream(work, key, inputs, priority)) as stream:  # type: ignore[type-var]
                 async for message in stream:
                     made += message.seconds
                     self.limits.add_speech(key, message.seconds)
@@ -108,9 +115,11 @@ class ServiceState:
             self.metrics.failures.labels(refused.code).inc()
             raise refused from error
 
-    def _stream(self, work: Work, key: ApiKey, inputs: "asyncio.Queue[Any] | None") -> AsyncIterator[Message]:
+    def _stream(
+        self, work: Work, key: ApiKey, inputs: "asyncio.Queue[Any] | None", priority: int
+    ) -> AsyncIterator[Message]:
         """Messages of a work from the cache, or from a process."""
-        made = self.pool.stream(work, key.name, inputs=inputs)
+        made = self.pool.stream(work, key.name, priority, inputs)
         if self.cache is None or work.kind not in CACHED_KINDS:
             return made
         return self.cache.messages(work, made)

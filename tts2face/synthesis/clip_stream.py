@@ -73,6 +73,8 @@ class Piece:
         Words that the recording probably does not contain and that start in this piece; in seconds of the whole clip.
     text
         Written sentence without its marks; empty for a recording and for idle animation.
+    transcript
+        Phones of the whole recording, with its first piece; None for all other pieces.
     """
 
     clip: Clip
@@ -83,6 +85,7 @@ class Piece:
     explain: Callable[[], tuple[PhoneExplanation, ...]] = tuple
     mismatches: tuple[TextMismatch, ...] = ()
     text: str = ""
+    transcript: PhoneSequence | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -289,6 +292,7 @@ def _recording_pieces(
             tuple(mark for mark in marks if begin <= mark.seconds < end),
             explain if before == 0 else tuple,
             tuple(mismatch for mismatch in transcript.mismatches if begin <= mismatch.begin < end),
+            transcript=transcript.phones if before == 0 else None,
         )
         before = after
 

@@ -12,6 +12,18 @@ RECORDING = ""  # text of the one sentence of a recording
 MAX_END_CHANGE_S = 0.05  # the last edge is the end of the sound, padded to a whole number of frames
 
 
+class StaleEdgesError(InputError):
+    """Corrected edges of a sentence that has other phones or another duration now."""
+
+    def __init__(self, text: str, occurrence: int) -> None:
+        self.text, self.occurrence = text, occurrence
+        where = f"the sentence {text[:60]!r}" if text else "the recording"
+        super().__init__(
+            f"the corrected phone edges of {where} belong to other phones or to another sound; remove them, or "
+            "restore the text, voice and pronunciations for which they were made"
+        )
+
+
 @dataclass(frozen=True, slots=True)
 class SentenceEdges:
     """Corrected edges of one sentence.
@@ -55,16 +67,12 @@ def correct_phones(
 
     Raises
     ------
-    InputError
+    StaleEdgesError
         The correction belongs to other phones or to a sound of another length.
     """
     for one in corrections:
         if (one.text, one.occurrence) == (text, occurrence):
             if not one.fits(phones):
-                where = f"the sentence {text[:60]!r}" if text else "the recording"
-                raise InputError(
-                    f"the corrected phone edges of {where} belong to other phones or to another sound; remove them, or "
-                    "restore the text, voice and pronunciations for which they were made"
-                )
+                raise StaleEdgesError(text, occurrence)
             return PhoneSequence(phones.phones, np.concatenate([one.edges[:-1], [phones.end]]))
     return phones

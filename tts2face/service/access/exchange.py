@@ -9,6 +9,7 @@ from collections.abc import Awaitable, Callable, MutableMapping
 from contextlib import suppress
 from typing import Any
 
+from tts2face.service.access.page_headers import is_page, page_headers
 from tts2face.service.errors import RefusedError, error_body
 from tts2face.service.logs import REQUEST_ID
 from tts2face.service.synthesis.stages import STAGES, Stage, durations
@@ -69,9 +70,10 @@ class Exchange:
         if message["type"] == "http.response.start":
             self.status = message["status"]
             given = {name for name, _ in message["headers"]}
+            own = (*HEADERS, *page_headers(self.scope["path"]))
             message["headers"] = [
                 *message["headers"],
-                *(header for header in HEADERS if header[0] not in given),
+                *(header for header in own if header[0] not in given),
                 (b"x-request-id", self.id.encode()),
                 (b"server-timing", self._server_timing().encode()),
             ]
@@ -114,8 +116,8 @@ class Exchange:
         await self._send({"type": f"{HTTP_FORM}.body", "body": body})
 
     async def announce_end(self, message: str) -> None:
-        """Write to the client of a WebSocket that the service is about to end."""
-        if self.scope["type"] == "websocket" and self.status == 101:
+        """Write to the client of a WebSocket that the service is about to end; pages notice its end by themselves."""
+        if self.scope["type"] == "websocket" and self.status == 101 and not is_page(self.scope["path"]):
             with suppress(OSError, RuntimeError):  # the client has left
                 text = json.dumps({"type": "error", "code": "draining", "message": message})
                 await self.send({"type": "websocket.send", "text": text})

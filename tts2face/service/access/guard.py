@@ -10,6 +10,7 @@ from urllib.parse import parse_qs, urlsplit
 from starlette.requests import ClientDisconnect
 from starlette.websockets import WebSocketDisconnect
 
+from tts2face.service.access import browser
 from tts2face.service.access.exchange import Exchange, Receive, Scope, Send
 from tts2face.service.access.keys import LOCAL_KEY, ApiKey, find_key
 from tts2face.service.errors import RefusedError
@@ -40,7 +41,7 @@ class Guard:
             return await self._app(scope, receive, send)
         request = Exchange(scope, receive, send)
         key: ApiKey | None = None
-        is_counted = scope["path"] not in UNCOUNTED_PATHS
+        is_counted = scope["path"] not in UNCOUNTED_PATHS and not browser.is_static(scope["path"])
         try:
             self._check_draining(scope["path"])
             self._check_head(request)
@@ -114,13 +115,18 @@ class Guard:
             )
 
     def _identify(self, request: "Exchange") -> ApiKey:
-        if request.scope["path"] in OPEN_PATHS or not self._state.keys:
+        path = request.scope["path"]
+        if path in OPEN_PATHS or path == browser.LOGIN_PATH or not self._state.keys:
             return LOCAL_KEY
         given = request.headers.get(b"authorization", b"").decode("latin-1").removeprefix("Bearer ").strip()
         given = given or request.headers.get(b"x-api-key", b"").decode("latin-1")
         if not given and request.scope["type"] == "websocket":  # a browser cannot send headers with it
             given = parse_qs(request.scope["query_string"].decode("latin-1")).get("key", [""])[0]
+        if not given and browser.is_page(path):
+            given = browser.cookie_key(request.headers)
         found = find_key(self._state.keys, given)
+        if found is None and browser.wants_login(request):
+            raise RefusedError(303, "unauthorized", "log in with an API key first", {"Location": browser.LOGIN_PATH})
         if found is None:
             what = "unknown" if given else "missing"
             raise RefusedError(

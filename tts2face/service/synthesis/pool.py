@@ -3,6 +3,7 @@
 import asyncio
 import os
 import time
+import zlib
 from collections import OrderedDict, deque
 from collections.abc import AsyncIterator
 from contextlib import suppress
@@ -47,7 +48,7 @@ class PoolSettings:
         Requests that may wait; further ones are refused.
     warm
         Works that each process executes before it is ready, as `Work.as_json`.
-    log_format, log_text, memory_mb
+    log_format, log_text, memory_mb, sentences_mb
         As in the settings of the service.
     """
 
@@ -58,11 +59,12 @@ class PoolSettings:
     log_format: str = JSON_LINES
     log_text: bool = False
     memory_mb: int = 0
+    sentences_mb: int = 0
 
 
 def work_cost(work: Work) -> float:
     """Share of a core that a work takes."""
-    if work.kind != "file":
+    if work.kind not in {"file", "project-file"}:
         return LINES_COST
     if work.format in SOUND_KINDS:
         return SOUND_COST
@@ -83,7 +85,7 @@ class Pool:
             WarmProcess(
                 {"core": cores[number % len(cores)] if cores else None, "n_sessions": settings.n_sessions,
                  "warm": list(settings.warm), "log_format": settings.log_format, "log_text": settings.log_text,
-                 "memory_mb": settings.memory_mb},
+                 "memory_mb": settings.memory_mb, "sentences_mb": settings.sentences_mb},
                 self._wake,
             )
             for number in range(count)
@@ -141,7 +143,7 @@ class Pool:
         cost, tries = work_cost(work), 0
         while True:
             with stage("queue"):
-                process = await self._take(cost, key)
+                process = await self._take(cost, key, work.affinity)
             is_begun = False
             messages = process.stream(work, priority, inputs)
             try:
@@ -158,8 +160,8 @@ class Pool:
                 await messages.aclose()  # type: ignore[attr-defined]
                 self._release(process, cost)
 
-    async def _take(self, cost: float, key: str) -> WarmProcess:
-        found = None if self._waiting else self._free_process(cost)
+    async def _take(self, cost: float, key: str, affinity: str) -> WarmProcess:
+        found = None if self._waiting else self._free_process(cost, affinity)
         if found is not None:
             found.load += cost
             return found
@@ -180,8 +182,11 @@ class Pool:
         process.load = round(process.load - cost, 6)  # sums of tenths are not exact: the load of no work is zero
         self._wake()
 
-    def _free_process(self, cost: float) -> WarmProcess | None:
+    def _free_process(self, cost: float, affinity: str = "") -> WarmProcess | None:
         free = [one for one in self.processes if one.is_ready and (one.load == 0 or one.load + cost <= CAPACITY)]
+        usual = self.processes[zlib.crc32(affinity.encode()) % len(self.processes)] if affinity else None
+        if usual in free:
+            return usual
         return min(free, key=lambda one: one.load, default=None)
 
     def _wake(self) -> None:

@@ -127,10 +127,12 @@ class Scheduler:
             self._send(Message(task.number, MessageKind.DATA, step.content, step.seconds))
 
     def _send_error(self, number: int, error: Exception, request: str | None) -> None:
-        kind, message = type(error).__name__, str(error)
+        # A subclass counts as the kind of `lexicon.errors` that it extends.
+        kind = next((one.__name__ for one in type(error).__mro__ if one.__module__ == Tts2faceError.__module__), DEFECT)
+        message = str(error)
         if not isinstance(error, Tts2faceError):
             log_event("defect", level=logging.ERROR, error=error, id=request)
-            kind, message = DEFECT, f"internal error: {kind}; see the log of the service"
+            kind, message = DEFECT, f"internal error: {type(error).__name__}; see the log of the service"
         self._send(_json_message(number, MessageKind.ERROR, {"kind": kind, "message": " ".join(message.split())}))
 
 

@@ -81,7 +81,7 @@ class SynthesisProcess:
 
     def _steps(self, number: int, work: Work) -> Iterator[Step]:
         inputs = self._inputs.setdefault(number, queue.SimpleQueue())
-        session = self._sessions.get(Models(**work.models))
+        session = self._sessions.get(Models(**work.models), work.owner)
         return TASKS[work.kind](session, work, inputs)
 
     def _send(self, message: Message) -> None:
@@ -105,6 +105,7 @@ def main() -> None:
             settings["n_sessions"],
             voices=VoicePool(aligner, OneAtATime()),
             max_bytes=settings["memory_mb"] * 1_000_000 or None,
+            memory_mb=settings["sentences_mb"],
         ),
         lambda task: commands.put(({"do": "wake", "task": task}, time.monotonic())),
     )

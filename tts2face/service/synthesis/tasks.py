@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from tts2face.render.picture import Picture
 from tts2face.request import Request
+from tts2face.service.synthesis import project_tasks
 from tts2face.service.synthesis.live_task import listen, live
 from tts2face.service.synthesis.messages import Event, Wait
 from tts2face.service.synthesis.work import Inputs, Work
@@ -45,4 +46,10 @@ TASKS: Mapping[str, Callable[["Session", Work, Inputs], Iterator[Chunk | Event |
     "speech": timed_speech,
     "live": live,
     "listen": listen,
+    "project": project_tasks.preview,
+    "picture": project_tasks.picture,
+    "explain": project_tasks.explain,
+    "project-file": project_tasks.project_file,
+    "project-export": project_tasks.project_export,
+    "face": project_tasks.face_file,
 }

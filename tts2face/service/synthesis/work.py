@@ -22,6 +22,10 @@ class Work:
         Fields of `Request` and `Picture` that differ from their defaults.
     format
         Format of `Session.stream_file`.
+    owner
+        For whom finished sentences are kept in memory (`SessionCache.get`); empty: none are.
+    affinity
+        Works of equal affinity run in the same process if it is free, which keeps their sentences; empty: any.
     """
 
     kind: str = "file"
@@ -29,6 +33,8 @@ class Work:
     request: Mapping[str, Any] = field(default_factory=dict)
     picture: Mapping[str, Any] = field(default_factory=dict)
     format: str = "mp4"
+    owner: str = ""
+    affinity: str = ""
 
     def as_json(self) -> dict[str, Any]:
         """JSON object from which `work_from_json` makes the work again."""

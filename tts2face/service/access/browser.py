@@ -1,0 +1,52 @@
+"""Browsers as clients: a cookie in place of a header with the key, only for the studio's addresses."""
+
+from collections.abc import Mapping
+from http.cookies import CookieError, SimpleCookie
+from typing import TYPE_CHECKING
+
+from tts2face.service.access.page_headers import PAGES, is_page
+
+if TYPE_CHECKING:
+    from tts2face.service.access.exchange import Exchange
+
+__all__ = ["COOKIE", "LOGIN_PATH", "cookie_key", "is_page", "is_static", "set_cookie", "wants_login"]
+
+COOKIE = "tts2face_key"
+LOGIN_PATH = f"{PAGES}/login"
+STATIC_PATHS = (f"{PAGES}/_nicegui/", f"{PAGES}/_nicegui_ws/")  # libraries of a page, and its connection
+UPLOADS = f"{PAGES}/_nicegui/client/"
+COOKIE_S = 30 * 86_400
+
+
+def is_static(path: str) -> bool:
+    """Whether an address is that of a page's libraries or of its connection, which no limit of a key counts.
+
+    The connection of an open page is no request that a draining service waits for.
+    """
+    return path.startswith(STATIC_PATHS) and not path.startswith(UPLOADS)
+
+
+def cookie_key(headers: Mapping[bytes, bytes]) -> str:
+    """Key in the cookie of a request; empty if there is none."""
+    cookies: SimpleCookie = SimpleCookie()
+    try:
+        cookies.load(headers.get(b"cookie", b"").decode("latin-1"))
+    except CookieError:
+        return ""
+    return cookies[COOKIE].value if COOKIE in cookies else ""
+
+
+def set_cookie(key: str, *, is_secure: bool) -> str:
+    """Header ``Set-Cookie`` that keeps a key, or removes it if it is empty.
+
+    Scripts cannot read it, and no request that another site causes has it.
+    """
+    age = COOKIE_S if key else 0
+    secure = "; Secure" if is_secure else ""
+    return f"{COOKIE}={key}; Path={PAGES}; Max-Age={age}; HttpOnly; SameSite=Strict{secure}"
+
+
+def wants_login(request: "Exchange") -> bool:
+    """Whether a request without a key is that of a person who opens a page."""
+    wants_page = b"text/html" in request.headers.get(b"accept", b"")
+    return request.scope["type"] == "http" and request.method == "GET" and is_page(request.scope["path"]) and wants_page

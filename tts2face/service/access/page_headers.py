@@ -1,0 +1,27 @@
+"""Addresses of the studio's pages, and headers that keep them within this service."""
+
+PAGES = "/studio"
+# NiceGUI has scripts and styles in its pages and compiles templates in the browser (Vue), hence 'unsafe-inline' and
+# 'unsafe-eval'. Nothing may come from, or go to, another host: no script, picture, font, frame, form or connection.
+POLICY = "; ".join([
+    "default-src 'self'", "script-src 'self' 'unsafe-inline' 'unsafe-eval'", "style-src 'self' 'unsafe-inline'",
+    "img-src 'self' data: blob:", "font-src 'self' data:", "media-src 'self' blob:", "connect-src 'self' blob: data:",
+    "worker-src 'self' blob:", "object-src 'none'", "base-uri 'none'", "form-action 'self'", "frame-ancestors 'none'",
+])  # fmt: skip
+HEADERS = (
+    (b"content-security-policy", POLICY.encode()),
+    (b"referrer-policy", b"no-referrer"),
+    (b"permissions-policy", b"camera=(self), microphone=(self), geolocation=(), usb=()"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+)
+
+
+def is_page(path: str) -> bool:
+    """Whether an address belongs to the studio."""
+    return path == PAGES or path.startswith(f"{PAGES}/")
+
+
+def page_headers(path: str) -> tuple[tuple[bytes, bytes], ...]:
+    """Further headers of an answer, if its address belongs to the studio."""
+    return HEADERS if is_page(path) else ()

@@ -1,0 +1,184 @@
+"""Tasks of the studio: the curves and the sound of a project, one of its pictures, its files, its face.
+
+A work has the project in ``request``: ``project`` (its JSON), ``folder`` (where its files are), and ``text``, which the
+service checks as that of any request.
+"""
+
+import hashlib
+import io
+import tempfile
+import zipfile
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lexicon.errors import InputError
+from lexicon.sequence import PhoneSequence
+from tts2face.project.fitting import cut_timeline, is_too_long, without_edges
+from tts2face.project.project import Project
+from tts2face.project.project_file import parse_project
+from tts2face.service.synthesis.messages import Event
+from tts2face.service.synthesis.work import Inputs, Work
+from tts2face.synthesis.phone_edges import StaleEdgesError
+from tts2face.types import Chunk
+
+if TYPE_CHECKING:
+    from tts2face.session import Session
+    from tts2face.synthesis.clip_stream import Piece
+
+DIGEST_BYTES = 12
+MAX_EXAMPLES = 12  # of an explained phone
+BLOCK_BYTES = 1 << 18
+
+
+def read_project(work: Work) -> Project:
+    """Project of a work."""
+    return parse_project(work.request["project"], "the project", Path(work.request["folder"]))
+
+
+def preview(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk]:
+    """Curves and sound of a project, sentence by sentence.
+
+    An event ``begin``; for each sentence an event ``piece``, and its motion, head pose and sound if its digest is not
+    among ``have`` of the request; then an event ``end``. Where a correction no longer fits, it is removed, and all is
+    sent again from ``begin``; ``end`` says what was removed.
+    """
+    project, dropped, cut_to = read_project(work), [], None
+    have = frozenset(work.request.get("have", ()))
+    while True:
+        yield Event({"type": "begin", "fps": float(project.request.fps)})
+        seconds = 0.0
+        try:
+            for event, content in _pieces(session, project, have):
+                seconds = event["begin"] + event["seconds"]
+                yield Event(event)
+                if content:
+                    yield Chunk(content)
+            break
+        except StaleEdgesError as stale:
+            dropped.append([stale.text, stale.occurrence])
+            project = without_edges(project, [(stale.text, stale.occurrence)])
+        except InputError:
+            if cut_to is not None or not is_too_long(project, seconds):
+                raise
+            cut_to = seconds
+            project = cut_timeline(project, seconds)
+    yield Event({"type": "end", "dropped": dropped, "cut_to": cut_to})
+
+
+def _pieces(session: "Session", project: Project, have: frozenset[str]) -> Iterator[tuple[dict[str, Any], bytes]]:
+    """Description and content of each piece; the content is empty if its digest is in `have`."""
+    said: Counter[str] = Counter()
+    for number, piece in enumerate(session.stream(project.prepare())):
+        clip = piece.clip
+        motion, head = clip.motion.values.astype("<f4"), clip.head.values.astype("<f4")
+        sound = np.rint(np.clip(clip.speech.waveform.samples, -1.0, 1.0) * 32767).astype("<i2")
+        parts = [motion.tobytes(), head.tobytes(), sound.tobytes()]
+        digests = [hashlib.blake2b(part, digest_size=DIGEST_BYTES).hexdigest() for part in parts]
+        digest = "".join(digests)
+        event = {
+            "type": "piece", "number": number, "text": piece.text, "occurrence": said[piece.text],
+            "begin": piece.begin, "seconds": clip.speech.waveform.duration, "rate": clip.speech.waveform.rate,
+            "n_frames": len(motion), "n_samples": len(sound), "digest": digest,
+            **_timing(piece), "notes": [one.sentence for one in piece.mismatches],
+        }  # fmt: skip
+        if number == 0:
+            event["channels"] = list(clip.motion.channels)
+        if piece.transcript is not None:
+            event["transcript"] = _phones(piece.transcript)
+        said[piece.text] += 1
+        yield event, b"" if digest in have else b"".join(parts)
+
+
+def _timing(piece: "Piece") -> dict[str, Any]:
+    phones, words = piece.clip.speech.phones, piece.clip.speech.words
+    edges = phones.edges
+    return {
+        **_phones(phones),
+        "words": [[word.text, round(float(edges[word.first]), 6), round(float(edges[word.last]), 6)] for word in words],
+    }
+
+
+def _phones(phones: PhoneSequence) -> dict[str, Any]:
+    return {"phones": list(phones.phones), "edges": [round(float(edge), 9) for edge in phones.edges]}
+
+
+def picture(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
+    """PNG of one instant of a project, at ``time`` seconds."""
+    from PIL import Image
+
+    project, time = read_project(work), float(work.request["time"])
+    last = None
+    for last in session.stream(project.prepare()):
+        if time < last.begin + last.clip.speech.waveform.duration:
+            break
+        yield Chunk(b"")
+    assert last is not None
+    number = min(max(round((time - last.begin) * last.clip.fps), 0), len(last.clip.motion) - 1)
+    renderer = session.renderer(project.picture, has_gestures=project.request.has_gestures)
+    content = io.BytesIO()
+    Image.fromarray(renderer.frame(last.clip, number)).save(content, "PNG", compress_level=3)
+    yield Chunk(content.getvalue())
+
+
+def explain(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk]:
+    """The phone at ``time`` seconds with the recorded examples that made it; no phone where none is used."""
+    project, time = read_project(work), float(work.request["time"])
+    found: dict[str, Any] = {}
+    for piece in session.stream(project.prepare()):
+        is_whole = piece.transcript is not None
+        if is_whole or time < piece.begin + piece.clip.speech.waveform.duration:
+            phone = next((one for one in piece.explain() if one.start <= time < one.end), None)
+            if phone is not None:
+                found = asdict(phone)
+                found["tokens"] = found["tokens"][:MAX_EXAMPLES]
+            break
+        yield Chunk(b"")
+    yield Event({"type": "explanation", "phone": found or None})
+
+
+def project_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
+    """Bytes of a project's clip in a format of `Session.stream_file`."""
+    project = read_project(work)
+    return session.stream_file(project.prepare(), work.format, picture=project.picture, threads=1)
+
+
+def project_export(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
+    """Bytes of an export of a project, whose file is named by ``name``; several files come as one .zip file."""
+    from tts2face.exports.writer import ExportWriter, mesh_of, plan_exports
+
+    project = read_project(work)
+    with tempfile.TemporaryDirectory(prefix="tts2face-") as folder:
+        files = plan_exports([Path(folder, work.request["name"])])
+        face = session.animated_face(has_gestures=project.request.has_gestures)
+        with ExportWriter(files, face=mesh_of(face, files)) as writer:
+            for piece in session.stream(project.prepare()):
+                writer.add(piece.clip, piece.text)
+                yield Chunk(b"", piece.clip.speech.waveform.duration)
+        with _packed(Path(folder)).open("rb") as file:
+            while block := file.read(BLOCK_BYTES):
+                yield Chunk(block)
+
+
+def _packed(folder: Path) -> Path:
+    """The one file of a folder, or a .zip file of all."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    if len(files) == 1:
+        return files[0]
+    packed = folder / "files.zip"
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in files:
+            archive.write(file, file.relative_to(folder))
+    return packed
+
+
+def face_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
+    """The session's face with its morph targets for a page (`tts2face.exports.stage_glb`)."""
+    from tts2face.exports.stage_glb import stage_glb
+
+    face = session.animated_face(has_gestures=bool(work.request.get("has_gestures", True)))
+    yield Chunk(stage_glb(face.mesh, face.channels))

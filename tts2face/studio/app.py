@@ -1,0 +1,58 @@
+"""The studio within the application of the service."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+from fastapi import FastAPI
+from nicegui import app as pages_app
+from nicegui import ui
+
+from tts2face.service.access.page_headers import PAGES
+from tts2face.service.app import NO_TELEMETRY
+from tts2face.service.state import ServiceState
+from tts2face.studio import routes
+from tts2face.studio.pages import animate, login, projects
+from tts2face.studio.studio import Studio
+
+TITLE = "tts2face studio"
+RECONNECT_S = 30.0  # for which the state of a page is kept while its connection is away
+
+
+def mount_studio(app: FastAPI, state: ServiceState) -> None:
+    """Add the studio to an application: pages under `PAGES`, what they fetch, and the login."""
+    studio = Studio(state)
+    app.include_router(login.make_router(state))
+    app.state.studio = studio
+    app.include_router(routes.router)
+    projects.register(studio)
+    animate.register(studio)
+    _disable_telemetry()
+    pages_app.config.socket_io_js_transports = ["websocket"]
+    ui.run_with(
+        app, mount_path=PAGES, title=TITLE, language="en-US", dark=None, tailwind=False, reconnect_timeout=RECONNECT_S,
+        show_welcome_message=False,
+    )  # fmt: skip
+    _run_with(app, studio)
+
+
+def _run_with(app: FastAPI, studio: Studio) -> None:
+    """Save all projects when the application ends, while its processes still run."""
+    before = app.router.lifespan_context
+
+    @asynccontextmanager
+    async def lifespan(whole: FastAPI) -> AsyncIterator[Any]:
+        async with before(whole) as state:
+            try:
+                yield state
+            finally:
+                await asyncio.shield(studio.close())
+
+    app.router.lifespan_context = lifespan
+
+
+def _disable_telemetry() -> None:
+    """Switch off FastAPI's telemetry of the pages, as in `tts2face.service.app`."""
+    pages_app._telemetry = {**pages_app._telemetry, **NO_TELEMETRY}
+    pages_app._native_telemetry = type(pages_app._native_telemetry)(pages_app._telemetry)

@@ -1,0 +1,263 @@
+"""Edits of a project, as a page sends them. Pure: no files, no clock, no pages.
+
+An edit is a JSON object with a ``kind`` and the fields of `EDITS`.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
+from typing import Any
+
+from lexicon.errors import InputError
+from lexicon.sequence import PhoneSequence
+from tts2face.exemplar.options import ExcludedToken
+from tts2face.gesture.key_curves import ChannelEdit, ExpressionCurve, StrengthCurve
+from tts2face.gesture.notation import expand_feature
+from tts2face.gesture.spans import GazeTarget, Nod, StyleSpan, check_feature, cut_spans, overlay_spans
+from tts2face.gesture.timeline import Timeline
+from tts2face.project.project import Project
+from tts2face.render.picture import Picture
+from tts2face.request import Request
+from tts2face.session_cache import Models
+from tts2face.synthesis.phone_edges import SentenceEdges
+
+MIN_PHONE_S = 0.01  # shortest phone that dragging an edge leaves: a frame of the alignment
+NEAR_S = 0.05  # within which a nod is the one at a time
+
+Edit = Mapping[str, Any]
+Sentences = Mapping[tuple[str, int], PhoneSequence]  # phones of each sentence by its text and occurrence
+
+
+def apply(project: Project, edit: Edit, sentences: Sentences | None = None) -> Project:
+    """The project after an edit.
+
+    Parameters
+    ----------
+    sentences
+        Phones of the sentences as they are shown, which only dragged edges need.
+
+    Raises
+    ------
+    InputError, DataError
+        There is no such kind of edit, a field is missing or has the wrong type, or its value is refused.
+    """
+    kind = edit.get("kind")
+    if not isinstance(kind, str) or kind not in EDITS:
+        raise InputError(f"there is no edit {str(kind)[:40]!r}; choose one of {', '.join(EDITS)}")
+    types, change = EDITS[kind]
+    given = {name: _checked(kind, name, wanted, edit) for name, wanted in types.items()}
+    return change(project, given, sentences or {})
+
+
+def _checked(kind: str, name: str, wanted: type, edit: Edit) -> Any:
+    """Value of a field; a missing or empty ``end`` is the end of the clip."""
+    if name == "end" and edit.get(name) is None:
+        return math.inf
+    if name not in edit:
+        raise InputError(f"the edit {kind} needs {name}; send it")
+    value = edit[name]
+    if wanted is float and isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+        return float(value)
+    if wanted is not float and type(value) is wanted:
+        return value
+    raise InputError(f"{name} of the edit {kind} must be {_NAMES[wanted]}, not {str(value)[:40]!r}")
+
+
+_NAMES = {
+    float: "a number",
+    int: "a whole number",
+    str: "a text",
+    bool: "true or false",
+    list: "a list",
+    dict: "an object",
+}
+
+
+def _paint(project: Project, given: Edit, _: Sentences) -> Project:
+    spans = tuple(
+        StyleSpan(feature, given["style"], max(0.0, given["start"]), given["end"])
+        for feature in expand_feature(given["feature"])
+    )
+    return _timed(project, spans=overlay_spans(project.timeline.spans, spans))
+
+
+def _erase(project: Project, given: Edit, _: Sentences) -> Project:
+    features = expand_feature(given["feature"])
+    kept = [span for span in project.timeline.spans if span.feature not in features]
+    for feature in features:
+        own = [span for span in project.timeline.spans if span.feature == feature]
+        kept += [*cut_spans(own, -1.0, given["start"]), *cut_spans(own, given["end"], math.inf)]
+    return _timed(project, spans=tuple(kept))
+
+
+def _curve(project: Project, given: Edit, _: Sentences) -> Project:
+    return _timed(project, curves=_replaced(project.timeline.curves, given["expression"], ExpressionCurve, given))
+
+
+def _strength(project: Project, given: Edit, _: Sentences) -> Project:
+    return _timed(project, strengths=_replaced(project.timeline.strengths, given["feature"], StrengthCurve, given))
+
+
+def _channel(project: Project, given: Edit, _: Sentences) -> Project:
+    return _timed(project, edits=_replaced(project.timeline.edits, given["channel"], ChannelEdit, given))
+
+
+def _replaced(curves: tuple[Any, ...], lane: str, make: Callable[[str, Any], Any], given: Edit) -> tuple[Any, ...]:
+    """Curves with the one of a lane replaced, or removed if there are no keys."""
+    keys = given["keys"]
+    if not all(isinstance(key, list | tuple) and len(key) == 2 and all(_is_number(one) for one in key) for key in keys):
+        raise InputError("keys must be a list of [seconds, value]")
+    others = tuple(curve for curve in curves if curve.lane != lane)
+    return (*others, make(lane, tuple(map(tuple, keys)))) if keys else others
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _nod(project: Project, given: Edit, _: Sentences) -> Project:
+    others = tuple(nod for nod in project.timeline.nods if abs(nod.time - given["time"]) >= NEAR_S)
+    return _timed(project, nods=(*others, Nod(given["time"], given["size"])))
+
+
+def _remove_nod(project: Project, given: Edit, _: Sentences) -> Project:
+    nods = project.timeline.nods
+    near = min(nods, key=lambda nod: abs(nod.time - given["time"]), default=None)
+    if near is None or abs(near.time - given["time"]) > NEAR_S:
+        raise InputError(f"there is no nod at {given['time']:.2f} s; click on one")
+    return _timed(project, nods=tuple(nod for nod in nods if nod is not near))
+
+
+def _gaze(project: Project, given: Edit, _: Sentences) -> Project:
+    target = GazeTarget(given["down_deg"], given["left_deg"], max(0.0, given["start"]), given["end"])
+    return _timed(project, gaze=overlay_spans(project.timeline.gaze, (target,)))
+
+
+def _remove_gaze(project: Project, given: Edit, _: Sentences) -> Project:
+    kept = tuple(one for one in project.timeline.gaze if not one.start <= given["time"] < one.end)
+    if len(kept) == len(project.timeline.gaze):
+        raise InputError(f"there is no gaze target at {given['time']:.2f} s; click on one")
+    return _timed(project, gaze=kept)
+
+
+def _mute(project: Project, given: Edit, _: Sentences) -> Project:
+    return replace(project, muted=_toggled(project.muted, given))
+
+
+def _solo(project: Project, given: Edit, _: Sentences) -> Project:
+    return replace(project, solo=_toggled(project.solo, given))
+
+
+def _toggled(features: frozenset[str], given: Edit) -> frozenset[str]:
+    feature = check_feature(given["feature"])
+    return features | {feature} if given["on"] else features - {feature}
+
+
+def _seed(project: Project, given: Edit, _: Sentences) -> Project:
+    seeds = {**project.timeline.seeds, **dict.fromkeys(expand_feature(given["feature"]), given["seed"])}
+    return _timed(project, seeds=seeds)
+
+
+def _edge(project: Project, given: Edit, sentences: Sentences) -> Project:
+    sentence, index = (given["text"], given["occurrence"]), given["index"]
+    phones = sentences.get(sentence)
+    if phones is None:
+        raise InputError(
+            f"there is no sentence {given['text'][:40]!r} in the clip; wait until it is made, and try again"
+        )
+    edges = phones.edges.tolist()
+    if not 0 < index < len(edges) - 1:
+        raise InputError(
+            f"edge {index} of a sentence cannot move; choose one between two phones, 1 to {len(edges) - 2}"
+        )
+    low, high = edges[index - 1] + MIN_PHONE_S, edges[index + 1] - MIN_PHONE_S
+    if low > high:
+        raise InputError("the two phones are too short to move the edge between them; move a neighbouring edge first")
+    edges[index] = min(max(given["time"], low), high)
+    others = tuple(one for one in project.edges if (one.text, one.occurrence) != sentence)
+    return replace(project, edges=(*others, SentenceEdges(*sentence, phones.phones, tuple(edges))))
+
+
+def _reset_edges(project: Project, given: Edit, _: Sentences) -> Project:
+    sentence = (given["text"], given["occurrence"])
+    return replace(project, edges=tuple(one for one in project.edges if (one.text, one.occurrence) != sentence))
+
+
+def _pronounce(project: Project, given: Edit, _: Sentences) -> Project:
+    word, phones = given["word"].strip(), given["phones"].strip()
+    others = {one: written for one, written in project.pronunciations.items() if one.lower() != word.lower()}
+    return replace(project, pronunciations=others | ({word: phones} if phones else {}))
+
+
+def _exclude(project: Project, given: Edit, _: Sentences) -> Project:
+    token = ExcludedToken(given["utterance"], given["start"])
+    others = tuple(one for one in project.excluded if one != token)
+    return replace(project, excluded=(*others, token) if given["on"] else others)
+
+
+def _request(project: Project, given: Edit, _: Sentences) -> Project:
+    return replace(project, request=_with_options(project.request, given["options"], Request))
+
+
+def _models(project: Project, given: Edit, _: Sentences) -> Project:
+    models = _with_options(project.models, given["options"], Models)
+    excluded = project.excluded if models.talker == project.models.talker else ()  # they are the talker's
+    return replace(project, models=models, excluded=excluded)
+
+
+def _picture(project: Project, given: Edit, _: Sentences) -> Project:
+    return replace(project, picture=_with_options(project.picture, given["options"], Picture))
+
+
+def _with_options(options: Any, given: Edit, kind: type) -> Any:
+    known = {one.name: one.default for one in fields(kind)}
+    for name, value in given.items():
+        if name not in known:
+            raise InputError(f"there is no option {str(name)[:40]!r}; choose {', '.join(known)}")
+        if isinstance(value, list | dict):
+            raise InputError(f"{name} must be a single value, not {str(value)[:40]}")
+        _check_option(name, value, known[name])
+    return replace(options, **given)
+
+
+def _check_option(name: str, value: Any, default: Any) -> None:
+    """Refuse a value of another kind than the default's."""
+    if isinstance(default, bool | str) and type(value) is not type(default):
+        raise InputError(f"{name} must be {_NAMES[type(default)]}, not {str(value)[:40]!r}")
+    if isinstance(default, int | float) and not isinstance(default, bool) and not _is_number(value):
+        raise InputError(f"{name} must be a number, not {str(value)[:40]!r}")
+
+
+def _name(project: Project, given: Edit, _: Sentences) -> Project:
+    return replace(project, name=given["name"].strip())
+
+
+def _timed(project: Project, **changes: Any) -> Project:
+    timeline: Timeline = replace(project.timeline, **changes)
+    return replace(project, timeline=timeline)
+
+
+Change = Callable[[Project, Edit, Sentences], Project]
+_SPAN = {"start": float, "end": float}
+EDITS: Mapping[str, tuple[Mapping[str, type], Change]] = {
+    "paint": ({"feature": str, "style": str, **_SPAN}, _paint),
+    "erase": ({"feature": str, **_SPAN}, _erase),
+    "curve": ({"expression": str, "keys": list}, _curve),
+    "strength": ({"feature": str, "keys": list}, _strength),
+    "channel": ({"channel": str, "keys": list}, _channel),
+    "nod": ({"time": float, "size": float}, _nod),
+    "remove_nod": ({"time": float}, _remove_nod),
+    "gaze": ({**_SPAN, "down_deg": float, "left_deg": float}, _gaze),
+    "remove_gaze": ({"time": float}, _remove_gaze),
+    "mute": ({"feature": str, "on": bool}, _mute),
+    "solo": ({"feature": str, "on": bool}, _solo),
+    "seed": ({"feature": str, "seed": int}, _seed),
+    "edge": ({"text": str, "occurrence": int, "index": int, "time": float}, _edge),
+    "reset_edges": ({"text": str, "occurrence": int}, _reset_edges),
+    "pronounce": ({"word": str, "phones": str}, _pronounce),
+    "exclude": ({"utterance": str, "start": float, "on": bool}, _exclude),
+    "request": ({"options": dict}, _request),
+    "models": ({"options": dict}, _models),
+    "picture": ({"options": dict}, _picture),
+    "name": ({"name": str}, _name),
+}  # fields with their types, and what the edit changes

@@ -1,0 +1,87 @@
+"""What all pages share: style, dark mode, icons with names, and errors that are shown."""
+
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from html import escape
+from pathlib import Path
+
+from fastapi import Request as HttpRequest
+from nicegui import ui
+
+from lexicon.errors import Tts2faceError
+from tts2face.service.access.page_headers import PAGES
+from tts2face.service.errors import RefusedError
+
+DARK_COOKIE = "tts2face_dark"
+_NEXT_DARK = {None: True, True: False, False: None}
+_DARK_NAMES = {None: "Colours of the system", True: "Dark", False: "Light"}
+_ICONS = {None: "brightness_auto", True: "dark_mode", False: "light_mode"}
+
+
+def begin_page(request: HttpRequest) -> None:
+    """Style of a page, and its colours as the browser chose them last."""
+    ui.add_css(_style())
+    ui.colors(primary="#1f5fbf", negative="#b3261e", positive="#1b6e3c")
+    ui.dark_mode(_chosen_dark(request))
+
+
+def dark_button(request: HttpRequest) -> None:
+    """Button that changes between light, dark and the colours of the system."""
+    dark = ui.dark_mode(_chosen_dark(request))
+    button = icon_button(_ICONS[dark.value], f"Colours: {_DARK_NAMES[dark.value]}")
+
+    def change() -> None:
+        dark.value = _NEXT_DARK[dark.value]
+        button.props(f'icon={_ICONS[dark.value]} aria-label="Colours: {_DARK_NAMES[dark.value]}"')
+        kept = {None: "", True: "1", False: "0"}[dark.value]
+        ui.run_javascript(f'document.cookie = "{DARK_COOKIE}={kept}; path={PAGES}; max-age=31536000; samesite=strict"')
+
+
+def icon_button(icon: str, name: str, on_click: Callable[[], object] | None = None) -> ui.button:
+    """Flat button with an icon, and its name for people who do not see it and as a hint."""
+    button = ui.button(icon=icon, on_click=on_click).props(f'flat dense round aria-label="{escape(name)}"')
+    with button:
+        ui.tooltip(name)
+    return button
+
+
+def heading(level: int, text: str) -> None:
+    """Heading of a level."""
+    ui.html(f"<h{level}>{escape(text)}</h{level}>", sanitize=False)
+
+
+@contextmanager
+def shown_errors() -> Iterator[None]:
+    """Show an error of the block as a message on the page."""
+    try:
+        yield
+    except (Tts2faceError, RefusedError) as wrong:
+        ui.notify(sentence(wrong), type="negative", multi_line=True, timeout=10_000, close_button="Close")
+
+
+def sentence(wrong: Tts2faceError | RefusedError) -> str:
+    """Message of an error as a sentence."""
+    text = " ".join((wrong.message if isinstance(wrong, RefusedError) else str(wrong)).split())
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+
+
+async def confirm(question: str, action: str, do: Callable[[], Awaitable[None]]) -> None:
+    """Ask before something that cannot be undone."""
+    with ui.dialog() as dialog, ui.card():
+        ui.label(question)
+        with ui.row():
+            ui.button(action, on_click=lambda: dialog.submit(True)).props("color=negative")
+            ui.button("Cancel", on_click=lambda: dialog.submit(False)).props("flat autofocus")
+    if await dialog:
+        await do()
+    dialog.delete()
+
+
+def _chosen_dark(request: HttpRequest) -> bool | None:
+    return {"1": True, "0": False}.get(request.cookies.get(DARK_COOKIE, ""))
+
+
+@lru_cache(maxsize=1)
+def _style() -> str:
+    return Path(__file__).with_name("studio.css").read_text(encoding="utf-8")

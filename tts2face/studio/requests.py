@@ -1,0 +1,136 @@
+"""Works of a project for the synthesis processes, and what a client may write into a project.
+
+A client names models, voices and assets; no path of a client reaches the file system.
+"""
+
+import json
+from collections.abc import AsyncIterator, Mapping
+from contextlib import aclosing
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import DataError, InputError
+from tts2face.project.project import Project
+from tts2face.project.project_file import parse_project, project_json
+from tts2face.render.picture import parse_size
+from tts2face.service.access.keys import ApiKey
+from tts2face.service.errors import RefusedError
+from tts2face.service.state import ServiceState
+from tts2face.service.synthesis.messages import Message, MessageKind
+from tts2face.service.synthesis.work import Work
+from tts2face.service.uploads.names import check_background, check_voice, resolve_models
+from tts2face.session_cache import Models
+from tts2face.studio.store import ASSET, ASSETS
+
+FILE_OPTIONS = ("audio", "dictionary", "timeline")  # of a request
+OPTION_PARTS = frozenset({"request", "models", "picture"})
+
+
+async def check_options(state: ServiceState, key: ApiKey, folder: Path, part: str, given: Any) -> dict[str, Any]:
+    """Options of a part of a project from a client, with the paths of assets.
+
+    Raises
+    ------
+    InputError
+        A model, voice, background or asset does not exist for the key.
+    """
+    if not isinstance(given, Mapping):
+        raise InputError(f"{part} must be an object of options, not {str(given)[:40]!r}")
+    options = dict(given)
+    try:
+        if part == "models":
+            await resolve_models(state.library, key, {name: _text(name, value) for name, value in options.items()})
+        elif part == "picture":
+            check_background(_text("background", options.get("background", "studio")) or "studio")
+            _check_pixels(options.get("size"), state.settings.pixels)
+        else:
+            check_voice(_text("voice", options.get("voice")))
+    except RefusedError as refused:
+        raise InputError(refused.message) from refused
+    if part == "request":
+        for name in FILE_OPTIONS:
+            if options.get(name) is not None:
+                options[name] = _asset(name, _text(name, options[name]) or "", folder)
+    return options
+
+
+async def check_project(state: ServiceState, key: ApiKey, folder: Path, content: Any) -> Project:
+    """Project of a client's JSON, whose models, voices and assets exist for the key.
+
+    Raises
+    ------
+    InputError, DataError
+        It is no project, or names what does not exist.
+    """
+    if not isinstance(content, dict):
+        raise DataError("the file is not a project; choose a file written by the studio")
+    checked = {part: await check_options(state, key, folder, part, content.get(part, {})) for part in OPTION_PARTS}
+    return parse_project({**content, **checked}, "the project", folder)
+
+
+async def project_work(
+    state: ServiceState, key: ApiKey, project: Project, folder: Path, kind: str, **more: Any
+) -> Work:
+    """Work of a kind of `tts2face.service.synthesis.project_tasks`; errors as `check_options`.
+
+    Parameters
+    ----------
+    more
+        Further fields of the work's request; ``format`` is that of the work.
+    """
+    chosen = {one.name: getattr(project.models, one.name) for one in fields(Models)}
+    try:
+        models = await resolve_models(state.library, key, chosen)
+    except RefusedError as refused:
+        raise InputError(refused.message) from refused
+    form = str(more.pop("format", "mp4"))
+    request = {"text": project.request.text, "project": project_json(project, folder), "folder": str(folder), **more}
+    return Work(kind, models, request, format=form, owner=key.name, affinity=folder.name)
+
+
+async def data_of(state: ServiceState, key: ApiKey, work: Work) -> bytes:
+    """All bytes of a work's result."""
+    content = bytearray()
+    async with aclosing(state.messages(work, key)) as messages:  # type: ignore[type-var]
+        async for message in messages:
+            if message.kind == MessageKind.DATA:
+                content += message.payload
+    return bytes(content)
+
+
+async def events_of(messages: AsyncIterator[Message]) -> AsyncIterator[tuple[dict[str, Any], bytes]]:
+    """Each event of a result with the bytes that follow it."""
+    event: dict[str, Any] | None = None
+    content = bytearray()
+    async for message in messages:
+        if message.kind == MessageKind.DATA:
+            content += message.payload
+            continue
+        if event is not None:
+            yield event, bytes(content)
+        event, content = json.loads(message.payload), bytearray()
+    if event is not None:
+        yield event, bytes(content)
+
+
+def _asset(option: str, name: str, folder: Path) -> str:
+    found = folder / ASSETS / Path(name).name
+    if option != "audio" or not ASSET.fullmatch(Path(name).name) or not found.is_file():
+        raise InputError(
+            f"the project has no file {name[:40]!r} for {option}; remove {option}, or import its recording"
+        )
+    return str(found)
+
+
+def _text(name: str, value: Any) -> str | None:
+    if value is not None and not isinstance(value, str):
+        raise InputError(f"{name} must be a text, not {str(value)[:40]!r}")
+    return value
+
+
+def _check_pixels(size: Any, most: int) -> None:
+    if size is not None:
+        width, height = parse_size(str(size))
+        if width * height > most:
+            raise InputError(f"size {str(size)[:20]} has more than {most} pixels; give a smaller one")
