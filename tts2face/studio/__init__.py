@@ -1,0 +1,1 @@
+"""The studio: pages in the browser on which a clip is made."""

@@ -1,0 +1,193 @@
+// The stage: the head of the project, at the time of the clock.
+
+import { clock } from "tts2face-studio/clock.js";
+import { metrics, Meter } from "tts2face-studio/metrics.js";
+import { loadPreview, preview } from "tts2face-studio/preview.js";
+import { StageScene } from "tts2face-studio/stage_scene.js";
+import { addStyle } from "tts2face-studio/style.js";
+
+const VIEWS = { front: "Front", "three-quarter": "Three-quarter", profile: "Profile", close: "Close-up" };
+
+export default {
+  template: `
+    <section class="studio-stage" aria-label="Stage">
+      <canvas ref="canvas" role="img" tabindex="0" :aria-label="label" @keydown="onKey"></canvas>
+      <img v-if="picture" class="studio-picture" :src="picture" alt="Final picture of this instant, drawn by the renderer">
+      <p v-if="message" class="studio-message" role="status">{{ message }}</p>
+      <div class="studio-views" role="group" aria-label="Camera">
+        <button v-for="(text, name) in views" :key="name" type="button" :aria-pressed="String(current === name)"
+          @click="view(name)">{{ text }}</button>
+        <button v-if="picture" type="button" @click="showPicture(null)">Live preview</button>
+        <button type="button" aria-label="Full screen" title="Full screen" @click="fullscreen()">⛶</button>
+      </div>
+    </section>`,
+
+  props: { face: String, environment: { type: String, default: "studio" }, preview: String },
+  emits: ["view", "failed"],
+
+  data: () => ({ views: VIEWS, current: "front", picture: null, message: "", time: 0 }),
+
+  computed: {
+    label() {
+      const view = VIEWS[this.current] ?? "Free view";
+      return `${view} of the head. Arrow keys turn the camera, plus and minus change the distance, 1 to 4 choose a view.`;
+    },
+  },
+
+  async mounted() {
+    addStyle();
+    this.meter = new Meter("js_ms", "fps");
+    this.dirty = true;
+    this.changed = () => (this.dirty = true);
+    try {
+      this.scene = new StageScene(this.$refs.canvas, this.changed);
+    } catch (refused) {
+      this.fail("This browser has no WebGL; switch it on, or use “Final picture”.", refused);
+      return;
+    }
+    this.stops = [preview.on("change", this.changed), clock.on("seek", this.changed)];
+    this.watchContext();
+    this.observer = new ResizeObserver(() => this.resize());
+    this.observer.observe(this.$el);
+    this.resize();
+    this.scene.controls.addEventListener("start", () => this.release());
+    this.animation = requestAnimationFrame(this.tick);
+    if (this.preview) loadPreview(this.preview).catch((wrong) => this.fail(wrong.message, wrong));
+    await this.loadFace();
+  },
+
+  beforeUnmount() {
+    cancelAnimationFrame(this.animation);
+    this.observer?.disconnect();
+    for (const stop of this.stops ?? []) stop();
+    this.scene?.dispose();
+  },
+
+  watch: {
+    face() {
+      this.loadFace();
+    },
+    environment() {
+      this.scene?.setBackground(this.environment);
+    },
+  },
+
+  methods: {
+    async loadFace() {
+      if (!this.scene || !this.face) {
+        this.message = this.face ? this.message : "Choose a face to see it here.";
+        return;
+      }
+      const wanted = this.face;
+      this.message = "Loading the face …";
+      const begin = performance.now();
+      try {
+        await this.scene.setFace(wanted);
+        if (wanted !== this.face) return;
+        this.scene.setBackground(this.environment);
+        this.message = "";
+        metrics.face_ms = performance.now() - begin;
+        this.resize();
+      } catch (wrong) {
+        this.fail(wrong.message, wrong);
+      }
+    },
+
+    /** Fetch the preview of a project again; what has not changed is kept. */
+    setPreview(url) {
+      return loadPreview(url).then(() => true);
+    },
+
+    view(name) {
+      this.current = name;
+      if (!this.scene) return;
+      this.scene.moved = false;
+      this.scene.view(name);
+      this.$emit("view", name);
+    },
+
+    fullscreen() {
+      if (document.fullscreenElement) document.exitFullscreen();
+      else this.$el.requestFullscreen();
+    },
+
+    /** Lay a picture over the head; null removes it. */
+    showPicture(url) {
+      this.picture = url;
+    },
+
+    release() {
+      this.scene.moved = true;
+      this.current = "";
+    },
+
+    resize() {
+      const { clientWidth: width, clientHeight: height } = this.$refs.canvas ?? {};
+      if (!width || !height || !this.scene) return;
+      this.scene.resize(width, height, window.devicePixelRatio);
+      this.dirty = true;
+    },
+
+    watchContext() {
+      const { canvas } = this.$refs;
+      canvas.addEventListener("webglcontextlost", (event) => {
+        event.preventDefault();
+        this.lost = true;
+        this.message = "The graphics device was reset; the head comes back in a moment.";
+      });
+      canvas.addEventListener("webglcontextrestored", () => {
+        this.lost = false;
+        this.message = "";
+        this.dirty = true;
+      });
+    },
+
+    tick() {
+      this.animation = requestAnimationFrame(this.tick);
+      if (clock.playing) this.dirty = true;
+      else this.meter.restart();
+      if (!this.dirty || this.lost) return;
+      const begin = performance.now(), { scene } = this;
+      this.dirty = false;
+      metrics.time = clock.time;
+      scene.setMotion(preview, metrics.time);
+      scene.render();
+      metrics.frames = (metrics.frames ?? 0) + 1;
+      if (clock.playing) this.meter.add(performance.now() - begin);
+    },
+
+    onKey(event) {
+      const names = Object.keys(VIEWS);
+      if (event.key >= "1" && event.key <= String(names.length)) this.view(names[event.key - 1]);
+      else if (event.key.startsWith("Arrow")) this.turn(event.key);
+      else if (event.key === "+" || event.key === "-") this.approach(event.key === "+" ? 0.9 : 1 / 0.9);
+      else return;
+      event.preventDefault();
+    },
+
+    turn(key) {
+      const { camera, controls } = this.scene, step = 0.08;
+      const away = camera.position.clone().sub(controls.target);
+      const radius = away.length(), yaw = Math.atan2(away.x, away.z), pitch = Math.asin(away.y / radius);
+      const a = yaw + (key === "ArrowLeft" ? -step : key === "ArrowRight" ? step : 0);
+      const b = Math.min(Math.max(pitch + (key === "ArrowUp" ? step : key === "ArrowDown" ? -step : 0), -1.4), 1.4);
+      away.set(Math.sin(a) * Math.cos(b), Math.sin(b), Math.cos(a) * Math.cos(b)).multiplyScalar(radius);
+      camera.position.copy(controls.target).add(away);
+      controls.update();
+      this.release();
+    },
+
+    approach(factor) {
+      const { camera, controls } = this.scene;
+      camera.position.sub(controls.target).multiplyScalar(factor).add(controls.target);
+      controls.update();
+      this.release();
+    },
+
+    fail(message, cause) {
+      this.message = message;
+      console.warn(cause);
+      this.$emit("failed", message);
+    },
+  },
+};

@@ -1,0 +1,284 @@
+// Shading of the renderer (tts2face/render: shade.py, strand_light.py, eyes.py) in GLSL: diffuse light at the vertices,
+// highlights at the fragments, the same lamps and tone curve. Light does not scatter between vertices here.
+
+import { THREE } from "nicegui-scene";
+
+const LAMPS = 4;
+
+const VERTEX = `
+  uniform mat4 joints[4];
+  uniform vec3 lamps[${LAMPS}], lampColours[${LAMPS}], sky, floorLight, skull;
+  uniform float opening, wrap, openSheet;
+  attribute vec2 _skin;
+  attribute vec4 _light0, _light1, _light2, _light3, _light4;
+  #ifdef STRANDS
+  attribute vec4 _tangent;
+  varying vec3 vTangent;
+  #endif
+  varying vec3 vNormal, vPlace, vLight, vColour;
+  varying vec4 vExposure;
+  varying vec2 vUv;
+
+  float seen(vec3 l, float c[9]) {
+    return clamp(c[0] + c[1] * l.x + c[2] * l.y + c[3] * l.z + c[4] * l.x * l.y + c[5] * l.y * l.z + c[6] * l.z * l.x
+      + c[7] * (l.x * l.x - l.y * l.y) + c[8] * (3. * l.z * l.z - 1.), 0., 1.);
+  }
+
+  void main() {
+    mat4 joint = joints[int(_skin.x + .5)];
+    float follow = _skin.y / 65535.;
+    vec4 place = vec4(mix(position, (joint * vec4(position, 1.)).xyz, follow), 1.);
+    vec3 n = normalize(normal);
+    vNormal = normalize(mix(n, mat3(joint) * n, follow));
+    vPlace = place.xyz;
+    gl_Position = projectionMatrix * viewMatrix * place;
+    #ifdef TEXTURED
+    vUv = uv;
+    #else
+    vColour = color.rgb;
+    #endif
+    vec3 towards = normalize(cameraPosition - place.xyz), m = vNormal;
+    float around = clamp(2. * (_light0.x + opening * _light2.z), 0., 1.);
+    float c[9];
+    c[0] = _light0.y + opening * _light2.w; c[1] = _light0.z + opening * _light3.x;
+    c[2] = _light0.w + opening * _light3.y; c[3] = _light1.x + opening * _light3.z;
+    c[4] = _light1.y + opening * _light3.w; c[5] = _light1.z + opening * _light4.x;
+    c[6] = _light1.w + opening * _light4.y; c[7] = _light2.x + opening * _light4.z;
+    c[8] = _light2.y + opening * _light4.w;
+    for (int k = 0; k < 9; k++) c[k] *= 2.;
+    #ifdef STRANDS
+    vTangent = normalize(mat3(joint) * _tangent.xyz);
+    vec3 outward = normalize(mat3(joint) * (position - skull));
+    m = normalize((dot(m, outward) > 0. ? .55 : -.55) * m + .5 * outward);
+    vNormal = m;
+    #else
+    if (openSheet > .5 && dot(m, towards) < 0.) m = -m;
+    #endif
+    vLight = mix(floorLight, sky, .5 + .5 * m.y) * around;
+    #ifdef STRANDS
+    vLight *= 1.4;
+    #endif
+    float visible[${LAMPS}];
+    for (int k = 0; k < ${LAMPS}; k++) {
+      float facing = dot(n, lamps[k]), turned = clamp((facing + .15) / .4, 0., 1.);
+      float v = 1. - turned + turned * seen(lamps[k], c);
+      visible[k] = v;
+      #ifdef STRANDS
+      float across = dot(m, lamps[k]), along = dot(vTangent, lamps[k]);
+      float matt = .55 * sqrt(max(1. - along * along, 0.)) * max(.25 + .75 * across, 0.) + .45 * max(across, 0.);
+      vLight += matt * v * lampColours[k];
+      #else
+      vec3 reach = wrap * vec3(1., .75, .65);
+      vec3 soaked = v + reach * v * (1. - v);
+      vLight += lampColours[k] * soaked * max(dot(m, lamps[k]) + reach, 0.) / (1. + reach);
+      #endif
+    }
+    vExposure = vec4(around, visible[0], visible[2], visible[3]);
+  }`;
+
+const TONE = `
+  uniform float brightness;
+  float curve(float light) {
+    float x = light * brightness;
+    return min((x * (2.51 * x + .03)) / (x * (2.43 * x + .59) + .14), 1.);
+  }
+  vec3 display(vec3 light) {
+    float strongest = max(max(light.r, light.g), max(light.b, 1e-6)), shown = curve(strongest);
+    float kept = .75 * (1. - shown);
+    vec3 mixed = kept * shown / strongest * light + (1. - kept) * vec3(curve(light.r), curve(light.g), curve(light.b));
+    mixed = clamp(mixed, 0., 1.);
+    return mix(12.92 * mixed, 1.055 * pow(max(mixed, 1e-5), vec3(1. / 2.4)) - .055, step(.0031308, mixed));
+  }`;
+
+const EYES = `
+  uniform vec3 eyeCentres[2], eyeGaze[2], eyeAcross, eyeUp;
+  uniform vec2 lids[36];
+  uniform float iris, eyeScale, hasLids;
+  float softEdge(float distance, float halfWidth, float slope) {
+    return 1. / (1. + exp((abs(distance) - halfWidth) * slope));
+  }
+  float lidHeight(int begin, float across) {
+    for (int k = 0; k < 8; k++) {
+      vec2 a = lids[begin + k], b = lids[begin + k + 1];
+      if (across <= b.x || k == 7) return mix(a.y, b.y, b.x > a.x ? clamp((across - a.x) / (b.x - a.x), 0., 1.) : 0.);
+    }
+    return 0.;
+  }
+  float lightEye(vec3 place, vec3 towards, inout vec3 albedo, inout vec3 diffuse, inout vec4 exposure, inout vec3 n) {
+    int best = distance(place, eyeCentres[0]) < distance(place, eyeCentres[1]) ? 0 : 1;
+    vec3 offset = place - eyeCentres[best], gaze = eyeGaze[best];
+    vec3 out_ = normalize(offset);
+    float ahead = dot(out_, gaze);
+    float bump = clamp((ahead - iris + .008) * 20., 0., 1.) * .85;
+    vec3 cornea = normalize(out_ + bump * (out_ - gaze * ahead));
+    mat3 level = mat3(viewMatrix);
+    vec3 mirrored = level * (2. * max(dot(cornea, towards), 0.) * cornea - towards);
+    float glow = 0.;
+    vec3 key = level * lamps[0], fill = level * lamps[1], from = level * out_;
+    if (dot(mirrored, key) > 0.) glow += 1.2 * softEdge(mirrored.x - key.x, .17, 40.) * softEdge(mirrored.y - key.y, .22, 40.);
+    if (dot(mirrored, fill) > 0.) glow += .16 * softEdge(mirrored.x - fill.x, .17, 30.) * softEdge(mirrored.y - fill.y, .22, 30.);
+    float edge = (ahead - iris - .006) * 80., ring = 1. - .6 * exp(-edge * edge);
+    bool inside = ahead > iris;
+    float lateral = dot(level * (out_ - gaze * ahead), vec3(key.xy, 0.));
+    float focus = inside ? 1.15 + 1.6 * max(-lateral, 0.) : 1.;
+    float inner = inside ? 0. : clamp((1. - ahead) * 1.6, 0., 1.), shade = 1.;
+    if (hasLids > .5) {
+      float across = dot(offset, eyeAcross) * eyeScale, height = dot(offset, eyeUp) * eyeScale;
+      float under = max(lidHeight(best * 18, across) - height, 0.), over = max(height - lidHeight(best * 18 + 9, across), 0.);
+      shade -= .55 * exp(-under / 1.5) + .18 * exp(-over * 1.6);
+      float line = (over - .3) / .22;
+      glow += .16 * exp(-line * line) * max(from.z - from.y * key.y + .3, 0.) * shade;
+    }
+    shade = max(shade, .1);
+    albedo *= ring * focus * (inside ? 1. : .6) * (1. - inner * vec3(.05, .11, .17));
+    diffuse *= shade;
+    exposure *= shade;
+    if (inside) n = out_;
+    return glow * shade;
+  }`;
+
+const FRAGMENT = `
+  uniform vec3 lamps[${LAMPS}], lampColours[${LAMPS}], sky;
+  uniform float gloss, rough, second, dark, opacity;
+  #ifdef TEXTURED
+  uniform sampler2D map;
+  #endif
+  varying vec3 vNormal, vPlace, vLight, vColour;
+  varying vec4 vExposure;
+  varying vec2 vUv;
+  ${TONE}
+  #ifdef EYE
+  ${EYES}
+  #endif
+  #ifdef STRANDS
+  varying vec3 vTangent;
+  uniform float shine;
+  #endif
+
+  void main() {
+    float cover = opacity;
+    #ifdef TEXTURED
+    vec4 texel = texture2D(map, vUv);
+    vec3 albedo = texel.rgb;
+    #ifdef CUTOUT
+    cover *= texel.a;
+    if (cover < .04) discard;
+    #endif
+    #else
+    vec3 albedo = vColour;
+    #endif
+    vec3 towards = normalize(cameraPosition - vPlace), n = normalize(vNormal), light = vLight;
+    vec4 exposure = vExposure;
+    #ifdef STRANDS
+    vec3 t = normalize(vTangent), colour = light * albedo;
+    float shift = .12 * (dot(albedo, vec3(.333)) * 4. - .5);
+    for (int k = 0; k < 3; k += 2) {
+      vec3 h = normalize(lamps[k] + towards);
+      float along = dot(t, h), normal = dot(n, h);
+      float arrives = clamp(1.6 * dot(n, lamps[k]) + .35, 0., 1.) * (k == 0 ? exposure.y : exposure.z) * shine;
+      float first = along + (shift - .08) * normal, other = along + (shift + .14) * normal;
+      float narrow = pow(max(1. - first * first, 0.), 32.), wide = pow(max(1. - other * other, 0.), 8.);
+      colour += lampColours[k] * arrives * (.085 * narrow + .8 * wide * albedo);
+    }
+    #else
+    if (!gl_FrontFacing) n = -n;
+    float glow = 0.;
+    #ifdef EYE
+    glow = lightEye(vPlace, towards, albedo, light, exposure, n);
+    #endif
+    float facing = max(dot(n, towards), 1e-3), tone = .5 * (albedo.r + albedo.g);
+    float spec = gloss * (1. - dark * (1. - clamp((tone - .03) / .27, 0., 1.)));
+    float depth = sqrt(rough) * .5, smoothness = 1. - sqrt(sqrt(rough)), edge = pow(1. - facing, 5.);
+    float grazing = (.25 * gloss + smoothness * edge) * .35 * min(gloss * 8., 1.);
+    vec3 shine = grazing * exposure.x * exposure.x * (.7 + .3 * n.y) * sky + glow * lampColours[0];
+    for (int k = 0; k < ${LAMPS}; k++) {
+      float to = dot(n, lamps[k]);
+      if (to <= 0.) continue;
+      float visible = k == 0 ? exposure.y : k == 1 ? exposure.x : k == 2 ? exposure.z : exposure.w;
+      vec3 h = normalize(lamps[k] + towards);
+      float middle = max(dot(n, h), 0.), away = 1. - min(dot(lamps[k], h), 1.);
+      float fresnel = 1. + (1. / .03 - 1.) * pow(away, 5.), squared = middle * middle;
+      float first = rough / (squared * (rough - 1.) + 1.), tight = rough * .24, other = tight / (squared * (tight - 1.) + 1.);
+      float shadow = (to * (1. - depth) + depth) * (facing * (1. - depth) + depth);
+      shine += lampColours[k] * spec * fresnel * to * (first * first + second * other * other) / shadow
+        * visible * min(exposure.x * 1.3, 1.);
+    }
+    float hidden = 1. - exposure.x;
+    vec3 colour = light * albedo / (1. - hidden * hidden * albedo * .8) + shine;
+    #endif
+    #ifdef CUTOUT
+    cover = clamp((cover - .45) / max(fwidth(cover), .0001) + .5, 0., 1.);
+    if (cover < .02) discard;
+    #endif
+    gl_FragColor = vec4(display(colour), cover);
+  }`;
+
+/** Values that all materials of a face share; those of the lamps and the eyes follow the camera and the motion. */
+export function sharedUniforms(stage) {
+  const colours = stage.lamps.map(([, , colour]) => new THREE.Vector3(...colour));
+  const vectors = (n, kind = THREE.Vector3) => Array.from({ length: n }, () => new kind());
+  return {
+    joints: { value: vectors(4, THREE.Matrix4) },
+    lamps: { value: vectors(LAMPS) },
+    lampColours: { value: colours },
+    sky: { value: new THREE.Vector3(...stage.sky) },
+    floorLight: { value: new THREE.Vector3(...stage.floor) },
+    skull: { value: new THREE.Vector3(...stage.skull) },
+    brightness: { value: stage.brightness },
+    opening: { value: 0 },
+    eyeCentres: { value: vectors(2) },
+    eyeGaze: { value: vectors(2) },
+    eyeAcross: { value: new THREE.Vector3(1, 0, 0) },
+    eyeUp: { value: new THREE.Vector3(0, 1, 0) },
+    lids: { value: vectors(36, THREE.Vector2) },
+    iris: { value: stage.eyes[0]?.iris ?? 0.868 },
+    eyeScale: { value: stage.eyes.length ? 12 / stage.eyes[0].radius : 1 }, // to mm of an eyeball of 12 mm
+    hasLids: { value: stage.eyes.length === 2 && stage.eyes.every((eye) => eye.lids.length) ? 1 : 0 },
+  };
+}
+
+export function partMaterial(part, shared) {
+  const { extras } = part.material;
+  const defines = {};
+  if (part.texture) defines.TEXTURED = 1;
+  if (extras.cutout) defines.CUTOUT = 1;
+  if (extras.kind === "strands") defines.STRANDS = 1;
+  if (extras.kind === "eye") defines.EYE = 1;
+  const own = { gloss: extras.gloss, rough: extras.rough, second: extras.second, dark: extras.dark, wrap: extras.wrap };
+  const numbers = { ...own, openSheet: Number(extras.open), opacity: extras.opacity, shine: Math.min(extras.gloss / 0.25, 1.5) };
+  const uniforms = { ...shared, map: { value: part.texture } };
+  for (const [name, value] of Object.entries(numbers)) uniforms[name] = { value };
+  return new THREE.ShaderMaterial({
+    defines,
+    uniforms,
+    vertexShader: VERTEX,
+    fragmentShader: FRAGMENT,
+    vertexColors: !part.texture,
+    side: THREE.DoubleSide,
+    alphaToCoverage: Boolean(extras.cutout),
+    transparent: extras.opacity < 1,
+  });
+}
+
+/** The wall behind the head: a soft radial gradient in display colours, or one colour. */
+export function wallMaterial([bright, dark, centre]) {
+  const vector = (rgb) => new THREE.Vector3(...rgb).divideScalar(255);
+  return new THREE.ShaderMaterial({
+    uniforms: {
+      bright: { value: vector(bright) },
+      dark: { value: vector(dark) },
+      centre: { value: new THREE.Vector2(centre[0], 1 - centre[1]) },
+      aspect: { value: 1 },
+    },
+    vertexShader: "varying vec2 vAt; void main() { vAt = uv; gl_Position = vec4(position.xy, .9999, 1.); }",
+    fragmentShader: `
+      uniform vec3 bright, dark; uniform vec2 centre; uniform float aspect; varying vec2 vAt;
+      void main() {
+        vec2 away = (vAt - centre) * vec2(clamp(aspect, 1., 1.6), 1.);
+        float dither = fract(52.98 * fract(dot(gl_FragCoord.xy, vec2(.0671, .00584))));
+        gl_FragColor = vec4(mix(dark, bright, exp(-2.6 * dot(away, away))) + (dither - .5) / 255., 1.);
+      }`,
+    depthTest: false,
+    depthWrite: false,
+  });
+}
