@@ -8,6 +8,7 @@ import json
 import struct
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from fastapi import Request as HttpRequest
@@ -20,6 +21,7 @@ from tts2face.gesture.timeline_file import parse_timeline_object, timeline_json
 from tts2face.models.palette import FEATURES
 from tts2face.session import Session
 from tts2face.studio.components.stage import Stage
+from tts2face.studio.components.timeline import Timeline as TimelineElement
 from tts2face.types import Clip
 
 TEXT = "We were away a year ago, but Bob may move five big maps."
@@ -29,6 +31,8 @@ STYLES = [
     {"name": "somber", "color": "#4a6fd0"},
     {"name": "irritated", "color": "#d0573a"},
 ]
+
+PAGE = "height: 100vh; padding: 8px; gap: 8px; display: flex; flex-direction: column; background: var(--studio-page)"
 
 
 def bundle(clip: Clip, revision: int, repeats: int = 1) -> bytes:
@@ -93,15 +97,39 @@ if __name__ in {"__main__", "__mp_main__"}:
         return Response((files / name).read_bytes(), media_type="application/octet-stream")
 
     @ui.page("/")
-    def page(preview: str = "clip.bin", dark: bool = False) -> None:
-        """Stage and timeline side by side."""
+    def page(preview: str = "clip.bin", compare: str = "", tool: str = "brush", dark: bool = False) -> None:
+        """Stage and timeline, and the edits as they come."""
+        edits: list[dict[str, Any]] = []
+        state = {"timeline": Timeline(), "lanes": {feature: {"feature": feature} for feature in FEATURES}}
+
+        def apply(edit: dict[str, Any]) -> None:
+            edits.append(edit)
+            listed.set_text(json.dumps(edits))
+            kind = edit["kind"]
+            if kind in {"mute", "solo"}:
+                state["lanes"][edit["feature"]]["muted" if kind == "mute" else "solo"] = edit["on"]
+                timeline.set_lanes(list(state["lanes"].values()))
+            elif kind == "paint":
+                span = {name: edit[name] for name in ("feature", "style", "start", "end")}
+                painted = parse_timeline_object({"spans": [span]})
+                state["timeline"] = state["timeline"].merge(painted)
+                timeline.set_timeline(timeline_json(state["timeline"]))
+
         ui.dark_mode(dark)
         ui.query(".nicegui-content").classes("p-0 gap-0")
-        with ui.element("main").classes("w-full").style("padding: 8px; background: var(--studio-page)"):
-            ui.label("Harness of the components").props("role=heading aria-level=1").classes("text-h6")
-            with ui.element("div").style("width: 640px; height: 480px"):
-                stage = Stage("/files/face.glb", preview=f"/files/{preview}")
+        with ui.element("main").classes("w-full").style(PAGE):
+            with ui.element("div").style("flex: 0 1 480px; min-height: 200px; display: flex; gap: 8px"):
+                with ui.element("div").style("width: 640px"):
+                    stage = Stage("/files/face.glb", preview=f"/files/{preview}")
+                with ui.element("div").style("flex: 1; color: var(--studio-text)"):
+                    ui.label("Harness of the components").props("role=heading aria-level=1").classes("text-h6")
+                    picked = ui.label().classes("picked")
+                    listed = ui.label("[]").classes("edits").style("overflow-wrap: anywhere; font-size: 11px")
+            timeline = TimelineElement(
+                timeline_json(state["timeline"]), styles=STYLES, brush={"tool": tool, "style": "delighted"},
+                on_edit=lambda event: apply(event.args), compare=f"/files/{compare}" if compare else None,
+            ).style("flex: 1 1 0; min-height: 250px")  # fmt: skip
+            timeline.on("pick", lambda event: picked.set_text(json.dumps(event.args)))
             ui.on("show_view", lambda event: stage.view(event.args))
-
 
     ui.run(host="127.0.0.1", port=port, show=False, reload=False, title="harness", show_welcome_message=False)
