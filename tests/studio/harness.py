@@ -1,7 +1,7 @@
 """A page with stage and timeline whose face, motion and sound a real session makes, for tests in a browser.
 
 ``python -m tests.studio.harness FOLDER PORT`` serves it; files that take seconds are kept in FOLDER. Edits that the
-timeline emits are listed in the page, and those of styles come back in its timeline as a server would send them.
+timeline emits are listed in the page, and those that add something come back as a server would send them.
 """
 
 import json
@@ -16,7 +16,6 @@ from fastapi.responses import Response
 from nicegui import app, ui
 
 from tts2face.exports.stage_glb import stage_glb
-from tts2face.gesture.timeline import Timeline
 from tts2face.gesture.timeline_file import parse_timeline_object, timeline_json
 from tts2face.models.palette import FEATURES
 from tts2face.session import Session
@@ -25,6 +24,9 @@ from tts2face.studio.components.timeline import Timeline as TimelineElement
 from tts2face.types import Clip
 
 TEXT = "We were away a year ago, but Bob may move five big maps."
+PLACES = {  # of edits that add an element, in a timeline's JSON
+    "paint": "spans", "nod": "nods", "gaze": "gaze", "strength": "strengths", "curve": "curves", "channel": "edits",
+}  # fmt: skip
 STYLES = [
     {"name": "measured", "color": "#7f8a99"},
     {"name": "delighted", "color": "#3aa757"},
@@ -100,20 +102,22 @@ if __name__ in {"__main__", "__mp_main__"}:
     def page(preview: str = "clip.bin", compare: str = "", tool: str = "brush", dark: bool = False) -> None:
         """Stage and timeline, and the edits as they come."""
         edits: list[dict[str, Any]] = []
-        state = {"timeline": Timeline(), "lanes": {feature: {"feature": feature} for feature in FEATURES}}
+        content: dict[str, Any] = {}
+        lanes = {feature: {"feature": feature} for feature in FEATURES}
 
         def apply(edit: dict[str, Any]) -> None:
             edits.append(edit)
             listed.set_text(json.dumps(edits))
-            kind = edit["kind"]
-            if kind in {"mute", "solo"}:
-                state["lanes"][edit["feature"]]["muted" if kind == "mute" else "solo"] = edit["on"]
-                timeline.set_lanes(list(state["lanes"].values()))
-            elif kind == "paint":
-                span = {name: edit[name] for name in ("feature", "style", "start", "end")}
-                painted = parse_timeline_object({"spans": [span]})
-                state["timeline"] = state["timeline"].merge(painted)
-                timeline.set_timeline(timeline_json(state["timeline"]))
+            rest = {name: value for name, value in edit.items() if name != "kind"}
+            if edit["kind"] in {"mute", "solo"}:
+                lanes[edit["feature"]]["muted" if edit["kind"] == "mute" else "solo"] = edit["on"]
+                timeline.set_lanes(list(lanes.values()))
+            elif edit["kind"] == "seed":
+                content["seeds"] = {**content.get("seeds", {}), edit["feature"]: edit["seed"]}
+            elif edit["kind"] in PLACES:
+                later = parse_timeline_object({PLACES[edit["kind"]]: [rest]} if rest.get("keys") != [] else {})
+                content.update(timeline_json(parse_timeline_object(content).merge(later)))
+            timeline.set_timeline(content)
 
         ui.dark_mode(dark)
         ui.query(".nicegui-content").classes("p-0 gap-0")
@@ -126,7 +130,7 @@ if __name__ in {"__main__", "__mp_main__"}:
                     picked = ui.label().classes("picked")
                     listed = ui.label("[]").classes("edits").style("overflow-wrap: anywhere; font-size: 11px")
             timeline = TimelineElement(
-                timeline_json(state["timeline"]), styles=STYLES, brush={"tool": tool, "style": "delighted"},
+                styles=STYLES, brush={"tool": tool, "style": "delighted"},
                 on_edit=lambda event: apply(event.args), compare=f"/files/{compare}" if compare else None,
             ).style("flex: 1 1 0; min-height: 250px")  # fmt: skip
             timeline.on("pick", lambda event: picked.set_text(json.dumps(event.args)))

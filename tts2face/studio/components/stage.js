@@ -8,6 +8,11 @@ import { addStyle } from "tts2face-studio/style.js";
 
 const VIEWS = { front: "Front", "three-quarter": "Three-quarter", profile: "Profile", close: "Close-up" };
 
+const SLOW_MS = 31, FAST_MS = 19; // between frames: fewer pixels above, more below
+const ADAPT_MS = 400; // between two changes of the number of pixels
+const REST_MS = 250; // at rest before the sharp picture
+const LEAST_SHARE = 0.5; // of the device's pixels along a side
+
 export default {
   template: `
     <section class="studio-stage" aria-label="Stage">
@@ -18,7 +23,8 @@ export default {
         <button v-for="(text, name) in views" :key="name" type="button" :aria-pressed="String(current === name)"
           @click="view(name)">{{ text }}</button>
         <button v-if="picture" type="button" @click="showPicture(null)">Live preview</button>
-        <button type="button" aria-label="Full screen" title="Full screen" @click="fullscreen()">⛶</button>
+        <button type="button" aria-label="Full screen" title="Full screen" @click="fullscreen()"><svg
+          viewBox="0 0 16 16" aria-hidden="true"><path d="M1 1h5v2H3v3H1zM10 1h5v5h-2V3h-3zM1 10h2v3h3v2H1zM13 10h2v5h-5v-2h3z"/></svg></button>
       </div>
     </section>`,
 
@@ -37,10 +43,11 @@ export default {
   async mounted() {
     addStyle();
     this.meter = new Meter("js_ms", "fps");
-    this.dirty = true;
+    Object.assign(this, { dirty: true, share: 1, interval: 25, adapted: 0, rested: 0, begun: null });
     this.changed = () => (this.dirty = true);
     try {
       this.scene = new StageScene(this.$refs.canvas, this.changed);
+      window.dbg = this.scene;
     } catch (refused) {
       this.fail("This browser has no WebGL; switch it on, or use “Final picture”.", refused);
       return;
@@ -146,6 +153,7 @@ export default {
       this.animation = requestAnimationFrame(this.tick);
       if (clock.playing) this.dirty = true;
       else this.meter.restart();
+      this.adapt();
       if (!this.dirty || this.lost) return;
       const begin = performance.now(), { scene } = this;
       this.dirty = false;
@@ -154,6 +162,28 @@ export default {
       scene.render();
       metrics.frames = (metrics.frames ?? 0) + 1;
       if (clock.playing) this.meter.add(performance.now() - begin);
+    },
+
+    /** Fewer pixels while a slow device plays; at rest, after a moment, one sharp picture. */
+    adapt() {
+      const now = performance.now(), { scene } = this;
+      const busy = clock.playing || this.dirty;
+      if (busy && this.begun) this.interval = 0.9 * this.interval + 0.1 * Math.min(now - this.begun, 200);
+      this.begun = busy ? now : null;
+      if (!busy) {
+        this.rested ??= now;
+        if (now - this.rested < REST_MS || scene.sharpness === (scene.isSoftware ? 2 : 1)) return;
+        scene.setSharpness(scene.isSoftware ? 2 : 1);
+        this.dirty = true;
+        return;
+      }
+      if (this.rested) scene.setSharpness(this.share);
+      this.rested = null;
+      if (now - this.adapted < ADAPT_MS) return;
+      this.adapted = now;
+      const step = this.interval > SLOW_MS ? 0.8 : this.interval < FAST_MS ? 1.1 : 1;
+      this.share = Math.min(Math.max(this.share * step, LEAST_SHARE), 1);
+      if (step !== 1) scene.setSharpness(this.share);
     },
 
     onKey(event) {

@@ -7,6 +7,8 @@ const ARRAYS = { 5120: Int8Array, 5121: Uint8Array, 5122: Int16Array, 5123: Uint
 const WIDTHS = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 const FULL_SHORT = 32767;
 const LEAST_CHANGE_M = 2e-5; // of the farthest vertex of a shape: a twentieth of a pixel
+const N_FIELDS = 5, N_GAIN = 10; // attributes of four numbers each of a light field; first number of its change
+const FIELD_UNIT = 2 / 127;
 const REFRESH_FRAMES = 600; // sums are made anew so often, against rounding errors that add up
 
 /** JSON and binary part of a .glb file. */
@@ -39,7 +41,7 @@ function readTarget(file, index) {
   return { at, moves: Float32Array.from(steps, (step) => step / FULL_SHORT) };
 }
 
-async function readTextures(file, anisotropy) {
+async function readTextures(file) {
   const images = file.json.images ?? [];
   return Promise.all(
     images.map(async (image) => {
@@ -47,7 +49,7 @@ async function readTextures(file, anisotropy) {
       const blob = new Blob([readView(file, image.bufferView, Uint8Array, view.byteLength)], { type: image.mimeType });
       const options = { premultiplyAlpha: "none", colorSpaceConversion: "none" };
       const texture = new THREE.Texture(await createImageBitmap(blob, options));
-      Object.assign(texture, { flipY: false, colorSpace: THREE.SRGBColorSpace, anisotropy, generateMipmaps: true });
+      Object.assign(texture, { flipY: false, colorSpace: THREE.SRGBColorSpace, minFilter: THREE.LinearMipmapNearestFilter });
       texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
       texture.needsUpdate = true;
       return texture;
@@ -186,12 +188,12 @@ export class StageFace {
     }));
   }
 
-  static async load(url, anisotropy) {
+  static async load(url) {
     const answer = await fetch(url);
     if (!answer.ok) throw new Error(`the face could not be fetched: ${answer.status} ${answer.statusText}`);
     const file = readContainer(await answer.arrayBuffer());
     if (!file.json.asset.extras?.lamps) throw new Error("the face lacks the values of the preview; make it with stage_glb");
-    return new StageFace(file, await readTextures(file, anisotropy));
+    return new StageFace(file, await readTextures(file));
   }
 
   #part(file, primitive, scales) {
@@ -204,8 +206,13 @@ export class StageFace {
     geometry.setAttribute("position", new THREE.InterleavedBufferAttribute(part.buffer, 3, 0));
     geometry.setAttribute("normal", new THREE.InterleavedBufferAttribute(part.buffer, 3, 3));
     const names = { TEXCOORD_0: "uv", COLOR_0: "color" };
+    part.field = Array.from({ length: N_FIELDS }, (_, k) => readAccessor(file, primitive.attributes[`_LIGHT${k}`]).array);
+    for (const [name, width] of [["restLight", 4], ["openLight", 4], ["skyLight", 2]]) {
+      const values = new THREE.BufferAttribute(new Float32Array((places.length / 3) * width), width);
+      geometry.setAttribute(name, values.setUsage(THREE.DynamicDrawUsage));
+    }
     for (const [name, index] of Object.entries(primitive.attributes)) {
-      if (name === "POSITION") continue;
+      if (name === "POSITION" || name.startsWith("_LIGHT")) continue;
       const { array, width, normalized } = readAccessor(file, index);
       geometry.setAttribute(names[name] ?? name.toLowerCase(), new THREE.BufferAttribute(array, width, normalized));
     }
@@ -249,6 +256,30 @@ export class StageFace {
     }
     for (const part of whole ? this.parts : changed) part.buffer.needsUpdate = true;
     return changed.size > 0;
+  }
+
+  /** Take the directions of the lamps: how much of their light reaches each vertex, by its light field. */
+  light(lamps) {
+    const bases = lamps.map(({ x, y, z }) => [1, x, y, z, x * y, y * z, z * x, x * x - y * y, 3 * z * z - 1]);
+    for (const { field, geometry } of this.parts) {
+      const { restLight, openLight, skyLight } = geometry.attributes;
+      const own = new Float32Array(4 * N_FIELDS);
+      for (let v = 0; v < skyLight.count; v++) {
+        for (let c = 0; c < own.length; c++) own[c] = field[c >> 2][4 * v + (c & 3)] * FIELD_UNIT;
+        skyLight.array[2 * v] = own[0];
+        skyLight.array[2 * v + 1] = own[N_GAIN];
+        for (let k = 0; k < 4; k++) {
+          let rest = 0, gain = 0;
+          for (let c = 0; c < 9; c++) {
+            rest += bases[k][c] * own[1 + c];
+            gain += bases[k][c] * own[N_GAIN + 1 + c];
+          }
+          restLight.array[4 * v + k] = rest;
+          openLight.array[4 * v + k] = gain;
+        }
+      }
+      for (const attribute of [restLight, openLight, skyLight]) attribute.needsUpdate = true;
+    }
   }
 
   /** Share from 0 to 1 of the light that enters with an open mouth. */

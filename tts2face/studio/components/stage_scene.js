@@ -6,10 +6,13 @@ import { partMaterial, sharedUniforms, wallMaterial } from "./stage_shader.js";
 
 const RADIAN = Math.PI / 180;
 const MM = 0.001;
+const LIGHT_STEP = 0.05; // radians of the camera's yaw between two directions of the lamps
 
 export class StageScene {
   constructor(canvas, onChange) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: "high-performance" });
+    this.isSoftware = drawsInSoftware();
+    const options = { antialias: !this.isSoftware, alpha: false, powerPreference: "high-performance" };
+    this.renderer = new THREE.WebGLRenderer({ canvas, ...options });
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(22, 1, 0.02, 20);
     this.controls = new OrbitControls(this.camera, canvas);
@@ -21,16 +24,17 @@ export class StageScene {
   }
 
   async setFace(url) {
-    const face = await StageFace.load(url, this.renderer.capabilities.getMaxAnisotropy());
+    const face = await StageFace.load(url);
     this.clear();
     this.face = face;
+    this.litYaw = NaN;
     this.shared = sharedUniforms(face.stage);
     this.wall = new THREE.Mesh(new THREE.PlaneGeometry(2, 2), wallMaterial(face.stage.wall));
     this.wall.frustumCulled = false;
     this.wall.renderOrder = -1;
     this.scene.add(this.wall);
     for (const part of face.parts) {
-      const mesh = new THREE.Mesh(part.geometry, partMaterial(part, this.shared));
+      const mesh = new THREE.Mesh(part.geometry, partMaterial(part, this.shared, !this.isSoftware));
       mesh.frustumCulled = false;
       mesh.renderOrder = part.material.extras.cutout ? 2 : 1;
       this.scene.add(mesh);
@@ -76,13 +80,24 @@ export class StageScene {
     this.onChange();
   }
 
+  /** Fit the canvas; `ratio` is device pixels per pixel of the page. */
   resize(width, height, ratio) {
-    this.renderer.setPixelRatio(Math.min(ratio, 2));
-    this.renderer.setSize(width, height, false);
+    this.size = { width, height, ratio: Math.min(ratio, 2) };
+    this.setSharpness(this.sharpness ?? 1);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     if (this.viewName && !this.moved) this.view(this.viewName);
     if (this.wall) this.wall.material.uniforms.aspect.value = width / height;
+  }
+
+  /** Draw with a share of the device's pixels: fewer while a slow device plays, more for a picture at rest. */
+  setSharpness(share) {
+    this.sharpness = share;
+    const { width, height, ratio } = this.size, pixels = Math.min(ratio * share, 2);
+    if (this.renderer.getPixelRatio() === pixels && this.drawn?.width === width && this.drawn.height === height) return;
+    this.drawn = { width, height };
+    this.renderer.setPixelRatio(pixels);
+    this.renderer.setSize(width, height, false);
   }
 
   /** Take the motion of a preview at a time in seconds; between two frames it is interpolated. */
@@ -140,11 +155,18 @@ export class StageScene {
     if (!this.face) return;
     const towards = this.camera.position.clone().sub(this.controls.target);
     const yaw = Math.atan2(towards.x, towards.z);
+    if (!(Math.abs(yaw - this.litYaw) < LIGHT_STEP)) this.turnLamps((this.litYaw = yaw));
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  /** The lamps turn with the camera, as in the renderer. */
+  turnLamps(yaw) {
+    const { lamps } = this.shared;
     this.face.stage.lamps.forEach(([own, pitch], number) => {
       const a = own * RADIAN + yaw, b = pitch * RADIAN;
-      this.shared.lamps.value[number].set(Math.sin(a) * Math.cos(b), Math.sin(b), Math.cos(a) * Math.cos(b));
+      lamps.value[number].set(Math.sin(a) * Math.cos(b), Math.sin(b), Math.cos(a) * Math.cos(b));
     });
-    this.renderer.render(this.scene, this.camera);
+    this.face.light(lamps.value);
   }
 
   clear() {
@@ -162,6 +184,16 @@ export class StageScene {
     this.controls.dispose();
     this.renderer.dispose();
   }
+}
+
+/** Whether the browser draws on the processor, where each sample of a pixel counts. */
+function drawsInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  if (!gl) throw new Error("the browser has no WebGL 2");
+  const info = gl.getExtension("WEBGL_debug_renderer_info");
+  const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
+  gl.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|softpipe|basic render/i.test(name);
 }
 
 /** A rotation about a point. */

@@ -9,19 +9,26 @@ const VERTEX = `
   uniform mat4 joints[4];
   uniform vec3 lamps[${LAMPS}], lampColours[${LAMPS}], sky, floorLight, skull;
   uniform float opening, wrap, openSheet;
+  uniform float gloss, rough, second;
   attribute vec2 _skin;
-  attribute vec4 _light0, _light1, _light2, _light3, _light4;
+  attribute vec4 restLight, openLight; // visibility of the lamps at rest, and how it changes with an open mouth
+  attribute vec2 skyLight; // the same of the sky
   #ifdef STRANDS
   attribute vec4 _tangent;
   varying vec3 vTangent;
   #endif
-  varying vec3 vNormal, vPlace, vLight, vColour;
+  varying vec3 vNormal, vPlace, vLight, vShine, vColour;
   varying vec4 vExposure;
   varying vec2 vUv;
 
-  float seen(vec3 l, float c[9]) {
-    return clamp(c[0] + c[1] * l.x + c[2] * l.y + c[3] * l.z + c[4] * l.x * l.y + c[5] * l.y * l.z + c[6] * l.z * l.x
-      + c[7] * (l.x * l.x - l.y * l.y) + c[8] * (3. * l.z * l.z - 1.), 0., 1.);
+  /** Highlight of a lamp: one lobe, for lamps whose highlights change slowly over the surface. */
+  float highlight(vec3 n, vec3 lamp, vec3 towards) {
+    float to = max(dot(n, lamp), 0.), facing = max(dot(n, towards), .05);
+    vec3 h = normalize(lamp + towards);
+    float middle = max(dot(n, h), 0.), away = 1. - min(dot(lamp, h), 1.), away2 = away * away;
+    float fresnel = 1. + (1. / .03 - 1.) * away2 * away2 * away, lobe = rough / (middle * middle * (rough - 1.) + 1.);
+    float depth = sqrt(rough) * .5;
+    return fresnel * to * lobe * lobe / ((to * (1. - depth) + depth) * (facing * (1. - depth) + depth));
   }
 
   void main() {
@@ -38,14 +45,8 @@ const VERTEX = `
     vColour = color.rgb;
     #endif
     vec3 towards = normalize(cameraPosition - place.xyz), m = vNormal;
-    float around = clamp(2. * (_light0.x + opening * _light2.z), 0., 1.);
-    float c[9];
-    c[0] = _light0.y + opening * _light2.w; c[1] = _light0.z + opening * _light3.x;
-    c[2] = _light0.w + opening * _light3.y; c[3] = _light1.x + opening * _light3.z;
-    c[4] = _light1.y + opening * _light3.w; c[5] = _light1.z + opening * _light4.x;
-    c[6] = _light1.w + opening * _light4.y; c[7] = _light2.x + opening * _light4.z;
-    c[8] = _light2.y + opening * _light4.w;
-    for (int k = 0; k < 9; k++) c[k] *= 2.;
+    float around = clamp(skyLight.x + opening * skyLight.y, 0., 1.);
+    vec4 seen = clamp(restLight + opening * openLight, 0., 1.);
     #ifdef STRANDS
     vTangent = normalize(mat3(joint) * _tangent.xyz);
     vec3 outward = normalize(mat3(joint) * (position - skull));
@@ -61,7 +62,7 @@ const VERTEX = `
     float visible[${LAMPS}];
     for (int k = 0; k < ${LAMPS}; k++) {
       float facing = dot(n, lamps[k]), turned = clamp((facing + .15) / .4, 0., 1.);
-      float v = 1. - turned + turned * seen(lamps[k], c);
+      float v = 1. - turned + turned * seen[k];
       visible[k] = v;
       #ifdef STRANDS
       float across = dot(m, lamps[k]), along = dot(vTangent, lamps[k]);
@@ -74,6 +75,15 @@ const VERTEX = `
       #endif
     }
     vExposure = vec4(around, visible[0], visible[2], visible[3]);
+    #ifndef STRANDS
+    float facing = max(dot(m, towards), 0.), edge = 1. - facing, edge2 = edge * edge;
+    float grazing = (.25 * gloss + (1. - sqrt(sqrt(rough))) * edge2 * edge2 * edge) * .35 * min(gloss * 8., 1.);
+    vShine = grazing * around * around * (.7 + .3 * m.y) * sky;
+    float lit = gloss * min(around * 1.3, 1.);
+    vShine += lit * visible[2] * highlight(m, lamps[2], towards) * lampColours[2];
+    vShine += lit * visible[3] * highlight(m, lamps[3], towards) * lampColours[3];
+    vShine += lit * around * highlight(m, lamps[1], towards) * lampColours[1];
+    #endif
   }`;
 
 const TONE = `
@@ -87,7 +97,8 @@ const TONE = `
     float kept = .75 * (1. - shown);
     vec3 mixed = kept * shown / strongest * light + (1. - kept) * vec3(curve(light.r), curve(light.g), curve(light.b));
     mixed = clamp(mixed, 0., 1.);
-    return mix(12.92 * mixed, 1.055 * pow(max(mixed, 1e-5), vec3(1. / 2.4)) - .055, step(.0031308, mixed));
+    vec3 a = sqrt(mixed), b = sqrt(a), c = sqrt(b); // sRGB within 0.002 without a power
+    return clamp(.662002687 * a + .68412206 * b - .323583601 * c - .022541147 * mixed, 0., 1.);
   }`;
 
 const EYES = `
@@ -143,7 +154,7 @@ const FRAGMENT = `
   #ifdef TEXTURED
   uniform sampler2D map;
   #endif
-  varying vec3 vNormal, vPlace, vLight, vColour;
+  varying vec3 vNormal, vPlace, vLight, vShine, vColour;
   varying vec4 vExposure;
   varying vec2 vUv;
   ${TONE}
@@ -177,7 +188,9 @@ const FRAGMENT = `
       float along = dot(t, h), normal = dot(n, h);
       float arrives = clamp(1.6 * dot(n, lamps[k]) + .35, 0., 1.) * (k == 0 ? exposure.y : exposure.z) * shine;
       float first = along + (shift - .08) * normal, other = along + (shift + .14) * normal;
-      float narrow = pow(max(1. - first * first, 0.), 32.), wide = pow(max(1. - other * other, 0.), 8.);
+      float narrow = max(1. - first * first, 0.), wide = max(1. - other * other, 0.);
+      narrow *= narrow; narrow *= narrow; narrow *= narrow; narrow *= narrow; narrow *= narrow;
+      wide *= wide; wide *= wide; wide *= wide;
       colour += lampColours[k] * arrives * (.085 * narrow + .8 * wide * albedo);
     }
     #else
@@ -188,27 +201,24 @@ const FRAGMENT = `
     #endif
     float facing = max(dot(n, towards), 1e-3), tone = .5 * (albedo.r + albedo.g);
     float spec = gloss * (1. - dark * (1. - clamp((tone - .03) / .27, 0., 1.)));
-    float depth = sqrt(rough) * .5, smoothness = 1. - sqrt(sqrt(rough)), edge = pow(1. - facing, 5.);
-    float grazing = (.25 * gloss + smoothness * edge) * .35 * min(gloss * 8., 1.);
-    vec3 shine = grazing * exposure.x * exposure.x * (.7 + .3 * n.y) * sky + glow * lampColours[0];
-    for (int k = 0; k < ${LAMPS}; k++) {
-      float to = dot(n, lamps[k]);
-      if (to <= 0.) continue;
-      float visible = k == 0 ? exposure.y : k == 1 ? exposure.x : k == 2 ? exposure.z : exposure.w;
-      vec3 h = normalize(lamps[k] + towards);
-      float middle = max(dot(n, h), 0.), away = 1. - min(dot(lamps[k], h), 1.);
-      float fresnel = 1. + (1. / .03 - 1.) * pow(away, 5.), squared = middle * middle;
+    vec3 shine = vShine * (spec / max(gloss, .001)) + glow * lampColours[0];
+    float to = dot(n, lamps[0]);
+    if (to > 0.) {
+      float depth = sqrt(rough) * .5;
+      vec3 h = normalize(lamps[0] + towards);
+      float middle = max(dot(n, h), 0.), away = 1. - min(dot(lamps[0], h), 1.), away2 = away * away;
+      float fresnel = 1. + (1. / .03 - 1.) * away2 * away2 * away, squared = middle * middle;
       float first = rough / (squared * (rough - 1.) + 1.), tight = rough * .24, other = tight / (squared * (tight - 1.) + 1.);
       float shadow = (to * (1. - depth) + depth) * (facing * (1. - depth) + depth);
-      shine += lampColours[k] * spec * fresnel * to * (first * first + second * other * other) / shadow
-        * visible * min(exposure.x * 1.3, 1.);
+      shine += lampColours[0] * spec * fresnel * to * (first * first + second * other * other) / shadow
+        * exposure.y * min(exposure.x * 1.3, 1.);
     }
     float hidden = 1. - exposure.x;
     vec3 colour = light * albedo / (1. - hidden * hidden * albedo * .8) + shine;
     #endif
-    #ifdef CUTOUT
-    cover = clamp((cover - .45) / max(fwidth(cover), .0001) + .5, 0., 1.);
-    if (cover < .02) discard;
+    #ifdef SOLID
+    cover = clamp((cover - .4) / max(fwidth(cover), .2) + .5, 0., 1.);
+    if (cover < LEAST_COVER) discard;
     #endif
     gl_FragColor = vec4(display(colour), cover);
   }`;
@@ -237,13 +247,16 @@ export function sharedUniforms(stage) {
   };
 }
 
-export function partMaterial(part, shared) {
+/** `samples` is whether a pixel has several samples, which share the coverage of hair. */
+export function partMaterial(part, shared, samples) {
   const { extras } = part.material;
   const defines = {};
   if (part.texture) defines.TEXTURED = 1;
   if (extras.cutout) defines.CUTOUT = 1;
   if (extras.kind === "strands") defines.STRANDS = 1;
   if (extras.kind === "eye") defines.EYE = 1;
+  const layered = extras.cutout && part.material.name.startsWith("hair"); // cards over cards hide each other
+  if (layered) Object.assign(defines, { SOLID: 1, LEAST_COVER: samples ? ".02" : ".25" });
   const own = { gloss: extras.gloss, rough: extras.rough, second: extras.second, dark: extras.dark, wrap: extras.wrap };
   const numbers = { ...own, openSheet: Number(extras.open), opacity: extras.opacity, shine: Math.min(extras.gloss / 0.25, 1.5) };
   const uniforms = { ...shared, map: { value: part.texture } };
@@ -254,9 +267,10 @@ export function partMaterial(part, shared) {
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
     vertexColors: !part.texture,
-    side: THREE.DoubleSide,
-    alphaToCoverage: Boolean(extras.cutout),
-    transparent: extras.opacity < 1,
+    side: extras.open || extras.cutout ? THREE.DoubleSide : THREE.FrontSide,
+    alphaToCoverage: layered && samples,
+    transparent: extras.opacity < 1 || (extras.cutout && !(layered && samples)),
+    depthWrite: !extras.cutout || layered,
   });
 }
 

@@ -18,14 +18,14 @@ export default {
     <section class="studio-timeline" aria-label="Timeline">
       <div class="studio-bar" role="toolbar" aria-label="Playback and zoom">
         <button type="button" class="studio-play" @click="toggle" :aria-label="playing ? 'Pause' : 'Play'"
-          title="Space">{{ playing ? "❚❚" : "▶" }}</button>
-        <button type="button" aria-label="To the start" title="Home" @click="host.seek(0)">⏮</button>
+          title="Space"><svg viewBox="0 0 16 16" aria-hidden="true"><path :d="playing ? 'M3 2h4v12H3zM9 2h4v12H9z' : 'M4 2l10 6-10 6z'"/></svg></button>
+        <button type="button" aria-label="To the start" title="Home" @click="host.seek(0)"><svg viewBox="0 0 16 16" aria-hidden="true"><path d="M2 2h2v12H2zM14 2v12L5 8z"/></svg></button>
         <output class="studio-time" aria-label="Time">{{ timeText }}</output>
         <label>Speed <select :value="speed" @change="setSpeed($event.target.value)">
           <option v-for="one in [0.25, 0.5, 1]" :key="one" :value="one">{{ one }}×</option></select></label>
         <span class="studio-gap"></span>
         <span v-if="rangeText" class="studio-range">{{ rangeText }}
-          <button type="button" aria-label="Clear the selection" title="Escape" @click="host.setRange(null)">✕</button></span>
+          <button type="button" aria-label="Clear the selection" title="Escape" @click="host.setRange(null)">Clear</button></span>
         <label><input type="checkbox" :checked="snaps" @change="setSnaps($event.target.checked)"> Snap</label>
         <button type="button" aria-label="Zoom out" title="Minus" @click="host.zoom(1 / 1.4)">−</button>
         <button type="button" aria-label="Zoom in" title="Plus" @click="host.zoom(1.4)">+</button>
@@ -51,13 +51,14 @@ export default {
               <button type="button" :aria-pressed="String(laneOf(row).solo)" :aria-label="'Solo ' + row.label" title="Solo"
                 @click="emitLane('solo', row, !laneOf(row).solo)">S</button>
               <button type="button" :aria-label="'New seed for ' + row.label + ', now ' + seedOf(row)" :title="'New seed, now ' + seedOf(row)"
-                @click="reroll(row)">⚄</button>
+                @click="reroll(row)"><svg viewBox="0 0 16 16" aria-hidden="true"><path d="M3 1h10a2 2 0 012 2v10a2 2 0 01-2 2H3a2 2 0 01-2-2V3a2 2 0 012-2zm2 3a1.3 1.3 0 100 2.6A1.3 1.3 0 005 4zm6 0a1.3 1.3 0 100 2.6A1.3 1.3 0 0011 4zM8 6.7a1.3 1.3 0 100 2.6 1.3 1.3 0 000-2.6zM5 9.4A1.3 1.3 0 105 12a1.3 1.3 0 000-2.6zm6 0a1.3 1.3 0 100 2.6 1.3 1.3 0 000-2.6z"/></svg></button>
             </span>
           </div>
         </div>
         <div class="studio-plot" ref="plot" :style="{ height: height + 'px' }">
           <canvas ref="base" aria-hidden="true"></canvas>
           <canvas ref="over" aria-hidden="true"></canvas>
+          <div ref="playhead" class="studio-playhead" aria-hidden="true"></div>
           <div ref="grid" class="studio-grid" role="grid" tabindex="0" :aria-label="'Elements of the timeline. ' + help"
             :aria-rowcount="rows.length" :aria-activedescendant="cellId(cursorRow)" @keydown="onKey" @wheel="onWheel">
             <div v-for="(cell, number) in cells" :key="number" role="row" :aria-rowindex="number + 1">

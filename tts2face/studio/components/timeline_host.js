@@ -70,6 +70,7 @@ export class TimelineHost {
   }
 
   takeTimeline() {
+    if (this.tools?.gesture) return; // the edit that ends it brings the timeline again
     this.state.model.set(this.component.timeline);
     this.refocus();
   }
@@ -143,8 +144,11 @@ export class TimelineHost {
     if (!this.dirty && time === this.shown) return;
     this.shown = time;
     if (this.dirty) this.painter.draw(state);
+    if (this.dirty) this.drawGhost();
     this.dirty = false;
-    this.drawOverlay(time);
+    const x = state.view.x(time), { style } = this.component.$refs.playhead;
+    style.transform = `translateX(${x.toFixed(1)}px)`;
+    style.visibility = x < 0 || x > state.view.width ? "hidden" : "visible";
     if (!clock.playing) {
       this.meter.restart();
       this.component.timeText = formatTime(time);
@@ -154,7 +158,8 @@ export class TimelineHost {
     this.meter.add(performance.now() - begin);
   }
 
-  drawOverlay(time) {
+  /** What a gesture would do when it ends here. */
+  drawGhost() {
     const { overlay, state } = this, { context: c } = overlay, { view, colors, ghost } = state;
     c.clearRect(0, 0, view.width, this.component.height);
     overlay.state = state;
@@ -168,14 +173,6 @@ export class TimelineHost {
       c.fillStyle = colors.accent;
       c.fillRect(view.x(ghost.time) - 1, 22, 2, state.rows.find((row) => row.id === "phones").y + 2);
     }
-    const x = Math.round(view.x(time));
-    c.fillStyle = colors.playhead;
-    c.fillRect(x - 1, 0, 2, this.component.height);
-    c.beginPath();
-    c.moveTo(x - 6, 0);
-    c.lineTo(x + 6, 0);
-    c.lineTo(x, 9);
-    c.fill();
   }
 
   key(event) {

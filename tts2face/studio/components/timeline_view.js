@@ -17,14 +17,14 @@ const SNAP_PX = 7;
 export function layoutRows(features) {
   const rows = [
     { id: "ruler", label: "Time", height: 22 },
-    { id: "wave", label: "Sound", height: 50 },
-    { id: "words", label: "Words", height: 22 },
-    { id: "phones", label: "Phones", height: 24 },
-    ...features.map((feature) => ({ id: `lane:${feature}`, feature, label: FEATURE_LABELS[feature] ?? feature, height: 30 })),
-    { id: "curve", label: "Expression keys", height: 46 },
-    { id: "nods", label: "Nods", height: 24 },
-    { id: "targets", label: "Gaze targets", height: 24 },
-    { id: "channel", label: "Channel", height: 84 },
+    { id: "wave", label: "Sound", height: 44 },
+    { id: "words", label: "Words", height: 20 },
+    { id: "phones", label: "Phones", height: 22 },
+    ...features.map((feature) => ({ id: `lane:${feature}`, feature, label: FEATURE_LABELS[feature] ?? feature, height: 27 })),
+    { id: "curve", label: "Expression keys", height: 44 },
+    { id: "nods", label: "Nods", height: 22 },
+    { id: "targets", label: "Gaze targets", height: 22 },
+    { id: "channel", label: "Channel", height: 72 },
   ];
   let y = 0;
   for (const row of rows) {
