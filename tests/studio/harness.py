@@ -121,7 +121,7 @@ if __name__ in {"__main__", "__mp_main__"}:
 
         ui.dark_mode(dark)
         ui.query(".nicegui-content").classes("p-0 gap-0")
-        with ui.element("main").classes("w-full").style(PAGE):
+        with ui.element("div").classes("w-full").style(PAGE):
             with ui.element("div").style("flex: 0 1 480px; min-height: 200px; display: flex; gap: 8px"):
                 with ui.element("div").style("width: 640px"):
                     stage = Stage("/files/face.glb", preview=f"/files/{preview}")

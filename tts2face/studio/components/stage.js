@@ -47,7 +47,6 @@ export default {
     this.changed = () => (this.dirty = true);
     try {
       this.scene = new StageScene(this.$refs.canvas, this.changed);
-      window.dbg = this.scene;
     } catch (refused) {
       this.fail("This browser has no WebGL; switch it on, or use “Final picture”.", refused);
       return;
@@ -161,6 +160,7 @@ export default {
       scene.setMotion(preview, metrics.time);
       scene.render();
       metrics.frames = (metrics.frames ?? 0) + 1;
+      metrics.is_sharp = scene.sharpness >= 1 && this.rested !== null;
       if (clock.playing) this.meter.add(performance.now() - begin);
     },
 

@@ -174,6 +174,9 @@ const FRAGMENT = `
     #ifdef CUTOUT
     cover *= texel.a;
     if (cover < .04) discard;
+    #ifndef SOLID
+    cover *= sqrt(cover); // blended in display light here, in linear light by the renderer
+    #endif
     #endif
     #else
     vec3 albedo = vColour;

@@ -121,7 +121,7 @@ export class TimelineHost {
   moved() {
     const { view } = this.state, { component } = this;
     component.scrollWidth = Math.max(view.duration * view.scale, 1);
-    metrics.view = { start: view.start, scale: view.scale };
+    metrics.view = { start: view.start, scale: view.scale, duration: view.duration };
     metrics.rows = this.state.rows;
     this.redraw();
     component.$nextTick(() => {
