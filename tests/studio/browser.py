@@ -49,11 +49,16 @@ class Browser:
             ["chromedriver", f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
         self._root = f"http://127.0.0.1:{port}"
-        wait_until(lambda: self._is_ready(), 30, "chromedriver starts")
+        wait_until(self._is_ready, 30, "chromedriver starts")
         options = {"args": [*ARGUMENTS, f"--window-size={size[0]},{size[1]}"]}
         wanted = {"goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "ALL"}}
         answer = self._post("/session", {"capabilities": {"alwaysMatch": wanted}})
         self._session = f"/session/{answer['sessionId']}"
+
+    @property
+    def driver(self) -> int:
+        """Number of the process whose descendants the browser's processes are."""
+        return self._driver.pid
 
     def close(self) -> None:
         """End window and driver."""

@@ -1,55 +1,22 @@
 """Stage and timeline in a real browser, with the motion and sound of a real session."""
 
-import json
-import os
-import subprocess
-import sys
-import urllib.error
-import urllib.request
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from tests.studio.browser import Browser, free_port, missing_program, wait_until
+from tests.studio.browser import Browser, missing_program, wait_until
+from tests.studio.served import Page, served_harness
 
 pytest.importorskip("nicegui", reason="needs nicegui: pip install 'tts2face[studio]'")
 pytestmark = pytest.mark.skipif(bool(missing_program()), reason=f"needs {missing_program()}")
 
-ROOT = Path(__file__).parents[2]
-MOUTH = (slice(0.60, 0.74), slice(0.42, 0.58))  # of the picture's height and width, in the front view
 SILENCE_S, SPEECH_S = (0.01, 0.05), (0.55, 0.95, 2.0, 2.4, 2.6)  # of the harness's sentence
-# A fixed piece of work, and its milliseconds on an idle core of 2.5 GHz.
-CALIBRATION = (
-    "const t = performance.now(); let a = 0; for (let i = 0; i < 1e8; i++) a += i; return performance.now() - t"
-)
-CALIBRATION_MS = 75
 
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
     """Address of the harness."""
-    port, log = free_port(), tmp_path_factory.mktemp("log") / "harness.txt"
-    files = tmp_path_factory.mktemp("files")
-    with log.open("wb") as out:
-        command = [sys.executable, "-m", "tests.studio.harness", str(files), str(port)]
-        # NiceGUI takes part in tests of its own where it finds pytest's variables.
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
-        process = subprocess.Popen(command, cwd=ROOT, stdout=out, stderr=out, env=environment)
-    url = f"http://127.0.0.1:{port}/"
-
-    def answers():
-        assert process.poll() is None, log.read_text()
-        try:
-            with urllib.request.urlopen(url, timeout=5) as page:
-                return page.status == 200
-        except (urllib.error.URLError, TimeoutError):
-            return False
-
-    wait_until(answers, 240, "the harness answers")
-    yield url
-    process.terminate()
-    process.wait(20)
+    with served_harness(tmp_path_factory.mktemp("files")) as url:
+        yield url
 
 
 @pytest.fixture(scope="module")
@@ -58,47 +25,6 @@ def browser():
     window = Browser()
     yield window
     window.close()
-
-
-class Page:
-    """A page of the harness with what its components report."""
-
-    def __init__(self, browser, url):
-        self.browser = browser
-        browser.open(url)
-        ready = "const s = window.__studio; return Boolean(s && s.face_ms && s.frames > 0 && s.view?.duration > 1)"
-        wait_until(lambda: browser.run(ready), 120, "face and sound are loaded")
-        self.grid = browser.box(".studio-grid")
-        self.rows = {row["id"]: row for row in browser.run("return window.__studio.rows")}
-
-    def measure(self, name):
-        return self.browser.run("return window.__studio[arguments[0]] ?? null", name)
-
-    def at(self, row, time, share=0.5):
-        """Place of a time on a row in the window."""
-        view, place = self.measure("view"), self.rows[row]
-        return self.grid["x"] + (time - view["start"]) * view["scale"], self.grid["y"] + place["y"] + share * place[
-            "height"
-        ]
-
-    def edits(self, n):
-        """The first n edits that the server received."""
-        script = "return document.querySelector('.edits').innerText"
-        return wait_until(lambda: (found := json.loads(self.browser.run(script)))[n - 1 :] and found, 20, f"{n} edits")
-
-    def show(self, time):
-        """Move the playhead by the ruler, and wait for the sharp picture of a stage at rest."""
-        place = self.at("ruler", time)
-        self.browser.drag([place, place])
-        wait_until(lambda: abs(self.measure("time") - time) < 0.02 and self.measure("is_sharp"), 30, "drawn")
-
-    def mouth(self):
-        picture = self.browser.picture(".studio-stage canvas").astype(np.float64)
-        height, width, _ = picture.shape
-        down, across = MOUTH
-        return picture[
-            int(down.start * height) : int(down.stop * height), int(across.start * width) : int(across.stop * width)
-        ]
 
 
 @pytest.fixture
@@ -117,9 +43,9 @@ def phones(browser):
 
 
 def test_mouth_moves_with_speech_and_rests_in_silence(page):
-    rest, again, *_ = [page.show(time) or page.mouth() for time in SILENCE_S]
+    rest, again = [page.mouth(time) for time in SILENCE_S]
     noise = np.abs(rest - again).mean()
-    speech = [np.abs((page.show(time) or page.mouth()) - rest).mean() for time in SPEECH_S]
+    speech = [np.abs(page.mouth(time) - rest).mean() for time in SPEECH_S]
     assert noise < 4  # of 255; the head moves a little
     assert np.median(speech) > max(10, 4 * noise)
 
@@ -133,11 +59,11 @@ def test_views_differ_and_the_picture_covers_the_head(page):
 
 def test_time_follows_the_sound_and_measures_are_reported(page):
     page.browser.press("Tab")
-    page.browser.run("document.querySelector('.studio-play').click()")
+    page.toggle()
     wait_until(lambda: page.measure("time") > 1.5, 30, "plays")
     wait_until(lambda: page.measure("fps") and page.measure("timeline_ms") is not None, 30, "measures")
     assert page.measure("js_ms") > 0
-    page.browser.run("document.querySelector('.studio-play').click()")
+    page.toggle()
     stopped = page.measure("time")
     assert page.browser.run("return document.querySelector('.studio-play').getAttribute('aria-label')") == "Play"
     assert stopped < 4.1
@@ -182,9 +108,9 @@ def test_edge_stays_ten_milliseconds_from_the_next(page):
 
 
 def test_keys_reach_rows_and_elements(page):
-    page.browser.run("document.querySelector('.studio-grid').focus()")
+    page.focus()
     page.browser.press("Down", "Down", "Down", "Right", "Right")
-    active = "const g = document.querySelector('.studio-grid'); return document.getElementById(g.getAttribute('aria-activedescendant')).innerText"
+    active = "return document.getElementById(document.activeElement.getAttribute('aria-activedescendant')).innerText"
     wait_until(lambda: "phone" in page.browser.run(active), 10, "a phone has the focus")
     page.browser.press("Alt+Right")
     (edit,) = page.edits(1)
@@ -193,10 +119,10 @@ def test_keys_reach_rows_and_elements(page):
 
 def test_keys_paint_and_erase_the_selection(page):
     page.show(0.5)
-    page.browser.run("document.querySelector('.studio-grid').focus()")
+    page.focus()
     page.browser.press("[")
     page.show(1.5)
-    page.browser.run("document.querySelector('.studio-grid').focus()")
+    page.focus()
     page.browser.press("]", "Down", "Down", "Down", "Down", "Enter", "Delete")
     paint, erase = page.edits(2)
     assert (paint["kind"], paint["feature"], erase["kind"]) == ("paint", "expression", "erase")
@@ -231,11 +157,10 @@ def test_lanes_are_muted_and_get_new_seeds(page):
 def test_ten_minutes_zoom_and_play(browser, address):
     page = Page(browser, f"{address}?preview=long.bin")
     fitted = page.measure("view")["scale"]
-    browser.run("document.querySelector('.studio-grid').focus()")
+    page.focus()
     browser.press("Right", "+", "+", "+", "+", "+", "+", "+", "+", "+", "+", "+", "+")
     assert page.measure("view")["scale"] > 20 * fitted
-    browser.run("document.querySelector('.studio-play').click()")
+    page.toggle()
     wait_until(lambda: page.measure("timeline_ms") is not None, 30, "measures")
-    browser.run("document.querySelector('.studio-play').click()")
-    slowness = browser.run(CALIBRATION) / CALIBRATION_MS  # other programs share the machine
-    assert page.measure("timeline_ms") < 4 * max(slowness, 1)  # milliseconds of script a frame
+    page.toggle()
+    assert page.measure("timeline_ms") < 4 * page.slowness()  # milliseconds of script a frame

@@ -21,8 +21,8 @@ from tts2face.render import studio_light
 from tts2face.render.camera import FIELD_OF_VIEW_RAD, framing_box
 from tts2face.render.camera_views import NAMED_VIEWS
 from tts2face.render.fragment_rows import DARK_GLOSS, GLOSS, OPEN_SURFACE, ROUGHNESS, SECOND_LOBE, WRAP
-from tts2face.render.light_field import light_fields
-from tts2face.render.materials import STRANDS
+from tts2face.render.light_field import N_HARMONICS, light_fields
+from tts2face.render.materials import SKIN, STRANDS
 from tts2face.render.scene import STUDIO_BRIGHT, STUDIO_CENTRE, STUDIO_DARK, available_cores
 from tts2face.render.soft_shadows import lip_opening
 from tts2face.render.strand_cards import SKULL_CENTRE_MM
@@ -33,6 +33,7 @@ from tts2face.types import HEAD_CHANNELS
 MAX_TEXTURE_PX = 1024  # along a side: more than a preview of 1000 pixels shows
 WEBP_QUALITY = 88
 LEAST_MOVE_MM = 0.01  # displacements below this are 0: a fortieth of a pixel
+HIDDEN_SKY = 0.045  # share of the sky that a vertex hidden from all sides has in a light field
 FULL = 32767  # of a quantised displacement
 FIELD_SCALE = 2.0  # light fields lie within 2
 TEXTURE_EXTENSION, QUANTISED = "EXT_texture_webp", "KHR_mesh_quantization"
@@ -55,9 +56,11 @@ def stage_glb(face: Face, channels: tuple[str, ...]) -> bytes:
     """
     surface = build_surface(face, scatters=False)
     skeleton, buffer = build_skeleton(face, len(channels)), GltfBuffer()
-    surfaces = [_along_curve(face, one) for one in divide_surface(face)]
     moves, scales = quantised_moves(face.shapes[: len(channels)])
-    rows = _rows(face, surface, skeleton)
+    fields = light_fields(face, surface, available_cores())
+    rows = _rows(face, surface, skeleton, fields)
+    shown = ~_hidden(fields, moves)
+    surfaces = [_along_curve(face, one) for one in (_without(one, shown) for one in divide_surface(face))]
     primitives = [_primitive(face, number, one, (rows, moves), buffer) for number, one in enumerate(surfaces)]
     content = {
         "asset": {"version": "2.0", "generator": "tts2face", "extras": _stage(face, surface, skeleton, channels)},
@@ -80,14 +83,27 @@ def stage_glb(face: Face, channels: tuple[str, ...]) -> bytes:
     return _container(content, buffer)
 
 
-def _rows(face: Face, surface: Surface, skeleton: Skeleton) -> _Rows:
-    fields = light_fields(face, surface, available_cores())
+def _rows(face: Face, surface: Surface, skeleton: Skeleton, fields: NDArray[np.float32]) -> _Rows:
     quantised = np.rint(np.clip(fields / FIELD_SCALE, -1, 1) * 127).astype(np.int8)
     joint = skeleton.joints[:, 1]
     skin = np.column_stack([joint, np.rint(skeleton.weights[:, 1] * 0xFFFF)]).astype(np.uint16)
     strands = np.zeros((len(face.vertices), 4), np.int8)
     strands[surface.strands.vertices, :3] = np.rint(surface.strands.tangents * 127)
     return _Rows(quantised, strands, skin, np.rint(linear_colours(face) * 0xFFFF).astype(np.uint16))
+
+
+def _hidden(fields: NDArray[np.float32], moves: NDArray[np.int16]) -> NDArray[np.bool_]:
+    """Whether no light reaches each vertex (V,) with closed and open mouth, and no channel moves it: under hair."""
+    sky = np.maximum(fields[:, 0], fields[:, 0] + fields[:, N_HARMONICS + 1])
+    return np.asarray((sky < HIDDEN_SKY) & ~moves.any(axis=(0, 2)))
+
+
+def _without(surface: ExportSurface, shown: NDArray[np.bool_]) -> ExportSurface:
+    """The surface without triangles of skin that cannot be seen."""
+    if surface.part.kind != SKIN:
+        return surface
+    seen = shown[surface.vertices[surface.triangles]].any(axis=1)
+    return ExportSurface(surface.part, surface.vertices, surface.triangles[seen])
 
 
 def _along_curve(face: Face, surface: ExportSurface) -> ExportSurface:
@@ -161,7 +177,7 @@ def _material(surface: ExportSurface, built: Surface, face: Face) -> dict[str, A
     if part.is_textured:
         shading["baseColorTexture"] = {"index": part.texture}
     columns = {"gloss": GLOSS, "rough": ROUGHNESS, "second": SECOND_LOBE, "dark": DARK_GLOSS, "wrap": WRAP}
-    extras = {name: round(float(row[at]), 5) for name, at in columns.items()}
+    extras: dict[str, Any] = {name: round(float(row[at]), 5) for name, at in columns.items()}
     extras |= {"kind": part.kind, "open": bool(row[OPEN_SURFACE]), "opacity": part.opacity, "cutout": part.cutout}
     material = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": shading, "extras": extras}
     return material | ({"alphaMode": "MASK"} if part.cutout else {})

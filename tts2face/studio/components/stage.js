@@ -160,6 +160,7 @@ export default {
       scene.setMotion(preview, metrics.time);
       scene.render();
       metrics.frames = (metrics.frames ?? 0) + 1;
+      if (clock.playing) metrics.playing_share = scene.sharpness;
       metrics.is_sharp = scene.sharpness >= 1 && this.rested !== null;
       if (clock.playing) this.meter.add(performance.now() - begin);
     },

@@ -2,60 +2,12 @@
 // a weight that does not change costs nothing, while a morph texture costs all targets at all vertices.
 
 import { THREE } from "nicegui-scene";
+import { mergePrimitives, readContainer, readTextures } from "./stage_glb.js";
 
-const ARRAYS = { 5120: Int8Array, 5121: Uint8Array, 5122: Int16Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
-const WIDTHS = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
-const FULL_SHORT = 32767;
 const LEAST_CHANGE_M = 2e-5; // of the farthest vertex of a shape: a twentieth of a pixel
 const N_FIELDS = 5, N_GAIN = 10; // attributes of four numbers each of a light field; first number of its change
 const FIELD_UNIT = 2 / 127;
 const REFRESH_FRAMES = 600; // sums are made anew so often, against rounding errors that add up
-
-/** JSON and binary part of a .glb file. */
-function readContainer(bytes) {
-  const view = new DataView(bytes);
-  if (view.getUint32(0, true) !== 0x46546c67) throw new Error("the face is not a .glb file");
-  const size = view.getUint32(12, true);
-  return { json: JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 20, size))), bytes, start: 28 + size };
-}
-
-function readView({ json, bytes, start }, index, type, count, offset = 0) {
-  const view = json.bufferViews[index];
-  const at = start + (view.byteOffset ?? 0) + offset;
-  return new type(bytes.slice(at, at + count * type.BYTES_PER_ELEMENT));
-}
-
-function readAccessor(file, index) {
-  const accessor = file.json.accessors[index];
-  const width = WIDTHS[accessor.type];
-  const array = readView(file, accessor.bufferView, ARRAYS[accessor.componentType], accessor.count * width);
-  return { array, width, normalized: accessor.normalized === true };
-}
-
-/** Moved vertices of a target, and their displacements in metres at weight 1. */
-function readTarget(file, index) {
-  const sparse = file.json.accessors[index].sparse;
-  if (!sparse) return { at: new Uint32Array(0), moves: new Float32Array(0) };
-  const at = readView(file, sparse.indices.bufferView, ARRAYS[sparse.indices.componentType], sparse.count);
-  const steps = readView(file, sparse.values.bufferView, Int16Array, sparse.count * 3);
-  return { at, moves: Float32Array.from(steps, (step) => step / FULL_SHORT) };
-}
-
-async function readTextures(file) {
-  const images = file.json.images ?? [];
-  return Promise.all(
-    images.map(async (image) => {
-      const view = file.json.bufferViews[image.bufferView];
-      const blob = new Blob([readView(file, image.bufferView, Uint8Array, view.byteLength)], { type: image.mimeType });
-      const options = { premultiplyAlpha: "none", colorSpaceConversion: "none" };
-      const texture = new THREE.Texture(await createImageBitmap(blob, options));
-      Object.assign(texture, { flipY: false, colorSpace: THREE.SRGBColorSpace, minFilter: THREE.LinearMipmapNearestFilter });
-      texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
-      texture.needsUpdate = true;
-      return texture;
-    }),
-  );
-}
 
 /** Index of the first vertex at the same place that moves alike, for each vertex, so that seams do not show. */
 function weldVertices(places, targets) {
@@ -178,7 +130,7 @@ export class StageFace {
     this.names = mesh.extras.targetNames;
     this.textures = textures;
     this.weights = new Float32Array(this.names.length);
-    this.parts = mesh.primitives.map((primitive) => this.#part(file, primitive, mesh.extras.scales));
+    this.parts = mergePrimitives(file, mesh).map((group) => this.#part(file, group, mesh.extras.scales));
     this.largest = this.names.map((_, k) => Math.max(...this.parts.map((part) => part.shapes[k].largest)));
     this.sinceRefresh = 0;
     this.eyes = this.stage.eyes.map((eye) => ({
@@ -196,28 +148,24 @@ export class StageFace {
     return new StageFace(file, await readTextures(file));
   }
 
-  #part(file, primitive, scales) {
-    const places = readAccessor(file, primitive.attributes.POSITION).array;
-    const triangles = readAccessor(file, primitive.indices).array;
-    const targets = primitive.targets.map((target) => readTarget(file, target.POSITION));
-    const part = new Part(places, triangles, targets, scales);
+  #part(file, { material, attributes, triangles, targets, surface }, scales) {
+    const places = attributes.POSITION.array, part = new Part(places, triangles, targets, scales);
     const geometry = (part.geometry = new THREE.BufferGeometry());
     geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
     geometry.setAttribute("position", new THREE.InterleavedBufferAttribute(part.buffer, 3, 0));
     geometry.setAttribute("normal", new THREE.InterleavedBufferAttribute(part.buffer, 3, 3));
-    const names = { TEXCOORD_0: "uv", COLOR_0: "color" };
-    part.field = Array.from({ length: N_FIELDS }, (_, k) => readAccessor(file, primitive.attributes[`_LIGHT${k}`]).array);
+    geometry.setAttribute("surface", new THREE.BufferAttribute(surface, 3));
+    part.field = Array.from({ length: N_FIELDS }, (_, k) => attributes[`_LIGHT${k}`].array);
     for (const [name, width] of [["restLight", 4], ["openLight", 4], ["skyLight", 2]]) {
       const values = new THREE.BufferAttribute(new Float32Array((places.length / 3) * width), width);
       geometry.setAttribute(name, values.setUsage(THREE.DynamicDrawUsage));
     }
-    for (const [name, index] of Object.entries(primitive.attributes)) {
-      if (name === "POSITION" || name.startsWith("_LIGHT")) continue;
-      const { array, width, normalized } = readAccessor(file, index);
-      geometry.setAttribute(names[name] ?? name.toLowerCase(), new THREE.BufferAttribute(array, width, normalized));
+    const names = { TEXCOORD_0: "uv", COLOR_0: "color", _SKIN: "_skin", _TANGENT: "_tangent" };
+    for (const [name, { array, width, normalized }] of Object.entries(attributes)) {
+      if (name in names) geometry.setAttribute(names[name], new THREE.BufferAttribute(array, width, normalized));
     }
-    part.material = file.json.materials[primitive.material];
-    const base = part.material.pbrMetallicRoughness.baseColorTexture;
+    part.material = material;
+    const base = material.pbrMetallicRoughness.baseColorTexture;
     part.texture = base ? this.textures[file.json.textures[base.index].extensions.EXT_texture_webp.source] : null;
     return part;
   }

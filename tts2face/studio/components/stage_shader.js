@@ -8,8 +8,11 @@ const LAMPS = 4;
 const VERTEX = `
   uniform mat4 joints[4];
   uniform vec3 lamps[${LAMPS}], lampColours[${LAMPS}], sky, floorLight, skull;
-  uniform float opening, wrap, openSheet;
-  uniform float gloss, rough, second;
+  uniform float opening, openSheet, second;
+  attribute vec3 surface; // strength and squared width of the highlight, wrap of diffuse light
+  #define gloss surface.x
+  #define rough surface.y
+  #define wrap surface.z
   attribute vec2 _skin;
   attribute vec4 restLight, openLight; // visibility of the lamps at rest, and how it changes with an open mouth
   attribute vec2 skyLight; // the same of the sky
@@ -19,7 +22,7 @@ const VERTEX = `
   #endif
   varying vec3 vNormal, vPlace, vLight, vShine, vColour;
   varying vec4 vExposure;
-  varying vec2 vUv;
+  varying vec2 vUv, vSurface;
 
   /** Highlight of a lamp: one lobe, for lamps whose highlights change slowly over the surface. */
   float highlight(vec3 n, vec3 lamp, vec3 towards) {
@@ -38,6 +41,7 @@ const VERTEX = `
     vec3 n = normalize(normal);
     vNormal = normalize(mix(n, mat3(joint) * n, follow));
     vPlace = place.xyz;
+    vSurface = surface.xy;
     gl_Position = projectionMatrix * viewMatrix * place;
     #ifdef TEXTURED
     vUv = uv;
@@ -81,8 +85,12 @@ const VERTEX = `
     vShine = grazing * around * around * (.7 + .3 * m.y) * sky;
     float lit = gloss * min(around * 1.3, 1.);
     vShine += lit * visible[2] * highlight(m, lamps[2], towards) * lampColours[2];
+    #ifndef COARSE
     vShine += lit * visible[3] * highlight(m, lamps[3], towards) * lampColours[3];
     vShine += lit * around * highlight(m, lamps[1], towards) * lampColours[1];
+    #else
+    vShine += lit * visible[0] * highlight(m, lamps[0], towards) * (1. + .5 * second) * lampColours[0];
+    #endif
     #endif
   }`;
 
@@ -150,13 +158,15 @@ const EYES = `
 
 const FRAGMENT = `
   uniform vec3 lamps[${LAMPS}], lampColours[${LAMPS}], sky;
-  uniform float gloss, rough, second, dark, opacity;
+  uniform float second, dark, opacity;
+  #define gloss vSurface.x
+  #define rough vSurface.y
   #ifdef TEXTURED
   uniform sampler2D map;
   #endif
   varying vec3 vNormal, vPlace, vLight, vShine, vColour;
   varying vec4 vExposure;
-  varying vec2 vUv;
+  varying vec2 vUv, vSurface;
   ${TONE}
   #ifdef EYE
   ${EYES}
@@ -170,7 +180,7 @@ const FRAGMENT = `
     float cover = opacity;
     #ifdef TEXTURED
     vec4 texel = texture2D(map, vUv);
-    vec3 albedo = texel.rgb;
+    vec3 albedo = texel.rgb * (texel.rgb * (texel.rgb * .305306 + .682171) + .012523); // sRGB to linear light
     #ifdef CUTOUT
     cover *= texel.a;
     if (cover < .04) discard;
@@ -181,7 +191,10 @@ const FRAGMENT = `
     #else
     vec3 albedo = vColour;
     #endif
-    vec3 towards = normalize(cameraPosition - vPlace), n = normalize(vNormal), light = vLight;
+    vec3 light = vLight;
+    #if !defined(COARSE) || defined(EYE) || defined(STRANDS)
+    vec3 towards = normalize(cameraPosition - vPlace), n = normalize(vNormal);
+    #endif
     vec4 exposure = vExposure;
     #ifdef STRANDS
     vec3 t = normalize(vTangent), colour = light * albedo;
@@ -197,15 +210,18 @@ const FRAGMENT = `
       colour += lampColours[k] * arrives * (.085 * narrow + .8 * wide * albedo);
     }
     #else
+    #ifndef COARSE
     if (!gl_FrontFacing) n = -n;
+    #endif
     float glow = 0.;
     #ifdef EYE
     glow = lightEye(vPlace, towards, albedo, light, exposure, n);
     #endif
-    float facing = max(dot(n, towards), 1e-3), tone = .5 * (albedo.r + albedo.g);
+    float tone = .5 * (albedo.r + albedo.g);
     float spec = gloss * (1. - dark * (1. - clamp((tone - .03) / .27, 0., 1.)));
     vec3 shine = vShine * (spec / max(gloss, .001)) + glow * lampColours[0];
-    float to = dot(n, lamps[0]);
+    #ifndef COARSE
+    float facing = max(dot(n, towards), 1e-3), to = dot(n, lamps[0]);
     if (to > 0.) {
       float depth = sqrt(rough) * .5;
       vec3 h = normalize(lamps[0] + towards);
@@ -216,6 +232,7 @@ const FRAGMENT = `
       shine += lampColours[0] * spec * fresnel * to * (first * first + second * other * other) / shadow
         * exposure.y * min(exposure.x * 1.3, 1.);
     }
+    #endif
     float hidden = 1. - exposure.x;
     vec3 colour = light * albedo / (1. - hidden * hidden * albedo * .8) + shine;
     #endif
@@ -250,18 +267,18 @@ export function sharedUniforms(stage) {
   };
 }
 
-/** `samples` is whether a pixel has several samples, which share the coverage of hair. */
+/** `samples` is whether a pixel has several samples, which share the coverage of hair, and highlights of its own. */
 export function partMaterial(part, shared, samples) {
   const { extras } = part.material;
   const defines = {};
   if (part.texture) defines.TEXTURED = 1;
+  if (!samples) defines.COARSE = 1;
   if (extras.cutout) defines.CUTOUT = 1;
   if (extras.kind === "strands") defines.STRANDS = 1;
   if (extras.kind === "eye") defines.EYE = 1;
   const layered = extras.cutout && part.material.name.startsWith("hair"); // cards over cards hide each other
   if (layered) Object.assign(defines, { SOLID: 1, LEAST_COVER: samples ? ".02" : ".25" });
-  const own = { gloss: extras.gloss, rough: extras.rough, second: extras.second, dark: extras.dark, wrap: extras.wrap };
-  const numbers = { ...own, openSheet: Number(extras.open), opacity: extras.opacity, shine: Math.min(extras.gloss / 0.25, 1.5) };
+  const numbers = { second: extras.second, dark: extras.dark, openSheet: Number(extras.open), opacity: extras.opacity, shine: Math.min(extras.gloss / 0.25, 1.5) };
   const uniforms = { ...shared, map: { value: part.texture } };
   for (const [name, value] of Object.entries(numbers)) uniforms[name] = { value };
   return new THREE.ShaderMaterial({
