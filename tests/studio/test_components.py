@@ -9,7 +9,7 @@ from tests.studio.served import Page, served_harness
 pytest.importorskip("nicegui", reason="needs nicegui: pip install 'tts2face[studio]'")
 pytestmark = pytest.mark.skipif(bool(missing_program()), reason=f"needs {missing_program()}")
 
-SILENCE_S, SPEECH_S = (0.01, 0.05), (0.55, 0.95, 2.0, 2.4, 2.6)  # of the harness's sentence
+SILENCE_S, SPEECH_S = (0.01, 0.03), (0.55, 0.95, 2.0, 2.4, 2.6)  # of the harness's sentence
 
 
 @pytest.fixture(scope="module")
@@ -164,3 +164,31 @@ def test_ten_minutes_zoom_and_play(browser, address):
     wait_until(lambda: page.measure("timeline_ms") is not None, 30, "measures")
     page.toggle()
     assert page.measure("timeline_ms") < 4 * page.slowness()  # milliseconds of script a frame
+
+
+MERGE = """
+    const { Preview } = await import('tts2face-studio/preview.js');
+    const bundle = (header, motion, pcm) => {
+      const text = new TextEncoder().encode(JSON.stringify({fps: 30, channels: ['a'], rate: 8, words: [], phones: [],
+        sentences: [], duration: 1, ...header}));
+      const parts = [new Uint32Array([text.length]), text, new Float32Array(motion),
+        new Float32Array(6 * motion.length), new Int16Array(pcm)];
+      return new Blob(parts).arrayBuffer();
+    };
+    const preview = new Preview(), changes = [];
+    preview.on('change', (change) => changes.push([change.sound, change.motion]));
+    const first = {revision: 1, n_frames: 4, first_frame: 0, n: 4, n_samples: 4, sound_first: 0};
+    preview.merge(await bundle(first, [1, 2, 3, 4], [10, 20, 30, 40]));
+    const longer = {revision: 2, n_frames: 5, first_frame: 1, n: 2, n_samples: 5, sound_first: 1};
+    preview.merge(await bundle(longer, [9, 8], [50, 60]));
+    preview.merge(await bundle({...longer, revision: 3, first_frame: 4, n: 1, sound_first: 0}, [7], []));
+    return [[...preview.motion], [...preview.pcm], preview.revision, changes];
+"""
+
+
+def test_previews_keep_what_lies_before_and_after_a_change(page):
+    motion, pcm, revision, changes = page.browser.run(MERGE)
+    assert motion == [1, 9, 8, 3, 7]
+    assert pcm == [10, 50, 60, 30, 40]
+    assert revision == 3
+    assert changes == [[True, True], [True, True], [False, True]]

@@ -57,7 +57,7 @@ export default {
         </div>
         <div class="studio-plot" ref="plot" :style="{ height: height + 'px' }">
           <canvas ref="base" aria-hidden="true"></canvas>
-          <canvas ref="over" aria-hidden="true"></canvas>
+          <canvas ref="over" aria-hidden="true" style="display: none"></canvas>
           <div ref="playhead" class="studio-playhead" aria-hidden="true"></div>
           <div ref="grid" class="studio-grid" role="grid" tabindex="0" :aria-label="'Elements of the timeline. ' + help"
             :aria-rowcount="rows.length" :aria-activedescendant="cellId(cursorRow)" @keydown="onKey" @wheel="onWheel">

@@ -29,8 +29,8 @@ function patternTile(number, color) {
 }
 
 export class Painter {
-  constructor(canvas) {
-    this.context = canvas.getContext("2d");
+  constructor(canvas, options) {
+    this.context = canvas.getContext("2d", options);
     this.patterns = new Map();
   }
 

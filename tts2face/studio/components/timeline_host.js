@@ -29,7 +29,7 @@ export class TimelineHost {
 
   mount() {
     const { base, over, grid, plot } = this.component.$refs;
-    this.painter = new Painter(base);
+    this.painter = new Painter(base, { alpha: false });
     this.overlay = new Painter(over);
     this.tools = new PointerTools(grid, this.state, this);
     this.meter = new Meter("timeline_ms");
@@ -161,6 +161,9 @@ export class TimelineHost {
   /** What a gesture would do when it ends here. */
   drawGhost() {
     const { overlay, state } = this, { context: c } = overlay, { view, colors, ghost } = state;
+    const shown = ghost ? "block" : "none"; // an empty canvas costs a blend of all its pixels in each frame
+    if (this.component.$refs.over.style.display !== shown) this.component.$refs.over.style.display = shown;
+    if (!ghost) return;
     c.clearRect(0, 0, view.width, this.component.height);
     overlay.state = state;
     c.font = "12px system-ui, sans-serif";
