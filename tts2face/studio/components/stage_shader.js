@@ -183,7 +183,9 @@ const FRAGMENT = `
     vec3 albedo = texel.rgb * (texel.rgb * (texel.rgb * .305306 + .682171) + .012523); // sRGB to linear light
     #ifdef CUTOUT
     cover *= texel.a;
+    #ifdef SOLID
     if (cover < .04) discard;
+    #endif
     #ifndef SOLID
     cover *= sqrt(cover); // blended in display light here, in linear light by the renderer
     #endif
@@ -199,7 +201,7 @@ const FRAGMENT = `
     #ifdef STRANDS
     vec3 t = normalize(vTangent), colour = light * albedo;
     float shift = .12 * (dot(albedo, vec3(.333)) * 4. - .5);
-    for (int k = 0; k < 3; k += 2) {
+    for (int k = 0; k < HAIR_LAMPS; k += 2) {
       vec3 h = normalize(lamps[k] + towards);
       float along = dot(t, h), normal = dot(n, h);
       float arrives = clamp(1.6 * dot(n, lamps[k]) + .35, 0., 1.) * (k == 0 ? exposure.y : exposure.z) * shine;
@@ -236,9 +238,12 @@ const FRAGMENT = `
     float hidden = 1. - exposure.x;
     vec3 colour = light * albedo / (1. - hidden * hidden * albedo * .8) + shine;
     #endif
-    #ifdef SOLID
+    #if defined(SOLID) && defined(COARSE)
+    if (cover < .4) discard;
+    cover = 1.;
+    #elif defined(SOLID)
     cover = clamp((cover - .4) / max(fwidth(cover), .2) + .5, 0., 1.);
-    if (cover < LEAST_COVER) discard;
+    if (cover < .02) discard;
     #endif
     gl_FragColor = vec4(display(colour), cover);
   }`;
@@ -274,10 +279,10 @@ export function partMaterial(part, shared, samples) {
   if (part.texture) defines.TEXTURED = 1;
   if (!samples) defines.COARSE = 1;
   if (extras.cutout) defines.CUTOUT = 1;
-  if (extras.kind === "strands") defines.STRANDS = 1;
+  if (extras.kind === "strands") Object.assign(defines, { STRANDS: 1, HAIR_LAMPS: samples ? 3 : 1 });
   if (extras.kind === "eye") defines.EYE = 1;
   const layered = extras.cutout && part.material.name.startsWith("hair"); // cards over cards hide each other
-  if (layered) Object.assign(defines, { SOLID: 1, LEAST_COVER: samples ? ".02" : ".25" });
+  if (layered) defines.SOLID = 1;
   const numbers = { second: extras.second, dark: extras.dark, openSheet: Number(extras.open), opacity: extras.opacity, shine: Math.min(extras.gloss / 0.25, 1.5) };
   const uniforms = { ...shared, map: { value: part.texture } };
   for (const [name, value] of Object.entries(numbers)) uniforms[name] = { value };
@@ -289,7 +294,7 @@ export function partMaterial(part, shared, samples) {
     vertexColors: !part.texture,
     side: extras.open || extras.cutout ? THREE.DoubleSide : THREE.FrontSide,
     alphaToCoverage: layered && samples,
-    transparent: extras.opacity < 1 || (extras.cutout && !(layered && samples)),
+    transparent: extras.opacity < 1 || (extras.cutout && !layered),
     depthWrite: !extras.cutout || layered,
   });
 }
