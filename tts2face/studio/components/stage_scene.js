@@ -2,7 +2,7 @@
 
 import { OrbitControls, THREE } from "nicegui-scene";
 import { StageFace } from "./stage_face.js";
-import { partMaterial, sharedUniforms, wallMaterial } from "./stage_shader.js";
+import { partMaterial, sharedUniforms, wallMaterial } from "./stage_materials.js";
 
 const RADIAN = Math.PI / 180;
 const MM = 0.001;

@@ -7,7 +7,7 @@ import { openEditor } from "./timeline_editor.js";
 import { Painter, readColors } from "./timeline_draw.js";
 import { rowItems } from "./timeline_items.js";
 import { performKey } from "./timeline_keyboard.js";
-import { TimelineModel } from "./timeline_model.js";
+import { describeEdit, TimelineModel } from "./timeline_model.js";
 import { PointerTools } from "./timeline_pointer.js";
 import { curveValue, formatTime, rounded, View } from "./timeline_view.js";
 import { Waveform } from "./waveform.js";
@@ -283,19 +283,4 @@ export class TimelineHost {
     clearTimeout(this.nudged);
     this.nudged = setTimeout(() => this.moveEdge(index, phone[1]), NUDGE_PAUSE_MS);
   }
-}
-
-function describeEdit(edit) {
-  const span = edit.start === undefined ? "" : ` from ${edit.start} to ${edit.end} seconds`;
-  const names = {
-    paint: `painted ${edit.style} on ${edit.feature}${span}`,
-    erase: `erased ${edit.feature}${span}`,
-    edge: `moved a phone edge to ${edit.time} seconds of its sentence`,
-    nod: `nod at ${edit.time} seconds`,
-    remove_nod: "removed a nod",
-    gaze: `gaze target${span}`,
-    remove_gaze: "removed a gaze target",
-    seed: `new seed for ${edit.feature}`,
-  };
-  return names[edit.kind] ?? `changed the curve of ${edit.feature ?? edit.expression ?? edit.channel}`;
 }

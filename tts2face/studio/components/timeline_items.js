@@ -1,6 +1,6 @@
 // Elements of the rows of a timeline as a list: what keys reach, what a pointer hits, and what a screen reader says.
 
-import { columnOf, describeGaze, frameValue } from "./timeline_draw.js";
+import { columnOf, describeGaze, frameValue } from "./timeline_values.js";
 import { curveValue, firstAfter } from "./timeline_view.js";
 
 const HIT_PX = 6;

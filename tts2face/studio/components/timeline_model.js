@@ -127,3 +127,19 @@ function joined(spans) {
   }
   return result;
 }
+
+/** What an edit did, for people who do not see it. */
+export function describeEdit(edit) {
+  const span = edit.start === undefined ? "" : ` from ${edit.start} to ${edit.end} seconds`;
+  const names = {
+    paint: `painted ${edit.style} on ${edit.feature}${span}`,
+    erase: `erased ${edit.feature}${span}`,
+    edge: `moved a phone edge to ${edit.time} seconds of its sentence`,
+    nod: `nod at ${edit.time} seconds`,
+    remove_nod: "removed a nod",
+    gaze: `gaze target${span}`,
+    remove_gaze: "removed a gaze target",
+    seed: `new seed for ${edit.feature}`,
+  };
+  return names[edit.kind] ?? `changed the curve of ${edit.feature ?? edit.expression ?? edit.channel}`;
+}

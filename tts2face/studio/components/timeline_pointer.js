@@ -1,7 +1,7 @@
 // What a pointer does on the timeline: each press begins one gesture, which moves with the pointer and ends in edits.
 
 import { clock } from "./clock.js";
-import { channelRange, valueY, yValue } from "./timeline_draw.js";
+import { channelRange, valueY, yValue } from "./timeline_values.js";
 import { channelValue, edgeAt, hitKey, rowAt, rowItems, shownLimits, snapTimes } from "./timeline_items.js";
 import { rounded } from "./timeline_view.js";
 
