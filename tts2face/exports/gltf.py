@@ -11,7 +11,9 @@ from tts2face.exports.spool import Spool
 from tts2face.storage.glb_container import ALIGNMENT, glb_header
 
 VERTICES, INDICES = 34962, 34963  # targets of buffer views
-_COMPONENTS: Mapping[str, int] = {"|u1": 5121, "<u2": 5123, "<u4": 5125, "<f4": 5126}
+_COMPONENTS: Mapping[str, int] = {
+    "|i1": 5120, "|u1": 5121, "<i2": 5122, "<u2": 5123, "<u4": 5125, "<f4": 5126,
+}  # fmt: skip
 _TYPES: Mapping[int, str] = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 
 
@@ -50,11 +52,11 @@ class GltfBuffer:
         self.accessors.append(accessor | {"bufferView": self.add_view(spool)} | more)
         return len(self.accessors) - 1
 
-    def add_sparse_accessor(self, values: NDArray[np.float32]) -> int:
+    def add_sparse_accessor(self, values: NDArray[Any], **more: Any) -> int:
         """Index of a sparse accessor for displacements (n, 3), most of which are 0."""
         moved = np.flatnonzero(values.any(axis=1))
         bounds = {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
-        accessor = self._accessor(np.dtype("<f4"), 3, len(values)) | bounds
+        accessor = self._accessor(values.dtype, 3, len(values)) | bounds | more
         if len(moved):
             kind = "<u2" if len(values) <= 0xFFFF else "<u4"
             accessor["sparse"] = {
@@ -63,10 +65,22 @@ class GltfBuffer:
                     "bufferView": self.add_view(moved.astype(kind).tobytes()),
                     "componentType": _COMPONENTS[kind],
                 },
-                "values": {"bufferView": self.add_view(values[moved].astype("<f4").tobytes())},
+                "values": {"bufferView": self.add_view(values[moved].tobytes())},
             }
         self.accessors.append(accessor)
         return len(self.accessors) - 1
+
+    def described(self, content: dict[str, Any]) -> dict[str, Any]:
+        """The content of the JSON part with buffer, views and accessors."""
+        return content | {
+            "buffers": [{"byteLength": self.n_bytes}],
+            "bufferViews": self.views,
+            "accessors": self.accessors,
+        }
+
+    def chunks(self) -> list[bytes]:
+        """The binary part of a file whose parts are all in memory."""
+        return [chunk for chunk in self._chunks if isinstance(chunk, bytes)]
 
     def write(self, path: Path, content: dict[str, Any]) -> None:
         """Write the container; `content` receives buffer, views and accessors.
@@ -76,12 +90,7 @@ class GltfBuffer:
         InputError
             The file would be larger than the format allows.
         """
-        content = content | {
-            "buffers": [{"byteLength": self.n_bytes}],
-            "bufferViews": self.views,
-            "accessors": self.accessors,
-        }
-        header = glb_header(content, self.n_bytes, path.name)
+        header = glb_header(self.described(content), self.n_bytes, path.name)
         with path.open("wb") as file:
             file.write(header)
             for chunk in self._chunks:

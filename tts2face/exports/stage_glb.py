@@ -1,26 +1,254 @@
-"""Binary glTF of a face for the live preview of the studio: without animation, with one morph target a channel."""
+"""Binary glTF of a face for the live preview of the studio: small, without animation, with what its shading takes.
 
-import tempfile
-from pathlib import Path
+Geometry and textures are plain glTF 2.0 with the extensions KHR_mesh_quantization and EXT_texture_webp, so that other
+viewers read it. Attributes whose names begin with an underscore and ``asset.extras`` hold what the renderer knows and
+glTF does not: visibility of the light, share of the head's motion, kinds of materials, lamps and cameras.
+"""
+
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tts2face.exports.glb import FIRST_JOINT, GENERATOR, MESH_NODE, _materials, _mesh, _nodes
-from tts2face.exports.gltf import GltfBuffer
-from tts2face.exports.skeleton import build_skeleton
-from tts2face.exports.surfaces import MorphTargets, divide_surface
-from tts2face.models.face import Face
+from tts2face.exports.gltf import INDICES, VERTICES, GltfBuffer
+from tts2face.exports.skeleton import HEAD, Skeleton, build_skeleton
+from tts2face.exports.surfaces import MM_PER_M, ExportSurface, divide_surface, linear_colours
+from tts2face.models.face import Face, Texture
+from tts2face.render import studio_light
+from tts2face.render.camera import FIELD_OF_VIEW_RAD, framing_box
+from tts2face.render.camera_views import NAMED_VIEWS
+from tts2face.render.fragment_rows import DARK_GLOSS, GLOSS, OPEN_SURFACE, ROUGHNESS, SECOND_LOBE, WRAP
+from tts2face.render.light_field import N_HARMONICS, light_fields
+from tts2face.render.materials import SKIN, STRANDS
+from tts2face.render.scene import STUDIO_BRIGHT, STUDIO_CENTRE, STUDIO_DARK, available_cores
+from tts2face.render.soft_shadows import lip_opening
+from tts2face.render.strand_cards import SKULL_CENTRE_MM
+from tts2face.render.surface import Surface, build_surface
+from tts2face.storage.glb_container import glb_header
+from tts2face.types import HEAD_CHANNELS
+
+MAX_TEXTURE_PX = 1024  # along a side: more than a preview of 1000 pixels shows
+WEBP_QUALITY = 88
+LEAST_MOVE_MM = 0.01  # displacements below this are 0: a fortieth of a pixel
+HIDDEN_SKY = 0.045  # share of the sky that a vertex hidden from all sides has in a light field
+FULL = 32767  # of a quantised displacement
+FIELD_SCALE = 2.0  # light fields lie within 2
+TEXTURE_EXTENSION, QUANTISED = "EXT_texture_webp", "KHR_mesh_quantization"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rows:
+    """Values of all vertices V: light fields (V, 20), strands (V, 4), joint and share (V, 2), linear colours (V, 3)."""
+
+    fields: NDArray[np.int8]
+    strands: NDArray[np.int8]
+    skin: NDArray[np.uint16]
+    colours: NDArray[np.uint16]
 
 
 def stage_glb(face: Face, channels: tuple[str, ...]) -> bytes:
-    """The face as binary glTF whose morph targets are `channels`, its first shapes, at weight 1."""
-    n = len(channels)
-    targets = MorphTargets(channels, np.arange(n), np.ones(n, np.float32), np.zeros(n, np.bool_))
-    buffer, skeleton = GltfBuffer(), build_skeleton(face, n)
-    content = {"asset": {"version": "2.0", "generator": GENERATOR}, "scene": 0}
-    content |= {"scenes": [{"nodes": [MESH_NODE, FIRST_JOINT]}], **_materials(face, buffer)}
-    content["meshes"] = [_mesh(face, divide_surface(face), targets, skeleton, buffer)]
-    with tempfile.TemporaryDirectory(prefix="tts2face-") as folder:
-        path = Path(folder, "face.glb")
-        buffer.write(path, content | _nodes(skeleton, buffer))
-        return path.read_bytes()
+    """The face as binary glTF whose morph targets are `channels`, its first shapes.
+
+    Target k has weight 1 where its channel has the value ``scales[k]`` of the mesh's extras.
+    """
+    surface = build_surface(face, scatters=False)
+    skeleton, buffer = build_skeleton(face, len(channels)), GltfBuffer()
+    moves, scales = quantised_moves(face.shapes[: len(channels)])
+    fields = light_fields(face, surface, available_cores())
+    rows = _rows(face, surface, skeleton, fields)
+    shown = ~_hidden(fields, moves)
+    surfaces = [_along_curve(face, one) for one in (_without(one, shown) for one in divide_surface(face))]
+    primitives = [_primitive(face, number, one, (rows, moves), buffer) for number, one in enumerate(surfaces)]
+    content = {
+        "asset": {"version": "2.0", "generator": "tts2face", "extras": _stage(face, surface, skeleton, channels)},
+        "extensionsUsed": [QUANTISED, *([TEXTURE_EXTENSION] if face.textures else [])],
+        "extensionsRequired": [QUANTISED, *([TEXTURE_EXTENSION] if face.textures else [])],
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"name": "face", "mesh": 0}],
+        "materials": [_material(one, surface, face) for one in surfaces],
+        "meshes": [
+            {
+                "name": "face",
+                "primitives": primitives,
+                "weights": [0] * len(channels),
+                "extras": {"targetNames": list(channels), "scales": scales.tolist()},
+            }
+        ],
+        **_textures(face, buffer),
+    }
+    return _container(content, buffer)
+
+
+def _rows(face: Face, surface: Surface, skeleton: Skeleton, fields: NDArray[np.float32]) -> _Rows:
+    quantised = np.rint(np.clip(fields / FIELD_SCALE, -1, 1) * 127).astype(np.int8)
+    joint = skeleton.joints[:, 1]
+    skin = np.column_stack([joint, np.rint(skeleton.weights[:, 1] * 0xFFFF)]).astype(np.uint16)
+    strands = np.zeros((len(face.vertices), 4), np.int8)
+    strands[surface.strands.vertices, :3] = np.rint(surface.strands.tangents * 127)
+    return _Rows(quantised, strands, skin, np.rint(linear_colours(face) * 0xFFFF).astype(np.uint16))
+
+
+def _hidden(fields: NDArray[np.float32], moves: NDArray[np.int16]) -> NDArray[np.bool_]:
+    """Whether no light reaches each vertex (V,) with closed and open mouth, and no channel moves it: under hair."""
+    sky = np.maximum(fields[:, 0], fields[:, 0] + fields[:, N_HARMONICS + 1])
+    return np.asarray((sky < HIDDEN_SKY) & ~moves.any(axis=(0, 2)))
+
+
+def _without(surface: ExportSurface, shown: NDArray[np.bool_]) -> ExportSurface:
+    """The surface without triangles of skin that cannot be seen."""
+    if surface.part.kind != SKIN:
+        return surface
+    seen = shown[surface.vertices[surface.triangles]].any(axis=1)
+    return ExportSurface(surface.part, surface.vertices, surface.triangles[seen])
+
+
+def _along_curve(face: Face, surface: ExportSurface) -> ExportSurface:
+    """The surface with triangles along a curve that fills space, and vertices in the order of their first use.
+
+    Neighbours follow each other, so that few vertices are shaded twice. Source: Morton 1966.
+    """
+    corners = surface.vertices[surface.triangles]
+    middle = face.vertices[corners].mean(axis=1)
+    low, high = middle.min(axis=0), middle.max(axis=0)
+    cells = ((middle - low) / np.maximum(high - low, 1e-6) * 1023).astype(np.int64)
+    code = np.zeros(len(cells), np.int64)
+    for bit in range(10):
+        for axis in range(3):
+            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
+    used = corners[np.argsort(code, kind="stable")].ravel()
+    vertices, first, places = np.unique(used, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))
+    return ExportSurface(surface.part, vertices[np.argsort(first)], rank[places.ravel()].reshape(-1, 3))
+
+
+def _primitive(
+    face: Face, number: int, surface: ExportSurface, values: tuple[_Rows, NDArray[np.int16]], buffer: GltfBuffer
+) -> dict[str, Any]:
+    own, (rows, moves) = surface.vertices, values
+    places = (face.vertices[own] / MM_PER_M).astype("<f4")
+    bounds = {"min": places.min(axis=0).tolist(), "max": places.max(axis=0).tolist()}
+    attributes = {
+        "POSITION": buffer.add_accessor(places, VERTICES, **bounds),
+        "_SKIN": buffer.add_accessor(rows.skin[own], VERTICES),
+    }
+    for column in range(0, rows.fields.shape[1], 4):
+        four = np.ascontiguousarray(rows.fields[own, column : column + 4])
+        attributes[f"_LIGHT{column // 4}"] = buffer.add_accessor(four, VERTICES, normalized=True)
+    if surface.part.is_textured and face.uv is not None:
+        uv = np.rint(np.clip(face.uv[own], 0, 1) * 0xFFFF).astype("<u2")
+        attributes["TEXCOORD_0"] = buffer.add_accessor(uv, VERTICES, normalized=True)
+    else:
+        colours = np.column_stack([rows.colours[own], np.full(len(own), 0xFFFF, np.uint16)])
+        attributes["COLOR_0"] = buffer.add_accessor(colours, VERTICES, normalized=True)
+    if surface.part.kind == STRANDS:
+        attributes["_TANGENT"] = buffer.add_accessor(rows.strands[own], VERTICES, normalized=True)
+    kind = "<u2" if len(own) < 0xFFFF else "<u4"
+    return {
+        "attributes": attributes,
+        "indices": buffer.add_accessor(surface.triangles.ravel().astype(kind), INDICES),
+        "material": number,
+        "targets": [{"POSITION": buffer.add_sparse_accessor(one, normalized=True)} for one in moves[:, own]],
+    }
+
+
+def quantised_moves(shapes: NDArray[np.floating]) -> tuple[NDArray[np.int16], NDArray[np.float64]]:
+    """Displacements (K, V, 3) of shapes in mm as shares of 32767 of 1 m, and the weights (K,) at which they hold.
+
+    The farthest vertex of each shape moves by 1 m, so that small shapes keep their precision.
+    """
+    largest = np.abs(shapes).reshape(len(shapes), -1).max(axis=1, initial=0.0).astype(np.float64)
+    scales = MM_PER_M / np.where(largest > 0, largest, MM_PER_M)
+    moves = np.zeros(shapes.shape, np.int16)
+    for shape, scale, target in zip(shapes, scales, moves, strict=True):
+        moved = np.abs(shape).max(axis=1) >= LEAST_MOVE_MM
+        target[moved] = np.rint(shape[moved] * (scale / MM_PER_M * FULL))
+    return moves, scales
+
+
+def _material(surface: ExportSurface, built: Surface, face: Face) -> dict[str, Any]:
+    """Material with the values of the renderer's table in its extras."""
+    part = surface.part
+    row = built.materials[face.parts.index(part)]
+    shading: dict[str, Any] = {"baseColorFactor": [1, 1, 1, part.opacity], "metallicFactor": 0}
+    if part.is_textured:
+        shading["baseColorTexture"] = {"index": part.texture}
+    columns = {"gloss": GLOSS, "rough": ROUGHNESS, "second": SECOND_LOBE, "dark": DARK_GLOSS, "wrap": WRAP}
+    extras: dict[str, Any] = {name: round(float(row[at]), 5) for name, at in columns.items()}
+    extras |= {"kind": part.kind, "open": bool(row[OPEN_SURFACE]), "opacity": part.opacity, "cutout": part.cutout}
+    material = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": shading, "extras": extras}
+    return material | ({"alphaMode": "MASK"} if part.cutout else {})
+
+
+def _textures(face: Face, buffer: GltfBuffer) -> dict[str, Any]:
+    if not face.textures:
+        return {}
+    images = [{"bufferView": buffer.add_view(_webp(one)), "mimeType": "image/webp"} for one in face.textures]
+    textures = [{"sampler": 0, "extensions": {TEXTURE_EXTENSION: {"source": n}}} for n in range(len(images))]
+    return {"images": images, "samplers": [{}], "textures": textures}
+
+
+def _webp(texture: Texture) -> bytes:
+    """A texture, no larger than `MAX_TEXTURE_PX`, as WebP."""
+    from PIL import Image
+
+    alpha = [] if texture.alpha is None else [texture.alpha]
+    picture = Image.fromarray(np.dstack([texture.pixels, *alpha]))
+    picture.thumbnail((MAX_TEXTURE_PX, MAX_TEXTURE_PX), Image.Resampling.LANCZOS)
+    content = io.BytesIO()
+    picture.save(content, "WEBP", quality=WEBP_QUALITY, exact=True)
+    return content.getvalue()
+
+
+def _stage(face: Face, surface: Surface, skeleton: Skeleton, channels: tuple[str, ...]) -> Mapping[str, Any]:
+    """What the preview takes from the renderer: lamps, cameras, joints; lengths in metres."""
+    low, high = framing_box(face)
+    jaw = face.shape_names.index("jawOpen") if "jawOpen" in face.shape_names else -1
+    opening = lip_opening(face, jaw)[: len(channels)]
+    eyes = [
+        {
+            "centre": (skeleton.places[HEAD + 1 + number] / MM_PER_M).tolist(),
+            "turns": {
+                name: turn.tolist()
+                for name, turn in zip(channels, skeleton.eye_turns[number], strict=True)
+                if turn.any()
+            },
+            "iris": float(surface.eyes.iris[number]),
+            "radius": float(surface.eyes.radius[number]) / MM_PER_M,
+            "lids": _lids(surface, number),
+        }
+        for number in range(len(face.eyes))
+    ]
+    return {
+        "skull": (SKULL_CENTRE_MM / MM_PER_M).tolist(),
+        "pivot": (skeleton.places[HEAD] / MM_PER_M).tolist(),
+        "head": list(HEAD_CHANNELS),
+        "eyes": eyes,
+        "opening": {name: float(value) for name, value in zip(channels, opening, strict=True) if value},
+        "frame": [(low / MM_PER_M).tolist(), (high / MM_PER_M).tolist()],
+        "views": {name: [view.yaw_deg, view.pitch_deg, view.share] for name, view in NAMED_VIEWS.items()},
+        "field_of_view": FIELD_OF_VIEW_RAD,
+        "lamps": [[yaw, pitch, list(colour)] for yaw, pitch, colour in studio_light.LAMPS],
+        "sky": list(studio_light.SKY_COLOUR),
+        "floor": list(studio_light.FLOOR_COLOUR),
+        "brightness": studio_light.BRIGHTNESS,
+        "wall": [list(STUDIO_BRIGHT), list(STUDIO_DARK), list(STUDIO_CENTRE)],
+    }
+
+
+def _lids(surface: Surface, eye: int) -> list[list[list[float]]]:
+    """Places of the lid landmarks at rest in metres, upper and lower; empty for a face without them."""
+    rows = surface.eyes.lids[eye]
+    if (rows < 0).any():
+        return []
+    corners = surface.rig.rest[surface.eyes.corners[rows]] / MM_PER_M
+    places: list[list[list[float]]] = np.einsum("slcx,slc->slx", corners, surface.eyes.weights[rows]).tolist()
+    return places
+
+
+def _container(content: dict[str, Any], buffer: GltfBuffer) -> bytes:
+    root = buffer.described(content)
+    return b"".join([glb_header(root, buffer.n_bytes, "the face"), *buffer.chunks()])

@@ -1,1 +1,1 @@
-"""The studio: projects in the browser, edited over time, shown at once, and rendered (docs/studio.md)."""
+"""The studio: pages in the browser on which a clip is made."""

@@ -16,6 +16,7 @@ export class Preview {
   phones = []; // [label, begin, end, sentence, index]
   sentences = []; // [text, occurrence, begin, end]
   notes = [];
+  isComplete = true; // whether nothing more comes for the present state of the project
   #listeners = new Set();
   #queue = Promise.resolve();
 
@@ -63,7 +64,7 @@ export class Preview {
   merge(bundle) {
     const size = new DataView(bundle).getUint32(0, true);
     const header = JSON.parse(new TextDecoder().decode(new Uint8Array(bundle, 4, size)));
-    const k = header.channels.length, n = header.n, first = header.first_frame;
+    const k = header.channels.length, { n } = header, first = header.first_frame;
     let at = 4 + size;
     const floats = (count) => new Float32Array(bundle.slice(at, (at += 4 * count)));
     const motion = floats(n * k), head = floats(n * 6);
@@ -84,6 +85,7 @@ export class Preview {
       phones: header.phones,
       sentences: header.sentences,
       notes: header.notes ?? [],
+      isComplete: header.is_complete ?? true,
     });
     this.#emit({ sound, motion: n > 0 });
   }
@@ -93,10 +95,14 @@ export class Preview {
   }
 }
 
-/** `whole` values of which those from `first` on are new, and the others are kept. */
+/** `whole` values: old ones before `first`, the fresh ones, and after them the last ones of the old. */
 function placed(old, fresh, first, whole) {
+  const after = first + fresh.length, rest = whole - after;
   const values = old.length === whole ? old : new fresh.constructor(whole);
-  if (values !== old) values.set(old.subarray(0, whole));
+  if (values !== old) {
+    values.set(old.subarray(0, Math.min(first, whole)));
+    if (rest > 0) values.set(old.subarray(Math.max(old.length - rest, 0)), after);
+  }
   values.set(fresh.subarray(0, Math.max(whole - first, 0)), first);
   return values;
 }
@@ -105,7 +111,7 @@ export const preview = new Preview(); // of the project
 export const comparison = new Preview(); // its curves are drawn beside those of the project
 
 preview.on("change", ({ sound }) => {
-  if (sound) clock.load(preview.pcm, preview.rate);
+  if (sound) clock.load(preview.pcm, preview.rate || 1);
 });
 
 export function loadPreview(url) {

@@ -1,37 +1,224 @@
-// The stage: what it shows at the time of the clock.
+// The stage: the head of the project, at the time of the clock.
 
 import { clock } from "tts2face-studio/clock.js";
+import { metrics, Meter } from "tts2face-studio/metrics.js";
 import { loadPreview, preview } from "tts2face-studio/preview.js";
+import { StageScene } from "tts2face-studio/stage_scene.js";
+import { addStyle } from "tts2face-studio/style.js";
+
+const VIEWS = { front: "Front", "three-quarter": "Three-quarter", profile: "Profile", close: "Close-up" };
+
+const SLOW_MS = 31, FAST_MS = 19; // between frames: fewer pixels above, more below
+const ADAPT_MS = 400; // between two changes of the number of pixels
+const REST_MS = 250; // at rest before the sharp picture
+const LEAST_SHARE = 0.5; // of the device's pixels along a side
 
 export default {
   template: `
-    <section aria-label="Stage" style="position: relative; height: 100%; overflow: hidden">
-      <img v-if="picture" :src="picture" alt="Final picture" style="width: 100%; height: 100%; object-fit: contain">
-      <p v-else role="status">{{ frames }} frames</p>
+    <section class="studio-stage" aria-label="Stage">
+      <canvas ref="canvas" role="img" tabindex="0" :aria-label="label" @keydown="onKey"></canvas>
+      <img v-if="picture" class="studio-picture" :src="picture" alt="Final picture of this instant, drawn by the renderer">
+      <p v-if="message" class="studio-message" role="status">{{ message }}</p>
+      <div class="studio-views" role="group" aria-label="Camera">
+        <button v-for="(text, name) in views" :key="name" type="button" :aria-pressed="String(current === name)"
+          @click="view(name)">{{ text }}</button>
+        <button v-if="picture" type="button" @click="showPicture(null)">Live preview</button>
+        <button type="button" aria-label="Full screen" title="Full screen" @click="fullscreen()"><svg
+          viewBox="0 0 16 16" aria-hidden="true"><path d="M1 1h5v2H3v3H1zM10 1h5v5h-2V3h-3zM1 10h2v3h3v2H1zM13 10h2v5h-5v-2h3z"/></svg></button>
+      </div>
     </section>`,
-  props: { face: String, environment: String, preview: String },
+
+  props: { face: String, environment: { type: String, default: "studio" }, preview: String },
   emits: ["view", "failed"],
-  data: () => ({ frames: 0, picture: null }),
-  mounted() {
-    window.__studio = { clock, preview };
-    this.stop = preview.on("change", () => (this.frames = preview.nFrames));
-    if (this.preview) loadPreview(this.preview).catch((wrong) => this.$emit("failed", wrong.message));
+
+  data: () => ({ views: VIEWS, current: "front", picture: null, message: "", time: 0 }),
+
+  computed: {
+    label() {
+      const view = VIEWS[this.current] ?? "Free view";
+      return `${view} of the head. Arrow keys turn the camera, plus and minus change the distance, 1 to 4 choose a view.`;
+    },
   },
+
+  async mounted() {
+    addStyle();
+    this.meter = new Meter("js_ms", "fps");
+    Object.assign(this, { dirty: true, share: 1, interval: 25, adapted: 0, rested: 0, begun: null });
+    this.changed = () => (this.dirty = true);
+    try {
+      this.scene = new StageScene(this.$refs.canvas, this.changed);
+    } catch (refused) {
+      this.fail("This browser has no WebGL; switch it on, or use “Final picture”.", refused);
+      return;
+    }
+    this.stops = [preview.on("change", this.changed), clock.on("seek", this.changed)];
+    this.watchContext();
+    this.observer = new ResizeObserver(() => this.resize());
+    this.observer.observe(this.$el);
+    this.resize();
+    this.scene.controls.addEventListener("start", () => this.release());
+    this.animation = requestAnimationFrame(this.tick);
+    if (this.preview) loadPreview(this.preview).catch((wrong) => this.fail(wrong.message, wrong));
+    await this.loadFace();
+  },
+
   beforeUnmount() {
-    this.stop?.();
+    cancelAnimationFrame(this.animation);
+    this.observer?.disconnect();
+    for (const stop of this.stops ?? []) stop();
+    this.scene?.dispose();
   },
+
+  watch: {
+    face() {
+      this.loadFace();
+    },
+    environment() {
+      this.scene?.setBackground(this.environment);
+    },
+  },
+
   methods: {
+    async loadFace() {
+      if (!this.scene || !this.face) {
+        this.message = this.face ? this.message : "Choose a face to see it here.";
+        return;
+      }
+      const wanted = this.face;
+      this.message = "Loading the face …";
+      const begin = performance.now();
+      try {
+        await this.scene.setFace(wanted);
+        if (wanted !== this.face) return;
+        this.scene.setBackground(this.environment);
+        this.message = "";
+        metrics.face_ms = performance.now() - begin;
+        this.resize();
+      } catch (wrong) {
+        this.fail(wrong.message, wrong);
+      }
+    },
+
+    /** Fetch the preview of a project again; what has not changed is kept. */
     setPreview(url) {
       return loadPreview(url).then(() => true);
     },
+
     view(name) {
+      this.current = name;
+      if (!this.scene) return;
+      this.scene.moved = false;
+      this.scene.view(name);
       this.$emit("view", name);
     },
+
     fullscreen() {
-      this.$el.requestFullscreen();
+      if (document.fullscreenElement) document.exitFullscreen();
+      else this.$el.requestFullscreen();
     },
+
+    /** Lay a picture over the head; null removes it. */
     showPicture(url) {
       this.picture = url;
+    },
+
+    release() {
+      this.scene.moved = true;
+      this.current = "";
+    },
+
+    resize() {
+      const { clientWidth: width, clientHeight: height } = this.$refs.canvas ?? {};
+      if (!width || !height || !this.scene) return;
+      this.scene.resize(width, height, window.devicePixelRatio);
+      this.dirty = true;
+    },
+
+    watchContext() {
+      const { canvas } = this.$refs;
+      canvas.addEventListener("webglcontextlost", (event) => {
+        event.preventDefault();
+        this.lost = true;
+        this.message = "The graphics device was reset; the head comes back in a moment.";
+      });
+      canvas.addEventListener("webglcontextrestored", () => {
+        this.lost = false;
+        this.message = "";
+        this.dirty = true;
+      });
+    },
+
+    tick() {
+      this.animation = requestAnimationFrame(this.tick);
+      if (clock.playing) this.dirty = true;
+      else this.meter.restart();
+      this.adapt();
+      if (!this.dirty || this.lost) return;
+      const begin = performance.now(), { scene } = this;
+      this.dirty = false;
+      metrics.time = clock.time;
+      scene.setMotion(preview, metrics.time);
+      scene.render();
+      metrics.frames = (metrics.frames ?? 0) + 1;
+      if (clock.playing) metrics.playing_share = scene.sharpness;
+      metrics.is_sharp = scene.sharpness >= 1 && this.rested !== null;
+      if (clock.playing) this.meter.add(performance.now() - begin);
+    },
+
+    /** Fewer pixels while a slow device plays; at rest, after a moment, one sharp picture. */
+    adapt() {
+      const now = performance.now(), { scene } = this;
+      const busy = clock.playing || this.dirty;
+      if (busy && this.begun) this.interval = 0.9 * this.interval + 0.1 * Math.min(now - this.begun, 200);
+      this.begun = busy ? now : null;
+      if (!busy) {
+        this.rested ??= now;
+        if (now - this.rested < REST_MS || scene.sharpness === (scene.isSoftware ? 2 : 1)) return;
+        scene.setSharpness(scene.isSoftware ? 2 : 1);
+        this.dirty = true;
+        return;
+      }
+      if (this.rested) scene.setSharpness(this.share);
+      this.rested = null;
+      if (now - this.adapted < ADAPT_MS) return;
+      this.adapted = now;
+      const step = this.interval > SLOW_MS ? 0.8 : this.interval < FAST_MS ? 1.1 : 1;
+      this.share = Math.min(Math.max(this.share * step, LEAST_SHARE), 1);
+      if (step !== 1) scene.setSharpness(this.share);
+    },
+
+    onKey(event) {
+      const names = Object.keys(VIEWS);
+      if (event.key >= "1" && event.key <= String(names.length)) this.view(names[event.key - 1]);
+      else if (event.key.startsWith("Arrow")) this.turn(event.key);
+      else if (event.key === "+" || event.key === "-") this.approach(event.key === "+" ? 0.9 : 1 / 0.9);
+      else return;
+      event.preventDefault();
+    },
+
+    turn(key) {
+      const { camera, controls } = this.scene, step = 0.08;
+      const away = camera.position.clone().sub(controls.target);
+      const radius = away.length(), yaw = Math.atan2(away.x, away.z), pitch = Math.asin(away.y / radius);
+      const a = yaw + (key === "ArrowLeft" ? -step : key === "ArrowRight" ? step : 0);
+      const b = Math.min(Math.max(pitch + (key === "ArrowUp" ? step : key === "ArrowDown" ? -step : 0), -1.4), 1.4);
+      away.set(Math.sin(a) * Math.cos(b), Math.sin(b), Math.cos(a) * Math.cos(b)).multiplyScalar(radius);
+      camera.position.copy(controls.target).add(away);
+      controls.update();
+      this.release();
+    },
+
+    approach(factor) {
+      const { camera, controls } = this.scene;
+      camera.position.sub(controls.target).multiplyScalar(factor).add(controls.target);
+      controls.update();
+      this.release();
+    },
+
+    fail(message, cause) {
+      this.message = message;
+      console.warn(cause);
+      this.$emit("failed", message);
     },
   },
 };

@@ -1,4 +1,4 @@
-"""The timeline of a page: sound, words, phones and lanes of gestures, on which styles are painted."""
+"""The timeline of a page: sound, words, phones, painted styles, key points and curves over time."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 from nicegui.element import Element
 from nicegui.events import GenericEventArguments, Handler
 
+from tts2face.models.palette import EXPRESSIONS, FEATURES
 from tts2face.studio.components.stage import COMPONENTS, MODULES
 
 
@@ -15,46 +16,78 @@ class Timeline(Element, component="timeline.js", esm={MODULES: str(COMPONENTS)})
     Parameters
     ----------
     timeline
-        JSON of the project's timeline.
+        The project's timeline as `tts2face.gesture.timeline_file.timeline_json` gives it.
     styles
-        Styles with their colours: ``name``, ``color``.
+        Styles of the palette: objects with ``name`` and ``color`` (#rrggbb).
+    brush
+        ``tool`` (brush, eraser or select) and ``style``, the name of the style that the brush paints.
     lanes
-        Features with ``feature``, ``muted``, ``solo`` and ``seed``.
+        Features from top to bottom: names, or objects with ``feature``, ``muted``, ``solo`` and ``seed``.
     on_edit
-        Called with an edit of `tts2face.studio.editing` as ``args``.
+        Called with one edit (docs/decisions): its ``args`` is the JSON object.
+    preview, compare
+        Addresses of the preview bundle that is loaded first, and of one whose curves are drawn beside it.
+
+    Notes
+    -----
+    Also emits ``pick`` with a clicked word or phone (``kind``, ``name``, ``begin``, ``end``, ``index`` in the sentence,
+    ``text`` and ``occurrence`` of the sentence), and ``range`` with the selection as [begin, end] in seconds, or null.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - one parameter a prop
         self,
-        timeline: Mapping[str, Any],
+        timeline: Mapping[str, Any] | None = None,
         *,
-        styles: Sequence[Mapping[str, str]],
-        lanes: Sequence[Mapping[str, Any]],
-        on_edit: Handler[GenericEventArguments],
+        styles: Sequence[Mapping[str, str]] = (),
+        brush: Mapping[str, str] | None = None,
+        lanes: Sequence[str | Mapping[str, Any]] = FEATURES,
+        on_edit: Handler[GenericEventArguments] | None = None,
+        preview: str | None = None,
+        compare: str | None = None,
     ) -> None:
         super().__init__()
-        self._props.update(timeline=timeline, styles=styles, lanes=lanes, brush={"tool": "select", "style": ""})
-        self.on("edit", on_edit)
+        self._props.update(
+            timeline=dict(timeline or {}), styles=list(styles), brush=dict(brush or {"tool": "select", "style": ""}),
+            lanes=list(lanes), expressions=list(EXPRESSIONS), preview=preview, compare=compare,
+        )  # fmt: skip
+        if on_edit is not None:
+            self.on("edit", on_edit)
 
     def set_timeline(self, timeline: Mapping[str, Any]) -> None:
-        """Show another state of the project."""
-        self._set(timeline=timeline)
+        """Show what the server made of the edits; it replaces what the page assumed."""
+        self._set(timeline=dict(timeline))
 
     def set_styles(self, styles: Sequence[Mapping[str, str]]) -> None:
-        """Offer other styles."""
-        self._set(styles=styles)
+        """Show the styles of another palette."""
+        self._set(styles=list(styles))
 
     def set_brush(self, tool: str, style: str) -> None:
-        """Choose a tool (brush, eraser, select) and its style."""
+        """Choose what a press on a lane does."""
         self._set(brush={"tool": tool, "style": style})
 
-    def set_lanes(self, lanes: Sequence[Mapping[str, Any]]) -> None:
+    def set_lanes(self, lanes: Sequence[str | Mapping[str, Any]]) -> None:
         """Show which lanes are muted or solo, and their seeds."""
-        self._set(lanes=lanes)
+        self._set(lanes=list(lanes))
 
     def set_compare(self, url: str | None) -> None:
         """Draw the curves of a second preview; None removes them."""
         self._set(compare=url)
+
+    def set_preview(self, url: str) -> None:
+        """Fetch what has changed of a preview; the stage of the page shows it, too."""
+        self.run_method("setPreview", url)
+
+    def play(self, start: float | None = None) -> None:
+        """Play from a time in seconds, from the playhead without one."""
+        self.run_method("play", start)
+
+    def pause(self) -> None:
+        """Stop playing."""
+        self.run_method("pause")
+
+    def seek(self, time: float) -> None:
+        """Move the playhead."""
+        self.run_method("seek", time)
 
     def _set(self, **props: Any) -> None:
         self._props.update(props)

@@ -1,0 +1,105 @@
+"""Live preview in headless Chromium without a GPU: PYTHONPATH=. python tests/bench/bench_studio.py [folder].
+
+Plays the harness's clip on a stage of 640 x 480 and its timeline, then ten minutes of material, then an empty WebGL
+scene of the same size. Frames per second hold for the load of the machine, which the script's slowness tells; the
+processor time of a frame, of all processes of the browser, does not depend on it.
+"""
+
+import gzip
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.studio.browser import Browser
+from tests.studio.served import Page, served_harness
+from tts2face.studio.components.stage import COMPONENTS
+
+PLAYED_S = 3.0  # shorter than the clip
+TICKS_PER_S = os.sysconf("SC_CLK_TCK")
+EMPTY = """
+    const canvas = Object.assign(document.createElement('canvas'), {width: 640, height: 480});
+    document.body.replaceChildren(canvas);
+    const gl = canvas.getContext('webgl2'), begin = performance.now();
+    let n = 0;
+    const frame = () => {
+      n++;
+      gl.clearColor(n % 2, 0, 0, 1);
+      gl.clear(gl.COLOR_BUFFER_BIT);
+      requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+    window.empty = () => n;
+"""
+
+
+def processor_s(root: int) -> dict[str, float]:
+    """Processor seconds of the processes below one, by their type."""
+    stats = {}
+    for folder in Path("/proc").iterdir():
+        if folder.name.isdigit():
+            try:
+                fields = (folder / "stat").read_text().rpartition(")")[2].split()
+                command = (folder / "cmdline").read_bytes().decode().replace(chr(0), " ")
+            except OSError:
+                continue  # it ended meanwhile
+            kind = command.partition("--type=")[2].partition(" ")[0] or "browser"
+            stats[int(folder.name)] = (int(fields[1]), kind, (int(fields[11]) + int(fields[12])) / TICKS_PER_S)
+    inside, spent = {root}, dict[str, float]()
+    while found := {pid for pid, (parent, _, _) in stats.items() if parent in inside} - inside:
+        inside |= found
+    for pid in inside & set(stats):
+        spent[stats[pid][1]] = spent.get(stats[pid][1], 0.0) + stats[pid][2]
+    return spent
+
+
+def processor_ms(browser: Browser, frames: Callable[[], float]) -> str:
+    """Processor time of a frame by kind of process, while a page draws for `PLAYED_S`."""
+    before, first = processor_s(browser.driver), frames()
+    time.sleep(PLAYED_S)
+    after, n = processor_s(browser.driver), frames() - first
+    each = {kind: 1000 * (after[kind] - before.get(kind, 0.0)) / max(n, 1) for kind in after}
+    parts = ", ".join(f"{kind} {spent:.1f}" for kind, spent in each.items() if spent > 0.05)
+    return f"{n / PLAYED_S:.1f} frames/s; processor time of a frame {sum(each.values()):.1f} ms ({parts})"
+
+
+def play(page: Page, name: str) -> None:
+    """Print the figures of a page that plays."""
+    page.toggle()
+    cost = processor_ms(page.browser, lambda: page.measure("frames"))
+    script, lines, share = (page.measure(one) for one in ("js_ms", "timeline_ms", "playing_share"))
+    page.toggle()
+    print(
+        f"{name}: {cost}; {100 * share:.0f} % of the pixels along a side, script of the stage {script:.2f} ms a frame, "
+        f"of the timeline {lines:.2f} ms; {page.slowness():.1f} times slower than an idle core"
+    )
+
+
+def main() -> None:
+    """Print all figures."""
+    folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp(prefix="bench-studio-"))
+    with served_harness(folder) as address:
+        browser = Browser()
+        try:
+            page = Page(browser, address)
+            print(f"face from request to first frame: {page.measure('face_ms'):.0f} ms")
+            play(page, "clip of 4 s")
+            page = Page(browser, f"{address}?preview=long.bin")
+            page.focus()
+            browser.press("Right", *"++++++")
+            play(page, "ten minutes")
+            browser.open("about:blank")
+            browser.run(EMPTY)
+            print(f"empty scene: {processor_ms(browser, lambda: browser.run('return window.empty()'))}")
+        finally:
+            browser.close()
+    face = (folder / "face.glb").read_bytes()
+    files = [file.read_bytes() for pattern in ("*.js", "*.css") for file in COMPONENTS.glob(pattern)]
+    sizes = [sum(map(len, group)) / 1e6 for group in ([face], [gzip.compress(face)], files, map(gzip.compress, files))]
+    print("face {:.2f} MB ({:.2f} compressed), components {:.3f} MB ({:.3f} compressed)".format(*sizes))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,83 @@
+"""The face of the live preview: its geometry and shapes are the face's within the quantisation."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+
+from tests.render.tiny_face import tiny_face
+from tts2face.exports.stage_glb import LEAST_MOVE_MM, quantised_moves, stage_glb
+from tts2face.exports.surfaces import divide_surface
+
+TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+FACE = tiny_face(textured=True)
+
+
+class Read:
+    """A file read by the rules of the glTF specification."""
+
+    def __init__(self, content):
+        size = struct.unpack_from("<I", content, 12)[0]
+        self.json = json.loads(content[20 : 20 + size])
+        self.binary = content[28 + size :]
+
+    def view(self, number, kind, count):
+        at = self.json["bufferViews"][number]["byteOffset"]
+        return np.frombuffer(self.binary, kind, count, at)
+
+    def accessor(self, number):
+        one = self.json["accessors"][number]
+        width, kind = WIDTHS[one["type"]], TYPES[one["componentType"]]
+        values = np.zeros((one["count"], width), kind)
+        if "bufferView" in one:
+            values = self.view(one["bufferView"], kind, values.size).reshape(-1, width).copy()
+        if "sparse" in one:
+            sparse = one["sparse"]
+            at = self.view(sparse["indices"]["bufferView"], TYPES[sparse["indices"]["componentType"]], sparse["count"])
+            values[at] = self.view(sparse["values"]["bufferView"], kind, sparse["count"] * width).reshape(-1, width)
+        return values
+
+
+@pytest.fixture(scope="module")
+def made():
+    return Read(stage_glb(FACE, FACE.shape_names))
+
+
+def test_triangles_are_those_of_the_face(made):
+    for surface, primitive in zip(divide_surface(FACE), made.json["meshes"][0]["primitives"], strict=True):
+        places = made.accessor(primitive["attributes"]["POSITION"]) * 1000
+        corners = places[made.accessor(primitive["indices"]).reshape(-1, 3)]
+        expected = FACE.vertices[surface.vertices[surface.triangles]]
+        order = [np.lexsort(one.reshape(len(one), -1).round(3).T) for one in (corners, expected)]
+        assert corners[order[0]] == pytest.approx(expected[order[1]], abs=1e-3)  # float32 of metres, in mm
+
+
+def test_targets_move_vertices_as_the_shapes_do(made):
+    mesh = made.json["meshes"][0]
+    assert mesh["extras"]["targetNames"] == list(FACE.shape_names)
+    for primitive in mesh["primitives"]:
+        places = made.accessor(primitive["attributes"]["POSITION"]) * 1000
+        at = [int(np.argmin(np.abs(FACE.vertices - place).sum(axis=1))) for place in places]
+        for shape, target, scale in zip(FACE.shapes, primitive["targets"], mesh["extras"]["scales"], strict=True):
+            moves = made.accessor(target["POSITION"]) / 32767 * 1000 / scale
+            step = 1000 / scale / 32767
+            assert moves == pytest.approx(shape[at], abs=max(step, LEAST_MOVE_MM))
+
+
+def test_small_shapes_keep_their_precision():
+    shapes = np.zeros((2, 3, 3), np.float32)
+    shapes[0, 1], shapes[1, 2] = (0.05, 0.0, -0.02), (40.0, -13.0, 0.005)
+    moves, scales = quantised_moves(shapes)
+    back = moves / 32767 * 1000 / scales[:, None, None]
+    assert back[0] == pytest.approx(shapes[0], abs=0.05 / 32767)
+    assert back[1] == pytest.approx(shapes[1], abs=40 / 32767)
+
+
+def test_other_viewers_can_read_it(made):
+    assert made.json["extensionsRequired"] == ["KHR_mesh_quantization", "EXT_texture_webp"]
+    stage = made.json["asset"]["extras"]
+    assert set(stage["views"]) == {"front", "three-quarter", "profile", "close"}
+    assert len(stage["lamps"]) == 4
+    assert len(stage["eyes"]) == len(FACE.eyes)

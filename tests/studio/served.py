@@ -1,0 +1,110 @@
+"""The harness as a process of its own, and its page in a browser."""
+
+import json
+import os
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.studio.webdriver import Browser, free_port, wait_until
+
+ROOT = Path(__file__).parents[2]
+MOUTH = (slice(0.60, 0.74), slice(0.42, 0.58))  # of the picture's height and width, in the front view
+# A fixed piece of work in the page, and its milliseconds on an idle core of 2.5 GHz.
+CALIBRATION = (
+    "const t = performance.now(); let a = 0; for (let i = 0; i < 1e8; i++) a += i; return performance.now() - t"
+)
+CALIBRATION_MS = 75
+
+
+@contextmanager
+def served_harness(folder: Path) -> Iterator[str]:
+    """Address of the harness, which keeps its files in a folder."""
+    port, log = free_port(), folder / "log.txt"
+    # NiceGUI takes part in tests of its own where it finds pytest's variables.
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
+    with log.open("wb") as out:
+        command = [sys.executable, "-m", "tests.studio.harness", str(folder), str(port)]
+        process = subprocess.Popen(command, cwd=ROOT, stdout=out, stderr=out, env=environment)
+    url = f"http://127.0.0.1:{port}/"
+
+    def answers() -> bool:
+        assert process.poll() is None, log.read_text()
+        try:
+            with urllib.request.urlopen(url, timeout=5) as page:
+                return bool(page.status == 200)
+        except (urllib.error.URLError, TimeoutError):
+            return False
+
+    try:
+        wait_until(answers, 240, "the harness answers")
+        yield url
+    finally:
+        process.terminate()
+        process.wait(20)
+
+
+class Page:
+    """A page of the harness with what its components report."""
+
+    def __init__(self, browser: Browser, url: str) -> None:
+        self.browser = browser
+        browser.open(url)
+        ready = "const s = window.__studio; return Boolean(s && s.face_ms && s.frames > 0 && s.view?.duration > 1)"
+        wait_until(lambda: browser.run(ready), 120, "face and sound are loaded")
+        self.grid = browser.box(".studio-grid")
+        self.rows = {row["id"]: row for row in browser.run("return window.__studio.rows")}
+
+    def measure(self, name: str) -> Any:
+        """A value of ``window.__studio``."""
+        return self.browser.run("return window.__studio[arguments[0]] ?? null", name)
+
+    def at(self, row: str, time: float, share: float = 0.5) -> tuple[float, float]:
+        """Place of a time on a row in the window."""
+        view, place = self.measure("view"), self.rows[row]
+        down = place["y"] + share * place["height"]
+        return self.grid["x"] + (time - view["start"]) * view["scale"], self.grid["y"] + down
+
+    def edits(self, n: int) -> list[dict[str, Any]]:
+        """The edits that the server received, once there are n."""
+        script = "return document.querySelector('.edits').innerText"
+
+        def received() -> list[dict[str, Any]]:
+            found: list[dict[str, Any]] = json.loads(self.browser.run(script))
+            return found if len(found) >= n else []
+
+        return list(wait_until(received, 20, f"{n} edits"))
+
+    def focus(self) -> None:
+        """Give the keyboard to the timeline."""
+        self.browser.run("document.querySelector('.studio-grid').focus()")
+
+    def toggle(self) -> None:
+        """Play or pause."""
+        self.browser.run("document.querySelector('.studio-play').click()")
+
+    def show(self, time: float) -> None:
+        """Move the playhead by the ruler, and wait for the sharp picture of a stage at rest."""
+        place = self.at("ruler", time)
+        self.browser.drag([place, place])
+        wait_until(lambda: abs(self.measure("time") - time) < 0.02 and self.measure("is_sharp"), 30, "drawn")
+
+    def mouth(self, time: float) -> np.ndarray:
+        """Pixels of the mouth at a time."""
+        self.show(time)
+        picture = self.browser.picture(".studio-stage canvas").astype(np.float64)
+        height, width, _ = picture.shape
+        down, across = MOUTH
+        rows = slice(int(down.start * height), int(down.stop * height))
+        return picture[rows, int(across.start * width) : int(across.stop * width)]
+
+    def slowness(self) -> float:
+        """How many times slower than an idle core the page's script runs now, at least 1."""
+        return max(self.browser.run(CALIBRATION) / CALIBRATION_MS, 1.0)

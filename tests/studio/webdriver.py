@@ -1,0 +1,159 @@
+"""A headless Chromium driven by chromedriver over the W3C WebDriver protocol: a real mouse, real keys, real pixels."""
+
+import base64
+import io
+import json
+import shutil
+import socket
+import subprocess
+import time
+import urllib.error
+import urllib.request
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+ELEMENT = "element-6066-11e4-a52e-4f735466cecf"  # key of an element's id, by the protocol
+KEYS = {
+    "Left": "\ue012", "Up": "\ue013", "Right": "\ue014", "Down": "\ue015", "Enter": "\ue007", "Delete": "\ue017",
+    "Escape": "\ue00c", "Home": "\ue011", "Tab": "\ue004", "Alt": "\ue00a", "Control": "\ue009", "Shift": "\ue008",
+}  # fmt: skip
+ARGUMENTS = (
+    "--headless=new", "--no-sandbox", "--disable-gpu-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader", "--autoplay-policy=no-user-gesture-required", "--force-device-scale-factor=1",
+)  # fmt: skip
+
+
+def missing_program() -> str:
+    """Name of a program that is needed and not installed; empty if none is."""
+    chromium = next((name for name in ("chromium", "chromium-browser", "google-chrome") if shutil.which(name)), "")
+    if not chromium:
+        return "chromium"
+    return "" if shutil.which("chromedriver") else "chromedriver"
+
+
+def free_port() -> int:
+    """A port of this machine on which nothing listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Browser:
+    """One window of a browser."""
+
+    def __init__(self, size: tuple[int, int] = (1280, 1180)) -> None:
+        port = free_port()
+        self._driver = subprocess.Popen(
+            ["chromedriver", f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        self._root = f"http://127.0.0.1:{port}"
+        wait_until(self._is_ready, 30, "chromedriver starts")
+        options = {"args": [*ARGUMENTS, f"--window-size={size[0]},{size[1]}"]}
+        wanted = {"goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "ALL"}}
+        answer = self._post("/session", {"capabilities": {"alwaysMatch": wanted}})
+        self._session = f"/session/{answer['sessionId']}"
+
+    @property
+    def driver(self) -> int:
+        """Number of the process whose descendants the browser's processes are."""
+        return self._driver.pid
+
+    def close(self) -> None:
+        """End window and driver."""
+        try:
+            self._call("DELETE", self._session, None)
+        finally:
+            self._driver.terminate()
+            self._driver.wait(20)
+
+    def open(self, url: str) -> None:
+        """Load a page."""
+        self._post(f"{self._session}/url", {"url": url})
+
+    def run(self, script: str, *arguments: Any) -> Any:
+        """Value that a function body returns in the page."""
+        return self._post(f"{self._session}/execute/sync", {"script": script, "args": list(arguments)})
+
+    def box(self, selector: str) -> dict[str, float]:
+        """Place and size of an element in the window: x, y, width, height."""
+        script = "const b = document.querySelector(arguments[0]).getBoundingClientRect(); return b.toJSON()"
+        return dict(self.run(script, selector))
+
+    def drag(self, places: list[tuple[float, float]], held: str = "") -> None:
+        """Press the mouse at the first place, move over the others, and release it; `held` names a key."""
+        moves = [
+            {"type": "pointerMove", "x": round(x), "y": round(y), "duration": 60 if number else 0}
+            for number, (x, y) in enumerate(places)
+        ]
+        actions = [moves[0], {"type": "pointerDown", "button": 0}, *moves[1:], {"type": "pointerUp", "button": 0}]
+        keys = [{"type": "pause"}] * len(actions)
+        if held:
+            keys = [{"type": "keyDown", "value": KEYS[held]}, *keys[2:], {"type": "keyUp", "value": KEYS[held]}]
+            actions = [{"type": "pause", "duration": 0}, *actions]
+            keys = [keys[0], *keys[1:-1], {"type": "pause"}, keys[-1]]
+        self._perform(
+            [
+                {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": actions},
+                {"type": "key", "id": "keys", "actions": keys},
+            ]
+        )
+
+    def double_click(self, x: float, y: float) -> None:
+        """Press the mouse twice at a place."""
+        press = [{"type": "pointerDown", "button": 0}, {"type": "pointerUp", "button": 0}]
+        actions = [{"type": "pointerMove", "x": round(x), "y": round(y), "duration": 0}, *press, *press]
+        self._perform([{"type": "pointer", "id": "mouse", "actions": actions}])
+
+    def press(self, *names: str) -> None:
+        """Press keys one after the other: names of `KEYS`, or characters; ``Alt+Left`` holds the first."""
+        for name in names:
+            parts = [KEYS.get(part, part) for part in name.split("+")] if len(name) > 1 else [name]
+            down = [{"type": "keyDown", "value": part} for part in parts]
+            up = [{"type": "keyUp", "value": part} for part in reversed(parts)]
+            self._perform([{"type": "key", "id": "keys", "actions": [*down, *up]}])
+
+    def picture(self, selector: str) -> np.ndarray:
+        """Pixels (H, W, 3) of an element as the window shows it."""
+        found = self._post(f"{self._session}/element", {"using": "css selector", "value": selector})
+        shot = self._call("GET", f"{self._session}/element/{found[ELEMENT]}/screenshot", None)
+        return np.asarray(Image.open(io.BytesIO(base64.b64decode(shot))).convert("RGB"))
+
+    def errors(self) -> list[str]:
+        """Errors of the page's console since the last call."""
+        entries = self._post(f"{self._session}/se/log", {"type": "browser"})
+        return [entry["message"] for entry in entries if entry["level"] == "SEVERE"]
+
+    def _perform(self, sources: list[dict[str, Any]]) -> None:
+        self._post(f"{self._session}/actions", {"actions": sources})
+
+    def _is_ready(self) -> bool:
+        try:
+            return bool(self._call("GET", "/status", None)["ready"])
+        except OSError:
+            return False
+
+    def _post(self, path: str, content: dict[str, Any]) -> Any:
+        return self._call("POST", path, content)
+
+    def _call(self, method: str, path: str, content: dict[str, Any] | None) -> Any:
+        data = None if content is None else json.dumps(content).encode()
+        headers = {"Content-Type": "application/json"}
+        request = urllib.request.Request(self._root + path, data, headers, method=method)
+        try:
+            with urllib.request.urlopen(request, timeout=180) as answer:
+                return json.load(answer)["value"]
+        except urllib.error.HTTPError as refused:
+            raise AssertionError(json.load(refused)["value"]["message"]) from refused
+
+
+def wait_until(holds: Any, seconds: float, what: str) -> Any:
+    """First true value of a function that is called again and again."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        value = holds()
+        if value:
+            return value
+        time.sleep(0.1)
+    raise AssertionError(f"did not happen within {seconds:g} s: {what}")

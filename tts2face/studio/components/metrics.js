@@ -1,0 +1,29 @@
+// Measures of a page for tests and for the curious: frames per second and milliseconds of script per frame.
+
+export const metrics = (window.__studio = window.__studio ?? {});
+
+/** Mean time of a repeated piece of work over a second, written to `metrics` under two names. */
+export class Meter {
+  #since = performance.now();
+  #spent = [];
+
+  constructor(timeName, rateName) {
+    this.names = [timeName, rateName];
+  }
+
+  add(milliseconds) {
+    this.#spent.push(milliseconds);
+    const now = performance.now(), elapsed = now - this.#since;
+    if (elapsed < 1000) return;
+    const [timeName, rateName] = this.names, spent = this.#spent;
+    metrics[timeName] = spent.reduce((sum, one) => sum + one, 0) / spent.length;
+    if (rateName) metrics[rateName] = (spent.length * 1000) / elapsed;
+    this.#since = now;
+    this.#spent = [];
+  }
+
+  restart() {
+    this.#since = performance.now();
+    this.#spent = [];
+  }
+}

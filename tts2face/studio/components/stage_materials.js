@@ -1,0 +1,78 @@
+// Materials of the stage: values of the shaders for a face, its parts, and the wall behind it.
+
+import { THREE } from "nicegui-scene";
+import { FRAGMENT, LAMPS, VERTEX } from "./stage_shader.js";
+
+/** Values that all materials of a face share; those of the lamps and the eyes follow the camera and the motion. */
+export function sharedUniforms(stage) {
+  const colours = stage.lamps.map(([, , colour]) => new THREE.Vector3(...colour));
+  const vectors = (n, kind = THREE.Vector3) => Array.from({ length: n }, () => new kind());
+  return {
+    joints: { value: vectors(4, THREE.Matrix4) },
+    lamps: { value: vectors(LAMPS) },
+    lampColours: { value: colours },
+    sky: { value: new THREE.Vector3(...stage.sky) },
+    floorLight: { value: new THREE.Vector3(...stage.floor) },
+    skull: { value: new THREE.Vector3(...stage.skull) },
+    brightness: { value: stage.brightness },
+    opening: { value: 0 },
+    eyeCentres: { value: vectors(2) },
+    eyeGaze: { value: vectors(2) },
+    eyeAcross: { value: new THREE.Vector3(1, 0, 0) },
+    eyeUp: { value: new THREE.Vector3(0, 1, 0) },
+    lids: { value: vectors(36, THREE.Vector2) },
+    iris: { value: stage.eyes[0]?.iris ?? 0.868 },
+    eyeScale: { value: stage.eyes.length ? 12 / stage.eyes[0].radius : 1 }, // to mm of an eyeball of 12 mm
+    hasLids: { value: stage.eyes.length === 2 && stage.eyes.every((eye) => eye.lids.length) ? 1 : 0 },
+  };
+}
+
+/** `samples` is whether a pixel has several samples, which share the coverage of hair, and highlights of its own. */
+export function partMaterial(part, shared, samples) {
+  const { extras } = part.material;
+  const defines = {};
+  if (part.texture) defines.TEXTURED = 1;
+  if (!samples) defines.COARSE = 1;
+  if (extras.cutout) defines.CUTOUT = 1;
+  if (extras.kind === "strands") Object.assign(defines, { STRANDS: 1, HAIR_LAMPS: samples ? 3 : 1 });
+  if (extras.kind === "eye") defines.EYE = 1;
+  const layered = extras.cutout && part.material.name.startsWith("hair"); // cards over cards hide each other
+  if (layered) defines.SOLID = 1;
+  const numbers = { second: extras.second, dark: extras.dark, openSheet: Number(extras.open), opacity: extras.opacity, shine: Math.min(extras.gloss / 0.25, 1.5) };
+  const uniforms = { ...shared, map: { value: part.texture } };
+  for (const [name, value] of Object.entries(numbers)) uniforms[name] = { value };
+  return new THREE.ShaderMaterial({
+    defines,
+    uniforms,
+    vertexShader: VERTEX,
+    fragmentShader: FRAGMENT,
+    vertexColors: !part.texture,
+    side: extras.open || extras.cutout ? THREE.DoubleSide : THREE.FrontSide,
+    alphaToCoverage: layered && samples,
+    transparent: extras.opacity < 1 || (extras.cutout && !layered),
+    depthWrite: !extras.cutout || layered,
+  });
+}
+
+/** The wall behind the head: a soft radial gradient in display colours, or one colour. */
+export function wallMaterial([bright, dark, centre]) {
+  const vector = (rgb) => new THREE.Vector3(...rgb).divideScalar(255);
+  return new THREE.ShaderMaterial({
+    uniforms: {
+      bright: { value: vector(bright) },
+      dark: { value: vector(dark) },
+      centre: { value: new THREE.Vector2(centre[0], 1 - centre[1]) },
+      aspect: { value: 1 },
+    },
+    vertexShader: "varying vec2 vAt; void main() { vAt = uv; gl_Position = vec4(position.xy, .9999, 1.); }",
+    fragmentShader: `
+      uniform vec3 bright, dark; uniform vec2 centre; uniform float aspect; varying vec2 vAt;
+      void main() {
+        vec2 away = (vAt - centre) * vec2(clamp(aspect, 1., 1.6), 1.);
+        float dither = fract(52.98 * fract(dot(gl_FragCoord.xy, vec2(.0671, .00584))));
+        gl_FragColor = vec4(mix(dark, bright, exp(-2.6 * dot(away, away))) + (dither - .5) / 255., 1.);
+      }`,
+    depthTest: false,
+    depthWrite: false,
+  });
+}

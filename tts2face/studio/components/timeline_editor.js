@@ -1,0 +1,60 @@
+// Forms in which the values of an element are typed.
+
+import { clock } from "./clock.js";
+import { rounded } from "./timeline_view.js";
+
+const number = (name, label, value, low, high, step) => ({ name, label, value: rounded(value), low, high, step });
+
+/** Open the form of an element; words and phones have none. */
+export function openEditor(host, row, item) {
+  const forms = { span: openSpan, nod: openNod, gaze: openGaze, key: openKey };
+  clock.pause();
+  forms[item.kind]?.(host, row, item);
+}
+
+function times(begin, end, duration) {
+  return [
+    number("start", "Start in seconds", begin, 0, rounded(duration), 0.01),
+    number("end", "End in seconds", Math.min(end, duration), 0, rounded(duration), 0.01),
+  ];
+}
+
+function openSpan(host, row, item) {
+  const { view, styles } = host.state, { feature, style, start } = item.span, end = Math.min(item.end, view.duration);
+  const fields = [{ name: "style", label: "Style", value: style, options: styles.map((one) => one.name) }, ...times(start, end, view.duration)];
+  const apply = (values) => {
+    if (values.end <= values.start) return host.component.say("The end must lie after the start.");
+    if (values.start > start || values.end < end) host.emit({ kind: "erase", feature, start, end });
+    return host.emit({ kind: "paint", feature, style: values.style, start: values.start, end: values.end });
+  };
+  host.component.openEditor(`Style on ${row.label}`, fields, apply, () => host.remove(row, item));
+}
+
+function openNod(host, row, item) {
+  const { time, size } = item.nod;
+  const fields = [number("time", "Time in seconds", time, 0, host.state.view.duration, 0.01), number("size", "Size (1 is 6°)", size, 0.1, 2, 0.1)];
+  host.component.openEditor("Nod", fields, (values) => host.replaceNod(item.nod, values.time, values.size), () => host.remove(row, item));
+}
+
+function openGaze(host, row, item) {
+  const { gaze } = item, { duration } = host.state.view;
+  const fields = [
+    ...times(gaze.start, gaze.end, duration),
+    number("down_deg", "Degrees down", gaze.down_deg, -35, 35, 1),
+    number("left_deg", "Degrees to the person’s left", gaze.left_deg, -35, 35, 1),
+  ];
+  const apply = (values) => {
+    if (values.end <= values.start) return host.component.say("The end must lie after the start.");
+    host.emit({ kind: "remove_gaze", time: gaze.start });
+    return host.emit({ kind: "gaze", ...values });
+  };
+  host.component.openEditor("Gaze target", fields, apply, () => host.remove(row, item));
+}
+
+function openKey(host, row, item) {
+  const { state } = host, curve = state.model.curveOf(row, state.chosen), { low, high } = curve.limits;
+  const what = row.id === "channel" ? "Offset" : "Value";
+  const fields = [number("time", "Time in seconds", item.begin, 0, state.view.duration, 0.01), number("value", what, item.value, low, high, 0.01)];
+  const apply = (values) => host.emit(state.model.moveKey(curve, item.number, values.time, values.value));
+  host.component.openEditor("Key point", fields, apply, () => host.remove(row, item));
+}
