@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.studio.webdriver import Browser, missing_program, wait_until
 from tests.studio.served import Page, served_harness
+from tests.studio.webdriver import Browser, missing_program, wait_until
 
 pytest.importorskip("nicegui", reason="needs nicegui: pip install 'tts2face[studio]'")
 pytestmark = pytest.mark.skipif(bool(missing_program()), reason=f"needs {missing_program()}")

@@ -6,14 +6,18 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from fastapi import FastAPI
+from fastapi import Request as HttpRequest
 from nicegui import app as pages_app
 from nicegui import ui
 
+from lexicon.errors import InputError
 from tts2face.service.access.page_headers import PAGES
 from tts2face.service.app import NO_TELEMETRY
 from tts2face.service.state import ServiceState
 from tts2face.studio import routes
 from tts2face.studio.pages import animate, login, projects
+from tts2face.studio.pages.record import add_record_page
+from tts2face.studio.recordings import Recordings
 from tts2face.studio.studio import Studio
 
 TITLE = "tts2face studio"
@@ -28,25 +32,42 @@ def mount_studio(app: FastAPI, state: ServiceState) -> None:
     app.include_router(routes.router)
     projects.register(studio)
     animate.register(studio)
+    recordings = add_record_page(app, studio.folder, _recording_owner)
     _disable_telemetry()
     pages_app.config.socket_io_js_transports = ["websocket"]
     ui.run_with(
         app, mount_path=PAGES, title=TITLE, language="en-US", dark=None, tailwind=False, reconnect_timeout=RECONNECT_S,
         show_welcome_message=False,
     )  # fmt: skip
-    _run_with(app, studio)
+    _run_with(app, studio, recordings)
 
 
-def _run_with(app: FastAPI, studio: Studio) -> None:
-    """Save all projects when the application ends, while its processes still run."""
+def _recording_owner(request: HttpRequest) -> str:
+    """Name of the key of a request that may build talkers.
+
+    Raises
+    ------
+    InputError
+        It may not.
+    """
+    key = request.state.key
+    if "build" not in key.scopes:
+        raise InputError(f"the key {key.name} lacks the scope build, which recordings need; use another key")
+    return str(key.name)
+
+
+def _run_with(app: FastAPI, studio: Studio, recordings: Recordings) -> None:
+    """Check takes while the application runs; save all projects when it ends, while its processes still run."""
     before = app.router.lifespan_context
 
     @asynccontextmanager
     async def lifespan(whole: FastAPI) -> AsyncIterator[Any]:
         async with before(whole) as state:
+            recordings.checks.start()
             try:
                 yield state
             finally:
+                await asyncio.shield(recordings.stop())
                 await asyncio.shield(studio.close())
 
     app.router.lifespan_context = lifespan

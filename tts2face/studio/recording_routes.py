@@ -9,12 +9,11 @@ from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse, JSONResponse, Response
 
 from lexicon.errors import InputError, Tts2faceError
+from tts2face.service.access.page_headers import RECORDINGS
 from tts2face.studio.recording_store import SUFFIXES, RecordingStore
 from tts2face.studio.recordings import Recordings
 from tts2face.studio.talker_building import CLIP, REPORT, TALKER
 
-PAGES = "/studio"  # where the pages are mounted
-API = "/api/recordings"  # below it
 TAKE = "/{number}/takes/{at}"
 MAX_TAKE_BYTES = 64 << 20
 NO_STORE = {"Cache-Control": "no-store"}
@@ -31,7 +30,7 @@ Owner = Callable[[Request], str]  # name of the key of a request
 
 def recording_router(recordings: Recordings, owner: Owner) -> APIRouter:
     """Routes of the takes and files of recordings."""
-    store, router = recordings.store, APIRouter(prefix=PAGES + API, include_in_schema=False)
+    store, router = recordings.store, APIRouter(prefix=RECORDINGS, include_in_schema=False)
 
     @router.put(TAKE)
     async def put_take(request: Request, number: str, at: int) -> Response:

@@ -40,6 +40,11 @@ class Studio:
         self._preparing: asyncio.Task[None] | None = None
         self._making: dict[str, asyncio.Lock] = {}  # of faces by name
 
+    @property
+    def folder(self) -> Path:
+        """Folder of projects, recordings and faces."""
+        return self._folder
+
     async def entries(self, key: ApiKey) -> list[ProjectEntry]:
         """Projects of a key, those changed last first."""
         return await asyncio.to_thread(self.store.entries, key.name)

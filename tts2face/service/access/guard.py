@@ -13,6 +13,7 @@ from starlette.websockets import WebSocketDisconnect
 from tts2face.service.access import browser
 from tts2face.service.access.exchange import Exchange, Receive, Scope, Send
 from tts2face.service.access.keys import LOCAL_KEY, ApiKey, find_key
+from tts2face.service.access.page_headers import RECORDINGS
 from tts2face.service.errors import RefusedError
 from tts2face.service.logs import log_event
 
@@ -137,9 +138,11 @@ class Guard:
 
 
 def _brings_video(scope: Scope) -> bool:
-    """Whether a request brings the recording of a talker: only such bodies may be larger than all others."""
-    is_build = scope["type"] == "http" and (scope["method"], scope["path"]) == ("POST", VIDEO_PATH)
-    return is_build and "build" in scope["state"]["key"].scopes
+    """Whether a request brings a recording of a person: only such bodies may be larger than all others."""
+    if scope["type"] != "http" or "build" not in scope["state"]["key"].scopes:
+        return False
+    is_take = scope["method"] == "PUT" and scope["path"].startswith(f"{RECORDINGS}/")
+    return is_take or (scope["method"], scope["path"]) == ("POST", VIDEO_PATH)
 
 
 def _draining() -> RefusedError:

@@ -1,6 +1,7 @@
 """Addresses of the studio's pages, and headers that keep them within this service."""
 
 PAGES = "/studio"
+RECORDINGS = f"{PAGES}/api/recordings"
 # NiceGUI has scripts and styles in its pages and compiles templates in the browser (Vue), hence 'unsafe-inline' and
 # 'unsafe-eval'. Nothing may come from, or go to, another host: no script, picture, font, frame, form or connection.
 POLICY = "; ".join([

@@ -9,12 +9,14 @@ from nicegui import events, ui
 
 from lexicon.errors import InputError, Tts2faceError
 from tts2face.exports.visemes import viseme_table
+from tts2face.service.access.page_headers import PAGES, RECORDINGS
 from tts2face.studio.components.recorder import STYLE, Recorder, VisemeMap
-from tts2face.studio.recording_routes import API, PAGES, Owner, recording_router
+from tts2face.studio.recording_routes import Owner, recording_router
 from tts2face.studio.recordings import Recordings
 from tts2face.studio.talker_building import CLIP, REPORT, TALKER
 
 LIST_PAGE = "/record"
+FILES = RECORDINGS.removeprefix(PAGES)  # links are relative to the mounted pages
 PRIMARY, NEGATIVE = "#0b5cb8", "#b3182a"  # white text on them has a contrast of 6 or more
 MAX_TEXT_BYTES = 2 << 20
 MINUTES = {2: "2 minutes, 25 prompts", 5: "5 minutes, 60 prompts", 10: "10 minutes, 120 prompts"}
@@ -37,7 +39,13 @@ def add_record_page(app: FastAPI, folder: Path, owner: Owner) -> Recordings:
 
     @ui.page(LIST_PAGE, title="Record - tts2face studio", language="en-US")
     def show_list(request: Request) -> None:
-        _list_page(recordings, owner(request))
+        try:
+            name = owner(request)
+        except InputError as refused:
+            _page_head("Record your own talker")
+            ui.label(str(refused))
+            return
+        _list_page(recordings, name)
 
     @ui.page(LIST_PAGE + "/{number}", title="Record - tts2face studio", language="en-US")
     def show_recording(request: Request, number: str) -> None:
@@ -135,7 +143,7 @@ class _RecordingPage:
                 takes = self._takes()
                 first = next((at for at in range(len(prompts)) if at not in takes), 0)
                 texts = [prompt["text"] for prompt in prompts]
-                self._recorder = Recorder(texts, takes, f"{PAGES}{API}/{self._number}/takes/", first)
+                self._recorder = Recorder(texts, takes, f"{RECORDINGS}/{self._number}/takes/", first)
                 self._recorder.on("remove", lambda event: self._delete_take(int(event.args)))
                 with ui.element("div").classes("record-side"):
                     ui.html("What your takes cover", tag="h2", sanitize=False)
@@ -163,8 +171,8 @@ class _RecordingPage:
         self._status = ui.label().props("role=status").classes("record-status")
         with ui.element("div").classes("record-side") as self._finished:
             with ui.row():
-                ui.link("Report", f"{API}/{self._number}/files/{REPORT}", new_tab=True)
-                ui.link("Download the talker", f"{API}/{self._number}/files/{TALKER}")
+                ui.link("Report", f"{FILES}/{self._number}/files/{REPORT}", new_tab=True)
+                ui.link("Download the talker", f"{FILES}/{self._number}/files/{TALKER}")
             with ui.element("div").classes("record-sentence"):
                 sentence = ui.input("First sentence", value=FIRST_SENTENCE).classes("record-wide")
                 ui.button(
@@ -222,7 +230,7 @@ class _RecordingPage:
         self._finished.set_visibility((self._folder / TALKER).is_file())
         self._clip.set_visibility(bool(now[2]))
         if now[2]:
-            self._clip.props(f'src="{PAGES}{API}/{self._number}/files/{CLIP}?{now[2]}"')
+            self._clip.props(f'src="{RECORDINGS}/{self._number}/files/{CLIP}?{now[2]}"')
 
 
 def _escaped(text: str) -> str:
