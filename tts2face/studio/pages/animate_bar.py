@@ -1,16 +1,14 @@
 """The bar of the page "animate": history, playing, views, files, and help."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fastapi import Request as HttpRequest
 from nicegui import ui
 
 from tts2face.render.camera_views import NAMED_VIEWS
 from tts2face.studio.pages.frame import dark_button, heading, icon_button, shown_errors
+from tts2face.studio.pages.open_page import OpenPage
 from tts2face.studio.renders import DONE, RUNNING, WAITING, Render, formats
-
-if TYPE_CHECKING:
-    from tts2face.studio.pages.animate import AnimatePage
 
 CLOCK = 'import("tts2face-studio/clock.js").then((m) => '
 # Keys with the ids of the buttons that they press, and what they do. None of them acts while a text is written.
@@ -58,7 +56,7 @@ KEYS_SCRIPT = """
 class Bar:
     """The bar of a page."""
 
-    def __init__(self, page: "AnimatePage", request: HttpRequest) -> None:
+    def __init__(self, page: OpenPage, request: HttpRequest) -> None:
         self._page = page
         workspace = page.workspace
         with ui.element("header").classes("bar"):

@@ -2,15 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from nicegui import ui
 
 from tts2face.studio.pages.frame import heading, shown_errors
+from tts2face.studio.pages.open_page import OpenPage
 from tts2face.studio.routes import explain
-
-if TYPE_CHECKING:
-    from tts2face.studio.pages.animate import AnimatePage
 
 TOOLS = {"select": ("Select", "near_me"), "brush": ("Brush", "brush"), "eraser": ("Eraser", "auto_fix_normal")}
 N_SHOWN = 6  # examples of a phone
@@ -20,7 +18,7 @@ NOW = 'import("tts2face-studio/clock.js").then((m) => emit(m.clock.time))'
 class Inspector:
     """Tools of the timeline, and what is known of what is chosen."""
 
-    def __init__(self, page: "AnimatePage") -> None:
+    def __init__(self, page: OpenPage) -> None:
         self._page = page
         self._tool, self._style = "select", ""
         self._styles: Sequence[Mapping[str, str]] = ()

@@ -1,6 +1,6 @@
 """The left panel of the page "animate": what is said, by which voice, and which head shows it."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from nicegui import ui
 
@@ -8,9 +8,7 @@ from tts2face.jobs.resource_check import FACE, PALETTE, TALKER
 from tts2face.request import GESTURES, OWN_FACE
 from tts2face.studio.pages.choices import hair_colours, haircuts, identities, languages, models, voices
 from tts2face.studio.pages.frame import heading
-
-if TYPE_CHECKING:
-    from tts2face.studio.pages.animate import AnimatePage
+from tts2face.studio.pages.open_page import OpenPage
 
 TYPING_MS = 350  # of rest after which a text is spoken
 
@@ -18,7 +16,7 @@ TYPING_MS = 350  # of rest after which a text is spoken
 class SpeechPanel:
     """Controls of a project's request and models."""
 
-    def __init__(self, page: "AnimatePage") -> None:
+    def __init__(self, page: OpenPage) -> None:
         self._page = page
         self._controls: dict[str, Any] = {}  # by name of the option
 
