@@ -246,11 +246,12 @@ def _sentences(prepared: PreparedRequest, models: SynthesisModels) -> Iterator[t
         return
 
     said: Counter[str] = Counter()
+    spoken_with = cache(lambda: (replace(request, text="", **NOT_SPOKEN), _entries(prepared)))  # of all sentences
 
     def speak(voice: Voice, sentence: Sentence, request: Request, voices: Voices) -> tuple[SpokenSentence, int, str]:
         text = " ".join(phrase.source for phrase in sentence.utterances)
         spoken = models.memory.recall(
-            lambda: ("speech", sentence.relative(), replace(request, text="", **NOT_SPOKEN), _entries(prepared)),
+            lambda: ("speech", sentence.relative(), spoken_with()),
             lambda: speak_sentence(voice, sentence, request, voices, models.give_way),
             lambda made: made.sound.samples.nbytes + made.speech.waveform.samples.nbytes,
         )
