@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.errors import DataError, InputError
+from tts2face.gesture.easing import interpolate_keys
 from tts2face.gesture.gesture_stream import GestureFields, GestureStream
-from tts2face.gesture.key_curves import ChannelEdit, ExpressionCurve, StrengthCurve, curve_values
+from tts2face.gesture.key_curves import ChannelEdit, ExpressionCurve, StrengthCurve
 from tts2face.gesture.spans import ExpressionSpan, GazeTarget, Nod, StyleSpan
 from tts2face.gesture.timeline import Timeline
 from tts2face.gesture.timeline_file import parse_timeline, timeline_json
@@ -46,15 +47,15 @@ def gestures(palette: Palette, timeline: Timeline, seed: int = 0) -> dict[str, n
 def test_a_curve_passes_its_keys_and_stays_between_neighbours(keys: tuple) -> None:
     times = np.array([time for time, _ in keys])
     values = np.array([value for _, value in keys])
-    np.testing.assert_allclose(curve_values(times, keys), values, atol=1e-12)
-    dense = curve_values(np.linspace(-1.0, 12.0, 400), keys)
+    np.testing.assert_allclose(interpolate_keys(times, keys), values, atol=1e-12)
+    dense = interpolate_keys(np.linspace(-1.0, 12.0, 400), keys)
     assert values.min() - 1e-12 <= dense.min() <= dense.max() <= values.max() + 1e-12
     assert dense[0] == pytest.approx(values[0], abs=1e-12)
     assert dense[-1] == pytest.approx(values[-1], abs=1e-12)
 
 
 def test_a_curve_is_flat_at_its_keys() -> None:
-    low, high = curve_values([0.999, 1.001], ((0.0, 0.0), (1.0, 1.0), (2.0, 0.0)))
+    low, high = interpolate_keys([0.999, 1.001], ((0.0, 0.0), (1.0, 1.0), (2.0, 0.0)))
     assert 1.0 - low < 1e-5
     assert 1.0 - high < 1e-5
 

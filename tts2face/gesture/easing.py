@@ -1,13 +1,12 @@
 """Smooth transitions of spans and key frames."""
 
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tts2face.numeric import smoothstep
 
 FloatArray = NDArray[np.float64]
+Keys = tuple[tuple[float, float], ...]  # seconds, value
 
 
 def span_weights(times: ArrayLike, start: float, end: float, ease_s: float) -> FloatArray:
@@ -28,10 +27,14 @@ def _raised_cosine_integral(share: FloatArray) -> FloatArray:
     return 0.5 * (1 + at + np.sin(np.pi * at) / np.pi)
 
 
-def interpolate_keys(times: ArrayLike, keys: tuple[tuple[float, float], ...]) -> FloatArray:
+def interpolate_keys(times: ArrayLike, keys: Keys) -> FloatArray:
     """(T,) values at T times of a curve through (time, value) keys with zero slope at each; constant outside."""
     seconds = np.asarray(times, np.float64)
-    curve = np.full(seconds.shape, keys[0][1])
-    for (begin, low), (end, high) in pairwise(keys):
-        curve = curve + (high - low) * smoothstep(seconds, begin, end)
+    at, values = np.array(keys).T
+    if len(keys) == 1:
+        return np.full(seconds.shape, values[0])
+    behind = np.clip(np.searchsorted(at, seconds, side="right"), 1, len(at) - 1)
+    before = behind - 1
+    share = smoothstep((seconds - at[before]) / (at[behind] - at[before]))
+    curve: FloatArray = values[before] + (values[behind] - values[before]) * share
     return curve

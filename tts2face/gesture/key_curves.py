@@ -10,15 +10,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TypeVar
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 from lexicon.errors import InputError
 from lexicon.inputs import check_limits
-from tts2face.gesture.easing import FloatArray
+from tts2face.gesture.easing import Keys
 from tts2face.gesture.spans import EXPRESSION_WEIGHT_LIMITS, GAIN_LIMITS, check_expression, check_feature
 
-Keys = tuple[tuple[float, float], ...]
 CHANNEL_OFFSET_LIMITS = (-1000.0, 1000.0)  # weights lie within 2; the head's position is in millimetres
 MAX_KEYS = 100_000  # of one curve: a key at each frame of half an hour
 
@@ -105,21 +101,6 @@ def check_keys(what: str, keys: Sequence[Sequence[float]], limits: tuple[float, 
         if not before < after:
             raise InputError(f"{what} has keys at {before:g} s and then {after:g} s; give times that increase")
     return pairs
-
-
-def curve_values(times: ArrayLike, keys: Keys) -> FloatArray:
-    """(T,) values at T times of the curve through some keys."""
-    seconds = np.asarray(times, np.float64)
-    at = np.array([time for time, _ in keys])
-    values = np.array([value for _, value in keys])
-    if len(keys) == 1:
-        return np.full(seconds.shape, values[0])
-    behind = np.clip(np.searchsorted(at, seconds, side="right"), 1, len(at) - 1)
-    before = behind - 1
-    share = np.clip((seconds - at[before]) / (at[behind] - at[before]), 0.0, 1.0)
-    eased = share * share * (3.0 - 2.0 * share)
-    curve: FloatArray = values[before] + (values[behind] - values[before]) * eased
-    return curve
 
 
 def shift_keys(curve: AnyCurve, seconds: float) -> AnyCurve:

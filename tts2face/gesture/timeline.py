@@ -18,7 +18,6 @@ from tts2face.gesture.key_curves import (
     ExpressionCurve,
     StrengthCurve,
     check_lanes,
-    curve_values,
     override_curves,
     shift_keys,
 )
@@ -157,7 +156,7 @@ class Timeline:
             column = EXPRESSIONS.index(span.expression)
             weights[:, column] += span.weight * span_weights(seconds, span.start, span.end, ONSET_S)
         for curve in self.curves:
-            weights[:, EXPRESSIONS.index(curve.expression)] += curve_values(seconds, curve.keys)
+            weights[:, EXPRESSIONS.index(curve.expression)] += interpolate_keys(seconds, curve.keys)
         return weights
 
     def strength(self, feature: str, times: ArrayLike) -> FloatArray:
@@ -165,7 +164,7 @@ class Timeline:
         seconds, gain = np.atleast_1d(np.asarray(times, np.float64)), self.gains.of(feature)
         for curve in self.strengths:
             if curve.feature == feature:
-                return gain * curve_values(seconds, curve.keys)
+                return gain * interpolate_keys(seconds, curve.keys)
         return np.full(len(seconds), gain)
 
     def apply_gaze(self, times: ArrayLike, gaze: NDArray[np.floating]) -> FloatArray:

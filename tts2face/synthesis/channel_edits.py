@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lexicon.errors import InputError
-from tts2face.gesture.key_curves import ChannelEdit, curve_values
+from tts2face.gesture.easing import interpolate_keys
+from tts2face.gesture.key_curves import ChannelEdit
 from tts2face.synthesis.animated_face import AnimatedFace, FaceMotion
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
@@ -49,5 +50,5 @@ def _offset(motion: Trajectory, edits: Sequence[ChannelEdit], times: np.ndarray)
     values = motion.values.copy()
     for edit in edits:
         if edit.channel in motion.channels:
-            values[:, motion.channels.index(edit.channel)] += curve_values(times, edit.keys).astype(np.float32)
+            values[:, motion.channels.index(edit.channel)] += interpolate_keys(times, edit.keys).astype(np.float32)
     return Trajectory(motion.channels, values, motion.fps)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.face.gesture_transfer import SPEECH_GAINS
+from tts2face.gesture.easing import interpolate_keys
 from tts2face.gesture.gesture_stream import GestureFields, GestureStream, GestureValues
-from tts2face.gesture.key_curves import curve_values
 from tts2face.gesture.perlin_noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import Palette
@@ -131,8 +131,8 @@ class GestureLayer:
 def _digest(history: Hashable, times: NDArray[np.float64], sound: Waveform, timeline: Timeline) -> bytes:
     """Digest of everything on which the gestures of a piece, after those before it, depend."""
     here = timeline.restrict(times[0] - REACH_S, times[-1] + REACH_S)
-    curves = [(one.feature, curve_values(times, one.keys).tobytes()) for one in here.strengths]
-    curves += [(one.expression, curve_values(times, one.keys).tobytes()) for one in here.curves]
+    curves = [(one.feature, interpolate_keys(times, one.keys).tobytes()) for one in here.strengths]
+    curves += [(one.expression, interpolate_keys(times, one.keys).tobytes()) for one in here.curves]
     elements = (dict(here.style), here.spans, here.expressions, here.nods, here.gaze, dict(here.gains.factors))
     found = blake2b(repr((history, elements, curves, sorted(here.seeds.items()))).encode())
     found.update(times.tobytes())
