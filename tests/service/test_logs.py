@@ -100,7 +100,7 @@ def test_a_defect_is_answered_with_its_id_and_logged_with_its_traceback(caplog: 
 class FakePool:
     """A pool whose works are done at once."""
 
-    async def stream(self, work: Any, key: str, **_: Any) -> AsyncIterator[Message]:
+    async def stream(self, work: Any, key: str, *_: Any) -> AsyncIterator[Message]:
         yield Message(1, MessageKind.DATA, b"abc", 2.0)
         yield Message(1, MessageKind.END, b'{"seconds": 2.5, "cpu_s": 0.1}')
 

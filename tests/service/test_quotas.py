@@ -63,7 +63,7 @@ def test_seconds_of_speech_a_day_are_limited() -> None:
 class OnePartPool:
     """A pool that makes 10 s of speech in a part, and then waits for ever."""
 
-    async def stream(self, work: Work, key: str, **_: Any) -> AsyncIterator[Message]:
+    async def stream(self, work: Work, key: str, *_: Any) -> AsyncIterator[Message]:
         yield Message(1, MessageKind.DATA, b"abc", 10.0)
         await asyncio.Event().wait()
 
@@ -125,7 +125,7 @@ def test_keys_take_turns() -> None:
         served: list[str] = []
 
         async def work(key: str) -> None:
-            process = await pool._take(2.0, key)
+            process = await pool._take(2.0, key, "")
             served.append(key)
             await asyncio.sleep(0)
             pool._release(process, 2.0)
@@ -148,7 +148,7 @@ def test_the_load_of_no_work_is_zero() -> None:
     async def load() -> float:
         pool = Pool(PoolSettings(n_processes=1))
         pool.processes = [FakeProcess()]  # type: ignore[list-item]
-        taken = [await pool._take(0.1, "a") for _ in range(7)]
+        taken = [await pool._take(0.1, "a", "") for _ in range(7)]
         for process in taken:
             pool._release(process, 0.1)
         return pool.processes[0].load

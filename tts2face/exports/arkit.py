@@ -114,7 +114,7 @@ def arkit_projection(channels: tuple[str, ...], face: Face | None, name: str) ->
 def _inner_products(
     face: Face, helpers: NDArray[np.int64], others: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    own = face.shapes[helpers].reshape(len(helpers), -1)
-    curvature = (own @ own.T).astype(np.float64)
+    own = face.shapes[helpers].reshape(len(helpers), -1).astype(np.float64)  # the sums of single precision differ
+    curvature = own @ own.T  # with the number of threads
     curvature += RIDGE * float(np.trace(curvature)) / len(curvature) * np.eye(len(curvature))
-    return curvature, (own @ face.shapes[others].reshape(len(others), -1).T).astype(np.float64)
+    return curvature, own @ face.shapes[others].reshape(len(others), -1).astype(np.float64).T
