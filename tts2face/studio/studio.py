@@ -17,8 +17,9 @@ from tts2face.service.synthesis.work import Work
 from tts2face.storage.files import translate_disk_errors, write_atomically
 from tts2face.studio.bundle import PieceMemory
 from tts2face.studio.renders import RenderQueue
-from tts2face.studio.requests import data_of
+from tts2face.studio.requests import data_of, studio_folder
 from tts2face.studio.store import ProjectEntry, ProjectStore
+from tts2face.studio.styles import Styles
 from tts2face.studio.workspace import Workspace
 
 MB = 1_000_000
@@ -31,10 +32,11 @@ class Studio:
 
     def __init__(self, state: ServiceState) -> None:
         self.state = state
-        self._folder: Path = state.settings.data_folder / "studio"
+        self._folder: Path = studio_folder(state)
         self.store = ProjectStore(self._folder)
         self.memory = PieceMemory(state.settings.previews_mb * MB)
         self.renders = RenderQueue(state)
+        self.styles = Styles(self)
         self._open: dict[tuple[str, str], Workspace] = {}
         self._opening = asyncio.Lock()
         self._preparing: asyncio.Task[None] | None = None
@@ -128,8 +130,13 @@ class Studio:
                 await asyncio.to_thread(_keep_last, path.parent, MAX_FACES)
         return path
 
+    def open_projects(self, key: ApiKey) -> list[Workspace]:
+        """Open projects of a key."""
+        return [one for (owner, _), one in self._open.items() if owner == key.name]
+
     async def close(self) -> None:
         """Save all projects, and end what is being made."""
+        await self.styles.close()
         if self._preparing is not None:
             self._preparing.cancel()
         await self.renders.close()

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.service.synthesis import project_tasks
+from tts2face.service.synthesis import project_tasks, style_tasks
 from tts2face.service.synthesis.live_task import listen, live
 from tts2face.service.synthesis.messages import Event, Wait
 from tts2face.service.synthesis.work import Inputs, Work
@@ -52,4 +52,6 @@ TASKS: Mapping[str, Callable[["Session", Work, Inputs], Iterator[Chunk | Event |
     "project-file": project_tasks.project_file,
     "project-export": project_tasks.project_export,
     "face": project_tasks.face_file,
+    "swatch": style_tasks.swatch,
+    "take": style_tasks.take,
 }
