@@ -100,10 +100,10 @@ class PaletteStore:
 
     def take(self, owner: str) -> Path | None:
         """The take of which a style is to be made."""
-        return next((file for file in self._take_folder(owner).glob("take.*")), None)
+        return next((file for file in self._take_folder(owner).glob("take.*") if file.suffix in SUFFIXES), None)
 
-    def put_take(self, owner: str, source: Path, suffix: str) -> Path:
-        """Keep a file, which is moved, as the take in place of an earlier one.
+    def put_take(self, owner: str, source: Path, suffix: str, sound: Path | None = None) -> Path:
+        """Keep a file, which is moved, as the take in place of an earlier one; the sound of a table is copied.
 
         Raises
         ------
@@ -117,6 +117,8 @@ class PaletteStore:
         with translate_disk_errors(target):
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.move(source, target)
+            if sound is not None:
+                shutil.copyfile(sound, target.with_suffix(".wav"))
         return target
 
     def delete_take(self, owner: str) -> None:

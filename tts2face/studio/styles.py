@@ -71,8 +71,8 @@ class Styles:
             self._start(key, CHECKING, lambda one: self._check(key, one))
         return found
 
-    async def add_take(self, key: ApiKey, source: Path, suffix: str) -> None:
-        """Check a new take, which replaces an earlier one; the file is moved.
+    async def add_take(self, key: ApiKey, source: Path, suffix: str, sound: Path | None = None) -> None:
+        """Check a new take, which replaces an earlier one; the file is moved, the sound of a table is copied.
 
         Raises
         ------
@@ -81,7 +81,7 @@ class Styles:
         """
         self.check_scope(key)
         await self._end_work(key)
-        await asyncio.to_thread(self.store.put_take, key.name, source, suffix)
+        await asyncio.to_thread(self.store.put_take, key.name, source, suffix, sound)
         self._works[key.name] = TakeWork()
         self._start(key, CHECKING, lambda one: self._check(key, one))
 

@@ -59,6 +59,7 @@ class PalettePage:
             heading(1, "Styles")
             ui.element("span").classes("grow")
             ui.link("Projects", "/").classes("bar-link")
+            ui.link("Puppetry", "/puppet").classes("bar-link")
             ui.link("Record your own talker", "/record").classes("bar-link")
             dark_button(request)
         with ui.element("div").classes("page-wide") as self._main:

@@ -49,6 +49,7 @@ class ProjectsPage:
             heading(1, "tts2face studio")
             ui.element("span").classes("grow")
             ui.link("Styles", "/palette").classes("bar-link")
+            ui.link("Puppetry", "/puppet").classes("bar-link")
             ui.link("Record your own talker", "/record").classes("bar-link")
             dark_button(request)
             if self._studio.state.keys:
