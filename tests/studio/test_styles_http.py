@@ -1,6 +1,7 @@
 """Own styles over HTTP: made of a take, mixed, painted in a project, renamed, deleted, and nothing of them left."""
 
 import io
+import json
 import time
 import zipfile
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.corpus_tools.test_take_process import write_table
 from tests.studio.test_projects_http import create, edit, preview
 from tts2face.models.palette import load_palette, read_palette
 from tts2face.project.project_file import load_project
@@ -100,12 +102,10 @@ def test_a_new_name_and_a_removal_reach_projects(owned: httpx.Client, data: Path
     np.testing.assert_array_equal(preview(owned, number)[1], before)
 
 
-def test_a_take_becomes_a_style_and_is_deleted(
-    owned: httpx.Client, data: Path, tmp_path: Path, shared_recordings: Path
-) -> None:
-    table = (shared_recordings / "livelink" / "testset_arkit61_60fps.csv").read_text().splitlines()
+def test_a_take_becomes_a_style_and_is_deleted(owned: httpx.Client, data: Path, tmp_path: Path) -> None:
+    table = write_table(tmp_path / "take.csv", 7).read_text().splitlines()
     kind = {"Content-Type": "text/csv"}
-    owned.put("/api/styles/take/0", content="\n".join(table[:60]), headers=kind)
+    owned.put("/api/styles/take/0", content="\n".join(table[:32]), headers=kind)
     short = wait_for_take(owned)
     assert (short["state"], short["advice"]) == (
         "refused", "the face is seen for 1.0 s, limit 2.5 s; record a longer take"
@@ -113,7 +113,7 @@ def test_a_take_becomes_a_style_and_is_deleted(
     answer = owned.post("/api/styles", json={"name": "short"})
     assert answer.status_code == 400
     assert "record it again, or upload another one" in answer.json()["error"]["message"]
-    owned.put("/api/styles/take/0", content="\n".join(table[:401]), headers=kind)
+    owned.put("/api/styles/take/0", content="\n".join(table), headers=kind)
     assert wait_for_take(owned)["state"] == "weak"
     assert owned.post("/api/styles", json={"name": "delighted"}).status_code == 400
     assert owned.post("/api/styles", json={"name": "live one"}).status_code == 201
@@ -150,6 +150,16 @@ def test_wrong_styles(owned: httpx.Client, change: dict[str, Any], reason: str) 
     answer = owned.post("/api/styles", json=change)
     assert answer.status_code == 400
     assert reason in answer.json()["error"]["message"]
+
+
+def test_a_mix_is_seen_before_it_is_kept(owned: httpx.Client) -> None:
+    def drawn(mixed: Any) -> httpx.Response:
+        return owned.get("/api/styles/mix.webp", params={"mix": json.dumps(mixed)})
+
+    annoyed = drawn({"source": "grid_s1", "shares": {"annoyed": 1}}).content
+    assert annoyed == owned.get("/api/styles/annoyed/swatch.webp").content
+    assert drawn(MIX).content != annoyed
+    assert "the mix cannot be read" in drawn([]).json()["error"]["message"]
 
 
 def test_shipped_styles_stay(owned: httpx.Client) -> None:

@@ -21,6 +21,7 @@ HEADER = struct.Struct("<dI")  # as the process reads it
 TIME = struct.Struct("<d")  # before each JPEG of a client
 MAX_PICTURE_BYTES = 1 << 20
 MAX_LIVE_S = 3600.0
+ENDING_S, LOOK_S = 3.0, 0.05  # for which the end of an earlier connection is waited for, and between looks
 MAX_ANSWER = 1 << 16
 REFUSED = 1008  # close code of WebSockets
 
@@ -31,7 +32,7 @@ async def follow_camera(connection: WebSocket, key: ApiKey, live: set[str]) -> N
     reason = ""
     if "build" not in key.scopes:
         reason = f"the key {key.name} lacks the scope build, which a camera needs; use another key"
-    elif key.name in live:
+    elif not await _is_free(key.name, live):
         reason = "the camera is live in another tab; stop it there first"
     if reason:
         await connection.send_text(json.dumps({"error": "InputError", "message": reason}))
@@ -48,6 +49,15 @@ async def follow_camera(connection: WebSocket, key: ApiKey, live: set[str]) -> N
             await connection.close()
     finally:
         live.discard(key.name)
+
+
+async def _is_free(owner: str, live: set[str]) -> bool:
+    """Whether no camera of an owner is live; one that is ending, as of a page that is loaded anew, is waited for."""
+    for _ in range(round(ENDING_S / LOOK_S)):
+        if owner not in live:
+            return True
+        await asyncio.sleep(LOOK_S)
+    return owner not in live
 
 
 async def _follow(connection: WebSocket) -> None:

@@ -5,11 +5,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body
+from fastapi import APIRouter, Body, Query
 from fastapi import Request as HttpRequest
 from fastapi.responses import FileResponse, Response
 
 from lexicon.errors import InputError, Tts2faceError
+from lexicon.inputs import parse_json
 from tts2face import catalogue
 from tts2face.models.palette_editing import StyleMix
 from tts2face.service.access.page_headers import STYLES
@@ -99,11 +100,11 @@ def download_palette(request: HttpRequest) -> FileResponse:
     return FileResponse(path, filename=FILE)
 
 
-@router.post("/mix.webp")
-async def draw_mix(request: HttpRequest, mix: Annotated[dict[str, Any], Body(embed=True)]) -> Response:
-    """Moving picture of a mix that is not kept."""
+@router.get("/mix.webp")
+async def draw_mix(request: HttpRequest, mix: Annotated[str, Query(max_length=4000)]) -> Response:
+    """Moving picture of a mix, an object of JSON, that is not kept."""
     try:
-        content = await _styles(request).draw_mix(request.state.key, parse_mix(mix))
+        content = await _styles(request).draw_mix(request.state.key, parse_mix(parse_json(mix, "the mix")))
     except Tts2faceError as wrong:
         raise as_refused(wrong) from wrong
     return Response(content, media_type="image/webp")
@@ -116,7 +117,7 @@ async def swatch(request: HttpRequest, name: str) -> FileResponse:
         path = await _styles(request).swatch(request.state.key, name)
     except Tts2faceError as wrong:
         raise as_refused(wrong) from wrong
-    return FileResponse(path, media_type="image/webp", headers=NO_STORE)
+    return FileResponse(path, media_type="image/webp", headers={"Cache-Control": "private, max-age=86400"})
 
 
 @router.patch("/{name}", status_code=204)

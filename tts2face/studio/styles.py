@@ -63,6 +63,7 @@ class Styles:
         self.store = PaletteStore(studio.folder)
         self._works: dict[str, TakeWork] = {}
         self._drawing: dict[Path, asyncio.Lock] = {}
+        self._drawn: dict[str, tuple[StyleMix, bytes]] = {}  # last mixes of owners
 
     def work(self, key: ApiKey) -> TakeWork:
         """What is done with the key's take; one that came before the server started is checked anew."""
@@ -153,15 +154,19 @@ class Styles:
         async with self._drawing.setdefault(path, asyncio.Lock()):
             if not path.is_file():
                 content = await self._draw(key, {"style": name})
+                (await asyncio.to_thread(self.store.read, key.name)).require(name)  # it may have been deleted meanwhile
                 with translate_disk_errors(path):
                     path.parent.mkdir(parents=True, exist_ok=True)
                 await asyncio.to_thread(write_atomically, path, content)
         return path
 
     async def draw_mix(self, key: ApiKey, mix: StyleMix) -> bytes:
-        """Moving picture of a style that is not kept yet; errors as `mix_styles`."""
-        mix_styles(await asyncio.to_thread(self.store.read, key.name), mix)
-        return await self._draw(key, {"mix": asdict(mix)})
+        """Moving picture of a style that is not kept yet, the last one from memory; errors as `mix_styles`."""
+        last = self._drawn.get(key.name)
+        if last is None or last[0] != mix:
+            mix_styles(await asyncio.to_thread(self.store.read, key.name), mix)
+            last = self._drawn[key.name] = mix, await self._draw(key, {"mix": asdict(mix)})
+        return last[1]
 
     def check_scope(self, key: ApiKey) -> None:
         """Refuse keys that may not build models of people."""
@@ -222,6 +227,7 @@ class Styles:
 
     async def _change(self, key: ApiKey, change: Callable[[Palette], Palette]) -> None:
         await asyncio.to_thread(self.store.change, key.name, change)
+        self._drawn.pop(key.name, None)
         for one in self._studio.open_projects(key):
             one.tell_styles()
 

@@ -95,6 +95,16 @@ async def render(request: HttpRequest, number: str) -> dict[str, str]:
     return {"state": "waiting"}
 
 
+@router.post("/{number}/style", status_code=204)
+async def make_style(request: HttpRequest, number: str) -> Response:
+    """Make the take the one of which a style is made (`tts2face.studio.style_routes`)."""
+    try:
+        await _takes(request).make_style_take(request.state.key, number)
+    except Tts2faceError as wrong:
+        raise as_refused(wrong) from wrong
+    return Response(status_code=204)
+
+
 @router.get("/{number}/files/{name}")
 def download(request: HttpRequest, number: str, name: str) -> FileResponse:
     """Table, sound or film of a take."""

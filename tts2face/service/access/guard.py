@@ -168,8 +168,9 @@ class _BoundedBody:
         self._deadline = time.monotonic() + max_s
 
     def check(self, headers: dict[bytes, bytes]) -> None:
-        """Refuse a body whose stated length is too large."""
+        """Refuse a body whose stated length is too large; what has none is complete, however late it is asked for."""
         length = headers.get(b"content-length", b"0")
+        self._is_complete = length == b"0" and b"transfer-encoding" not in headers
         if not length.isdigit() or int(length) > self._max_bytes:
             raise self._too_large()
 

@@ -1,13 +1,16 @@
 """Sliders from which a derived style is mixed, with a moving picture of what they make."""
 
-import base64
+import json
+from dataclasses import asdict
 from typing import Any
+from urllib.parse import quote
 
 from nicegui import ui
 
 from tts2face.models.palette import EXPRESSIONS
 from tts2face.models.palette_editing import StyleMix
 from tts2face.service.access.keys import ApiKey
+from tts2face.service.access.page_headers import STYLES
 from tts2face.studio.pages.frame import heading, shown_errors
 from tts2face.studio.styles import Styles
 
@@ -103,7 +106,9 @@ class MixPanel:
             while self._is_stale:
                 self._is_stale = False
                 with shown_errors():
-                    content = base64.b64encode(await self._styles.draw_mix(self._key, self.mix())).decode()
-                    self._picture.style(f"background-image: url(data:image/webp;base64,{content})")
+                    mix = self.mix()
+                    await self._styles.draw_mix(self._key, mix)  # the page gets it at once, without a gap
+                    address = f"{STYLES}/mix.webp?mix={quote(json.dumps(asdict(mix)))}"
+                    self._picture.style(f"background-image: url({address})")
         finally:
             self._is_drawing = False

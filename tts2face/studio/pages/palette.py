@@ -52,6 +52,8 @@ class PalettePage:
     def __init__(self, studio: Studio, key: ApiKey) -> None:
         self._studio, self._key, self._styles = studio, key, studio.styles
         self._shown: object = None
+        self._pictures: dict[str, ui.element] = {}  # of the styles
+        self._missing: list[str] = []  # styles whose picture is not made yet
 
     def build(self, request: HttpRequest) -> None:
         """Build the page."""
@@ -183,6 +185,7 @@ class PalettePage:
         own = [one for one in listed if one.name not in shipped().names]
         self._download.set_visibility(bool(own))
         self._cards.clear()
+        self._pictures = {}
         with self._cards:
             if not own:
                 ui.label(
@@ -198,12 +201,33 @@ class PalettePage:
                     if one not in own:
                         self._card(one, version, is_own=False)
 
+        self._missing = [name for name in self._pictures if not store.swatch(self._key.name, name).is_file()]
+        if self._missing:
+            ui.timer(0.0, lambda: self._draw_pictures(version), once=True)
+
+    async def _draw_pictures(self, version: int) -> None:
+        """Show pictures that are not made yet, one after the other."""
+        missing = self._missing
+        while missing:
+            name = missing.pop(0)
+            with shown_errors():
+                await self._styles.swatch(self._key, name)
+            if missing is not self._missing:
+                return  # the styles have changed meanwhile
+            self._show_picture(name, version)
+
+    def _show_picture(self, name: str, version: int) -> None:
+        address = f"{STYLES}/{quote(name, safe='')}/swatch.webp?{version}"
+        self._pictures[name].style(f"background-image: url({address})")
+
     def _card(self, style: catalogue.StyleEntry, version: int, *, is_own: bool) -> None:
         name = style.name
         with ui.element("article").classes("swatch-card" + " own" * is_own):
-            address = f"{STYLES}/{quote(name, safe='')}/swatch.webp?{version if is_own else 0}"
-            picture = ui.element("span").classes("swatch").style(f"background-image: url({address})")
+            picture = ui.element("span").classes("swatch")
             picture.props(f'role=img aria-label="Moving picture of {escape(name)}"')
+            self._pictures[name] = picture
+            if self._styles.store.swatch(self._key.name, name).is_file():
+                self._show_picture(name, version)
             heading(3, name)
             summary = style.summary if style.source is None or not is_own else f"{style.summary}, from {style.source}"
             ui.html(escape(summary), sanitize=False, tag="p").props(f'title="{escape(summary)}"')
