@@ -64,7 +64,8 @@ def test_a_camera_drives_the_head_and_its_take_becomes_a_style(page: Browser, da
     page.wait("return document.body.innerText.includes('gestures of 20 s and more repeat less')", seconds=60)
     page.type("Name of the style", "from the camera")
     page.click("Make the style")
-    page.wait("return !!document.querySelector('[aria-label=\"Moving picture of from the camera\"]')", seconds=120)
+    page.wait("return document.querySelector('[aria-label=\"Moving picture of from the camera\"]')"
+              "?.style.backgroundImage.includes('swatch.webp')", seconds=120)  # fmt: skip
     page.picture(SCREENSHOTS / "palette.png")
     own = data / "studio" / "palettes" / "local.styles"
     assert "from the camera" in read_palette(own / "my-styles.palette").styles

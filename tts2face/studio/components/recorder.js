@@ -34,7 +34,7 @@ export default {
       </div>
       <div class="recorder-level" role="meter" aria-label="Level of the microphone" aria-valuemin="0" aria-valuemax="100"
         :aria-valuenow="level"><span :style="{ width: level + '%' }" :class="{ loud: isLoud }"></span></div>
-      <p class="recorder-number">{{ isSingle ? '' : `Prompt ${at + 1} of ${prompts.length}` }}
+      <p class="recorder-number">{{ isSingle ? '' : 'Prompt ' + (at + 1) + ' of ' + prompts.length }}
         <span v-if="stateOf(at)" :class="'recorder-state ' + stateOf(at)">{{ names[stateOf(at)] }}</span></p>
       <p class="recorder-prompt" lang="" aria-live="polite">{{ prompts[at] }}</p>
       <div class="recorder-buttons">

@@ -31,7 +31,7 @@ from tts2face.studio.styles import CHECKING, MAKING, REFUSED, named
 
 REFRESH_S = 0.4
 LONGEST_S = 120.0  # of a recorded take
-PROMPT = "Speak for 20 seconds or more as the style shall be: tell what you did yesterday, or read something aloud."
+PROMPT = "Speak for 20 seconds or more in the manner of the style: tell what you did yesterday, or read aloud."
 ANY_TAKE = ",".join(sorted(SUFFIXES))
 
 
