@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
-from corpus_tools.evaluation.measures import correlation, speech_frames
 from corpus_tools.evaluation.methods import build_methods
 from corpus_tools.evaluation.reference import LipCurves
 from corpus_tools.recordings.audio_video_sync import LAGS_S, NEAR_S, lag_correlations
@@ -33,6 +32,7 @@ from corpus_tools.run_options import RunOptions
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence
+from tts2face.exemplar.motion_measures import correlation, speech_frames
 from tts2face.models.landmarks import lip_opening
 from tts2face.speech.forced_alignment import Aligner
 from tts2face.types import Waveform
