@@ -14,7 +14,7 @@ from lexicon.errors import InputError
 from tts2face.service.access.page_headers import PAGES
 from tts2face.service.app import NO_TELEMETRY
 from tts2face.service.state import ServiceState
-from tts2face.studio import routes
+from tts2face.studio import comparison_routes, routes
 from tts2face.studio.pages import animate, login, projects
 from tts2face.studio.pages.record import add_record_page
 from tts2face.studio.recordings import Recordings
@@ -30,6 +30,7 @@ def mount_studio(app: FastAPI, state: ServiceState) -> None:
     app.include_router(login.make_router(state))
     app.state.studio = studio
     app.include_router(routes.router)
+    app.include_router(comparison_routes.router)
     projects.register(studio)
     animate.register(studio)
     recordings = add_record_page(app, studio.folder, _recording_owner)
