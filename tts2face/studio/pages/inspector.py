@@ -6,6 +6,7 @@ from typing import Any
 
 from nicegui import ui
 
+from tts2face.studio.pages.compare_panel import ComparePanel
 from tts2face.studio.pages.examples import Examples
 from tts2face.studio.pages.frame import heading
 from tts2face.studio.pages.open_page import OpenPage
@@ -41,9 +42,10 @@ class Inspector:
             )
         self._own_words = ui.label().classes("quiet")
         self._examples = Examples(self._page)
+        self.compare = ComparePanel(self._page)
         heading(2, "Notes")
         self._notes = ui.element("div").props("role=status")
-        self._enabled = [self._word, self._phones, self._keep, set_word, forget]
+        self._enabled = [self._word, self._phones, self._keep, set_word, forget, self.compare]
         self.refresh()
         self.show_notes()
 
