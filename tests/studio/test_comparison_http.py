@@ -11,6 +11,7 @@ import pytest
 from tests.studio.test_projects_http import create, edit, preview
 from tts2face.session import Session
 from tts2face.studio.bundle import read_bundle
+from tts2face.studio.studio import MAX_IDLE
 from tts2face.types import HEAD_CHANNELS
 
 TEXT = "Bob may move. Five maps were there."
@@ -91,6 +92,11 @@ def test_a_kept_project_stays_as_it_was(studio: httpx.Client, data: Path) -> Non
     assert not found["is_same_time"]
     assert row(found, "opening")["r"] is None  # other times
     assert 0 < found["dtw_cost"] < 1.5  # standard deviations: the same words
+    for other in [studio.post("/api/projects", json={"text": "Hi."}).json()["id"] for _ in range(MAX_IDLE + 1)]:
+        studio.get(f"/api/projects/{other}/project.json")
+    again = studio.get(f"/api/projects/{number}/comparison").json()  # the project had been closed, and is read again
+    assert (again["kind"], again["label"], again["is_ready"]) == ("kept", "first", False)
+    np.testing.assert_array_equal(compared(studio, number)[1], before)
 
 
 def test_a_recording_is_compared_with_lips_made_from_its_words(

@@ -14,8 +14,8 @@ from lexicon.errors import InputError
 from tts2face.service.access.page_headers import PAGES
 from tts2face.service.app import NO_TELEMETRY
 from tts2face.service.state import ServiceState
-from tts2face.studio import comparison_routes, routes
-from tts2face.studio.pages import animate, login, projects
+from tts2face.studio import comparison_routes, report_routes, routes
+from tts2face.studio.pages import animate, login, projects, reports
 from tts2face.studio.pages.record import add_record_page
 from tts2face.studio.recordings import Recordings
 from tts2face.studio.studio import Studio
@@ -31,8 +31,10 @@ def mount_studio(app: FastAPI, state: ServiceState) -> None:
     app.state.studio = studio
     app.include_router(routes.router)
     app.include_router(comparison_routes.router)
+    app.include_router(report_routes.router)
     projects.register(studio)
     animate.register(studio)
+    reports.register(studio)
     recordings = add_record_page(app, studio.folder, _recording_owner)
     _disable_telemetry()
     pages_app.config.socket_io_js_transports = ["websocket"]

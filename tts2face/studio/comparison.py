@@ -6,6 +6,7 @@ import shutil
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,9 +79,11 @@ class Comparison:
         found = parse_reference(content, self._workspace.folder)
         if found.project is not None:
             raise InputError("a project is kept as it is now; give the kind kept without a project")
-        for part, options in (("request", found.request), ("models", found.models)):
+        for part in ("request", "models"):
+            options = getattr(found, part)
             if options:
-                await check_options(self._state, self._workspace.key, self._workspace.folder, part, options)
+                checked = await check_options(self._state, self._workspace.key, self._workspace.folder, part, options)
+                found = replace(found, request=checked) if part == "request" else replace(found, models=checked)
         if found.kind == TAKE and not (self._folder / TAKE_FILE).is_file():
             raise InputError("there is no take; import a Live Link file first")
         reference_project(found, self._workspace.project)

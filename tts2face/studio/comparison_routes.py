@@ -72,6 +72,9 @@ async def comparison_preview(
         comparison.follow()
         await comparison.preview.wait(wait)
         content = comparison.preview.bundle(have) if comparison.is_ready else None
+        if content is None and comparison.preview.is_running:  # contents that were dropped are made again
+            await comparison.preview.wait(WAIT_S if comparison.is_ready else 0.0)
+            content = comparison.preview.bundle(have) if comparison.is_ready else None
         if content is None:
             raise RefusedError(409, "not_ready", comparison.error or NOT_READY)
         return Response(content, media_type="application/octet-stream")

@@ -47,6 +47,7 @@ class ProjectsPage:
         with ui.element("header").classes("bar"):
             heading(1, "tts2face studio")
             ui.element("span").classes("grow")
+            ui.link("Reports", "/reports").classes("bar-link")
             ui.link("Record your own talker", "/record").classes("bar-link")
             dark_button(request)
             if self._studio.state.keys:
