@@ -1,6 +1,7 @@
 """Checks of the values in parsed JSON; a wrong one is refused with its name, itself, and what to give."""
 
 import json
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
@@ -11,7 +12,9 @@ EXPECTED: Mapping[type, str] = MappingProxyType({
     float: "a number",
     int: "a whole number",
     str: "a text in quotes",
+    bool: "true or false",
     list: "a list in square brackets",
+    dict: "an object in curly brackets",
 })  # fmt: skip
 
 
@@ -52,11 +55,11 @@ def check_type(name: str, value: Any, kind: type) -> Any:
     Raises
     ------
     InputError
-        It has another type, or is too large for a float.
+        It has another type, or is infinite or too large for a float.
     """
-    if kind is float and isinstance(value, int | float) and not isinstance(value, bool):
-        return _finite(name, value)
-    if kind is not float and isinstance(value, kind) and not isinstance(value, bool):
+    if kind is float and is_number(value):
+        return _as_float(name, value)
+    if kind is not float and type(value) is kind:
         return value
     raise InputError(f"{name} must be {EXPECTED[kind]}, not {format_value(value)}")
 
@@ -66,13 +69,17 @@ def check_list(name: str, value: Any, kind: type) -> list[Any]:
     return [check_type(f"each value of {name}", one, kind) for one in check_type(name, value, list)]
 
 
+def is_number(value: Any) -> bool:
+    """Whether a value is a number of JSON, which has no infinity, and is no boolean."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and -math.inf < value < math.inf
+
+
 def format_value(value: Any) -> str:
     """The beginning of a value, for messages."""
     return json.dumps(value, ensure_ascii=False)[:40]
 
 
-def _finite(name: str, value: float) -> float:
-    """A number as JSON has them; infinity is only ever our own default."""
+def _as_float(name: str, value: float) -> float:
     try:
         return float(value)
     except OverflowError as huge:

@@ -123,16 +123,15 @@ def _parse_each(place: str, content: Any, make: Callable[[Any], Made]) -> list[M
 
 def _parse_spans(content: Any) -> tuple[StyleSpan, ...]:
     parts = check_object(content, {"feature": str, "style": str, "start": float}, {"end": math.inf})
-    end = check_type("end", parts["end"], float)
     return tuple(
-        StyleSpan(feature, parts["style"], parts["start"], end) for feature in expand_feature(parts["feature"])
+        StyleSpan(feature, parts["style"], parts["start"], _end(parts)) for feature in expand_feature(parts["feature"])
     )
 
 
 def _parse_expression(content: Any) -> ExpressionSpan:
     parts = check_object(content, {"expression": str, "weight": float}, {"start": 0.0, "end": math.inf})
-    start, end = (check_type(name, parts[name], float) for name in ("start", "end"))
-    return ExpressionSpan(parts["expression"], parts["weight"], start, end)
+    start = check_type("start", parts["start"], float)
+    return ExpressionSpan(parts["expression"], parts["weight"], start, _end(parts))
 
 
 def _parse_nod(content: Any) -> Nod:
@@ -142,8 +141,13 @@ def _parse_nod(content: Any) -> Nod:
 
 def _parse_gaze(content: Any) -> GazeTarget:
     parts = check_object(content, {"down_deg": float, "left_deg": float}, {"start": 0.0, "end": math.inf})
-    start, end = (check_type(name, parts[name], float) for name in ("start", "end"))
-    return GazeTarget(parts["down_deg"], parts["left_deg"], start, end)
+    start = check_type("start", parts["start"], float)
+    return GazeTarget(parts["down_deg"], parts["left_deg"], start, _end(parts))
+
+
+def _end(parts: Mapping[str, Any]) -> float:
+    """End of a span; infinite, which JSON cannot say, only where none is given."""
+    return math.inf if parts["end"] == math.inf else float(check_type("end", parts["end"], float))
 
 
 def _parse_curve(kind: Callable[[str, Any], AnyCurve], owner: str, content: Any) -> AnyCurve:
