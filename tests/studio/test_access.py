@@ -81,12 +81,19 @@ def test_a_key_sees_its_own_projects_only(closed: RunningService, keys: dict[str
         number = ann.post("/api/projects", json={"text": "Hello."}).json()["id"]
         assert number in ann.get("/api/projects").text
         assert number not in bob.get("/api/projects").text
-        for path in ("preview", "project.json", "face.glb", "picture.png?time=0", "explanation?time=0", "renders"):
+        paths = ("preview", "project.json", "face.glb", "picture.png?time=0", "explanation?time=0", "renders")
+        for path in (*paths, "comparison", "comparison/preview", "comparison/measures", "recordings"):
             assert bob.get(f"/api/projects/{number}/{path}").status_code == 404
         change = {"edit": {"kind": "name", "name": "x"}}
         assert bob.post(f"/api/projects/{number}/edits", json=change).status_code == 404
         assert bob.delete(f"/api/projects/{number}").status_code == 404
         assert "cannot be opened" in bob.get(f"/animate/{number}").text
+        kept = {"reference": {"kind": "kept"}}
+        assert bob.put(f"/api/projects/{number}/comparison", json=kept).status_code == 404
+        report = ann.post("/api/reports", json={"kind": "gestures", "model": "starter"}).json()["id"]
+        assert bob.get("/api/reports").json() == []
+        assert bob.delete(f"/api/reports/{report}").status_code == 404
+        assert ann.delete(f"/api/reports/{report}").status_code == 204
 
 
 def test_a_key_without_speak_makes_no_project(closed: RunningService, keys: dict[str, str]) -> None:

@@ -18,6 +18,7 @@ from tests.service.conftest import RunningService
 from tts2face.project.project_file import load_project
 from tts2face.session import Session
 from tts2face.studio.bundle import read_bundle
+from tts2face.studio.lip_strips import opening_mm
 
 TEXT = "Bob may move. Five maps were there."
 Bundle = tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray]
@@ -206,6 +207,10 @@ def test_a_phone_is_explained_and_its_example_excluded(studio: httpx.Client, num
     phone = studio.get(address, params=middle).json()["phone"]
     assert phone["phone"] == label
     best = phone["tokens"][0]
+    openings = [[opening_mm(lips) for lips in one["outlines"]] for one in phone["tokens"]]
+    assert np.median([one[2] for one in openings]) < 2.0  # mm: recorded lips of an m are closed in its middle
+    assert len(phone["made"]) == len(openings[0]) == 5
+    assert opening_mm(phone["made"][2]) < 1.0
     edit(studio, number, {"kind": "exclude", "utterance": best["utterance"], "start": best["start"], "on": True})
     again = studio.get(address, params=middle).json()["phone"]["tokens"]
     assert (best["utterance"], best["start"]) not in {(one["utterance"], one["start"]) for one in again}

@@ -17,6 +17,7 @@ from tts2face.service.synthesis.work import Work
 from tts2face.storage.files import translate_disk_errors, write_atomically
 from tts2face.studio.bundle import PieceMemory
 from tts2face.studio.renders import RenderQueue
+from tts2face.studio.reports import Reports
 from tts2face.studio.requests import data_of, studio_folder
 from tts2face.studio.store import ProjectEntry, ProjectStore
 from tts2face.studio.styles import Styles
@@ -38,6 +39,7 @@ class Studio:
         self.memory = PieceMemory(state.settings.previews_mb * MB)
         self.renders = RenderQueue(state)
         self.styles, self.takes = Styles(self), Takes(self)
+        self.reports = Reports(state.library, self._folder)
         self._open: dict[tuple[str, str], Workspace] = {}
         self._opening = asyncio.Lock()
         self._preparing: asyncio.Task[None] | None = None
@@ -149,6 +151,7 @@ class Studio:
         if self._preparing is not None:
             self._preparing.cancel()
         await self.renders.close()
+        await self.reports.close()
         for one in self._open.values():
             await one.close()
 

@@ -2,7 +2,7 @@
 
 import { clock } from "tts2face-studio/clock.js";
 import { metrics, Meter } from "tts2face-studio/metrics.js";
-import { loadPreview, preview } from "tts2face-studio/preview.js";
+import { comparison, loadPreview, preview, sides } from "tts2face-studio/preview.js";
 import { StageScene } from "tts2face-studio/stage_scene.js";
 import { addStyle } from "tts2face-studio/style.js";
 
@@ -19,6 +19,7 @@ export default {
       <canvas ref="canvas" role="img" tabindex="0" :aria-label="label" @keydown="onKey"></canvas>
       <img v-if="picture" class="studio-picture" :src="picture" alt="Final picture of this instant, drawn by the renderer">
       <p v-if="message" class="studio-message" role="status">{{ message }}</p>
+      <p v-if="side" class="studio-side" role="status">{{ side }}</p>
       <div class="studio-views" role="group" aria-label="Camera">
         <button v-for="(text, name) in views" :key="name" type="button" :aria-pressed="String(current === name)"
           @click="view(name)">{{ text }}</button>
@@ -31,7 +32,7 @@ export default {
   props: { face: String, environment: { type: String, default: "studio" }, preview: String },
   emits: ["view", "failed"],
 
-  data: () => ({ views: VIEWS, current: "front", picture: null, message: "", time: 0 }),
+  data: () => ({ views: VIEWS, current: "front", picture: null, message: "", time: 0, side: "" }),
 
   computed: {
     label() {
@@ -52,6 +53,7 @@ export default {
       return;
     }
     this.stops = [preview.on("change", this.changed), clock.on("seek", this.changed)];
+    this.stops.push(comparison.on("change", () => this.showSide()), sides.on(() => this.showSide()));
     this.watchContext();
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.$el);
@@ -117,6 +119,11 @@ export default {
       else this.$el.requestFullscreen();
     },
 
+    showSide() {
+      this.dirty = true;
+      this.side = !comparison.nFrames ? "" : sides.shown === comparison ? "A" : "B: the project";
+    },
+
     /** Lay a picture over the head; null removes it. */
     showPicture(url) {
       this.picture = url;
@@ -157,7 +164,7 @@ export default {
       const begin = performance.now(), { scene } = this;
       this.dirty = false;
       metrics.time = clock.time;
-      scene.setMotion(preview, metrics.time);
+      scene.setMotion(sides.shown, metrics.time);
       scene.render();
       metrics.frames = (metrics.frames ?? 0) + 1;
       if (clock.playing) metrics.playing_share = scene.sharpness;

@@ -99,6 +99,7 @@ class AnimatePage:
         self._looks = self._shown_looks()
         self._set_enabled(may_edit)
         self.workspace.listeners.add(self._on_change)
+        self._show_comparison()
         self.client.on_delete(self._leave)
         ui.timer(LEASE_S / 3, self._renew)
         self.workspace.show()
@@ -170,6 +171,8 @@ class AnimatePage:
                 self._show_project()
             elif what == "preview":
                 self._show_preview()
+            elif what == "comparison":
+                self._show_comparison()
             elif what == "lease":
                 self._set_enabled(self.workspace.may_edit(self.tab))
             elif what == "styles":
@@ -205,6 +208,16 @@ class AnimatePage:
             if self._plays_next and preview.is_complete:
                 self._play()
         self.inspector.show_notes()
+        self.inspector.compare.refresh()
+        self.bar.refresh()
+
+    def _show_comparison(self) -> None:
+        comparison = self.workspace.comparison
+        revision = comparison.preview.current.revision
+        self.timeline.set_compare(
+            f"{self.address}/comparison/preview?revision={revision}" if comparison.is_ready else None
+        )
+        self.inspector.compare.refresh()
         self.bar.refresh()
 
     def _play(self) -> None:

@@ -50,6 +50,7 @@ class ProjectsPage:
             ui.element("span").classes("grow")
             ui.link("Styles", "/palette").classes("bar-link")
             ui.link("Puppetry", "/puppet").classes("bar-link")
+            ui.link("Reports", "/reports").classes("bar-link")
             ui.link("Record your own talker", "/record").classes("bar-link")
             dark_button(request)
             if self._studio.state.keys:
