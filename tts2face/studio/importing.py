@@ -6,7 +6,6 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lexicon.errors import InputError
 from lexicon.inputs import parse_json
@@ -19,11 +18,9 @@ from tts2face.service.errors import RefusedError
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.uploads.decode_process import SOUND, SUBTITLES
 from tts2face.service.uploads.upload_folder import MAX_TEXT_BYTES, decode_file
+from tts2face.studio.host import StudioHost
 from tts2face.studio.requests import check_project
 from tts2face.subtitles.reader import SUFFIXES, read_subtitles
-
-if TYPE_CHECKING:
-    from tts2face.studio.studio import Studio
 
 SOUND_SUFFIXES = (
     ".wav", ".mp3", ".ogg", ".oga", ".opus", ".flac", ".aac", ".m4a", ".mp4", ".mov", ".webm", ".mkv", ".aiff",
@@ -36,7 +33,7 @@ SAMPLE_TIMELINE = Timeline(
 )
 
 
-async def import_text(studio: "Studio", key: ApiKey, text: str, name: str = "") -> str:
+async def import_text(studio: StudioHost, key: ApiKey, text: str, name: str = "") -> str:
     """Id of a new project that speaks a text, with marks or SSML."""
     if len(text) > studio.state.settings.text_characters:
         raise InputError(f"the text has more than {studio.state.settings.text_characters} characters; divide it")
@@ -44,14 +41,14 @@ async def import_text(studio: "Studio", key: ApiKey, text: str, name: str = "") 
     return await studio.create(key, project)
 
 
-async def import_sample(studio: "Studio", key: ApiKey) -> str:
+async def import_sample(studio: StudioHost, key: ApiKey) -> str:
     """Id of a new project that shows what the studio does."""
     return await studio.create(
         key, Project(name="Example", request=Request(text=SAMPLE_TEXT), timeline=SAMPLE_TIMELINE)
     )
 
 
-async def import_file(studio: "Studio", key: ApiKey, path: Path, name: str, transcript: str = "") -> str:
+async def import_file(studio: StudioHost, key: ApiKey, path: Path, name: str, transcript: str = "") -> str:
     """Id of a new project from an uploaded file, whose ending says what it is.
 
     Parameters
@@ -84,14 +81,14 @@ async def import_file(studio: "Studio", key: ApiKey, path: Path, name: str, tran
     raise InputError(f"a file {name[-40:]!r} cannot be imported; give one that ends in {', '.join(kinds)}")
 
 
-async def _import_project(studio: "Studio", key: ApiKey, path: Path) -> str:
+async def _import_project(studio: StudioHost, key: ApiKey, path: Path) -> str:
     content = parse_json(_read_text(path, "the project"), "the project")
     with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as empty:
         project = await check_project(studio.state, key, Path(empty), content)
     return await studio.create(key, project)
 
 
-async def add_recording(studio: "Studio", key: ApiKey, sound: Path, title: str, transcript: str) -> str:
+async def add_recording(studio: StudioHost, key: ApiKey, sound: Path, title: str, transcript: str) -> str:
     """Id of a new project with a checked sound and its words, if they are known."""
     number = await studio.create(key, Project(name=title))
     asset = await asyncio.to_thread(studio.store.add_asset, number, RECORDING, sound)

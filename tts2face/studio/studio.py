@@ -38,7 +38,8 @@ class Studio:
         self.store = ProjectStore(self._folder)
         self.memory = PieceMemory(state.settings.previews_mb * MB)
         self.renders = RenderQueue(state)
-        self.styles, self.takes = Styles(self), Takes(self)
+        self.styles = Styles(self)
+        self.takes = Takes(self, self.styles)
         self.reports = Reports(state.library, self._folder)
         self._open: dict[tuple[str, str], Workspace] = {}
         self._opening = asyncio.Lock()

@@ -5,7 +5,7 @@ import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lexicon.errors import InputError, Tts2faceError
 from tts2face.models.palette import Palette, read_palette
@@ -21,13 +21,11 @@ from tts2face.project import style_names
 from tts2face.project.project import Project
 from tts2face.service.access.keys import ApiKey
 from tts2face.storage.files import translate_disk_errors, write_atomically
+from tts2face.studio.host import StudioHost
 from tts2face.studio.palette_store import CACHE, MADE, SHIPPED, PaletteStore, is_own_palette
 from tts2face.studio.requests import data_of
 from tts2face.studio.store import ProjectEntry
 from tts2face.studio.take_tools import run_take_process
-
-if TYPE_CHECKING:
-    from tts2face.studio.studio import Studio
 
 GOOD, WEAK, REFUSED = "good", "weak", "refused"  # states of a take that was checked
 CHECKING, MAKING, CHECKED = "checking", "making", "checked"
@@ -58,7 +56,7 @@ class TakeWork:
 class Styles:
     """Own styles of all keys of a studio; methods belong to the event loop."""
 
-    def __init__(self, studio: "Studio") -> None:
+    def __init__(self, studio: StudioHost) -> None:
         self._studio = studio
         self.store = PaletteStore(studio.folder)
         self._works: dict[str, TakeWork] = {}

@@ -8,7 +8,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +18,11 @@ from tts2face.service.errors import RefusedError
 from tts2face.service.uploads.decode_process import SOUND as SOUND_KIND
 from tts2face.service.uploads.upload_folder import decode_file
 from tts2face.storage.files import translate_disk_errors, write_atomically
+from tts2face.studio.host import StudioHost
 from tts2face.studio.importing import add_recording
 from tts2face.studio.palette_store import SUFFIXES
 from tts2face.studio.requests import events_of
+from tts2face.studio.styles import Styles
 from tts2face.studio.take_store import (
     FAILED,
     FILM,
@@ -33,9 +35,6 @@ from tts2face.studio.take_store import (
     TakeStore,
 )
 from tts2face.studio.take_tools import run_take_process
-
-if TYPE_CHECKING:
-    from tts2face.studio.studio import Studio
 
 QUIET_RATE = 8000  # Hz of the silence that a take without sound has on the stage, whose clock it is
 FLOAT_BYTES = 4
@@ -59,8 +58,8 @@ class TakeProgress:
 class Takes:
     """Takes of all keys of a studio; methods belong to the event loop."""
 
-    def __init__(self, studio: "Studio") -> None:
-        self._studio = studio
+    def __init__(self, studio: StudioHost, styles: Styles) -> None:
+        self._studio, self._styles = studio, styles
         self.store = TakeStore(studio.folder)
         self.live: set[str] = set()  # names of the keys with a live camera
         self._works: dict[str, TakeProgress] = {}
@@ -78,7 +77,7 @@ class Takes:
         InputError
             The key may not build, or the file is of another kind.
         """
-        self._studio.styles.check_scope(key)
+        self._styles.check_scope(key)
         if suffix not in SUFFIXES:
             raise InputError(f"a take {suffix[:10]!r} cannot be read; give {', '.join(sorted(SUFFIXES))}")
         entry = await asyncio.to_thread(self.store.create, key.name, name)
@@ -96,7 +95,7 @@ class Takes:
         InputError
             There is no such take, or the file has no sound that can be decoded.
         """
-        self._studio.styles.check_scope(key)
+        self._styles.check_scope(key)
         folder, settings = self.store.folder(key.name, number), self._studio.state.settings
         try:
             await decode_file(
@@ -132,7 +131,7 @@ class Takes:
         folder, entry = self._ready(key, number)
         copied = folder / "copy.csv"
         await asyncio.to_thread(shutil.copyfile, folder / TABLE, copied)
-        await self._studio.styles.add_take(key, copied, ".csv", folder / SOUND if entry.has_sound else None)
+        await self._styles.add_take(key, copied, ".csv", folder / SOUND if entry.has_sound else None)
 
     async def make_project(self, key: ApiKey, number: str) -> str:
         """Id of a new project with the take's sound.
