@@ -93,6 +93,12 @@ class Studio:
         self.renders.forget(number)
         await asyncio.to_thread(self.store.remove, number, key.name)
 
+    async def start(self) -> None:
+        """Begin what an earlier server did not finish, and the face of new projects, as the settings say."""
+        await self.renders.resume(self._folder / "projects")
+        if self.state.settings.warm_studio:
+            self.prepare()
+
     def prepare(self) -> None:
         """Begin to make the face of new projects, so that the first one shows it at once; only the first call does."""
         if self._preparing is None:

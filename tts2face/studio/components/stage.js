@@ -11,6 +11,7 @@ const VIEWS = { front: "Front", "three-quarter": "Three-quarter", profile: "Prof
 
 const SLOW_MS = 21, FAST_MS = 18; // between frames of the browser: fewer pixels above, more below
 const ADAPT_MS = 400; // between two changes of the number of pixels
+const MAKING_MS = 1500; // after which a face that does not come is being made
 const REST_MS = 250; // at rest before the sharp picture
 const LEAST_SHARE = 0.65; // of the device's pixels along a side: fewer show as squares
 
@@ -89,6 +90,7 @@ export default {
       const wanted = this.face;
       this.message = "Loading the face …";
       const begin = performance.now();
+      const making = setTimeout(() => (this.message = "This face is shown for the first time: it takes some seconds …"), MAKING_MS);
       try {
         await this.scene.setFace(wanted);
         if (wanted !== this.face) return;
@@ -98,6 +100,8 @@ export default {
         this.resize();
       } catch (wrong) {
         this.fail(wrong.message, wrong);
+      } finally {
+        clearTimeout(making);
       }
     },
 
