@@ -1,13 +1,13 @@
 """Memory of a service with long projects of two users: PYTHONPATH=. python tests/bench/bench_studio_memory.py.
 
-Two keys open projects of ten minutes in turn over HTTP, each with a text of its own, fetch all curves and sound, edit
-and fetch again. Printed after each: resident memory of the server, and of each of its synthesis processes.
-``--projects 10 --minutes 10`` are the defaults.
+Two keys at once open projects of ten minutes over HTTP, each with a text of its own, fetch all curves and sound, edit
+and fetch again. Printed after each: resident memory of the server and of its processes.
 """
 
 import argparse
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 import httpx
@@ -54,6 +54,7 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--projects", type=int, default=10)
     parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--voice", default="espeak", help="the one that takes the least time")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "keys.toml")
@@ -68,21 +69,25 @@ def main() -> None:
                 for key in keys
             ]
             show(running, "empty")
-            for number in range(chosen.projects):
-                begin = time.monotonic()
-                seconds, n_bytes = open_project(clients[number % 2], text_of(number, chosen.minutes))
-                show(
-                    running,
-                    f"{number + 1} projects, the last of {seconds / 60:.1f} minutes ({n_bytes / 1e6:.0f} MB), "
-                    f"made in {time.monotonic() - begin:.0f} s",
-                )
+            begin = time.monotonic()
+            with ThreadPoolExecutor(len(clients)) as users:
+                jobs = [
+                    users.submit(open_project, clients[number % 2], text_of(number, chosen.minutes), chosen.voice)
+                    for number in range(chosen.projects)
+                ]
+                for number, job in enumerate(as_completed(jobs)):
+                    seconds, n_bytes = job.result()
+                    what = f"{number + 1} after {time.monotonic() - begin:.0f} s, the last of {seconds / 60:.1f} min"
+                    show(running, f"{what} and {n_bytes / 1e6:.0f} MB")
         finally:
             running.close()
 
 
-def open_project(client: httpx.Client, text: str) -> tuple[float, int]:
+def open_project(client: httpx.Client, text: str, voice: str) -> tuple[float, int]:
     """Seconds and bytes of a new project's preview, after an edit."""
     number = client.post("/projects", json={"text": text}).json()["id"]
+    edit = {"kind": "request", "options": {"voice": voice}}
+    client.post(f"/projects/{number}/edits", json={"edit": edit}).raise_for_status()
     fetch(client, number)
     client.post(f"/projects/{number}/edits", json={"edit": {"kind": "nod", "time": 2.0, "size": 1.0}})
     return fetch(client, number)

@@ -36,7 +36,11 @@ class RunningService:
     ) -> None:
         command = [sys.executable, *program, "serve", "--port", "0", *arguments]
         command += ["--processes", str(processes)]
-        kept = {name: value for name, value in os.environ.items() if not name.startswith(("TTS2FACE_SERVE_", "OTEL_"))}
+        kept = {
+            name: value
+            for name, value in os.environ.items()
+            if not name.startswith(("TTS2FACE_SERVE_", "OTEL_", "PYTEST"))
+        }
         self.data = tempfile.TemporaryDirectory(prefix="tts2face-service-")
         self.process = subprocess.Popen(
             command, stderr=subprocess.PIPE, text=True,
