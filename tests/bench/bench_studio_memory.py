@@ -54,12 +54,16 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--projects", type=int, default=10)
     parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--previews-mb", type=int, default=300, help="limit of the server, as the setting")
+    parser.add_argument("--sentences-mb", type=int, default=100, help="limit of each session, as the setting")
     parser.add_argument("--voice", default="espeak", help="the one that takes the least time")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "keys.toml")
         keys = [add_key(file, name, ["speak"]) for name in ("ann", "bob")]
-        running = RunningService("--keys", str(file), processes=2)
+        limits = {"PREVIEWS_MB": chosen.previews_mb, "SENTENCES_MB": chosen.sentences_mb}
+        variables = {f"TTS2FACE_SERVE_{name}": str(value) for name, value in limits.items()}
+        running = RunningService("--keys", str(file), environment=variables, processes=2)
         try:
             running.wait_until_ready()
             clients = [
