@@ -67,6 +67,7 @@ def _run_with(app: FastAPI, studio: Studio, recordings: Recordings) -> None:
     async def lifespan(whole: FastAPI) -> AsyncIterator[Any]:
         async with before(whole) as state:
             recordings.checks.start()
+            await studio.start()
             try:
                 yield state
             finally:
