@@ -18,6 +18,7 @@ from tts2face.project.project_file import project_json
 from tts2face.service.access.page_headers import PAGES
 from tts2face.service.errors import RefusedError, as_refused
 from tts2face.service.uploads.upload_folder import BLOCK_BYTES
+from tts2face.studio.archive import archive
 from tts2face.studio.importing import import_file, import_text
 from tts2face.studio.renders import DONE, Render
 from tts2face.studio.requests import data_of, events_of
@@ -84,6 +85,15 @@ async def download_project(request: HttpRequest, project: str) -> JSONResponse:
     async with opened(request, project) as workspace:
         content = project_json(workspace.project, workspace.folder)
         return JSONResponse(content, headers={"Content-Disposition": 'attachment; filename="project.json"'})
+
+
+@router.get("/projects/{project}/project.zip")
+async def download_archive(request: HttpRequest, project: str) -> Response:
+    """The project with the recordings and the palette that it needs, as the command line renders it."""
+    async with opened(request, project) as workspace:
+        content = await asyncio.to_thread(archive, workspace.project)
+        headers = {"Content-Disposition": 'attachment; filename="project.zip"'}
+        return Response(content, media_type="application/zip", headers=headers)
 
 
 @router.delete("/projects/{project}", status_code=204)

@@ -175,6 +175,8 @@ class AnimatePage:
                 self._show_comparison()
             elif what == "lease":
                 self._set_enabled(self.workspace.may_edit(self.tab))
+            elif what == "styles":
+                ui.timer(0.0, self._show_styles, once=True)
             elif what == "removed":
                 ui.navigate.to("/")
             else:
