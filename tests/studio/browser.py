@@ -44,6 +44,7 @@ ARGUMENTS = (
     "--mute-audio", "--disable-background-networking",
 )  # fmt: skip
 WAIT_S = 60.0
+SCRIPT_S = 150  # of one script or load, on a busy machine
 
 
 def missing_program() -> str:
@@ -81,7 +82,8 @@ class Browser:
         wait_until(self._is_ready, 30, "chromedriver starts")
         options = {"args": [*ARGUMENTS, f"--window-size={size[0]},{size[1]}", *arguments]}
         logs = {"browser": "ALL", "performance": "ALL"}
-        wanted = {"goog:chromeOptions": options, "goog:loggingPrefs": logs}
+        timeouts = {"script": 1000 * SCRIPT_S, "pageLoad": 1000 * SCRIPT_S}
+        wanted = {"goog:chromeOptions": options, "goog:loggingPrefs": logs, "timeouts": timeouts}
         answer = self._post("/session", {"capabilities": {"alwaysMatch": wanted}})
         self._session = f"/session/{answer['sessionId']}"
 
@@ -113,7 +115,7 @@ class Browser:
             if found := self.run(script, *arguments):
                 return found
             time.sleep(0.05)
-        raise AssertionError(f"not within {seconds:g} s: {script} {arguments}; page: {self.text()[-1500:]}")
+        raise AssertionError(f"not within {seconds:g} s: {script} {arguments}; page: {self.text()[:1500]}")
 
     def text(self) -> str:
         """Visible text of the page."""
@@ -154,6 +156,10 @@ class Browser:
                 {"type": "key", "id": "keys", "actions": keys},
             ]
         )
+
+    def mouse(self, *actions: dict[str, Any]) -> None:
+        """Perform actions of the mouse, which stays where it is, and pressed, until the next ones."""
+        self._perform([{"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": actions}])
 
     def double_click(self, x: float, y: float) -> None:
         """Press the mouse twice at a place."""

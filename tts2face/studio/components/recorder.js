@@ -4,6 +4,7 @@ const COUNT_MS = 600; // between them
 const TAIL_MS = 300; // recorded after the stop, so that the last sound is whole
 const MAX_TAKE_S = 30; // a forgotten recording ends by itself
 const KINDS = ["video/webm;codecs=vp8,opus", "video/webm", "video/mp4"];
+const HINT = "Press Space, read the sentence after the countdown, and press Space again. What to do better is written here.";
 const STATES = {
   sending: "sending",
   failed: "not sent",
@@ -76,7 +77,7 @@ export default {
       return ["counting", "recording", "saving"].includes(this.mode);
     },
     advice() {
-      if (this.told === null || !this.stateOf(this.told)) return "";
+      if (this.told === null || !this.stateOf(this.told)) return HINT;
       const take = this.takes[this.told] || {};
       const state = this.stateOf(this.told);
       if (state === "failed") return `Prompt ${this.told + 1}: the take was not sent; record it again.`;

@@ -15,7 +15,7 @@ from tts2face.studio.importing import (
     import_sample,
     import_text,
 )
-from tts2face.studio.pages.frame import begin_page, confirm, dark_button, heading, icon_button, shown_errors
+from tts2face.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
 from tts2face.studio.pages.login import LOGOUT_PATH
 from tts2face.studio.store import ProjectEntry
 from tts2face.studio.studio import Studio
@@ -44,17 +44,15 @@ class ProjectsPage:
     async def build(self, request: HttpRequest) -> None:
         """Build the page."""
         self._studio.prepare()
-        with ui.element("header").classes("bar"):
-            heading(1, "tts2face studio")
-            ui.element("span").classes("grow")
-            ui.link("Record your own talker", "/record").classes("bar-link")
-            dark_button(request)
+        with page_bar(request, "tts2face studio"):
+            if "build" in self._key.scopes:
+                ui.link("Record your own talker", "/record").classes("bar-link")
             if self._studio.state.keys:
                 ui.html(
                     f'<form method="post" action="{LOGOUT_PATH}"><button type="submit">Log out</button></form>',
                     sanitize=False,
                 )
-        with ui.element("main").classes("projects"):
+        with ui.element("div").classes("projects"):
             self._new()
             with ui.element("section").classes("panel"):
                 heading(2, "Projects")
