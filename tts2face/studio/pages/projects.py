@@ -120,7 +120,7 @@ class ProjectsPage:
             with ui.element("div").classes("grow"):
                 ui.link(entry.name, f"/animate/{entry.id}").classes("open")
                 changed = time.strftime("%Y-%m-%d %H:%M", time.localtime(entry.changed))
-                ui.label(f"changed {changed}, {entry.n_bytes / MB:.1f} MB").classes("quiet")
+                ui.label(f"changed {changed}, {_size(entry.n_bytes)}").classes("quiet")
             address = f"/api/projects/{entry.id}/project.json"  # below `PAGES`
             icon_button("download", f"Download {entry.name} as a project file", lambda: ui.download(address))
             icon_button("delete", f"Delete {entry.name}", lambda: self._ask_delete(entry))
@@ -133,3 +133,7 @@ class ProjectsPage:
 
         question = f"Delete the project {entry.name!r} with its recordings and rendered files? This cannot be undone."
         await confirm(question, "Delete", delete)
+
+
+def _size(n_bytes: int) -> str:
+    return f"{n_bytes / MB:.1f} MB" if n_bytes >= MB / 10 else f"{max(n_bytes / 1000, 1):.0f} kB"

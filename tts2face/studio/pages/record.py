@@ -169,6 +169,10 @@ class _RecordingPage:
             with ui.element("div").classes("record-side"):
                 with ui.element("section").classes("panel"):
                     heading(2, "What your takes cover")
+                    ui.label(
+                        "Rows: visemes and their phones. Columns: the viseme that follows. Stronger colour: more of "
+                        "what running text needs."
+                    ).classes("quiet")
                     running = self._content["running"]
                     visemes = {phone: viseme_table("oculus")[phone][0] for phone in running["phones"]}
                     self._map = VisemeMap(prompts, running, visemes)
