@@ -59,7 +59,10 @@ def _recording_owner(request: HttpRequest) -> str:
     """
     key = request.state.key
     if "build" not in key.scopes:
-        raise InputError(f"the key {key.name} lacks the scope build, which recordings need; use another key")
+        raise InputError(
+            f"the key {key.name} lacks the scope build, which recordings need; ask the operator for a key with it "
+            "(`tts2face keys add NAME --scope speak --scope build`)"
+        )
     return str(key.name)
 
 

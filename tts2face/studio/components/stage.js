@@ -26,7 +26,7 @@ export default {
         <button v-for="(text, name) in views" :key="name" type="button" :aria-pressed="String(current === name)"
           @click="view(name)">{{ text }}</button>
         <button v-if="picture" type="button" @click="showPicture(null)">Live preview</button>
-        <button type="button" aria-label="Full screen" title="Full screen" @click="fullscreen()"><svg
+        <button type="button" id="studio-fullscreen" aria-label="Full screen" title="Full screen" @click="fullscreen()"><svg
           viewBox="0 0 16 16" aria-hidden="true"><path d="M1 1h5v2H3v3H1zM10 1h5v5h-2V3h-3zM1 10h2v3h3v2H1zM13 10h2v5h-5v-2h3z"/></svg></button>
       </div>
     </section>`,
