@@ -1,5 +1,7 @@
 """What a page fetches, and what a program may ask of the studio (docs/studio.md). Errors as those of the service."""
 
+import asyncio
+import gzip
 import tempfile
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -16,6 +18,7 @@ from tts2face.project.project_file import project_json
 from tts2face.service.access.page_headers import PAGES
 from tts2face.service.errors import RefusedError, as_refused
 from tts2face.service.uploads.upload_folder import BLOCK_BYTES
+from tts2face.studio.archive import archive
 from tts2face.studio.importing import import_file, import_text
 from tts2face.studio.renders import DONE, Render
 from tts2face.studio.requests import data_of, events_of
@@ -84,6 +87,15 @@ async def download_project(request: HttpRequest, project: str) -> JSONResponse:
         return JSONResponse(content, headers={"Content-Disposition": 'attachment; filename="project.json"'})
 
 
+@router.get("/projects/{project}/project.zip")
+async def download_archive(request: HttpRequest, project: str) -> Response:
+    """The project with the recordings and the palette that it needs, as the command line renders it."""
+    async with opened(request, project) as workspace:
+        content = await asyncio.to_thread(archive, workspace.project)
+        headers = {"Content-Disposition": 'attachment; filename="project.zip"'}
+        return Response(content, media_type="application/zip", headers=headers)
+
+
 @router.delete("/projects/{project}", status_code=204)
 async def delete_project(request: HttpRequest, project: str) -> Response:
     """Remove a project with everything in it."""
@@ -138,14 +150,18 @@ async def preview(
 
 
 @router.get("/projects/{project}/face.glb")
-async def face(request: HttpRequest, project: str) -> FileResponse:
+async def face(request: HttpRequest, project: str) -> Response:
     """The face as binary glTF."""
     async with opened(request, project) as workspace:
         path = await _studio(request).face(workspace)
+    content = await asyncio.to_thread(path.read_bytes)
     # The address has the models in its query: what it names never changes.
-    return FileResponse(
-        path, media_type="model/gltf-binary", headers={"Cache-Control": "private, max-age=31536000, immutable"}
-    )
+    headers = {"Cache-Control": "private, max-age=31536000, immutable", "Vary": "Accept-Encoding"}
+    if "gzip" in request.headers.get("accept-encoding", ""):
+        headers["Content-Encoding"] = "gzip"
+    else:
+        content = gzip.decompress(content)
+    return Response(content, media_type="model/gltf-binary", headers=headers)
 
 
 @router.get("/projects/{project}/picture.png")

@@ -27,9 +27,8 @@ LEASE_S = 45.0  # after the last sign of life of a tab, for which it stays the o
 SHOWN_ONLY = frozenset({"name"})  # kinds of edits that change neither motion nor sound
 PICTURE_ONLY = frozenset({"picture"})  # kinds that change final pictures only
 
-Listener = Callable[
-    [str], None
-]  # gets "project", "preview", "comparison", "saved", "failed" (to save), "lease" or "removed"
+# gets "project", "preview", "comparison", "saved", "failed" (to save), "lease", "styles" (own palette) or "removed"
+Listener = Callable[[str], None]
 
 
 class Workspace:
@@ -138,6 +137,14 @@ class Workspace:
             await asyncio.to_thread(self._store.write, self.id, history)
             self._saved = history
         self._notify("saved")
+
+    def revise(self, change: Callable[[Project], Project]) -> None:
+        """Change the project in all states of its history."""
+        self._set(self.history.revise(change))
+
+    def tell_styles(self) -> None:
+        """Tell pages that the own palette has other styles."""
+        self._notify("styles")
 
     async def close(self) -> None:
         """Save, and end the preview."""

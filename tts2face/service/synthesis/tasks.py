@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.service.synthesis import comparison_tasks, project_tasks
+from tts2face.service.synthesis import comparison_tasks, project_tasks, style_tasks
 from tts2face.service.synthesis.explanation_task import explain
 from tts2face.service.synthesis.live_task import listen, live
 from tts2face.service.synthesis.messages import Event, Wait
@@ -56,4 +56,6 @@ TASKS: Mapping[str, Callable[["Session", Work, Inputs], Iterator[Chunk | Event |
     "recorded": comparison_tasks.recorded_motion,
     "measure": comparison_tasks.measure,
     "face": project_tasks.face_file,
+    "swatch": style_tasks.swatch,
+    "take": style_tasks.take,
 }

@@ -43,6 +43,14 @@ export class Preview {
     return column < 0 ? this.head[frame * 6 + column + 6] : this.motion[frame * this.channels.length + column];
   }
 
+  /** Show one pose in place of the clip: weights of channels, and the six values of the head. */
+  pose(channels, weights, head) {
+    Object.assign(this, { revision: null, nFrames: 1, duration: 0, channels, words: [], phones: [], sentences: [] });
+    this.motion = Float32Array.from(weights);
+    this.head = Float32Array.from(head);
+    this.#emit({ sound: false, motion: true });
+  }
+
   clear() {
     this.revision = null;
     this.nFrames = this.duration = 0;
