@@ -6,7 +6,7 @@ import httpx
 import pytest
 
 from tests.service.conftest import RunningService
-from tests.studio.webdriver import Browser, missing_program, wait_until
+from tests.studio.browser import Browser, missing_program, wait_until
 
 MOST_BYTES = 2_500_000
 SHOWN = "const s = window.__studio; return Boolean(s && s.frames > 0 && s.face_ms && s.view && s.view.duration > 0)"
