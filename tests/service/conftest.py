@@ -43,7 +43,9 @@ class RunningService:
         self.data = tempfile.TemporaryDirectory(prefix="tts2face-service-")
         self.process = subprocess.Popen(
             command, stderr=subprocess.PIPE, text=True,
-            env=kept | {"TTS2FACE_SERVE_DATA": self.data.name} | dict(environment or {}),
+            # Most tests show no face.
+            env=kept | {"TTS2FACE_SERVE_DATA": self.data.name, "TTS2FACE_SERVE_WARM_STUDIO": "false"}
+            | dict(environment or {}),
         )  # fmt: skip
         self.lines: list[str] = []
         self._reader = threading.Thread(target=self._read, daemon=True)

@@ -89,4 +89,9 @@ class Page:
 
     def slowness(self) -> float:
         """How many times slower than an idle core the page's script runs now, at least 1."""
-        return max(self.browser.run(CALIBRATION) / CALIBRATION_MS, 1.0)
+        return slowness(self.browser)
+
+
+def slowness(browser: Browser) -> float:
+    """How many times slower than an idle core the script of a page runs now, at least 1."""
+    return float(max(browser.run(CALIBRATION) / CALIBRATION_MS, 1.0))

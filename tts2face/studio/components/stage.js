@@ -2,16 +2,18 @@
 
 import { clock } from "tts2face-studio/clock.js";
 import { metrics, Meter } from "tts2face-studio/metrics.js";
-import { loadPreview, preview } from "tts2face-studio/preview.js";
+import { pace } from "tts2face-studio/pace.js";
+import { comparison, loadPreview, preview, sides } from "tts2face-studio/preview.js";
 import { StageScene } from "tts2face-studio/stage_scene.js";
 import { addStyle } from "tts2face-studio/style.js";
 
 const VIEWS = { front: "Front", "three-quarter": "Three-quarter", profile: "Profile", close: "Close-up" };
 
-const SLOW_MS = 31, FAST_MS = 19; // between frames: fewer pixels above, more below
+const SLOW_MS = 21, FAST_MS = 18; // between frames of the browser: fewer pixels above, more below
 const ADAPT_MS = 400; // between two changes of the number of pixels
+const MAKING_MS = 1500; // after which a face that does not come is being made
 const REST_MS = 250; // at rest before the sharp picture
-const LEAST_SHARE = 0.5; // of the device's pixels along a side
+const LEAST_SHARE = 0.65; // of the device's pixels along a side: fewer show as squares
 
 export default {
   template: `
@@ -19,6 +21,7 @@ export default {
       <canvas ref="canvas" role="img" tabindex="0" :aria-label="label" @keydown="onKey"></canvas>
       <img v-if="picture" class="studio-picture" :src="picture" alt="Final picture of this instant, drawn by the renderer">
       <p v-if="message" class="studio-message" role="status">{{ message }}</p>
+      <p v-if="side" class="studio-side" role="status">{{ side }}</p>
       <div class="studio-views" role="group" aria-label="Camera">
         <button v-for="(text, name) in views" :key="name" type="button" :aria-pressed="String(current === name)"
           @click="view(name)">{{ text }}</button>
@@ -31,7 +34,7 @@ export default {
   props: { face: String, environment: { type: String, default: "studio" }, preview: String },
   emits: ["view", "failed"],
 
-  data: () => ({ views: VIEWS, current: "front", picture: null, message: "", time: 0 }),
+  data: () => ({ views: VIEWS, current: "front", picture: null, message: "", time: 0, side: "" }),
 
   computed: {
     label() {
@@ -51,7 +54,9 @@ export default {
       this.fail("This browser has no WebGL; switch it on, or use “Final picture”.", refused);
       return;
     }
+    pace.isSoftware = this.scene.isSoftware;
     this.stops = [preview.on("change", this.changed), clock.on("seek", this.changed)];
+    this.stops.push(comparison.on("change", () => this.showSide()), sides.on(() => this.showSide()));
     this.watchContext();
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.$el);
@@ -87,6 +92,7 @@ export default {
       const wanted = this.face;
       this.message = "Loading the face …";
       const begin = performance.now();
+      const making = setTimeout(() => (this.message = "This face is shown for the first time: it takes some seconds …"), MAKING_MS);
       try {
         await this.scene.setFace(wanted);
         if (wanted !== this.face) return;
@@ -96,6 +102,8 @@ export default {
         this.resize();
       } catch (wrong) {
         this.fail(wrong.message, wrong);
+      } finally {
+        clearTimeout(making);
       }
     },
 
@@ -115,6 +123,11 @@ export default {
     fullscreen() {
       if (document.fullscreenElement) document.exitFullscreen();
       else this.$el.requestFullscreen();
+    },
+
+    showSide() {
+      this.dirty = true;
+      this.side = !comparison.nFrames ? "" : sides.shown === comparison ? "A" : "B: the project";
     },
 
     /** Lay a picture over the head; null removes it. */
@@ -148,16 +161,16 @@ export default {
       });
     },
 
-    tick() {
+    tick(now) {
       this.animation = requestAnimationFrame(this.tick);
       if (clock.playing) this.dirty = true;
       else this.meter.restart();
       this.adapt();
-      if (!this.dirty || this.lost) return;
+      if (!this.dirty || this.lost || (clock.playing && !pace.draws(now))) return;
       const begin = performance.now(), { scene } = this;
       this.dirty = false;
       metrics.time = clock.time;
-      scene.setMotion(preview, metrics.time);
+      scene.setMotion(sides.shown, metrics.time);
       scene.render();
       metrics.frames = (metrics.frames ?? 0) + 1;
       if (clock.playing) metrics.playing_share = scene.sharpness;

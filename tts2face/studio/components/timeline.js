@@ -42,7 +42,7 @@ export default {
               <select aria-label="Channel of the curve" :value="channel" @change="choose('channel', $event.target.value)">
                 <option value="">Channel …</option>
                 <option v-for="one in channels" :key="one">{{ one }}</option></select>
-              <small v-if="compares">dashed: B</small>
+              <small v-if="compares">dashed: A</small>
             </template>
             <span v-else class="studio-name">{{ row.label }}</span>
             <span v-if="row.feature" class="studio-lane-buttons">

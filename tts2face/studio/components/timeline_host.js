@@ -3,6 +3,7 @@
 import { clock } from "./clock.js";
 import { metrics, Meter } from "./metrics.js";
 import { comparison, preview } from "./preview.js";
+import { pace } from "./pace.js";
 import { openEditor } from "./timeline_editor.js";
 import { Painter, readColors } from "./timeline_draw.js";
 import { rowItems } from "./timeline_items.js";
@@ -42,7 +43,7 @@ export class TimelineHost {
     this.takeColors();
     this.takeProps();
     this.resize();
-    this.animation = requestAnimationFrame(() => this.tick());
+    this.animation = requestAnimationFrame((now) => this.tick(now));
   }
 
   unmount() {
@@ -137,8 +138,9 @@ export class TimelineHost {
     this.moved();
   }
 
-  tick() {
-    this.animation = requestAnimationFrame(() => this.tick());
+  tick(now) {
+    this.animation = requestAnimationFrame((next) => this.tick(next));
+    if (clock.playing && !pace.draws(now)) return;
     const begin = performance.now(), { state } = this, time = clock.time;
     if (clock.playing && state.view.reveal(time)) this.moved();
     if (!this.dirty && time === this.shown) return;

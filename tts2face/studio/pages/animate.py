@@ -99,6 +99,7 @@ class AnimatePage:
         self._looks = self._shown_looks()
         self._set_enabled(may_edit)
         self.workspace.listeners.add(self._on_change)
+        self._show_comparison()
         self.client.on_disconnect(lambda: self.workspace.release(self.tab))  # a reloaded page may edit at once
         self.client.on_connect(self._renew)
         self.client.on_delete(self._leave)
@@ -168,8 +169,12 @@ class AnimatePage:
                 self._show_project()
             elif what == "preview":
                 self._show_preview()
+            elif what == "comparison":
+                self._show_comparison()
             elif what == "lease":
                 self._set_enabled(self.workspace.may_edit(self.tab))
+            elif what == "styles":
+                ui.timer(0.0, self._show_styles, once=True)
             elif what == "removed":
                 ui.navigate.to("/")
             else:
@@ -201,6 +206,16 @@ class AnimatePage:
             if self._plays_next and preview.is_complete:
                 self._play()
         self.inspector.show_notes()
+        self.inspector.compare.refresh()
+        self.bar.refresh()
+
+    def _show_comparison(self) -> None:
+        comparison = self.workspace.comparison
+        revision = comparison.preview.current.revision
+        self.timeline.set_compare(
+            f"{self.address}/comparison/preview?revision={revision}" if comparison.is_ready else None
+        )
+        self.inspector.compare.refresh()
         self.bar.refresh()
 
     def _play(self) -> None:

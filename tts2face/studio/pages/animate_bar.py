@@ -10,6 +10,7 @@ from tts2face.studio.pages.open_page import OpenPage
 from tts2face.studio.renders import DONE, RUNNING, WAITING, Render, formats
 
 CLOCK = 'import("tts2face-studio/clock.js").then((m) => '
+TOGGLE_SIDES = 'import("tts2face-studio/preview.js").then((m) => m.sides.toggle())'
 # Keys with the ids of the buttons that they press, and what they do. None of them acts while a text is written.
 SHORTCUTS = (
     ("Space", " ", "studio-play", "Play and pause"),
@@ -19,6 +20,7 @@ SHORTCUTS = (
     ("V", "v", "studio-select", "Select and move"),
     ("B", "b", "studio-brush", "Brush: paint the chosen style"),
     ("E", "e", "studio-eraser", "Eraser: remove styles"),
+    ("A", "a", "studio-ab", "Show A or the project, where they are compared"),
     ("P", "p", "studio-picture", "Final picture of this instant"),
     ("F", "f", "studio-fullscreen", "Full screen"),
     ("X", "x", "studio-files", "Render and export"),
@@ -62,6 +64,8 @@ class Bar:
             ui.element("span").classes("grow")
             self._undo = self._button("undo", "Undo", "studio-undo", page.undo)
             self._redo = self._button("redo", "Redo", "studio-redo", page.redo)
+            self._ab = icon_button("compare", "Show A or the project").props("id=studio-ab")
+            self._ab.on("click", js_handler=f"() => {TOGGLE_SIDES}")
             self._picture_button()
             self._button("movie", "Render and export", "studio-files", self._open_files)
             dark_button(request)
@@ -79,6 +83,7 @@ class Bar:
             self._name.value = workspace.project.name
         making = workspace.preview.is_running
         self._saved.set_text("Making the preview" if making else "Saved" if workspace.is_saved else "Saving")
+        self._ab.set_visibility(workspace.comparison.is_ready)
         self._undo.set_enabled(bool(workspace.history.past))
         self._redo.set_enabled(bool(workspace.history.future))
 

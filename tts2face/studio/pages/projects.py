@@ -8,6 +8,7 @@ from fastapi import Request as HttpRequest
 from nicegui import events, ui
 
 from tts2face.service.access.keys import ApiKey
+from tts2face.studio.archive import has_files
 from tts2face.studio.importing import (
     SOUND_SUFFIXES,
     TEXT_SUFFIXES,
@@ -45,6 +46,9 @@ class ProjectsPage:
         """Build the page."""
         self._studio.prepare()
         with page_bar(request, "tts2face studio"):
+            ui.link("Styles", "/palette").classes("bar-link")
+            ui.link("Puppetry", "/puppet").classes("bar-link")
+            ui.link("Reports", "/reports").classes("bar-link")
             if "build" in self._key.scopes:
                 ui.link("Record your own talker", "/record").classes("bar-link")
             if self._studio.state.keys:
@@ -121,9 +125,13 @@ class ProjectsPage:
                 ui.link(entry.name, f"/animate/{entry.id}").classes("open")
                 changed = time.strftime("%Y-%m-%d %H:%M", time.localtime(entry.changed))
                 ui.label(f"changed {changed}, {_size(entry.n_bytes)}").classes("quiet")
-            address = f"/api/projects/{entry.id}/project.json"  # below `PAGES`
-            icon_button("download", f"Download {entry.name} as a project file", lambda: ui.download(address))
+            icon_button("download", f"Download {entry.name} as a project file", lambda: self._download(entry))
             icon_button("delete", f"Delete {entry.name}", lambda: self._ask_delete(entry))
+
+    async def _download(self, entry: ProjectEntry) -> None:
+        with shown_errors():
+            project = (await self._studio.open(self._key, entry.id)).project
+            ui.download(f"/api/projects/{entry.id}/project.{'zip' if has_files(project) else 'json'}")  # below `PAGES`
 
     async def _ask_delete(self, entry: ProjectEntry) -> None:
         async def delete() -> None:
