@@ -20,7 +20,9 @@ from typing import Any
 import av
 import httpx
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
+from scipy.spatial import cKDTree
 
 from corpus_tools.prompts.coverage import count_units, sentence_units
 from corpus_tools.recording_process import prompts_answer
@@ -37,7 +39,7 @@ FILM_SIZE = (800, 450)
 FPS = 12
 TICKS = 100  # a second, of a GIF's clock
 N_PALETTE_FRAMES = 8
-N_COMMON = 176  # of 256 colours; the others are rare ones
+N_EXACT, N_SHADES, N_RARE = 16, 196, 44  # colours of a palette, 256 in all
 TEXT = "We were away a year ago, but Bob may move five big maps."
 CORRECTED = "/mɑps/"
 CLOCK = "const { clock } = await import('tts2face-studio/clock.js'); return "
@@ -121,17 +123,17 @@ class Film:
             self.take()
 
     def write(self, path: Path) -> None:
-        """Write the film as a GIF, with one palette and without dither, whose patterns would not compress."""
+        """Write the film as a GIF with one palette."""
         frames = [frame.resize(FILM_SIZE, Image.Resampling.LANCZOS) for frame in self.frames]
         colours = palette(frames[:: len(frames) // N_PALETTE_FRAMES])
-        table = np.zeros((256, 4), np.uint8)  # alpha, red, green, blue
-        table[:, 0], table[:, 1:] = 255, np.reshape(colours.getpalette() or [], (-1, 3))
+        table = np.full((256, 4), 255, np.uint8)  # alpha, red, green, blue
+        table[: len(colours), 1:] = colours
         with av.open(str(path), "w", format="gif", options={"loop": "0"}) as container:
             stream = container.add_stream("gif", rate=FPS)
             stream.width, stream.height, stream.pix_fmt = *FILM_SIZE, "pal8"
             stream.codec_context.time_base = Fraction(1, TICKS)
             for number, frame in enumerate(frames):
-                indexed: Any = (np.asarray(frame.quantize(palette=colours, dither=Image.Dither.NONE)), table)
+                indexed: Any = (indices(frame, colours), table)
                 picture = av.VideoFrame.from_ndarray(indexed, format="pal8")
                 picture.pts, picture.time_base = round(number * TICKS / FPS), Fraction(1, TICKS)
                 container.mux(stream.encode(picture))
@@ -149,17 +151,32 @@ def screenshot(browser: Browser) -> Image.Image:
     return Image.open(io.BytesIO(base64.b64decode(data))).convert("RGB")
 
 
-def palette(pictures: list[Image.Image]) -> Image.Image:
-    """Palette of pictures: common colours, and rare ones, which are those of small marks."""
-    width, height = pictures[0].size
-    sheet = Image.new("RGB", (width, height * len(pictures)))
-    for number, picture in enumerate(pictures):
-        sheet.paste(picture, (0, number * height))
-    common = sheet.quantize(N_COMMON, Image.Quantize.MEDIANCUT).getpalette() or []
-    rare = sheet.quantize(256 - N_COMMON, Image.Quantize.MAXCOVERAGE).getpalette() or []
-    found = Image.new("P", (1, 1))
-    found.putpalette(common[: 3 * N_COMMON] + rare[: 3 * (256 - N_COMMON)])
-    return found
+def palette(pictures: list[Image.Image]) -> NDArray[np.uint8]:
+    """Colours (256, 3) of pictures: the most frequent ones exactly, those of shades, and rare ones of small marks."""
+    sheet = Image.fromarray(np.concatenate([np.asarray(picture) for picture in pictures]))
+    numbers, counts = np.unique(packed(np.asarray(sheet)), return_counts=True)
+    parts = [unpacked(numbers[np.argsort(-counts)[:N_EXACT]])]
+    for count, method in ((N_SHADES, Image.Quantize.MEDIANCUT), (N_RARE, Image.Quantize.MAXCOVERAGE)):
+        found = sheet.quantize(count, method, dither=Image.Dither.NONE).getpalette() or []
+        parts.append(np.reshape(found, (-1, 3))[:count])
+    return np.concatenate(parts).astype(np.uint8)
+
+
+def indices(picture: Image.Image, colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """For each pixel (H, W) the nearest of some colours; without dither, whose patterns would not compress."""
+    own, places = np.unique(packed(np.asarray(picture)), return_inverse=True)
+    nearest = np.asarray(cKDTree(colours).query(unpacked(own))[1], np.uint8)
+    return nearest[places].reshape(picture.height, picture.width)
+
+
+def packed(pixels: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Colours (..., 3) as one number each."""
+    return pixels.astype(np.int64) @ np.array([65536, 256, 1])
+
+
+def unpacked(numbers: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """Colours (..., 3) of numbers."""
+    return np.stack([numbers >> 16, numbers >> 8 & 255, numbers & 255], axis=-1).astype(np.uint8)
 
 
 def seek(browser: Browser, time_of: float) -> None:
@@ -263,7 +280,10 @@ def keep(browser: Browser, path: Path) -> None:
     """Write a picture of the window with few colours."""
     browser.run("document.getElementById('film-pointer')?.remove()")
     picture = screenshot(browser)
-    picture.quantize(palette=palette([picture]), dither=Image.Dither.NONE).save(path, optimize=True)
+    colours = palette([picture])
+    small = Image.fromarray(indices(picture, colours), "P")
+    small.putpalette(colours.ravel().tolist())
+    small.save(path, optimize=True)
 
 
 def animate_pictures(browser: Browser, page: Page, pictures: Path) -> None:

@@ -98,6 +98,14 @@ def test_a_key_without_speak_makes_no_project(closed: RunningService, keys: dict
         assert (answer.status_code, "lacks the scope speak" in answer.text) == (400, True)
 
 
+def test_a_key_without_build_is_told_where_recordings_need_it(closed: RunningService, keys: dict[str, str]) -> None:
+    with browser(closed, keys["ann"]) as client:
+        assert "Record your own talker" not in client.get("/").text
+        page = client.get("/record").text
+        assert "lacks the scope build" in page
+        assert "Go to the projects" in page
+
+
 def test_pages_of_other_origins_reach_nothing(studio: httpx.Client) -> None:
     evil = {"Origin": "https://evil.example"}
     assert studio.post("/api/projects", json={"text": "Hello."}, headers=evil).status_code == 403

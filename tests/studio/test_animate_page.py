@@ -215,7 +215,7 @@ def test_axe_finds_nothing(browser: Browser, studio_service: Any, studio: httpx.
     browser.devtools("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
     found = []
     try:
-        for path in ("", "record", f"animate/{number}"):
+        for path in ("", "record", "palette", "puppet", f"animate/{number}"):
             browser.open(f"{studio_service.url}/studio/{path}")
             browser.wait("return !!document.querySelector('h1') && document.readyState === 'complete'")
             time.sleep(0.5)  # transitions of colours end
