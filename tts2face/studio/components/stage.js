@@ -54,6 +54,7 @@ export default {
       return;
     }
     pace.isSoftware = this.scene.isSoftware;
+    if (pace.isSoftware) this.share = LEAST_SHARE;
     this.stops = [preview.on("change", this.changed), clock.on("seek", this.changed)];
     this.watchContext();
     this.observer = new ResizeObserver(() => this.resize());
