@@ -22,7 +22,6 @@ from corpus_tools.decomposition.capture import FaceRecording
 from corpus_tools.decomposition.capture_files import MarkerOptions
 from corpus_tools.decomposition.decompose import Decomposition, decompose, weight_displacements
 from corpus_tools.decomposition.derived_styles import read_derived_styles
-from corpus_tools.decomposition.face_motion import rest_landmarks
 from corpus_tools.decomposition.marker_set import read_marker_set
 from corpus_tools.decomposition.markers import read_marker_face
 from corpus_tools.decomposition.recording_files import read_recordings
@@ -33,6 +32,7 @@ from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.pose_correction import fit_pose_correction
 from lexicon.errors import DataError, InputError
 from tts2face.face.expressions import expression_landmarks
+from tts2face.face.face_motion import rest_landmarks
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face

@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from corpus_tools.build_talker import PROVENANCE, BuiltTalker, build_talker, consent_record
+from corpus_tools.message_lines import line_progress, write_line
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, Tts2faceError
 from tts2face.child_process import exit_after
 from tts2face.jobs.refused_file import RefusedFileError
 from tts2face.jobs.resource_check import TALKER, check_resource
 from tts2face.limited_process import ProcessLimits, limit_process
-from tts2face.types import Progress
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,17 +66,17 @@ def build(order: BuildOrder, out: TextIO) -> None:
             consent=consent,
             report=folder / "report.html" if order.with_report else None,
             run_options=RunOptions(folder / "cache", 1),
-            stages=lambda name: _progress(out, name),
+            stages=lambda name: line_progress(out, name),
         )
         (folder / "checked").mkdir()
         check_resource(TALKER, folder / "made.talker", folder / "checked", order.max_bytes)
     except RefusedFileError as refused:
-        _write(out, {"error": DataError.__name__, "message": f"the talker cannot be used: {refused}"})
+        write_line(out, {"error": DataError.__name__, "message": f"the talker cannot be used: {refused}"})
     except Tts2faceError as error:
         message = " ".join(str(error).replace(f"{recordings}/", "").split())
-        _write(out, {"error": type(error).__name__, "message": message})
+        write_line(out, {"error": type(error).__name__, "message": message})
     else:
-        _write(out, _result(built))
+        write_line(out, _result(built))
 
 
 def _result(built: BuiltTalker) -> dict[str, Any]:
@@ -87,24 +87,6 @@ def _result(built: BuiltTalker) -> dict[str, Any]:
         "warnings": [[warning.name, warning.message] for warning in built.warnings],
         "notes": built.notes,
     }
-
-
-def _progress(out: TextIO, stage: str) -> Progress:
-    """Progress callback of a stage; equal messages are written once."""
-    written = [(0, 0)]
-
-    def report(done: int, of: int) -> None:
-        if (done, of) != written[0]:
-            written[0] = (done, of)
-            _write(out, {"stage": stage, "done": done, "of": of})
-
-    _write(out, {"stage": stage, "done": 0, "of": 0})
-    return report
-
-
-def _write(out: TextIO, content: Mapping[str, Any]) -> None:
-    out.write(json.dumps(content, ensure_ascii=False) + "\n")
-    out.flush()
 
 
 def main() -> None:

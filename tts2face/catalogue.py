@@ -10,6 +10,8 @@ from lexicon.errors import DataError
 from tts2face.request import OWN_FACE
 from tts2face.storage.files import SHIPPED_FOLDER, find_file
 
+SHORT_S = 120.0  # recordings that are shorter are listed in seconds
+
 
 @dataclass(frozen=True, slots=True)
 class VoiceEntry:
@@ -221,8 +223,7 @@ def styles(palette: str = "starter") -> tuple[StyleEntry, ...]:
         for name, derivation in found.derivations.items()
     )
     recorded = (
-        StyleEntry(name, palette, None, f"recorded, {style.seconds / 60:.1f} minutes")
-        for name, style in found.styles.items()
+        StyleEntry(name, palette, None, f"recorded, {_length(style.seconds)}") for name, style in found.styles.items()
     )
     listed = (*derived, *recorded)
     if any(entry.name == MEASURED_STYLE for entry in listed):
@@ -230,6 +231,10 @@ def styles(palette: str = "starter") -> tuple[StyleEntry, ...]:
     source = found.source(MEASURED_STYLE)
     summary = f"{source} as recorded: the person's own blinks and head motion"
     return (*listed, StyleEntry(MEASURED_STYLE, palette, source, summary))
+
+
+def _length(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < SHORT_S else f"{seconds / 60:.1f} minutes"
 
 
 def talkers() -> tuple[TalkerEntry, ...]:

@@ -1,11 +1,12 @@
 """The session: a talker, a face and a palette, loaded once, for synthesising any number of clips."""
 
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from pathlib import Path
 from typing import Any
 
 from tts2face.models.face import Face
-from tts2face.models.palette import Palette
+from tts2face.models.palette import Derivation, Palette
 from tts2face.models.talker import Talker
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
@@ -306,6 +307,18 @@ class Session:
     def animated_face(self, *, has_gestures: bool = True) -> AnimatedFace:
         """Face whose channels the clips of requests with or without gestures use."""
         return self._models.face(has_gestures=has_gestures)
+
+    def with_style(self, name: str, derived: Derivation) -> "Session":
+        """A session with one more derived style, which shares all models with this one.
+
+        Raises
+        ------
+        InputError
+            The name is taken or cannot be used, or the session has no palette.
+        """
+        new = copy(self)
+        new._models = self._models.with_style(name, derived)
+        return new
 
     def _write(
         self,

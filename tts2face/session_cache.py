@@ -59,17 +59,17 @@ class SessionCache:
     ) -> None:
         self._n_sessions, self._voices, self._max_bytes = n_sessions, voices, max_bytes
         self._memory_mb = memory_mb
-        self._sessions: OrderedDict[tuple[Models, str], Session] = OrderedDict()
+        self._sessions: OrderedDict[tuple[Models, str, tuple[int, ...]], Session] = OrderedDict()
 
     def get(self, models: Models, owner: str = "") -> "Session":
-        """Session of these models; raises as `Session`.
+        """Session of these models; a new one if a file has changed; raises as `Session`.
 
         Parameters
         ----------
         owner
             For whom the session keeps finished sentences, and for nobody else; empty: it keeps none.
         """
-        key = (models, owner)
+        key = (models, owner, _file_times(models))
         if key in self._sessions:
             self._sessions.move_to_end(key)
         else:
@@ -81,6 +81,16 @@ class SessionCache:
             self._sessions.popitem(last=False)
             gc.collect()
         return self._sessions[key]
+
+
+def _file_times(models: Models) -> tuple[int, ...]:
+    """Times of the last change of those models that are files, in nanoseconds."""
+    found = []
+    for name in (models.talker, models.face, models.palette):
+        if name is not None and os.sep in name:
+            with suppress(OSError):
+                found.append(os.stat(name).st_mtime_ns)
+    return tuple(found)
 
 
 def resident_bytes() -> int:

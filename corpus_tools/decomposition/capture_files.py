@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.decomposition.capture import FaceRecording, read_capture_sound
-from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
 from corpus_tools.decomposition.marker_set import DEFAULT_MARKER_TABLE, read_marker_set
 from corpus_tools.decomposition.markers import read_marker_recording
 from lexicon.errors import InputError
+from tts2face.face.face_motion import moved_landmarks, rest_landmarks
 from tts2face.models.face import Face
 from tts2face.retargeting.performer import match_shapes
 from tts2face.types import Trajectory

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.decomposition.capture import FaceRecording, read_capture_sound
-from corpus_tools.decomposition.face_motion import rest_landmarks
 from corpus_tools.decomposition.head_markers import HeadPoses, fit_head_poses
 from corpus_tools.decomposition.marker_files import MarkerTake, read_markers
 from corpus_tools.decomposition.marker_gaps import fill_marker_gaps
 from corpus_tools.decomposition.marker_interpolation import MarkerInterpolator, build_marker_interpolator
 from corpus_tools.decomposition.marker_set import MIN_FACE_MARKERS, MarkerSet
 from lexicon.errors import DataError
+from tts2face.face.face_motion import rest_landmarks
 from tts2face.models.face import Face
 from tts2face.numeric import nearest_rotation
 from tts2face.video.pose import head_angles

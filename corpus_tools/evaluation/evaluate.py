@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.measures import speech_frames
 from corpus_tools.evaluation.methods import SynthesisMethod, build_methods
 from corpus_tools.evaluation.own_durations import VoicedUtterance, compare_own_durations, speak_references
 from corpus_tools.evaluation.reference import LipCurves, ReferenceUtterance, Thresholds
@@ -21,6 +20,7 @@ from corpus_tools.recordings.observation import Observation
 from corpus_tools.training.pose_correction import correct_pose, fit_pose_correction
 from corpus_tools.training.train_phone_network import add_phone_network
 from corpus_tools.training.train_talker import learn_talker
+from tts2face.exemplar.motion_measures import speech_frames
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.types import Progress

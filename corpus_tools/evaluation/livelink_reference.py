@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.decomposition.capture import find_capture_sound
-from corpus_tools.decomposition.face_motion import moved_landmarks
 from corpus_tools.recordings.corpus_audio import CachedAligner
 from corpus_tools.recordings.observation import Observation, Quality, trim_to_picture
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
+from tts2face.face.face_motion import moved_landmarks
 from tts2face.models.face_loading import load_face
 from tts2face.retargeting.performer import match_shapes
 from tts2face.speech.loudness import intensity

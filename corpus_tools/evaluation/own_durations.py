@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.measures import speech_frames
 from corpus_tools.evaluation.methods import SynthesisMethod
 from corpus_tools.evaluation.reference import LipCurves, ReferenceUtterance
 from corpus_tools.evaluation.scores import OwnDurationMotion, UtteranceComparison, speech_spread
 from lexicon.errors import InputError
 from lexicon.normalize import normalize
 from lexicon.sequence import PhoneSequence, WordSpan
+from tts2face.exemplar.motion_measures import speech_frames
 from tts2face.interpolation import interpolate_columns
 from tts2face.models.talker import ShapeModel
 from tts2face.types import Speech, frame_count

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.measures import DTW_BAND_S, speech_frames, warping_cost
 from corpus_tools.evaluation.methods import SynthesisMethod, build_methods
 from corpus_tools.evaluation.paired_bootstrap import PairedCurves, estimate, estimate_difference
 from corpus_tools.evaluation.reference import LipCurves, ReferenceUtterance
@@ -22,6 +21,7 @@ from corpus_tools.evaluation.tracks import ExternalTrack, map_tracks
 from corpus_tools.recordings.observation import Observation
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.exemplar.motion_measures import DTW_BAND_S, speech_frames, warping_cost
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import ShapeModel, Talker
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from corpus_tools.evaluation import measures
 from corpus_tools.recordings.observation import Observation
 from lexicon.phones import PHONES
+from tts2face.exemplar import motion_measures
 from tts2face.models.landmarks import lip_opening, lip_width
 from tts2face.models.talker import ShapeModel
 
@@ -55,7 +56,7 @@ class ReferenceUtterance:
         n_frames = len(observation.landmarks)
         return cls(
             observation,
-            measures.speech_frames(observation.phones, n_frames, observation.fps),
+            motion_measures.speech_frames(observation.phones, n_frames, observation.fps),
             model.parameters(observation.landmarks)[:, : model.n_speech],
             LipCurves.of(observation.landmarks),
             frame_classes(observation.phones.phones, observation.phones.edges, np.arange(n_frames) / observation.fps),

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from corpus_tools.evaluation import measures
 from corpus_tools.evaluation.reference import OTHER_CLASS, PHONE_CLASSES, LipCurves, ReferenceUtterance, Thresholds
 from lexicon.sequence import PhoneSequence
+from tts2face.exemplar import motion_measures
 from tts2face.models.talker import ShapeModel
 
 N_DRAWS = 1000  # of utterances, with replacement (Efron 1979)
@@ -177,7 +178,7 @@ def _utterance_statistics(comparison: UtteranceComparison, limits: Thresholds) -
         _curve_moments(one.curves.opening[here], curves.opening[here]),
         _curve_moments(one.curves.width[here], curves.width[here]),
         measures.rmse_z(real, synthesised, comparison.spread),
-        measures.warping_cost(real, synthesised, comparison.spread, round(measures.DTW_BAND_S * fps)),
+        motion_measures.warping_cost(real, synthesised, comparison.spread, round(motion_measures.DTW_BAND_S * fps)),
         _free_cost(comparison),
         _event_counts(comparison, limits),
         np.abs(offsets[np.isfinite(offsets)]),
@@ -190,7 +191,9 @@ def _free_cost(comparison: UtteranceComparison) -> float | None:
         return None
     n = len(comparison.spread)
     real = comparison.real.parameters[comparison.real.evaluated, :n]
-    return measures.warping_cost(real, comparison.own.values[comparison.own.evaluated, :n], comparison.spread, None)
+    return motion_measures.warping_cost(
+        real, comparison.own.values[comparison.own.evaluated, :n], comparison.spread, None
+    )
 
 
 def _event_counts(comparison: UtteranceComparison, limits: Thresholds) -> Floats:
@@ -290,10 +293,10 @@ def _utterance_score(tally: UtteranceStatistics, comparison: UtteranceComparison
     here, recorded = one.evaluated, one.curves
     return UtteranceScore(
         one.observation.name,
-        measures.correlation(recorded.opening[here], synthesised.opening[here]),
-        measures.correlation(recorded.width[here], synthesised.width[here]),
+        motion_measures.correlation(recorded.opening[here], synthesised.opening[here]),
+        motion_measures.correlation(recorded.width[here], synthesised.width[here]),
         tally.rmse_z,
         tally.dtw_cost,
-        measures.range_ratio(recorded.opening[here], synthesised.opening[here]),
+        motion_measures.range_ratio(recorded.opening[here], synthesised.opening[here]),
         int(tally.opening[0]),
     )

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.measures import pearson
 from corpus_tools.gesture_study.blinks import find_blinks
 from corpus_tools.gesture_study.clips import field_clip, hold_out, noise_clip, published_clip, replace_style
 from corpus_tools.gesture_study.longrun import LongRun, long_run
@@ -22,6 +21,7 @@ from corpus_tools.gesture_study.measures import (
 )
 from corpus_tools.gesture_study.traits import Trait, in_display_units, style_traits
 from lexicon.errors import InputError
+from tts2face.exemplar.motion_measures import pearson
 from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
 from tts2face.types import Progress

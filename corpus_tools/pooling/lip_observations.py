@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.measures import speech_frames
 from corpus_tools.evaluation.person_tracks import TRACKED
 from corpus_tools.pooling.pooled_speech import PooledSpeech, talker_features
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.training.adapt_talker import separate_lips
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.exemplar.motion_measures import speech_frames
 from tts2face.models.talker import Talker
 
 MIN_PART_S = 3.0  # tracks are cut at the first pause after as much: about a sentence

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.measures import speech_frames
 from corpus_tools.pooling.lip_alignment import (
     LipSpeech,
     align_phones,
@@ -18,6 +17,7 @@ from corpus_tools.pooling.lip_tracks import LipTrack
 from corpus_tools.training.feature_table import feature_table
 from lexicon.phones import ARPABET
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.exemplar.motion_measures import speech_frames
 from tts2face.models.talker import Talker
 
 N_ROUNDS = 4  # alignments: the first by the talker's model, the others by models of both speakers

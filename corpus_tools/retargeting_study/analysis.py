@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.measures import correlation, range_ratio, speech_frames
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import check_any_kept, observe
 from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.train_score_map import read_scores
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE
+from tts2face.exemplar.motion_measures import correlation, range_ratio, speech_frames
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face

@@ -6,9 +6,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.measures import pearson
 from lexicon.errors import InputError
 from lexicon.phones import phone_distance
+from tts2face.exemplar.motion_measures import pearson
 
 N_PERMUTATIONS = 9999
 

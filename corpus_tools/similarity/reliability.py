@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.measures import pearson
 from corpus_tools.similarity.mantel import upper_triangle
 from corpus_tools.similarity.tokens import LEAST_PHONES, LEAST_TOKENS, SimilarityTable, SpokenTokens, similarity_table
 from lexicon.errors import InputError
+from tts2face.exemplar.motion_measures import pearson
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.evaluation.evaluate import SpeakerScale
-from corpus_tools.evaluation.measures import DTW_BAND_S, correlation, range_ratio, speech_frames, warping_cost
 from corpus_tools.evaluation.methods import build_methods
 from corpus_tools.evaluation.reference import LipCurves
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.training.adapt_talker import NO_CHANGE, Adaptation, Base, base_lips, combined_shapes, learn_base_map
 from corpus_tools.training.base_map import frame_terms
 from corpus_tools.training.train_talker import learn_talker
+from tts2face.exemplar.motion_measures import DTW_BAND_S, correlation, range_ratio, speech_frames, warping_cost
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.types import Progress
 

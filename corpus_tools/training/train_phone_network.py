@@ -17,7 +17,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.measures import speech_frames
 from corpus_tools.pooling.pooled_speech import PooledSpeech, pooled_inventory, talker_features
 from corpus_tools.training.feature_table import feature_table
 from corpus_tools.training.network_training import (
@@ -28,6 +27,7 @@ from corpus_tools.training.network_training import (
     train_network,
 )
 from lexicon.sequence import SILENCE
+from tts2face.exemplar.motion_measures import speech_frames
 from tts2face.models.phone_network import PhoneNetwork, window_features
 from tts2face.models.talker import Talker
 from tts2face.types import Progress

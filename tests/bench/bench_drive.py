@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation import measures
 from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
 from corpus_tools.evaluation.reference import ReferenceUtterance, Thresholds
 from corpus_tools.evaluation.scores import Scores, score_splits
@@ -32,6 +31,7 @@ from corpus_tools.training.train_audio_map import (
     utterance_features,
 )
 from corpus_tools.training.train_talker import learn_talker
+from tts2face.exemplar import motion_measures
 from tts2face.models.audio_map import AudioMap
 from tts2face.speech.features import FEATURE_RATE, speech_level
 from tts2face.types import Waveform
@@ -104,7 +104,7 @@ class Bench:
     def ties(self, trials: int, seed: int) -> dict[str, np.ndarray]:
         """First canonical correlation of randomly selected frames, mean over trials."""
         model = learn_talker(self.train, metadata=EVALUATION_METADATA).model
-        speech = [measures.speech_frames(one.phones, len(one.landmarks), one.fps) for one in self.train]
+        speech = [motion_measures.speech_frames(one.phones, len(one.landmarks), one.fps) for one in self.train]
         seen = np.concatenate(
             [model.parameters(one.landmarks[here])[:, :20] for one, here in zip(self.train, speech, strict=True)]
         )

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from sentences import sentences
 
-from corpus_tools.evaluation import measures
+from tts2face.exemplar import motion_measures
 from tts2face.exemplar.synthesis import build_exemplar_model, speech_trajectory
 from tts2face.models.landmarks import lip_opening, lip_width
 from tts2face.models.talker import Talker, load_talker
@@ -53,7 +53,11 @@ def lip_errors(speeches: list[Speech], talker: Talker, drive: object) -> tuple[f
         for ways in (exemplars, heard)
     ]
     openings, widths = ([measure(one) for one in shapes] for measure in (lip_opening, lip_width))
-    return measures.correlation(*openings), measures.correlation(*widths), measures.range_ratio(*openings)
+    return (
+        motion_measures.correlation(*openings),
+        motion_measures.correlation(*widths),
+        motion_measures.range_ratio(*openings),
+    )
 
 
 def write_wave(path: Path, speech: Speech) -> Path:

@@ -27,7 +27,15 @@ from corpus_tools.recordings.corpus_audio import SOUND_RATE
 from corpus_tools.recordings.observation import Observation, head_motion
 from corpus_tools.recordings.observe import observe
 from corpus_tools.run_options import RunOptions
-from tests.bench.bench_recording_limits import Pictures, Samples, add_noise, darken, shrink, through_mp3
+from tests.bench.bench_recording_limits import (
+    Pictures,
+    Samples,
+    add_noise,
+    darken,
+    shrink,
+    through_codec,
+    through_mp3,
+)
 from tts2face.speech.loudness import intensity
 from tts2face.types import Waveform
 from tts2face.video.frame_grid import trim_and_fill
@@ -49,27 +57,9 @@ def with_sound(one: Observation, samples: Samples) -> Fingerprint:
     return Fingerprint(one.name, sound_changes(sound), motion, one.phones)
 
 
-def through_aac(sound: Samples) -> Samples:
-    """Encoded with 64 kb/s and decoded."""
-    import soxr
-
-    buffer = io.BytesIO()
-    with av.open(buffer, "w", format="adts") as container:
-        stream = container.add_stream("aac", rate=44_100, layout="mono")
-        stream.bit_rate = 64_000
-        frame = av.AudioFrame.from_ndarray(soxr.resample(sound, SOUND_RATE, 44_100)[None], "fltp", "mono")
-        frame.sample_rate = 44_100
-        container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
-    buffer.seek(0)
-    with av.open(buffer, "r") as encoded:
-        blocks = [block.to_ndarray()[0] for block in encoded.decode(audio=0)]
-    return np.asarray(soxr.resample(np.concatenate(blocks), 44_100, SOUND_RATE), np.float32)
-
-
 SOUNDS: dict[str, Callable[[Samples], Samples]] = {
     "MP3, 64 kb/s": through_mp3,
-    "AAC, 64 kb/s": through_aac,
+    "AAC, 64 kb/s": lambda sound: through_codec(sound, "adts", "aac"),
     "level -12 dB": lambda sound: sound / 4,
     "noise at -10 dB": lambda sound: add_noise(sound, 10),
     "trimmed by 0.21 s": lambda sound: sound[round(TRIMMED_S * SOUND_RATE) :],

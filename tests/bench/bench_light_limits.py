@@ -17,12 +17,8 @@ from corpus_tools.recordings.limits import landmark_measures
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import observe
 from corpus_tools.run_options import RunOptions
-from lexicon.errors import DataError
-from tests.bench.bench_recording_limits import Pictures, lip_correlations
-from tts2face.video.frame_grid import trim_and_fill
+from tests.bench.bench_recording_limits import Pictures, lip_correlations, retrack
 from tts2face.video.landmark_models import find_bundle
-from tts2face.video.media import TimedFrame, read_frames
-from tts2face.video.pose import remove_pose
 from tts2face.video.streaming_tracker import StreamingTracker
 
 RNG = np.random.default_rng(0)
@@ -70,19 +66,14 @@ def rows(seen: Sequence[Observation]) -> Iterator[str]:
     for name, damage in DAMAGES.items():
         table, lost = [], 0
         for one in seen:
-            frames = list(read_frames(one.video))
-            pictures = damage([frame.pixels for frame in frames])
-            timed = [TimedFrame(frame.time, pixels) for frame, pixels in zip(frames, pictures, strict=True)]
-            points = np.array([found.points for found in tracker.track(timed, one.fps)])
-            try:
-                filled, first, _ = trim_and_fill(points, one.fps)
-            except DataError:
+            made = retrack(one, damage, tracker)
+            if made is None:
                 lost += 1
                 continue
-            light = measure_light(timed, points, np.array([frame.time for frame in frames]))
-            landmarks = remove_pose(filled, one.fps).landmarks
-            same = lip_correlations(one, landmarks, first)
-            table.append((*np.median(light[:, 1:], axis=0), landmark_measures(filled, landmarks)["jitter"], *same))
+            light = measure_light(made.frames, made.points, np.array([frame.time for frame in made.frames]))
+            jitter = landmark_measures(made.filled, made.landmarks)["jitter"]
+            same = lip_correlations(one, made.landmarks, made.first)
+            table.append((*np.median(light[:, 1:], axis=0), jitter, *same))
         yield f"| {name} | {_cells(np.array(table))} | {lost} of {len(seen)} |" if table else f"| {name} | lost |"
 
 

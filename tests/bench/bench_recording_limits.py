@@ -12,13 +12,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
+from typing import NamedTuple
 
 import av
 import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
-from corpus_tools.evaluation.measures import correlation, speech_frames
 from corpus_tools.evaluation.methods import build_methods
 from corpus_tools.evaluation.reference import LipCurves
 from corpus_tools.recordings.audio_video_sync import LAGS_S, NEAR_S, lag_correlations
@@ -33,6 +33,7 @@ from corpus_tools.run_options import RunOptions
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence
+from tts2face.exemplar.motion_measures import correlation, speech_frames
 from tts2face.models.landmarks import lip_opening
 from tts2face.speech.forced_alignment import Aligner
 from tts2face.types import Waveform
@@ -71,13 +72,13 @@ def add_echo(sound: Samples) -> Samples:
     return np.convolve(sound, response)[: len(sound)].astype(np.float32)
 
 
-def through_mp3(sound: Samples) -> Samples:
-    """Encoded with 64 kb/s and decoded."""
+def through_codec(sound: Samples, container_format: str, codec: str) -> Samples:
+    """Encoded with 64 kb/s at 44.1 kHz and decoded, not longer than before."""
     import soxr
 
     buffer = io.BytesIO()
-    with av.open(buffer, "w", format="mp3") as container:
-        stream = container.add_stream("libmp3lame", rate=44_100, layout="mono")
+    with av.open(buffer, "w", format=container_format) as container:
+        stream = container.add_stream(codec, rate=44_100, layout="mono")
         stream.bit_rate = 64_000
         frame = av.AudioFrame.from_ndarray(soxr.resample(sound, SOUND_RATE, 44_100)[None], "fltp", "mono")
         frame.sample_rate = 44_100
@@ -88,6 +89,11 @@ def through_mp3(sound: Samples) -> Samples:
         blocks = [block.to_ndarray()[0] for block in encoded.decode(audio=0)]
     decoded = soxr.resample(np.concatenate(blocks), 44_100, SOUND_RATE)
     return np.asarray(decoded[: len(sound)], np.float32)
+
+
+def through_mp3(sound: Samples) -> Samples:
+    """Encoded as MP3 with 64 kb/s and decoded."""
+    return through_codec(sound, "mp3", "libmp3lame")
 
 
 SOUND_DAMAGES: dict[str, Callable[[Samples], Samples]] = {
@@ -256,25 +262,42 @@ def lip_correlations(one: Observation, landmarks: NDArray[np.float32], first: in
     return [correlation(pair[0][:, at], pair[1][:, at]) for at in range(2)]
 
 
-def picture_rows(recordings: dict[str, Recording], seen: Sequence[Observation]) -> Iterator[str]:
+class Retracked(NamedTuple):
+    """Damaged pictures, their points (T, P, 2); from the frame `first` on filled points and landmarks without pose."""
+
+    frames: list[TimedFrame]
+    points: NDArray[np.float32]
+    filled: NDArray[np.float32]
+    landmarks: NDArray[np.float32]
+    first: int
+
+
+def retrack(one: Observation, damage: Callable[[Pictures], Pictures], tracker: StreamingTracker) -> Retracked | None:
+    """A recording tracked in damaged pictures; None if the face is lost."""
+    recorded = list(read_frames(one.video))
+    pictures = damage([frame.pixels for frame in recorded])
+    frames = [TimedFrame(frame.time, pixels) for frame, pixels in zip(recorded, pictures, strict=True)]
+    points = np.array([found.points for found in tracker.track(frames, one.fps)])
+    try:
+        filled, first, _ = trim_and_fill(points, one.fps)
+    except DataError:
+        return None
+    return Retracked(frames, points, filled, remove_pose(filled, one.fps).landmarks, first)
+
+
+def picture_rows(seen: Sequence[Observation]) -> Iterator[str]:
     """Rows of the table of damaged pictures."""
     tracker = StreamingTracker(find_bundle(None))
     for name, damage in PICTURE_DAMAGES.items():
         rows, lost = [], 0
         for one in seen:
-            frames = list(read_frames(recordings[one.name].video))
-            pictures = damage([frame.pixels for frame in frames])
-            timed = (TimedFrame(frame.time, pixels) for frame, pixels in zip(frames, pictures, strict=True))
-            points = np.array([found.points for found in tracker.track(timed, one.fps)])
-            try:
-                filled, first, _ = trim_and_fill(points, one.fps)
-            except DataError:
+            made = retrack(one, damage, tracker)
+            if made is None:
                 lost += 1
                 continue
-            landmarks = remove_pose(filled, one.fps).landmarks
-            found = lip_correlations(one, landmarks, first)
-            measures = landmark_measures(filled, landmarks)
-            rows.append((measures["eye_px"], measures["jitter"], *found, float(lip_opening(landmarks).min())))
+            found = lip_correlations(one, made.landmarks, made.first)
+            measures = landmark_measures(made.filled, made.landmarks)
+            rows.append((measures["eye_px"], measures["jitter"], *found, float(lip_opening(made.landmarks).min())))
         table = np.array(rows)
         low, median, high = np.quantile(table, [0, 0.5, 1], axis=0)
         yield (
@@ -296,7 +319,7 @@ def main() -> None:
         recordings = {one.name: one for one in find_recordings(folder)}
         print(f"\n{folder.name}: quantiles 1, 5, 50, 95, 99 %", flush=True)
         pictures = seen[::EVERY_PICTURE] if len(seen) > EVERY_PICTURE else seen
-        tables = [sync_rows(folder.name, seen), sound_rows(recordings, seen), picture_rows(recordings, pictures)]
+        tables = [sync_rows(folder.name, seen), sound_rows(recordings, seen), picture_rows(pictures)]
         for row in chain(*tables, harm_rows(seen) if len(seen) > MIN_FOR_TALKER else ()):
             print(row, flush=True)
 

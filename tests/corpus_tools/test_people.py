@@ -9,7 +9,6 @@ import pytest
 
 from cli.main import run
 from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
-from corpus_tools.evaluation.measures import speech_frames
 from corpus_tools.evaluation.paired_bootstrap import PairedCurves, estimate, estimate_difference
 from corpus_tools.evaluation.people import PeopleEvaluation, compare_people, evaluate_people, z_score_people
 from corpus_tools.evaluation.people_tables import difference_table, people_rows, people_table, phone_table
@@ -20,6 +19,7 @@ from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE
 from tests.corpus_tools.speaking import FPS, OPENINGS, observation, with_words
+from tts2face.exemplar.motion_measures import speech_frames
 from tts2face.models.talker import Talker, write_talker
 
 

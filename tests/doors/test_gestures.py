@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.decomposition.face_motion import moved_landmarks
 from lexicon.errors import InputError
+from tts2face.face.face_motion import moved_landmarks
 from tts2face.face.gesture_transfer import gesture_face
 from tts2face.models.face import Face
 from tts2face.models.palette import FEATURES, load_palette, write_palette

@@ -10,6 +10,7 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.test_plate import own_talker
 from tts2face.models.talker import Utterance
 from tts2face.own_face.appearance_regression import fit_appearance_regression
+from tts2face.synthesis.own_appearance_face import OwnAppearanceFace
 from tts2face.types import Trajectory
 
 
@@ -25,6 +26,8 @@ def test_a_linear_relation_is_recovered():
     motion = regression.motion(Trajectory(("shape0", "shape1"), [[0.5, -1.0], [0.0, 0.0]], 25.0))
     assert motion.channels == ("shape0", "shape1", "face0", "face1", "mouth0", "mouth1")
     assert motion.values[0, :2].tolist() == [0.5, -1.0]
+    face = OwnAppearanceFace(talker, None, None, regression, None)
+    np.testing.assert_allclose(face.landmarks(motion), talker.model.shapes(motion.values[:, :2]), atol=1e-5)  # mm
     assert np.abs(motion.values[:, 2:] - (np.array([[0.5, -1.0], [0.0, 0.0]]) @ mix + offset)).max() < 0.05
 
 

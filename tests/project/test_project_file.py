@@ -83,8 +83,11 @@ def test_silent_features_are_the_muted_and_those_that_are_not_solo(whole: Projec
         ({"pronunciations": {"two": "XX"}}, "pronunciations of untitled, line 1"),
         ({"pronunciations": {"two words": "T UW1"}}, "a pronunciation is for one word, not for 'two words'"),
         ({"edges": [{"phones": ["t"], "edges": [0, 0]}]}, "edges: "),
-        ({"edges": [{"phones": ["t"], "edges": [0, 1], "at": 1}]}, "edges: there is no 'at' in corrected edges"),
-        ({"excluded": [{"utterance": "u"}]}, "excluded: give a number, not null"),
+        (
+            {"edges": [{"phones": ["t"], "edges": [0, 1], "at": 1}]},
+            "edges: there is no 'at' here; choose phones, edges",
+        ),
+        ({"excluded": [{"utterance": "u"}]}, "excluded: start is missing"),
         ({"muted": ["ears"]}, "name: there is no feature 'ears'"),
     ],
 )

@@ -63,6 +63,18 @@ def test_a_request_passes_with_headers(make_client: Make) -> None:
     assert response.headers["x-content-type-options"] == "nosniff"
 
 
+def test_an_answer_may_take_longer_than_a_body_that_there_is_not() -> None:
+    """Files that are made first are sent while their end of the connection is watched."""
+
+    async def slow(scope: Scope, receive: Receive, send: Send) -> None:
+        await asyncio.sleep(0.15)
+        await echo(scope, receive, send)
+
+    state = ServiceState(ServiceSettings(processes=1, body_s=0.1))
+    client = httpx.AsyncClient(transport=httpx.ASGITransport(Guard(slow, state)), base_url="http://localhost:8880")
+    assert answer(client, "GET").json() == {"size": 0, "key": "local"}
+
+
 @pytest.mark.parametrize("given", ["a b", "x" * 65, "é"])
 def test_a_request_id_that_could_confuse_a_log_is_replaced(make_client: Make, given: str) -> None:
     response = answer(make_client(), headers={"x-request-id": given.encode()})

@@ -8,7 +8,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from tests.service.conftest import RunningService
+from tests.service.conftest import RunningService, running_service
 from tts2face.service.access.browser import COOKIE, cookie_key, set_cookie
 from tts2face.service.access.keys import add_key
 from tts2face.service.access.page_headers import POLICY
@@ -26,12 +26,8 @@ def keys(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 @pytest.fixture(scope="module")
 def closed(keys: dict[str, str]) -> Iterator[RunningService]:
     """A service with keys."""
-    running = RunningService("--keys", keys["file"])
-    try:
-        running.wait_until_ready()
+    with running_service("--keys", keys["file"]) as running:
         yield running
-    finally:
-        running.close()
 
 
 @contextmanager
@@ -81,12 +77,19 @@ def test_a_key_sees_its_own_projects_only(closed: RunningService, keys: dict[str
         number = ann.post("/api/projects", json={"text": "Hello."}).json()["id"]
         assert number in ann.get("/api/projects").text
         assert number not in bob.get("/api/projects").text
-        for path in ("preview", "project.json", "face.glb", "picture.png?time=0", "explanation?time=0", "renders"):
+        paths = ("preview", "project.json", "face.glb", "picture.png?time=0", "explanation?time=0", "renders")
+        for path in (*paths, "comparison", "comparison/preview", "comparison/measures", "recordings"):
             assert bob.get(f"/api/projects/{number}/{path}").status_code == 404
         change = {"edit": {"kind": "name", "name": "x"}}
         assert bob.post(f"/api/projects/{number}/edits", json=change).status_code == 404
         assert bob.delete(f"/api/projects/{number}").status_code == 404
         assert "cannot be opened" in bob.get(f"/animate/{number}").text
+        kept = {"reference": {"kind": "kept"}}
+        assert bob.put(f"/api/projects/{number}/comparison", json=kept).status_code == 404
+        report = ann.post("/api/reports", json={"kind": "gestures", "model": "starter"}).json()["id"]
+        assert bob.get("/api/reports").json() == []
+        assert bob.delete(f"/api/reports/{report}").status_code == 404
+        assert ann.delete(f"/api/reports/{report}").status_code == 204
 
 
 def test_a_key_without_speak_makes_no_project(closed: RunningService, keys: dict[str, str]) -> None:
@@ -132,12 +135,9 @@ def test_the_body_of_an_upload_is_bounded(studio: httpx.Client) -> None:
 def test_the_log_names_the_studio_and_it_can_be_left_out(studio_service: RunningService) -> None:
     listening = studio_service.wait_for_event("listening")
     assert listening["studio"] == f"{listening['url']}/studio"
-    without = RunningService("--no-studio")
-    try:
+    with running_service("--no-studio", is_ready=False) as without:
         assert without.wait_for_event("listening")["studio"] is None
         assert httpx.get(f"{without.url}/studio/").status_code == 404
-    finally:
-        without.close()
 
 
 @pytest.mark.parametrize("cookie", ["", "a=b", "tts2face_key", '"', "tts2face_key=\x01"])
@@ -165,3 +165,25 @@ def test_styles_and_scripts_are_in_the_package() -> None:
     folder = Path(tts2face.studio.__file__).parent
     assert (folder / "pages" / "studio.css").is_file()
     assert {"stage.js", "timeline.js", "clock.js", "preview.js"} <= {one.name for one in folder.glob("components/*.js")}
+
+
+def test_styles_and_takes_belong_to_a_key(closed: RunningService, keys: dict[str, str]) -> None:
+    mix = {"name": "anns", "mix": {"source": "grid_s1"}}
+    with browser(closed, keys["ann"]) as ann, browser(closed, keys["bob"]) as bob:
+        assert ann.post("/api/styles", json=mix).status_code == 201
+        assert "anns" in {one["name"] for one in ann.get("/api/styles").json()["styles"]}
+        assert "anns" not in {one["name"] for one in bob.get("/api/styles").json()["styles"]}
+        assert "is not one of your own styles" in bob.delete("/api/styles/anns").json()["error"]["message"]
+        assert "you have no own styles yet" in bob.get("/api/styles/my-styles.palette").json()["error"]["message"]
+        number = bob.post("/api/projects", json={"text": "Hello."}).json()["id"]
+        edit = {
+            "kind": "models",
+            "options": {"palette": f"{closed.data.name}/studio/palettes/ann.styles/my-styles.palette"},
+        }
+        answer = bob.post(f"/api/projects/{number}/edits", json={"edit": edit})
+        assert "there is no palette" in answer.json()["error"]["message"]
+        for address in ("/api/styles/take/0", "/api/takes/new"):
+            answer = ann.put(address, content=b"Timecode", headers={"Content-Type": "text/csv"})
+            assert "lacks the scope build" in answer.json()["error"]["message"]
+    with browser(closed, keys["reader"]) as reader:
+        assert "lacks the scope speak" in reader.post("/api/styles", json=mix).json()["error"]["message"]

@@ -14,10 +14,11 @@ import pygltflib
 import pytest
 from PIL import Image
 
-from tests.service.conftest import RunningService
+from tests.service.conftest import running_service
 from tts2face.project.project_file import load_project
 from tts2face.session import Session
 from tts2face.studio.bundle import read_bundle
+from tts2face.studio.lip_strips import opening_mm
 
 TEXT = "Bob may move. Five maps were there."
 Bundle = tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray]
@@ -206,6 +207,10 @@ def test_a_phone_is_explained_and_its_example_excluded(studio: httpx.Client, num
     phone = studio.get(address, params=middle).json()["phone"]
     assert phone["phone"] == label
     best = phone["tokens"][0]
+    openings = [[opening_mm(lips) for lips in one["outlines"]] for one in phone["tokens"]]
+    assert np.median([one[2] for one in openings]) < 2.0  # mm: recorded lips of an m are closed in its middle
+    assert len(phone["made"]) == len(openings[0]) == 5
+    assert opening_mm(phone["made"][2]) < 1.0
     edit(studio, number, {"kind": "exclude", "utterance": best["utterance"], "start": best["start"], "on": True})
     again = studio.get(address, params=middle).json()["phone"]["tokens"]
     assert (best["utterance"], best["start"]) not in {(one["utterance"], one["start"]) for one in again}
@@ -309,8 +314,7 @@ def test_kept_words_come_into_new_projects(studio: httpx.Client, number: str) ->
 
 
 def test_a_killed_server_loses_nothing_older_than_a_second_and_makes_its_files_later() -> None:
-    running = RunningService()
-    try:
+    with running_service(is_ready=False) as running:
         with httpx.Client(base_url=f"{running.url}/studio", timeout=60.0) as client:
             number = client.post("/api/projects", json={"text": TEXT}).json()["id"]
             for at in range(12):
@@ -326,22 +330,17 @@ def test_a_killed_server_loses_nothing_older_than_a_second_and_makes_its_files_l
         running.process.kill()
         running.process.wait(timeout=30)
         kept = load_project(project_file(Path(running.data.name), number))
-        again = RunningService(environment={"TTS2FACE_SERVE_DATA": running.data.name})
-        try:
-            with httpx.Client(base_url=f"{again.url}/studio", timeout=60.0) as client:
-                back = client.get(f"/api/projects/{number}/project.json").json()
-                undone = client.post(f"/api/projects/{number}/undo").json()
-                deadline = time.monotonic() + 120
-                while {one["state"] for one in client.get(address).json()} != {"done"}:
-                    assert time.monotonic() < deadline
-                    time.sleep(0.1)
-                made = {one["id"] for one in client.get(address).json()}
-            folder = project_file(Path(running.data.name), number).parent / "renders"
-            assert {path.suffix for path in folder.iterdir()} == {".mp4"}
-        finally:
-            again.close()
-    finally:
-        running.close()
+        again = running_service(environment={"TTS2FACE_SERVE_DATA": running.data.name}, is_ready=False)
+        with again as restarted, httpx.Client(base_url=f"{restarted.url}/studio", timeout=60.0) as client:
+            back = client.get(f"/api/projects/{number}/project.json").json()
+            undone = client.post(f"/api/projects/{number}/undo").json()
+            deadline = time.monotonic() + 120
+            while {one["state"] for one in client.get(address).json()} != {"done"}:
+                assert time.monotonic() < deadline
+                time.sleep(0.1)
+            made = {one["id"] for one in client.get(address).json()}
+        folder = project_file(Path(running.data.name), number).parent / "renders"
+        assert {path.suffix for path in folder.iterdir()} == {".mp4"}
     assert len(kept.timeline.nods) == len(back["timeline"]["nods"]) == 12
     assert (undone["n_undo"], undone["n_redo"]) == (12, 1)
     assert made == set(wanted)

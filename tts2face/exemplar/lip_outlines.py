@@ -1,4 +1,4 @@
-"""Outlines of the recorded lips of tokens, for drawing."""
+"""Outlines of lips, recorded or made, for drawing."""
 
 from dataclasses import dataclass
 
@@ -13,6 +13,7 @@ from tts2face.models.talker import Talker
 
 OUTER = (*OUTER_LIP_UPPER, *reversed(OUTER_LIP_LOWER[1:-1]))  # from the person's right corner over the upper lip
 INNER = (*INNER_LIP_UPPER, *reversed(INNER_LIP_LOWER[1:-1]))
+N_INSTANTS = 5  # of a phone that are drawn
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,10 +24,22 @@ class LipOutline:
     inner: NDArray[np.float32]
 
 
-def token_outlines(talker: Talker, token: UsedToken, n_instants: int = 5) -> tuple[LipOutline, ...]:
-    """Outlines at equally spaced instants of a recorded token, from its beginning to its end.
+def lip_outlines(landmarks: NDArray[np.floating], rest: NDArray[np.floating]) -> tuple[LipOutline, ...]:
+    """Outlines of landmarks (T, 478, 3) of one face, mm.
 
-    The middle is that of the corners of the talker's mean mouth, so that outlines of several tokens can be compared.
+    The middle is that of the mouth's corners in `rest` (478, 3), so that outlines of several instants can be compared.
+    """
+    flip = np.array([1.0, -1.0])  # y is up in landmarks
+    points, still = landmarks[..., :2] * flip, rest[:, :2] * flip
+    middle = (still[OUTER[0]] + still[OUTER[len(OUTER_LIP_UPPER) - 1]]) / 2
+    return tuple(
+        LipOutline((face[list(OUTER)] - middle).astype(np.float32), (face[list(INNER)] - middle).astype(np.float32))
+        for face in points
+    )
+
+
+def token_outlines(talker: Talker, token: UsedToken, n_instants: int = N_INSTANTS) -> tuple[LipOutline, ...]:
+    """Outlines at equally spaced instants of a recorded token, from its beginning to its end, around its mean mouth.
 
     Raises
     ------
@@ -39,10 +52,4 @@ def token_outlines(talker: Talker, token: UsedToken, n_instants: int = 5) -> tup
     times = np.linspace(token.start, token.end, n_instants)
     frames = np.arange(len(utterance.shape)) / talker.fps
     shape = interpolate_columns(utterance.shape, frames, np.clip(times, 0.0, frames[-1]))
-    points = talker.model.shapes(shape)[:, :, :2] * np.array([1.0, -1.0])  # y is up in the model
-    corners = talker.model.mean[list(OUTER), :2] * np.array([1.0, -1.0])
-    middle = (corners[0] + corners[len(OUTER_LIP_UPPER) - 1]) / 2
-    return tuple(
-        LipOutline((face[list(OUTER)] - middle).astype(np.float32), (face[list(INNER)] - middle).astype(np.float32))
-        for face in points
-    )
+    return lip_outlines(talker.model.shapes(shape), talker.model.mean)

@@ -1,6 +1,5 @@
 """Timeline files in JSON (docs/file-formats.md)."""
 
-import json
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -11,6 +10,7 @@ from typing import Any, TypeVar
 
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
+from lexicon.json_values import check_object, check_type, format_value
 from tts2face.gesture.key_curves import AnyCurve, ChannelEdit, ExpressionCurve, StrengthCurve
 from tts2face.gesture.notation import ALL_FEATURES, expand_feature, parse_style
 from tts2face.gesture.spans import ExpressionSpan, Gains, GazeTarget, Nod, StyleSpan, check_feature
@@ -56,7 +56,7 @@ def parse_timeline(content: str, name: str = "timeline") -> Timeline:
 
 def parse_timeline_object(data: Any, name: str = "timeline") -> Timeline:
     """A timeline from its object of JSON; errors as `read_timeline`."""
-    parts = _add_place_to_errors(name, lambda: _check_object(data, {}, dict.fromkeys(TIMELINE_KEYS)))
+    parts = _add_place_to_errors(name, lambda: check_object(data, {}, dict.fromkeys(TIMELINE_KEYS)))
     spans = _parse_each(f"{name}, spans", parts["spans"], _parse_spans)
     expressions = _parse_each(f"{name}, expressions", parts["expressions"], _parse_expression)
     nods = _parse_each(f"{name}, nods", parts["nods"], _parse_nod)
@@ -117,51 +117,54 @@ def _parse_each(place: str, content: Any, make: Callable[[Any], Made]) -> list[M
     if content is None:
         return []
     if not isinstance(content, list):
-        raise DataError(f"{place} must be a list in square brackets, not {_format_value(content)}")
+        raise DataError(f"{place} must be a list in square brackets, not {format_value(content)}")
     return [_add_place_to_errors(f"{place}[{number}]", partial(make, one)) for number, one in enumerate(content)]
 
 
 def _parse_spans(content: Any) -> tuple[StyleSpan, ...]:
-    parts = _check_object(content, {"feature": str, "style": str, "start": float}, {"end": math.inf})
-    end = _check_type("end", parts["end"], float)
+    parts = check_object(content, {"feature": str, "style": str, "start": float}, {"end": math.inf})
     return tuple(
-        StyleSpan(feature, parts["style"], parts["start"], end) for feature in expand_feature(parts["feature"])
+        StyleSpan(feature, parts["style"], parts["start"], _end(parts)) for feature in expand_feature(parts["feature"])
     )
 
 
 def _parse_expression(content: Any) -> ExpressionSpan:
-    parts = _check_object(content, {"expression": str, "weight": float}, {"start": 0.0, "end": math.inf})
-    start, end = (_check_type(name, parts[name], float) for name in ("start", "end"))
-    return ExpressionSpan(parts["expression"], parts["weight"], start, end)
+    parts = check_object(content, {"expression": str, "weight": float}, {"start": 0.0, "end": math.inf})
+    start = check_type("start", parts["start"], float)
+    return ExpressionSpan(parts["expression"], parts["weight"], start, _end(parts))
 
 
 def _parse_nod(content: Any) -> Nod:
-    parts = _check_object(content, {"time": float}, {"size": 1.0})
-    return Nod(parts["time"], _check_type("size", parts["size"], float))
+    parts = check_object(content, {"time": float}, {"size": 1.0})
+    return Nod(parts["time"], check_type("size", parts["size"], float))
 
 
 def _parse_gaze(content: Any) -> GazeTarget:
-    parts = _check_object(content, {"down_deg": float, "left_deg": float}, {"start": 0.0, "end": math.inf})
-    start, end = (_check_type(name, parts[name], float) for name in ("start", "end"))
-    return GazeTarget(parts["down_deg"], parts["left_deg"], start, end)
+    parts = check_object(content, {"down_deg": float, "left_deg": float}, {"start": 0.0, "end": math.inf})
+    start = check_type("start", parts["start"], float)
+    return GazeTarget(parts["down_deg"], parts["left_deg"], start, _end(parts))
+
+
+def _end(parts: Mapping[str, Any]) -> float:
+    """End of a span; infinite, which JSON cannot say, only where none is given."""
+    return math.inf if parts["end"] == math.inf else float(check_type("end", parts["end"], float))
 
 
 def _parse_curve(kind: Callable[[str, Any], AnyCurve], owner: str, content: Any) -> AnyCurve:
-    parts = _check_object(content, {owner: str}, {"keys": None})
+    parts = check_object(content, {owner: str}, {"keys": None})
     keys = parts["keys"]
     if not isinstance(keys, list) or not all(isinstance(key, list) and len(key) == 2 for key in keys):
-        raise InputError(f"keys must be a list of [seconds, value], not {_format_value(keys)}")
-    return kind(parts[owner], tuple(tuple(_check_type("a number of a key", one, float) for one in key) for key in keys))
+        raise InputError(f"keys must be a list of [seconds, value], not {format_value(keys)}")
+    return kind(parts[owner], tuple(tuple(check_type("a number of a key", one, float) for one in key) for key in keys))
 
 
 def _parse_seeds(content: Any) -> Mapping[str, int]:
     if content is None:
         return {}
     if not isinstance(content, dict):
-        raise InputError(f"give a seed for each feature, not {_format_value(content)}")
+        raise InputError(f"give a seed for each feature, not {format_value(content)}")
     for name, seed in content.items():
-        if not isinstance(seed, int) or isinstance(seed, bool):
-            raise InputError(f"the seed of {name} must be a whole number, not {_format_value(seed)}")
+        check_type(f"the seed of {name}", seed, int)
     return content
 
 
@@ -171,8 +174,8 @@ def _parse_styles(content: Any) -> Mapping[str, str]:
     if isinstance(content, str):
         return parse_style(content)
     if not isinstance(content, dict):
-        raise InputError(f"give a name, or a style for each feature, not {_format_value(content)}")
-    named = {name: _check_type(name, style, str) for name, style in content.items()}
+        raise InputError(f"give a name, or a style for each feature, not {format_value(content)}")
+    named = {name: check_type(name, style, str) for name, style in content.items()}
     base = named.pop(ALL_FEATURES, None)
     return {**(dict.fromkeys(FEATURES, base) if base else {}), **{check_feature(name): named[name] for name in named}}
 
@@ -181,40 +184,5 @@ def _parse_gains(content: Any) -> Gains:
     if content is None:
         return Gains()
     if not isinstance(content, dict):
-        raise InputError(f"give a factor for each feature, not {_format_value(content)}")
-    return Gains({name: _check_type(name, factor, float) for name, factor in content.items()})
-
-
-def _check_object(content: Any, required: Mapping[str, type], optional: Mapping[str, Any]) -> dict[str, Any]:
-    """The parts of a JSON object: all that are required, of their type, and no unknown one."""
-    if not isinstance(content, dict):
-        raise InputError(f"give an object in curly brackets, not {_format_value(content)}")
-    for name in content:
-        if name not in required and name not in optional:
-            raise InputError(f"there is no {name!r} here; choose {', '.join([*required, *optional])}")
-    for name in required:
-        if name not in content:
-            raise InputError(f"{name} is missing")
-    return {**optional, **content, **{name: _check_type(name, content[name], kind) for name, kind in required.items()}}
-
-
-def _check_type(name: str, value: Any, kind: type) -> Any:
-    if kind is float and isinstance(value, int | float) and not isinstance(value, bool):
-        return _check_finite(name, value)
-    if kind is str and isinstance(value, str):
-        return value
-    raise InputError(
-        f"{name} must be {'a number' if kind is float else 'a text in quotes'}, not {_format_value(value)}"
-    )
-
-
-def _check_finite(name: str, value: float) -> float:
-    """A number as JSON has them; infinity is only ever our own default."""
-    try:
-        return float(value)
-    except OverflowError as huge:
-        raise InputError(f"{name} is too large a number") from huge
-
-
-def _format_value(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False)[:40]
+        raise InputError(f"give a factor for each feature, not {format_value(content)}")
+    return Gains({name: check_type(name, factor, float) for name, factor in content.items()})

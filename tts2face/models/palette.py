@@ -71,6 +71,9 @@ class Style:
         (T, k) values of each recorded feature of `FEATURES`.
     metadata
         At least sources, licence, attribution and command.
+    steps
+        (k,) steps of each feature's values in the file from which the style was read, so that it is written unchanged;
+        empty for new motion.
     """
 
     lengths: NDArray[np.int32]
@@ -78,6 +81,7 @@ class Style:
     pitch: Float32Array
     motion: Mapping[str, Float32Array]
     metadata: Mapping[str, Any] = field(default_factory=dict)
+    steps: Mapping[str, Float32Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check that all parts have the same number of frames."""
@@ -189,7 +193,7 @@ class Palette:
 
 
 def write_palette(path: Path, palette: Palette) -> None:
-    """Write a ``.palette`` file (docs/file-formats.md); values in steps of 1/2000 of their spread."""
+    """Write a ``.palette`` file (docs/file-formats.md); values as read, or in steps of 1/2000 of their spread."""
     arrays: dict[str, NDArray[Any]] = {"neutral": palette.neutral}
     for name, region in palette.regions.items():
         arrays |= {f"region.{name}.landmarks": region.landmarks, f"region.{name}.modes": region.modes}
@@ -200,7 +204,9 @@ def write_palette(path: Path, palette: Palette) -> None:
             f"style.{name}.pitch": style.pitch.astype(np.float16),
         }
         for feature, values in style.motion.items():
-            step = np.maximum(values.std(axis=0), 1e-6) / STEPS_PER_SPREAD
+            step = style.steps.get(feature)
+            if step is None:
+                step = np.maximum(values.std(axis=0), 1e-6) / STEPS_PER_SPREAD
             arrays[f"style.{name}.{feature}"] = np.clip(np.rint(values / step), -32768, 32767).astype(np.int16)
             arrays[f"style.{name}.{feature}.step"] = step.astype(np.float32)
     header = {
@@ -265,15 +271,14 @@ def _palette_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str
 
 
 def _style_from_arrays(name: str, arrays: Mapping[str, NDArray[Any]], metadata: Mapping[str, Any]) -> Style:
-    motion = {
-        feature: arrays[f"style.{name}.{feature}"] * arrays[f"style.{name}.{feature}.step"]
-        for feature in FEATURES
-        if f"style.{name}.{feature}" in arrays
-    }
+    features = [feature for feature in FEATURES if f"style.{name}.{feature}" in arrays]
+    steps = {feature: arrays[f"style.{name}.{feature}.step"] for feature in features}
+    motion = {feature: arrays[f"style.{name}.{feature}"] * steps[feature] for feature in features}
     return Style(
         lengths=arrays[f"style.{name}.lengths"],
         intensity=arrays[f"style.{name}.intensity"].astype(np.float32),
         pitch=arrays[f"style.{name}.pitch"].astype(np.float32),
         motion=motion,
         metadata=metadata,
+        steps=steps,
     )

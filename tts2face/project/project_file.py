@@ -2,13 +2,14 @@
 
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar
 
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
+from lexicon.json_values import check_list, check_mapping, check_object, check_type
 from tts2face.exemplar.options import ExcludedToken
 from tts2face.gesture.timeline_file import parse_timeline_object, timeline_json
 from tts2face.project.project import Project
@@ -74,18 +75,16 @@ def parse_project(content: Any, name: str, folder: Path) -> Project:
     return part(
         "name",
         lambda title: Project(
-            _text(title),
+            check_type("the name", title, str),
             part("request", lambda given: _options(Request, given, folder, REQUEST_FILES), {}),
             part("models", lambda given: _options(Models, given, folder, MODEL_FILES), {}),
             part("picture", lambda given: _options(Picture, given, folder, PICTURE_FILES), {}),
-            part("timeline", lambda given: parse_timeline_object(_object(given)), {}),
-            part(
-                "pronunciations", lambda given: {word: _text(written) for word, written in _object(given).items()}, {}
-            ),
-            part("edges", lambda given: tuple(_sentence_edges(one) for one in _list(given)), []),
-            part("excluded", lambda given: tuple(_excluded(one) for one in _list(given)), []),
-            part("muted", lambda given: frozenset(map(_text, _list(given))), []),
-            part("solo", lambda given: frozenset(map(_text, _list(given))), []),
+            part("timeline", lambda given: parse_timeline_object(check_mapping(given)), {}),
+            part("pronunciations", _pronunciations, {}),
+            part("edges", lambda given: tuple(map(_sentence_edges, check_type("edges", given, list))), []),
+            part("excluded", lambda given: tuple(map(_excluded, check_type("excluded", given, list))), []),
+            part("muted", lambda given: frozenset(check_list("muted", given, str)), []),
+            part("solo", lambda given: frozenset(check_list("solo", given, str)), []),
         ),
         "untitled",
     )
@@ -130,7 +129,7 @@ def save_project(project: Project, path: str | Path) -> None:
 
 def _options(kind: type[Options], given: Any, folder: Path, files: tuple[str, ...]) -> Options:
     known = {option.name for option in fields(kind)}
-    chosen = dict(_object(given))
+    chosen = dict(check_mapping(given))
     for name in chosen:
         if name not in known:
             raise InputError(f"there is no option {name!r}; choose {', '.join(sorted(known))}")
@@ -156,46 +155,20 @@ def _options_json(options: Options, default: Options, folder: Path, files: tuple
     return chosen
 
 
+def _pronunciations(given: Any) -> dict[str, str]:
+    return {word: check_type(word, written, str) for word, written in check_mapping(given).items()}
+
+
 def _sentence_edges(given: Any) -> SentenceEdges:
-    parts = _object(given)
-    for name in parts:
-        if name not in {"text", "occurrence", "phones", "edges"}:
-            raise InputError(f"there is no {name!r} in corrected edges; choose text, occurrence, phones, edges")
-    occurrence = parts.get("occurrence", 0)
-    if not isinstance(occurrence, int) or isinstance(occurrence, bool):
-        raise InputError(f"occurrence must be a whole number, not {occurrence!r}")
+    parts = check_object(given, {"phones": list, "edges": list}, {"text": "", "occurrence": 0})
     return SentenceEdges(
-        _text(parts.get("text", "")),
-        occurrence,
-        tuple(map(_text, _list(parts.get("phones")))),
-        tuple(map(_number, _list(parts.get("edges")))),
+        check_type("text", parts["text"], str),
+        check_type("occurrence", parts["occurrence"], int),
+        tuple(check_list("phones", parts["phones"], str)),
+        tuple(check_list("edges", parts["edges"], float)),
     )
 
 
 def _excluded(given: Any) -> ExcludedToken:
-    parts = _object(given)
-    return ExcludedToken(_text(parts.get("utterance")), _number(parts.get("start")))
-
-
-def _object(given: Any) -> Mapping[str, Any]:
-    if not isinstance(given, dict):
-        raise InputError(f"give an object in curly brackets, not {json.dumps(given)[:40]}")
-    return given
-
-
-def _list(given: Any) -> list[Any]:
-    if not isinstance(given, list):
-        raise InputError(f"give a list in square brackets, not {json.dumps(given)[:40]}")
-    return given
-
-
-def _text(given: Any) -> str:
-    if not isinstance(given, str):
-        raise InputError(f"give a text in quotes, not {json.dumps(given)[:40]}")
-    return given
-
-
-def _number(given: Any) -> float:
-    if not isinstance(given, int | float) or isinstance(given, bool):
-        raise InputError(f"give a number, not {json.dumps(given)[:40]}")
-    return float(given)
+    parts = check_object(given, {"utterance": str, "start": float}, {})
+    return ExcludedToken(parts["utterance"], parts["start"])

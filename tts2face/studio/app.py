@@ -14,8 +14,8 @@ from lexicon.errors import InputError
 from tts2face.service.access.page_headers import PAGES
 from tts2face.service.app import NO_TELEMETRY
 from tts2face.service.state import ServiceState
-from tts2face.studio import routes
-from tts2face.studio.pages import animate, login, projects
+from tts2face.studio import comparison_routes, report_routes, routes, style_routes, take_routes
+from tts2face.studio.pages import animate, login, palette, projects, puppet, reports
 from tts2face.studio.pages.record import add_record_page
 from tts2face.studio.recordings import Recordings
 from tts2face.studio.studio import Studio
@@ -30,8 +30,15 @@ def mount_studio(app: FastAPI, state: ServiceState) -> None:
     app.include_router(login.make_router(state))
     app.state.studio = studio
     app.include_router(routes.router)
+    app.include_router(comparison_routes.router)
+    app.include_router(report_routes.router)
+    app.include_router(style_routes.router)
+    app.include_router(take_routes.router)
     projects.register(studio)
     animate.register(studio)
+    reports.register(studio)
+    palette.register(studio)
+    puppet.register(studio)
     recordings = add_record_page(app, studio.folder, _recording_owner)
     _disable_telemetry()
     pages_app.config.socket_io_js_transports = ["websocket"]
@@ -52,7 +59,10 @@ def _recording_owner(request: HttpRequest) -> str:
     """
     key = request.state.key
     if "build" not in key.scopes:
-        raise InputError(f"the key {key.name} lacks the scope build, which recordings need; use another key")
+        raise InputError(
+            f"the key {key.name} lacks the scope build, which recordings need; ask the operator for a key with it "
+            "(`tts2face keys add NAME --scope speak --scope build`)"
+        )
     return str(key.name)
 
 
@@ -65,6 +75,7 @@ def _run_with(app: FastAPI, studio: Studio, recordings: Recordings) -> None:
         async with before(whole) as state:
             recordings.checks.start()
             await studio.start()
+            await asyncio.to_thread(studio.takes.store.end_readings)
             try:
                 yield state
             finally:

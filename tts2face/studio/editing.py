@@ -9,6 +9,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from lexicon.errors import InputError
+from lexicon.json_values import check_type, is_number
 from lexicon.sequence import PhoneSequence
 from tts2face.exemplar.options import ExcludedToken
 from tts2face.gesture.key_curves import ChannelEdit, ExpressionCurve, StrengthCurve
@@ -55,22 +56,7 @@ def _checked(kind: str, name: str, wanted: type, edit: Edit) -> Any:
         return math.inf
     if name not in edit:
         raise InputError(f"the edit {kind} needs {name}; send it")
-    value = edit[name]
-    if wanted is float and isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
-        return float(value)
-    if wanted is not float and type(value) is wanted:
-        return value
-    raise InputError(f"{name} of the edit {kind} must be {_NAMES[wanted]}, not {str(value)[:40]!r}")
-
-
-_NAMES = {
-    float: "a number",
-    int: "a whole number",
-    str: "a text",
-    bool: "true or false",
-    list: "a list",
-    dict: "an object",
-}
+    return check_type(f"{name} of the edit {kind}", edit[name], wanted)
 
 
 def _paint(project: Project, given: Edit, _: Sentences) -> Project:
@@ -105,14 +91,10 @@ def _channel(project: Project, given: Edit, _: Sentences) -> Project:
 def _replaced(curves: tuple[Any, ...], lane: str, make: Callable[[str, Any], Any], given: Edit) -> tuple[Any, ...]:
     """Curves with the one of a lane replaced, or removed if there are no keys."""
     keys = given["keys"]
-    if not all(isinstance(key, list | tuple) and len(key) == 2 and all(_is_number(one) for one in key) for key in keys):
+    if not all(isinstance(key, list | tuple) and len(key) == 2 and all(is_number(one) for one in key) for key in keys):
         raise InputError("keys must be a list of [seconds, value]")
     others = tuple(curve for curve in curves if curve.lane != lane)
     return (*others, make(lane, tuple(map(tuple, keys)))) if keys else others
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _nod(project: Project, given: Edit, _: Sentences) -> Project:
@@ -222,10 +204,10 @@ def _with_options(options: Any, given: Edit, kind: type) -> Any:
 
 def _check_option(name: str, value: Any, default: Any) -> None:
     """Refuse a value of another kind than the default's."""
-    if isinstance(default, bool | str) and type(value) is not type(default):
-        raise InputError(f"{name} must be {_NAMES[type(default)]}, not {str(value)[:40]!r}")
-    if isinstance(default, int | float) and not isinstance(default, bool) and not _is_number(value):
-        raise InputError(f"{name} must be a number, not {str(value)[:40]!r}")
+    if isinstance(default, bool | str):
+        check_type(name, value, type(default))
+    elif isinstance(default, int | float):
+        check_type(name, value, float)
 
 
 def _name(project: Project, given: Edit, _: Sentences) -> Project:

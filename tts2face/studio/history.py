@@ -1,5 +1,6 @@
 """The history of a project: what was before, what was undone. Pure."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
 from lexicon.errors import InputError
@@ -51,6 +52,13 @@ class History:
     def amend(self, project: Project) -> "History":
         """The history with another present state, which undo does not know: for what follows from an edit."""
         return replace(self, present=project)
+
+    def revise(self, change: Callable[[Project], Project]) -> "History":
+        """The history with every state changed alike: for what holds of the past, too, as the name of a style."""
+        past, future = (
+            tuple(Step(change(one.project), one.topic) for one in part) for part in (self.past, self.future)
+        )
+        return History(change(self.present), past, future)
 
     def undo(self) -> "History":
         """The state before the last edit.

@@ -79,7 +79,7 @@ async def import_file(studio: "Studio", key: ApiKey, path: Path, name: str, tran
         return await import_text(studio, key, text, title)
     if suffix in SOUND_SUFFIXES:
         async with _decoded(studio.state.settings, SOUND, path, ".wav") as checked:
-            return await _add_recording(studio, key, checked, title, transcript)
+            return await add_recording(studio, key, checked, title, transcript)
     kinds = (*TEXT_SUFFIXES, *SUFFIXES, *SOUND_SUFFIXES, ".json")
     raise InputError(f"a file {name[-40:]!r} cannot be imported; give one that ends in {', '.join(kinds)}")
 
@@ -91,7 +91,8 @@ async def _import_project(studio: "Studio", key: ApiKey, path: Path) -> str:
     return await studio.create(key, project)
 
 
-async def _add_recording(studio: "Studio", key: ApiKey, sound: Path, title: str, transcript: str) -> str:
+async def add_recording(studio: "Studio", key: ApiKey, sound: Path, title: str, transcript: str) -> str:
+    """Id of a new project with a checked sound and its words, if they are known."""
     number = await studio.create(key, Project(name=title))
     asset = await asyncio.to_thread(studio.store.add_asset, number, RECORDING, sound)
     workspace = await studio.open(key, number)

@@ -139,7 +139,10 @@ class ProjectPreview:
             self._publish(Preview(0, fps, tuple(pieces)))
 
     def _fail(self, wrong: RefusedError | Tts2faceError) -> None:
-        message = wrong.message if isinstance(wrong, RefusedError) else str(wrong)
+        self.fail(wrong.message if isinstance(wrong, RefusedError) else str(wrong))
+
+    def fail(self, message: str) -> None:
+        """Say why there is no preview; the last one stays."""
         shown = self.current
         self._publish(Preview(0, shown.fps, shown.pieces, is_complete=True, error=" ".join(message.split())))
 

@@ -38,7 +38,7 @@ def recording_router(recordings: Recordings, owner: Owner) -> APIRouter:
             folder = store.folder(number, owner(request))
             upload = folder / f"upload-{secrets.token_hex(8)}"
             try:
-                await _receive(request.stream(), upload)
+                await receive_take(request.stream(), upload)
                 take = store.add_take(number, at, upload, request.headers.get("content-type", ""))
             finally:
                 upload.unlink(missing_ok=True)
@@ -66,8 +66,8 @@ def recording_router(recordings: Recordings, owner: Owner) -> APIRouter:
     return router
 
 
-async def _receive(parts: AsyncIterator[bytes], target: Path) -> None:
-    """Write an upload to a file.
+async def receive_take(parts: AsyncIterator[bytes], target: Path) -> None:
+    """Write an uploaded take to a file.
 
     Raises
     ------

@@ -4,6 +4,7 @@ A client names models, voices and assets; no path of a client reaches the file s
 """
 
 import json
+import os
 from collections.abc import AsyncIterator, Mapping
 from contextlib import aclosing
 from dataclasses import fields
@@ -21,6 +22,7 @@ from tts2face.service.synthesis.messages import Message, MessageKind
 from tts2face.service.synthesis.work import Work
 from tts2face.service.uploads.names import check_background, check_voice, resolve_models
 from tts2face.session_cache import Models
+from tts2face.studio.palette_store import is_own_palette, own_palette
 from tts2face.studio.store import ASSET, ASSETS
 
 FILE_OPTIONS = ("audio", "dictionary", "timeline")  # of a request
@@ -40,7 +42,7 @@ async def check_options(state: ServiceState, key: ApiKey, folder: Path, part: st
     options = dict(given)
     try:
         if part == "models":
-            await resolve_models(state.library, key, {name: _text(name, value) for name, value in options.items()})
+            options = await _checked_models(state, key, options)
         elif part == "picture":
             check_background(_text("background", options.get("background", "studio")) or "studio")
             _check_pixels(options.get("size"), state.settings.pixels)
@@ -81,12 +83,39 @@ async def project_work(
     """
     chosen = {one.name: getattr(project.models, one.name) for one in fields(Models)}
     try:
-        models = await resolve_models(state.library, key, chosen)
+        models = await _resolve(state, key, chosen)
     except RefusedError as refused:
         raise InputError(refused.message) from refused
     form = str(more.pop("format", "mp4"))
     request = {"text": project.request.text, "project": project_json(project, folder), "folder": str(folder), **more}
     return Work(kind, models, request, format=form, owner=key.name, affinity=folder.name)
+
+
+async def _resolve(state: ServiceState, key: ApiKey, models: Mapping[str, Any]) -> dict[str, Any]:
+    """Models as `resolve_models`, with the path of the own palette."""
+    name, own = models.get("palette"), _own_palette(state, key)
+    if name is None or not is_own_palette(name, own):
+        return await resolve_models(state.library, key, models)
+    if not own.is_file():
+        raise InputError("you have no own styles; make one on the page Styles, or choose another palette")
+    others = {one: value for one, value in models.items() if one != "palette"}
+    return {**await resolve_models(state.library, key, others), "palette": str(own)}
+
+
+async def _checked_models(state: ServiceState, key: ApiKey, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options of the models, whose values exist, with the path of the own palette."""
+    found = await _resolve(state, key, {name: _text(name, value) for name, value in options.items()})
+    own = str(_own_palette(state, key))
+    return {**options, "palette": own} if found.get("palette") == own else dict(options)
+
+
+def _own_palette(state: ServiceState, key: ApiKey) -> Path:
+    return own_palette(studio_folder(state), key.name)
+
+
+def studio_folder(state: ServiceState) -> Path:
+    """Folder of the studio's files."""
+    return Path(os.path.abspath(state.settings.data_folder)) / "studio"
 
 
 async def data_of(state: ServiceState, key: ApiKey, work: Work) -> bytes:

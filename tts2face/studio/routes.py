@@ -18,6 +18,7 @@ from tts2face.project.project_file import project_json
 from tts2face.service.access.page_headers import PAGES
 from tts2face.service.errors import RefusedError, as_refused
 from tts2face.service.uploads.upload_folder import BLOCK_BYTES
+from tts2face.studio.archive import archive
 from tts2face.studio.importing import import_file, import_text
 from tts2face.studio.renders import DONE, Render
 from tts2face.studio.requests import data_of, events_of
@@ -36,7 +37,7 @@ def _studio(request: HttpRequest) -> Studio:
 
 
 @asynccontextmanager
-async def _opened(request: HttpRequest, project: str) -> AsyncIterator[Workspace]:
+async def opened(request: HttpRequest, project: str) -> AsyncIterator[Workspace]:
     """The project of a request; errors become answers."""
     with_project = False
     try:
@@ -81,15 +82,24 @@ async def import_upload(
 @router.get("/projects/{project}/project.json")
 async def download_project(request: HttpRequest, project: str) -> JSONResponse:
     """The project as the command line renders it."""
-    async with _opened(request, project) as workspace:
+    async with opened(request, project) as workspace:
         content = project_json(workspace.project, workspace.folder)
         return JSONResponse(content, headers={"Content-Disposition": 'attachment; filename="project.json"'})
+
+
+@router.get("/projects/{project}/project.zip")
+async def download_archive(request: HttpRequest, project: str) -> Response:
+    """The project with the recordings and the palette that it needs, as the command line renders it."""
+    async with opened(request, project) as workspace:
+        content = await asyncio.to_thread(archive, workspace.project)
+        headers = {"Content-Disposition": 'attachment; filename="project.zip"'}
+        return Response(content, media_type="application/zip", headers=headers)
 
 
 @router.delete("/projects/{project}", status_code=204)
 async def delete_project(request: HttpRequest, project: str) -> Response:
     """Remove a project with everything in it."""
-    async with _opened(request, project):
+    async with opened(request, project):
         await _studio(request).remove(request.state.key, project)
     return Response(status_code=204)
 
@@ -100,7 +110,7 @@ async def edit_project(
     tab: Annotated[str, Body(max_length=64)] = "",
 ) -> dict[str, Any]:  # fmt: skip
     """Change a project; nothing is changed while a tab edits it."""
-    async with _opened(request, project) as workspace:
+    async with opened(request, project) as workspace:
         await workspace.edit(edit, tab)
         return _state(workspace)
 
@@ -108,7 +118,7 @@ async def edit_project(
 @router.post("/projects/{project}/undo")
 async def undo(request: HttpRequest, project: str) -> dict[str, Any]:
     """Take the last edit back."""
-    async with _opened(request, project) as workspace:
+    async with opened(request, project) as workspace:
         workspace.undo()
         return _state(workspace)
 
@@ -116,7 +126,7 @@ async def undo(request: HttpRequest, project: str) -> dict[str, Any]:
 @router.post("/projects/{project}/redo")
 async def redo(request: HttpRequest, project: str) -> dict[str, Any]:
     """Make the edit again that was taken back last."""
-    async with _opened(request, project) as workspace:
+    async with opened(request, project) as workspace:
         workspace.redo()
         return _state(workspace)
 
@@ -126,7 +136,7 @@ async def preview(
     request: HttpRequest, project: str, have: int | None = None, wait: float = Query(default=0.0, ge=0, le=WAIT_S)
 ) -> Response:
     """What has changed of the preview since revision `have`; after up to `wait` seconds, complete."""
-    async with _opened(request, project) as workspace:
+    async with opened(request, project) as workspace:
         workspace.show()
         if wait or not workspace.preview.current.pieces:
             await workspace.preview.wait(wait or WAIT_S)
@@ -142,7 +152,7 @@ async def preview(
 @router.get("/projects/{project}/face.glb")
 async def face(request: HttpRequest, project: str) -> Response:
     """The face as binary glTF."""
-    async with _opened(request, project) as workspace:
+    async with opened(request, project) as workspace:
         path = await _studio(request).face(workspace)
     content = await asyncio.to_thread(path.read_bytes)
     # The address has the models in its query: what it names never changes.
@@ -157,7 +167,7 @@ async def face(request: HttpRequest, project: str) -> Response:
 @router.get("/projects/{project}/picture.png")
 async def picture(request: HttpRequest, project: str, time: float = Query(ge=0)) -> Response:
     """The renderer's picture of an instant."""
-    async with _opened(request, project) as workspace:
+    async with opened(request, project) as workspace:
         work = await workspace.work("picture", time=time)
         return Response(await data_of(_studio(request).state, workspace.key, work), media_type="image/png")
 
@@ -165,14 +175,14 @@ async def picture(request: HttpRequest, project: str, time: float = Query(ge=0))
 @router.get("/projects/{project}/explanation")
 async def explanation(request: HttpRequest, project: str, time: float = Query(ge=0)) -> dict[str, Any]:
     """The recorded examples that made the phone at a time."""
-    async with _opened(request, project) as workspace:
+    async with opened(request, project) as workspace:
         return await explain(_studio(request), workspace, time)
 
 
 @router.get("/projects/{project}/renders")
 async def list_renders(request: HttpRequest, project: str) -> list[dict[str, Any]]:
     """Files of a project, and their progress."""
-    async with _opened(request, project) as workspace:
+    async with opened(request, project) as workspace:
         found = _studio(request).renders.of_project(project, workspace.key.name, workspace.folder)
         return [render_state(one) for one in found]
 
@@ -182,14 +192,14 @@ async def start_render(
     request: HttpRequest, project: str, format: Annotated[str, Body(embed=True, max_length=40)]
 ) -> dict[str, Any]:
     """Queue a film or an export."""
-    async with _opened(request, project) as workspace:
+    async with opened(request, project) as workspace:
         return render_state(await _studio(request).renders.add(workspace, format))
 
 
 @router.delete("/projects/{project}/renders/{number}", status_code=204)
 async def cancel_render(request: HttpRequest, project: str, number: str) -> Response:
     """Cancel a file, or delete it."""
-    async with _opened(request, project) as workspace:
+    async with opened(request, project) as workspace:
         _studio(request).renders.cancel(
             _studio(request).renders.find(project, workspace.key.name, workspace.folder, number)
         )
@@ -199,7 +209,7 @@ async def cancel_render(request: HttpRequest, project: str, number: str) -> Resp
 @router.get("/projects/{project}/renders/{number}/file")
 async def download_render(request: HttpRequest, project: str, number: str) -> FileResponse:
     """A finished file."""
-    async with _opened(request, project) as workspace:
+    async with opened(request, project) as workspace:
         found = _studio(request).renders.find(project, workspace.key.name, workspace.folder, number)
         if found.state != DONE:
             raise InputError(f"the file {found.name} is {found.state}; wait until it is done")

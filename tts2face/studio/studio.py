@@ -18,8 +18,11 @@ from tts2face.service.synthesis.work import Work
 from tts2face.storage.files import translate_disk_errors, write_atomically
 from tts2face.studio.bundle import PieceMemory
 from tts2face.studio.renders import RenderQueue
-from tts2face.studio.requests import data_of
+from tts2face.studio.reports import Reports
+from tts2face.studio.requests import data_of, studio_folder
 from tts2face.studio.store import ProjectEntry, ProjectStore
+from tts2face.studio.styles import Styles
+from tts2face.studio.takes import Takes
 from tts2face.studio.workspace import Workspace
 
 MB = 1_000_000
@@ -32,10 +35,12 @@ class Studio:
 
     def __init__(self, state: ServiceState) -> None:
         self.state = state
-        self._folder: Path = state.settings.data_folder / "studio"
+        self._folder: Path = studio_folder(state)
         self.store = ProjectStore(self._folder)
         self.memory = PieceMemory(state.settings.previews_mb * MB)
         self.renders = RenderQueue(state)
+        self.reports = Reports(state.library, self._folder)
+        self.styles, self.takes = Styles(self), Takes(self)
         self._open: dict[tuple[str, str], Workspace] = {}
         self._opening = asyncio.Lock()
         self._preparing: asyncio.Task[None] | None = None
@@ -122,6 +127,13 @@ class Studio:
         # In any process: making a face takes seconds, in which the project's own process makes its preview.
         return await self._face_file(workspace.project, replace(work, affinity=""), workspace.key)
 
+    async def plain_face(self, key: ApiKey) -> Path:
+        """File of the default head without gestures, as takes move it; errors as `face`."""
+        project = Project()
+        project = replace(project, request=replace(project.request, gestures="none"))
+        work = self.state.work(kind="face", models=asdict(project.models), request={"has_gestures": False})
+        return await self._face_file(project, work, key)
+
     async def _face_file(self, project: Project, work: Work, key: ApiKey) -> Path:
         looks = [asdict(project.models), dict(work.models), project.request.has_gestures, __version__]
         name = hashlib.sha256(json.dumps(looks, default=str, sort_keys=True).encode()).hexdigest()[:24]
@@ -135,11 +147,18 @@ class Studio:
                 await asyncio.to_thread(_keep_last, path.parent, MAX_FACES)
         return path
 
+    def open_projects(self, key: ApiKey) -> list[Workspace]:
+        """Open projects of a key."""
+        return [one for (owner, _), one in self._open.items() if owner == key.name]
+
     async def close(self) -> None:
         """Save all projects, and end what is being made."""
+        await self.styles.close()
+        await self.takes.close()
         if self._preparing is not None:
             self._preparing.cancel()
         await self.renders.close()
+        await self.reports.close()
         for one in self._open.values():
             await one.close()
 

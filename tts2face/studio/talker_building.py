@@ -5,22 +5,18 @@ makes the clip.
 """
 
 import asyncio
-import json
 import os
 import shutil
 import sys
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import asdict, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
-from lexicon.errors import BackendError, DataError
-from lexicon.inputs import parse_json
-from tts2face.batch.render_process import KINDS
+from lexicon.errors import BackendError
 from tts2face.jobs.talker_job import BUILDER, CPU_S, CPU_S_PER_S, LIMITS, SLOWNESS
 from tts2face.limited_process import bare_environment
+from tts2face.studio.take_tools import end_process, run_tool
 
 TALKER, REPORT, CLIP = "talker.talker", "report.html", "first.mp4"  # files in the folder of a recording
 MADE, CHECKED = "made.talker", "checked"  # as the builder names them
@@ -53,34 +49,12 @@ async def build_talker(folder: Path, *, name: str, consent: str, n_takes: int, o
         "with_appearance": True, "with_report": find_spec("matplotlib") is not None, "max_bytes": MAX_TALKER_BYTES,
         "limits": asdict(replace(LIMITS, cpu_s=cpu_s)),
     }  # fmt: skip
-    result = await asyncio.wait_for(_run_builder(order, on_message), SLOWNESS * cpu_s)
+    result = await asyncio.wait_for(run_tool(BUILDER, order, on_message, "n_kept", "the recording"), SLOWNESS * cpu_s)
     os.replace(folder / MADE, folder / TALKER)
     shutil.rmtree(folder / CHECKED, ignore_errors=True)
     refused = "; ".join(f"{take}: {reason}" for take, reason in result["refused"][:N_SHOWN])
     minutes = f"{result['n_kept']} takes, {result['minutes']:.1f} minutes"
     return f"The talker {name} is made of {minutes}." + (f" Refused: {refused}." if refused else "")
-
-
-async def _run_builder(order: dict[str, Any], on_message: Callable[..., None]) -> dict[str, Any]:
-    child = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", BUILDER, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.DEVNULL, env=bare_environment(),
-    )  # fmt: skip
-    assert child.stdin is not None
-    assert child.stdout is not None
-    try:
-        child.stdin.write(json.dumps(order).encode() + b"\n")
-        await child.stdin.drain()
-        while line := await child.stdout.readline():
-            content: dict[str, Any] = parse_json(line.decode(), "the builder")
-            if "error" in content:
-                raise KINDS.get(content["error"], BackendError)(content["message"])
-            if "n_kept" in content:
-                return content
-            on_message(content["stage"], content["done"], content["of"])
-    finally:
-        await _end(child)
-    raise DataError("the takes need too much memory or time; delete some, or record smaller pictures")
 
 
 async def speak(folder: Path, text: str) -> None:
@@ -103,13 +77,7 @@ async def speak(folder: Path, text: str) -> None:
     except TimeoutError as late:
         raise BackendError("the clip took too long; give a shorter sentence") from late
     finally:
-        await _end(child)
+        await end_process(child)
     if child.returncode:
         reason = " ".join(errors.decode(errors="replace").split())[-MAX_REASON_CHARACTERS:]
         raise BackendError(reason.removeprefix("tts2face: ") or "the clip could not be made; try again")
-
-
-async def _end(child: asyncio.subprocess.Process) -> None:
-    with suppress(ProcessLookupError):
-        child.kill()
-    await child.wait()

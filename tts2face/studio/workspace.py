@@ -13,6 +13,7 @@ from tts2face.service.logs import log_event
 from tts2face.service.state import ServiceState
 from tts2face.service.synthesis.work import Work
 from tts2face.studio.bundle import PieceMemory, Preview
+from tts2face.studio.comparison import Comparison
 from tts2face.studio.editing import Edit, apply
 from tts2face.studio.history import History
 from tts2face.studio.previews import ProjectPreview
@@ -26,7 +27,8 @@ LEASE_S = 45.0  # after the last sign of life of a tab, for which it stays the o
 SHOWN_ONLY = frozenset({"name"})  # kinds of edits that change neither motion nor sound
 PICTURE_ONLY = frozenset({"picture"})  # kinds that change final pictures only
 
-Listener = Callable[[str], None]  # gets "project", "preview", "saved", "failed" (to save), "lease" or "removed"
+# gets "project", "preview", "comparison", "saved", "failed" (to save), "lease", "styles" (own palette) or "removed"
+Listener = Callable[[str], None]
 
 
 class Workspace:
@@ -40,10 +42,11 @@ class Workspace:
         self.preview = ProjectPreview(
             lambda work: state.messages(work, self.key),
             memory,
-            on_change=lambda: self._notify("preview"),
+            on_change=self._show_preview,
             on_fit=self._fit,
             on_speech=lambda seconds: state.limits.add_speech(self.key, seconds),
         )
+        self.comparison = Comparison(state, self, memory, lambda: self._notify("comparison"))
         self.listeners: set[Listener] = set()
         self._save_task: asyncio.Task[None] | None = None
         self._saved: History = self.history
@@ -135,9 +138,18 @@ class Workspace:
             self._saved = history
         self._notify("saved")
 
+    def revise(self, change: Callable[[Project], Project]) -> None:
+        """Change the project in all states of its history."""
+        self._set(self.history.revise(change))
+
+    def tell_styles(self) -> None:
+        """Tell pages that the own palette has other styles."""
+        self._notify("styles")
+
     async def close(self) -> None:
         """Save, and end the preview."""
         self.preview.cancel()
+        self.comparison.preview.cancel()
         if self._save_task is not None:
             self._save_task.cancel()
         await self.save()
@@ -158,6 +170,11 @@ class Workspace:
     def _start_preview(self) -> None:
         project = self.project
         self.preview.start(lambda have: project_work(self._state, self.key, project, self.folder, "project", have=have))
+
+    def _show_preview(self) -> None:
+        if self.preview.current.is_complete and not self.preview.current.error:
+            self.comparison.follow()  # after the project's own preview, which it never delays
+        self._notify("preview")
 
     def _fit(self, shown: Preview, dropped: list[tuple[str, int]], cut_to: float | None) -> list[str]:
         """Remove from the project what no longer fits its text or sound; a note for each."""

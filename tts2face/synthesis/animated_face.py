@@ -92,6 +92,15 @@ class AnimatedFace(Protocol):
             The face cannot be extended.
         """
 
+    def landmarks(self, motion: Trajectory) -> NDArray[np.float32]:
+        """Landmarks (T, 478, 3) of the face, mm, moved by the first or all of its channels.
+
+        Raises
+        ------
+        DataError
+            The face lacks landmarks, or the motion is not of its channels.
+        """
+
     def check_articulation(self, factor: float | None) -> None:
         """Reject a factor of articulation that this face cannot show; None is its own.
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.exemplar.synthesis import ExemplarModel, TokenSelection, blend_trajectory
+from tts2face.face.face_motion import moved_landmarks
 from tts2face.face.gesture_transfer import GestureFace, gesture_face
 from tts2face.models.face import Face
 from tts2face.models.palette import Palette
@@ -81,6 +82,10 @@ class MeshFace:
         """Raise InputError: the shapes of a mesh are fixed."""
         del take
         raise InputError("missing motion can be appended to a talker's own face only; choose --face self")
+
+    def landmarks(self, motion: Trajectory) -> NDArray[np.float32]:
+        """Landmarks (T, 478, 3) of the mesh, mm, for weights of its first or all shapes."""
+        return moved_landmarks(self.mesh, motion)
 
     def check_articulation(self, factor: float | None) -> None:
         """Accept all factors: a mesh can round and spread further than the talker."""

@@ -96,6 +96,10 @@ class OwnAppearanceFace:
         talker = extend_talker(lip_model(take.landmarks), self.talker)
         return replace(self, talker=talker, regression=fit_appearance_regression(talker))
 
+    def landmarks(self, motion: Trajectory) -> NDArray[np.float32]:
+        """Landmarks (T, 478, 3) of the talker, mm, of the speech parameters in the motion."""
+        return self.talker.model.shapes(motion.values[:, : len(self.regression.speech_channels)])
+
     def check_articulation(self, factor: float | None) -> None:
         """Reject factors other than natural (InputError): there are pictures of recorded mouths only."""
         if factor not in (None, NATURAL):

@@ -3,6 +3,8 @@
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
+from copy import copy
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,7 +16,8 @@ from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.gesture.ju2008 import FIELD_OPTIONS
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
-from tts2face.models.palette import Palette, load_palette
+from tts2face.models.palette import Derivation, Palette, load_palette
+from tts2face.models.palette_editing import add_derivation
 from tts2face.models.talker import Talker, load_talker
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
@@ -121,6 +124,21 @@ class SessionModels:
         if palette is None:
             return self.speech_face
         return self._once("face", lambda: self.speech_face.with_gestures_of(palette))
+
+    def with_style(self, name: str, derived: Derivation) -> "SessionModels":
+        """Models with one more derived style, which share everything else; errors as `Session.with_style`."""
+        palette = self.palette
+        if palette is None:
+            raise InputError("a session without a palette has no styles; open it with one")
+        new = copy(self)
+        more = add_derivation(palette, name, derived)
+        new._palette, new._memory = more, NO_MEMORY  # finished sentences are kept by the names of styles
+        with self._lock:
+            new._cache = {
+                key: replace(value, palette=more) if isinstance(value, GestureFields) else value
+                for key, value in self._cache.items()
+            }
+        return new
 
     def renderer(self, picture: Picture, *, has_gestures: bool) -> FrameRenderer:
         """Renderer of the face for drawing options; the last `MAX_RENDERERS` renderers are cached."""

@@ -14,11 +14,11 @@ from corpus_tools.decomposition.capture import (
     resample_to_gesture_rate,
 )
 from corpus_tools.decomposition.capture_files import read_livelink_recording
-from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
 from corpus_tools.decomposition.recording_files import read_sound_span
 from lexicon.errors import DataError, InputError
 from tests.face.posing import posed_vertices
 from tests.rendered_takes import write_sound
+from tts2face.face.face_motion import moved_landmarks, rest_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.retargeting.performer import match_shapes

@@ -19,10 +19,10 @@ from corpus_tools.decomposition.decompose import (
     weight_displacements,
 )
 from corpus_tools.decomposition.derived_styles import read_derived_styles
-from corpus_tools.decomposition.face_motion import moved_landmarks, rest_landmarks
 from corpus_tools.decomposition.style import add_style
 from lexicon.errors import DataError, InputError
 from tts2face.face.expressions import expression_landmarks
+from tts2face.face.face_motion import moved_landmarks, rest_landmarks
 from tts2face.face.landmark_fit import axis_ratios
 from tts2face.models.face import Face
 from tts2face.models.landmarks import MOUTH_REGION

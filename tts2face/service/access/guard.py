@@ -13,7 +13,7 @@ from starlette.websockets import WebSocketDisconnect
 from tts2face.service.access import browser
 from tts2face.service.access.exchange import Exchange, Receive, Scope, Send
 from tts2face.service.access.keys import LOCAL_KEY, ApiKey, find_key
-from tts2face.service.access.page_headers import RECORDINGS
+from tts2face.service.access.page_headers import RECORDINGS, STYLES, TAKES
 from tts2face.service.errors import RefusedError
 from tts2face.service.logs import log_event
 
@@ -25,6 +25,7 @@ App = Callable[[Scope, Receive, Send], Awaitable[None]]
 OPEN_PATHS = frozenset({"/healthz", "/readyz", "/docs", "/openapi.json"})
 UNCOUNTED_PATHS = frozenset({*OPEN_PATHS, "/metrics", "/v1/hello"})
 VIDEO_PATH = "/v1/talkers/build"
+VIDEO_PUTS = (f"{RECORDINGS}/", f"{STYLES}/", f"{TAKES}/")
 DRAINING_PATHS = frozenset({"/healthz", "/readyz", "/metrics"})  # that are answered until the end
 CLOSE = {"Connection": "close"}
 DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
@@ -141,7 +142,7 @@ def _brings_video(scope: Scope) -> bool:
     """Whether a request brings a recording of a person: only such bodies may be larger than all others."""
     if scope["type"] != "http" or "build" not in scope["state"]["key"].scopes:
         return False
-    is_take = scope["method"] == "PUT" and scope["path"].startswith(f"{RECORDINGS}/")
+    is_take = scope["method"] == "PUT" and scope["path"].startswith(VIDEO_PUTS)
     return is_take or (scope["method"], scope["path"]) == ("POST", VIDEO_PATH)
 
 
@@ -167,8 +168,9 @@ class _BoundedBody:
         self._deadline = time.monotonic() + max_s
 
     def check(self, headers: dict[bytes, bytes]) -> None:
-        """Refuse a body whose stated length is too large."""
+        """Refuse a body whose stated length is too large; what has none is complete, however late it is asked for."""
         length = headers.get(b"content-length", b"0")
+        self._is_complete = length == b"0" and b"transfer-encoding" not in headers
         if not length.isdigit() or int(length) > self._max_bytes:
             raise self._too_large()
 

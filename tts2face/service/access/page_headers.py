@@ -2,6 +2,8 @@
 
 PAGES = "/studio"
 RECORDINGS = f"{PAGES}/api/recordings"
+STYLES = f"{PAGES}/api/styles"
+TAKES = f"{PAGES}/api/takes"
 # NiceGUI has scripts and styles in its pages and compiles templates in the browser (Vue), hence 'unsafe-inline' and
 # 'unsafe-eval'. Nothing may come from, or go to, another host: no script, picture, font, frame, form or connection.
 POLICY = "; ".join([

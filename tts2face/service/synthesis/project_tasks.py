@@ -10,7 +10,6 @@ import tempfile
 import zipfile
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,7 +30,6 @@ if TYPE_CHECKING:
     from tts2face.synthesis.clip_stream import Piece
 
 DIGEST_BYTES = 12
-MAX_EXAMPLES = 12  # of an explained phone
 BLOCK_BYTES = 1 << 18
 
 
@@ -123,22 +121,6 @@ def picture(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
     content = io.BytesIO()
     Image.fromarray(renderer.frame(last.clip, number)).save(content, "PNG", compress_level=3)
     yield Chunk(content.getvalue())
-
-
-def explain(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk]:
-    """The phone at ``time`` seconds with the recorded examples that made it; no phone where none is used."""
-    project, time = read_project(work), float(work.request["time"])
-    found: dict[str, Any] = {}
-    for piece in session.stream(project.prepare()):
-        is_whole = piece.transcript is not None
-        if is_whole or time < piece.begin + piece.clip.speech.waveform.duration:
-            phone = next((one for one in piece.explain() if one.start <= time < one.end), None)
-            if phone is not None:
-                found = asdict(phone)
-                found["tokens"] = found["tokens"][:MAX_EXAMPLES]
-            break
-        yield Chunk(b"")
-    yield Event({"type": "explanation", "phone": found or None})
 
 
 def project_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:

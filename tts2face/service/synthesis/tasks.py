@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.service.synthesis import project_tasks
+from tts2face.service.synthesis import comparison_tasks, project_tasks, style_tasks
+from tts2face.service.synthesis.explanation_task import explain
 from tts2face.service.synthesis.live_task import listen, live
 from tts2face.service.synthesis.messages import Event, Wait
 from tts2face.service.synthesis.work import Inputs, Work
@@ -48,8 +49,13 @@ TASKS: Mapping[str, Callable[["Session", Work, Inputs], Iterator[Chunk | Event |
     "listen": listen,
     "project": project_tasks.preview,
     "picture": project_tasks.picture,
-    "explain": project_tasks.explain,
+    "explain": explain,
     "project-file": project_tasks.project_file,
     "project-export": project_tasks.project_export,
+    "recordings": comparison_tasks.recordings,
+    "recorded": comparison_tasks.recorded_motion,
+    "measure": comparison_tasks.measure,
     "face": project_tasks.face_file,
+    "swatch": style_tasks.swatch,
+    "take": style_tasks.take,
 }

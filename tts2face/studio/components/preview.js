@@ -43,6 +43,14 @@ export class Preview {
     return column < 0 ? this.head[frame * 6 + column + 6] : this.motion[frame * this.channels.length + column];
   }
 
+  /** Show one pose in place of the clip: weights of channels, and the six values of the head. */
+  pose(channels, weights, head) {
+    Object.assign(this, { revision: null, nFrames: 1, duration: 0, channels, words: [], phones: [], sentences: [] });
+    this.motion = Float32Array.from(weights);
+    this.head = Float32Array.from(head);
+    this.#emit({ sound: false, motion: true });
+  }
+
   clear() {
     this.revision = null;
     this.nFrames = this.duration = 0;
@@ -110,8 +118,48 @@ function placed(old, fresh, first, whole) {
 export const preview = new Preview(); // of the project
 export const comparison = new Preview(); // its curves are drawn beside those of the project
 
+/** Which of the two is seen and heard: the project, or what it is compared with. */
+class Sides {
+  shown = preview;
+  #heard = null;
+  #listeners = new Set();
+
+  /** Call a function after each change; returns a function that stops it. */
+  on(listener) {
+    this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
+  }
+
+  toggle() {
+    this.show(this.shown === preview ? comparison : preview);
+  }
+
+  show(side) {
+    this.shown = side.nFrames ? side : preview;
+    this.hear(false);
+    for (const listener of this.#listeners) listener();
+  }
+
+  /** Load the sound of what is shown unless it is loaded; recorded motion has none of its own. */
+  hear(isChanged) {
+    const { pcm, rate } = this.shown.pcm.length ? this.shown : preview;
+    if (!isChanged && this.#heard && isEqual(this.#heard, pcm)) return;
+    this.#heard = pcm;
+    clock.load(pcm, rate || 1);
+  }
+}
+
+function isEqual(one, other) {
+  return one === other || (one.length === other.length && one.every((value, i) => value === other[i]));
+}
+
+export const sides = new Sides();
+
 preview.on("change", ({ sound }) => {
-  if (sound) clock.load(preview.pcm, preview.rate || 1);
+  if (sound) sides.hear(true);
+});
+comparison.on("change", () => {
+  if (sides.shown === comparison) sides.show(comparison);
 });
 
 export function loadPreview(url) {

@@ -2,8 +2,8 @@
 const COUNT = 3; // numbers before a take
 const COUNT_MS = 600; // between them
 const TAIL_MS = 300; // recorded after the stop, so that the last sound is whole
-const MAX_TAKE_S = 30; // a forgotten recording ends by itself
 const KINDS = ["video/webm;codecs=vp8,opus", "video/webm", "video/mp4"];
+const HINT = "Press Space, read the sentence after the countdown, and press Space again. What to do better is written here.";
 const STATES = {
   sending: "sending",
   failed: "not sent",
@@ -35,20 +35,21 @@ export default {
       </div>
       <div class="recorder-level" role="meter" aria-label="Level of the microphone" aria-valuemin="0" aria-valuemax="100"
         :aria-valuenow="level"><span :style="{ width: level + '%' }" :class="{ loud: isLoud }"></span></div>
-      <p class="recorder-number">Prompt {{ at + 1 }} of {{ prompts.length }}
+      <p class="recorder-number">{{ isSingle ? '' : 'Prompt ' + (at + 1) + ' of ' + prompts.length }}
         <span v-if="stateOf(at)" :class="'recorder-state ' + stateOf(at)">{{ names[stateOf(at)] }}</span></p>
       <p class="recorder-prompt" lang="" aria-live="polite">{{ prompts[at] }}</p>
       <div class="recorder-buttons">
         <button type="button" class="recorder-main" :disabled="mode === 'off' || mode === 'saving'" @click="toggle"
           aria-keyshortcuts="Space">{{ mode === 'recording' ? 'Stop' : mode === 'counting' ? 'Cancel' : stateOf(at) ? 'Record again' : 'Record' }}
           <kbd>Space</kbd></button>
-        <button type="button" :disabled="isBusy || at === 0" @click="select(at - 1)">Back</button>
-        <button type="button" :disabled="isBusy || at + 1 === prompts.length" @click="select(at + 1)">Next</button>
+        <button v-if="!isSingle" type="button" :disabled="isBusy || at === 0" @click="select(at - 1)">Back</button>
+        <button v-if="!isSingle" type="button" :disabled="isBusy || at + 1 === prompts.length"
+          @click="select(at + 1)">Next</button>
         <button type="button" :disabled="isBusy || !takes[at]" @click="play">{{ shown === null ? 'Play' : 'Close' }}</button>
         <button type="button" :disabled="isBusy || !takes[at]" @click="$emit('remove', at)">Delete take</button>
       </div>
       <p class="recorder-advice" role="status" :class="stateOf(told)">{{ advice }}</p>
-      <ol class="recorder-list" aria-label="Prompts" tabindex="0">
+      <ol v-if="!isSingle" class="recorder-list" aria-label="Prompts" tabindex="0">
         <li v-for="(text, n) in prompts" :key="n">
           <button type="button" :class="stateOf(n)" :aria-current="n === at ? 'true' : null" :disabled="isBusy"
             @click="select(n)"><span class="recorder-mark" aria-hidden="true">{{ marks[stateOf(n)] || '○' }}</span>
@@ -56,7 +57,8 @@ export default {
         </li>
       </ol>
     </section>`,
-  props: { prompts: Array, takes: Object, upload: String, first: Number },
+  // `longest`: seconds after which a forgotten recording ends by itself.
+  props: { prompts: Array, takes: Object, upload: String, first: Number, longest: { type: Number, default: 30 } },
   data: () => ({
     mode: "off",
     at: 0,
@@ -75,13 +77,17 @@ export default {
     isBusy() {
       return ["counting", "recording", "saving"].includes(this.mode);
     },
+    isSingle() {
+      return this.prompts.length === 1;
+    },
     advice() {
-      if (this.told === null || !this.stateOf(this.told)) return "";
+      if (this.told === null || !this.stateOf(this.told)) return HINT;
       const take = this.takes[this.told] || {};
       const state = this.stateOf(this.told);
-      if (state === "failed") return `Prompt ${this.told + 1}: the take was not sent; record it again.`;
-      if (take.advice) return `Prompt ${this.told + 1}, ${STATES[state]}: ${take.advice}.`;
-      return `Prompt ${this.told + 1}: ${STATES[state]}.`;
+      const which = this.isSingle ? "The take" : `Prompt ${this.told + 1}`;
+      if (state === "failed") return `${which} was not sent; record it again.`;
+      if (take.advice) return `${which}, ${STATES[state]}: ${take.advice}.`;
+      return `${which}: ${STATES[state]}.`;
     },
   },
   watch: {
@@ -135,7 +141,7 @@ export default {
         this.level = Math.round(Math.max(0, 100 + (100 / 60) * 20 * Math.log10(Math.min(peak, 1)))); // of 60 dB
         this.isLoud = peak >= 0.99;
         if (this.mode === "recording") this.seconds = (performance.now() - this.began) / 1000;
-        if (this.mode === "recording" && this.seconds > MAX_TAKE_S) this.stop();
+        if (this.mode === "recording" && this.seconds > this.longest) this.stop();
       }, 80);
     },
     close() {

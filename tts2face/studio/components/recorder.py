@@ -6,6 +6,7 @@ from typing import Any
 
 from nicegui.element import Element
 
+LONGEST_S = 30.0
 STYLE = Path(__file__).with_name("recorder.css")
 
 
@@ -18,6 +19,8 @@ class Recorder(Element, component="recorder.js"):
         State and advice of each take, by the index of its prompt.
     first
         Index of the prompt that is shown first.
+    longest
+        Seconds after which a forgotten take ends by itself.
 
     Notes
     -----
@@ -25,9 +28,12 @@ class Recorder(Element, component="recorder.js"):
     that of the prompt that is shown.
     """
 
-    def __init__(self, prompts: Sequence[str], takes: Mapping[int, Mapping[str, str]], upload: str, first: int) -> None:
+    def __init__(
+        self, prompts: Sequence[str], takes: Mapping[int, Mapping[str, str]], upload: str, first: int = 0,
+        *, longest: float = LONGEST_S,
+    ) -> None:  # fmt: skip
         super().__init__()
-        self._props.update(prompts=list(prompts), takes=_by_name(takes), upload=upload, first=first)
+        self._props.update(prompts=list(prompts), takes=_by_name(takes), upload=upload, first=first, longest=longest)
 
     def set_takes(self, takes: Mapping[int, Mapping[str, str]]) -> None:
         """Show other states of the takes."""

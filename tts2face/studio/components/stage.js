@@ -3,7 +3,7 @@
 import { clock } from "tts2face-studio/clock.js";
 import { metrics, Meter } from "tts2face-studio/metrics.js";
 import { pace } from "tts2face-studio/pace.js";
-import { loadPreview, preview } from "tts2face-studio/preview.js";
+import { comparison, loadPreview, preview, sides } from "tts2face-studio/preview.js";
 import { StageScene } from "tts2face-studio/stage_scene.js";
 import { addStyle } from "tts2face-studio/style.js";
 
@@ -21,11 +21,12 @@ export default {
       <canvas ref="canvas" role="img" tabindex="0" :aria-label="label" @keydown="onKey"></canvas>
       <img v-if="picture" class="studio-picture" :src="picture" alt="Final picture of this instant, drawn by the renderer">
       <p v-if="message" class="studio-message" role="status">{{ message }}</p>
+      <p v-if="side" class="studio-side" role="status">{{ side }}</p>
       <div class="studio-views" role="group" aria-label="Camera">
         <button v-for="(text, name) in views" :key="name" type="button" :aria-pressed="String(current === name)"
           @click="view(name)">{{ text }}</button>
         <button v-if="picture" type="button" @click="showPicture(null)">Live preview</button>
-        <button type="button" aria-label="Full screen" title="Full screen" @click="fullscreen()"><svg
+        <button type="button" id="studio-fullscreen" aria-label="Full screen" title="Full screen" @click="fullscreen()"><svg
           viewBox="0 0 16 16" aria-hidden="true"><path d="M1 1h5v2H3v3H1zM10 1h5v5h-2V3h-3zM1 10h2v3h3v2H1zM13 10h2v5h-5v-2h3z"/></svg></button>
       </div>
     </section>`,
@@ -33,7 +34,7 @@ export default {
   props: { face: String, environment: { type: String, default: "studio" }, preview: String },
   emits: ["view", "failed"],
 
-  data: () => ({ views: VIEWS, current: "front", picture: null, message: "", time: 0 }),
+  data: () => ({ views: VIEWS, current: "front", picture: null, message: "", time: 0, side: "" }),
 
   computed: {
     label() {
@@ -56,6 +57,7 @@ export default {
     pace.isSoftware = this.scene.isSoftware;
     if (pace.isSoftware) this.share = LEAST_SHARE;
     this.stops = [preview.on("change", this.changed), clock.on("seek", this.changed)];
+    this.stops.push(comparison.on("change", () => this.showSide()), sides.on(() => this.showSide()));
     this.watchContext();
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.$el);
@@ -124,6 +126,11 @@ export default {
       else this.$el.requestFullscreen();
     },
 
+    showSide() {
+      this.dirty = true;
+      this.side = !comparison.nFrames ? "" : sides.shown === comparison ? "A" : "B: the project";
+    },
+
     /** Lay a picture over the head; null removes it. */
     showPicture(url) {
       this.picture = url;
@@ -164,7 +171,7 @@ export default {
       const begin = performance.now(), { scene } = this;
       this.dirty = false;
       metrics.time = clock.time;
-      scene.setMotion(preview, metrics.time);
+      scene.setMotion(sides.shown, metrics.time);
       scene.render();
       metrics.frames = (metrics.frames ?? 0) + 1;
       if (clock.playing) metrics.playing_share = scene.sharpness;

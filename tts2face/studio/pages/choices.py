@@ -1,6 +1,7 @@
 """What a person can choose from in a project: voices, languages, models, styles with their colours."""
 
 import asyncio
+import os
 from functools import lru_cache
 
 from lexicon.errors import Tts2faceError
@@ -70,8 +71,8 @@ async def styles(library: Library, key: ApiKey, palette: str | None) -> list[dic
     if palette is None:
         return []
     try:
-        path = palette
-        if palette not in shipped_names(PALETTE):
+        path = palette  # the own palette is given as its path, which no client can choose
+        if palette not in shipped_names(PALETTE) and os.sep not in palette:
             path, _ = await asyncio.to_thread(library.resolve, key, PALETTE, palette)
         found = await asyncio.to_thread(catalogue.styles, path)
     except (RefusedError, Tts2faceError):

@@ -6,13 +6,12 @@ from typing import Any
 
 from nicegui import ui
 
-from tts2face.studio.pages.frame import heading, shown_errors
+from tts2face.studio.pages.compare_panel import ComparePanel
+from tts2face.studio.pages.examples import Examples
+from tts2face.studio.pages.frame import heading
 from tts2face.studio.pages.open_page import OpenPage
-from tts2face.studio.routes import explain
 
 TOOLS = {"select": ("Select", "near_me"), "brush": ("Brush", "brush"), "eraser": ("Eraser", "auto_fix_normal")}
-N_SHOWN = 6  # examples of a phone
-NOW = 'import("tts2face-studio/clock.js").then((m) => emit(m.clock.time))'
 
 
 class Inspector:
@@ -23,7 +22,6 @@ class Inspector:
         self._tool, self._style = "select", ""
         self._styles: Sequence[Mapping[str, str]] = ()
         self._enabled: list[Any] = []
-        self._explained: float | None = None
 
     def build(self, styles: Sequence[Mapping[str, str]]) -> None:
         """Build the panel."""
@@ -43,15 +41,11 @@ class Inspector:
                 "dense flat"
             )
         self._own_words = ui.label().classes("quiet")
-        heading(2, "Explain")
-        button = ui.button("The phone at the playhead").props("dense outline")
-        button.on("click", lambda event: self._explain(float(event.args)), js_handler=f"() => {NOW}")
-        self._examples = ui.element("div")
-        with self._examples:
-            ui.label("Shows from which recorded examples the lips of a phone are made.").classes("quiet")
+        self._examples = Examples(self._page)
+        self.compare = ComparePanel(self._page)
         heading(2, "Notes")
         self._notes = ui.element("div").props("role=status")
-        self._enabled = [self._word, self._phones, self._keep, set_word, forget]
+        self._enabled = [self._word, self._phones, self._keep, set_word, forget, self.compare]
         self.refresh()
         self.show_notes()
 
@@ -87,7 +81,7 @@ class Inspector:
             self._word.value = word
             self._phones.value = self._page.workspace.project.pronunciations.get(word, "")
         elif item.get("kind") == "phone":
-            await self._explain((float(item["begin"]) + float(item["end"])) / 2)
+            await self._examples.explain((float(item["begin"]) + float(item["end"])) / 2)
 
     def show_notes(self) -> None:
         """Show what is known of the preview."""
@@ -128,50 +122,3 @@ class Inspector:
             "kind": "pronounce", "word": word, "phones": "" if is_removed else phones, "keep": bool(self._keep.value),
         })  # fmt: skip
         self.refresh()
-
-    async def _explain(self, time: float) -> None:
-        page = self._page
-        self._explained = time
-        with shown_errors():
-            found = (await explain(page.studio, page.workspace, time))["phone"]
-            self._examples.clear()
-            with self._examples:
-                self._show_phone(found)
-
-    def _show_phone(self, phone: Mapping[str, Any] | None) -> None:
-        if phone is None:
-            ui.label("No example is used here: it is a pause, an h, or a recording whose words are unknown.").classes(
-                "quiet"
-            )
-        else:
-            shown = "" if phone["shown"] == phone["phone"] else f", shown by {phone['shown']}"
-            around = f"{' '.join(phone['left'])} [{phone['phone']}] {' '.join(phone['right'])}"
-            ui.label(f"{around}{shown}, {phone['start']:.2f}-{phone['end']:.2f} s")
-            with ui.element("table").classes("examples"):
-                ui.html("<tr><th>Example</th><th>In</th><th>Score</th><th></th></tr>", sanitize=False, tag="thead")
-                with ui.element("tbody"):
-                    for token in phone["tokens"][:N_SHOWN]:
-                        self._show_token(phone, token)
-        self._show_excluded()
-
-    def _show_token(self, phone: Mapping[str, Any], token: Mapping[str, Any]) -> None:
-        around = f"{' '.join(token['left'])} [{phone['shown']}] {' '.join(token['right'])}"
-        with ui.element("tr"):
-            for text in (f"{token['utterance']} {token['start']:.2f} s", around, f"{token['score']:.2f}"):
-                ui.html(escape(text), sanitize=False, tag="td")
-            with ui.element("td"):
-                self._exclude_button("Exclude", token["utterance"], token["start"], is_excluded=True)
-
-    def _show_excluded(self) -> None:
-        for one in self._page.workspace.project.excluded:
-            with ui.row().style("align-items: center; gap: .25rem"):
-                ui.label(f"excluded: {one.utterance} {one.start:.2f} s").classes("quiet")
-                self._exclude_button("Use again", one.utterance, one.start, is_excluded=False)
-
-    def _exclude_button(self, text: str, utterance: str, start: float, *, is_excluded: bool) -> None:
-        async def change() -> None:
-            await self._page.edit({"kind": "exclude", "utterance": utterance, "start": start, "on": is_excluded})
-            if self._explained is not None:
-                await self._explain(self._explained)
-
-        ui.button(text, on_click=change).props(f'dense flat no-caps aria-label="{escape(text)} {escape(utterance)}"')

@@ -1,5 +1,6 @@
 """The left panel of the page "animate": what is said, by which voice, and which head shows it."""
 
+import os
 from typing import Any
 
 from nicegui import ui
@@ -46,7 +47,9 @@ class SpeechPanel:
         self._select("models", "hair_color", "Hair colour", hair_colours())
         heading(2, "Gestures")
         palettes = await models(library, key, PALETTE)
-        self._select("models", "palette", "Palette", {name: name for name in palettes})
+        own = page.studio.styles.store.path(key.name)
+        mine = {str(own): "my styles"} if own.is_file() else {}
+        self._select("models", "palette", "Palette", {**{name: name for name in palettes}, **mine})
         self._select("request", "gestures", "Method", {name: name for name in GESTURES})
 
     def refresh(self) -> None:
@@ -87,6 +90,8 @@ class SpeechPanel:
         project = self._page.workspace.project
         owner = project.request if hasattr(project.request, name) else project.models
         value = getattr(owner, name)
+        if name == "palette" and value is not None and os.sep in value:
+            value = os.path.normpath(value)
         return "" if value is None else value
 
     def _show(self, name: str) -> None:

@@ -26,17 +26,18 @@ def rest_landmarks(face: Face) -> Floats:
 
 
 def moved_landmarks(face: Face, motion: Trajectory) -> NDArray[np.float32]:
-    """(T, 478, 3) landmarks of a face, mm, for weights (T, K) of its shapes; its eyes turn.
+    """(T, 478, 3) landmarks of a face, mm, for weights (T, K) of its first K shapes; its eyes turn.
 
     Raises
     ------
     DataError
         The face has not all landmarks, or the weights are not of its shapes.
     """
-    if motion.channels != face.shape_names:
+    n = len(motion.channels)
+    if motion.channels != face.shape_names[:n]:
         raise DataError("the weights are not for the shapes of this face; retarget them to it first")
     weights = motion.values.astype(np.float64)
-    moves = scatter_landmarks(face, landmark_motion(face, np.arange(len(face.shapes))))
+    moves = scatter_landmarks(face, landmark_motion(face, np.arange(n)))
     found = rest_landmarks(face) + np.tensordot(weights, moves, axes=(1, 2))
     _turn_eyes(face, weights, found)
     return found.astype(np.float32)
@@ -48,10 +49,11 @@ def _turn_eyes(face: Face, weights: Floats, landmarks: Floats) -> None:
 
     for eye in face.eyes:
         on_it = ((face.landmark_vertices >= eye.first) & (face.landmark_vertices < eye.first + eye.count)).all(axis=1)
-        columns = [face.shape_names.index(name) for name in eye.turns]
-        if not on_it.any() or not columns:
+        known = [name for name in eye.turns if name in face.shape_names[: weights.shape[1]]]
+        if not on_it.any() or not known:
             continue
-        turns = weights[:, columns] @ np.array(list(eye.turns.values()), np.float64)
+        columns = [face.shape_names.index(name) for name in known]
+        turns = weights[:, columns] @ np.array([eye.turns[name] for name in known], np.float64)
         rows = face.landmarks[on_it]
         about = Rotation.from_rotvec(turns).as_matrix()
         landmarks[:, rows] = np.einsum("tij,tlj->tli", about, landmarks[:, rows] - eye.centre) + eye.centre

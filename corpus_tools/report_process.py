@@ -1,0 +1,151 @@
+"""Reports of a talker or a palette as one HTML page, in a process with limits and without a network.
+
+``python -m corpus_tools.report_process``: standard input holds one line of JSON, fields of `ReportOrder`, and ends with
+the parent process; standard output has lines of JSON: the progress (``stage``, ``done``, ``of``), and at last
+``is_result``, or the ``error`` and its ``message``.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import TextIO
+
+from corpus_tools.message_lines import line_progress, write_line
+from corpus_tools.recordings.observation import Observation, Quality
+from lexicon.errors import InputError, Tts2faceError
+from tts2face.child_process import exit_after
+from tts2face.limited_process import ProcessLimits, limit_process
+from tts2face.models.talker import Talker, load_talker
+from tts2face.storage.files import write_atomically
+from tts2face.types import Progress
+
+LEAST_UTTERANCES = 10  # of an accuracy report: two are held out
+SEED = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ReportOrder:
+    """What is to be reported.
+
+    Parameters
+    ----------
+    kind
+        One of `REPORTS`.
+    model
+        Name of a shipped talker or palette, or the path of a file.
+    name
+        Name of the model in the report.
+    out
+        The page.
+    limits
+        Of `ProcessLimits`.
+    """
+
+    kind: str
+    model: str
+    name: str
+    out: str
+    limits: Mapping[str, int]
+
+
+def similarity_report(model: str, name: str, on_progress: Progress) -> str:
+    """Page of the visual similarity of a talker's phones."""
+    from corpus_tools.similarity.analysis import NamedTalker, Options, analyse
+    from corpus_tools.similarity.page import similarity_page
+
+    return similarity_page(analyse(NamedTalker(name, load_talker(model)), Options(), None, on_progress), "both")
+
+
+def gesture_report(model: str, name: str, on_progress: Progress) -> str:
+    """Page that compares a palette's gestures with motion from its fields, noise and published fields."""
+    from corpus_tools.gesture_study.analysis import Options, study_gestures
+    from corpus_tools.gesture_study.page import gestures_page
+    from tts2face.models.palette import load_palette
+
+    return gestures_page(study_gestures(name, load_palette(model), Options(), on_progress))
+
+
+def accuracy_report(model: str, name: str, on_progress: Progress) -> str:
+    """Page of the accuracy of lips for a fifth of a talker's recordings, made by what the others teach.
+
+    Raises
+    ------
+    InputError
+        The talker has too few recordings.
+    """
+    from corpus_tools.evaluation.evaluate import evaluate
+    from corpus_tools.evaluation.splits import split_randomly
+    from corpus_tools.report.evaluation import evaluation_page
+
+    talker = load_talker(model)
+    if len(talker.utterances) < LEAST_UTTERANCES:
+        raise InputError(
+            f"the talker {name} has {len(talker.utterances)} recordings; an accuracy report holds some out and needs "
+            f"{LEAST_UTTERANCES}"
+        )
+    found, runs = evaluate([split_randomly(talker_observations(talker), seed=SEED)], on_progress=on_progress)
+    return evaluation_page(found, runs)
+
+
+def talker_observations(talker: Talker) -> tuple[Observation, ...]:
+    """The recordings of a talker as observations: landmarks as its shape model holds them, without what it leaves out.
+
+    Phones, words and levels are those of the recordings; the pictures are gone.
+    """
+    return tuple(
+        Observation(
+            one.name,
+            talker.fps,
+            talker.model.shapes(one.shape),
+            one.head,
+            one.phones,
+            one.words,
+            one.intensity,
+            Quality(0.0, 1.0, 0, 0.0),
+            Path(one.name),
+        )
+        for one in talker.utterances
+    )
+
+
+REPORTS: Mapping[str, tuple[str, Callable[[str, str, Progress], str]]] = MappingProxyType(
+    {
+        "similarity": ("comparing halves", similarity_report),
+        "gestures": ("analysing styles", gesture_report),
+        "accuracy": ("evaluating methods", accuracy_report),
+    }
+)
+
+
+def report(order: ReportOrder, out: TextIO) -> None:
+    """Write a report; the progress is written to `out`."""
+    try:
+        if order.kind not in REPORTS:
+            raise InputError(f"there is no report {order.kind!r}; choose one of {', '.join(REPORTS)}")
+        stage, make = REPORTS[order.kind]
+        page = make(order.model, order.name, line_progress(out, stage))
+        write_atomically(Path(order.out), page.encode())
+    except Tts2faceError as error:
+        message = " ".join(str(error).replace(order.model, order.name).split())
+        write_line(out, {"error": type(error).__name__, "message": message})
+    else:
+        write_line(out, {"is_result": True})
+
+
+def main() -> None:
+    """Write one report."""
+    order = ReportOrder(**json.loads(sys.stdin.readline()))
+    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # whatever a library prints must not mix with the messages
+    exit_after(sys.stdin.read)
+    limit_process(ProcessLimits(**order.limits))
+    report(order, out)
+    os._exit(0)  # the thread that waits for the parent does not end
+
+
+if __name__ == "__main__":
+    main()

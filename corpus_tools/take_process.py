@@ -1,0 +1,115 @@
+"""Work on one take of a person for the studio, in a process with limits and without a network.
+
+``python -m corpus_tools.take_process``, started by `tts2face.studio.take_tools`: standard input holds one line of JSON,
+an order, and ends with the parent process; lines of JSON on standard output tell the progress (``stage``, ``done``,
+``of``) and at last the result, or the ``error`` and its ``message``. A take is a video or a Live Link Face table.
+
+``{"kind": "check", "take", "cache"}`` gives ``seconds`` and ``findings``, objects with ``severity`` and ``message``,
+refusals first. ``{"kind": "style", "take", "cache", "base", "name", "out"}`` writes the palette `base` with a style of
+this name. ``{"kind": "capture", "take", "table", "sound"}`` writes a video as a Live Link table, and its sound if it
+has any (``has_sound``). ``{"kind": "film", "take", "sound", "out"}`` renders a table with its sound, or null.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from corpus_tools.build_palette import StyleSource, build_style
+from corpus_tools.decomposition.gesture_take import check_gesture_take
+from corpus_tools.message_lines import line_progress, write_line
+from corpus_tools.run_options import RunOptions
+from lexicon.errors import Tts2faceError
+from tts2face.child_process import exit_after
+from tts2face.limited_process import ProcessLimits, limit_process
+from tts2face.models.palette import load_palette
+from tts2face.types import Progress
+
+LIMITS = ProcessLimits(memory_bytes=6 << 30, cpu_s=1800, file_bytes=1 << 30, n_files=256)
+LOW_PRIORITY = 10
+NO_PROVENANCE = {"sources": "a take recorded in the studio"}
+
+Stages = Callable[[str], Progress]
+
+
+def work(order: Mapping[str, Any], stages: Stages) -> dict[str, Any]:
+    """Result of an order; errors as those of what it asks for."""
+    return _KINDS[order["kind"]](order, stages)
+
+
+def _check(order: Mapping[str, Any], stages: Stages) -> dict[str, Any]:
+    progress = stages("checking the take")
+    found = check_gesture_take(Path(order["take"]), _options(order), lambda share: progress(round(100 * share), 100))
+    return {
+        "seconds": round(found.seconds, 2),
+        "findings": [{"severity": one.severity, "message": one.message} for one in found.findings],
+    }
+
+
+def _style(order: Mapping[str, Any], stages: Stages) -> dict[str, Any]:
+    take = Path(order["take"])
+    stated = take.with_name("provenance.json")
+    stated.write_text(json.dumps(NO_PROVENANCE), encoding="utf-8")
+    built = build_style(
+        StyleSource(recordings=take, provenance=stated), order["name"], Path(order["out"]),
+        base=load_palette(order["base"]), run_options=_options(order), stages=stages,
+    )  # fmt: skip
+    return {"seconds": round(60 * built.minutes, 2)}
+
+
+def _capture(order: Mapping[str, Any], stages: Stages) -> dict[str, Any]:
+    from tts2face.session import Session
+    from tts2face.synthesis.performance import Performance
+
+    exports = [order["table"], order["sound"]]
+    written = Session(palette=None).write_performance(
+        Performance(take=Path(order["take"])), None, exports=exports, stages=stages
+    )
+    if written.is_silent:
+        Path(order["sound"]).unlink()
+    return {"seconds": round(written.seconds, 2), "has_sound": not written.is_silent}
+
+
+def _film(order: Mapping[str, Any], stages: Stages) -> dict[str, Any]:
+    from tts2face.session import Session
+    from tts2face.synthesis.performance import Performance
+
+    sound = None if order["sound"] is None else Path(order["sound"])
+    written = Session(palette=None).write_performance(
+        Performance(take=Path(order["take"]), audio=sound), order["out"], stages=stages
+    )
+    return {"seconds": round(written.seconds, 2)}
+
+
+_KINDS: Mapping[str, Callable[[Mapping[str, Any], Stages], dict[str, Any]]] = {
+    "check": _check, "style": _style, "capture": _capture, "film": _film,
+}  # fmt: skip
+
+
+def _options(order: Mapping[str, Any]) -> RunOptions:
+    return RunOptions(Path(order["cache"]), 1)
+
+
+def main() -> None:
+    """Work on one order."""
+    order = json.loads(sys.stdin.readline())
+    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # whatever a library prints must not mix with the messages
+    exit_after(sys.stdin.read)
+    limit_process(replace(LIMITS, cpu_s=int(order.get("cpu_s", LIMITS.cpu_s))))
+    os.nice(LOW_PRIORITY)  # streams go first
+    try:
+        result = work(order, lambda stage: line_progress(out, stage))
+    except Tts2faceError as error:
+        folder = str(Path(order["take"]).parent)
+        message = " ".join(str(error).replace(f"{folder}/", "").split())
+        result = {"error": type(error).__name__, "message": message}
+    write_line(out, {"is_result": True, **result})
+    os._exit(0)  # the thread that waits for the parent does not end
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,86 @@
+"""Work on one take: its check, and what the process answers."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from corpus_tools.decomposition.gesture_take import GOOD_S, LEAST_S, check_gesture_take
+from corpus_tools.run_options import RunOptions
+from lexicon.errors import InputError
+from tts2face.models.palette import load_palette, read_palette
+
+HEADER = "Timecode,BlendshapeCount,JawOpen,EyeBlinkLeft,EyeBlinkRight,BrowInnerUp,HeadYaw,HeadPitch,HeadRoll"
+
+
+def write_table(path: Path, seconds: float, *, broken: bool = False) -> Path:
+    """A Live Link table at 30 frames/s in which everything moves."""
+    rows = [HEADER]
+    for frame in range(round(30 * seconds)):
+        share = (frame % 20) / 20
+        values = f"{share:.3f},{float(frame % 40 < 4)},{float(frame % 40 < 4)},{1 - share:.3f},{share / 9:.4f},0,0"
+        rows.append(f"00:00:{frame // 30:02d}:{frame % 30:02d}.000,61,{'x' if broken and frame == 5 else ''}{values}")
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(("seconds", "found"), [(LEAST_S - 1, "refusal"), (LEAST_S + 1, "warning"), (GOOD_S + 1, "")])
+def test_a_take_must_be_long_enough(tmp_path: Path, seconds: float, found: str) -> None:
+    shares: list[float] = []
+    report = check_gesture_take(write_table(tmp_path / "take.csv", seconds), RunOptions(tmp_path, 1), shares.append)
+    assert report.seconds == pytest.approx(seconds, abs=0.1)
+    assert "".join(one.severity for one in report.findings) == found
+
+
+def test_a_damaged_take_says_what_is_wrong(tmp_path: Path) -> None:
+    report = check_gesture_take(write_table(tmp_path / "take.csv", 3, broken=True), RunOptions(tmp_path, 1), print)
+    assert (report.seconds, report.findings[0].severity) == (0.0, "refusal")
+    assert "line 7 of" in report.findings[0].message
+
+
+def test_another_kind_of_file(tmp_path: Path) -> None:
+    (tmp_path / "take.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(InputError, match="neither a video nor a Live Link Face table"):
+        check_gesture_take(tmp_path / "take.csv", RunOptions(tmp_path, 1), print)
+
+
+def ordered(order: dict[str, object]) -> list[dict[str, object]]:
+    """Messages of the process about an order."""
+    child = subprocess.Popen(
+        [sys.executable, "-m", "corpus_tools.take_process"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert child.stdin is not None
+    assert child.stdout is not None
+    child.stdin.write(json.dumps(order) + "\n")
+    child.stdin.flush()
+    lines = [json.loads(line) for line in child.stdout]
+    child.stdin.close()
+    child.stdout.close()
+    child.wait()
+    return lines
+
+
+def test_a_table_becomes_a_style_beside_the_others(tmp_path: Path) -> None:
+    take = write_table(tmp_path / "take.csv", 4)
+    order = {
+        "kind": "style", "take": str(take), "cache": str(tmp_path), "base": "starter", "name": "my own",
+        "out": str(tmp_path / "out.palette"),
+    }  # fmt: skip
+    *progress, result = ordered(order)
+    assert progress[0]["stage"] == "reading recordings"
+    assert result["seconds"] == pytest.approx(4.0, abs=0.1)
+    made = read_palette(tmp_path / "out.palette")
+    assert set(made.names) - set(load_palette("starter").names) == {"my own"}
+    assert made.styles["my own"].metadata["sources"] == "a take recorded in the studio"
+
+
+def test_an_error_names_no_path(tmp_path: Path) -> None:
+    take = write_table(tmp_path / "take.csv", 4)
+    order = {"kind": "style", "take": str(take), "cache": str(tmp_path), "base": "starter", "name": "delighted",
+             "out": str(tmp_path / "out.palette")}  # fmt: skip
+    (error,) = ordered(order)[-1:]
+    assert error["error"] == "InputError"
+    assert "the palette has a style delighted already" in str(error["message"])
+    assert str(tmp_path) not in str(error["message"])

@@ -1,0 +1,62 @@
+"""Reports over HTTP: made by a process, kept, shown as a page that can do nothing, and deleted."""
+
+import time
+from pathlib import Path
+
+import httpx
+import pytest
+
+pytest.importorskip("matplotlib", reason="needs `pip install 'tts2face[report]'`")
+pytest.importorskip("sklearn", reason="needs `pip install 'tts2face[report]'`")
+
+REPORTS = "/api/reports"
+
+
+def state(studio: httpx.Client, number: str) -> dict[str, object]:
+    return next(one for one in studio.get(REPORTS).json() if one["id"] == number)
+
+
+def test_a_report_is_made_kept_and_deleted(studio: httpx.Client, data: Path) -> None:
+    started = studio.post(REPORTS, json={"kind": "similarity", "model": "grid_s1"})
+    assert started.status_code == 202
+    number = started.json()["id"]
+    assert studio.get(f"{REPORTS}/{number}/page").status_code == 400  # not made yet
+    deadline = time.monotonic() + 180
+    while state(studio, number)["state"] in {"waiting", "running"}:
+        assert time.monotonic() < deadline
+        time.sleep(0.2)
+    assert state(studio, number)["state"] == "done", state(studio, number)
+    page = studio.get(f"{REPORTS}/{number}/page")
+    assert "<h1>Similarity of phones: grid_s1</h1>" in page.text
+    assert "sandbox; default-src 'none'" in page.headers["content-security-policy"]
+    assert "http://" not in page.text.replace("http://www.w3.org/", "")  # names of XML, not addresses
+    assert "<script" not in page.text
+    assert sorted(path.name for path in (data / "studio" / "reports" / number).iterdir()) == [
+        "report.html", "report.json",
+    ]  # fmt: skip
+    shown = studio.get(f"/reports/{number}")
+    assert "Visual similarity of phones: grid_s1" in shown.text
+    assert studio.delete(f"{REPORTS}/{number}").status_code == 204
+    assert studio.get(REPORTS).json() == []
+    assert not (data / "studio" / "reports" / number).exists()
+
+
+def test_a_report_that_waits_or_runs_is_cancelled(studio: httpx.Client, data: Path) -> None:
+    number = studio.post(REPORTS, json={"kind": "gestures", "model": "starter"}).json()["id"]
+    assert studio.delete(f"{REPORTS}/{number}").status_code == 204
+    time.sleep(0.3)
+    assert studio.get(REPORTS).json() == []
+    assert not (data / "studio" / "reports" / number).exists()
+
+
+def test_what_cannot_be_reported_is_refused(studio: httpx.Client) -> None:
+    for content, reason in (
+        ({"kind": "beauty", "model": "grid_s1"}, "there is no report 'beauty'"),
+        ({"kind": "similarity", "model": "nobody"}, "nobody"),
+        ({"kind": "gestures", "model": "grid_s1"}, "grid_s1"),
+    ):
+        answer = studio.post(REPORTS, json=content)
+        assert answer.status_code == 400
+        assert reason in answer.text
+    assert studio.get(f"{REPORTS}/0123456789ab/page").status_code == 404
+    assert studio.delete(f"{REPORTS}/../reports").status_code in {404, 405}

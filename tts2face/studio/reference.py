@@ -1,0 +1,144 @@
+"""What a project is compared with: itself as it was kept, itself with other settings, or recorded motion. Pure."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import DataError, InputError
+from tts2face.project.project import Project
+from tts2face.project.project_file import parse_project, project_json
+from tts2face.request import Request
+from tts2face.session_cache import Models
+
+KEPT, SETTINGS, RECORDING, TAKE = "kept", "settings", "recording", "take"
+KINDS = (KEPT, SETTINGS, RECORDING, TAKE)
+NOT_SETTINGS = frozenset({"text", "audio", "idle", "timeline", "dictionary"})  # what is said stays the same
+MAX_LABEL = 100
+MAX_OFFSET_S = 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """The A of a comparison.
+
+    Parameters
+    ----------
+    kind
+        ``kept``: `project`. ``settings``: the project with other `request` and `models`. ``recording``: motion of the
+        talker's `recording`. ``take``: motion of an imported Live Link take.
+    label
+        What it is, for people.
+    offset
+        Second of the recorded motion at which the project's sound begins.
+
+    Raises
+    ------
+    InputError
+        The kind is unknown, or what it needs is missing.
+    """
+
+    kind: str
+    label: str = ""
+    project: Project | None = None
+    request: Mapping[str, Any] = field(default_factory=dict)
+    models: Mapping[str, Any] = field(default_factory=dict)
+    recording: str = ""
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is incomplete."""
+        if self.kind not in KINDS:
+            raise InputError(f"a project is compared with {', '.join(KINDS)}, not {self.kind[:20]!r}")
+        if self.kind == KEPT and self.project is None:
+            raise InputError("a comparison with a kept project needs that project; keep it again")
+        if self.kind == SETTINGS:
+            _check_settings(self.request, self.models)
+        if self.kind == RECORDING and not self.recording:
+            raise InputError("a comparison with a recording needs its name; choose one from the list")
+        if len(self.label) > MAX_LABEL or abs(self.offset) > MAX_OFFSET_S:
+            raise InputError(f"a label has at most {MAX_LABEL} characters, an offset {MAX_OFFSET_S:g} s; change it")
+
+    @property
+    def is_recorded(self) -> bool:
+        """Whether its motion is recorded and not synthesised."""
+        return self.kind in {RECORDING, TAKE}
+
+
+def reference_project(reference: Reference, project: Project) -> Project:
+    """The project whose clip is the A, given the project as it is now; for recorded motion, what that depends on.
+
+    Raises
+    ------
+    InputError
+        The settings do not fit the project.
+    """
+    if reference.kind == KEPT:
+        assert reference.project is not None
+        return reference.project
+    if reference.is_recorded:
+        kept = project.request
+        return Project(request=Request(audio=kept.audio, fps=kept.fps, gestures=kept.gestures), models=project.models)
+    options = dict(reference.request)
+    gestures = options.get("gestures", project.request.gestures)
+    if gestures == "none":
+        options |= {"style": None, "gain": None, "expression": None, "pitch": False}
+    elif gestures == "noise":
+        options["pitch"] = False
+    return replace(
+        project, request=replace(project.request, **options), models=replace(project.models, **reference.models)
+    )
+
+
+def reference_json(reference: Reference, folder: Path) -> dict[str, Any]:
+    """JSON object of a reference; paths of its project are relative to a folder."""
+    kept = None if reference.project is None else project_json(reference.project, folder)
+    values = {one.name: getattr(reference, one.name) for one in fields(Reference)}
+    return {**values, "request": dict(reference.request), "models": dict(reference.models), "project": kept}
+
+
+def parse_reference(content: Any, folder: Path) -> Reference:
+    """Reference of `reference_json`.
+
+    Raises
+    ------
+    InputError, DataError
+        It is none, or damaged.
+    """
+    names = {one.name for one in fields(Reference)}
+    if not isinstance(content, Mapping) or not isinstance(content.get("kind"), str) or set(content) - names:
+        raise DataError(f"a comparison is an object with kind and some of {', '.join(sorted(names - {'kind'}))}")
+    kept = content.get("project")
+    try:
+        return Reference(
+            str(content["kind"]),
+            str(content.get("label", "")),
+            None if kept is None else parse_project(kept, "the kept project", folder),
+            _options(content, "request"),
+            _options(content, "models"),
+            str(content.get("recording", "")),
+            float(content.get("offset", 0.0)),
+        )
+    except (TypeError, ValueError) as wrong:
+        if isinstance(wrong, DataError | InputError):
+            raise
+        raise DataError(f"the comparison cannot be read: {wrong}") from wrong
+
+
+def _options(content: Mapping[str, Any], part: str) -> Mapping[str, Any]:
+    options = content.get(part) or {}
+    if not isinstance(options, Mapping):
+        raise DataError(f"{part} of a comparison must be an object of options, not {str(options)[:40]!r}")
+    return options
+
+
+def _check_settings(request: Mapping[str, Any], models: Mapping[str, Any]) -> None:
+    if not request and not models:
+        raise InputError("a comparison with other settings needs at least one; give request or models")
+    known = {one.name for one in fields(Request)} - NOT_SETTINGS
+    for name in request:
+        if name not in known:
+            raise InputError(f"a comparison cannot change {name[:40]!r} of the request; choose one of {sorted(known)}")
+    for name in models:
+        if name not in {one.name for one in fields(Models)}:
+            raise InputError(f"there is no model {name[:40]!r}; choose one of {[one.name for one in fields(Models)]}")

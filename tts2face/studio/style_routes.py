@@ -1,0 +1,159 @@
+"""Addresses of own styles: the take in work, moving pictures, derived styles, the palette file."""
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body, Query
+from fastapi import Request as HttpRequest
+from fastapi.responses import FileResponse, Response
+
+from lexicon.errors import InputError, Tts2faceError
+from lexicon.inputs import parse_json
+from tts2face import catalogue
+from tts2face.models.palette_editing import StyleMix
+from tts2face.service.access.page_headers import STYLES
+from tts2face.service.errors import as_refused
+from tts2face.studio.palette_store import FILE
+from tts2face.studio.recording_routes import receive_take
+from tts2face.studio.recording_store import SUFFIXES
+from tts2face.studio.styles import Styles, TakeWork
+
+NO_STORE = {"Cache-Control": "no-store"}
+
+router = APIRouter(prefix=STYLES, include_in_schema=False)
+
+
+def _styles(request: HttpRequest) -> Styles:
+    found: Styles = request.app.state.studio.styles
+    return found
+
+
+@router.get("")
+async def list_styles(request: HttpRequest) -> dict[str, Any]:
+    """Styles of the key's palette, and what is known of its take."""
+    styles, key = _styles(request), request.state.key
+    own = styles.store.own_names(key.name)
+    listed = [
+        {"name": one.name, "source": one.source, "summary": one.summary, "is_own": one.name in own}
+        for one in catalogue.styles(styles.store.base(key.name))
+    ]
+    return {"styles": listed, "take": take_state(styles.work(key))}
+
+
+@router.post("", status_code=201)
+async def make_style(
+    request: HttpRequest, name: Annotated[str, Body()], mix: Annotated[dict[str, Any] | None, Body()] = None
+) -> dict[str, str]:
+    """A new style: a mix of others, or of the take, which takes some seconds."""
+    styles, key = _styles(request), request.state.key
+    try:
+        if mix is None:
+            await styles.make(key, name)
+            return {"name": name}
+        return {"name": await styles.derive(key, name, parse_mix(mix))}
+    except Tts2faceError as wrong:
+        raise as_refused(wrong) from wrong
+
+
+@router.put("/take/{number}", status_code=201)
+async def put_take(request: HttpRequest, number: str) -> dict[str, str]:
+    """A recorded take in place of an earlier one; the number, by which recorders name prompts, does not matter."""
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    suffix = {**SUFFIXES, "text/csv": ".csv"}.get(kind)
+    try:
+        if suffix is None:
+            raise InputError(f"a take must be {', '.join(SUFFIXES)} or text/csv, not {kind[:40]!r}; convert it")
+        with tempfile.TemporaryDirectory(prefix="tts2face-take-") as folder:
+            upload = Path(folder, "upload")
+            await receive_take(request.stream(), upload)
+            await _styles(request).add_take(request.state.key, upload, suffix)
+    except Tts2faceError as wrong:
+        raise as_refused(wrong) from wrong
+    return {"state": "checking"}
+
+
+@router.get("/take/{number}")
+def get_take(request: HttpRequest, number: str) -> Response:
+    """The take, to look at."""
+    path = _styles(request).store.take(request.state.key.name)
+    kinds = {suffix: kind for kind, suffix in SUFFIXES.items()}
+    if path is None:
+        raise as_refused(InputError("there is no take; record or upload one"))
+    return FileResponse(path, media_type=kinds.get(path.suffix, "application/octet-stream"), headers=NO_STORE)
+
+
+@router.delete("/take/{number}", status_code=204)
+async def delete_take(request: HttpRequest, number: str) -> Response:
+    """Delete the take."""
+    await _styles(request).delete_take(request.state.key)
+    return Response(status_code=204)
+
+
+@router.get(f"/{FILE}")
+def download_palette(request: HttpRequest) -> FileResponse:
+    """The palette with the own styles and the shipped ones."""
+    path = _styles(request).store.path(request.state.key.name)
+    if not path.is_file():
+        raise as_refused(InputError("you have no own styles yet; make one first"))
+    return FileResponse(path, filename=FILE)
+
+
+@router.get("/mix.webp")
+async def draw_mix(request: HttpRequest, mix: Annotated[str, Query(max_length=4000)]) -> Response:
+    """Moving picture of a mix, an object of JSON, that is not kept."""
+    try:
+        content = await _styles(request).draw_mix(request.state.key, parse_mix(parse_json(mix, "the mix")))
+    except Tts2faceError as wrong:
+        raise as_refused(wrong) from wrong
+    return Response(content, media_type="image/webp")
+
+
+@router.get("/{name}/swatch.webp")
+async def swatch(request: HttpRequest, name: str) -> FileResponse:
+    """Moving picture of a style: 20 instants, a tenth of a second apart, one beside the other."""
+    try:
+        path = await _styles(request).swatch(request.state.key, name)
+    except Tts2faceError as wrong:
+        raise as_refused(wrong) from wrong
+    return FileResponse(path, media_type="image/webp", headers={"Cache-Control": "private, max-age=86400"})
+
+
+@router.patch("/{name}", status_code=204)
+async def rename(request: HttpRequest, name: str, new: Annotated[str, Body(embed=True, alias="name")]) -> Response:
+    """Rename an own style, in projects, too."""
+    try:
+        await _styles(request).rename(request.state.key, name, new)
+    except Tts2faceError as wrong:
+        raise as_refused(wrong) from wrong
+    return Response(status_code=204)
+
+
+@router.delete("/{name}", status_code=204)
+async def remove(request: HttpRequest, name: str) -> Response:
+    """Delete an own style, and what is painted in it."""
+    try:
+        await _styles(request).remove(request.state.key, name)
+    except Tts2faceError as wrong:
+        raise as_refused(wrong) from wrong
+    return Response(status_code=204)
+
+
+def parse_mix(given: Mapping[str, Any]) -> StyleMix:
+    """A mix from JSON.
+
+    Raises
+    ------
+    InputError
+        A field is unknown or has a value of the wrong kind.
+    """
+    try:
+        return StyleMix(**given)
+    except (TypeError, AttributeError) as wrong:
+        raise InputError(f"the mix cannot be read ({wrong}); give source, shares, expressions, sizes, tempo") from wrong
+
+
+def take_state(work: TakeWork) -> dict[str, Any]:
+    """JSON of the work on a take."""
+    return {name: getattr(work, name) for name in ("doing", "stage", "done", "of", "state", "advice")}

@@ -1,0 +1,226 @@
+"""Takes of puppetry at work: read from videos and tables, shown on the stage, made films, styles and projects."""
+
+import asyncio
+import json
+import os
+import shutil
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lexicon.errors import InputError, Tts2faceError
+from tts2face.service.access.keys import ApiKey
+from tts2face.service.errors import RefusedError
+from tts2face.service.uploads.decode_process import SOUND as SOUND_KIND
+from tts2face.service.uploads.upload_folder import decode_file
+from tts2face.storage.files import translate_disk_errors, write_atomically
+from tts2face.studio.importing import add_recording
+from tts2face.studio.palette_store import SUFFIXES
+from tts2face.studio.requests import events_of
+from tts2face.studio.take_store import (
+    FAILED,
+    FILM,
+    PREVIEW,
+    READY,
+    SOUND,
+    TABLE,
+    VIDEO,
+    TakeEntry,
+    TakeStore,
+)
+from tts2face.studio.take_tools import run_take_process
+
+if TYPE_CHECKING:
+    from tts2face.studio.studio import Studio
+
+QUIET_RATE = 8000  # Hz of the silence that a take without sound has on the stage, whose clock it is
+FLOAT_BYTES = 4
+
+
+@dataclass(slots=True)
+class TakeProgress:
+    """Work on one take: its stage with steps done and of all, or an error."""
+
+    stage: str = ""
+    done: int = 0
+    of: int = 0
+    error: str = ""
+    task: "asyncio.Task[None] | None" = field(default=None, repr=False)
+
+    def show(self, stage: str, done: int, of: int) -> None:
+        """Set the stage and its steps."""
+        self.stage, self.done, self.of = stage, done, of
+
+
+class Takes:
+    """Takes of all keys of a studio; methods belong to the event loop."""
+
+    def __init__(self, studio: "Studio") -> None:
+        self._studio = studio
+        self.store = TakeStore(studio.folder)
+        self.live: set[str] = set()  # names of the keys with a live camera
+        self._works: dict[str, TakeProgress] = {}
+        self._turns: dict[str, asyncio.Lock] = {}  # of owners: one process at a time
+
+    def progress(self, number: str) -> TakeProgress:
+        """Work on a take."""
+        return self._works.setdefault(number, TakeProgress())
+
+    async def add(self, key: ApiKey, source: Path, suffix: str, name: str) -> TakeEntry:
+        """A new take of a video or a table, which is read from now on; the file is moved.
+
+        Raises
+        ------
+        InputError
+            The key may not build, or the file is of another kind.
+        """
+        self._studio.styles.check_scope(key)
+        if suffix not in SUFFIXES:
+            raise InputError(f"a take {suffix[:10]!r} cannot be read; give {', '.join(sorted(SUFFIXES))}")
+        entry = await asyncio.to_thread(self.store.create, key.name, name)
+        file = self.store.folder(key.name, entry.id) / (TABLE if suffix == ".csv" else f"{VIDEO}{suffix}")
+        with translate_disk_errors(file):
+            await asyncio.to_thread(shutil.move, source, file)
+        self._start(key, entry.id, lambda show: self._read(key, entry, file, show))
+        return entry
+
+    async def add_sound(self, key: ApiKey, number: str, source: Path) -> None:
+        """Give a take the sound of a file.
+
+        Raises
+        ------
+        InputError
+            There is no such take, or the file has no sound that can be decoded.
+        """
+        self._studio.styles.check_scope(key)
+        folder, settings = self.store.folder(key.name, number), self._studio.state.settings
+        try:
+            await decode_file(
+                (SOUND_KIND, source, folder / f"new-{SOUND}", settings.sound_s), "the sound", settings.decode_s
+            )
+        except RefusedError as refused:
+            raise InputError(refused.message) from refused
+        os.replace(folder / f"new-{SOUND}", folder / SOUND)
+        for made in (PREVIEW, FILM):
+            (folder / made).unlink(missing_ok=True)
+        self.store.write(replace(self.store.entry(key.name, number), has_sound=True))
+
+    async def preview(self, key: ApiKey, number: str) -> bytes:
+        """The take on the default head, as a preview bundle (docs/studio.md)."""
+        folder, entry = self._ready(key, number)
+        file = folder / PREVIEW
+        if not file.is_file():
+            sound = str(folder / SOUND) if entry.has_sound else None
+            work = self._studio.state.work(kind="take", request={"take": str(folder / TABLE), "sound": sound})
+            async for event, content in events_of(self._studio.state.messages(work, key)):
+                await asyncio.to_thread(write_atomically, file, take_bundle(event, content))
+        return await asyncio.to_thread(file.read_bytes)
+
+    def film(self, key: ApiKey, number: str) -> None:
+        """Begin to render the take as a film."""
+        folder, entry = self._ready(key, number)
+        sound = str(folder / SOUND) if entry.has_sound else None
+        order = {"kind": "film", "take": str(folder / TABLE), "sound": sound, "out": str(folder / FILM)}
+        self._start(key, number, lambda show: run_take_process(order, show))
+
+    async def make_style_take(self, key: ApiKey, number: str) -> None:
+        """Make the take the one of which a style is made; errors as `Styles.add_take`."""
+        folder, entry = self._ready(key, number)
+        copied = folder / "copy.csv"
+        await asyncio.to_thread(shutil.copyfile, folder / TABLE, copied)
+        await self._studio.styles.add_take(key, copied, ".csv", folder / SOUND if entry.has_sound else None)
+
+    async def make_project(self, key: ApiKey, number: str) -> str:
+        """Id of a new project with the take's sound.
+
+        Raises
+        ------
+        InputError
+            It has none.
+        """
+        folder, entry = self._ready(key, number)
+        if not entry.has_sound:
+            raise InputError("the take has no sound, which a project needs; add a sound to it first")
+        return await add_recording(self._studio, key, folder / SOUND, entry.name, "")
+
+    async def remove(self, key: ApiKey, number: str) -> None:
+        """End the work on a take and delete it; errors as `TakeStore.folder`."""
+        self.store.folder(key.name, number)
+        work = self._works.pop(number, None)
+        if work is not None and work.task is not None:
+            work.task.cancel()
+            await asyncio.wait([work.task])
+        await asyncio.to_thread(self.store.remove, key.name, number)
+
+    async def close(self) -> None:
+        """End all work."""
+        tasks = [one.task for one in self._works.values() if one.task is not None]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _ready(self, key: ApiKey, number: str) -> tuple[Path, TakeEntry]:
+        folder, entry = self.store.folder(key.name, number), self.store.entry(key.name, number)
+        if entry.state != READY:
+            raise InputError(f"the take {entry.name} is not ready; wait until it is read, or delete it")
+        return folder, entry
+
+    async def _read(self, key: ApiKey, entry: TakeEntry, file: Path, show: Callable[[str, int, int], None]) -> None:
+        folder = file.parent
+        try:
+            if file.name == TABLE:
+                found = await run_take_process({"kind": "check", "take": str(file), "cache": str(folder)}, show)
+                if not found["seconds"]:
+                    raise InputError(found["findings"][0]["message"])
+            else:
+                table, sound = folder / TABLE, folder / SOUND
+                order = {"kind": "capture", "take": str(file), "table": str(table), "sound": str(sound)}
+                found = await run_take_process(order, show)
+            ready = replace(entry, state=READY, seconds=found["seconds"], has_sound=found.get("has_sound", False))
+            self.store.write(ready)
+        except Tts2faceError as wrong:
+            self.store.write(replace(entry, state=FAILED, message=str(wrong)))
+        finally:
+            if file.name != TABLE:
+                file.unlink(missing_ok=True)  # nothing but the motion and the sound is kept
+
+    def _start(self, key: ApiKey, number: str, work: Callable[[Callable[[str, int, int], None]], Any]) -> None:
+        progress = self.progress(number)
+        if progress.task is not None:
+            raise InputError("the take is at work already; wait until it is done")
+        progress.error = ""
+        progress.show("waiting", 0, 0)
+
+        async def follow() -> None:
+            try:
+                async with self._turns.setdefault(key.name, asyncio.Lock()):
+                    await work(progress.show)
+            except Tts2faceError as wrong:
+                progress.error = str(wrong)
+            except TimeoutError:
+                progress.error = "the take needs too much time; record a shorter one"
+            finally:
+                progress.stage, progress.task = "", None
+
+        progress.task = asyncio.get_running_loop().create_task(follow())
+
+
+def take_bundle(described: dict[str, Any], content: bytes) -> bytes:
+    """A preview bundle of a take as the task ``take`` describes it; silence where it has no sound."""
+    rate, n_samples, seconds = described["rate"], described["n_samples"], described["seconds"]
+    if not n_samples:
+        rate, n_samples = QUIET_RATE, round(QUIET_RATE * seconds)
+        content += np.zeros(n_samples, "<i2").tobytes()
+    n_frames = described["n_frames"]
+    header = {
+        "revision": 0, "is_complete": True, "fps": described["fps"], "n_frames": n_frames, "first_frame": 0,
+        "n": n_frames, "channels": described["channels"], "rate": rate, "n_samples": n_samples, "sound_first": 0,
+        "n_sound": n_samples, "duration": seconds, "words": [], "phones": [], "sentences": [], "notes": [], "error": "",
+    }  # fmt: skip
+    text = json.dumps(header).encode()
+    text += b" " * (-len(text) % FLOAT_BYTES)
+    return struct.pack("<I", len(text)) + text + content
