@@ -13,8 +13,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from tests.studio.browser import Browser
 from tests.studio.served import Page, served_harness
-from tests.studio.webdriver import Browser
 from tts2face.studio.components.stage import COMPONENTS
 
 PLAYED_S = 3.0  # shorter than the clip

@@ -9,8 +9,8 @@ import time
 from pathlib import Path
 
 from tests.service.conftest import RunningService
+from tests.studio.browser import Browser, wait_until
 from tests.studio.served import slowness
-from tests.studio.webdriver import Browser, wait_until
 
 ROUNDS = 3
 SHOWN = "const s = window.__studio; return Boolean(s && s.frames > 0 && s.face_ms && s.view && s.view.duration > 0)"

@@ -7,8 +7,8 @@ import httpx
 import pytest
 
 from tests.service.conftest import RunningService
+from tests.studio.browser import Browser, missing_program, wait_until
 from tests.studio.test_projects_http import create, preview
-from tests.studio.webdriver import Browser, missing_program, wait_until
 
 pytestmark = pytest.mark.skipif(bool(missing_program()), reason=f"needs {missing_program()}")
 

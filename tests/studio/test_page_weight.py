@@ -6,7 +6,7 @@ import httpx
 import pytest
 
 from tests.service.conftest import RunningService
-from tests.studio.webdriver import Browser, missing_program, wait_until
+from tests.studio.browser import Browser, missing_program, open_browser, wait_until
 
 MOST_BYTES = 2_500_000
 SHOWN = "const s = window.__studio; return Boolean(s && s.frames > 0 && s.face_ms && s.view && s.view.duration > 0)"
@@ -20,11 +20,9 @@ pytestmark = pytest.mark.skipif(bool(missing_program()), reason=f"needs {missing
 
 @pytest.fixture
 def browser() -> Iterator[Browser]:
-    made = Browser()
-    try:
+    """A browser with an empty cache."""
+    with open_browser() as made:
         yield made
-    finally:
-        made.close()
 
 
 def test_the_page_with_face_and_sound_stays_below_its_limit(
