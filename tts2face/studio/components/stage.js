@@ -55,6 +55,7 @@ export default {
       return;
     }
     pace.isSoftware = this.scene.isSoftware;
+    if (pace.isSoftware) this.share = LEAST_SHARE;
     this.stops = [preview.on("change", this.changed), clock.on("seek", this.changed)];
     this.stops.push(comparison.on("change", () => this.showSide()), sides.on(() => this.showSide()));
     this.watchContext();

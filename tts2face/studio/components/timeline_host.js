@@ -14,6 +14,7 @@ import { curveValue, formatTime, rounded, View } from "./timeline_view.js";
 import { Waveform } from "./waveform.js";
 
 const EDGE_LEAST_S = 0.01;
+const TEXT_S = 0.2; // between two texts of the time that plays: each makes the browser draw a part of the page
 const NUDGE_PAUSE_MS = 350; // an edge that keys move is sent when they rest
 const WHEEL_ZOOM = 0.0015;
 
@@ -156,7 +157,7 @@ export class TimelineHost {
       this.component.timeText = formatTime(time);
       return;
     }
-    if (Math.abs(time - (this.written ?? -1)) > 0.1) this.component.timeText = formatTime((this.written = time));
+    if (Math.abs(time - (this.written ?? -1)) > TEXT_S) this.component.timeText = formatTime((this.written = time));
     this.meter.add(performance.now() - begin);
   }
 
