@@ -3,15 +3,8 @@
 import httpx
 
 from tests.service.conftest import RunningService
-<<<<<<< HEAD
 from tests.studio.browser import Browser, wait_until
 from tests.studio.test_projects_http import create, preview
-=======
-from tests.studio.browser import Browser, missing_program, wait_until
-from tests.studio.test_projects_http import create, preview
-
-pytestmark = pytest.mark.skipif(bool(missing_program()), reason=f"needs {missing_program()}")
->>>>>>> s-speed
 
 LOADED = "const s = window.__studio; return Boolean(s && s.face_ms && s.frames > 0 && s.view?.duration > 1)"
 SIDE = "return document.querySelector('.studio-side')?.innerText ?? ''"

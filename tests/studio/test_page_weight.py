@@ -3,11 +3,7 @@
 import httpx
 
 from tests.service.conftest import RunningService
-<<<<<<< HEAD
 from tests.studio.browser import Browser, wait_until
-=======
-from tests.studio.browser import Browser, missing_program, open_browser, wait_until
->>>>>>> s-speed
 
 MOST_BYTES = 2_500_000
 SHOWN = "const s = window.__studio; return Boolean(s && s.frames > 0 && s.face_ms && s.view && s.view.duration > 0)"
@@ -16,18 +12,6 @@ RECEIVED = """
     return entries.map((one) => [one.name, one.transferSize])
 """
 
-<<<<<<< HEAD
-=======
-pytestmark = pytest.mark.skipif(bool(missing_program()), reason=f"needs {missing_program()}")
-
-
-@pytest.fixture
-def browser() -> Iterator[Browser]:
-    """A browser with an empty cache."""
-    with open_browser() as made:
-        yield made
-
->>>>>>> s-speed
 
 def test_the_page_with_face_and_sound_stays_below_its_limit(
     browser: Browser, studio: httpx.Client, studio_service: RunningService
