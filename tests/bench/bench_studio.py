@@ -18,6 +18,7 @@ from tests.studio.served import Page, served_harness
 from tts2face.studio.components.stage import COMPONENTS
 
 PLAYED_S = 3.0  # shorter than the clip
+SIZE = (1280, 900)  # of the window, whose pixels are composed for each frame
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 EMPTY = """
     const canvas = Object.assign(document.createElement('canvas'), {width: 640, height: 480});
@@ -81,7 +82,7 @@ def main() -> None:
     """Print all figures."""
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp(prefix="bench-studio-"))
     with served_harness(folder) as address:
-        browser = Browser()
+        browser = Browser(SIZE)
         try:
             page = Page(browser, address)
             print(f"face from request to first frame: {page.measure('face_ms'):.0f} ms")

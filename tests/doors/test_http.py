@@ -9,7 +9,7 @@ import pytest
 
 import tts2face
 from cli.main import run
-from tests.service.conftest import RunningService
+from tests.service.conftest import running_service
 
 TEXT = "Bob may move. We were away."
 LONG = (
@@ -43,17 +43,13 @@ MODELS = ("talker", "face", "identity", "palette")
 @pytest.fixture(scope="module")
 def url() -> Iterator[str]:
     """Address of a service with a dictionary."""
-    running = RunningService()
-    try:
-        running.wait_until_ready()
+    with running_service() as running:
         made = httpx.post(
             f"{running.url}/v1/dictionaries", data={"name": "names"}, files={"file": ("own.txt", WORDS.encode())},
             timeout=60.0,
         )  # fmt: skip
         assert made.status_code == 201, made.text
         yield running.url
-    finally:
-        running.close()
 
 
 def of_python(options: dict[str, Any], out: Path) -> bytes:

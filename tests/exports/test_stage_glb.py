@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.render.tiny_face import tiny_face
+from tts2face.exports import stage_surfaces
 from tts2face.exports.stage_glb import LEAST_MOVE_MM, quantised_moves, stage_glb
 from tts2face.exports.surfaces import divide_surface
 
@@ -42,7 +43,9 @@ class Read:
 
 @pytest.fixture(scope="module")
 def made():
-    return Read(stage_glb(FACE, FACE.shape_names))
+    with pytest.MonkeyPatch.context() as whole:
+        whole.setattr(stage_surfaces, "LEAST_TRIANGLES", 10**9)
+        return Read(stage_glb(FACE, FACE.shape_names))
 
 
 def test_triangles_are_those_of_the_face(made):
@@ -52,6 +55,20 @@ def test_triangles_are_those_of_the_face(made):
         expected = FACE.vertices[surface.vertices[surface.triangles]]
         order = [np.lexsort(one.reshape(len(one), -1).round(3).T) for one in (corners, expected)]
         assert corners[order[0]] == pytest.approx(expected[order[1]], abs=1e-3)  # float32 of metres, in mm
+
+
+def test_large_surfaces_are_reduced_to_vertices_of_the_face(made):
+    reduced = Read(stage_glb(FACE, FACE.shape_names))
+    counts = [
+        [one.json["accessors"][primitive["indices"]]["count"] // 3 for primitive in one.json["meshes"][0]["primitives"]]
+        for one in (reduced, made)
+    ]
+    assert sum(counts[0]) < 0.9 * sum(counts[1])
+    assert all(few == all_ for few, all_ in zip(*counts, strict=True) if all_ < stage_surfaces.LEAST_TRIANGLES)
+    for primitive in reduced.json["meshes"][0]["primitives"]:
+        places = reduced.accessor(primitive["attributes"]["POSITION"]) * 1000
+        away = np.abs(FACE.vertices[None] - places[:, None]).max(axis=2).min(axis=1)
+        assert away.max() < 1e-3  # float32 of metres, in mm
 
 
 def test_targets_move_vertices_as_the_shapes_do(made):

@@ -8,6 +8,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import httpx
@@ -36,11 +37,15 @@ class RunningService:
     ) -> None:
         command = [sys.executable, *program, "serve", "--port", "0", *arguments]
         command += ["--processes", str(processes)]
-        kept = {name: value for name, value in os.environ.items() if not name.startswith(("TTS2FACE_SERVE_", "OTEL_"))}
+        # NiceGUI takes part in tests of its own where it finds pytest's variables.
+        removed = ("TTS2FACE_SERVE_", "OTEL_", "PYTEST")
+        kept = {name: value for name, value in os.environ.items() if not name.startswith(removed)}
         self.data = tempfile.TemporaryDirectory(prefix="tts2face-service-")
         self.process = subprocess.Popen(
             command, stderr=subprocess.PIPE, text=True,
-            env=kept | {"TTS2FACE_SERVE_DATA": self.data.name} | dict(environment or {}),
+            # Most tests show no face.
+            env=kept | {"TTS2FACE_SERVE_DATA": self.data.name, "TTS2FACE_SERVE_WARM_STUDIO": "false"}
+            | dict(environment or {}),
         )  # fmt: skip
         self.lines: list[str] = []
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -84,14 +89,22 @@ class RunningService:
         return "".join(self.lines)
 
 
-@pytest.fixture(scope="session")
-def service() -> Iterator[RunningService]:
-    running = RunningService()
+@contextmanager
+def running_service(*arguments: str, is_ready: bool = True, **options: Any) -> Iterator[RunningService]:
+    """A service that ends with the block; `is_ready`: with its synthesis processes; parameters as `RunningService`."""
+    running = RunningService(*arguments, **options)
     try:
-        running.wait_until_ready()
+        if is_ready:
+            running.wait_until_ready()
         yield running
     finally:
         running.close()
+
+
+@pytest.fixture(scope="session")
+def service() -> Iterator[RunningService]:
+    with running_service() as running:
+        yield running
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import pytest
 import websockets
 
 from tests.service.attacked import alive, attacked
-from tests.service.conftest import RunningService
+from tests.service.conftest import RunningService, running_service
 from tests.service.raw import ask, connect, head
 
 __all__ = ["alive", "attacked"]  # fixtures
@@ -114,8 +114,9 @@ def resident_bytes(pid: int) -> int:
 
 
 def test_too_many_connections_get_503() -> None:
-    running = RunningService(environment={"TTS2FACE_SERVE_CONNECTIONS": "5", "TTS2FACE_SERVE_HEAD_S": "60"})
-    try:
+    with running_service(
+        environment={"TTS2FACE_SERVE_CONNECTIONS": "5", "TTS2FACE_SERVE_HEAD_S": "60"}, is_ready=False
+    ) as running:
         held = [connect(running.url) for _ in range(5)]
         answer = ask(running.url, head("GET", "/healthz"))
         assert (answer.status, answer.code, answer.headers["retry-after"]) == (503, "busy", "2")
@@ -124,8 +125,6 @@ def test_too_many_connections_get_503() -> None:
         deadline = time.monotonic() + 60
         while ask(running.url, head("GET", "/healthz")).status != 200:
             assert time.monotonic() < deadline
-    finally:
-        running.close()
 
 
 @pytest.mark.parametrize("path", PATHS)

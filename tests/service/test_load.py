@@ -12,7 +12,7 @@ import httpx
 import pytest
 import websockets
 
-from tests.service.conftest import RunningService
+from tests.service.conftest import RunningService, running_service
 from tests.service.raw import connect, request
 from tests.service.test_drain import children
 
@@ -61,12 +61,8 @@ def wait_until_idle(service: RunningService) -> None:
 
 @pytest.fixture(scope="module")
 def loaded() -> Iterator[RunningService]:
-    running = RunningService(environment={"TTS2FACE_SERVE_KEEP_ALIVE_S": "1"})
-    try:
-        running.wait_until_ready()
+    with running_service(environment={"TTS2FACE_SERVE_KEEP_ALIVE_S": "1"}) as running:
         yield running
-    finally:
-        running.close()
 
 
 async def speak_many(url: str, n_requests: int, n_at_once: int) -> Counter[int]:

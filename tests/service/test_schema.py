@@ -10,7 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.service.conftest import RunningService
+from tests.service.conftest import RunningService, running_service
 from tts2face.service.app import create_app
 from tts2face.service.settings import ServiceSettings
 
@@ -33,14 +33,10 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
     """A service with small limits and a folder of its own."""
     known = {one.name for one in fields(ServiceSettings)}
     chosen = SMALL | {"data": str(tmp_path_factory.mktemp("data"))}
-    running = RunningService(
+    with running_service(
         environment={f"TTS2FACE_SERVE_{name.upper()}": value for name, value in chosen.items() if name in known}
-    )
-    try:
-        running.wait_until_ready()
+    ) as running:
         yield running
-    finally:
-        running.close()
 
 
 def run_schemathesis(service: RunningService, folder: Path, *options: str) -> None:

@@ -14,7 +14,7 @@ import httpx
 import pytest
 
 from lexicon.errors import BackendError, InputError
-from tests.service.conftest import RunningService
+from tests.service.conftest import RunningService, running_service
 from tts2face.service.tracing import is_tracing_requested, tracing_from_environment
 
 pytest.importorskip("opentelemetry.sdk", reason="needs `pip install 'tts2face[otel]'`")
@@ -82,12 +82,8 @@ def collector() -> Iterator[Collector]:
 
 @pytest.fixture(scope="module")
 def traced(collector: Collector) -> Iterator[RunningService]:
-    running = RunningService(environment={ENDPOINT: collector.url, "OTEL_BSP_SCHEDULE_DELAY": "100"})
-    try:
-        running.wait_until_ready()
+    with running_service(environment={ENDPOINT: collector.url, "OTEL_BSP_SCHEDULE_DELAY": "100"}) as running:
         yield running
-    finally:
-        running.close()
 
 
 def test_a_request_becomes_a_span_with_its_stages(traced: RunningService, collector: Collector) -> None:
@@ -131,11 +127,10 @@ def test_a_broken_traceparent_begins_a_new_trace(traced: RunningService, collect
 
 
 def test_an_unreachable_collector_does_not_disturb(tmp_path: object) -> None:
-    running = RunningService(environment={ENDPOINT: "http://127.0.0.1:9", "OTEL_BSP_SCHEDULE_DELAY": "50"})
-    try:
+    with running_service(
+        environment={ENDPOINT: "http://127.0.0.1:9", "OTEL_BSP_SCHEDULE_DELAY": "50"}, is_ready=False
+    ) as running:
         assert httpx.get(f"{running.url}/v1/models").status_code == 200
-    finally:
-        running.close()
     assert running.process.returncode == 0
     assert all(event["event"] for event in running.events())
 

@@ -1,4 +1,4 @@
-"""A running service with the studio, one for each process of the tests."""
+"""A running service with the studio and the harness, and a browser: one of each for each process of the tests."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -6,19 +6,23 @@ from pathlib import Path
 import httpx
 import pytest
 
+from tests.conftest import SHARED
 from tests.service.conftest import RunningService
+from tests.studio.browser import Browser, open_browser
+from tests.studio.fake_camera import write_fake_media
+from tests.studio.served import service_with_harness
 
 pytest.importorskip("nicegui", reason="needs `pip install 'tts2face[studio]'`")
 
+SPOKEN = SHARED / "recordings" / "grid_s1" / "clips" / "bbaf2n.mkv"  # "bin blue at f two now"
+
 
 @pytest.fixture(scope="session")
-def studio_service() -> Iterator[RunningService]:
-    running = RunningService()
-    try:
+def studio_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
+    with service_with_harness(tmp_path_factory.mktemp("harness")) as running:
         running.wait_until_ready()
         yield running
-    finally:
-        running.close()
+        assert not [line for line in running.lines if "Traceback" in line]
 
 
 @pytest.fixture
@@ -31,3 +35,19 @@ def studio(studio_service: RunningService) -> Iterator[httpx.Client]:
 def data(studio_service: RunningService) -> Path:
     """Data folder of the service."""
     return Path(studio_service.data.name)
+
+
+@pytest.fixture(scope="session")
+def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A window whose camera and microphone play a recording of GRID, if there is one."""
+    arguments = write_fake_media(SPOKEN, tmp_path_factory.mktemp("camera")) if SPOKEN.is_file() else []
+    with open_browser(arguments=arguments) as opened:
+        yield opened
+
+
+@pytest.fixture
+def browser(window: Browser) -> Iterator[Browser]:
+    """The window; the test's pages write no errors to its console."""
+    window.errors()
+    yield window
+    assert window.errors() == []

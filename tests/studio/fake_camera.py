@@ -4,8 +4,8 @@ import wave
 from pathlib import Path
 
 import av
-import cv2
 import numpy as np
+from PIL import Image
 
 from tts2face.video.media import read_frames, read_sound
 
@@ -42,14 +42,13 @@ def write_fake_media(clip: Path, folder: Path) -> list[str]:
         "--use-fake-ui-for-media-stream",
         f"--use-file-for-fake-video-capture={folder / 'camera.y4m'}",
         f"--use-file-for-fake-audio-capture={folder / 'microphone.wav'}",
-        "--autoplay-policy=no-user-gesture-required",
     ]
 
 
 def _scaled(pixels: np.ndarray) -> np.ndarray:
     """The picture in the middle of one of `WIDTH` and `HEIGHT`."""
     width = round(pixels.shape[1] * HEIGHT / pixels.shape[0])
-    small = cv2.resize(pixels, (min(width, WIDTH), HEIGHT), interpolation=cv2.INTER_AREA)
+    small = np.asarray(Image.fromarray(pixels).resize((min(width, WIDTH), HEIGHT), Image.Resampling.BOX))
     whole = np.full((HEIGHT, WIDTH, 3), 110, np.uint8)
     left = (WIDTH - small.shape[1]) // 2
     whole[:, left : left + small.shape[1]] = small

@@ -1,12 +1,14 @@
 """A page with stage and timeline whose face, motion and sound a real session makes, for tests in a browser.
 
-``python -m tests.studio.harness FOLDER PORT`` serves it; files that take seconds are kept in FOLDER. Edits that the
-timeline emits are listed in the page, and those that add something come back as a server would send them.
+``python -m tests.studio.harness FOLDER serve`` is ``tts2face serve`` with this page at ``/studio/harness``; files that
+take seconds are kept in FOLDER. Edits that the timeline emits are listed in the page, and those that add something come
+back as a server would send them.
 """
 
 import json
 import struct
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import Response
 from nicegui import app, ui
 
+from cli.main import main
 from tts2face.exports.stage_glb import stage_glb
 from tts2face.gesture.timeline_file import parse_timeline_object, timeline_json
 from tts2face.models.palette import FEATURES
@@ -33,6 +36,8 @@ STYLES = [
     {"name": "somber", "color": "#4a6fd0"},
     {"name": "irritated", "color": "#d0573a"},
 ]
+
+MAKING = threading.Lock()
 
 PAGE = "height: 100vh; padding: 8px; gap: 8px; display: flex; flex-direction: column; background: var(--studio-page)"
 
@@ -87,18 +92,19 @@ def make_files(folder: Path) -> None:
     (folder / "long.bin").write_bytes(bundle(clip, 1, repeats=round(600 / clip.speech.waveform.duration)))
 
 
-if __name__ in {"__main__", "__mp_main__"}:
-    files, port = Path(sys.argv[1]), int(sys.argv[2])
-    make_files(files)
+def add_page(files: Path) -> None:
+    """Add the page and its files to NiceGUI."""
 
     @app.get("/files/{name}")
     def file(name: str, request: HttpRequest) -> Response:
         """One of the files, once: a page that has it is told that nothing changed."""
         if request.query_params.get("have"):
             return Response(status_code=204)
+        with MAKING:
+            make_files(files)
         return Response((files / name).read_bytes(), media_type="application/octet-stream")
 
-    @ui.page("/")
+    @ui.page("/harness")
     def page(preview: str = "clip.bin", compare: str = "", tool: str = "brush", dark: bool = False) -> None:
         """Stage and timeline, and the edits as they come."""
         edits: list[dict[str, Any]] = []
@@ -124,16 +130,19 @@ if __name__ in {"__main__", "__mp_main__"}:
         with ui.element("div").classes("w-full").style(PAGE):
             with ui.element("div").style("flex: 0 1 480px; min-height: 200px; display: flex; gap: 8px"):
                 with ui.element("div").style("width: 640px"):
-                    stage = Stage("/files/face.glb", preview=f"/files/{preview}")
+                    stage = Stage("/studio/files/face.glb", preview=f"/studio/files/{preview}")
                 with ui.element("div").style("flex: 1; color: var(--studio-text)"):
                     ui.label("Harness of the components").props("role=heading aria-level=1").classes("text-h6")
                     picked = ui.label().classes("picked")
                     listed = ui.label("[]").classes("edits").style("overflow-wrap: anywhere; font-size: 11px")
             timeline = TimelineElement(
                 styles=STYLES, brush={"tool": tool, "style": "delighted"},
-                on_edit=lambda event: apply(event.args), compare=f"/files/{compare}" if compare else None,
+                on_edit=lambda event: apply(event.args), compare=f"/studio/files/{compare}" if compare else None,
             ).style("flex: 1 1 0; min-height: 250px")  # fmt: skip
             timeline.on("pick", lambda event: picked.set_text(json.dumps(event.args)))
             ui.on("show_view", lambda event: stage.view(event.args))
 
-    ui.run(host="127.0.0.1", port=port, show=False, reload=False, title="harness", show_welcome_message=False)
+
+if __name__ == "__main__":
+    add_page(Path(sys.argv.pop(1)))
+    main()

@@ -1,22 +1,18 @@
-"""The harness as a process of its own, and its page in a browser."""
+"""The harness in a service, and its page in a browser."""
 
 import json
-import os
-import subprocess
-import sys
-import urllib.error
-import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tests.studio.webdriver import Browser, free_port, wait_until
+from tests.service.conftest import RunningService, running_service
+from tests.studio.browser import Browser, wait_until
 
-ROOT = Path(__file__).parents[2]
-MOUTH = (slice(0.60, 0.74), slice(0.42, 0.58))  # of the picture's height and width, in the front view
+HARNESS = "/studio/harness"  # path of the page
+MOUTH = (slice(0.60, 0.74), slice(-0.107, 0.107))  # down and from the middle across, of the height in the front view
 # A fixed piece of work in the page, and its milliseconds on an idle core of 2.5 GHz.
 CALIBRATION = (
     "const t = performance.now(); let a = 0; for (let i = 0; i < 1e8; i++) a += i; return performance.now() - t"
@@ -24,39 +20,25 @@ CALIBRATION = (
 CALIBRATION_MS = 75
 
 
+def service_with_harness(folder: Path) -> AbstractContextManager[RunningService]:
+    """A service with the harness, which keeps its files in a folder."""
+    return running_service(program=("-m", "tests.studio.harness", str(folder)), is_ready=False)
+
+
 @contextmanager
 def served_harness(folder: Path) -> Iterator[str]:
-    """Address of the harness, which keeps its files in a folder."""
-    port, log = free_port(), folder / "log.txt"
-    # NiceGUI takes part in tests of its own where it finds pytest's variables.
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
-    with log.open("wb") as out:
-        command = [sys.executable, "-m", "tests.studio.harness", str(folder), str(port)]
-        process = subprocess.Popen(command, cwd=ROOT, stdout=out, stderr=out, env=environment)
-    url = f"http://127.0.0.1:{port}/"
-
-    def answers() -> bool:
-        assert process.poll() is None, log.read_text()
-        try:
-            with urllib.request.urlopen(url, timeout=5) as page:
-                return bool(page.status == 200)
-        except (urllib.error.URLError, TimeoutError):
-            return False
-
-    try:
-        wait_until(answers, 240, "the harness answers")
-        yield url
-    finally:
-        process.terminate()
-        process.wait(20)
+    """Address of the harness in a service of its own."""
+    with service_with_harness(folder) as running:
+        yield running.url + HARNESS
 
 
 class Page:
-    """A page of the harness with what its components report."""
+    """A page with stage and timeline, of the harness or of a project, with what its components report."""
 
-    def __init__(self, browser: Browser, url: str) -> None:
+    def __init__(self, browser: Browser, url: str = "") -> None:
         self.browser = browser
-        browser.open(url)
+        if url:
+            browser.open(url)
         ready = "const s = window.__studio; return Boolean(s && s.face_ms && s.frames > 0 && s.view?.duration > 1)"
         wait_until(lambda: browser.run(ready), 120, "face and sound are loaded")
         self.grid = browser.box(".studio-grid")
@@ -103,8 +85,13 @@ class Page:
         height, width, _ = picture.shape
         down, across = MOUTH
         rows = slice(int(down.start * height), int(down.stop * height))
-        return picture[rows, int(across.start * width) : int(across.stop * width)]
+        return picture[rows, int(width / 2 + across.start * height) : int(width / 2 + across.stop * height)]
 
     def slowness(self) -> float:
         """How many times slower than an idle core the page's script runs now, at least 1."""
-        return max(self.browser.run(CALIBRATION) / CALIBRATION_MS, 1.0)
+        return slowness(self.browser)
+
+
+def slowness(browser: Browser) -> float:
+    """How many times slower than an idle core the script of a page runs now, at least 1."""
+    return float(max(browser.run(CALIBRATION) / CALIBRATION_MS, 1.0))

@@ -8,7 +8,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from tests.service.conftest import RunningService
+from tests.service.conftest import RunningService, running_service
 from tts2face.service.access.browser import COOKIE, cookie_key, set_cookie
 from tts2face.service.access.keys import add_key
 from tts2face.service.access.page_headers import POLICY
@@ -26,12 +26,8 @@ def keys(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 @pytest.fixture(scope="module")
 def closed(keys: dict[str, str]) -> Iterator[RunningService]:
     """A service with keys."""
-    running = RunningService("--keys", keys["file"])
-    try:
-        running.wait_until_ready()
+    with running_service("--keys", keys["file"]) as running:
         yield running
-    finally:
-        running.close()
 
 
 @contextmanager
@@ -102,6 +98,14 @@ def test_a_key_without_speak_makes_no_project(closed: RunningService, keys: dict
         assert (answer.status_code, "lacks the scope speak" in answer.text) == (400, True)
 
 
+def test_a_key_without_build_is_told_where_recordings_need_it(closed: RunningService, keys: dict[str, str]) -> None:
+    with browser(closed, keys["ann"]) as client:
+        assert "Record your own talker" not in client.get("/").text
+        page = client.get("/record").text
+        assert "lacks the scope build" in page
+        assert "Go to the projects" in page
+
+
 def test_pages_of_other_origins_reach_nothing(studio: httpx.Client) -> None:
     evil = {"Origin": "https://evil.example"}
     assert studio.post("/api/projects", json={"text": "Hello."}, headers=evil).status_code == 403
@@ -139,12 +143,9 @@ def test_the_body_of_an_upload_is_bounded(studio: httpx.Client) -> None:
 def test_the_log_names_the_studio_and_it_can_be_left_out(studio_service: RunningService) -> None:
     listening = studio_service.wait_for_event("listening")
     assert listening["studio"] == f"{listening['url']}/studio"
-    without = RunningService("--no-studio")
-    try:
+    with running_service("--no-studio", is_ready=False) as without:
         assert without.wait_for_event("listening")["studio"] is None
         assert httpx.get(f"{without.url}/studio/").status_code == 404
-    finally:
-        without.close()
 
 
 @pytest.mark.parametrize("cookie", ["", "a=b", "tts2face_key", '"', "tts2face_key=\x01"])

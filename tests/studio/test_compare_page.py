@@ -1,26 +1,13 @@
 """The page "animate" with a comparison and an explained phone, in a real browser."""
 
-import time
-from collections.abc import Iterator
-
 import httpx
-import pytest
 
 from tests.service.conftest import RunningService
+from tests.studio.browser import Browser, wait_until
 from tests.studio.test_projects_http import create, preview
-from tests.studio.webdriver import Browser, missing_program, wait_until
-
-pytestmark = pytest.mark.skipif(bool(missing_program()), reason=f"needs {missing_program()}")
 
 LOADED = "const s = window.__studio; return Boolean(s && s.face_ms && s.frames > 0 && s.view?.duration > 1)"
 SIDE = "return document.querySelector('.studio-side')?.innerText ?? ''"
-
-
-@pytest.fixture
-def browser() -> Iterator[Browser]:
-    window = Browser((1280, 860))
-    yield window
-    window.close()
 
 
 def test_a_is_compared_shown_by_key_and_a_phone_explained(
@@ -53,5 +40,3 @@ def test_a_is_compared_shown_by_key_and_a_phone_explained(
     assert len(labels) == 7  # the made lips, and six examples
     studio.delete(f"/api/projects/{number}/comparison")
     wait_until(lambda: browser.run(SIDE) == "", 20, "the comparison ends")
-    time.sleep(0.2)
-    assert browser.errors() == []

@@ -3,42 +3,29 @@
 import numpy as np
 import pytest
 
-from tests.studio.served import Page, served_harness
-from tests.studio.webdriver import Browser, missing_program, wait_until
-
-pytest.importorskip("nicegui", reason="needs nicegui: pip install 'tts2face[studio]'")
-pytestmark = pytest.mark.skipif(bool(missing_program()), reason=f"needs {missing_program()}")
+from tests.studio.browser import wait_until
+from tests.studio.served import HARNESS, Page
 
 SILENCE_S, SPEECH_S = (0.01, 0.03), (0.55, 0.95, 2.0, 2.4, 2.6)  # of the harness's sentence
 
 
-@pytest.fixture(scope="module")
-def address(tmp_path_factory):
+@pytest.fixture
+def address(studio_service):
     """Address of the harness."""
-    with served_harness(tmp_path_factory.mktemp("files")) as url:
-        yield url
-
-
-@pytest.fixture(scope="module")
-def browser():
-    """A window."""
-    window = Browser()
-    yield window
-    window.close()
+    return studio_service.url + HARNESS
 
 
 @pytest.fixture
 def page(browser, address):
-    """A fresh page whose console stays without errors."""
-    browser.errors()
-    yield Page(browser, address)
-    assert browser.errors() == []
+    """A fresh page."""
+    return Page(browser, address)
 
 
 def phones(browser):
     """Rows of the preview's phones."""
     return browser.run("""
-        const bytes = await (await fetch('/files/clip.bin')).arrayBuffer(), n = new DataView(bytes).getUint32(0, true);
+        const bytes = await (await fetch('/studio/files/clip.bin')).arrayBuffer();
+        const n = new DataView(bytes).getUint32(0, true);
         return JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, n))).phones""")
 
 

@@ -14,7 +14,7 @@ import pygltflib
 import pytest
 from PIL import Image
 
-from tests.service.conftest import RunningService
+from tests.service.conftest import running_service
 from tts2face.project.project_file import load_project
 from tts2face.session import Session
 from tts2face.studio.bundle import read_bundle
@@ -313,26 +313,35 @@ def test_kept_words_come_into_new_projects(studio: httpx.Client, number: str) ->
     assert "pronunciations" not in studio.get(f"/api/projects/{create(studio)}/project.json").json()
 
 
-def test_a_killed_server_loses_nothing_older_than_a_second() -> None:
-    running = RunningService()
-    try:
+def test_a_killed_server_loses_nothing_older_than_a_second_and_makes_its_files_later() -> None:
+    with running_service(is_ready=False) as running:
         with httpx.Client(base_url=f"{running.url}/studio", timeout=60.0) as client:
             number = client.post("/api/projects", json={"text": TEXT}).json()["id"]
             for at in range(12):
                 assert edit(client, number, {"kind": "nod", "time": 0.2 * at, "size": 1.0}).status_code == 200
                 time.sleep(0.1)
+            picture = {"kind": "picture", "options": {"size": "64x64", "quality": "draft"}}
+            assert edit(client, number, picture).status_code == 200
             time.sleep(1.0)
+            address = f"/api/projects/{number}/renders"
+            wanted = [client.post(address, json={"format": "mp4"}).json()["id"] for _ in range(3)]
+            assert client.delete(f"{address}/{wanted.pop()}").status_code == 204
+            done = {one["id"] for one in client.get(address).json() if one["state"] == "done"}
         running.process.kill()
         running.process.wait(timeout=30)
         kept = load_project(project_file(Path(running.data.name), number))
-        again = RunningService(environment={"TTS2FACE_SERVE_DATA": running.data.name})
-        try:
-            with httpx.Client(base_url=f"{again.url}/studio", timeout=60.0) as client:
-                back = client.get(f"/api/projects/{number}/project.json").json()
-                undone = client.post(f"/api/projects/{number}/undo").json()
-        finally:
-            again.close()
-    finally:
-        running.close()
+        again = running_service(environment={"TTS2FACE_SERVE_DATA": running.data.name}, is_ready=False)
+        with again as restarted, httpx.Client(base_url=f"{restarted.url}/studio", timeout=60.0) as client:
+            back = client.get(f"/api/projects/{number}/project.json").json()
+            undone = client.post(f"/api/projects/{number}/undo").json()
+            deadline = time.monotonic() + 120
+            while {one["state"] for one in client.get(address).json()} != {"done"}:
+                assert time.monotonic() < deadline
+                time.sleep(0.1)
+            made = {one["id"] for one in client.get(address).json()}
+        folder = project_file(Path(running.data.name), number).parent / "renders"
+        assert {path.suffix for path in folder.iterdir()} == {".mp4"}
     assert len(kept.timeline.nods) == len(back["timeline"]["nods"]) == 12
-    assert (undone["n_undo"], undone["n_redo"]) == (11, 1)
+    assert (undone["n_undo"], undone["n_redo"]) == (12, 1)
+    assert made == set(wanted)
+    assert len(done) < len(wanted)  # otherwise the second server had nothing to make

@@ -54,9 +54,10 @@ def test_a_reference_is_read_as_it_was_written(tmp_path: Path) -> None:
     ({"kind": "kept"}, "keep it again"),
     ({"kind": "recording"}, "choose one from the list"),
     ({"kind": "recording", "recording": "a", "offset": 1e9}, "an offset 3600"),
-    ({"kind": "settings", "request": "x"}, "must be an object"),
-    ({"kind": "take", "offset": "soon"}, "cannot be read"),
-    ({"kind": "take", "path": "x"}, "is an object with kind"),
+    ({"kind": "settings", "request": "x"}, "an object in curly brackets"),
+    ({"kind": "take", "offset": "soon"}, "offset must be a number"),
+    ({"kind": "take", "offset": float("nan")}, "offset must be a number, not NaN"),
+    ({"kind": "take", "path": "x"}, "there is no 'path' here"),
 ])  # fmt: skip
 def test_what_is_no_reference_is_refused(content: dict[str, object], reason: str, tmp_path: Path) -> None:
     with pytest.raises((InputError, DataError), match=reason):

@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 
 from tts2face.exports.gltf import INDICES, VERTICES, GltfBuffer
 from tts2face.exports.skeleton import HEAD, Skeleton, build_skeleton
-from tts2face.exports.surfaces import MM_PER_M, ExportSurface, divide_surface, linear_colours
+from tts2face.exports.stage_surfaces import stage_surfaces
+from tts2face.exports.surfaces import MM_PER_M, ExportSurface, linear_colours
 from tts2face.models.face import Face, Texture
 from tts2face.render import studio_light
 from tts2face.render.camera import FIELD_OF_VIEW_RAD, framing_box
 from tts2face.render.camera_views import NAMED_VIEWS
 from tts2face.render.fragment_rows import DARK_GLOSS, GLOSS, OPEN_SURFACE, ROUGHNESS, SECOND_LOBE, WRAP
-from tts2face.render.light_field import N_HARMONICS, light_fields
-from tts2face.render.materials import SKIN, STRANDS
+from tts2face.render.light_field import light_fields
+from tts2face.render.materials import STRANDS
 from tts2face.render.scene import STUDIO_BRIGHT, STUDIO_CENTRE, STUDIO_DARK, available_cores
 from tts2face.render.soft_shadows import lip_opening
 from tts2face.render.strand_cards import SKULL_CENTRE_MM
@@ -33,7 +34,8 @@ from tts2face.types import HEAD_CHANNELS
 MAX_TEXTURE_PX = 1024  # along a side: more than a preview of 1000 pixels shows
 WEBP_QUALITY = 88
 LEAST_MOVE_MM = 0.01  # displacements below this are 0: a fortieth of a pixel
-HIDDEN_SKY = 0.045  # share of the sky that a vertex hidden from all sides has in a light field
+HALF = 127  # of the coverage of a texel
+LEAST_APART = 0.1  # of typical colours
 FULL = 32767  # of a quantised displacement
 FIELD_SCALE = 2.0  # light fields lie within 2
 TEXTURE_EXTENSION, QUANTISED = "EXT_texture_webp", "KHR_mesh_quantization"
@@ -59,8 +61,8 @@ def stage_glb(face: Face, channels: tuple[str, ...]) -> bytes:
     moves, scales = quantised_moves(face.shapes[: len(channels)])
     fields = light_fields(face, surface, available_cores())
     rows = _rows(face, surface, skeleton, fields)
-    shown = ~_hidden(fields, moves)
-    surfaces = [_along_curve(face, one) for one in (_without(one, shown) for one in divide_surface(face))]
+    moved = np.where(moves.any(axis=2, keepdims=True), face.shapes[: len(channels)], np.float32(0))
+    surfaces = stage_surfaces(face, fields, moved)
     primitives = [_primitive(face, number, one, (rows, moves), buffer) for number, one in enumerate(surfaces)]
     content = {
         "asset": {"version": "2.0", "generator": "tts2face", "extras": _stage(face, surface, skeleton, channels)},
@@ -90,39 +92,6 @@ def _rows(face: Face, surface: Surface, skeleton: Skeleton, fields: NDArray[np.f
     strands = np.zeros((len(face.vertices), 4), np.int8)
     strands[surface.strands.vertices, :3] = np.rint(surface.strands.tangents * 127)
     return _Rows(quantised, strands, skin, np.rint(linear_colours(face) * 0xFFFF).astype(np.uint16))
-
-
-def _hidden(fields: NDArray[np.float32], moves: NDArray[np.int16]) -> NDArray[np.bool_]:
-    """Whether no light reaches each vertex (V,) with closed and open mouth, and no channel moves it: under hair."""
-    sky = np.maximum(fields[:, 0], fields[:, 0] + fields[:, N_HARMONICS + 1])
-    return np.asarray((sky < HIDDEN_SKY) & ~moves.any(axis=(0, 2)))
-
-
-def _without(surface: ExportSurface, shown: NDArray[np.bool_]) -> ExportSurface:
-    """The surface without triangles of skin that cannot be seen."""
-    if surface.part.kind != SKIN:
-        return surface
-    seen = shown[surface.vertices[surface.triangles]].any(axis=1)
-    return ExportSurface(surface.part, surface.vertices, surface.triangles[seen])
-
-
-def _along_curve(face: Face, surface: ExportSurface) -> ExportSurface:
-    """The surface with triangles along a curve that fills space, and vertices in the order of their first use.
-
-    Neighbours follow each other, so that few vertices are shaded twice. Source: Morton 1966.
-    """
-    corners = surface.vertices[surface.triangles]
-    middle = face.vertices[corners].mean(axis=1)
-    low, high = middle.min(axis=0), middle.max(axis=0)
-    cells = ((middle - low) / np.maximum(high - low, 1e-6) * 1023).astype(np.int64)
-    code = np.zeros(len(cells), np.int64)
-    for bit in range(10):
-        for axis in range(3):
-            code |= ((cells[:, axis] >> bit) & 1) << (3 * bit + axis)
-    used = corners[np.argsort(code, kind="stable")].ravel()
-    vertices, first, places = np.unique(used, return_index=True, return_inverse=True)
-    rank = np.argsort(np.argsort(first))
-    return ExportSurface(surface.part, vertices[np.argsort(first)], rank[places.ravel()].reshape(-1, 3))
 
 
 def _primitive(
@@ -174,13 +143,33 @@ def _material(surface: ExportSurface, built: Surface, face: Face) -> dict[str, A
     part = surface.part
     row = built.materials[face.parts.index(part)]
     shading: dict[str, Any] = {"baseColorFactor": [1, 1, 1, part.opacity], "metallicFactor": 0}
+    more: dict[str, Any] = {}
     if part.is_textured:
         shading["baseColorTexture"] = {"index": part.texture}
+        more["texels"] = _typical_texels(face.textures[part.texture])
     columns = {"gloss": GLOSS, "rough": ROUGHNESS, "second": SECOND_LOBE, "dark": DARK_GLOSS, "wrap": WRAP}
     extras: dict[str, Any] = {name: round(float(row[at]), 5) for name, at in columns.items()}
-    extras |= {"kind": part.kind, "open": bool(row[OPEN_SURFACE]), "opacity": part.opacity, "cutout": part.cutout}
+    extras |= {
+        "kind": part.kind,
+        "open": bool(row[OPEN_SURFACE]),
+        "opacity": part.opacity,
+        "cutout": part.cutout,
+        **more,
+    }
     material = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": shading, "extras": extras}
     return material | ({"alphaMode": "MASK"} if part.cutout else {})
+
+
+def _typical_texels(texture: Texture) -> list[list[float]]:
+    """Mean colour of the darker and of the brighter half of a texture, 0 to 1, apart in each channel."""
+    shown = texture.pixels[texture.alpha > HALF] if texture.alpha is not None else texture.pixels.reshape(-1, 3)
+    colours = shown.astype(np.float32) / 255
+    sums = colours.sum(axis=1)
+    middle = np.median(sums) if len(sums) else 0.0
+    dark, bright = (
+        colours[half].mean(axis=0) if half.any() else np.zeros(3) for half in (sums <= middle, sums > middle)
+    )
+    return [dark.round(4).tolist(), np.maximum(bright, dark + LEAST_APART).round(4).tolist()]
 
 
 def _textures(face: Face, buffer: GltfBuffer) -> dict[str, Any]:

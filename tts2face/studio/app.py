@@ -59,7 +59,10 @@ def _recording_owner(request: HttpRequest) -> str:
     """
     key = request.state.key
     if "build" not in key.scopes:
-        raise InputError(f"the key {key.name} lacks the scope build, which recordings need; use another key")
+        raise InputError(
+            f"the key {key.name} lacks the scope build, which recordings need; ask the operator for a key with it "
+            "(`tts2face keys add NAME --scope speak --scope build`)"
+        )
     return str(key.name)
 
 
@@ -71,6 +74,7 @@ def _run_with(app: FastAPI, studio: Studio, recordings: Recordings) -> None:
     async def lifespan(whole: FastAPI) -> AsyncIterator[Any]:
         async with before(whole) as state:
             recordings.checks.start()
+            await studio.start()
             await asyncio.to_thread(studio.takes.store.end_readings)
             try:
                 yield state

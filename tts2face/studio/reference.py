@@ -5,7 +5,8 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from lexicon.errors import DataError, InputError
+from lexicon.errors import InputError
+from lexicon.json_values import check_mapping, check_object, check_type
 from tts2face.project.project import Project
 from tts2face.project.project_file import parse_project, project_json
 from tts2face.request import Request
@@ -105,31 +106,25 @@ def parse_reference(content: Any, folder: Path) -> Reference:
     InputError, DataError
         It is none, or damaged.
     """
-    names = {one.name for one in fields(Reference)}
-    if not isinstance(content, Mapping) or not isinstance(content.get("kind"), str) or set(content) - names:
-        raise DataError(f"a comparison is an object with kind and some of {', '.join(sorted(names - {'kind'}))}")
-    kept = content.get("project")
-    try:
-        return Reference(
-            str(content["kind"]),
-            str(content.get("label", "")),
-            None if kept is None else parse_project(kept, "the kept project", folder),
-            _options(content, "request"),
-            _options(content, "models"),
-            str(content.get("recording", "")),
-            float(content.get("offset", 0.0)),
-        )
-    except (TypeError, ValueError) as wrong:
-        if isinstance(wrong, DataError | InputError):
-            raise
-        raise DataError(f"the comparison cannot be read: {wrong}") from wrong
-
-
-def _options(content: Mapping[str, Any], part: str) -> Mapping[str, Any]:
-    options = content.get(part) or {}
-    if not isinstance(options, Mapping):
-        raise DataError(f"{part} of a comparison must be an object of options, not {str(options)[:40]!r}")
-    return options
+    optional: dict[str, Any] = {
+        "label": "",
+        "project": None,
+        "request": {},
+        "models": {},
+        "recording": "",
+        "offset": 0.0,
+    }
+    parts = check_object(content, {"kind": str}, optional)
+    kept = parts["project"]
+    return Reference(
+        parts["kind"],
+        check_type("label", parts["label"], str),
+        None if kept is None else parse_project(kept, "the kept project", folder),
+        check_mapping(parts["request"]),
+        check_mapping(parts["models"]),
+        check_type("recording", parts["recording"], str),
+        check_type("offset", parts["offset"], float),
+    )
 
 
 def _check_settings(request: Mapping[str, Any], models: Mapping[str, Any]) -> None:

@@ -1,29 +1,40 @@
-"""Films and exports of projects: queued, made one after another behind previews, kept until they are deleted."""
+"""Films and exports of projects: queued, made one after another behind previews, kept until they are deleted.
+
+What waits or runs lies beside the files as ``ID.json``, with the project as it was; the next server queues it again.
+"""
 
 import asyncio
+import json
 import re
 import secrets
 from collections.abc import Callable
 from contextlib import aclosing
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from lexicon.errors import InputError, Tts2faceError
+from lexicon.errors import DataError, InputError, Tts2faceError
+from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
 from tts2face.exports.formats import FORMATS, find_format
+from tts2face.project.project_file import parse_project, project_json
 from tts2face.render.movie_stream import MOVIE_KINDS
 from tts2face.render.sound_stream import SOUND_KINDS
-from tts2face.service.access.keys import ApiKey
+from tts2face.service.access.keys import LOCAL_KEY, ApiKey
 from tts2face.service.errors import RefusedError
+from tts2face.service.logs import log_event
 from tts2face.service.state import ServiceState
 from tts2face.service.synthesis.messages import MessageKind
 from tts2face.service.synthesis.work import Work
-from tts2face.storage.files import translate_disk_errors
+from tts2face.storage.files import translate_disk_errors, write_atomically
+from tts2face.studio.requests import project_work
 from tts2face.studio.store import RENDERS
 from tts2face.studio.workspace import Workspace
 
 WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"
 PRIORITY = 1  # below that of previews and of all requests over HTTP
 MAX_OPEN = 20  # of an owner, waiting or running
+MAX_TRIES = 3  # of a file by servers that ended meanwhile
+ORDER = re.compile(r"([0-9a-f]{12})\.json")
 FILE = re.compile(r"([0-9a-f]{12})-(.+)")
 
 
@@ -49,6 +60,11 @@ class Render:
     total: float = 0.0
     message: str = ""
     task: "asyncio.Task[None] | None" = field(default=None, repr=False)
+
+    @property
+    def order(self) -> Path:
+        """File with what is to be made, while it is not done."""
+        return self.path.with_name(f"{self.id}.json")
 
     @property
     def share(self) -> float:
@@ -84,12 +100,46 @@ class RenderQueue:
         number = secrets.token_hex(6)
         name, kind, more = _plan(workspace.project.name, form)
         path = workspace.folder / RENDERS / f"{number}-{name}"
+        total = workspace.preview.current.duration
+        content = project_json(workspace.project, workspace.folder)
+        order = {"owner": owner, "format": form, "total": total, "tries": 1, "project": content}
         work = await workspace.work(kind, **more)
-        made = Render(number, workspace.id, owner, name, path, total=workspace.preview.current.duration)
-        self._renders[number] = made
-        made.task = asyncio.get_running_loop().create_task(self._make(made, work, workspace.key))
-        self._notify()
+        made = Render(number, workspace.id, owner, name, path, total=total)
+        await asyncio.to_thread(_write_order, made.order, order)
+        self._begin(made, work, workspace.key)
         return made
+
+    async def resume(self, projects: Path) -> None:
+        """Queue again what an earlier server did not finish.
+
+        Parameters
+        ----------
+        projects
+            Folder of the folders of projects.
+        """
+        for path, order in await asyncio.to_thread(_read_orders, projects):
+            try:
+                await self._resume(path, order)
+            except (Tts2faceError, RefusedError, KeyError, TypeError) as wrong:
+                log_event("file not queued again", file=path.name, reason=str(wrong))
+                path.unlink(missing_ok=True)
+
+    async def _resume(self, path: Path, order: dict[str, Any]) -> None:
+        folder, owner = path.parent.parent, order["owner"]
+        key = next((one for one in self._state.keys or (LOCAL_KEY,) if one.name == owner), None)
+        if key is None or order["tries"] >= MAX_TRIES:
+            raise InputError("its key is gone" if key is None else f"{MAX_TRIES} servers ended while it was made")
+        project = parse_project(order["project"], path.name, folder)
+        name, kind, more = _plan(project.name, order["format"])
+        work = await project_work(self._state, key, project, folder, kind, **more)
+        await asyncio.to_thread(_write_order, path, order | {"tries": order["tries"] + 1})
+        file = path.with_name(f"{path.stem}-{name}")
+        self._begin(Render(path.stem, folder.name, owner, name, file, total=order["total"]), work, key)
+
+    def _begin(self, render: Render, work: Work, key: ApiKey) -> None:
+        self._renders[render.id] = render
+        render.task = asyncio.get_running_loop().create_task(self._make(render, work, key))
+        self._notify()
 
     def of_project(self, project: str, owner: str, folder: Path) -> list[Render]:
         """Renders of a project, those made before this server began too."""
@@ -122,6 +172,7 @@ class RenderQueue:
         else:
             self._renders.pop(render.id, None)
         render.path.unlink(missing_ok=True)
+        render.order.unlink(missing_ok=True)
         self._notify()
 
     def forget(self, project: str) -> None:
@@ -132,7 +183,7 @@ class RenderQueue:
             del self._renders[one.id]
 
     async def close(self) -> None:
-        """Cancel all."""
+        """End all; a later server makes what is not done."""
         tasks = [one.task for one in self._renders.values() if one.task is not None and not one.task.done()]
         for task in tasks:
             task.cancel()
@@ -146,8 +197,10 @@ class RenderQueue:
                 await self._write(render, part, work, key)
                 part.replace(render.path)
                 render.state = DONE
+                render.order.unlink(missing_ok=True)
         except (RefusedError, Tts2faceError) as wrong:
             render.state, render.message = FAILED, wrong.message if isinstance(wrong, RefusedError) else str(wrong)
+            render.order.unlink(missing_ok=True)
         except asyncio.CancelledError:
             render.state = CANCELLED
             raise
@@ -170,6 +223,28 @@ class RenderQueue:
     def _notify(self) -> None:
         for listener in list(self.listeners):
             listener()
+
+
+def _write_order(path: Path, order: dict[str, Any]) -> None:
+    with translate_disk_errors(path):
+        path.parent.mkdir(exist_ok=True)
+    write_atomically(path, json.dumps(order, ensure_ascii=False).encode())
+
+
+def _read_orders(projects: Path) -> list[tuple[Path, dict[str, Any]]]:
+    """Orders of all projects, the oldest first; what an ended server left of their files is removed."""
+    found = []
+    for path in projects.glob(f"*/{RENDERS}/*.json"):
+        if ORDER.fullmatch(path.name):
+            for part in path.parent.glob(f"{path.stem}-*.part"):
+                part.unlink(missing_ok=True)
+            try:
+                found.append(
+                    (path.stat().st_mtime, path, dict(parse_json(read_text(path, LARGEST_JSON_BYTES), path.name)))
+                )
+            except (OSError, DataError, TypeError, ValueError):
+                path.unlink(missing_ok=True)
+    return [(path, order) for _, path, order in sorted(found, key=lambda one: one[0])]
 
 
 def formats() -> dict[str, str]:

@@ -1,6 +1,7 @@
 """What a page fetches, and what a program may ask of the studio (docs/studio.md). Errors as those of the service."""
 
 import asyncio
+import gzip
 import tempfile
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -149,14 +150,18 @@ async def preview(
 
 
 @router.get("/projects/{project}/face.glb")
-async def face(request: HttpRequest, project: str) -> FileResponse:
+async def face(request: HttpRequest, project: str) -> Response:
     """The face as binary glTF."""
     async with opened(request, project) as workspace:
         path = await _studio(request).face(workspace)
+    content = await asyncio.to_thread(path.read_bytes)
     # The address has the models in its query: what it names never changes.
-    return FileResponse(
-        path, media_type="model/gltf-binary", headers={"Cache-Control": "private, max-age=31536000, immutable"}
-    )
+    headers = {"Cache-Control": "private, max-age=31536000, immutable", "Vary": "Accept-Encoding"}
+    if "gzip" in request.headers.get("accept-encoding", ""):
+        headers["Content-Encoding"] = "gzip"
+    else:
+        content = gzip.decompress(content)
+    return Response(content, media_type="model/gltf-binary", headers=headers)
 
 
 @router.get("/projects/{project}/picture.png")

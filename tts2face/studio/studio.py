@@ -1,6 +1,7 @@
 """The studio of a service: its projects, those that are open, and what is made of them."""
 
 import asyncio
+import gzip
 import hashlib
 import json
 from contextlib import suppress
@@ -98,6 +99,12 @@ class Studio:
         self.renders.forget(number)
         await asyncio.to_thread(self.store.remove, number, key.name)
 
+    async def start(self) -> None:
+        """Begin what an earlier server did not finish, and the face of new projects, as the settings say."""
+        await self.renders.resume(self._folder / "projects")
+        if self.state.settings.warm_studio:
+            self.prepare()
+
     def prepare(self) -> None:
         """Begin to make the face of new projects, so that the first one shows it at once; only the first call does."""
         if self._preparing is None:
@@ -110,7 +117,7 @@ class Studio:
             await self._face_file(project, work, LOCAL_KEY)
 
     async def face(self, workspace: Workspace) -> Path:
-        """File of the face of a project for a page; made at its first use, and kept.
+        """File of the face of a project for a page, compressed by gzip; made at its first use, and kept.
 
         Raises
         ------
@@ -131,13 +138,13 @@ class Studio:
     async def _face_file(self, project: Project, work: Work, key: ApiKey) -> Path:
         looks = [asdict(project.models), dict(work.models), project.request.has_gestures, __version__]
         name = hashlib.sha256(json.dumps(looks, default=str, sort_keys=True).encode()).hexdigest()[:24]
-        path = self._folder / "faces" / f"{name}.glb"
+        path = self._folder / "faces" / f"{name}.glb.gz"
         async with self._making.setdefault(name, asyncio.Lock()):
             if not path.is_file():
                 with translate_disk_errors(path):
                     path.parent.mkdir(parents=True, exist_ok=True)
                 content = await data_of(self.state, key, work)
-                await asyncio.to_thread(write_atomically, path, content)
+                await asyncio.to_thread(lambda: write_atomically(path, gzip.compress(content, mtime=0)))
                 await asyncio.to_thread(_keep_last, path.parent, MAX_FACES)
         return path
 
@@ -173,6 +180,6 @@ class Studio:
 
 
 def _keep_last(folder: Path, count: int) -> None:
-    files = sorted(folder.glob("*.glb"), key=lambda path: path.stat().st_mtime)
+    files = sorted(folder.glob("*.glb*"), key=lambda path: path.stat().st_mtime)
     for path in files[: max(0, len(files) - count)]:
         path.unlink(missing_ok=True)

@@ -27,7 +27,7 @@ LEASE_S = 45.0  # after the last sign of life of a tab, for which it stays the o
 SHOWN_ONLY = frozenset({"name"})  # kinds of edits that change neither motion nor sound
 PICTURE_ONLY = frozenset({"picture"})  # kinds that change final pictures only
 
-# gets "project", "preview", "comparison", "saved", "failed" (to save), "lease", "styles" (own ones) or "removed"
+# gets "project", "preview", "comparison", "saved", "failed" (to save), "lease", "styles" (own palette) or "removed"
 Listener = Callable[[str], None]
 
 

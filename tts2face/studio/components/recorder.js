@@ -3,6 +3,7 @@ const COUNT = 3; // numbers before a take
 const COUNT_MS = 600; // between them
 const TAIL_MS = 300; // recorded after the stop, so that the last sound is whole
 const KINDS = ["video/webm;codecs=vp8,opus", "video/webm", "video/mp4"];
+const HINT = "Press Space, read the sentence after the countdown, and press Space again. What to do better is written here.";
 const STATES = {
   sending: "sending",
   failed: "not sent",
@@ -80,7 +81,7 @@ export default {
       return this.prompts.length === 1;
     },
     advice() {
-      if (this.told === null || !this.stateOf(this.told)) return "";
+      if (this.told === null || !this.stateOf(this.told)) return HINT;
       const take = this.takes[this.told] || {};
       const state = this.stateOf(this.told);
       const which = this.isSingle ? "The take" : `Prompt ${this.told + 1}`;

@@ -2,16 +2,18 @@
 
 import { clock } from "tts2face-studio/clock.js";
 import { metrics, Meter } from "tts2face-studio/metrics.js";
+import { pace } from "tts2face-studio/pace.js";
 import { comparison, loadPreview, preview, sides } from "tts2face-studio/preview.js";
 import { StageScene } from "tts2face-studio/stage_scene.js";
 import { addStyle } from "tts2face-studio/style.js";
 
 const VIEWS = { front: "Front", "three-quarter": "Three-quarter", profile: "Profile", close: "Close-up" };
 
-const SLOW_MS = 31, FAST_MS = 19; // between frames: fewer pixels above, more below
+const SLOW_MS = 21, FAST_MS = 18; // between frames of the browser: fewer pixels above, more below
 const ADAPT_MS = 400; // between two changes of the number of pixels
+const MAKING_MS = 1500; // after which a face that does not come is being made
 const REST_MS = 250; // at rest before the sharp picture
-const LEAST_SHARE = 0.5; // of the device's pixels along a side
+const LEAST_SHARE = 0.65; // of the device's pixels along a side: fewer show as squares
 
 export default {
   template: `
@@ -24,7 +26,7 @@ export default {
         <button v-for="(text, name) in views" :key="name" type="button" :aria-pressed="String(current === name)"
           @click="view(name)">{{ text }}</button>
         <button v-if="picture" type="button" @click="showPicture(null)">Live preview</button>
-        <button type="button" aria-label="Full screen" title="Full screen" @click="fullscreen()"><svg
+        <button type="button" id="studio-fullscreen" aria-label="Full screen" title="Full screen" @click="fullscreen()"><svg
           viewBox="0 0 16 16" aria-hidden="true"><path d="M1 1h5v2H3v3H1zM10 1h5v5h-2V3h-3zM1 10h2v3h3v2H1zM13 10h2v5h-5v-2h3z"/></svg></button>
       </div>
     </section>`,
@@ -52,6 +54,8 @@ export default {
       this.fail("This browser has no WebGL; switch it on, or use “Final picture”.", refused);
       return;
     }
+    pace.isSoftware = this.scene.isSoftware;
+    if (pace.isSoftware) this.share = LEAST_SHARE;
     this.stops = [preview.on("change", this.changed), clock.on("seek", this.changed)];
     this.stops.push(comparison.on("change", () => this.showSide()), sides.on(() => this.showSide()));
     this.watchContext();
@@ -89,6 +93,7 @@ export default {
       const wanted = this.face;
       this.message = "Loading the face …";
       const begin = performance.now();
+      const making = setTimeout(() => (this.message = "This face is shown for the first time: it takes some seconds …"), MAKING_MS);
       try {
         await this.scene.setFace(wanted);
         if (wanted !== this.face) return;
@@ -98,6 +103,8 @@ export default {
         this.resize();
       } catch (wrong) {
         this.fail(wrong.message, wrong);
+      } finally {
+        clearTimeout(making);
       }
     },
 
@@ -155,12 +162,12 @@ export default {
       });
     },
 
-    tick() {
+    tick(now) {
       this.animation = requestAnimationFrame(this.tick);
       if (clock.playing) this.dirty = true;
       else this.meter.restart();
       this.adapt();
-      if (!this.dirty || this.lost) return;
+      if (!this.dirty || this.lost || (clock.playing && !pace.draws(now))) return;
       const begin = performance.now(), { scene } = this;
       this.dirty = false;
       metrics.time = clock.time;

@@ -49,10 +49,6 @@ class Stage(Element, component="stage.js", esm={MODULES: str(COMPONENTS)}):
         """Choose a camera of `tts2face.render.camera_views.NAMED_VIEWS`."""
         self.run_method("view", name)
 
-    def fullscreen(self) -> None:
-        """Fill the screen with the stage, or end it."""
-        self.run_method("fullscreen")
-
     def show_picture(self, url: str | None) -> None:
         """Lay a rendered picture over the head; None removes it."""
         self.run_method("showPicture", url)

@@ -34,12 +34,13 @@ export function partMaterial(part, shared, samples) {
   if (part.texture) defines.TEXTURED = 1;
   if (!samples) defines.COARSE = 1;
   if (extras.cutout) defines.CUTOUT = 1;
-  if (extras.kind === "strands") Object.assign(defines, { STRANDS: 1, HAIR_LAMPS: samples ? 3 : 1 });
+  if (extras.kind === "strands") defines.STRANDS = 1;
   if (extras.kind === "eye") defines.EYE = 1;
   const layered = extras.cutout && part.material.name.startsWith("hair"); // cards over cards hide each other
   if (layered) defines.SOLID = 1;
   const numbers = { second: extras.second, dark: extras.dark, openSheet: Number(extras.open), opacity: extras.opacity, shine: Math.min(extras.gloss / 0.25, 1.5) };
-  const uniforms = { ...shared, map: { value: part.texture } };
+  const [darkTexel, brightTexel] = (extras.texels ?? [[0, 0, 0], [1, 1, 1]]).map((rgb) => ({ value: new THREE.Vector3(...rgb) }));
+  const uniforms = { ...shared, map: { value: part.texture }, darkTexel, brightTexel };
   for (const [name, value] of Object.entries(numbers)) uniforms[name] = { value };
   return new THREE.ShaderMaterial({
     defines,
@@ -64,15 +65,19 @@ export function wallMaterial([bright, dark, centre]) {
       centre: { value: new THREE.Vector2(centre[0], 1 - centre[1]) },
       aspect: { value: 1 },
     },
-    vertexShader: "varying vec2 vAt; void main() { vAt = uv; gl_Position = vec4(position.xy, .9999, 1.); }",
-    fragmentShader: `
-      uniform vec3 bright, dark; uniform vec2 centre; uniform float aspect; varying vec2 vAt;
+    vertexShader: `
+      uniform vec3 bright, dark; uniform vec2 centre; uniform float aspect; varying vec3 vShade;
       void main() {
-        vec2 away = (vAt - centre) * vec2(clamp(aspect, 1., 1.6), 1.);
-        float dither = fract(52.98 * fract(dot(gl_FragCoord.xy, vec2(.0671, .00584))));
-        gl_FragColor = vec4(mix(dark, bright, exp(-2.6 * dot(away, away))) + (dither - .5) / 255., 1.);
+        vec2 away = (uv - centre) * vec2(clamp(aspect, 1., 1.6), 1.);
+        vShade = mix(dark, bright, exp(-2.6 * dot(away, away))) - .5 / 255.;
+        gl_Position = vec4(position.xy, .9999, 1.);
       }`,
-    depthTest: false,
+    fragmentShader: `
+      varying vec3 vShade;
+      void main() {
+        float dither = fract(52.98 * fract(dot(gl_FragCoord.xy, vec2(.0671, .00584))));
+        gl_FragColor = vec4(vShade + dither / 255., 1.);
+      }`,
     depthWrite: false,
   });
 }

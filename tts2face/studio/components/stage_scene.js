@@ -6,6 +6,7 @@ import { partMaterial, sharedUniforms, wallMaterial } from "./stage_materials.js
 
 const RADIAN = Math.PI / 180;
 const MM = 0.001;
+const WALL_STEPS = [24, 18]; // of the gradient over the canvas
 const LIGHT_STEP = 0.05; // radians of the camera's yaw between two directions of the lamps
 
 export class StageScene {
@@ -29,9 +30,9 @@ export class StageScene {
     this.face = face;
     this.litYaw = NaN;
     this.shared = sharedUniforms(face.stage);
-    this.wall = new THREE.Mesh(new THREE.PlaneGeometry(2, 2), wallMaterial(face.stage.wall));
+    this.wall = new THREE.Mesh(new THREE.PlaneGeometry(2, 2, ...WALL_STEPS), wallMaterial(face.stage.wall));
     this.wall.frustumCulled = false;
-    this.wall.renderOrder = -1;
+    this.wall.renderOrder = 1.5; // where neither skin nor clothes hide it
     this.scene.add(this.wall);
     for (const part of face.parts) {
       const mesh = new THREE.Mesh(part.geometry, partMaterial(part, this.shared, !this.isSoftware));

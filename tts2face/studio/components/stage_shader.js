@@ -3,7 +3,30 @@
 
 export const LAMPS = 4;
 
+const TONE = `
+  uniform float brightness;
+  float curve(float light) {
+    float x = light * brightness;
+    return min((x * (2.51 * x + .03)) / (x * (2.43 * x + .59) + .14), 1.);
+  }
+  vec3 display(vec3 light) {
+    float strongest = max(max(light.r, light.g), max(light.b, 1e-6)), shown = curve(strongest);
+    float kept = .75 * (1. - shown);
+    vec3 mixed = kept * shown / strongest * light + (1. - kept) * vec3(curve(light.r), curve(light.g), curve(light.b));
+    mixed = clamp(mixed, 0., 1.);
+    vec3 a = sqrt(mixed), b = sqrt(a), c = sqrt(b); // sRGB within 0.002 without a power
+    return clamp(.662002687 * a + .68412206 * b - .323583601 * c - .022541147 * mixed, 0., 1.);
+  }`;
+
+// Without highlights of its own, a fragment takes its colour from two colours that its vertices have at two texels.
+const COARSE_COLOUR = `
+  #if defined(COARSE) && !defined(EYE)
+  #define FLAT 1
+  varying vec3 vBase, vSlope;
+  #endif`;
+
 export const VERTEX = `
+  ${COARSE_COLOUR}
   uniform mat4 joints[4];
   uniform vec3 lamps[${LAMPS}], lampColours[${LAMPS}], sky, floorLight, skull;
   uniform float opening, openSheet, second;
@@ -21,6 +44,23 @@ export const VERTEX = `
   varying vec3 vNormal, vPlace, vLight, vShine, vColour;
   varying vec4 vExposure;
   varying vec2 vUv, vSurface;
+  #ifdef FLAT
+  uniform float dark, shine;
+  uniform vec3 darkTexel, brightTexel;
+  ${TONE}
+  vec3 linear(vec3 texel) {
+    return texel * (texel * (texel * .305306 + .682171) + .012523);
+  }
+  vec3 shade(vec3 albedo, vec3 wide, vec3 narrow) {
+    #ifdef STRANDS
+    return display(albedo * (vLight + wide) + narrow);
+    #else
+    float hidden = 1. - vExposure.x, tone = .5 * (albedo.r + albedo.g);
+    float spec = 1. - dark * (1. - clamp((tone - .03) / .27, 0., 1.));
+    return display(vLight * albedo / (1. - hidden * hidden * albedo * .8) + vShine * spec);
+    #endif
+  }
+  #endif
 
   /** Highlight of a lamp: one lobe, for lamps whose highlights change slowly over the surface. */
   float highlight(vec3 n, vec3 lamp, vec3 towards) {
@@ -90,21 +130,24 @@ export const VERTEX = `
     vShine += lit * visible[0] * highlight(m, lamps[0], towards) * (1. + .5 * second) * lampColours[0];
     #endif
     #endif
-  }`;
-
-const TONE = `
-  uniform float brightness;
-  float curve(float light) {
-    float x = light * brightness;
-    return min((x * (2.51 * x + .03)) / (x * (2.43 * x + .59) + .14), 1.);
-  }
-  vec3 display(vec3 light) {
-    float strongest = max(max(light.r, light.g), max(light.b, 1e-6)), shown = curve(strongest);
-    float kept = .75 * (1. - shown);
-    vec3 mixed = kept * shown / strongest * light + (1. - kept) * vec3(curve(light.r), curve(light.g), curve(light.b));
-    mixed = clamp(mixed, 0., 1.);
-    vec3 a = sqrt(mixed), b = sqrt(a), c = sqrt(b); // sRGB within 0.002 without a power
-    return clamp(.662002687 * a + .68412206 * b - .323583601 * c - .022541147 * mixed, 0., 1.);
+    #ifdef FLAT
+    vec3 wide = vec3(0.), narrow = vec3(0.);
+    #ifdef STRANDS
+    vec3 h = normalize(lamps[0] + towards);
+    float along = dot(vTangent, h), across = dot(m, h), shift = -.03; // of brown hair
+    float arrives = clamp(1.6 * dot(m, lamps[0]) + .35, 0., 1.) * visible[0] * shine;
+    float first = along + (shift - .08) * across, other = along + (shift + .14) * across;
+    narrow = lampColours[0] * arrives * .085 * pow(max(1. - first * first, 1e-4), 32.);
+    wide = lampColours[0] * arrives * .8 * pow(max(1. - other * other, 1e-4), 8.);
+    #endif
+    #ifdef TEXTURED
+    vec3 low = shade(linear(darkTexel), wide, narrow), high = shade(linear(brightTexel), wide, narrow);
+    vSlope = (high - low) / (brightTexel - darkTexel);
+    vBase = low - darkTexel * vSlope;
+    #else
+    vBase = shade(color.rgb, wide, narrow);
+    #endif
+    #endif
   }`;
 
 const EYES = `
@@ -154,7 +197,36 @@ const EYES = `
     return glow * shade;
   }`;
 
+const FLAT = `
+  uniform float opacity;
+  #ifdef TEXTURED
+  uniform sampler2D map;
+  varying vec2 vUv;
+  #endif
+  void main() {
+    vec3 colour = vBase;
+    float cover = opacity;
+    #ifdef TEXTURED
+    vec4 texel = texture2D(map, vUv);
+    colour += texel.rgb * vSlope;
+    #ifdef CUTOUT
+    cover *= texel.a;
+    #ifdef SOLID
+    if (cover < .4) discard;
+    cover = 1.;
+    #else
+    cover *= sqrt(cover);
+    #endif
+    #endif
+    #endif
+    gl_FragColor = vec4(colour, cover);
+  }`;
+
 export const FRAGMENT = `
+  ${COARSE_COLOUR}
+  #ifdef FLAT
+  ${FLAT}
+  #else
   uniform vec3 lamps[${LAMPS}], lampColours[${LAMPS}], sky;
   uniform float second, dark, opacity;
   #define gloss vSurface.x
@@ -192,14 +264,12 @@ export const FRAGMENT = `
     vec3 albedo = vColour;
     #endif
     vec3 light = vLight;
-    #if !defined(COARSE) || defined(EYE) || defined(STRANDS)
     vec3 towards = normalize(cameraPosition - vPlace), n = normalize(vNormal);
-    #endif
     vec4 exposure = vExposure;
     #ifdef STRANDS
     vec3 t = normalize(vTangent), colour = light * albedo;
     float shift = .12 * (dot(albedo, vec3(.333)) * 4. - .5);
-    for (int k = 0; k < HAIR_LAMPS; k += 2) {
+    for (int k = 0; k < 3; k += 2) {
       vec3 h = normalize(lamps[k] + towards);
       float along = dot(t, h), normal = dot(n, h);
       float arrives = clamp(1.6 * dot(n, lamps[k]) + .35, 0., 1.) * (k == 0 ? exposure.y : exposure.z) * shine;
@@ -236,12 +306,10 @@ export const FRAGMENT = `
     float hidden = 1. - exposure.x;
     vec3 colour = light * albedo / (1. - hidden * hidden * albedo * .8) + shine;
     #endif
-    #if defined(SOLID) && defined(COARSE)
-    if (cover < .4) discard;
-    cover = 1.;
-    #elif defined(SOLID)
+    #ifdef SOLID
     cover = clamp((cover - .4) / max(fwidth(cover), .2) + .5, 0., 1.);
     if (cover < .02) discard;
     #endif
     gl_FragColor = vec4(display(colour), cover);
-  }`;
+  }
+  #endif`;

@@ -17,9 +17,9 @@ export default {
   template: `
     <section class="studio-timeline" aria-label="Timeline">
       <div class="studio-bar" role="toolbar" aria-label="Playback and zoom">
-        <button type="button" class="studio-play" @click="toggle" :aria-label="playing ? 'Pause' : 'Play'"
+        <button type="button" class="studio-play" id="studio-play" @click="toggle" :aria-label="playing ? 'Pause' : 'Play'"
           title="Space"><svg viewBox="0 0 16 16" aria-hidden="true"><path :d="playing ? 'M3 2h4v12H3zM9 2h4v12H9z' : 'M4 2l10 6-10 6z'"/></svg></button>
-        <button type="button" aria-label="To the start" title="Home" @click="host.seek(0)"><svg viewBox="0 0 16 16" aria-hidden="true"><path d="M2 2h2v12H2zM14 2v12L5 8z"/></svg></button>
+        <button type="button" id="studio-start" aria-label="To the start" title="Home" @click="host.seek(0)"><svg viewBox="0 0 16 16" aria-hidden="true"><path d="M2 2h2v12H2zM14 2v12L5 8z"/></svg></button>
         <output class="studio-time" aria-label="Time">{{ timeText }}</output>
         <label>Speed <select :value="speed" @change="setSpeed($event.target.value)">
           <option v-for="one in [0.25, 0.5, 1]" :key="one" :value="one">{{ one }}×</option></select></label>

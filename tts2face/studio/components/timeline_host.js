@@ -3,6 +3,7 @@
 import { clock } from "./clock.js";
 import { metrics, Meter } from "./metrics.js";
 import { comparison, preview } from "./preview.js";
+import { pace } from "./pace.js";
 import { openEditor } from "./timeline_editor.js";
 import { Painter, readColors } from "./timeline_draw.js";
 import { rowItems } from "./timeline_items.js";
@@ -13,6 +14,7 @@ import { curveValue, formatTime, rounded, View } from "./timeline_view.js";
 import { Waveform } from "./waveform.js";
 
 const EDGE_LEAST_S = 0.01;
+const TEXT_S = 0.2; // between two texts of the time that plays: each makes the browser draw a part of the page
 const NUDGE_PAUSE_MS = 350; // an edge that keys move is sent when they rest
 const WHEEL_ZOOM = 0.0015;
 
@@ -42,7 +44,7 @@ export class TimelineHost {
     this.takeColors();
     this.takeProps();
     this.resize();
-    this.animation = requestAnimationFrame(() => this.tick());
+    this.animation = requestAnimationFrame((now) => this.tick(now));
   }
 
   unmount() {
@@ -137,8 +139,9 @@ export class TimelineHost {
     this.moved();
   }
 
-  tick() {
-    this.animation = requestAnimationFrame(() => this.tick());
+  tick(now) {
+    this.animation = requestAnimationFrame((next) => this.tick(next));
+    if (clock.playing && !pace.draws(now)) return;
     const begin = performance.now(), { state } = this, time = clock.time;
     if (clock.playing && state.view.reveal(time)) this.moved();
     if (!this.dirty && time === this.shown) return;
@@ -154,7 +157,7 @@ export class TimelineHost {
       this.component.timeText = formatTime(time);
       return;
     }
-    if (Math.abs(time - (this.written ?? -1)) > 0.1) this.component.timeText = formatTime((this.written = time));
+    if (Math.abs(time - (this.written ?? -1)) > TEXT_S) this.component.timeText = formatTime((this.written = time));
     this.meter.add(performance.now() - begin);
   }
 

@@ -37,7 +37,7 @@ def register(studio: Studio) -> None:
         try:
             workspace = await studio.open(request.state.key, project)
         except (Tts2faceError, RefusedError) as wrong:
-            with ui.element("main").classes("projects"):
+            with ui.element("div").classes("projects"):
                 heading(1, "This project cannot be opened")
                 ui.label(sentence(wrong))
                 ui.link("All projects", "/")
@@ -80,7 +80,7 @@ class AnimatePage:
         self.bar, self.inspector = Bar(self, request), Inspector(self)
         self._banner()
         project = self.workspace.project
-        with ui.element("main").classes("workbench"):
+        with ui.element("div").classes("workbench"):
             with ui.element("section").classes("panel left").props('aria-label="Speech and head"'):
                 self.speech = SpeechPanel(self)
                 await self.speech.build()
@@ -100,6 +100,8 @@ class AnimatePage:
         self._set_enabled(may_edit)
         self.workspace.listeners.add(self._on_change)
         self._show_comparison()
+        self.client.on_disconnect(lambda: self.workspace.release(self.tab))  # a reloaded page may edit at once
+        self.client.on_connect(self._renew)
         self.client.on_delete(self._leave)
         ui.timer(LEASE_S / 3, self._renew)
         self.workspace.show()
@@ -132,10 +134,6 @@ class AnimatePage:
         await self.edit({"kind": "request", "options": {"text": text}})
         if self.workspace.project is before and self.workspace.preview.current.is_complete:
             self._play()
-
-    def fullscreen(self) -> None:
-        """Fill the screen with the stage."""
-        self.stage.fullscreen()
 
     def take_over(self) -> None:
         """Edit here in place of the other tab."""

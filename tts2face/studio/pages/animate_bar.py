@@ -5,7 +5,6 @@ from typing import Any
 from fastapi import Request as HttpRequest
 from nicegui import ui
 
-from tts2face.render.camera_views import NAMED_VIEWS
 from tts2face.studio.pages.frame import dark_button, heading, icon_button, shown_errors
 from tts2face.studio.pages.open_page import OpenPage
 from tts2face.studio.renders import DONE, RUNNING, WAITING, Render, formats
@@ -30,14 +29,6 @@ SHORTCUTS = (
 KEYS_SCRIPT = """
 {
   const keys = %s;
-  const clocked = import("tts2face-studio/clock.js").then(({ clock }) => {
-    const show = () => {
-      const button = document.getElementById("studio-play"), icon = button?.querySelector(".q-icon");
-      if (icon) icon.textContent = clock.playing ? "pause" : "play_arrow";
-      button?.setAttribute("aria-label", clock.playing ? "Pause" : "Play");
-    };
-    for (const event of ["play", "pause", "end", "load"]) clock.on(event, show);
-  });
   document.addEventListener("keydown", (event) => {
     const written = event.target.closest?.("input, textarea, select, [contenteditable=true], [role=listbox]");
     const isButton = event.target.closest?.("button, a, [role=button]");
@@ -63,23 +54,18 @@ class Bar:
         workspace = page.workspace
         with ui.element("header").classes("bar"):
             icon_button("arrow_back", "All projects", lambda: ui.navigate.to("/"))
+            ui.html("Animate", tag="h1", sanitize=False).classes("visually-hidden")
             heading_name = ui.input(value=workspace.project.name).props(
                 'dense borderless aria-label="Name of the project"'
             )
-            self._name = heading_name.style("font-size: 1.1rem; font-weight: 600; width: 14rem")
+            self._name = heading_name.style("font-size: 1.1rem; font-weight: 600; width: 18rem; margin-right: 0.75rem")
             self._name.on("change", lambda: page.edit({"kind": "name", "name": self._name.value}))
             self._saved = ui.label().classes("quiet").props("role=status")
             ui.element("span").classes("grow")
             self._undo = self._button("undo", "Undo", "studio-undo", page.undo)
             self._redo = self._button("redo", "Redo", "studio-redo", page.redo)
-            self._local("skip_previous", "Go to the start", "studio-start", "m.clock.seek(0)")
-            self._local("play_arrow", "Play", "studio-play", "m.clock.playing ? m.clock.pause() : m.clock.play()")
             self._ab = icon_button("compare", "Show A or the project").props("id=studio-ab")
             self._ab.on("click", js_handler=f"() => {TOGGLE_SIDES}")
-            ui.select(list(NAMED_VIEWS), value="front", on_change=lambda event: page.stage.view(event.value)).props(
-                'dense options-dense borderless aria-label="Camera of the stage"'
-            )
-            self._button("fullscreen", "Full screen", "studio-fullscreen", page.fullscreen)
             self._picture_button()
             self._button("movie", "Render and export", "studio-files", self._open_files)
             dark_button(request)
@@ -116,10 +102,6 @@ class Bar:
 
     def _button(self, icon: str, name: str, number: str, on_click: Any) -> ui.button:
         return icon_button(icon, name, on_click).props(f"id={number}")
-
-    def _local(self, icon: str, name: str, number: str, script: str) -> None:
-        """Button that acts in the browser at once."""
-        icon_button(icon, name).props(f"id={number}").on("click", js_handler=f"() => {CLOCK}{script})")
 
     def _picture_button(self) -> None:
         page = self._page

@@ -38,6 +38,19 @@ def dark_button(request: HttpRequest) -> None:
         ui.run_javascript(f'document.cookie = "{DARK_COOKIE}={kept}; path={PAGES}; max-age=31536000; samesite=strict"')
 
 
+@contextmanager
+def page_bar(request: HttpRequest, title: str, back: tuple[str, str] | None = None) -> Iterator[None]:
+    """Bar at the top of a page with its title; the block adds links; `back`: name and address of the page above."""
+    with ui.element("header").classes("bar"):
+        if back is not None:
+            name, address = back
+            icon_button("arrow_back", name, lambda: ui.navigate.to(address))
+        heading(1, title)
+        ui.element("span").classes("grow")
+        yield
+        dark_button(request)
+
+
 def icon_button(icon: str, name: str, on_click: Callable[[], object] | None = None) -> ui.button:
     """Flat button with an icon, and its name for people who do not see it and as a hint."""
     button = ui.button(icon=icon, on_click=on_click).props(f'flat dense round aria-label="{escape(name)}"')

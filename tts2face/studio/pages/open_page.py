@@ -34,8 +34,5 @@ class OpenPage(Protocol):
     async def redo(self) -> Any:
         """Make the edit again that was taken back last."""
 
-    def fullscreen(self) -> Any:
-        """Fill the screen with the stage."""
-
     async def speak(self, text: str) -> Any:
         """Change the text."""

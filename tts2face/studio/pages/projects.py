@@ -16,7 +16,7 @@ from tts2face.studio.importing import (
     import_sample,
     import_text,
 )
-from tts2face.studio.pages.frame import begin_page, confirm, dark_button, heading, icon_button, shown_errors
+from tts2face.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
 from tts2face.studio.pages.login import LOGOUT_PATH
 from tts2face.studio.store import ProjectEntry
 from tts2face.studio.studio import Studio
@@ -45,20 +45,18 @@ class ProjectsPage:
     async def build(self, request: HttpRequest) -> None:
         """Build the page."""
         self._studio.prepare()
-        with ui.element("header").classes("bar"):
-            heading(1, "tts2face studio")
-            ui.element("span").classes("grow")
+        with page_bar(request, "tts2face studio"):
             ui.link("Styles", "/palette").classes("bar-link")
             ui.link("Puppetry", "/puppet").classes("bar-link")
             ui.link("Reports", "/reports").classes("bar-link")
-            ui.link("Record your own talker", "/record").classes("bar-link")
-            dark_button(request)
+            if "build" in self._key.scopes:
+                ui.link("Record your own talker", "/record").classes("bar-link")
             if self._studio.state.keys:
                 ui.html(
                     f'<form method="post" action="{LOGOUT_PATH}"><button type="submit">Log out</button></form>',
                     sanitize=False,
                 )
-        with ui.element("main").classes("projects"):
+        with ui.element("div").classes("projects"):
             self._new()
             with ui.element("section").classes("panel"):
                 heading(2, "Projects")
@@ -126,7 +124,7 @@ class ProjectsPage:
             with ui.element("div").classes("grow"):
                 ui.link(entry.name, f"/animate/{entry.id}").classes("open")
                 changed = time.strftime("%Y-%m-%d %H:%M", time.localtime(entry.changed))
-                ui.label(f"changed {changed}, {entry.n_bytes / MB:.1f} MB").classes("quiet")
+                ui.label(f"changed {changed}, {_size(entry.n_bytes)}").classes("quiet")
             icon_button("download", f"Download {entry.name} as a project file", lambda: self._download(entry))
             icon_button("delete", f"Delete {entry.name}", lambda: self._ask_delete(entry))
 
@@ -143,3 +141,7 @@ class ProjectsPage:
 
         question = f"Delete the project {entry.name!r} with its recordings and rendered files? This cannot be undone."
         await confirm(question, "Delete", delete)
+
+
+def _size(n_bytes: int) -> str:
+    return f"{n_bytes / MB:.1f} MB" if n_bytes >= MB / 10 else f"{max(n_bytes / 1000, 1):.0f} kB"

@@ -1,7 +1,8 @@
 """Pages that record a person: prompts, takes, the coverage of phones, and the talker that is built of them."""
 
 import tempfile
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from fastapi import FastAPI, Request
@@ -11,13 +12,18 @@ from lexicon.errors import InputError, Tts2faceError
 from tts2face.exports.visemes import viseme_table
 from tts2face.service.access.page_headers import PAGES, RECORDINGS
 from tts2face.studio.components.recorder import STYLE, Recorder, VisemeMap
+from tts2face.studio.pages.choices import languages
+from tts2face.studio.pages.frame import begin_page, confirm, heading, page_bar, sentence
 from tts2face.studio.recording_routes import Owner, recording_router
+from tts2face.studio.recording_store import RecordingEntry
 from tts2face.studio.recordings import Recordings
 from tts2face.studio.talker_building import CLIP, REPORT, TALKER
 
 LIST_PAGE = "/record"
 FILES = RECORDINGS.removeprefix(PAGES)  # links are relative to the mounted pages
-PRIMARY, NEGATIVE = "#0b5cb8", "#b3182a"  # white text on them has a contrast of 6 or more
+TITLE = "Record your own talker"
+PROJECTS, RECORDINGS_LIST = ("All projects", "/"), ("All recordings", LIST_PAGE)
+ENGLISH = "en-us"
 MAX_TEXT_BYTES = 2 << 20
 MINUTES = {2: "2 minutes, 25 prompts", 5: "5 minutes, 60 prompts", 10: "10 minutes, 120 prompts"}
 REFRESH_S = 0.4
@@ -39,75 +45,93 @@ def add_record_page(app: FastAPI, folder: Path, owner: Owner) -> Recordings:
 
     @ui.page(LIST_PAGE, title="Record - tts2face studio", language="en-US")
     def show_list(request: Request) -> None:
-        try:
-            name = owner(request)
-        except InputError as refused:
-            _page_head("Record your own talker")
-            ui.label(str(refused))
-            return
-        _list_page(recordings, name)
+        with _page(request, TITLE, PROJECTS):
+            try:
+                name = owner(request)
+            except InputError as refused:
+                _show_refusal(refused)
+                return
+            _list_page(recordings, name)
 
     @ui.page(LIST_PAGE + "/{number}", title="Record - tts2face studio", language="en-US")
     def show_recording(request: Request, number: str) -> None:
         try:
             here = recordings.store.folder(number, owner(request))
         except InputError as unknown:
-            _page_head("Record your own talker")
-            ui.label(str(unknown))
-            ui.link("Recordings", LIST_PAGE)
+            with _page(request, TITLE, RECORDINGS_LIST):
+                _show_refusal(unknown)
             return
-        _RecordingPage(recordings, number, here).show()
+        with _page(request, f"Record {recordings.store.name(number)}", RECORDINGS_LIST):
+            _RecordingPage(recordings, number, here).show()
 
     return recordings
 
 
-def _page_head(title: str) -> None:
-    ui.dark_mode(None)
-    ui.colors(primary=PRIMARY, negative=NEGATIVE)
+@contextmanager
+def _page(request: Request, title: str, back: tuple[str, str]) -> Iterator[None]:
+    """Frame of a page around its content."""
+    begin_page(request)
     ui.add_css(STYLE.read_text(encoding="utf-8"), shared=False)
-    ui.html(title, tag="h1", sanitize=False)
+    with page_bar(request, title, back):
+        pass
+    with ui.element("div").classes("projects record-page"):
+        yield
+
+
+def _show_refusal(refused: InputError) -> None:
+    with ui.element("section").classes("panel"):
+        heading(2, "This page cannot be used")
+        ui.label(sentence(refused))
+        ui.link("Go to the projects", "/")
 
 
 def _list_page(recordings: Recordings, owner: str) -> None:
-    with ui.element("div").classes("record-page record-list"):
-        _page_head("Record your own talker")
+    entries = recordings.store.entries(owner)
+    if entries:
+        with ui.element("section").classes("panel"):
+            heading(2, "Recordings")
+            for entry in entries:
+                _show_entry(entry)
+    with ui.element("section").classes("panel"):
+        heading(2, "New recording")
         ui.label(
             "Read sentences aloud in front of the webcam. Each take is checked while you read the next one; from two "
             "minutes on they become a talker with your lips and your face. Everything stays on the computer that runs "
-            "the studio."
+            "the studio, and one button deletes all of it."
         )
-        entries = recordings.store.entries(owner)
-        if entries:
-            ui.html("Recordings", tag="h2", sanitize=False)
-        for entry in entries:
-            with ui.row():
-                ui.link(entry.name, f"{LIST_PAGE}/{entry.id}")
-                ui.label(f"{entry.n_accepted} of {entry.n_prompts} prompts recorded")
-        ui.html("New recording", tag="h2", sanitize=False)
-        name = ui.input("Name of the talker").classes("record-field")
-        minutes = ui.select(MINUTES, value=5, label="Length").classes("record-field")
-        language = ui.input("Language (an espeak-ng code)", value="en-us").classes("record-field")
+        with ui.element("div").classes("record-fields"):
+            name = ui.input("Name of the talker").props("outlined dense").classes("record-field")
+            minutes = ui.select(MINUTES, value=5, label="Length").props("outlined dense").classes("record-field")
+            language = ui.select(languages(), value=ENGLISH, label="Language", with_input=True)
+            language.props("outlined dense options-dense").classes("record-field")
         text: list[bytes] = []
 
         async def keep_text(upload: events.UploadEventArguments) -> None:
             text[:] = [await upload.file.read()]
-            chosen.text = f"Prompts are selected from {upload.file.name}, in the language above."
+            chosen.text = f"Prompts are selected from {upload.file.name}."
 
         upload = ui.upload(auto_upload=True, max_file_size=MAX_TEXT_BYTES, on_upload=keep_text).style("display: none")
-        choose = ui.button("Choose a text in another language", on_click=lambda: upload.run_method("pickFiles"))
-        choose.props("no-caps color=grey-8")
-        chosen = ui.label().props("role=status")
+        with ui.row().style("align-items: center"):
+            ui.button("Prompts from my own text", on_click=lambda: upload.run_method("pickFiles")).props("outline")
+            chosen = ui.label("Needed in other languages than English: a text file (UTF-8) with some pages in them.")
+            chosen.props("role=status").classes("quiet")
 
         async def create() -> None:
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / "text"
                 path.write_bytes(text[0] if text else b"")
                 prompts = await recordings.checks.prompts(
-                    float(minutes.value), language.value.strip(), str(path) if text else None
+                    float(minutes.value), str(language.value), str(path) if text else None
                 )
             ui.navigate.to(f"{LIST_PAGE}/{recordings.store.create(owner, name.value, prompts)}")
 
-        ui.button("Start recording", on_click=_reporting(create)).props("no-caps")
+        ui.button("Start recording", on_click=_reporting(create)).style("width: auto; align-self: flex-start")
+
+
+def _show_entry(entry: RecordingEntry) -> None:
+    with ui.element("div").classes("project"), ui.element("div").classes("grow"):
+        ui.link(entry.name, f"{LIST_PAGE}/{entry.id}").classes("open")
+        ui.label(f"{entry.n_accepted} of {entry.n_prompts} prompts recorded and accepted").classes("quiet")
 
 
 def _reporting(action: Callable[[], Awaitable[None] | None]) -> Callable[[], Awaitable[None]]:
@@ -119,7 +143,7 @@ def _reporting(action: Callable[[], Awaitable[None] | None]) -> Callable[[], Awa
             if result is not None:
                 await result
         except Tts2faceError as error:
-            ui.notify(str(error), type="negative", multi_line=True, close_button="Close", timeout=0)
+            ui.notify(sentence(error), type="negative", multi_line=True, close_button="Close", timeout=0)
 
     return run
 
@@ -135,38 +159,40 @@ class _RecordingPage:
     def show(self) -> None:
         """Build the page."""
         prompts = self._content["prompts"]
-        with ui.element("div").classes("record-page"):
-            with ui.element("div").classes("record-head"):
-                _page_head(f"Record {_escaped(self._recordings.store.name(self._number))}")
-                ui.link("All recordings", LIST_PAGE)
-            with ui.element("div").classes("record-columns"):
-                takes = self._takes()
-                first = next((at for at in range(len(prompts)) if at not in takes), 0)
-                texts = [prompt["text"] for prompt in prompts]
+        with ui.element("div").classes("record-columns"):
+            takes = self._takes()
+            first = next((at for at in range(len(prompts)) if at not in takes), 0)
+            texts = [prompt["text"] for prompt in prompts]
+            with ui.element("section").classes("panel").props('aria-label="Takes"'):
                 self._recorder = Recorder(texts, takes, f"{RECORDINGS}/{self._number}/takes/", first)
                 self._recorder.on("remove", lambda event: self._delete_take(int(event.args)))
-                with ui.element("div").classes("record-side"):
-                    ui.html("What your takes cover", tag="h2", sanitize=False)
+            with ui.element("div").classes("record-side"):
+                with ui.element("section").classes("panel"):
+                    heading(2, "What your takes cover")
+                    ui.label(
+                        "Rows: visemes and their phones. Columns: the viseme that follows. Stronger colour: more of "
+                        "what running text needs."
+                    ).classes("quiet")
                     running = self._content["running"]
                     visemes = {phone: viseme_table("oculus")[phone][0] for phone in running["phones"]}
                     self._map = VisemeMap(prompts, running, visemes)
+                with ui.element("section").classes("panel"):
                     self._build_panel()
         self._refresh()
         ui.timer(REFRESH_S, self._refresh)
 
     def _build_panel(self) -> None:
-        ui.html("Your talker", tag="h2", sanitize=False)
+        heading(2, "Your talker")
         self._count = ui.label()
-        consent = ui.input("Statement of consent", placeholder="I, NAME, agree that my face is used for ...").classes(
-            "record-wide"
-        )
+        consent = ui.input("Statement of consent", placeholder="I, NAME, agree that my face is used for ...")
+        consent.props("outlined dense")
         with ui.row():
             self._build = ui.button(
                 "Build the talker",
                 on_click=_reporting(lambda: self._recordings.build(self._number, self._folder, consent.value or "")),
-            ).props("no-caps")
+            )
             self._cancel = ui.button("Cancel", on_click=lambda: self._recordings.cancel(self._number))
-            self._cancel.props("no-caps color=grey-8")
+            self._cancel.props("flat")
         self._bar = ui.linear_progress(value=0, show_value=False).props('aria-label="Progress of the work"')
         self._status = ui.label().props("role=status").classes("record-status")
         with ui.element("div").classes("record-side") as self._finished:
@@ -174,18 +200,16 @@ class _RecordingPage:
                 ui.link("Report", f"{FILES}/{self._number}/files/{REPORT}", new_tab=True)
                 ui.link("Download the talker", f"{FILES}/{self._number}/files/{TALKER}")
             with ui.element("div").classes("record-sentence"):
-                sentence = ui.input("First sentence", value=FIRST_SENTENCE).classes("record-wide")
+                said = ui.input("First sentence", value=FIRST_SENTENCE).props("outlined dense").classes("record-wide")
                 ui.button(
                     "Speak",
-                    on_click=_reporting(
-                        lambda: self._recordings.speak(self._number, self._folder, sentence.value or "")
-                    ),
-                ).props("no-caps")
+                    on_click=_reporting(lambda: self._recordings.speak(self._number, self._folder, said.value or "")),
+                )
             self._clip = ui.element("video").props('controls aria-label="First sentence of the talker"')
             self._clip.classes("record-clip")
-        ui.button("Delete everything", on_click=self._confirm_deletion).props("no-caps color=negative").classes(
-            "self-start"
-        )
+        ui.button("Delete everything", icon="delete", on_click=self._confirm_deletion).props(
+            "flat color=negative"
+        ).style("width: auto; align-self: flex-start")
 
     def _takes(self) -> dict[int, dict[str, str]]:
         takes = self._recordings.store.takes(self._number)
@@ -196,14 +220,13 @@ class _RecordingPage:
         self._refresh()
 
     async def _confirm_deletion(self) -> None:
-        with ui.dialog() as dialog, ui.card():
-            ui.label("Delete all takes, the report and the talker of this recording? This cannot be undone.")
-            with ui.row():
-                ui.button("Delete", on_click=lambda: dialog.submit(True)).props("no-caps color=negative")
-                ui.button("Keep", on_click=lambda: dialog.submit(False)).props("no-caps color=grey-8")
-        if await dialog:
+        async def delete() -> None:
             await self._recordings.delete(self._number)
             ui.navigate.to(LIST_PAGE)
+
+        await confirm(
+            "Delete all takes, the report and the talker of this recording? This cannot be undone.", "Delete", delete
+        )
 
     def _refresh(self) -> None:
         """Show what has changed."""
@@ -231,7 +254,3 @@ class _RecordingPage:
         self._clip.set_visibility(bool(now[2]))
         if now[2]:
             self._clip.props(f'src="{RECORDINGS}/{self._number}/files/{CLIP}?{now[2]}"')
-
-
-def _escaped(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")

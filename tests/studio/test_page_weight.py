@@ -1,0 +1,42 @@
+"""Bytes that a browser receives for the page "animate" with an empty cache."""
+
+import httpx
+
+from tests.service.conftest import RunningService
+from tests.studio.browser import Browser, wait_until
+
+MOST_BYTES = 2_500_000
+SHOWN = "const s = window.__studio; return Boolean(s && s.frames > 0 && s.face_ms && s.view && s.view.duration > 0)"
+RECEIVED = """
+    const entries = [...performance.getEntriesByType('navigation'), ...performance.getEntriesByType('resource')];
+    return entries.map((one) => [one.name, one.transferSize])
+"""
+
+
+def test_the_page_with_face_and_sound_stays_below_its_limit(
+    browser: Browser, studio: httpx.Client, studio_service: RunningService
+) -> None:
+    text = "The young chef usually pushes five big maps before noon."
+    number = studio.post("/api/projects", json={"text": text}).json()["id"]
+    browser.devtools("Network.clearBrowserCache")
+    browser.open(f"{studio_service.url}/studio/animate/{number}")
+    wait_until(lambda: browser.run(SHOWN), 120, "face and sound are shown")
+    received = dict[str, int]()
+    for address, size in browser.run(RECEIVED):
+        name = address.partition("?")[0].rpartition("/")[2]
+        received[name] = received.get(name, 0) + size
+    assert received["face.glb"] > 500_000  # it came from the service, not from a cache
+    assert received["preview"] > 50_000
+    assert sum(received.values()) < MOST_BYTES, sorted(received.items(), key=lambda one: -one[1])[:10]
+
+
+def test_the_face_is_the_same_with_and_without_compression(studio: httpx.Client) -> None:
+    number = studio.post("/api/projects", json={"text": "Hello."}).json()["id"]
+    answers = [
+        studio.get(f"/api/projects/{number}/face.glb", headers={"Accept-Encoding": coding})
+        for coding in ("gzip", "identity")
+    ]
+    assert [one.headers.get("content-encoding") for one in answers] == ["gzip", None]
+    assert int(answers[0].headers["content-length"]) < 0.7 * len(answers[0].content)
+    assert int(answers[1].headers["content-length"]) == len(answers[1].content)
+    assert answers[0].content == answers[1].content
