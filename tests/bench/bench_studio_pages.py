@@ -1,16 +1,22 @@
-"""Opening the studio's example, and from Enter to speech: PYTHONPATH=. python tests/bench/bench_studio_pages.py.
+"""Opening the studio's example, from Enter to speech, and from a moved edge to its curves.
+
+Run: ``PYTHONPATH=. python tests/bench/bench_studio_pages.py``.
 
 A service that has been started before (its face is made and kept, its processes have spoken) and headless Chromium
 without a GPU. The page is loaded cold: each round has a browser of its own. Times hold for the load of the machine,
 which the script's slowness tells.
 """
 
+import statistics
 import time
 from pathlib import Path
+
+import httpx
 
 from tests.service.conftest import RunningService
 from tests.studio.browser import Browser, wait_until
 from tests.studio.served import slowness
+from tests.studio.test_projects_http import create, edit, preview
 
 ROUNDS = 3
 SHOWN = "const s = window.__studio; return Boolean(s && s.frames > 0 && s.face_ms && s.view && s.view.duration > 0)"
@@ -50,12 +56,16 @@ SPEAK = """
 TEXTS = ("A quiet word about the weather.", "Seven ships sailed south at dawn.", "Please put the kettle on for Ruth.")
 
 
+DRAGS = 20
+
+
 def main() -> None:
     """Print all figures."""
     running = RunningService(environment={"TTS2FACE_SERVE_WARM_STUDIO": "true"}, processes=2)
     try:
         running.wait_until_ready()
         _wait_for_face(running)
+        _measure_edges(running.url)
         for number in range(ROUNDS):
             browser = Browser((1280, 859))
             try:
@@ -70,6 +80,23 @@ def _wait_for_face(running: RunningService) -> None:
     begin, folder = time.monotonic(), Path(running.data.name) / "studio" / "faces"
     wait_until(lambda: list(folder.glob("*.glb.gz")), 300, "the face is made")
     print(f"face made {time.monotonic() - begin:.1f} s after the first process was ready")
+
+
+def _measure_edges(url: str) -> None:
+    """Times from the release of a phone edge to the new curves of its sentence, which has been made before."""
+    with httpx.Client(base_url=f"{url}/studio", timeout=60.0) as studio:
+        number = create(studio)
+        header, *_ = preview(studio, number)
+        text, occurrence, begin, _ = header["sentences"][1]
+        index, time_of = next((one[4], one[1] - begin) for one in header["phones"] if one[3] == 1 and one[4] > 1)
+        change, seconds = {"kind": "edge", "text": text, "occurrence": occurrence, "index": index}, []
+        for at in range(DRAGS):
+            began = time.perf_counter()
+            edit(studio, number, change | {"time": time_of + 0.004 * (at % 2 + 1)})
+            header, *_ = preview(studio, number, header["revision"])
+            seconds.append(time.perf_counter() - began)
+    middle, most = 1e3 * statistics.median(seconds), 1e3 * max(seconds)
+    print(f"from a moved edge to its curves {middle:.0f} ms, at most {most:.0f} ms")
 
 
 def _measure(browser: Browser, url: str, number: int) -> None:

@@ -141,16 +141,12 @@ def test_lanes_are_muted_and_get_new_seeds(page):
     wait_until(lambda: page.browser.run(pressed) == "true", 10, "the lane is muted")
 
 
-def test_ten_minutes_zoom_and_play(browser, address):
+def test_ten_minutes_zoom(browser, address):
     page = Page(browser, f"{address}?preview=long.bin")
     fitted = page.measure("view")["scale"]
     page.focus()
     browser.press("Right", "+", "+", "+", "+", "+", "+", "+", "+", "+", "+", "+", "+")
     assert page.measure("view")["scale"] > 20 * fitted
-    page.toggle()
-    wait_until(lambda: page.measure("timeline_ms") is not None, 30, "measures")
-    page.toggle()
-    assert page.measure("timeline_ms") < 4 * page.slowness()  # milliseconds of script a frame
 
 
 MERGE = """

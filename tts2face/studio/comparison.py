@@ -8,13 +8,15 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from lexicon.errors import DataError, InputError, Tts2faceError
 from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
+from tts2face.project.project import Project
 from tts2face.project.project_file import project_json
+from tts2face.service.access.keys import ApiKey
 from tts2face.service.state import ServiceState
 from tts2face.service.synthesis.work import Work
 from tts2face.storage.files import translate_disk_errors, write_atomically
@@ -23,13 +25,25 @@ from tts2face.studio.previews import ProjectPreview
 from tts2face.studio.reference import TAKE, Reference, parse_reference, reference_json, reference_project
 from tts2face.studio.requests import check_options, events_of, project_work
 
-if TYPE_CHECKING:
-    from tts2face.studio.workspace import Workspace
-
 FOLDER = "compare"  # in the folder of a project
 FILE, TAKE_FILE = "reference.json", "take.csv"
 MAX_TAKE_BYTES = 100_000_000
 NOT_READY = "the comparison is not made yet; wait a moment"
+
+
+class OpenProject(Protocol):
+    """What a comparison needs of the project that it belongs to (`tts2face.studio.workspace.Workspace`)."""
+
+    key: ApiKey
+    folder: Path
+    preview: ProjectPreview
+
+    @property
+    def project(self) -> Project:
+        """The project as it is now."""
+
+    async def work(self, kind: str, **more: Any) -> Work:
+        """A work of the project."""
 
 
 class Comparison:
@@ -42,7 +56,7 @@ class Comparison:
     """
 
     def __init__(
-        self, state: ServiceState, workspace: "Workspace", memory: PieceMemory, on_change: Callable[[], None]
+        self, state: ServiceState, workspace: OpenProject, memory: PieceMemory, on_change: Callable[[], None]
     ) -> None:
         self._state, self._workspace, self._on_change = state, workspace, on_change
         self._folder = workspace.folder / FOLDER
