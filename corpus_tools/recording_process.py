@@ -1,7 +1,8 @@
 """Prompts and checks of takes for a recording page, in a process with limits that keeps its networks loaded.
 
-``python -m corpus_tools.recording_process``, started by `tts2face.studio.take_checks`: standard input holds one order a
-line, a JSON object, and ends with the parent process; each is answered by one line of JSON on standard output.
+``python -m corpus_tools.recording_process``, started by `tts2face.studio.recording.take_checks`: standard input holds
+one order a line, a JSON object, and ends with the parent process; each is answered by one line of JSON on standard
+output.
 
 ``{"kind": "prompts", "minutes", "language", "text"}``, where the text is a path or null, gives ``prompts``, objects
 with ``text``, ``phones`` and ``triphones``, and ``running``, the counts of ``phones`` and ``triphones`` in running

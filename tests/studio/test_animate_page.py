@@ -13,7 +13,7 @@ import pytest
 from tests.exports.programs import node_package
 from tests.studio.browser import Browser, wait_until
 from tests.studio.served import Page
-from tts2face.studio.renders import formats
+from tts2face.studio.projects.renders import formats
 from tts2face.video.media import read_frames, read_sound
 
 TEXT = "Bob may move. Five maps were there."

@@ -10,7 +10,7 @@ import pytest
 
 from tests.studio.test_projects_http import create, edit, preview
 from tts2face.session import Session
-from tts2face.studio.bundle import read_bundle
+from tts2face.studio.projects.bundle import read_bundle
 from tts2face.studio.studio import MAX_IDLE
 from tts2face.types import HEAD_CHANNELS
 

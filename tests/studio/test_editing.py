@@ -15,7 +15,7 @@ from tts2face.models.palette import FEATURES
 from tts2face.project.project import Project
 from tts2face.request import Request
 from tts2face.session_cache import Models
-from tts2face.studio.editing import EDITS, MIN_PHONE_S, apply
+from tts2face.studio.projects.editing import EDITS, MIN_PHONE_S, apply
 
 PROJECT = Project(request=Request(text="Bob may move."))
 SENTENCE = ("Bob may move.", 0)

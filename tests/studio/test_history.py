@@ -6,7 +6,7 @@ import pytest
 
 from lexicon.errors import InputError
 from tts2face.project.project import Project
-from tts2face.studio.history import MAX_STEPS, History
+from tts2face.studio.projects.history import MAX_STEPS, History
 
 BEGIN = History(Project(name="0"))
 

@@ -10,8 +10,8 @@ from tts2face.service.errors import RefusedError
 from tts2face.service.synthesis.messages import Message, MessageKind
 from tts2face.service.synthesis.warm_process import ProcessEndedError
 from tts2face.service.synthesis.work import Work
-from tts2face.studio.bundle import PieceMemory, Preview
-from tts2face.studio.previews import PARTIAL_S, ProjectPreview
+from tts2face.studio.projects.bundle import PieceMemory, Preview
+from tts2face.studio.projects.previews import PARTIAL_S, ProjectPreview
 
 Stream = Callable[[Work], AsyncIterator[Message]]
 

@@ -17,8 +17,8 @@ from PIL import Image
 from tests.service.conftest import running_service
 from tts2face.project.project_file import load_project
 from tts2face.session import Session
-from tts2face.studio.bundle import read_bundle
-from tts2face.studio.lip_strips import opening_mm
+from tts2face.studio.projects.bundle import read_bundle
+from tts2face.studio.projects.lip_strips import opening_mm
 
 TEXT = "Bob may move. Five maps were there."
 Bundle = tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray]

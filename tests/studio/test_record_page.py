@@ -10,7 +10,7 @@ from corpus_tools.recording_process import prompts_answer
 from tests.studio.browser import Browser
 from tts2face.models.talker import load_talker
 from tts2face.service.access.keys import LOCAL_KEY
-from tts2face.studio.recording_store import RecordingStore
+from tts2face.studio.recording.store import RecordingStore
 
 SPOKEN, WRONG = "bin blue at f two now", "place green with q nine please"
 STATE = """return ['good', 'weak', 'refused'].find(

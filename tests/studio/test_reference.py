@@ -9,7 +9,7 @@ from tts2face.gesture.spans import StyleSpan
 from tts2face.gesture.timeline import Timeline
 from tts2face.project.project import Project
 from tts2face.request import Request
-from tts2face.studio.reference import Reference, parse_reference, reference_json, reference_project
+from tts2face.studio.comparing.reference import Reference, parse_reference, reference_json, reference_project
 
 PROJECT = Project("One", Request(text="Hello.", style="delighted", pitch=True), timeline=Timeline(
     spans=(StyleSpan("head", "delighted", 0.0, 0.5),)))  # fmt: skip

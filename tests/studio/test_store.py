@@ -12,8 +12,8 @@ from tts2face.project.project import Project
 from tts2face.project.project_file import load_project
 from tts2face.request import Request
 from tts2face.storage.temporary import Temporary
-from tts2face.studio.history import History
-from tts2face.studio.store import ASSETS, HISTORY, PROJECT, ProjectStore
+from tts2face.studio.projects.history import History
+from tts2face.studio.projects.store import ASSETS, HISTORY, PROJECT, ProjectStore
 
 PROJECT_ONE = Project(name="One", request=Request(text="Hello."))
 

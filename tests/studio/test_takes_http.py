@@ -17,8 +17,8 @@ from tests.corpus_tools.test_take_process import write_table
 from tests.service.conftest import RunningService
 from tests.studio.test_styles_http import owned, wait_for_take  # noqa: F401 - a fixture
 from tts2face.session import Session
-from tts2face.studio.bundle import read_bundle
-from tts2face.studio.take_store import FAILED, READY, TakeStore
+from tts2face.studio.projects.bundle import read_bundle
+from tts2face.studio.puppetry.store import FAILED, READY, TakeStore
 from tts2face.synthesis.performance import Performance, perform
 from tts2face.video.media import read_frames
 

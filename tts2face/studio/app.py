@@ -14,11 +14,15 @@ from lexicon.errors import InputError
 from tts2face.service.access.page_headers import PAGES
 from tts2face.service.app import NO_TELEMETRY
 from tts2face.service.state import ServiceState
-from tts2face.studio import comparison_routes, report_routes, routes, style_routes, take_routes
+from tts2face.studio.comparing import routes as comparison_routes
 from tts2face.studio.pages import animate, login, palette, projects, puppet, reports
 from tts2face.studio.pages.record import add_record_page
-from tts2face.studio.recordings import Recordings
+from tts2face.studio.projects import routes as projects_routes
+from tts2face.studio.puppetry import routes as take_routes
+from tts2face.studio.recording.recordings import Recordings
+from tts2face.studio.reports import routes as report_routes
 from tts2face.studio.studio import Studio
+from tts2face.studio.styles import routes as style_routes
 
 TITLE = "tts2face studio"
 RECONNECT_S = 30.0  # for which the state of a page is kept while its connection is away
@@ -29,16 +33,10 @@ def mount_studio(app: FastAPI, state: ServiceState) -> None:
     studio = Studio(state)
     app.include_router(login.make_router(state))
     app.state.studio = studio
-    app.include_router(routes.router)
-    app.include_router(comparison_routes.router)
-    app.include_router(report_routes.router)
-    app.include_router(style_routes.router)
-    app.include_router(take_routes.router)
-    projects.register(studio)
-    animate.register(studio)
-    reports.register(studio)
-    palette.register(studio)
-    puppet.register(studio)
+    for room in (projects_routes, comparison_routes, report_routes, style_routes, take_routes):
+        app.include_router(room.router)
+    for page in (projects, animate, palette, puppet, reports):
+        page.register(studio)
     recordings = add_record_page(app, studio.folder, _recording_owner)
     _disable_telemetry()
     pages_app.config.socket_io_js_transports = ["websocket"]

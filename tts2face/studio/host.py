@@ -6,8 +6,8 @@ from typing import Protocol
 from tts2face.project.project import Project
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.state import ServiceState
-from tts2face.studio.store import ProjectEntry, ProjectStore
-from tts2face.studio.workspace import Workspace
+from tts2face.studio.projects.store import ProjectEntry, ProjectStore
+from tts2face.studio.projects.workspace import Workspace
 
 
 class StudioHost(Protocol):

@@ -22,8 +22,8 @@ from tts2face.service.synthesis.messages import Message, MessageKind
 from tts2face.service.synthesis.work import Work
 from tts2face.service.uploads.names import check_background, check_voice, resolve_models
 from tts2face.session_cache import Models
-from tts2face.studio.palette_store import is_own_palette, own_palette
-from tts2face.studio.store import ASSET, ASSETS
+from tts2face.studio.projects.store import ASSET, ASSETS
+from tts2face.studio.styles.palette_store import is_own_palette, own_palette
 
 FILE_OPTIONS = ("audio", "dictionary", "timeline")  # of a request
 OPTION_PARTS = frozenset({"request", "models", "picture"})

@@ -16,14 +16,14 @@ from tts2face.service.errors import RefusedError
 from tts2face.service.state import ServiceState
 from tts2face.service.synthesis.work import Work
 from tts2face.storage.files import translate_disk_errors, write_atomically
-from tts2face.studio.bundle import PieceMemory
-from tts2face.studio.renders import RenderQueue
-from tts2face.studio.reports import Reports
+from tts2face.studio.projects.bundle import PieceMemory
+from tts2face.studio.projects.renders import RenderQueue
+from tts2face.studio.projects.store import ProjectEntry, ProjectStore
+from tts2face.studio.projects.workspace import Workspace
+from tts2face.studio.puppetry.takes import Takes
+from tts2face.studio.reports.reports import Reports
 from tts2face.studio.requests import data_of, studio_folder
-from tts2face.studio.store import ProjectEntry, ProjectStore
-from tts2face.studio.styles import Styles
-from tts2face.studio.takes import Takes
-from tts2face.studio.workspace import Workspace
+from tts2face.studio.styles.styles import Styles
 
 MB = 1_000_000
 MAX_IDLE = 10  # open projects that no page shows

@@ -15,14 +15,14 @@ from tts2face.service.access.page_headers import PAGES
 from tts2face.service.errors import RefusedError
 from tts2face.studio.components.stage import Stage
 from tts2face.studio.components.timeline import Timeline
-from tts2face.studio.editing import Edit
 from tts2face.studio.pages.animate_bar import Bar
 from tts2face.studio.pages.choices import styles
 from tts2face.studio.pages.frame import begin_page, heading, sentence, shown_errors
 from tts2face.studio.pages.inspector import Inspector
 from tts2face.studio.pages.speech_panel import SpeechPanel
+from tts2face.studio.projects.editing import Edit
+from tts2face.studio.projects.workspace import LEASE_S, Workspace
 from tts2face.studio.studio import Studio
-from tts2face.studio.workspace import LEASE_S, Workspace
 
 LOAD = 'import("tts2face-studio/preview.js").then((m) => m.loadPreview("%s"))'
 PLAY = 'import("tts2face-studio/clock.js").then((m) => m.clock.play(0))'

@@ -7,7 +7,7 @@ from nicegui import ui
 
 from tts2face.studio.pages.frame import dark_button, heading, icon_button, shown_errors
 from tts2face.studio.pages.open_page import OpenPage
-from tts2face.studio.renders import DONE, RUNNING, WAITING, Render, formats
+from tts2face.studio.projects.renders import DONE, RUNNING, WAITING, Render, formats
 
 CLOCK = 'import("tts2face-studio/clock.js").then((m) => '
 TOGGLE_SIDES = 'import("tts2face-studio/preview.js").then((m) => m.sides.toggle())'

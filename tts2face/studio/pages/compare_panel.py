@@ -10,11 +10,11 @@ from typing import Any
 from nicegui import events, ui
 
 from tts2face.jobs.resource_check import TALKER
-from tts2face.studio.comparison import MAX_TAKE_BYTES
+from tts2face.studio.comparing.comparison import MAX_TAKE_BYTES
+from tts2face.studio.comparing.reference import RECORDING, SETTINGS, TAKE
 from tts2face.studio.pages.choices import models
 from tts2face.studio.pages.frame import heading, shown_errors
 from tts2face.studio.pages.open_page import OpenPage
-from tts2face.studio.reference import RECORDING, SETTINGS, TAKE
 from tts2face.types import HEAD_CHANNELS
 
 RECORDINGS, LIVE_LINK, SEED, TALKERS = "a recording of the talker", "a Live Link take", "another seed", "talker "

@@ -6,10 +6,10 @@ from typing import Any
 
 from nicegui import ui
 
-from tts2face.studio.lip_strips import Cell, Outlines, common_cell, strip_svg
 from tts2face.studio.pages.frame import heading, shown_errors
 from tts2face.studio.pages.open_page import OpenPage
-from tts2face.studio.routes import explain
+from tts2face.studio.projects.lip_strips import Cell, Outlines, common_cell, strip_svg
+from tts2face.studio.projects.routes import explain
 
 N_SHOWN = 6  # examples of a phone
 NOW = 'import("tts2face-studio/clock.js").then((m) => emit(m.clock.time))'

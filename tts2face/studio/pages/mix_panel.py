@@ -12,7 +12,7 @@ from tts2face.models.palette_editing import StyleMix
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.access.page_headers import STYLES
 from tts2face.studio.pages.frame import heading, shown_errors
-from tts2face.studio.styles import Styles
+from tts2face.studio.styles.styles import Styles
 
 SIZES = {"head": "head", "brows": "brows", "blink": "lids", "cheeks": "cheeks", "gaze": "gaze"}
 FREE = "expressions", "sizes"

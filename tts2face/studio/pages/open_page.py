@@ -6,9 +6,9 @@ from nicegui import Client
 
 from tts2face.studio.components.stage import Stage
 from tts2face.studio.components.timeline import Timeline
-from tts2face.studio.editing import Edit
+from tts2face.studio.projects.editing import Edit
+from tts2face.studio.projects.workspace import Workspace
 from tts2face.studio.studio import Studio
-from tts2face.studio.workspace import Workspace
 
 
 class OpenPage(Protocol):

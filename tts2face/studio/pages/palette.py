@@ -21,13 +21,13 @@ from tts2face.service.access.keys import ApiKey
 from tts2face.service.access.page_headers import STYLES
 from tts2face.studio.components.recorder import STYLE as RECORDER_STYLE
 from tts2face.studio.components.recorder import Recorder
-from tts2face.studio.importing import SAMPLE_TEXT
 from tts2face.studio.pages.frame import begin_page, confirm, dark_button, heading, icon_button, shown_errors
 from tts2face.studio.pages.mix_panel import MixPanel
-from tts2face.studio.palette_store import FILE, SUFFIXES, shipped
-from tts2face.studio.recording_routes import MAX_TAKE_BYTES
+from tts2face.studio.projects.importing import SAMPLE_TEXT
+from tts2face.studio.recording.routes import MAX_TAKE_BYTES
 from tts2face.studio.studio import Studio
-from tts2face.studio.styles import CHECKING, MAKING, REFUSED, named
+from tts2face.studio.styles.palette_store import FILE, SUFFIXES, shipped
+from tts2face.studio.styles.styles import CHECKING, MAKING, REFUSED, named
 
 REFRESH_S = 0.4
 LONGEST_S = 120.0  # of a recorded take

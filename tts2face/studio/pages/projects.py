@@ -8,17 +8,17 @@ from fastapi import Request as HttpRequest
 from nicegui import events, ui
 
 from tts2face.service.access.keys import ApiKey
-from tts2face.studio.archive import has_files
-from tts2face.studio.importing import (
+from tts2face.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
+from tts2face.studio.pages.login import LOGOUT_PATH
+from tts2face.studio.projects.archive import has_files
+from tts2face.studio.projects.importing import (
     SOUND_SUFFIXES,
     TEXT_SUFFIXES,
     import_file,
     import_sample,
     import_text,
 )
-from tts2face.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
-from tts2face.studio.pages.login import LOGOUT_PATH
-from tts2face.studio.store import ProjectEntry
+from tts2face.studio.projects.store import ProjectEntry
 from tts2face.studio.studio import Studio
 from tts2face.subtitles.reader import SUFFIXES
 

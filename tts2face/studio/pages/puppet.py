@@ -12,12 +12,12 @@ from tts2face.service.access.keys import ApiKey
 from tts2face.service.access.page_headers import TAKES
 from tts2face.studio.components.puppet import Puppet
 from tts2face.studio.components.stage import Stage
-from tts2face.studio.importing import SOUND_SUFFIXES
 from tts2face.studio.pages.frame import begin_page, confirm, dark_button, heading, icon_button, shown_errors
 from tts2face.studio.pages.palette import ANY_TAKE
-from tts2face.studio.recording_routes import MAX_TAKE_BYTES
+from tts2face.studio.projects.importing import SOUND_SUFFIXES
+from tts2face.studio.puppetry.store import FAILED, FILM, READING, SOUND, TABLE, TakeEntry
+from tts2face.studio.recording.routes import MAX_TAKE_BYTES
 from tts2face.studio.studio import Studio
-from tts2face.studio.take_store import FAILED, FILM, READING, SOUND, TABLE, TakeEntry
 
 REFRESH_S = 0.5
 FILES = "/api/takes"  # below the address of the pages

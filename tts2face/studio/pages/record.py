@@ -14,10 +14,10 @@ from tts2face.service.access.page_headers import PAGES, RECORDINGS
 from tts2face.studio.components.recorder import STYLE, Recorder, VisemeMap
 from tts2face.studio.pages.choices import languages
 from tts2face.studio.pages.frame import begin_page, confirm, heading, page_bar, sentence
-from tts2face.studio.recording_routes import Owner, recording_router
-from tts2face.studio.recording_store import RecordingEntry
-from tts2face.studio.recordings import Recordings
-from tts2face.studio.talker_building import CLIP, REPORT, TALKER
+from tts2face.studio.recording.recordings import Recordings
+from tts2face.studio.recording.routes import Owner, recording_router
+from tts2face.studio.recording.store import RecordingEntry
+from tts2face.studio.recording.talker_building import CLIP, REPORT, TALKER
 
 LIST_PAGE = "/record"
 FILES = RECORDINGS.removeprefix(PAGES)  # links are relative to the mounted pages

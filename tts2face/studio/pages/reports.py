@@ -10,8 +10,8 @@ from lexicon.errors import InputError
 from tts2face.service.access.keys import ApiKey
 from tts2face.studio.pages.choices import models
 from tts2face.studio.pages.frame import begin_page, confirm, dark_button, heading, icon_button, shown_errors
-from tts2face.studio.renders import DONE, RUNNING, WAITING
-from tts2face.studio.reports import KINDS, Report
+from tts2face.studio.projects.renders import DONE, RUNNING, WAITING
+from tts2face.studio.reports.reports import KINDS, Report
 from tts2face.studio.studio import Studio
 
 # Loads a report into its frame in the colours of the studio: a frame knows only those of the system.

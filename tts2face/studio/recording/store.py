@@ -2,14 +2,12 @@
 
 ``recordings/ID/recordings`` holds the accepted takes with their transcripts, as `tts2face corpus build` reads them;
 ``unchecked`` and ``refused`` the others; ``prompts.json`` what is to be read, ``manifest.json`` the state of each take;
-``owner`` the name of the key. A crash leaves whole files only. All methods block.
+`owned_folders` says whose it is. A crash leaves whole files only. All methods block.
 """
 
 import json
 import os
-import re
 import secrets
-import shutil
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -19,10 +17,10 @@ from typing import Any
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_json
 from tts2face.storage.files import translate_disk_errors, write_atomically
+from tts2face.studio.owned_folders import OwnedFolders
 
-ID = re.compile(r"[0-9a-f]{16}")
 SUFFIXES = {"video/webm": ".webm", "video/mp4": ".mp4"}  # as MediaRecorder writes them
-PROMPTS, MANIFEST, OWNER, CACHE = "prompts.json", "manifest.json", "owner", "cache"
+PROMPTS, MANIFEST, CACHE = "prompts.json", "manifest.json", "cache"
 ACCEPTED_FOLDER, UNCHECKED_FOLDER, REFUSED_FOLDER = "recordings", "unchecked", "refused"
 CHECKING, GOOD, WEAK, REFUSED = "checking", "good", "weak", "refused"  # states of a take
 FOLDERS = {
@@ -57,7 +55,7 @@ class RecordingStore:
     """Recordings of all owners in a folder, which is made at its first use."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder / "recordings"
+        self._recordings = OwnedFolders(folder / "recordings", MANIFEST, "recording")
         self._lock = threading.Lock()  # of the manifests
         self.revision = 0  # increased with every change
 
@@ -71,27 +69,14 @@ class RecordingStore:
         """
         if not name.strip() or len(name) > MAX_NAME_CHARACTERS:
             raise InputError(f"the name must have 1 to {MAX_NAME_CHARACTERS} characters; write a name")
-        number = secrets.token_hex(8)
-        folder = self._folder / number
-        with translate_disk_errors(folder):
-            for part in set(FOLDERS.values()):
-                (folder / part).mkdir(parents=True)
-            (folder / OWNER).write_text(owner, encoding="utf-8")
+        folder = self._recordings.make(owner, *set(FOLDERS.values()))
         write_atomically(folder / PROMPTS, json.dumps(prompts, ensure_ascii=False).encode())
-        self._write(number, {"name": name.strip(), "takes": {}})
-        return number
+        self._write(folder.name, {"name": name.strip(), "takes": {}})
+        return folder.name
 
     def entries(self, owner: str) -> list[RecordingEntry]:
         """Recordings of an owner, those changed last first."""
-        found = []
-        for file in self._folder.glob(f"*/{MANIFEST}"):
-            if self._is_owned(file.parent.name, owner):
-                takes = self.takes(file.parent.name).values()
-                n_accepted = sum(FOLDERS[take.state] == ACCEPTED_FOLDER for take in takes)
-                n_prompts = len(self.prompts(file.parent.name)["prompts"])
-                name, changed = self.name(file.parent.name), file.stat().st_mtime
-                found.append(RecordingEntry(file.parent.name, name, n_accepted, n_prompts, changed))
-        return sorted(found, key=lambda one: -one.changed)
+        return [self._entry(folder) for folder in self._recordings.of(owner)]
 
     def folder(self, number: str, owner: str) -> Path:
         """Folder of a recording.
@@ -101,9 +86,7 @@ class RecordingStore:
         InputError
             The owner has no such recording.
         """
-        if not ID.fullmatch(number) or not self._is_owned(number, owner):
-            raise InputError(f"there is no recording {number[:40]!r}; choose one from the list")
-        return self._folder / number
+        return self._recordings.find(number, owner)
 
     def name(self, number: str) -> str:
         """Name of a recording."""
@@ -134,7 +117,7 @@ class RecordingStore:
         take = Take(f"take-{at + 1:04d}-{secrets.token_hex(3)}{suffix}", CHECKING)
         with self._lock, translate_disk_errors(content):
             manifest = self._read(number)
-            os.replace(content, self._folder / number / UNCHECKED_FOLDER / take.file)
+            os.replace(content, self._recordings.at(number) / UNCHECKED_FOLDER / take.file)
             earlier = manifest["takes"].get(str(at))
             manifest["takes"][str(at)] = asdict(take)
             self._write(number, manifest)
@@ -144,7 +127,7 @@ class RecordingStore:
 
     def judge(self, number: str, at: int, judged: Take) -> None:
         """Set the state of a take after its check; if it was recorded again or deleted meanwhile, forget it."""
-        folder = self._folder / number
+        folder = self._recordings.at(number)
         with self._lock:
             if not folder.is_dir():
                 return
@@ -173,16 +156,16 @@ class RecordingStore:
 
     def delete(self, number: str) -> None:
         """Delete a recording with all that was made of it."""
-        with self._lock, translate_disk_errors(self._folder / number):
-            shutil.rmtree(self._folder / number)
+        with self._lock:
+            self._recordings.remove(number)
 
     def path(self, number: str, take: Take) -> Path:
         """File of a take."""
-        return self._folder / number / FOLDERS[take.state] / take.file
+        return self._recordings.at(number) / FOLDERS[take.state] / take.file
 
     def unchecked(self) -> Sequence[tuple[str, int, Take]]:
         """Takes whose check did not end, of all recordings: id, index of the prompt, take."""
-        numbers = [file.parent.name for file in sorted(self._folder.glob(f"*/{MANIFEST}"))]
+        numbers = [folder.name for folder in self._recordings.of()]
         return [
             (number, at, take)
             for number in numbers
@@ -199,24 +182,24 @@ class RecordingStore:
     def _remove_files(self, number: str, take: Take) -> None:
         """Remove a take, its transcript, and what its check cached."""
         for folder in set(FOLDERS.values()):
-            file = self._folder / number / folder / take.file
+            file = self._recordings.at(number) / folder / take.file
             file.unlink(missing_ok=True)
             file.with_suffix(".txt").unlink(missing_ok=True)
         if take.key:
-            for file in (self._folder / number / CACHE).glob(f"{take.key}-*"):
+            for file in (self._recordings.at(number) / CACHE).glob(f"{take.key}-*"):
                 file.unlink(missing_ok=True)
 
-    def _is_owned(self, number: str, owner: str) -> bool:
-        try:
-            return (self._folder / number / OWNER).read_text(encoding="utf-8") == owner
-        except OSError:
-            return False
+    def _entry(self, folder: Path) -> RecordingEntry:
+        manifest, number = folder / MANIFEST, folder.name
+        n_accepted = sum(FOLDERS[take.state] == ACCEPTED_FOLDER for take in self.takes(number).values())
+        n_prompts = len(self.prompts(number)["prompts"])
+        return RecordingEntry(number, self.name(number), n_accepted, n_prompts, manifest.stat().st_mtime)
 
     def _read(self, number: str) -> dict[str, Any]:
         return dict(self._read_json(number, MANIFEST))
 
     def _read_json(self, number: str, name: str) -> Any:
-        path = self._folder / number / name
+        path = self._recordings.at(number) / name
         try:
             return read_json(path)
         except OSError as refused:
@@ -224,4 +207,4 @@ class RecordingStore:
 
     def _write(self, number: str, manifest: Mapping[str, Any]) -> None:
         self.revision += 1
-        write_atomically(self._folder / number / MANIFEST, json.dumps(manifest, ensure_ascii=False).encode())
+        write_atomically(self._recordings.at(number) / MANIFEST, json.dumps(manifest, ensure_ascii=False).encode())

@@ -10,9 +10,9 @@ from fastapi.responses import Response
 
 from tts2face.service.errors import RefusedError
 from tts2face.service.uploads.upload_folder import BLOCK_BYTES
-from tts2face.studio.comparison import NOT_READY, Comparison
-from tts2face.studio.reference import KEPT
-from tts2face.studio.routes import API, WAIT_S, opened
+from tts2face.studio.comparing.comparison import NOT_READY, Comparison
+from tts2face.studio.comparing.reference import KEPT
+from tts2face.studio.projects.routes import API, WAIT_S, opened
 
 router = APIRouter(prefix=f"{API}/projects/{{project}}", include_in_schema=False)
 

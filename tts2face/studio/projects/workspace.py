@@ -12,13 +12,13 @@ from tts2face.service.access.keys import ApiKey
 from tts2face.service.logs import log_event
 from tts2face.service.state import ServiceState
 from tts2face.service.synthesis.work import Work
-from tts2face.studio.bundle import PieceMemory, Preview
-from tts2face.studio.comparison import Comparison
-from tts2face.studio.editing import Edit, apply
-from tts2face.studio.history import History
-from tts2face.studio.previews import ProjectPreview
+from tts2face.studio.comparing.comparison import Comparison
+from tts2face.studio.projects.bundle import PieceMemory, Preview
+from tts2face.studio.projects.editing import Edit, apply
+from tts2face.studio.projects.history import History
+from tts2face.studio.projects.previews import ProjectPreview
+from tts2face.studio.projects.store import ProjectStore
 from tts2face.studio.requests import OPTION_PARTS, check_options, project_work
-from tts2face.studio.store import ProjectStore
 
 SAVE_S = 0.5  # between an edit and the time at which it is on disk
 CONTINUE_S = 1.5  # within which edits of the same kind are one step of the history

@@ -6,7 +6,6 @@ undone, ``owner`` the name of the key, ``assets/`` recordings, ``renders/`` fini
 
 import json
 import re
-import secrets
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,11 +18,11 @@ from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
 from tts2face.project.project import Project
 from tts2face.project.project_file import parse_project, project_json
 from tts2face.storage.files import translate_disk_errors, write_atomically
-from tts2face.studio.history import History, Step
+from tts2face.studio.owned_folders import OwnedFolders
+from tts2face.studio.projects.history import History, Step
 
-ID = re.compile(r"[0-9a-f]{16}")
 ASSET = re.compile(r"[a-z0-9][a-z0-9-]{0,40}\.[a-z0-9]{1,5}")
-PROJECT, HISTORY, OWNER, ASSETS, RENDERS = "project.json", "history.json", "owner", "assets", "renders"
+PROJECT, HISTORY, ASSETS, RENDERS = "project.json", "history.json", "assets", "renders"
 WORDS = "words"  # folder of pronunciations that users keep for all their projects
 MAX_HISTORY_BYTES = 4_000_000  # older steps beyond are not kept over a restart
 
@@ -43,25 +42,21 @@ class ProjectStore:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        self._projects = OwnedFolders(folder / "projects", PROJECT, "project")
         self._written: dict[int, tuple[Step, str]] = {}  # steps of histories as they were written last
 
     def create(self, owner: str, project: Project) -> str:
         """Id of a new project of an owner."""
-        number = secrets.token_hex(8)
-        folder = self._folder / "projects" / number
-        with translate_disk_errors(folder):
-            (folder / ASSETS).mkdir(parents=True)
-            (folder / OWNER).write_text(owner, encoding="utf-8")
+        number = self._projects.make(owner, ASSETS).name
         self.write(number, History(project))
         return number
 
     def entries(self, owner: str) -> list[ProjectEntry]:
         """Projects of an owner, those changed last first; a damaged one has its id as name."""
-        found = []
-        for file in (self._folder / "projects").glob(f"*/{PROJECT}"):
-            if ID.fullmatch(file.parent.name) and self._owner(file.parent) == owner:
-                found.append(ProjectEntry(file.parent.name, _name(file), file.stat().st_mtime, _size(file.parent)))
-        return sorted(found, key=lambda one: -one.changed)
+        return [
+            ProjectEntry(one.name, _name(one / PROJECT), (one / PROJECT).stat().st_mtime, _size(one))
+            for one in self._projects.of(owner)
+        ]
 
     def folder(self, number: str, owner: str) -> Path:
         """Folder of a project.
@@ -71,10 +66,7 @@ class ProjectStore:
         InputError
             The owner has no such project.
         """
-        folder = self._folder / "projects" / number
-        if not ID.fullmatch(number) or self._owner(folder) != owner or not (folder / PROJECT).is_file():
-            raise InputError(f"there is no project {number[:40]!r}; choose one from the list of projects")
-        return folder
+        return self._projects.find(number, owner)
 
     def read(self, number: str, owner: str) -> History:
         """History of a project; without what could be undone if that file is damaged.
@@ -107,7 +99,7 @@ class ProjectStore:
         BackendError
             The disk is full.
         """
-        folder = self._folder / "projects" / number
+        folder = self._projects.at(number)
         content = json.dumps(project_json(history.present, folder), ensure_ascii=False, indent=1)
         write_atomically(folder / PROJECT, f"{content}\n".encode())
         steps = {id(step): self._step(step, folder) for step in (*history.past, *history.future)}
@@ -120,7 +112,7 @@ class ProjectStore:
         """Path of a new asset with the content of a checked file."""
         if not ASSET.fullmatch(name):
             raise InputError(f"an asset cannot be called {name[:40]!r}")
-        target = self._folder / "projects" / number / ASSETS / name
+        target = self._projects.at(number) / ASSETS / name
         with translate_disk_errors(target):
             target.parent.mkdir(exist_ok=True)
             shutil.copyfile(source, target.with_name(f".{name}"))
@@ -129,11 +121,7 @@ class ProjectStore:
 
     def remove(self, number: str, owner: str) -> None:
         """Remove a project with everything in it; errors as `folder`."""
-        folder = self.folder(number, owner)
-        gone = folder.with_name(f".{number}")  # no half of a project is ever listed
-        with translate_disk_errors(folder):
-            folder.rename(gone)
-            shutil.rmtree(gone)
+        self._projects.remove(self.folder(number, owner).name)
 
     def words(self, owner: str) -> dict[str, str]:
         """Pronunciations that an owner keeps for new projects."""
@@ -169,13 +157,6 @@ class ProjectStore:
             return known
         content: Mapping[str, Any] = {"topic": step.topic, "project": project_json(step.project, folder)}
         return step, json.dumps(content, ensure_ascii=False)
-
-    @staticmethod
-    def _owner(folder: Path) -> str | None:
-        try:
-            return (folder / OWNER).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError):
-            return None
 
 
 def _recent(steps: list[str]) -> list[str]:

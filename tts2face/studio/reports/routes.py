@@ -8,8 +8,8 @@ from fastapi.responses import FileResponse, Response
 
 from lexicon.errors import InputError, Tts2faceError
 from tts2face.service.errors import RefusedError, as_refused
-from tts2face.studio.reports import Report, Reports
-from tts2face.studio.routes import API
+from tts2face.studio.projects.routes import API
+from tts2face.studio.reports.reports import Report, Reports
 
 # A report holds names of a user's files and must not act as a page of this origin.
 HEADERS = {

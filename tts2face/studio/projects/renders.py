@@ -26,9 +26,9 @@ from tts2face.service.state import ServiceState
 from tts2face.service.synthesis.messages import MessageKind
 from tts2face.service.synthesis.work import Work
 from tts2face.storage.files import translate_disk_errors, write_atomically
+from tts2face.studio.projects.store import RENDERS
+from tts2face.studio.projects.workspace import Workspace
 from tts2face.studio.requests import project_work
-from tts2face.studio.store import RENDERS
-from tts2face.studio.workspace import Workspace
 
 WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"
 PRIORITY = 1  # below that of previews and of all requests over HTTP

@@ -18,12 +18,12 @@ from tts2face.project.project_file import project_json
 from tts2face.service.access.page_headers import PAGES
 from tts2face.service.errors import RefusedError, as_refused
 from tts2face.service.uploads.upload_folder import BLOCK_BYTES
-from tts2face.studio.archive import archive
-from tts2face.studio.importing import import_file, import_text
-from tts2face.studio.renders import DONE, Render
+from tts2face.studio.projects.archive import archive
+from tts2face.studio.projects.importing import import_file, import_text
+from tts2face.studio.projects.renders import DONE, Render
+from tts2face.studio.projects.workspace import Workspace
 from tts2face.studio.requests import data_of, events_of
 from tts2face.studio.studio import Studio
-from tts2face.studio.workspace import Workspace
 
 API = f"{PAGES}/api"
 WAIT_S = 120.0  # for a preview that is asked to be complete

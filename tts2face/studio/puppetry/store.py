@@ -6,20 +6,17 @@ methods block.
 """
 
 import json
-import re
-import secrets
-import shutil
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_json
-from tts2face.storage.files import translate_disk_errors, write_atomically
+from tts2face.storage.files import write_atomically
+from tts2face.studio.owned_folders import OwnedFolders
 
-ID = re.compile(r"[0-9a-f]{16}")
-ENTRY, OWNER, TABLE, SOUND, PREVIEW, FILM, VIDEO = (
-    "take.json", "owner", "take.csv", "sound.wav", "preview.bin", "film.mp4", "video",
+ENTRY, TABLE, SOUND, PREVIEW, FILM, VIDEO = (
+    "take.json", "take.csv", "sound.wav", "preview.bin", "film.mp4", "video",
 )  # fmt: skip
 READING, READY, FAILED = "reading", "ready", "failed"  # states of a take
 MAX_NAME = 60
@@ -42,7 +39,7 @@ class TakeStore:
     """Takes of all owners in the folder of a studio."""
 
     def __init__(self, studio: Path) -> None:
-        self._folder = studio / "takes"
+        self._takes = OwnedFolders(studio / "takes", ENTRY, "take")
 
     def create(self, owner: str, name: str) -> TakeEntry:
         """A new take, which is being read.
@@ -54,19 +51,14 @@ class TakeStore:
         """
         if len(self.entries(owner)) >= MAX_TAKES:
             raise InputError(f"there are {MAX_TAKES} takes already; delete one")
-        entry = TakeEntry(secrets.token_hex(8), " ".join(name.split())[:MAX_NAME] or "take", READING)
-        folder = self._folder / entry.id
-        with translate_disk_errors(folder):
-            folder.mkdir(parents=True)
-            (folder / OWNER).write_text(owner, encoding="utf-8")
+        number = self._takes.make(owner).name
+        entry = TakeEntry(number, " ".join(name.split())[:MAX_NAME] or "take", READING)
         self.write(entry)
         return entry
 
     def entries(self, owner: str) -> list[TakeEntry]:
-        """Takes of an owner, the last one first."""
-        files = [file for file in self._folder.glob(f"*/{ENTRY}") if self._is_owned(file.parent.name, owner)]
-        files.sort(key=lambda file: -(file.parent / OWNER).stat().st_mtime)
-        return [self._read(file) for file in files]
+        """Takes of an owner, those changed last first."""
+        return [self._read(one / ENTRY) for one in self._takes.of(owner)]
 
     def entry(self, owner: str, number: str) -> TakeEntry:
         """A take; errors as `folder`."""
@@ -80,20 +72,17 @@ class TakeStore:
         InputError
             The owner has no such take.
         """
-        if not ID.fullmatch(number) or not self._is_owned(number, owner):
-            raise InputError(f"there is no take {number[:40]!r}; choose one from the list")
-        return self._folder / number
+        return self._takes.find(number, owner)
 
     def write(self, entry: TakeEntry) -> None:
         """Write a take's state, unless it was deleted."""
-        if (self._folder / entry.id).is_dir():
-            write_atomically(self._folder / entry.id / ENTRY, json.dumps(asdict(entry), ensure_ascii=False).encode())
+        folder = self._takes.at(entry.id)
+        if folder.is_dir():
+            write_atomically(folder / ENTRY, json.dumps(asdict(entry), ensure_ascii=False).encode())
 
     def remove(self, owner: str, number: str) -> None:
         """Delete a take with all that was made of it; errors as `folder`."""
-        folder = self.folder(owner, number)
-        with translate_disk_errors(folder):
-            shutil.rmtree(folder)
+        self._takes.remove(self.folder(owner, number).name)
 
     def rename(self, owner: str, number: str, name: str) -> None:
         """Give a take another name; errors as `folder`."""
@@ -104,19 +93,13 @@ class TakeStore:
 
     def end_readings(self) -> None:
         """Mark takes whose reading a stop of the server ended as failed, and delete their videos."""
-        for file in self._folder.glob(f"*/{ENTRY}"):
-            entry = self._read(file)
+        for folder in self._takes.of():
+            entry = self._read(folder / ENTRY)
             if entry.state == READING:
-                for video in file.parent.glob(f"{VIDEO}.*"):
+                for video in folder.glob(f"{VIDEO}.*"):
                     video.unlink()
                 message = "the server stopped while it was read; record or upload it again"
                 self.write(replace(entry, state=FAILED, message=message))
-
-    def _is_owned(self, number: str, owner: str) -> bool:
-        try:
-            return (self._folder / number / OWNER).read_text(encoding="utf-8") == owner
-        except OSError:
-            return False
 
     @staticmethod
     def _read(file: Path) -> TakeEntry:

@@ -20,9 +20,9 @@ from tts2face.service.access.keys import ApiKey
 from tts2face.service.state import ServiceState
 from tts2face.service.synthesis.work import Work
 from tts2face.storage.files import translate_disk_errors, write_atomically
-from tts2face.studio.bundle import PieceMemory, Preview, read_bundle
-from tts2face.studio.previews import ProjectPreview
-from tts2face.studio.reference import TAKE, Reference, parse_reference, reference_json, reference_project
+from tts2face.studio.comparing.reference import TAKE, Reference, parse_reference, reference_json, reference_project
+from tts2face.studio.projects.bundle import PieceMemory, Preview, read_bundle
+from tts2face.studio.projects.previews import ProjectPreview
 from tts2face.studio.requests import check_options, events_of, project_work
 
 FOLDER = "compare"  # in the folder of a project
@@ -32,7 +32,7 @@ NOT_READY = "the comparison is not made yet; wait a moment"
 
 
 class OpenProject(Protocol):
-    """What a comparison needs of the project that it belongs to (`tts2face.studio.workspace.Workspace`)."""
+    """What a comparison needs of the project that it belongs to (`tts2face.studio.projects.workspace.Workspace`)."""
 
     key: ApiKey
     folder: Path

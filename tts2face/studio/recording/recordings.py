@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import InputError, Tts2faceError
-from tts2face.studio.recording_store import ACCEPTED_FOLDER, FOLDERS, RecordingStore
-from tts2face.studio.take_checks import TakeChecks
-from tts2face.studio.talker_building import TALKER, build_talker, speak
+from tts2face.studio.recording.store import ACCEPTED_FOLDER, FOLDERS, RecordingStore
+from tts2face.studio.recording.take_checks import TakeChecks
+from tts2face.studio.recording.talker_building import TALKER, build_talker, speak
 
 MAX_SENTENCE_CHARACTERS = 300
 

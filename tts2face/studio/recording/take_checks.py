@@ -15,7 +15,7 @@ from lexicon.errors import BackendError, Tts2faceError
 from lexicon.inputs import parse_json
 from tts2face.batch.render_process import KINDS
 from tts2face.limited_process import bare_environment
-from tts2face.studio.recording_store import CACHE, CHECKING, GOOD, REFUSED, WEAK, RecordingStore, Take
+from tts2face.studio.recording.store import CACHE, CHECKING, GOOD, REFUSED, WEAK, RecordingStore, Take
 
 PROCESS = "corpus_tools.recording_process"  # by name: the tools stand above this package
 ANSWER_S = 120.0  # of one order, with the loading of the networks

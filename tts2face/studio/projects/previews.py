@@ -11,7 +11,7 @@ from tts2face.service.errors import RefusedError
 from tts2face.service.synthesis.messages import Message
 from tts2face.service.synthesis.warm_process import ProcessEndedError
 from tts2face.service.synthesis.work import Work
-from tts2face.studio.bundle import DIGEST_LENGTH, PieceMemory, Preview, bundle
+from tts2face.studio.projects.bundle import DIGEST_LENGTH, PieceMemory, Preview, bundle
 from tts2face.studio.requests import events_of
 
 MAX_REVISIONS = 30  # that a page may have and is sent the difference to

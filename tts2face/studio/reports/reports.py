@@ -22,7 +22,7 @@ from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
 from tts2face.service.uploads.library import Library
 from tts2face.storage.files import translate_disk_errors, write_atomically
-from tts2face.studio.renders import CANCELLED, DONE, FAILED, RUNNING, WAITING
+from tts2face.studio.projects.renders import CANCELLED, DONE, FAILED, RUNNING, WAITING
 from tts2face.studio.take_tools import run_tool
 
 REPORT_PROCESS = "corpus_tools.report_process"  # by name: the tools stand above this package

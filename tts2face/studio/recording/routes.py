@@ -10,9 +10,9 @@ from fastapi.responses import FileResponse, JSONResponse, Response
 
 from lexicon.errors import InputError, Tts2faceError
 from tts2face.service.access.page_headers import RECORDINGS
-from tts2face.studio.recording_store import SUFFIXES, RecordingStore
-from tts2face.studio.recordings import Recordings
-from tts2face.studio.talker_building import CLIP, REPORT, TALKER
+from tts2face.studio.recording.recordings import Recordings
+from tts2face.studio.recording.store import SUFFIXES, RecordingStore
+from tts2face.studio.recording.talker_building import CLIP, REPORT, TALKER
 
 TAKE = "/{number}/takes/{at}"
 MAX_TAKE_BYTES = 64 << 20

@@ -15,10 +15,10 @@ from tts2face import catalogue
 from tts2face.models.palette_editing import StyleMix
 from tts2face.service.access.page_headers import STYLES
 from tts2face.service.errors import as_refused
-from tts2face.studio.palette_store import FILE
-from tts2face.studio.recording_routes import receive_take
-from tts2face.studio.recording_store import SUFFIXES
-from tts2face.studio.styles import Styles, TakeWork
+from tts2face.studio.recording.routes import receive_take
+from tts2face.studio.recording.store import SUFFIXES
+from tts2face.studio.styles.palette_store import FILE
+from tts2face.studio.styles.styles import Styles, TakeWork
 
 NO_STORE = {"Cache-Control": "no-store"}
 

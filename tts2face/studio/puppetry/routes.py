@@ -12,11 +12,11 @@ from fastapi.responses import FileResponse, Response
 from lexicon.errors import InputError, Tts2faceError
 from tts2face.service.access.page_headers import TAKES
 from tts2face.service.errors import as_refused
-from tts2face.studio.live_camera import follow_camera
-from tts2face.studio.recording_routes import receive_take
-from tts2face.studio.recording_store import SUFFIXES
-from tts2face.studio.take_store import FILM, SOUND, TABLE
-from tts2face.studio.takes import Takes
+from tts2face.studio.puppetry.live_camera import follow_camera
+from tts2face.studio.puppetry.store import FILM, SOUND, TABLE
+from tts2face.studio.puppetry.takes import Takes
+from tts2face.studio.recording.routes import receive_take
+from tts2face.studio.recording.store import SUFFIXES
 
 KINDS = {TABLE: "text/csv", SOUND: "audio/wav", FILM: "video/mp4"}
 SOUND_TYPES = ("audio/", "video/")
@@ -97,7 +97,7 @@ async def render(request: HttpRequest, number: str) -> dict[str, str]:
 
 @router.post("/{number}/style", status_code=204)
 async def make_style(request: HttpRequest, number: str) -> Response:
-    """Make the take the one of which a style is made (`tts2face.studio.style_routes`)."""
+    """Make the take the one of which a style is made (`tts2face.studio.styles.routes`)."""
     try:
         await _takes(request).make_style_take(request.state.key, number)
     except Tts2faceError as wrong:

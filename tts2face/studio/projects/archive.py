@@ -10,7 +10,7 @@ from typing import Any
 
 from tts2face.project.project import Project
 from tts2face.project.project_file import MODEL_FILES, REQUEST_FILES, save_project
-from tts2face.studio.store import PROJECT
+from tts2face.studio.projects.store import PROJECT
 
 
 def has_files(project: Project) -> bool:

@@ -19,11 +19,8 @@ from tts2face.service.uploads.decode_process import SOUND as SOUND_KIND
 from tts2face.service.uploads.upload_folder import decode_file
 from tts2face.storage.files import translate_disk_errors, write_atomically
 from tts2face.studio.host import StudioHost
-from tts2face.studio.importing import add_recording
-from tts2face.studio.palette_store import SUFFIXES
-from tts2face.studio.requests import events_of
-from tts2face.studio.styles import Styles
-from tts2face.studio.take_store import (
+from tts2face.studio.projects.importing import add_recording
+from tts2face.studio.puppetry.store import (
     FAILED,
     FILM,
     PREVIEW,
@@ -34,6 +31,9 @@ from tts2face.studio.take_store import (
     TakeEntry,
     TakeStore,
 )
+from tts2face.studio.requests import events_of
+from tts2face.studio.styles.palette_store import SUFFIXES
+from tts2face.studio.styles.styles import Styles
 from tts2face.studio.take_tools import run_take_process
 
 QUIET_RATE = 8000  # Hz of the silence that a take without sound has on the stage, whose clock it is

@@ -1,0 +1,1 @@
+"""Projects: edits, previews, files, and where they are kept."""

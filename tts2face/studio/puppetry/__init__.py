@@ -1,0 +1,1 @@
+"""Takes of a person who moves the head, recorded or live."""

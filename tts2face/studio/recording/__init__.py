@@ -1,0 +1,1 @@
+"""Recordings of a person, and the talkers that are built of them."""

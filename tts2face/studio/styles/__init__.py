@@ -1,0 +1,1 @@
+"""Own styles of a palette."""
