@@ -12,9 +12,10 @@ from fastapi.telemetry import TelemetryConfig
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
+from lexicon.errors import Tts2faceError
 from tts2face import __version__
 from tts2face.service.access.guard import Guard
-from tts2face.service.errors import DOCUMENTED, RefusedError, error_body
+from tts2face.service.errors import DOCUMENTED, RefusedError, as_refused, error_body
 from tts2face.service.routes import clips, headtts, health, jobs, live, openai_speech, resources, results
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.state import ServiceState
@@ -62,12 +63,18 @@ def create_app(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> FastA
     for part in (openai_speech, clips, headtts, live, jobs, results, resources, health):
         app.include_router(part.router)
     app.add_exception_handler(RefusedError, _answer_refused)
+    app.add_exception_handler(Tts2faceError, _answer_error)
     app.add_exception_handler(RequestValidationError, _answer_invalid)
     app.add_exception_handler(HTTPException, _answer_http)
     for mount in mounts:
         mount(app, state)
     app.add_middleware(Guard, state=state)
     return app
+
+
+async def _answer_error(request: HttpRequest, error: Exception) -> JSONResponse:
+    assert isinstance(error, Tts2faceError)
+    return await _answer_refused(request, as_refused(error))
 
 
 async def _answer_refused(request: HttpRequest, error: Exception) -> JSONResponse:

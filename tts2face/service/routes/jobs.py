@@ -18,7 +18,6 @@ from fastapi.responses import JSONResponse, Response, StreamingResponse
 from pydantic import BaseModel, ValidationError
 from starlette.datastructures import FormData, UploadFile
 
-from lexicon.errors import Tts2faceError
 from tts2face.batch.address import content_address
 from tts2face.jobs.job_client import JobClient
 from tts2face.jobs.job_kinds import media_type
@@ -27,7 +26,7 @@ from tts2face.jobs.resource_check import TALKER
 from tts2face.service.access.guard import VIDEO_PATH
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.access.scopes import require_scope
-from tts2face.service.errors import RefusedError, as_refused
+from tts2face.service.errors import RefusedError
 from tts2face.service.jobs.job_models import EXAMPLE_ID, JobDetail, JobPage, NewJobBody, job_detail, job_view
 from tts2face.service.jobs.webhooks import check_webhook
 from tts2face.service.orders.job_kinds import JOB_KINDS
@@ -107,10 +106,7 @@ async def _queue(request: HttpRequest, idempotency_key: str | None, kinds: Mappi
         folder = await stack.enter_async_context(upload_folder(state.settings))
         order = JobOrder(state, key, _parse(kind.model, json.dumps(asked.request)), Upload(folder))
         await _add_files(kind, order, form)
-        try:
-            content = await kind.prepare(order)
-        except Tts2faceError as wrong:
-            raise as_refused(wrong) from wrong
+        content = await kind.prepare(order)
         record, is_new = await service.call(lambda client: _submit(client, order, asked, content, idempotency_key))
         if is_new:
             state.limits.add_speech(key, expected_speech_s(order))

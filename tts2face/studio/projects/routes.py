@@ -13,10 +13,10 @@ from fastapi import APIRouter, Body, File, Form, Query, UploadFile
 from fastapi import Request as HttpRequest
 from fastapi.responses import FileResponse, JSONResponse, Response
 
-from lexicon.errors import InputError, Tts2faceError
+from lexicon.errors import InputError
 from tts2face.project.project_file import project_json
 from tts2face.service.access.page_headers import PAGES
-from tts2face.service.errors import RefusedError, as_refused
+from tts2face.service.errors import RefusedError
 from tts2face.service.uploads.upload_folder import BLOCK_BYTES
 from tts2face.studio.projects.archive import archive
 from tts2face.studio.projects.importing import import_file, import_text
@@ -38,18 +38,12 @@ def _studio(request: HttpRequest) -> Studio:
 
 @asynccontextmanager
 async def opened(request: HttpRequest, project: str) -> AsyncIterator[Workspace]:
-    """The project of a request; errors become answers."""
-    with_project = False
+    """The project of a request."""
     try:
         workspace = await _studio(request).open(request.state.key, project)
-        with_project = True
-        yield workspace
     except InputError as wrong:
-        if not with_project:
-            raise RefusedError(404, "not_found", str(wrong)) from wrong
-        raise as_refused(wrong) from wrong
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+        raise RefusedError(404, "not_found", str(wrong)) from wrong
+    yield workspace
 
 
 @router.get("/projects")
@@ -241,7 +235,4 @@ def _state(workspace: Workspace) -> dict[str, Any]:
 
 
 async def _made(number: Any) -> dict[str, str]:
-    try:
-        return {"id": await number}
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    return {"id": await number}

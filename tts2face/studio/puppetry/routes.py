@@ -9,9 +9,8 @@ from fastapi import APIRouter, Body, Query, WebSocket
 from fastapi import Request as HttpRequest
 from fastapi.responses import FileResponse, Response
 
-from lexicon.errors import InputError, Tts2faceError
+from lexicon.errors import InputError
 from tts2face.service.access.page_headers import TAKES
-from tts2face.service.errors import as_refused
 from tts2face.studio.puppetry.live_camera import follow_camera
 from tts2face.studio.puppetry.store import FILM, SOUND, TABLE
 from tts2face.studio.puppetry.takes import Takes
@@ -38,10 +37,7 @@ async def list_takes(request: HttpRequest) -> list[dict[str, Any]]:
 @router.get("/face.glb")
 async def face(request: HttpRequest) -> FileResponse:
     """The default head with a morph target for each channel of takes."""
-    try:
-        path = await request.app.state.studio.plain_face(request.state.key)
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    path = await request.app.state.studio.plain_face(request.state.key)
     return FileResponse(path, media_type="model/gltf-binary", headers={"Cache-Control": "private, max-age=31536000"})
 
 
@@ -50,73 +46,53 @@ async def add_take(request: HttpRequest, name: Annotated[str, Query(max_length=2
     """A new take: a video, or a Live Link Face table (text/csv)."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     suffix = {**SUFFIXES, "text/csv": ".csv"}.get(kind)
-    try:
-        if suffix is None:
-            raise InputError(f"a take must be {', '.join(SUFFIXES)} or text/csv, not {kind[:40]!r}; convert it")
-        with tempfile.TemporaryDirectory(prefix="tts2face-take-") as folder:
-            upload = Path(folder, "upload")
-            await receive_take(request.stream(), upload)
-            entry = await _takes(request).add(request.state.key, upload, suffix, name)
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    if suffix is None:
+        raise InputError(f"a take must be {', '.join(SUFFIXES)} or text/csv, not {kind[:40]!r}; convert it")
+    with tempfile.TemporaryDirectory(prefix="tts2face-take-") as folder:
+        upload = Path(folder, "upload")
+        await receive_take(request.stream(), upload)
+        entry = await _takes(request).add(request.state.key, upload, suffix, name)
     return {"id": entry.id}
 
 
 @router.put("/{number}/sound", status_code=204)
 async def add_sound(request: HttpRequest, number: str) -> Response:
     """The sound of a take, or a video that has it."""
-    try:
-        with tempfile.TemporaryDirectory(prefix="tts2face-take-") as folder:
-            upload = Path(folder, "upload")
-            await receive_take(request.stream(), upload)
-            await _takes(request).add_sound(request.state.key, number, upload)
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    with tempfile.TemporaryDirectory(prefix="tts2face-take-") as folder:
+        upload = Path(folder, "upload")
+        await receive_take(request.stream(), upload)
+        await _takes(request).add_sound(request.state.key, number, upload)
     return Response(status_code=204)
 
 
 @router.get("/{number}/preview")
 async def preview(request: HttpRequest, number: str) -> Response:
     """The take as a preview bundle."""
-    try:
-        content = await _takes(request).preview(request.state.key, number)
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    content = await _takes(request).preview(request.state.key, number)
     return Response(content, media_type="application/octet-stream")
 
 
 @router.post("/{number}/film", status_code=202)
 async def render(request: HttpRequest, number: str) -> dict[str, str]:
     """Render a take."""
-    try:
-        _takes(request).film(request.state.key, number)
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    _takes(request).film(request.state.key, number)
     return {"state": "waiting"}
 
 
 @router.post("/{number}/style", status_code=204)
 async def make_style(request: HttpRequest, number: str) -> Response:
     """Make the take the one of which a style is made (`tts2face.studio.styles.routes`)."""
-    try:
-        await _takes(request).make_style_take(request.state.key, number)
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    await _takes(request).make_style_take(request.state.key, number)
     return Response(status_code=204)
 
 
 @router.get("/{number}/files/{name}")
 def download(request: HttpRequest, number: str, name: str) -> FileResponse:
     """Table, sound or film of a take."""
-    try:
-        store = _takes(request).store
-        folder, entry = store.folder(request.state.key.name, number), store.entry(request.state.key.name, number)
-        if name not in KINDS or not (folder / name).is_file():
-            raise InputError(
-                f"the take has no file {name[:40]!r}; choose {', '.join(KINDS)}, and render the film first"
-            )
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    store = _takes(request).store
+    folder, entry = store.folder(request.state.key.name, number), store.entry(request.state.key.name, number)
+    if name not in KINDS or not (folder / name).is_file():
+        raise InputError(f"the take has no file {name[:40]!r}; choose {', '.join(KINDS)}, and render the film first")
     shown = "".join(letter if letter.isalnum() else "-" for letter in entry.name)
     return FileResponse(folder / name, media_type=KINDS[name], filename=f"{shown}{Path(name).suffix}")
 
@@ -124,20 +100,14 @@ def download(request: HttpRequest, number: str, name: str) -> FileResponse:
 @router.patch("/{number}", status_code=204)
 def rename(request: HttpRequest, number: str, name: Annotated[str, Body(embed=True)]) -> Response:
     """Rename a take."""
-    try:
-        _takes(request).store.rename(request.state.key.name, number, name)
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    _takes(request).store.rename(request.state.key.name, number, name)
     return Response(status_code=204)
 
 
 @router.delete("/{number}", status_code=204)
 async def remove(request: HttpRequest, number: str) -> Response:
     """Delete a take with all that was made of it."""
-    try:
-        await _takes(request).remove(request.state.key, number)
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    await _takes(request).remove(request.state.key, number)
     return Response(status_code=204)
 
 

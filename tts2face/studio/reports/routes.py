@@ -6,8 +6,8 @@ from fastapi import APIRouter, Body
 from fastapi import Request as HttpRequest
 from fastapi.responses import FileResponse, Response
 
-from lexicon.errors import InputError, Tts2faceError
-from tts2face.service.errors import RefusedError, as_refused
+from lexicon.errors import InputError
+from tts2face.service.errors import RefusedError
 from tts2face.studio.projects.routes import API
 from tts2face.studio.reports.reports import Report, Reports
 
@@ -43,20 +43,14 @@ async def start_report(
     request: HttpRequest, kind: Annotated[str, Body(max_length=40)], model: Annotated[str, Body(max_length=200)]
 ) -> dict[str, Any]:
     """Queue a report."""
-    try:
-        request.app.state.studio.check_scope(request.state.key)
-        return report_state(await _reports(request).add(request.state.key, kind, model))
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    request.app.state.studio.check_scope(request.state.key)
+    return report_state(await _reports(request).add(request.state.key, kind, model))
 
 
 @router.get("/{number}/page")
 async def show_report(request: HttpRequest, number: str) -> FileResponse:
     """A finished report."""
-    try:
-        path = _reports(request).page(_found(request, number))
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    path = _reports(request).page(_found(request, number))
     return FileResponse(path, media_type="text/html", headers=HEADERS)
 
 

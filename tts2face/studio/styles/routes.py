@@ -9,12 +9,11 @@ from fastapi import APIRouter, Body, Query
 from fastapi import Request as HttpRequest
 from fastapi.responses import FileResponse, Response
 
-from lexicon.errors import InputError, Tts2faceError
+from lexicon.errors import InputError
 from lexicon.inputs import parse_json
 from tts2face import catalogue
 from tts2face.models.palette_editing import StyleMix
 from tts2face.service.access.page_headers import STYLES
-from tts2face.service.errors import as_refused
 from tts2face.studio.recording.routes import receive_take
 from tts2face.studio.recording.store import SUFFIXES
 from tts2face.studio.styles.palette_store import FILE
@@ -48,13 +47,10 @@ async def make_style(
 ) -> dict[str, str]:
     """A new style: a mix of others, or of the take, which takes some seconds."""
     styles, key = _styles(request), request.state.key
-    try:
-        if mix is None:
-            await styles.make(key, name)
-            return {"name": name}
-        return {"name": await styles.derive(key, name, parse_mix(mix))}
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    if mix is None:
+        await styles.make(key, name)
+        return {"name": name}
+    return {"name": await styles.derive(key, name, parse_mix(mix))}
 
 
 @router.put("/take/{number}", status_code=201)
@@ -62,15 +58,12 @@ async def put_take(request: HttpRequest, number: str) -> dict[str, str]:
     """A recorded take in place of an earlier one; the number, by which recorders name prompts, does not matter."""
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     suffix = {**SUFFIXES, "text/csv": ".csv"}.get(kind)
-    try:
-        if suffix is None:
-            raise InputError(f"a take must be {', '.join(SUFFIXES)} or text/csv, not {kind[:40]!r}; convert it")
-        with tempfile.TemporaryDirectory(prefix="tts2face-take-") as folder:
-            upload = Path(folder, "upload")
-            await receive_take(request.stream(), upload)
-            await _styles(request).add_take(request.state.key, upload, suffix)
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    if suffix is None:
+        raise InputError(f"a take must be {', '.join(SUFFIXES)} or text/csv, not {kind[:40]!r}; convert it")
+    with tempfile.TemporaryDirectory(prefix="tts2face-take-") as folder:
+        upload = Path(folder, "upload")
+        await receive_take(request.stream(), upload)
+        await _styles(request).add_take(request.state.key, upload, suffix)
     return {"state": "checking"}
 
 
@@ -80,7 +73,7 @@ def get_take(request: HttpRequest, number: str) -> Response:
     path = _styles(request).store.take(request.state.key.name)
     kinds = {suffix: kind for kind, suffix in SUFFIXES.items()}
     if path is None:
-        raise as_refused(InputError("there is no take; record or upload one"))
+        raise InputError("there is no take; record or upload one")
     return FileResponse(path, media_type=kinds.get(path.suffix, "application/octet-stream"), headers=NO_STORE)
 
 
@@ -96,47 +89,35 @@ def download_palette(request: HttpRequest) -> FileResponse:
     """The palette with the own styles and the shipped ones."""
     path = _styles(request).store.path(request.state.key.name)
     if not path.is_file():
-        raise as_refused(InputError("you have no own styles yet; make one first"))
+        raise InputError("you have no own styles yet; make one first")
     return FileResponse(path, filename=FILE)
 
 
 @router.get("/mix.webp")
 async def draw_mix(request: HttpRequest, mix: Annotated[str, Query(max_length=4000)]) -> Response:
     """Moving picture of a mix, an object of JSON, that is not kept."""
-    try:
-        content = await _styles(request).draw_mix(request.state.key, parse_mix(parse_json(mix, "the mix")))
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    content = await _styles(request).draw_mix(request.state.key, parse_mix(parse_json(mix, "the mix")))
     return Response(content, media_type="image/webp")
 
 
 @router.get("/{name}/swatch.webp")
 async def swatch(request: HttpRequest, name: str) -> FileResponse:
     """Moving picture of a style: 20 instants, a tenth of a second apart, one beside the other."""
-    try:
-        path = await _styles(request).swatch(request.state.key, name)
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    path = await _styles(request).swatch(request.state.key, name)
     return FileResponse(path, media_type="image/webp", headers={"Cache-Control": "private, max-age=86400"})
 
 
 @router.patch("/{name}", status_code=204)
 async def rename(request: HttpRequest, name: str, new: Annotated[str, Body(embed=True, alias="name")]) -> Response:
     """Rename an own style, in projects, too."""
-    try:
-        await _styles(request).rename(request.state.key, name, new)
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    await _styles(request).rename(request.state.key, name, new)
     return Response(status_code=204)
 
 
 @router.delete("/{name}", status_code=204)
 async def remove(request: HttpRequest, name: str) -> Response:
     """Delete an own style, and what is painted in it."""
-    try:
-        await _styles(request).remove(request.state.key, name)
-    except Tts2faceError as wrong:
-        raise as_refused(wrong) from wrong
+    await _styles(request).remove(request.state.key, name)
     return Response(status_code=204)
 
 
