@@ -8,6 +8,7 @@ from nicegui import ui
 from tts2face.studio.pages.frame import dark_button, heading, icon_button, shown_errors
 from tts2face.studio.pages.open_page import OpenPage
 from tts2face.studio.projects.renders import DONE, RUNNING, WAITING, Render, formats
+from tts2face.studio.projects.workspace import Workspace
 
 CLOCK = 'import("tts2face-studio/clock.js").then((m) => '
 TOGGLE_SIDES = 'import("tts2face-studio/preview.js").then((m) => m.sides.toggle())'
@@ -81,8 +82,7 @@ class Bar:
         workspace = self._page.workspace
         if self._name.value != workspace.project.name:
             self._name.value = workspace.project.name
-        making = workspace.preview.is_running
-        self._saved.set_text("Making the preview" if making else "Saved" if workspace.is_saved else "Saving")
+        self._saved.set_text(_progress(workspace))
         self._ab.set_visibility(workspace.comparison.is_ready)
         self._undo.set_enabled(bool(workspace.history.past))
         self._redo.set_enabled(bool(workspace.history.future))
@@ -181,3 +181,11 @@ def _show_help() -> None:
         ui.button("Close", on_click=dialog.close).props("flat autofocus")
     dialog.on("hide", dialog.delete)
     dialog.open()
+
+
+def _progress(workspace: Workspace) -> str:
+    if workspace.save_error:
+        return f"Not saved, trying again: {workspace.save_error}"
+    if workspace.preview.is_running:
+        return "Making the preview"
+    return "Saved" if workspace.is_saved else "Saving"

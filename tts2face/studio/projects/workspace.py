@@ -21,6 +21,7 @@ from tts2face.studio.projects.store import ProjectStore
 from tts2face.studio.requests import OPTION_PARTS, check_options, project_work
 
 SAVE_S = 0.5  # between an edit and the time at which it is on disk
+SAVE_AGAIN_S = 5.0  # after a failure, such as a full disk
 CONTINUE_S = 1.5  # within which edits of the same kind are one step of the history
 MOVE_S = 0.3  # within which an element that is removed and added has been moved
 LEASE_S = 45.0  # after the last sign of life of a tab, for which it stays the one that edits
@@ -50,6 +51,7 @@ class Workspace:
         self.listeners: set[Listener] = set()
         self._save_task: asyncio.Task[None] | None = None
         self._saved: History = self.history
+        self.save_error = ""  # why the last edits are not on disk, while that is tried again
         self._edited_at, self._last_kind = -CONTINUE_S, ""
         self._editor, self._lease_until = "", 0.0
         self._turn = asyncio.Lock()
@@ -136,6 +138,7 @@ class Workspace:
             history = self.history
             await asyncio.to_thread(self._store.write, self.id, history)
             self._saved = history
+        self.save_error = ""
         self._notify("saved")
 
     def revise(self, change: Callable[[Project], Project]) -> None:
@@ -152,7 +155,7 @@ class Workspace:
         self.comparison.preview.cancel()
         if self._save_task is not None:
             self._save_task.cancel()
-        await self.save()
+        await self._try_to_save()
 
     def tell_removed(self) -> None:
         """Tell pages that the project is gone."""
@@ -203,11 +206,18 @@ class Workspace:
 
     async def _save_later(self) -> None:
         await asyncio.sleep(SAVE_S)
+        while not await self._try_to_save():
+            await asyncio.sleep(SAVE_AGAIN_S)
+
+    async def _try_to_save(self) -> bool:
         try:
             await self.save()
         except Tts2faceError as wrong:
-            log_event("project not saved", project=self.id, reason=str(wrong))
+            self.save_error = str(wrong)
+            log_event("project not saved", project=self.id, reason=self.save_error)
             self._notify("failed")
+            return False
+        return True
 
     async def _checked(self, edit: Edit) -> Edit:
         kind = edit.get("kind")

@@ -1,0 +1,71 @@
+"""Saving of an open project while the disk refuses it."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from lexicon.errors import BackendError
+from tts2face.project.project import Project
+from tts2face.service.access.keys import LOCAL_KEY
+from tts2face.service.settings import ServiceSettings
+from tts2face.service.state import ServiceState
+from tts2face.studio.projects import workspace as opened
+from tts2face.studio.projects.bundle import PieceMemory
+from tts2face.studio.projects.history import History
+from tts2face.studio.projects.store import ProjectStore
+from tts2face.studio.projects.workspace import Workspace
+
+
+class FullDisk(ProjectStore):
+    """Refuses to write so many times."""
+
+    n_refused = 0
+
+    def write(self, number: str, history: History) -> None:
+        if self.n_refused:
+            self.n_refused -= 1
+            raise BackendError("the disk is full; free some space")
+        super().write(number, history)
+
+
+@pytest.fixture
+def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FullDisk:
+    monkeypatch.setattr(opened, "SAVE_S", 0.0)
+    monkeypatch.setattr(opened, "SAVE_AGAIN_S", 0.01)
+    return FullDisk(tmp_path)
+
+
+def rename(store: FullDisk, number: str, *, n_refused: int, closes_at_once: bool) -> list[str]:
+    """What a page is told while a project is renamed and closed."""
+
+    async def run() -> list[str]:
+        workspace = Workspace(
+            ServiceState(ServiceSettings(processes=1)), store, LOCAL_KEY, number, PieceMemory(1000)
+        )  # fmt: skip
+        told = list[str]()
+        workspace.listeners.add(lambda what: told.append(f"{what} {workspace.save_error}".strip()))
+        store.n_refused = n_refused
+        await workspace.edit({"kind": "name", "name": "Second"})
+        while not closes_at_once and not workspace.is_saved:
+            await asyncio.sleep(0.001)
+        await workspace.close()
+        return told
+
+    return asyncio.run(run())
+
+
+def test_a_full_disk_is_told_and_tried_again(store: FullDisk) -> None:
+    number = store.create(LOCAL_KEY.name, Project(name="First"))
+    told = rename(store, number, n_refused=2, closes_at_once=False)
+    failed = "failed the disk is full; free some space"
+    assert [one for one in told if one != "project"][:3] == [failed, failed, "saved"]
+    assert store.read(number, LOCAL_KEY.name).present.name == "Second"
+
+
+def test_closing_saves_at_once_and_survives_a_full_disk(store: FullDisk) -> None:
+    number = store.create(LOCAL_KEY.name, Project(name="First"))
+    rename(store, number, n_refused=1, closes_at_once=True)
+    assert store.read(number, LOCAL_KEY.name).present.name == "First"
+    rename(store, number, n_refused=0, closes_at_once=True)
+    assert store.read(number, LOCAL_KEY.name).present.name == "Second"
