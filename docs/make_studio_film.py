@@ -39,7 +39,7 @@ FILM_SIZE = (800, 450)
 FPS = 12
 TICKS = 100  # a second, of a GIF's clock
 N_PALETTE_FRAMES = 8
-N_EXACT, N_SHADES, N_RARE = 16, 196, 44  # colours of a palette, 256 in all
+N_EXACT, N_SHADES, N_RARE = 16, 220, 20  # colours of a palette, 256 in all
 TEXT = "We were away a year ago, but Bob may move five big maps."
 CORRECTED = "/mɑps/"
 CLOCK = "const { clock } = await import('tts2face-studio/clock.js'); return "
@@ -156,8 +156,8 @@ def palette(pictures: list[Image.Image]) -> NDArray[np.uint8]:
     sheet = Image.fromarray(np.concatenate([np.asarray(picture) for picture in pictures]))
     numbers, counts = np.unique(packed(np.asarray(sheet)), return_counts=True)
     parts = [unpacked(numbers[np.argsort(-counts)[:N_EXACT]])]
-    for count, method in ((N_SHADES, Image.Quantize.MEDIANCUT), (N_RARE, Image.Quantize.MAXCOVERAGE)):
-        found = sheet.quantize(count, method, dither=Image.Dither.NONE).getpalette() or []
+    for count, method, steps in ((N_SHADES, Image.Quantize.MEDIANCUT, 3), (N_RARE, Image.Quantize.MAXCOVERAGE, 0)):
+        found = sheet.quantize(count, method, kmeans=steps, dither=Image.Dither.NONE).getpalette() or []
         parts.append(np.reshape(found, (-1, 3))[:count])
     return np.concatenate(parts).astype(np.uint8)
 
@@ -277,13 +277,9 @@ def export(film: Film, pictures: Path) -> None:
 
 
 def keep(browser: Browser, path: Path) -> None:
-    """Write a picture of the window with few colours."""
+    """Write a picture of the window."""
     browser.run("document.getElementById('film-pointer')?.remove()")
-    picture = screenshot(browser)
-    colours = palette([picture])
-    small = Image.fromarray(indices(picture, colours), "P")
-    small.putpalette(colours.ravel().tolist())
-    small.save(path, optimize=True)
+    screenshot(browser).save(path, optimize=True)
 
 
 def animate_pictures(browser: Browser, page: Page, pictures: Path) -> None:

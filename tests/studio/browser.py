@@ -19,8 +19,9 @@ import pytest
 from PIL import Image
 
 CLICK = """
-    const named = (one) => (one.innerText.trim() || '').startsWith(arguments[0])
-        || (one.getAttribute('aria-label') || '').startsWith(arguments[0]);
+    // the name of an icon is a line of its own
+    const lines = (one) => [...one.innerText.split('\\n'), one.getAttribute('aria-label') || ''];
+    const named = (one) => lines(one).some((line) => line.trim().startsWith(arguments[0]));
     const all = [...document.querySelectorAll('button, a, [role=option]')].filter(
         (one) => one.offsetParent && !one.disabled && named(one));
     if (all.length) all[0].click();

@@ -139,7 +139,7 @@ def check_reload(page: Page, project: Project) -> None:
     assert page.browser.run(PREVIEW + "preview.phones.filter((one) => one[0] === 'ɑ').length") > 1
     page.browser.wait("""return [...document.querySelectorAll('.studio-grid [role=gridcell]')].some(
         (one) => one.innerText === 'Brows lane, 1 elements')""")
-    assert page.browser.run("return !document.querySelector('#studio-undo').disabled")
+    page.browser.wait("return !document.querySelector('#studio-undo').disabled")
     reloaded.focus()
 
 
