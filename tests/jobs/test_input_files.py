@@ -1,8 +1,10 @@
 """Files of jobs on another machine than the one that queued their segments."""
 
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from threading import Barrier
 
 import pytest
 
@@ -53,3 +55,17 @@ def test_a_removed_copy_is_fetched_again(stores: tuple[BlobStore, BlobStore], tm
     assert first == tmp_path / "work" / sha256 / "audio.wav"
     shutil.rmtree(tmp_path / "cache")  # a full cache
     assert place_file(stores, sha256, "audio.wav", tmp_path / "work").read_bytes() == b"sound"
+
+
+def test_segments_place_the_same_file_at_the_same_time(stores: tuple[BlobStore, BlobStore], tmp_path: Path) -> None:
+    sha256, n_threads = stores[0].put(b"sound"), 8
+    stores[0].fetch(sha256)
+    with ThreadPoolExecutor(n_threads) as threads:
+        for number in range(50):
+            begin = Barrier(n_threads)
+
+            def place(folder: Path = tmp_path / str(number), begin: Barrier = begin) -> bytes:
+                begin.wait()
+                return place_file(stores, sha256, "one.wav", folder).read_bytes()
+
+            assert {one.result() for one in [threads.submit(place) for _ in range(n_threads)]} == {b"sound"}

@@ -6,6 +6,7 @@ a worker on another machine can fetch them.
 
 import contextlib
 import os
+import secrets
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
@@ -33,11 +34,12 @@ def place_file(blobs: Sequence[BlobStore], sha256: str, name: str, folder: Path)
         return path
     found = fetch_file(blobs, sha256)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.unlink(missing_ok=True)
+    placed = path.with_name(f".{secrets.token_hex(8)}")  # segments that need the same file place it at the same time
     try:
-        os.symlink(found.resolve(), path)
+        os.symlink(found.resolve(), placed)
     except OSError:  # no links here
-        shutil.copyfile(found, path)
+        shutil.copyfile(found, placed)
+    placed.replace(path)
     return path
 
 
