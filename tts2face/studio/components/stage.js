@@ -9,7 +9,7 @@ import { addStyle } from "tts2face-studio/style.js";
 
 const VIEWS = { front: "Front", "three-quarter": "Three-quarter", profile: "Profile", close: "Close-up" };
 
-const SLOW_MS = 21, FAST_MS = 18; // between frames of the browser: fewer pixels above, more below
+const SLOW_MS = 18, FAST_MS = 17; // between frames of the browser, 60 a second: fewer pixels above, more below
 const ADAPT_MS = 400; // between two changes of the number of pixels
 const MAKING_MS = 1500; // after which a face that does not come is being made
 const REST_MS = 250; // at rest before the sharp picture
