@@ -14,8 +14,7 @@ from tts2face.service.access.page_headers import TAKES
 from tts2face.studio.puppetry.live_camera import follow_camera
 from tts2face.studio.puppetry.store import FILM, SOUND, TABLE
 from tts2face.studio.puppetry.takes import Takes
-from tts2face.studio.recording.routes import receive_take
-from tts2face.studio.recording.store import SUFFIXES
+from tts2face.studio.recording.routes import receive_take, uploaded_take
 
 KINDS = {TABLE: "text/csv", SOUND: "audio/wav", FILM: "video/mp4"}
 SOUND_TYPES = ("audio/", "video/")
@@ -44,13 +43,7 @@ async def face(request: HttpRequest) -> FileResponse:
 @router.put("/new", status_code=201)
 async def add_take(request: HttpRequest, name: Annotated[str, Query(max_length=200)] = "") -> dict[str, str]:
     """A new take: a video, or a Live Link Face table (text/csv)."""
-    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    suffix = {**SUFFIXES, "text/csv": ".csv"}.get(kind)
-    if suffix is None:
-        raise InputError(f"a take must be {', '.join(SUFFIXES)} or text/csv, not {kind[:40]!r}; convert it")
-    with tempfile.TemporaryDirectory(prefix="tts2face-take-") as folder:
-        upload = Path(folder, "upload")
-        await receive_take(request.stream(), upload)
+    async with uploaded_take(request) as (upload, suffix):
         entry = await _takes(request).add(request.state.key, upload, suffix, name)
     return {"id": entry.id}
 

@@ -2,7 +2,9 @@
 
 import os
 import secrets
+import tempfile
 from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager
 from pathlib import Path
 
 from fastapi import APIRouter, Request
@@ -64,6 +66,25 @@ def recording_router(recordings: Recordings, owner: Owner) -> APIRouter:
         return FileResponse(path, media_type=kind, headers={**NO_STORE, **headers})
 
     return router
+
+
+@asynccontextmanager
+async def uploaded_take(request: Request) -> AsyncIterator[tuple[Path, str]]:
+    """File of a take that a request holds, and its suffix: a video, or a Live Link Face table.
+
+    Raises
+    ------
+    InputError
+        It is of another kind.
+    """
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    suffix = {**SUFFIXES, "text/csv": ".csv"}.get(kind)
+    if suffix is None:
+        raise InputError(f"a take must be {', '.join(SUFFIXES)} or text/csv, not {kind[:40]!r}; convert it")
+    with tempfile.TemporaryDirectory(prefix="tts2face-take-") as folder:
+        upload = Path(folder, "upload")
+        await receive_take(request.stream(), upload)
+        yield upload, suffix
 
 
 async def receive_take(parts: AsyncIterator[bytes], target: Path) -> None:

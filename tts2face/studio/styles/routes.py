@@ -1,8 +1,6 @@
 """Addresses of own styles: the take in work, moving pictures, derived styles, the palette file."""
 
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query
@@ -14,7 +12,7 @@ from lexicon.inputs import parse_json
 from tts2face import catalogue
 from tts2face.models.palette_editing import StyleMix
 from tts2face.service.access.page_headers import STYLES
-from tts2face.studio.recording.routes import receive_take
+from tts2face.studio.recording.routes import uploaded_take
 from tts2face.studio.recording.store import SUFFIXES
 from tts2face.studio.styles.palette_store import FILE
 from tts2face.studio.styles.styles import Styles, TakeWork
@@ -56,13 +54,7 @@ async def make_style(
 @router.put("/take/{number}", status_code=201)
 async def put_take(request: HttpRequest, number: str) -> dict[str, str]:
     """A recorded take in place of an earlier one; the number, by which recorders name prompts, does not matter."""
-    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    suffix = {**SUFFIXES, "text/csv": ".csv"}.get(kind)
-    if suffix is None:
-        raise InputError(f"a take must be {', '.join(SUFFIXES)} or text/csv, not {kind[:40]!r}; convert it")
-    with tempfile.TemporaryDirectory(prefix="tts2face-take-") as folder:
-        upload = Path(folder, "upload")
-        await receive_take(request.stream(), upload)
+    async with uploaded_take(request) as (upload, suffix):
         await _styles(request).add_take(request.state.key, upload, suffix)
     return {"state": "checking"}
 
