@@ -8,7 +8,6 @@ fields of `BuildOrder`, and ends with the parent process; lines of JSON on stand
 
 import json
 import os
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +17,7 @@ from corpus_tools.build_talker import PROVENANCE, BuiltTalker, build_talker, con
 from corpus_tools.message_lines import line_progress, write_line
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, Tts2faceError
-from tts2face.child_process import exit_after
+from tts2face.child_process import received_order
 from tts2face.jobs.refused_file import RefusedFileError
 from tts2face.jobs.resource_check import TALKER, check_resource
 from tts2face.limited_process import ProcessLimits, limit_process
@@ -91,10 +90,8 @@ def _result(built: BuiltTalker) -> dict[str, Any]:
 
 def main() -> None:
     """Build one talker."""
-    order = BuildOrder(**json.loads(sys.stdin.readline()))
-    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # whatever a library prints must not mix with the messages
-    exit_after(sys.stdin.read)
+    received, out = received_order()
+    order = BuildOrder(**received)
     limit_process(ProcessLimits(**order.limits))
     build(order, out)
     os._exit(0)  # the thread that waits for the parent does not end

@@ -5,9 +5,7 @@ the parent process; standard output has lines of JSON: the progress (``stage``, 
 ``is_result``, or the ``error`` and its ``message``.
 """
 
-import json
 import os
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +15,7 @@ from typing import TextIO
 from corpus_tools.message_lines import line_progress, write_line
 from corpus_tools.recordings.observation import Observation, Quality
 from lexicon.errors import InputError, Tts2faceError
-from tts2face.child_process import exit_after
+from tts2face.child_process import received_order
 from tts2face.limited_process import ProcessLimits, limit_process
 from tts2face.models.talker import Talker, load_talker
 from tts2face.storage.files import write_atomically
@@ -138,10 +136,8 @@ def report(order: ReportOrder, out: TextIO) -> None:
 
 def main() -> None:
     """Write one report."""
-    order = ReportOrder(**json.loads(sys.stdin.readline()))
-    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # whatever a library prints must not mix with the messages
-    exit_after(sys.stdin.read)
+    received, out = received_order()
+    order = ReportOrder(**received)
     limit_process(ProcessLimits(**order.limits))
     report(order, out)
     os._exit(0)  # the thread that waits for the parent does not end

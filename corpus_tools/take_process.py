@@ -12,7 +12,6 @@ has any (``has_sound``). ``{"kind": "film", "take", "sound", "out"}`` renders a 
 
 import json
 import os
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +22,7 @@ from corpus_tools.decomposition.gesture_take import check_gesture_take
 from corpus_tools.message_lines import line_progress, write_line
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import Tts2faceError
-from tts2face.child_process import exit_after
+from tts2face.child_process import received_order
 from tts2face.limited_process import ProcessLimits, limit_process
 from tts2face.models.palette import load_palette
 from tts2face.types import Progress
@@ -95,10 +94,7 @@ def _options(order: Mapping[str, Any]) -> RunOptions:
 
 def main() -> None:
     """Work on one order."""
-    order = json.loads(sys.stdin.readline())
-    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # whatever a library prints must not mix with the messages
-    exit_after(sys.stdin.read)
+    order, out = received_order()
     limit_process(replace(LIMITS, cpu_s=int(order.get("cpu_s", LIMITS.cpu_s))))
     os.nice(LOW_PRIORITY)  # streams go first
     try:

@@ -1,5 +1,6 @@
 """Child processes that answer requests: their cores, environment and pipes, and their end with their parent."""
 
+import io
 import json
 import os
 import queue
@@ -7,7 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TextIO
 
 # glibc returns blocks of 1 MiB and more to the system, instead of keeping those of each thread (decision 064).
 RETURNED_BLOCKS = {"MALLOC_MMAP_THRESHOLD_": "1048576", "MALLOC_TRIM_THRESHOLD_": "1048576"}
@@ -45,6 +46,17 @@ def received_requests() -> "queue.Queue[tuple[Any, float]]":
 
     exit_after(read_lines)
     return requests
+
+
+def received_order() -> tuple[dict[str, Any], TextIO]:
+    """The order of a process that gets only one, a line of JSON on standard input, and the stream for its messages.
+
+    This process exits when the input ends.
+    """
+    order = json.loads(sys.stdin.readline())
+    messages = io.TextIOWrapper(claim_standard_output(), encoding="utf-8")
+    exit_after(sys.stdin.read)
+    return order, messages
 
 
 def exit_after(wait: Callable[[], object]) -> None:

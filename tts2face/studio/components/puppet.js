@@ -1,6 +1,7 @@
 // A camera that drives the head: its pictures go to the studio's server, whose tracker answers with poses. Beside it,
 // takes are recorded, and played on the stage.
 
+import { openCamera, streamRecorder } from "tts2face-studio/camera.js";
 import { clock } from "tts2face-studio/clock.js";
 import { metrics } from "tts2face-studio/metrics.js";
 import { loadPreview, preview } from "tts2face-studio/preview.js";
@@ -11,7 +12,6 @@ const MAX_WAITING = 2; // pictures on their way: one that is read, and the next 
 const MEASURED = 60; // pictures of which the delay and the rate are shown
 const MAX_TAKE_S = 120;
 const TAIL_MS = 200; // recorded after the stop, so that the last sound is whole
-const KINDS = ["video/webm;codecs=vp8,opus", "video/webm", "video/mp4"];
 const REST = { live: "The head follows you.", "no face": "No face is found; come into the picture." };
 
 export default {
@@ -76,17 +76,10 @@ export default {
       this.problem = "";
       this.mode = "starting";
       try {
-        if (!navigator.mediaDevices) throw new Error("insecure");
-        this.stream = await navigator.mediaDevices.getUserMedia({
-          video: { width: { ideal: 640 }, height: { ideal: 480 }, frameRate: { ideal: 30 } },
-          audio: { echoCancellation: false, noiseSuppression: false, autoGainControl: false },
-        });
+        this.stream = await openCamera();
       } catch (refused) {
         this.mode = "off";
-        this.problem =
-          refused.message === "insecure"
-            ? "The browser gives the camera to pages of this computer or of https only; open the studio there."
-            : "The camera or the microphone cannot be used; allow both for this page, and close other programs that use them.";
+        this.problem = refused.message;
         return;
       }
       this.$refs.video.srcObject = this.stream;
@@ -180,10 +173,7 @@ export default {
         setTimeout(() => this.recorder.stop(), TAIL_MS);
         return;
       }
-      const kind = KINDS.find((one) => MediaRecorder.isTypeSupported(one)), parts = [];
-      this.recorder = new MediaRecorder(this.stream, { mimeType: kind, videoBitsPerSecond: 4e6 });
-      this.recorder.ondataavailable = (event) => parts.push(event.data);
-      this.recorder.onstop = () => this.store(new Blob(parts, { type: kind }));
+      this.recorder = streamRecorder(this.stream, (recording) => this.store(recording));
       this.recorder.start();
       this.began = performance.now();
       this.seconds = 0;

@@ -1,8 +1,10 @@
 // Records takes of prompts with the webcam and the microphone, and sends each while the next one is read.
+
+import { openCamera, streamRecorder } from "tts2face-studio/camera.js";
+
 const COUNT = 3; // numbers before a take
 const COUNT_MS = 600; // between them
 const TAIL_MS = 300; // recorded after the stop, so that the last sound is whole
-const KINDS = ["video/webm;codecs=vp8,opus", "video/webm", "video/mp4"];
 const HINT = "Press Space, read the sentence after the countdown, and press Space again. What to do better is written here.";
 const STATES = {
   sending: "sending",
@@ -114,16 +116,9 @@ export default {
     async open() {
       this.problem = "";
       try {
-        if (!navigator.mediaDevices) throw new Error("insecure");
-        this.stream = await navigator.mediaDevices.getUserMedia({
-          video: { width: { ideal: 640 }, height: { ideal: 480 }, frameRate: { ideal: 30 } },
-          audio: { echoCancellation: false, noiseSuppression: false, autoGainControl: false },
-        });
+        this.stream = await openCamera();
       } catch (refused) {
-        this.problem =
-          refused.message === "insecure"
-            ? "The browser gives the camera to pages of this computer or of https only; open the studio there."
-            : "The camera or the microphone cannot be used; allow both for this page, and close other programs that use them.";
+        this.problem = refused.message;
         return;
       }
       this.$refs.video.srcObject = this.stream;
@@ -176,11 +171,7 @@ export default {
       this.timer = setTimeout(this.tick, COUNT_MS);
     },
     record() {
-      const kind = KINDS.find((one) => MediaRecorder.isTypeSupported(one));
-      const parts = [];
-      this.recorder = new MediaRecorder(this.stream, { mimeType: kind, videoBitsPerSecond: 4e6 });
-      this.recorder.ondataavailable = (event) => parts.push(event.data);
-      this.recorder.onstop = () => this.send(this.at, new Blob(parts, { type: kind }));
+      this.recorder = streamRecorder(this.stream, (recording) => this.send(this.at, recording));
       this.recorder.start();
       this.began = performance.now();
       this.seconds = 0;

@@ -6,11 +6,13 @@ from typing import Any
 
 from nicegui.element import Element
 
+from tts2face.studio.components.stage import COMPONENTS, MODULES
+
 LONGEST_S = 30.0
 STYLE = Path(__file__).with_name("recorder.css")
 
 
-class Recorder(Element, component="recorder.js"):
+class Recorder(Element, component="recorder.js", esm={MODULES: str(COMPONENTS)}):
     """Prompts, camera and microphone; sends each take by PUT to `upload` followed by the index of its prompt.
 
     Parameters
