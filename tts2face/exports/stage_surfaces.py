@@ -11,8 +11,8 @@ from tts2face.render.materials import EYE_KIND, SKIN, STRANDS
 
 HIDDEN_SKY = 0.045  # share of the sky that a vertex hidden from all sides has in a light field
 HIDDEN_MM = 5.0  # error of hidden skin, which is removed
-SKIN_MM, MOUTH_MM = 0.55, 0.14  # error of skin that no channel moves, and the least one, of lips and lids
-EYE_MM, INSIDE_MM, CLOTH_MM = 0.3, 0.16, 1.2  # of eyeballs; teeth, gums and tongue; clothes
+SKIN_MM, MOUTH_MM = 0.8, 0.2  # error of skin that no channel moves, and the least one, of lips and lids
+EYE_MM, INSIDE_MM, CLOTH_MM = 0.3, 0.25, 1.2  # of eyeballs; teeth, gums and tongue; clothes
 CLOTH_LENGTH_MM = 150.0  # of a surface that is no part of the head
 LEAST_TRIANGLES = 200  # of a surface that is reduced
 N_MOTIONS = 3  # principal motions of a surface, which its triangles interpolate

@@ -9,7 +9,8 @@ import { addStyle } from "tts2face-studio/style.js";
 
 const VIEWS = { front: "Front", "three-quarter": "Three-quarter", profile: "Profile", close: "Close-up" };
 
-const SLOW_MS = 18, FAST_MS = 17; // between frames of the browser, 60 a second: fewer pixels above, more below
+// Mean time between drawn frames, above which fewer pixels are drawn, and below which more.
+const LIMITS_MS = { device: [18, 17], processor: [34.2, 33.5] }; // 60 frames a second, 30 of them drawn
 const ADAPT_MS = 400; // between two changes of the number of pixels
 const MAKING_MS = 1500; // after which a face that does not come is being made
 const REST_MS = 250; // at rest before the sharp picture
@@ -46,7 +47,7 @@ export default {
   async mounted() {
     addStyle();
     this.meter = new Meter("js_ms", "fps");
-    Object.assign(this, { dirty: true, share: 1, interval: 25, adapted: 0, rested: 0, begun: null });
+    Object.assign(this, { dirty: true, share: 1, adapted: 0, rested: 0, drawn: null });
     this.changed = () => (this.dirty = true);
     try {
       this.scene = new StageScene(this.$refs.canvas, this.changed);
@@ -56,6 +57,8 @@ export default {
     }
     pace.isSoftware = this.scene.isSoftware;
     if (pace.isSoftware) this.share = LEAST_SHARE;
+    this.limits = LIMITS_MS[pace.isSoftware ? "processor" : "device"];
+    this.interval = this.limits[0];
     this.stops = [preview.on("change", this.changed), clock.on("seek", this.changed)];
     this.stops.push(comparison.on("change", () => this.showSide()), sides.on(() => this.showSide()));
     this.watchContext();
@@ -173,19 +176,24 @@ export default {
       metrics.time = clock.time;
       scene.setMotion(sides.shown, metrics.time);
       scene.render();
+      this.measure(now);
       metrics.frames = (metrics.frames ?? 0) + 1;
       if (clock.playing) metrics.playing_share = scene.sharpness;
       metrics.is_sharp = scene.sharpness >= 1 && this.rested !== null;
       if (clock.playing) this.meter.add(performance.now() - begin);
     },
 
+    /** Take the time of a frame that was drawn into the mean time between two. */
+    measure(now) {
+      if (this.drawn) this.interval = 0.9 * this.interval + 0.1 * Math.min(now - this.drawn, 200);
+      this.drawn = now;
+    },
+
     /** Fewer pixels while a slow device plays; at rest, after a moment, one sharp picture. */
     adapt() {
       const now = performance.now(), { scene } = this;
-      const busy = clock.playing || this.dirty;
-      if (busy && this.begun) this.interval = 0.9 * this.interval + 0.1 * Math.min(now - this.begun, 200);
-      this.begun = busy ? now : null;
-      if (!busy) {
+      if (!clock.playing && !this.dirty) {
+        this.drawn = null;
         this.rested ??= now;
         if (now - this.rested < REST_MS || scene.sharpness === (scene.isSoftware ? 2 : 1)) return;
         scene.setSharpness(scene.isSoftware ? 2 : 1);
@@ -196,7 +204,8 @@ export default {
       this.rested = null;
       if (now - this.adapted < ADAPT_MS) return;
       this.adapted = now;
-      const step = this.interval > SLOW_MS ? 0.8 : this.interval < FAST_MS ? 1.1 : 1;
+      const [slow, fast] = this.limits;
+      const step = this.interval > slow ? 0.8 : this.interval < fast ? 1.1 : 1;
       this.share = Math.min(Math.max(this.share * step, LEAST_SHARE), 1);
       if (step !== 1) scene.setSharpness(this.share);
     },

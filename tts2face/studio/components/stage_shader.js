@@ -3,6 +3,9 @@
 
 export const LAMPS = 4;
 
+/** Statements for each lamp: SwiftShader reads what a loop indexes one number at a time. */
+const eachLamp = (statements) => Array.from({ length: LAMPS }, (_, k) => statements(k)).join("");
+
 const TONE = `
   uniform float brightness;
   float curve(float light) {
@@ -73,8 +76,13 @@ export const VERTEX = `
   }
 
   void main() {
+    #ifdef EYE
     mat4 joint = joints[int(_skin.x + .5)];
     float follow = _skin.y / 65535.;
+    #else
+    mat4 joint = joints[1]; // the head; what belongs to the body does not follow
+    float follow = _skin.x > .5 ? _skin.y / 65535. : 0.;
+    #endif
     vec4 place = vec4(mix(position, (joint * vec4(position, 1.)).xyz, follow), 1.);
     vec3 n = normalize(normal);
     vNormal = normalize(mix(n, mat3(joint) * n, follow));
@@ -101,24 +109,24 @@ export const VERTEX = `
     #ifdef STRANDS
     vLight *= 1.4;
     #endif
-    float visible[${LAMPS}];
-    for (int k = 0; k < ${LAMPS}; k++) {
-      float facing = dot(n, lamps[k]), turned = clamp((facing + .15) / .4, 0., 1.);
-      float v = 1. - turned + turned * seen[k];
-      visible[k] = v;
+    float facing, turned, across, along, matt;
+    vec3 reach = wrap * vec3(1., .75, .65), soaked;
+    vec4 visible;
+    ${eachLamp((k) => `
+      facing = dot(n, lamps[${k}]), turned = clamp((facing + .15) / .4, 0., 1.);
+      visible[${k}] = 1. - turned + turned * seen[${k}];
       #ifdef STRANDS
-      float across = dot(m, lamps[k]), along = dot(vTangent, lamps[k]);
-      float matt = .55 * sqrt(max(1. - along * along, 0.)) * max(.25 + .75 * across, 0.) + .45 * max(across, 0.);
-      vLight += matt * v * lampColours[k];
+      across = dot(m, lamps[${k}]), along = dot(vTangent, lamps[${k}]);
+      matt = .55 * sqrt(max(1. - along * along, 0.)) * max(.25 + .75 * across, 0.) + .45 * max(across, 0.);
+      vLight += matt * visible[${k}] * lampColours[${k}];
       #else
-      vec3 reach = wrap * vec3(1., .75, .65);
-      vec3 soaked = v + reach * v * (1. - v);
-      vLight += lampColours[k] * soaked * max(dot(m, lamps[k]) + reach, 0.) / (1. + reach);
-      #endif
-    }
+      soaked = visible[${k}] + reach * visible[${k}] * (1. - visible[${k}]);
+      vLight += lampColours[${k}] * soaked * max(dot(m, lamps[${k}]) + reach, 0.) / (1. + reach);
+      #endif`)}
     vExposure = vec4(around, visible[0], visible[2], visible[3]);
     #ifndef STRANDS
-    float facing = max(dot(m, towards), 0.), edge = 1. - facing, edge2 = edge * edge;
+    facing = max(dot(m, towards), 0.);
+    float edge = 1. - facing, edge2 = edge * edge;
     float grazing = (.25 * gloss + (1. - sqrt(sqrt(rough))) * edge2 * edge2 * edge) * .35 * min(gloss * 8., 1.);
     vShine = grazing * around * around * (.7 + .3 * m.y) * sky;
     float lit = gloss * min(around * 1.3, 1.);
@@ -134,7 +142,8 @@ export const VERTEX = `
     vec3 wide = vec3(0.), narrow = vec3(0.);
     #ifdef STRANDS
     vec3 h = normalize(lamps[0] + towards);
-    float along = dot(vTangent, h), across = dot(m, h), shift = -.03; // of brown hair
+    float shift = -.03; // of brown hair
+    along = dot(vTangent, h), across = dot(m, h);
     float arrives = clamp(1.6 * dot(m, lamps[0]) + .35, 0., 1.) * visible[0] * shine;
     float first = along + (shift - .08) * across, other = along + (shift + .14) * across;
     narrow = lampColours[0] * arrives * .085 * pow(max(1. - first * first, 1e-4), 32.);
