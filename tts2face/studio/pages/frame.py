@@ -14,6 +14,13 @@ from tts2face.service.access.page_headers import PAGES
 from tts2face.service.errors import RefusedError
 
 DARK_COOKIE = "tts2face_dark"
+TOP_PAGES = {  # names by address
+    "/": "Projects",
+    "/palette": "Styles",
+    "/puppet": "Puppetry",
+    "/reports": "Reports",
+    "/record": "Record your own talker",
+}
 _NEXT_DARK = {None: True, True: False, False: None}
 _DARK_NAMES = {None: "Colours of the system", True: "Dark", False: "Light"}
 _ICONS = {None: "brightness_auto", True: "dark_mode", False: "light_mode"}
@@ -40,15 +47,31 @@ def dark_button(request: HttpRequest) -> None:
 
 @contextmanager
 def page_bar(request: HttpRequest, title: str, back: tuple[str, str] | None = None) -> Iterator[None]:
-    """Bar at the top of a page with its title; the block adds links; `back`: name and address of the page above."""
+    """Bar at the top of a page with its title; the block adds to it.
+
+    Parameters
+    ----------
+    back
+        Name and address of the page above; without it the bar links to all pages that have none above.
+    """
     with ui.element("header").classes("bar"):
         if back is not None:
             name, address = back
             icon_button("arrow_back", name, lambda: ui.navigate.to(address))
         heading(1, title)
         ui.element("span").classes("grow")
+        if back is None:
+            _top_links(request.url.path.removeprefix(PAGES) or "/")
         yield
         dark_button(request)
+
+
+def _top_links(current: str) -> None:
+    with ui.element("nav").classes("bar-links").props('aria-label="Pages"'):
+        for address, name in TOP_PAGES.items():
+            link = ui.link(name, address)
+            if address == current:
+                link.props("aria-current=page")
 
 
 def icon_button(icon: str, name: str, on_click: Callable[[], object] | None = None) -> ui.button:

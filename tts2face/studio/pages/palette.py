@@ -21,7 +21,7 @@ from tts2face.service.access.keys import ApiKey
 from tts2face.service.access.page_headers import STYLES
 from tts2face.studio.components.recorder import STYLE as RECORDER_STYLE
 from tts2face.studio.components.recorder import Recorder
-from tts2face.studio.pages.frame import begin_page, confirm, dark_button, heading, icon_button, shown_errors
+from tts2face.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
 from tts2face.studio.pages.mix_panel import MixPanel
 from tts2face.studio.projects.importing import SAMPLE_TEXT
 from tts2face.studio.recording.routes import MAX_TAKE_BYTES
@@ -57,13 +57,8 @@ class PalettePage:
 
     def build(self, request: HttpRequest) -> None:
         """Build the page."""
-        with ui.element("header").classes("bar"):
-            heading(1, "Styles")
-            ui.element("span").classes("grow")
-            ui.link("Projects", "/").classes("bar-link")
-            ui.link("Puppetry", "/puppet").classes("bar-link")
-            ui.link("Record your own talker", "/record").classes("bar-link")
-            dark_button(request)
+        with page_bar(request, "Styles"):
+            pass
         with ui.element("div").classes("page-wide") as self._main:
             with ui.element("section").classes("panel").props('aria-label="Palette"'):
                 self._head()

@@ -46,11 +46,6 @@ class ProjectsPage:
         """Build the page."""
         self._studio.prepare()
         with page_bar(request, "tts2face studio"):
-            ui.link("Styles", "/palette").classes("bar-link")
-            ui.link("Puppetry", "/puppet").classes("bar-link")
-            ui.link("Reports", "/reports").classes("bar-link")
-            if "build" in self._key.scopes:
-                ui.link("Record your own talker", "/record").classes("bar-link")
             if self._studio.state.keys:
                 ui.html(
                     f'<form method="post" action="{LOGOUT_PATH}"><button type="submit">Log out</button></form>',

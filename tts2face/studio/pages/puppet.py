@@ -12,7 +12,7 @@ from tts2face.service.access.keys import ApiKey
 from tts2face.service.access.page_headers import TAKES
 from tts2face.studio.components.puppet import Puppet
 from tts2face.studio.components.stage import Stage
-from tts2face.studio.pages.frame import begin_page, confirm, dark_button, heading, icon_button, shown_errors
+from tts2face.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
 from tts2face.studio.pages.palette import ANY_TAKE
 from tts2face.studio.projects.importing import SOUND_SUFFIXES
 from tts2face.studio.puppetry.store import FAILED, FILM, READING, SOUND, TABLE, TakeEntry
@@ -44,12 +44,8 @@ class PuppetPage:
 
     def build(self, request: HttpRequest) -> None:
         """Build the page."""
-        with ui.element("header").classes("bar"):
-            heading(1, "Puppetry")
-            ui.element("span").classes("grow")
-            ui.link("Projects", "/").classes("bar-link")
-            ui.link("Styles", "/palette").classes("bar-link")
-            dark_button(request)
+        with page_bar(request, "Puppetry"):
+            pass
         with ui.element("div").classes("puppet-page"):
             with ui.element("div").classes("stage"):
                 stage = Stage(f"{TAKES}/face.glb?version={__version__}")

@@ -22,7 +22,7 @@ from tts2face.studio.recording.talker_building import CLIP, REPORT, TALKER
 LIST_PAGE = "/record"
 FILES = RECORDINGS.removeprefix(PAGES)  # links are relative to the mounted pages
 TITLE = "Record your own talker"
-PROJECTS, RECORDINGS_LIST = ("All projects", "/"), ("All recordings", LIST_PAGE)
+RECORDINGS_LIST = ("All recordings", LIST_PAGE)
 ENGLISH = "en-us"
 MAX_TEXT_BYTES = 2 << 20
 MINUTES = {2: "2 minutes, 25 prompts", 5: "5 minutes, 60 prompts", 10: "10 minutes, 120 prompts"}
@@ -45,7 +45,7 @@ def add_record_page(app: FastAPI, folder: Path, owner: Owner) -> Recordings:
 
     @ui.page(LIST_PAGE, title="Record - tts2face studio", language="en-US")
     def show_list(request: Request) -> None:
-        with _page(request, TITLE, PROJECTS):
+        with _page(request, TITLE):
             try:
                 name = owner(request)
             except InputError as refused:
@@ -68,7 +68,7 @@ def add_record_page(app: FastAPI, folder: Path, owner: Owner) -> Recordings:
 
 
 @contextmanager
-def _page(request: Request, title: str, back: tuple[str, str]) -> Iterator[None]:
+def _page(request: Request, title: str, back: tuple[str, str] | None = None) -> Iterator[None]:
     """Frame of a page around its content."""
     begin_page(request)
     ui.add_css(STYLE.read_text(encoding="utf-8"), shared=False)

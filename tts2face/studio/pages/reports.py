@@ -9,11 +9,12 @@ from nicegui import ui
 from lexicon.errors import InputError
 from tts2face.service.access.keys import ApiKey
 from tts2face.studio.pages.choices import models
-from tts2face.studio.pages.frame import begin_page, confirm, dark_button, heading, icon_button, shown_errors
+from tts2face.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
 from tts2face.studio.projects.renders import DONE, RUNNING, WAITING
 from tts2face.studio.reports.reports import KINDS, Report
 from tts2face.studio.studio import Studio
 
+ALL_REPORTS = ("All reports", "/reports")
 # Loads a report into its frame in the colours of the studio: a frame knows only those of the system.
 LOAD = """
 {
@@ -44,18 +45,15 @@ def register(studio: Studio) -> None:
     @ui.page("/reports/{number}", title="Report - tts2face studio")
     async def show_one(request: HttpRequest, number: str) -> None:
         begin_page(request)
-        with ui.element("header").classes("bar"):
-            icon_button("arrow_back", "All reports", lambda: ui.navigate.to("/reports"))
-            try:
-                report = studio.reports.find(request.state.key.name, number)
-                studio.reports.page(report)
-            except InputError as wrong:
-                heading(1, "This report cannot be shown")
+        try:
+            report = studio.reports.find(request.state.key.name, number)
+            studio.reports.page(report)
+        except InputError as wrong:
+            with page_bar(request, "This report cannot be shown", ALL_REPORTS):
                 ui.label(str(wrong))
-                return
-            heading(1, report.title)
-            ui.element("span").classes("grow")
-            dark_button(request)
+            return
+        with page_bar(request, report.title, ALL_REPORTS):
+            pass
         with ui.element("div").classes("report"):
             ui.element("iframe").props(f'id=studio-report sandbox="" title="{escape(report.title)}"')
         ui.run_javascript(LOAD % f"/studio/api/reports/{report.id}/page")
@@ -70,11 +68,8 @@ class ReportsPage:
 
     async def build(self, request: HttpRequest) -> None:
         """Build the page."""
-        with ui.element("header").classes("bar"):
-            icon_button("arrow_back", "All projects", lambda: ui.navigate.to("/"))
-            heading(1, "Reports")
-            ui.element("span").classes("grow")
-            dark_button(request)
+        with page_bar(request, "Reports"):
+            pass
         with ui.element("div").classes("projects"):
             with ui.element("section").classes("panel"):
                 heading(2, "New report")
