@@ -14,12 +14,13 @@ from tts2face.service.access.page_headers import PAGES
 from tts2face.service.errors import RefusedError
 
 DARK_COOKIE = "tts2face_dark"
+RECORD_PAGE = "/record"  # for keys that may build talkers
 TOP_PAGES = {  # names by address
     "/": "Projects",
     "/palette": "Styles",
     "/puppet": "Puppetry",
     "/reports": "Reports",
-    "/record": "Record your own talker",
+    RECORD_PAGE: "Record your own talker",
 }
 _NEXT_DARK = {None: True, True: False, False: None}
 _DARK_NAMES = {None: "Colours of the system", True: "Dark", False: "Light"}
@@ -61,14 +62,17 @@ def page_bar(request: HttpRequest, title: str, back: tuple[str, str] | None = No
         heading(1, title)
         ui.element("span").classes("grow")
         if back is None:
-            _top_links(request.url.path.removeprefix(PAGES) or "/")
+            _top_links(request)
         yield
         dark_button(request)
 
 
-def _top_links(current: str) -> None:
+def _top_links(request: HttpRequest) -> None:
+    current = request.url.path.removeprefix(PAGES) or "/"
     with ui.element("nav").classes("bar-links").props('aria-label="Pages"'):
         for address, name in TOP_PAGES.items():
+            if address == RECORD_PAGE and "build" not in request.state.key.scopes:
+                continue
             link = ui.link(name, address)
             if address == current:
                 link.props("aria-current=page")

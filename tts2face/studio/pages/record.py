@@ -13,16 +13,15 @@ from tts2face.exports.visemes import viseme_table
 from tts2face.service.access.page_headers import PAGES, RECORDINGS
 from tts2face.studio.components.recorder import STYLE, Recorder, VisemeMap
 from tts2face.studio.pages.choices import languages
-from tts2face.studio.pages.frame import begin_page, confirm, heading, page_bar, sentence
+from tts2face.studio.pages.frame import RECORD_PAGE, begin_page, confirm, heading, page_bar, sentence
 from tts2face.studio.recording.recordings import Recordings
 from tts2face.studio.recording.routes import Owner, recording_router
 from tts2face.studio.recording.store import RecordingEntry
 from tts2face.studio.recording.talker_building import CLIP, REPORT, TALKER
 
-LIST_PAGE = "/record"
 FILES = RECORDINGS.removeprefix(PAGES)  # links are relative to the mounted pages
 TITLE = "Record your own talker"
-RECORDINGS_LIST = ("All recordings", LIST_PAGE)
+RECORDINGS_LIST = ("All recordings", RECORD_PAGE)
 ENGLISH = "en-us"
 MAX_TEXT_BYTES = 2 << 20
 MINUTES = {2: "2 minutes, 25 prompts", 5: "5 minutes, 60 prompts", 10: "10 minutes, 120 prompts"}
@@ -43,7 +42,7 @@ def add_record_page(app: FastAPI, folder: Path, owner: Owner) -> Recordings:
     recordings = Recordings(folder)
     app.include_router(recording_router(recordings, owner))
 
-    @ui.page(LIST_PAGE, title="Record - tts2face studio", language="en-US")
+    @ui.page(RECORD_PAGE, title="Record - tts2face studio", language="en-US")
     def show_list(request: Request) -> None:
         with _page(request, TITLE):
             try:
@@ -53,7 +52,7 @@ def add_record_page(app: FastAPI, folder: Path, owner: Owner) -> Recordings:
                 return
             _list_page(recordings, name)
 
-    @ui.page(LIST_PAGE + "/{number}", title="Record - tts2face studio", language="en-US")
+    @ui.page(RECORD_PAGE + "/{number}", title="Record - tts2face studio", language="en-US")
     def show_recording(request: Request, number: str) -> None:
         try:
             here = recordings.store.folder(number, owner(request))
@@ -123,14 +122,14 @@ def _list_page(recordings: Recordings, owner: str) -> None:
                 prompts = await recordings.checks.prompts(
                     float(minutes.value), str(language.value), str(path) if text else None
                 )
-            ui.navigate.to(f"{LIST_PAGE}/{recordings.store.create(owner, name.value, prompts)}")
+            ui.navigate.to(f"{RECORD_PAGE}/{recordings.store.create(owner, name.value, prompts)}")
 
         ui.button("Start recording", on_click=_reporting(create)).style("width: auto; align-self: flex-start")
 
 
 def _show_entry(entry: RecordingEntry) -> None:
     with ui.element("div").classes("project"), ui.element("div").classes("grow"):
-        ui.link(entry.name, f"{LIST_PAGE}/{entry.id}").classes("open")
+        ui.link(entry.name, f"{RECORD_PAGE}/{entry.id}").classes("open")
         ui.label(f"{entry.n_accepted} of {entry.n_prompts} prompts recorded and accepted").classes("quiet")
 
 
@@ -222,7 +221,7 @@ class _RecordingPage:
     async def _confirm_deletion(self) -> None:
         async def delete() -> None:
             await self._recordings.delete(self._number)
-            ui.navigate.to(LIST_PAGE)
+            ui.navigate.to(RECORD_PAGE)
 
         await confirm(
             "Delete all takes, the report and the talker of this recording? This cannot be undone.", "Delete", delete
