@@ -208,6 +208,32 @@ def test_a_text_is_heard_painted_corrected_kept_and_rendered(
     check_requests(browser, url)
 
 
+def test_styles_of_another_tab_are_offered_when_the_page_is_seen_again(
+    browser: Browser, studio_service: Any, studio: httpx.Client
+) -> None:
+    number = studio.post("/api/projects", json={"text": TEXT}).json()["id"]
+    browser.open(f"{studio_service.url}/studio/animate/{number}")
+    browser.wait("return window.__studio?.frames > 0")
+    texts = "return [...document.querySelectorAll('[role=option], button')].map((one) => one.innerText.trim())"
+
+    def is_offered(name: str) -> bool:
+        browser.run("document.dispatchEvent(new Event('visibilitychange'))")
+        return name in browser.run(texts)
+
+    try:
+        studio.post("/api/styles", json={"name": "half glad", "mix": {"source": "grid_s1"}}).raise_for_status()
+        browser.run("document.querySelector('[aria-label=Palette]').click()")
+        wait_until(lambda: is_offered("my styles"), 30, "the own palette is offered")
+        browser.click("my styles")
+        wait_until(lambda: "half glad" in browser.run(texts), 30, "the own palette is chosen")
+        studio.post("/api/styles", json={"name": "very glad", "mix": {"source": "grid_s1"}}).raise_for_status()
+        wait_until(lambda: is_offered("very glad"), 30, "the new style is offered")
+    finally:
+        for name in ("half glad", "very glad"):
+            studio.delete(f"/api/styles/{name}")
+    assert browser.errors() == []
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_nothing(browser: Browser, studio_service: Any, studio: httpx.Client, scheme: str) -> None:
     axe = (node_package("axe-core") / "axe-core" / "axe.min.js").read_text()
@@ -215,7 +241,7 @@ def test_axe_finds_nothing(browser: Browser, studio_service: Any, studio: httpx.
     browser.devtools("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
     found = []
     try:
-        for path in ("", "record", "palette", "puppet", f"animate/{number}"):
+        for path in ("", "record", "palette", "puppet", "reports", f"animate/{number}"):
             browser.open(f"{studio_service.url}/studio/{path}")
             browser.wait("return !!document.querySelector('h1') && document.readyState === 'complete'")
             time.sleep(0.5)  # transitions of colours end

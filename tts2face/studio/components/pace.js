@@ -9,6 +9,11 @@ class Pace {
   #frame = -1;
   #draws = true;
 
+  /** Of how many frames of a display, so many milliseconds apart, one draws. */
+  steps(display) {
+    return this.isSoftware ? Math.ceil(SOFTWARE_MS / display) : 1;
+  }
+
   /** Whether the frame with the time of its callback draws; the same answer for all that ask in it. */
   draws(now) {
     if (now === this.#frame) return this.#draws;

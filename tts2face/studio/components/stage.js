@@ -9,8 +9,9 @@ import { addStyle } from "tts2face-studio/style.js";
 
 const VIEWS = { front: "Front", "three-quarter": "Three-quarter", profile: "Profile", close: "Close-up" };
 
-// Mean time between drawn frames, above which fewer pixels are drawn, and below which more.
-const LIMITS_MS = { device: [18, 17], processor: [34.2, 33.5] }; // 60 frames a second, 30 of them drawn
+const WANTED_MS = { device: 1000 / 60, processor: 1000 / 30 }; // between drawn frames, or what the display allows
+const SLOW = 1.03, FAST = 1.01; // of it, above which fewer pixels are drawn, and below which more
+const LONGEST_DISPLAY_MS = 34; // between frames of a display: 30 a second
 const ADAPT_MS = 400; // between two changes of the number of pixels
 const MAKING_MS = 1500; // after which a face that does not come is being made
 const REST_MS = 250; // at rest before the sharp picture
@@ -47,7 +48,7 @@ export default {
   async mounted() {
     addStyle();
     this.meter = new Meter("js_ms", "fps");
-    Object.assign(this, { dirty: true, share: 1, adapted: 0, rested: 0, drawn: null });
+    Object.assign(this, { dirty: true, share: 1, adapted: 0, rested: 0, drawn: null, ticked: null });
     this.changed = () => (this.dirty = true);
     try {
       this.scene = new StageScene(this.$refs.canvas, this.changed);
@@ -57,8 +58,8 @@ export default {
     }
     pace.isSoftware = this.scene.isSoftware;
     if (pace.isSoftware) this.share = LEAST_SHARE;
-    this.limits = LIMITS_MS[pace.isSoftware ? "processor" : "device"];
-    this.interval = this.limits[0];
+    this.display = 1000 / 60;
+    this.interval = this.wanted();
     this.stops = [preview.on("change", this.changed), clock.on("seek", this.changed)];
     this.stops.push(comparison.on("change", () => this.showSide()), sides.on(() => this.showSide()));
     this.watchContext();
@@ -169,6 +170,8 @@ export default {
       this.animation = requestAnimationFrame(this.tick);
       if (clock.playing) this.dirty = true;
       else this.meter.restart();
+      if (this.dirty) this.ticked = null;
+      else this.measureDisplay(now);
       this.adapt();
       if (!this.dirty || this.lost || (clock.playing && !pace.draws(now))) return;
       const begin = performance.now(), { scene } = this;
@@ -181,6 +184,19 @@ export default {
       if (clock.playing) metrics.playing_share = scene.sharpness;
       metrics.is_sharp = scene.sharpness >= 1 && this.rested !== null;
       if (clock.playing) this.meter.add(performance.now() - begin);
+    },
+
+    /** Least time between two drawn frames that display and pace allow. */
+    wanted() {
+      const least = WANTED_MS[pace.isSoftware ? "processor" : "device"];
+      return Math.max(pace.steps(this.display) * this.display, least);
+    },
+
+    /** Take the time since the last frame of a page at rest into the mean time between frames of the display. */
+    measureDisplay(now) {
+      const since = now - (this.ticked ?? now);
+      if (since > 0) this.display = 0.95 * this.display + 0.05 * Math.min(since, LONGEST_DISPLAY_MS);
+      this.ticked = now;
     },
 
     /** Take the time of a frame that was drawn into the mean time between two. */
@@ -204,8 +220,7 @@ export default {
       this.rested = null;
       if (now - this.adapted < ADAPT_MS) return;
       this.adapted = now;
-      const [slow, fast] = this.limits;
-      const step = this.interval > slow ? 0.8 : this.interval < fast ? 1.1 : 1;
+      const wanted = this.wanted(), step = this.interval > SLOW * wanted ? 0.8 : this.interval < FAST * wanted ? 1.1 : 1;
       this.share = Math.min(Math.max(this.share * step, LEAST_SHARE), 1);
       if (step !== 1) scene.setSharpness(this.share);
     },

@@ -27,6 +27,9 @@ from tts2face.studio.studio import Studio
 LOAD = 'import("tts2face-studio/preview.js").then((m) => m.loadPreview("%s"))'
 PLAY = 'import("tts2face-studio/clock.js").then((m) => m.clock.play(0))'
 
+SEEN_AGAIN = "studio-seen-again"  # after another tab, in which talkers and styles may have been made
+WATCH = f'document.addEventListener("visibilitychange", () => document.hidden || emitEvent("{SEEN_AGAIN}"))'
+
 
 def register(studio: Studio) -> None:
     """Add the page."""
@@ -104,6 +107,8 @@ class AnimatePage:
         self.client.on_connect(self._renew)
         self.client.on_delete(self._leave)
         ui.timer(LEASE_S / 3, self._renew)
+        ui.on(SEEN_AGAIN, self._show_models)
+        ui.run_javascript(WATCH)
         self.workspace.show()
 
     async def edit(self, edit: Edit) -> None:
@@ -191,6 +196,10 @@ class AnimatePage:
             self._looks = looks
             self.stage.set_face(looks[0])
             ui.timer(0.0, self._show_styles, once=True)
+
+    async def _show_models(self) -> None:
+        await self.speech.show_models()
+        await self._show_styles()
 
     async def _show_styles(self) -> None:
         models = self.workspace.project.models

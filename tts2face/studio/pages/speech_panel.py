@@ -39,17 +39,14 @@ class SpeechPanel:
             self._slider("rate", "Rate", 0.5, 2.0, 0.05)
         self._select("request", "language", "Language", languages(), with_filter=True)
         heading(2, "Head")
+        found = await self._models()
         for kind in (TALKER, FACE):
-            names = await models(library, key, kind)
-            self._select("models", kind, kind.capitalize(), {name: _model_name(name) for name in names})
+            self._select("models", kind, kind.capitalize(), found[kind])
         self._select("models", "identity", "Identity", await identities(library, key, project.models.face))
         self._select("models", "hair", "Hair", haircuts())
         self._select("models", "hair_color", "Hair colour", hair_colours())
         heading(2, "Gestures")
-        palettes = await models(library, key, PALETTE)
-        own = page.studio.styles.store.path(key.name)
-        mine = {str(own): "my styles"} if own.is_file() else {}
-        self._select("models", "palette", "Palette", {**{name: name for name in palettes}, **mine})
+        self._select("models", PALETTE, PALETTE.capitalize(), found[PALETTE])
         self._select("request", "gestures", "Method", {name: name for name in GESTURES})
 
     def refresh(self) -> None:
@@ -57,12 +54,30 @@ class SpeechPanel:
         for name in self._controls:
             self._show(name)
 
+    async def show_models(self) -> None:
+        """Offer the models that there are now: another tab may have made one."""
+        for kind, options in (await self._models()).items():
+            value = self._value(kind)
+            self._controls[kind].set_options({value: value, **options}, value=value)
+
     async def show_identities(self) -> None:
         """Offer the identities of the present face."""
         page = self._page
         face = page.workspace.project.models.face
         found = await identities(page.studio.state.library, page.workspace.key, face)
         self._controls["identity"].set_options(found, value=page.workspace.project.models.identity or "")
+
+    async def _models(self) -> dict[str, dict[str, str]]:
+        """Shown names of talkers, faces and palettes, by kind and value."""
+        library, key, styles = self._page.studio.state.library, self._page.workspace.key, self._page.studio.styles
+        found = {
+            kind: {name: _model_name(name) for name in await models(library, key, kind)}
+            for kind in (TALKER, FACE, PALETTE)
+        }
+        own = styles.store.path(key.name)
+        if own.is_file():
+            found[PALETTE][str(own)] = "my styles"
+        return found
 
     def set_enabled(self, is_enabled: bool) -> None:
         """Allow or refuse changes."""
