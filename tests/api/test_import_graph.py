@@ -17,7 +17,8 @@ PACKAGES = ("lexicon", "tts2face", "corpus_tools", "cli")
 IMPORT_EACH_ALONE = """
 import gc, importlib, os, sys, traceback
 for name in ("numpy", "scipy.optimize", "scipy.signal", "numba", "av", "PIL.Image", "concurrent.futures.process",
-             "concurrent.futures.thread", "multiprocessing.connection", "xml.parsers.expat"):
+             "concurrent.futures.thread", "multiprocessing.connection", "xml.parsers.expat", "fastapi", "nicegui",
+             "pydantic_settings", "sqlalchemy", "dbos", "httpx", "uvicorn", "prometheus_client", "cyclopts"):
     importlib.import_module(name)
 sys.path.insert(0, sys.argv[1])
 sys.pycache_prefix, sys.dont_write_bytecode = sys.argv[2], False
