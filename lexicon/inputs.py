@@ -213,4 +213,4 @@ def check_limits(what: str, value: float, limits: tuple[float, float], unit: str
     """
     low, high = limits
     if not low <= value <= high:
-        raise InputError(f"{what} must lie between {low:g} and {high:g}{unit}, not {value:g}{unit}")
+        raise InputError(f"{what} must lie between {low:g} and {high:g}{unit}, not {value:.12g}{unit}")
