@@ -10,6 +10,7 @@ from corpus_tools.evaluation.scores import CONFIDENCE, IntervalEstimate
 from lexicon.errors import InputError
 
 N_DRAWS = 2000  # resamples of utterances with replacement (Efron 1979)
+ROUNDING = 1e-12  # spread of a constant curve in parts of its sum of squares: what float32 values and sums leave
 Floats = NDArray[np.float64]
 
 
@@ -74,12 +75,13 @@ def interval_of(values: Floats) -> IntervalEstimate:
 
 
 def _curve_moments(a: NDArray[np.floating], b: NDArray[np.floating]) -> list[float]:
+    a, b = a.astype(np.float64), b.astype(np.float64)
     return [len(a), a.sum(), b.sum(), a @ a, b @ b, a @ b]
 
 
 def _pooled_correlation(moments: Floats) -> Floats:
-    """(W,) Pearson's r for moments (W, 6); 0 where a curve is constant."""
+    """(W,) Pearson's r for moments (W, 6); 0 where a curve is constant but for rounding."""
     n, a, b, aa, bb, ab = moments.T
-    norm = np.sqrt(np.maximum(aa - a * a / n, 0.0) * np.maximum(bb - b * b / n, 0.0))
-    moves = norm > 1e-9 * n
-    return np.where(moves, (ab - a * b / n) / np.where(moves, norm, 1.0), 0.0)
+    spread_a, spread_b = aa - a * a / n, bb - b * b / n
+    moves = (spread_a > ROUNDING * aa) & (spread_b > ROUNDING * bb)
+    return np.where(moves, ab - a * b / n, 0.0) / np.sqrt(np.where(moves, spread_a * spread_b, 1.0))

@@ -13,6 +13,7 @@ from corpus_tools.evaluation.paired_bootstrap import PairedCurves, estimate, est
 from corpus_tools.evaluation.people import PeopleEvaluation, compare_people, evaluate_people, z_score_people
 from corpus_tools.evaluation.people_tables import difference_table, people_rows, people_table, phone_table
 from corpus_tools.evaluation.person_tracks import read_person
+from corpus_tools.evaluation.scores import IntervalEstimate
 from corpus_tools.evaluation.tracks import ExternalTrack
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.training.train_talker import learn_talker
@@ -142,6 +143,27 @@ def test_paired_intervals_are_narrower_than_those_of_single_methods(
     assert difference["dtw_cost"].high == pytest.approx(-0.1)
     single = estimate(one)["dtw_cost"]
     assert single.high - single.low > 1.0
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-6, 0.1, 0.37, 1.0, 1e6])
+def test_a_curve_that_never_moves_correlates_with_nothing(
+    value: float, rng_curves: tuple[list[np.ndarray], list[np.ndarray]]
+) -> None:
+    """Rounding of sums of squares is not taken for motion, at any value and in either precision."""
+    real, made = rng_curves
+    for precision in (np.float32, np.float64):
+        flat = [np.full(one.shape, value, precision) for one in made]
+        assert estimate(PairedCurves.of(real, flat, [1.0] * 4))["r_opening"] == IntervalEstimate(0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_correlations_do_not_depend_on_the_scale(
+    scale: float, rng_curves: tuple[list[np.ndarray], list[np.ndarray]]
+) -> None:
+    real, made = rng_curves
+    small = estimate(PairedCurves.of([scale * one for one in real], made, [1.0] * 4))["r_width"].value
+    assert small == pytest.approx(estimate(PairedCurves.of(real, made, [1.0] * 4))["r_width"].value, abs=1e-9)
+    assert abs(small) > 0.01
 
 
 def test_other_numbers_of_utterances_cannot_be_paired(rng_curves: tuple[list[np.ndarray], list[np.ndarray]]) -> None:
