@@ -1,8 +1,8 @@
 """Live preview in headless Chromium without a GPU: PYTHONPATH=. python tests/bench/bench_studio.py [folder].
 
-Plays the harness's clip on a stage of 640 x 480 and its timeline, then ten minutes of material, then an empty WebGL
-scene of the same size, each once the processes of service and browser rest. Frames per second hold for the load of the
-machine, which the slowness of a script tells, taken just before.
+Plays a new project on its page, whose window makes a stage of 640 x 480, then ten minutes of material on the harness,
+then an empty WebGL scene of the same size, each once the processes of service and browser rest. Frames per second hold
+for the load of the machine, which the slowness of a script tells, taken just before.
 """
 
 import gzip
@@ -14,16 +14,19 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.studio.browser import Browser
-from tests.studio.served import Page, served_harness
+from tests.studio.harness import TEXT
+from tests.studio.served import HARNESS, Page, service_with_harness
 from tts2face.studio.components.stage import COMPONENTS
 
 PLAYED_S = 3.0  # shorter than the clip
-SIZE = (1280, 900)  # of the window, whose pixels are composed for each frame
+SIZE = (1280, 900)  # of the harness's window, whose pixels are composed for each frame
+STAGE = (640, 480)
 REST_SHARE = 0.15  # of a core that all processes together use at most when they rest; workers look for jobs
 REST_S, LONGEST_START_S = 2.0, 120.0
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 EMPTY = """
-    const canvas = Object.assign(document.createElement('canvas'), {width: 640, height: 480});
+    const [width, height] = arguments;
+    const canvas = Object.assign(document.createElement('canvas'), {width, height});
     document.body.replaceChildren(canvas);
     const gl = canvas.getContext('webgl2'), begin = performance.now();
     let n = 0;
@@ -93,21 +96,41 @@ def play(page: Page, name: str) -> None:
     )
 
 
+def open_project(browser: Browser, url: str) -> Page:
+    """The page of a new project, in a window whose stage has the size `STAGE`."""
+    browser.open(f"{url}/studio/")
+    browser.type("Text to speak", TEXT)
+    browser.click("Create from text")
+    browser.wait("return location.pathname.includes('/animate/')")
+    page, size = Page(browser), SIZE
+    for _ in range(4):  # part of the height is the timeline's
+        browser.devtools(
+            "Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1, mobile=False
+        )
+        time.sleep(0.5)
+        stage = browser.box(".studio-stage canvas")
+        size = (size[0] + round(STAGE[0] - stage["width"]), size[1] + round(STAGE[1] - stage["height"]))
+    print(f"window of {size[0]} x {size[1]}, stage of {stage['width']:.0f} x {stage['height']:.0f}")
+    return page
+
+
 def main() -> None:
     """Print all figures."""
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else tempfile.mkdtemp(prefix="bench-studio-"))
-    with served_harness(folder) as address:
+    with service_with_harness(folder) as running:
+        running.wait_until_ready()
         browser = Browser(SIZE)
         try:
-            page = Page(browser, address)
+            page = open_project(browser, running.url)
             print(f"face from request to first frame: {page.measure('face_ms'):.0f} ms")
             play(page, "clip of 4 s")
-            page = Page(browser, f"{address}?preview=long.bin")
+            browser.devtools("Emulation.clearDeviceMetricsOverride")
+            page = Page(browser, f"{running.url}{HARNESS}?preview=long.bin")
             page.focus()
             browser.press("Right", *"++++++")
             play(page, "ten minutes")
             browser.open("about:blank")
-            browser.run(EMPTY)
+            browser.run(EMPTY, *STAGE)
             print(f"empty scene: {processor_ms(browser, lambda: browser.run('return window.empty()'))}")
         finally:
             browser.close()

@@ -39,7 +39,8 @@ STYLES = [
 
 MAKING = threading.Lock()
 
-PAGE = "height: 100vh; padding: 8px; gap: 8px; display: flex; flex-direction: column; background: var(--studio-page)"
+PAGE = "height: 100vh; padding: 8px; gap: 8px; display: flex; flex-direction: column"
+LAYER = "will-change: transform"  # as on the pages
 
 
 def bundle(clip: Clip, revision: int, repeats: int = 1) -> bytes:
@@ -127,18 +128,19 @@ def add_page(files: Path) -> None:
 
         ui.dark_mode(dark)
         ui.query(".nicegui-content").classes("p-0 gap-0")
+        ui.query("body").style("background: var(--studio-page)")
         with ui.element("div").classes("w-full").style(PAGE):
             with ui.element("div").style("flex: 0 1 480px; min-height: 200px; display: flex; gap: 8px"):
-                with ui.element("div").style("width: 640px"):
+                with ui.element("div").style(f"width: 640px; {LAYER}"):
                     stage = Stage("/studio/files/face.glb", preview=f"/studio/files/{preview}")
-                with ui.element("div").style("flex: 1; color: var(--studio-text)"):
+                with ui.element("div").style(f"flex: 1; color: var(--studio-text); {LAYER}"):
                     ui.label("Harness of the components").props("role=heading aria-level=1").classes("text-h6")
                     picked = ui.label().classes("picked")
                     listed = ui.label("[]").classes("edits").style("overflow-wrap: anywhere; font-size: 11px")
             timeline = TimelineElement(
                 styles=STYLES, brush={"tool": tool, "style": "delighted"},
                 on_edit=lambda event: apply(event.args), compare=f"/studio/files/{compare}" if compare else None,
-            ).style("flex: 1 1 0; min-height: 250px")  # fmt: skip
+            ).style(f"flex: 1 1 0; min-height: 250px; {LAYER}")  # fmt: skip
             timeline.on("pick", lambda event: picked.set_text(json.dumps(event.args)))
             ui.on("show_view", lambda event: stage.view(event.args))
 

@@ -1,5 +1,7 @@
 """Stage and timeline in a real browser, with the motion and sound of a real session."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -54,6 +56,30 @@ def test_time_follows_the_sound_and_measures_are_reported(page):
     stopped = page.measure("time")
     assert page.browser.run("return document.querySelector('.studio-play').getAttribute('aria-label')") == "Play"
     assert stopped < 4.1
+
+
+COUNT_FRAMES = """window.called = 0;
+    const next = window.requestAnimationFrame;
+    window.requestAnimationFrame = (call) => next((now) => (window.called++, call(now)));"""
+
+
+def test_a_page_at_rest_does_nothing_until_it_plays_or_changes(page):
+    def calls(seconds: float) -> int:
+        before = page.browser.run("return window.called")
+        time.sleep(seconds)
+        return int(page.browser.run("return window.called") - before)
+
+    page.browser.run(COUNT_FRAMES)
+    page.toggle()
+    assert calls(1.0) > 5
+    page.toggle()
+    page.browser.wait("return window.__studio.is_sharp")
+    wait_until(lambda: calls(0.5) == 0, 20, "the page rests")
+    drawn = page.measure("frames")
+    page.focus()
+    page.browser.press("Right")
+    wait_until(lambda: page.measure("frames") > drawn, 10, "the head is drawn at another time")
+    wait_until(lambda: calls(0.5) == 0, 20, "the page rests")
 
 
 def test_brush_paints_the_span_that_is_dragged(page):

@@ -25,3 +25,26 @@ class Pace {
 }
 
 export const pace = new Pace();
+
+/** Calls a function in each frame of the display while it returns true, and again once it is woken. */
+export class Frames {
+  #tick;
+  #next = null;
+
+  constructor(tick) {
+    this.#tick = tick;
+  }
+
+  wake() {
+    this.#next ??= requestAnimationFrame((now) => {
+      this.#next = null;
+      if (this.#tick(now)) this.wake();
+    });
+  }
+
+  /** End for good. */
+  stop() {
+    cancelAnimationFrame(this.#next);
+    this.#tick = () => false;
+  }
+}

@@ -2,7 +2,7 @@
 
 import { clock } from "tts2face-studio/clock.js";
 import { metrics, Meter } from "tts2face-studio/metrics.js";
-import { pace } from "tts2face-studio/pace.js";
+import { Frames, pace } from "tts2face-studio/pace.js";
 import { comparison, loadPreview, preview, sides } from "tts2face-studio/preview.js";
 import { StageScene } from "tts2face-studio/stage_scene.js";
 import { addStyle } from "tts2face-studio/style.js";
@@ -15,6 +15,7 @@ const LONGEST_DISPLAY_MS = 34; // between frames of a display: 30 a second
 const ADAPT_MS = 400; // between two changes of the number of pixels
 const MAKING_MS = 1500; // after which a face that does not come is being made
 const REST_MS = 250; // at rest before the sharp picture
+const AWAKE_MS = 1500; // at rest, while the frames of the display are measured; then nothing is called
 const LEAST_SHARE = 0.65; // of the device's pixels along a side: fewer show as squares
 
 export default {
@@ -49,7 +50,11 @@ export default {
     addStyle();
     this.meter = new Meter("js_ms", "fps");
     Object.assign(this, { dirty: true, share: 1, adapted: 0, rested: 0, drawn: null, ticked: null });
-    this.changed = () => (this.dirty = true);
+    this.frames = new Frames(this.tick);
+    this.changed = () => {
+      this.dirty = true;
+      this.frames.wake();
+    };
     try {
       this.scene = new StageScene(this.$refs.canvas, this.changed);
     } catch (refused) {
@@ -60,20 +65,20 @@ export default {
     if (pace.isSoftware) this.share = LEAST_SHARE;
     this.display = 1000 / 60;
     this.interval = this.wanted();
-    this.stops = [preview.on("change", this.changed), clock.on("seek", this.changed)];
+    this.stops = [preview.on("change", this.changed), ...["play", "seek"].map((event) => clock.on(event, this.changed))];
     this.stops.push(comparison.on("change", () => this.showSide()), sides.on(() => this.showSide()));
     this.watchContext();
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.$el);
     this.resize();
     this.scene.controls.addEventListener("start", () => this.release());
-    this.animation = requestAnimationFrame(this.tick);
+    this.frames.wake();
     if (this.preview) loadPreview(this.preview).catch((wrong) => this.fail(wrong.message, wrong));
     await this.loadFace();
   },
 
   beforeUnmount() {
-    cancelAnimationFrame(this.animation);
+    this.frames?.stop();
     this.observer?.disconnect();
     for (const stop of this.stops ?? []) stop();
     this.scene?.dispose();
@@ -131,7 +136,7 @@ export default {
     },
 
     showSide() {
-      this.dirty = true;
+      this.changed();
       this.side = !comparison.nFrames ? "" : sides.shown === comparison ? "A" : "B: the project";
     },
 
@@ -149,7 +154,7 @@ export default {
       const { clientWidth: width, clientHeight: height } = this.$refs.canvas ?? {};
       if (!width || !height || !this.scene) return;
       this.scene.resize(width, height, window.devicePixelRatio);
-      this.dirty = true;
+      this.changed();
     },
 
     watchContext() {
@@ -162,18 +167,21 @@ export default {
       canvas.addEventListener("webglcontextrestored", () => {
         this.lost = false;
         this.message = "";
-        this.dirty = true;
+        this.changed();
       });
     },
 
+    /** One frame of the display; returns whether the next one is wanted, too. */
     tick(now) {
-      this.animation = requestAnimationFrame(this.tick);
       if (clock.playing) this.dirty = true;
-      else this.meter.restart();
       if (this.dirty) this.ticked = null;
       else this.measureDisplay(now);
       this.adapt();
-      if (!this.dirty || this.lost || (clock.playing && !pace.draws(now))) return;
+      if (this.dirty && !this.lost && (!clock.playing || pace.draws(now))) this.draw(now);
+      return clock.playing || this.dirty || this.rested === null || performance.now() - this.rested < AWAKE_MS;
+    },
+
+    draw(now) {
       const begin = performance.now(), { scene } = this;
       this.dirty = false;
       metrics.time = clock.time;

@@ -3,7 +3,7 @@
 import { clock } from "./clock.js";
 import { metrics, Meter } from "./metrics.js";
 import { comparison, preview } from "./preview.js";
-import { pace } from "./pace.js";
+import { Frames, pace } from "./pace.js";
 import { openEditor } from "./timeline_editor.js";
 import { Painter, readColors } from "./timeline_draw.js";
 import { rowItems } from "./timeline_items.js";
@@ -39,20 +39,21 @@ export class TimelineHost {
     this.sizes.observe(plot);
     this.themes = new MutationObserver(() => this.takeColors());
     for (const element of [document.body, document.documentElement]) this.themes.observe(element, { attributeFilter: ["class", "data-theme"] });
-    this.stop = clock.on("seek", () => this.reveal());
+    this.frames = new Frames((now) => this.tick(now));
+    this.stops = ["play", "pause", "end", "load", "seek"].map((event) => clock.on(event, () => this.frames.wake()));
+    this.stops.push(clock.on("seek", () => this.reveal()));
     document.getElementById("studio-style").addEventListener("load", () => this.takeColors());
     this.takeColors();
     this.takeProps();
     this.resize();
-    this.animation = requestAnimationFrame((now) => this.tick(now));
   }
 
   unmount() {
-    cancelAnimationFrame(this.animation);
+    this.frames.stop();
     clearTimeout(this.nudged);
     this.sizes.disconnect();
     this.themes.disconnect();
-    this.stop();
+    for (const stop of this.stops) stop();
   }
 
   takeColors() {
@@ -117,6 +118,7 @@ export class TimelineHost {
 
   redraw() {
     this.dirty = true;
+    this.frames.wake();
   }
 
   /** After a change of what is visible. */
@@ -139,9 +141,13 @@ export class TimelineHost {
     this.moved();
   }
 
+  /** One frame of the display; returns whether the next one is wanted, too. */
   tick(now) {
-    this.animation = requestAnimationFrame((next) => this.tick(next));
-    if (clock.playing && !pace.draws(now)) return;
+    if (!clock.playing || pace.draws(now)) this.draw();
+    return clock.playing || this.dirty;
+  }
+
+  draw() {
     const begin = performance.now(), { state } = this, time = clock.time;
     if (clock.playing && state.view.reveal(time)) this.moved();
     if (!this.dirty && time === this.shown) return;
@@ -153,7 +159,6 @@ export class TimelineHost {
     style.transform = `translateX(${x.toFixed(1)}px)`;
     style.visibility = x < 0 || x > state.view.width ? "hidden" : "visible";
     if (!clock.playing) {
-      this.meter.restart();
       this.component.timeText = formatTime(time);
       return;
     }
