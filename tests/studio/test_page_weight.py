@@ -1,6 +1,7 @@
 """Bytes that a browser receives for the page "animate" with an empty cache."""
 
 import httpx
+import pytest
 
 from tests.service.conftest import RunningService
 from tests.studio.browser import Browser, wait_until
@@ -30,12 +31,14 @@ def test_the_page_with_face_and_sound_stays_below_its_limit(
     assert sum(received.values()) < MOST_BYTES, sorted(received.items(), key=lambda one: -one[1])[:10]
 
 
-def test_the_face_is_the_same_with_and_without_compression(studio: httpx.Client) -> None:
+@pytest.mark.parametrize("address", ["projects/{}/face.glb", "takes/face.glb"])
+def test_the_face_is_the_same_with_and_without_compression(studio: httpx.Client, address: str) -> None:
     number = studio.post("/api/projects", json={"text": "Hello."}).json()["id"]
     answers = [
-        studio.get(f"/api/projects/{number}/face.glb", headers={"Accept-Encoding": coding})
+        studio.get(f"/api/{address.format(number)}", headers={"Accept-Encoding": coding})
         for coding in ("gzip", "identity")
     ]
+    assert answers[1].content[:4] == b"glTF"
     assert [one.headers.get("content-encoding") for one in answers] == ["gzip", None]
     assert int(answers[0].headers["content-length"]) < 0.7 * len(answers[0].content)
     assert int(answers[1].headers["content-length"]) == len(answers[1].content)

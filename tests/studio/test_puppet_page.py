@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.service.conftest import RunningService
@@ -28,10 +29,19 @@ def press(browser: Browser, label: str) -> None:
     browser.wait(script, label)
 
 
+def head(page: Browser) -> np.ndarray:
+    """The stage's picture."""
+    return page.picture(".studio-stage canvas").astype(np.float64)
+
+
 def test_a_camera_drives_the_head_and_its_take_becomes_a_style(page: Browser, data: Path) -> None:
+    page.wait("return window.__studio?.face_ms > 0", seconds=120)
+    rest = head(page)
+    assert rest.std() > 20  # a head before a wall
     page.click("Use camera and microphone")
     page.wait("return window.__studio.camera_state === 'live'", seconds=120)
     page.wait(POSE, seconds=60)
+    assert np.abs(head(page) - rest).mean() > 1
     page.click("Record a take")
     page.wait(
         "return parseFloat(document.querySelector('.puppet-on')?.innerText.match(/[0-9.]+/)) > arguments[0]", TAKE_S

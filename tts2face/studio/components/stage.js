@@ -200,10 +200,10 @@ export default {
       return Math.max(pace.steps(this.display) * this.display, least);
     },
 
-    /** Take the time since the last frame of a page at rest into the mean time between frames of the display. */
+    /** Take the time since the last frame of a page at rest into that of the display: near the least, as other work skips frames. */
     measureDisplay(now) {
-      const since = now - (this.ticked ?? now);
-      if (since > 0) this.display = 0.95 * this.display + 0.05 * Math.min(since, LONGEST_DISPLAY_MS);
+      const since = Math.min(now - (this.ticked ?? now), LONGEST_DISPLAY_MS);
+      if (since > 0) this.display += (since < this.display ? 0.3 : 0.02) * (since - this.display);
       this.ticked = now;
     },
 

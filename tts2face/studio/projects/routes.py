@@ -1,7 +1,6 @@
 """What a page fetches, and what a program may ask of the studio (docs/studio.md). Errors as those of the service."""
 
 import asyncio
-import gzip
 import tempfile
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -18,6 +17,7 @@ from tts2face.project.project_file import project_json
 from tts2face.service.access.page_headers import PAGES
 from tts2face.service.errors import RefusedError
 from tts2face.service.uploads.upload_folder import BLOCK_BYTES
+from tts2face.studio.face_answer import face_answer
 from tts2face.studio.projects.archive import archive
 from tts2face.studio.projects.importing import import_file, import_text
 from tts2face.studio.projects.renders import DONE, Render
@@ -148,14 +148,7 @@ async def face(request: HttpRequest, project: str) -> Response:
     """The face as binary glTF."""
     async with opened(request, project) as workspace:
         path = await _studio(request).face(workspace)
-    content = await asyncio.to_thread(path.read_bytes)
-    # The address has the models in its query: what it names never changes.
-    headers = {"Cache-Control": "private, max-age=31536000, immutable", "Vary": "Accept-Encoding"}
-    if "gzip" in request.headers.get("accept-encoding", ""):
-        headers["Content-Encoding"] = "gzip"
-    else:
-        content = gzip.decompress(content)
-    return Response(content, media_type="model/gltf-binary", headers=headers)
+    return await face_answer(request, path)
 
 
 @router.get("/projects/{project}/picture.png")

@@ -11,6 +11,7 @@ from fastapi.responses import FileResponse, Response
 
 from lexicon.errors import InputError
 from tts2face.service.access.page_headers import TAKES
+from tts2face.studio.face_answer import face_answer
 from tts2face.studio.puppetry.live_camera import follow_camera
 from tts2face.studio.puppetry.store import FILM, SOUND, TABLE
 from tts2face.studio.puppetry.takes import Takes
@@ -34,10 +35,9 @@ async def list_takes(request: HttpRequest) -> list[dict[str, Any]]:
 
 
 @router.get("/face.glb")
-async def face(request: HttpRequest) -> FileResponse:
+async def face(request: HttpRequest) -> Response:
     """The default head with a morph target for each channel of takes."""
-    path = await request.app.state.studio.plain_face(request.state.key)
-    return FileResponse(path, media_type="model/gltf-binary", headers={"Cache-Control": "private, max-age=31536000"})
+    return await face_answer(request, await request.app.state.studio.plain_face(request.state.key))
 
 
 @router.put("/new", status_code=201)
