@@ -15,7 +15,7 @@ from pathlib import Path
 
 from tests.studio.browser import Browser
 from tests.studio.harness import TEXT
-from tests.studio.served import HARNESS, Page, service_with_harness
+from tests.studio.served import HARNESS, Page, create_project, service_with_harness
 from tts2face.studio.components.stage import COMPONENTS
 
 WARM_S, PLAYED_S = 2.0, 6.0  # played before and while a page is measured
@@ -29,7 +29,7 @@ EMPTY = """
     const [width, height] = arguments;
     const canvas = Object.assign(document.createElement('canvas'), {width, height});
     document.body.replaceChildren(canvas);
-    const gl = canvas.getContext('webgl2'), begin = performance.now();
+    const gl = canvas.getContext('webgl2');
     let n = 0;
     const frame = () => {
       n++;
@@ -100,19 +100,19 @@ def play(page: Page, name: str) -> None:
 
 def open_project(browser: Browser, url: str) -> Page:
     """The page of a new project, in a window whose stage has the size `STAGE`."""
-    browser.open(f"{url}/studio/")
-    browser.type("Text to speak", " ".join([TEXT] * REPEATS))
-    browser.click("Create from text")
-    browser.wait("return location.pathname.includes('/animate/')")
-    page, size = Page(browser), SIZE
-    for _ in range(4):  # part of the height is the timeline's
+    create_project(browser, url, " ".join([TEXT] * REPEATS))
+    page, (width, height) = Page(browser), SIZE
+    for _ in range(8):  # part of each change of the height is the timeline's
         browser.devtools(
-            "Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1, mobile=False
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False
         )
         time.sleep(0.5)
         stage = browser.box(".studio-stage canvas")
-        size = (size[0] + round(STAGE[0] - stage["width"]), size[1] + round(STAGE[1] - stage["height"]))
-    print(f"window of {size[0]} x {size[1]}, stage of {stage['width']:.0f} x {stage['height']:.0f}")
+        wider, higher = (round(wanted - stage[side]) for wanted, side in zip(STAGE, ("width", "height"), strict=True))
+        if not wider and not higher:
+            break
+        width, height = width + wider, height + higher
+    print(f"window of {width} x {height}, stage of {stage['width']:.0f} x {stage['height']:.0f}")
     return page
 
 

@@ -1,8 +1,7 @@
 """The harness in a service, and its page in a browser."""
 
 import json
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +24,13 @@ def service_with_harness(folder: Path) -> AbstractContextManager[RunningService]
     return running_service(program=("-m", "tests.studio.harness", str(folder)), is_ready=False)
 
 
-@contextmanager
-def served_harness(folder: Path) -> Iterator[str]:
-    """Address of the harness in a service of its own."""
-    with service_with_harness(folder) as running:
-        yield running.url + HARNESS
+def create_project(browser: Browser, url: str, text: str) -> str:
+    """Id of a project that is made of a text on the first page; its own page is open then."""
+    browser.open(f"{url}/studio/")
+    browser.type("Text to speak", text)
+    browser.click("Create from text")
+    browser.wait("return location.pathname.includes('/animate/')")
+    return str(browser.run("return location.pathname.split('/').pop()"))
 
 
 class Page:

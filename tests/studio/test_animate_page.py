@@ -12,7 +12,7 @@ import pytest
 
 from tests.exports.programs import node_package
 from tests.studio.browser import Browser, wait_until
-from tests.studio.served import Page
+from tests.studio.served import Page, create_project
 from tts2face.studio.projects.renders import formats
 from tts2face.video.media import read_frames, read_sound
 
@@ -52,15 +52,6 @@ class Project:
         return {
             Path(one["name"]).suffix: self._studio.get(f"{address}/{one['id']}/file").content for one in made
         }  # fmt: skip
-
-
-def imported(browser: Browser, url: str) -> str:
-    """Id of a project that is made of a text on the first page."""
-    browser.open(f"{url}/studio/")
-    browser.type("Text to speak", TEXT)
-    browser.click("Create from text")
-    browser.wait("return location.pathname.includes('/animate/')")
-    return str(browser.run("return location.pathname.split('/').pop()"))
 
 
 def check_sound(page: Page) -> None:
@@ -185,7 +176,7 @@ def test_a_text_is_heard_painted_corrected_kept_and_rendered(
 ) -> None:
     url = studio_service.url
     browser.requests()
-    number = imported(browser, url)
+    number = create_project(browser, url, TEXT)
     project = Project(studio, number)
     change = {"edit": {"kind": "picture", "options": {"size": "128x128", "quality": "draft"}}}
     assert studio.post(f"/api/projects/{number}/edits", json=change).status_code == 400  # the page edits it

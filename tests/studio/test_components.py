@@ -82,6 +82,35 @@ def test_a_page_at_rest_does_nothing_until_it_plays_or_changes(page):
     wait_until(lambda: calls(0.5) == 0, 20, "the page rests")
 
 
+CHANGE_FACE = """
+    const id = document.querySelector('.studio-stage').id.slice(1), first = window.fetch;
+    const later = (seconds) => new Promise((done) => setTimeout(done, 1000 * seconds));
+    window.late = 0;
+    window.fetch = async (url, options) => {
+      if (!String(url).includes('slow')) return first(url, options);
+      await later(1.0); // by then the other face is shown
+      window.late++;
+      return first(url.replace('slow', arguments[0]), options);
+    };
+    const { props } = mounted_app.elements[id];
+    window.stage = getElement(id);
+    props.face = '/studio/files/face.glb?slow';
+    await later(0.1);
+    props.face = '/studio/files/face.glb?second'"""
+
+
+@pytest.mark.parametrize("answer", ["late", "/../nothing.glb?"])
+def test_an_earlier_face_that_comes_late_is_neither_shown_nor_a_failure(page, answer):
+    before = page.browser.run("return window.__studio.face_ms")
+    page.browser.run(CHANGE_FACE, answer)
+    page.browser.wait("return window.__studio.face_ms !== arguments[0]", before)
+    page.browser.run("window.shown = window.stage.scene.face")
+    page.browser.wait("return window.late")
+    time.sleep(0.5)
+    assert page.browser.run("return window.shown === window.stage.scene.face")
+    assert page.browser.run("return window.stage.message") == ""
+
+
 def test_brush_paints_the_span_that_is_dragged(page):
     begin, end = page.at("lane:brows", 0.6), page.at("lane:brows", 1.45)
     page.browser.drag([begin, page.at("lane:brows", 1.0), end], held="Alt")

@@ -14,21 +14,34 @@ RECEIVED = """
 """
 
 
+def received(browser: Browser, address: str) -> dict[str, int]:
+    """Bytes of each file of a page that came over the network."""
+    browser.open(address)
+    wait_until(lambda: browser.run(SHOWN), 120, "face and sound are shown")
+    sizes = dict[str, int]()
+    for one, size in browser.run(RECEIVED):
+        name = one.partition("?")[0].rpartition("/")[2]
+        sizes[name] = sizes.get(name, 0) + size
+    return sizes
+
+
 def test_the_page_with_face_and_sound_stays_below_its_limit(
     browser: Browser, studio: httpx.Client, studio_service: RunningService
 ) -> None:
     text = "The young chef usually pushes five big maps before noon."
     number = studio.post("/api/projects", json={"text": text}).json()["id"]
+    address = f"{studio_service.url}/studio/animate/{number}"
     browser.devtools("Network.clearBrowserCache")
-    browser.open(f"{studio_service.url}/studio/animate/{number}")
-    wait_until(lambda: browser.run(SHOWN), 120, "face and sound are shown")
-    received = dict[str, int]()
-    for address, size in browser.run(RECEIVED):
-        name = address.partition("?")[0].rpartition("/")[2]
-        received[name] = received.get(name, 0) + size
-    assert received["face.glb"] > 500_000  # it came from the service, not from a cache
-    assert received["preview"] > 50_000
-    assert sum(received.values()) < MOST_BYTES, sorted(received.items(), key=lambda one: -one[1])[:10]
+    sizes = received(browser, address)
+    assert sizes["face.glb"] > 500_000  # it came from the service, not from a cache
+    assert sizes["preview"] > 50_000
+    assert sum(sizes.values()) < MOST_BYTES, sorted(sizes.items(), key=lambda one: -one[1])[:10]
+    assert received(browser, address)["face.glb"] == 0  # a browser keeps a face that its address names
+
+
+def test_a_face_that_is_not_the_one_of_the_address_is_not_kept_by_a_browser(studio: httpx.Client) -> None:
+    number = studio.post("/api/projects", json={"text": "Hello."}).json()["id"]
+    assert studio.get(f"/api/projects/{number}/face.glb?look=another").headers["cache-control"] == "no-store"
 
 
 @pytest.mark.parametrize("address", ["projects/{}/face.glb", "takes/face.glb"])

@@ -4,6 +4,7 @@ import io
 import json
 import time
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from tts2face.service.synthesis.style_tasks import N_TILES, TILE_PX
 from tts2face.session import Session
 
 TEXT = "Bob may move."
+TABLE = {"Content-Type": "text/csv"}
 MIX = {"source": "grid_s1", "shares": {"delighted": 0.5}, "sizes": {"head": 2.0}}
 
 
@@ -102,10 +104,24 @@ def test_a_new_name_and_a_removal_reach_projects(owned: httpx.Client, data: Path
     np.testing.assert_array_equal(preview(owned, number)[1], before)
 
 
+def test_a_face_comes_though_its_palette_is_removed_while_it_is_made(owned: httpx.Client) -> None:
+    mix(owned, "short-lived")
+    number = create(owned, TEXT)
+    looks = {"palette": "my-styles", "hair_color": "#123457"}  # a face that is not kept yet
+    assert edit(owned, number, {"kind": "models", "options": looks}).status_code == 200
+    with ThreadPoolExecutor(1) as pool:
+        asked = pool.submit(owned.get, f"/api/projects/{number}/face.glb")
+        time.sleep(0.2)  # of some seconds
+        assert owned.delete("/api/styles/short-lived").status_code == 204
+        assert not asked.done()
+        answer = asked.result()
+    assert answer.status_code == 200, answer.text
+    assert answer.content[:4] == b"glTF"
+
+
 def test_a_take_becomes_a_style_and_is_deleted(owned: httpx.Client, data: Path, tmp_path: Path) -> None:
     table = write_table(tmp_path / "take.csv", 7).read_text().splitlines()
-    kind = {"Content-Type": "text/csv"}
-    owned.put("/api/styles/take/0", content="\n".join(table[:32]), headers=kind)
+    owned.put("/api/styles/take/0", content="\n".join(table[:32]), headers=TABLE)
     short = wait_for_take(owned)
     assert (short["state"], short["advice"]) == (
         "refused", "the face is seen for 1.0 s, limit 2.5 s; record a longer take"
@@ -113,7 +129,7 @@ def test_a_take_becomes_a_style_and_is_deleted(owned: httpx.Client, data: Path, 
     answer = owned.post("/api/styles", json={"name": "short"})
     assert answer.status_code == 400
     assert "record it again, or upload another one" in answer.json()["error"]["message"]
-    owned.put("/api/styles/take/0", content="\n".join(table), headers=kind)
+    owned.put("/api/styles/take/0", content="\n".join(table), headers=TABLE)
     assert wait_for_take(owned)["state"] == "weak"
     assert owned.post("/api/styles", json={"name": "delighted"}).status_code == 400
     assert owned.post("/api/styles", json={"name": "live one"}).status_code == 201
@@ -131,7 +147,12 @@ def test_a_take_becomes_a_style_and_is_deleted(owned: httpx.Client, data: Path, 
     for feature, values in starter.styles["grid_s1"].motion.items():
         np.testing.assert_array_equal(mine.styles["grid_s1"].motion[feature], values)
     mix(owned, "livelier", source="live one")
+    number = create(owned, TEXT)
+    edit(owned, number, {"kind": "models", "options": {"palette": "my-styles"}})
+    edit(owned, number, {"kind": "paint", "feature": "head", "style": "live one", "start": 0.0, "end": 0.5})
     assert "livelier is derived from live one" in owned.delete("/api/styles/live one").json()["error"]["message"]
+    (span,) = owned.get(f"/api/projects/{number}/project.json").json()["timeline"]["spans"]
+    assert span["style"] == "live one"  # what is refused changes nothing
     assert owned.delete("/api/styles/livelier").status_code == 204
     assert owned.delete("/api/styles/live one").status_code == 204
     assert [path.name for path in folder.rglob("*") if path.is_file()] == []

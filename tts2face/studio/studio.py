@@ -116,17 +116,24 @@ class Studio:
         with suppress(RefusedError):  # the first page says why
             await self._face_file(project, work, LOCAL_KEY)
 
-    async def face(self, workspace: Workspace) -> Path:
-        """File of the face of a project for a page, compressed by gzip; made at its first use, and kept.
+    async def face(self, workspace: Workspace) -> tuple[str, Path]:
+        """Look of a project and the file of its face, compressed by gzip; made at its first use, and kept.
 
         Raises
         ------
         InputError
             It is a talker's own face, which has no mesh.
         """
-        work = await workspace.work("face", has_gestures=workspace.project.request.has_gestures)
-        # In any process: making a face takes seconds, in which the project's own process makes its preview.
-        return await self._face_file(workspace.project, replace(work, affinity=""), workspace.key)
+        while True:
+            look, project = workspace.look, workspace.project
+            work = await workspace.work("face", has_gestures=project.request.has_gestures)
+            try:
+                # In any process: making a face takes seconds, in which the project's own process makes its preview.
+                return look, await self._face_file(project, replace(work, affinity=""), workspace.key)
+            except RefusedError:
+                if look == workspace.look:
+                    raise
+                # The project has changed meanwhile, and what its face was made of may have been removed.
 
     async def plain_face(self, key: ApiKey) -> Path:
         """File of the default head without gestures, as takes move it; errors as `face`."""

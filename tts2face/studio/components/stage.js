@@ -78,6 +78,7 @@ export default {
   },
 
   beforeUnmount() {
+    this.loading?.abort();
     this.frames?.stop();
     this.observer?.disconnect();
     for (const stop of this.stops ?? []) stop();
@@ -95,23 +96,23 @@ export default {
 
   methods: {
     async loadFace() {
+      this.loading?.abort(); // a face that is asked for no longer neither replaces this one nor fails
       if (!this.scene || !this.face) {
         this.message = this.face ? this.message : "Choose a face to see it here.";
         return;
       }
-      const wanted = this.face;
+      const { signal } = (this.loading = new AbortController());
       this.message = "Loading the face …";
       const begin = performance.now();
       const making = setTimeout(() => (this.message = "This face is shown for the first time: it takes some seconds …"), MAKING_MS);
       try {
-        await this.scene.setFace(wanted);
-        if (wanted !== this.face) return;
+        await this.scene.setFace(this.face, signal);
         this.scene.setBackground(this.environment);
         this.message = "";
         metrics.face_ms = performance.now() - begin;
         this.resize();
       } catch (wrong) {
-        this.fail(wrong.message, wrong);
+        if (!signal.aborted) this.fail(wrong.message, wrong);
       } finally {
         clearTimeout(making);
       }

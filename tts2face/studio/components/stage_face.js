@@ -140,8 +140,8 @@ export class StageFace {
     }));
   }
 
-  static async load(url) {
-    const answer = await fetch(url);
+  static async load(url, signal) {
+    const answer = await fetch(url, { signal });
     if (!answer.ok) throw new Error(`the face could not be fetched: ${answer.status} ${answer.statusText}`);
     const file = readContainer(await answer.arrayBuffer());
     if (!file.json.asset.extras?.lamps) throw new Error("the face lacks the values of the preview; make it with stage_glb");

@@ -24,8 +24,10 @@ export class StageScene {
     this.onChange = onChange;
   }
 
-  async setFace(url) {
-    const face = await StageFace.load(url);
+  /** Show the face of an address; rejects with an AbortError, and changes nothing, once `signal` is aborted. */
+  async setFace(url, signal) {
+    const face = await StageFace.load(url, signal);
+    signal.throwIfAborted();
     this.clear();
     this.face = face;
     this.litYaw = NaN;

@@ -1,13 +1,11 @@
 """The page on which a project is edited: stage, timeline, and panels around them."""
 
-import zlib
 from typing import Any
 
 from fastapi import Request as HttpRequest
 from nicegui import ui
 
 from lexicon.errors import Tts2faceError
-from tts2face import __version__
 from tts2face.gesture.timeline_file import timeline_json
 from tts2face.models.palette import FEATURES
 from tts2face.request import OWN_FACE
@@ -67,11 +65,9 @@ class AnimatePage:
     @property
     def face_address(self) -> str | None:
         """Address of the face, which changes with it; None for a talker's own face, which has no mesh."""
-        project = self.workspace.project
-        if project.models.face == OWN_FACE:
+        if self.workspace.project.models.face == OWN_FACE:
             return None
-        looks = f"{__version__} {project.models} {project.request.has_gestures}"
-        return f"{self.address}/face.glb?look={zlib.crc32(looks.encode()):08x}"
+        return f"{self.address}/face.glb?look={self.workspace.look}"
 
     @property
     def _preview_address(self) -> str:

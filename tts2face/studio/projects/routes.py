@@ -144,11 +144,11 @@ async def preview(
 
 
 @router.get("/projects/{project}/face.glb")
-async def face(request: HttpRequest, project: str) -> Response:
-    """The face as binary glTF."""
+async def face(request: HttpRequest, project: str, look: str = "") -> Response:
+    """The face as binary glTF; a browser may keep it if it is the one of `look` (`Workspace.look`)."""
     async with opened(request, project) as workspace:
-        path = await _studio(request).face(workspace)
-    return await face_answer(request, path)
+        made, path = await _studio(request).face(workspace)
+    return await face_answer(request, path, is_named=look == made)
 
 
 @router.get("/projects/{project}/picture.png")

@@ -1,11 +1,13 @@
 """An open project: edits and their history, saving, the preview, and who may edit."""
 
 import asyncio
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from lexicon.errors import InputError, Tts2faceError
+from tts2face import __version__
 from tts2face.project.fitting import cut_timeline, without_edges
 from tts2face.project.project import Project
 from tts2face.service.access.keys import ApiKey
@@ -61,6 +63,12 @@ class Workspace:
     def project(self) -> Project:
         """The project as it is now."""
         return self.history.present
+
+    @property
+    def look(self) -> str:
+        """Word that names what the face of the project, as it is now, is made of."""
+        made_of = f"{__version__} {self.project.models} {self.project.request.has_gestures}"
+        return f"{zlib.crc32(made_of.encode()):08x}"
 
     @property
     def is_saved(self) -> bool:

@@ -128,12 +128,12 @@ class Styles:
         Without own styles left, projects return to the shipped palette.
         """
         await self._check_own(key, name)
-        used = await self.users(key, name)
-        await self._change(key, lambda palette: remove_style(palette, name))
-        await self._revise(key, used, lambda project: style_names.drop_style(project, name))
-        own = self.store.path(key.name)
-        if not own.is_file():
+        remove_style(await asyncio.to_thread(self.store.read, key.name), name)  # refuses before a project is changed
+        # Projects first: none has a style or a palette that is gone.
+        await self._revise(key, await self.users(key, name), lambda project: style_names.drop_style(project, name))
+        if await asyncio.to_thread(self.store.own_names, key.name) == (name,):
             await self._revise(key, await self._projects(key, lambda one: True), _with_shipped)
+        await self._change(key, lambda palette: remove_style(palette, name))
 
     async def users(self, key: ApiKey, name: str) -> list[ProjectEntry]:
         """Projects of a key that use an own style."""
