@@ -52,6 +52,16 @@ def parse(content: bytes) -> RawAnswer:
     return RawAnswer(int(first.split()[1]), headers, rest[: int(headers.get("content-length", len(rest)))])
 
 
+def read_answer(connection: socket.socket) -> RawAnswer:
+    """The next answer of a connection that stays open; it states its length."""
+    content = b""
+    while b"\r\n\r\n" not in content or len((answer := parse(content)).body) < int(answer.headers["content-length"]):
+        block = connection.recv(65_536)
+        assert block, f"the connection has ended within {content!r}"
+        content += block
+    return answer
+
+
 def ask(url: str, content: bytes) -> RawAnswer:
     """Send bytes, and read what comes until the connection is closed."""
     with connect(url) as connection:

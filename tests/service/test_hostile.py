@@ -3,12 +3,14 @@
 import gzip
 import json
 import socket
+import time
 
 import pytest
 
 from tests.service.attacked import SPEECH, alive, attacked, say
 from tests.service.conftest import RunningService
-from tests.service.raw import ask, connect, drip, head, parse, read_all, request
+from tests.service.raw import ask, connect, drip, head, parse, read_all, read_answer, request
+from tts2face.service.access.connections import LINGER_S
 
 __all__ = ["alive", "attacked"]  # fixtures
 
@@ -153,9 +155,20 @@ def test_slow_heads_and_bodies_are_ended(attacked: RunningService) -> None:
     assert (parse(came).status, parse(came).code) == (408, "too_slow")
     with connect(attacked.url) as connection:
         connection.sendall(b"GET /v1/models HTTP/1.1\r\nHost: localhost\r\n\r\n")
-        assert parse(connection.recv(65_536)).status == 200
+        assert read_answer(connection).status == 200
         connection.sendall(b"GET /v1/mod")
         assert parse(read_all(connection)).status == 408
+
+
+def test_a_connection_goes_on_after_a_refused_body_has_been_read(attacked: RunningService) -> None:
+    kept_open = head("POST", "/nothing", "Content-Length: 2").replace(b"Connection: close\r\n", b"")
+    with connect(attacked.url) as connection:
+        connection.sendall(kept_open)
+        assert read_answer(connection).status == 404
+        connection.sendall(b"{}")
+        time.sleep(LINGER_S + 0.5)
+        connection.sendall(head("GET", "/v1/models"))
+        assert parse(read_all(connection)).status == 200
 
 
 def test_idle_connections_are_closed_and_do_not_disturb(attacked: RunningService) -> None:

@@ -82,6 +82,9 @@ class HttpConnection(H11Protocol):
             if self._n_lingering > LINGER_BYTES:
                 return self._abort()
         super().data_received(data)
+        is_answered = self.cycle is not None and self.cycle.response_complete
+        if not is_answered or self.conn.their_state is not h11.SEND_BODY:
+            self._linger.stop()  # the rest has come
         if self.conn.their_state is not h11.IDLE:
             self._head.stop()
         elif not self._head.is_running and self.conn.trailing_data[0]:
