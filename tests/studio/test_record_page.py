@@ -1,6 +1,7 @@
 """The recording page in Chromium, with a fake camera and microphone fed with a recording."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -84,11 +85,8 @@ def build_and_speak(browser: Browser, folder: Path) -> None:
     browser.wait("return document.body.innerText.includes('state the consent')")
     browser.type("Statement of consent", "I, Test person, agree to this test.")
     browser.click("Build the talker")
-    script = (
-        "const text = document.body.innerText; return text.includes('is made of 4 takes') || text.includes(' refused')"
-    )
-    browser.wait(script, seconds=240)
-    assert "The talker Test person is made of 4 takes" in browser.text()
+    done = "const text = document.body.innerText; return text.match(/(The talker .* is made of|.* refused).*/)?.[0]"
+    check_takes(browser.wait(done, seconds=240))
     assert load_talker(str(folder / "talker.talker")).metadata["consent"]["statement"].startswith("I, Test person")
     browser.type("First sentence", "Now I speak.")
     browser.click("Speak")
@@ -98,6 +96,17 @@ def build_and_speak(browser: Browser, folder: Path) -> None:
     browser.wait("return !document.querySelector('video[aria-label^=First]').seeking")
     size = browser.run("const clip = document.querySelector('video[aria-label^=First]'); return clip.duration")
     assert 0.5 < size < 5
+
+
+def check_takes(sentence: str) -> None:
+    """All four takes are in the talker, but those that Chromium's fake devices have moved against their sound.
+
+    A take is too short to tell; the build compares it with the others.
+    """
+    made = re.match(r"The talker Test person is made of (\d) takes?, [0-9.]+ minutes\.", sentence)
+    assert made, sentence
+    n_refused = sentence.count("lip motion does not match the sound")
+    assert (int(made[1]) + n_refused, n_refused <= 2) == (4, True), sentence
 
 
 def delete_everything(browser: Browser) -> None:
