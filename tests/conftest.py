@@ -3,9 +3,11 @@
 import os
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+STUDIO = "tests/studio/"
 SHARED = Path(os.environ.get("TTS2FACE_SHARED", Path(__file__).resolve().parents[2] / "shared"))
 
 
@@ -69,6 +71,20 @@ def face_model() -> Path:
         return find_bundle()
     except BackendError as missing:
         pytest.skip(str(missing))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """One process runs the tests of the studio: two browsers that draw at once are too slow for what a page must do."""
+    if config.getvalue("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class Scheduler(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return STUDIO if nodeid.startswith(STUDIO) else super()._split_scope(nodeid)
+
+    return Scheduler(config, log)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
