@@ -92,6 +92,14 @@ def test_one_mood_cannot_be_told_apart() -> None:
         study_moods(Session("grid_s1", "head"), MoodOptions(), ["neutral"])
 
 
-def test_another_kind_of_file_is_refused(tmp_path: Path) -> None:
+def test_the_command_writes_a_contact_sheet(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], study: MoodStudy, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("corpus_tools.gesture_study.write_moods.study_moods", lambda *_, **__: study)  # takes 30 s
+    out = tmp_path / "moods.png"
+    assert run(["report", "moods", "--out", str(out), "--seeds", "4"]) == 0
+    with Image.open(out) as sheet:
+        assert sheet.size == (6 * 256, 6 * 256)
+    assert "of 12 clips of 6 moods" in capsys.readouterr().err
     assert run(["report", "moods", "--out", str(tmp_path / "moods.txt")]) == 2
-    assert not list(tmp_path.iterdir())
+    assert list(tmp_path.iterdir()) == [out]
