@@ -87,11 +87,11 @@ def play(page: Page, name: str) -> None:
     """Print the figures of a page that plays."""
     wait_for_rest()
     alone = page.slowness()
-    page.toggle()
+    page.play()
     time.sleep(WARM_S)
     cost = processor_ms(page.browser, lambda: page.measure("frames"))
     script, lines, share = (page.measure(one) for one in ("js_ms", "timeline_ms", "playing_share"))
-    page.toggle()
+    page.pause()
     print(
         f"{name}: {cost}; {100 * share:.0f} % of the pixels along a side, script of the stage {script:.2f} ms a frame, "
         f"of the timeline {lines:.2f} ms; a script is {alone:.1f} times slower than on an idle core of 2.5 GHz"

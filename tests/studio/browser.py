@@ -163,10 +163,12 @@ class Browser:
         self._perform([{"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": actions}])
 
     def double_click(self, x: float, y: float) -> None:
-        """Press the mouse twice at a place."""
-        press = [{"type": "pointerDown", "button": 0}, {"type": "pointerUp", "button": 0}]
-        actions = [{"type": "pointerMove", "x": round(x), "y": round(y), "duration": 0}, *press, *press]
-        self._perform([{"type": "pointer", "id": "mouse", "actions": actions}])
+        """Press the mouse twice at a place; they count as two however long a busy browser takes."""
+        place = {"x": round(x), "y": round(y)}
+        self.devtools("Input.dispatchMouseEvent", type="mouseMoved", **place)
+        for count in (1, 2):
+            for kind in ("mousePressed", "mouseReleased"):
+                self.devtools("Input.dispatchMouseEvent", type=kind, button="left", clickCount=count, **place)
 
     def press(self, *names: str) -> None:
         """Press keys one after the other: names of `KEYS`, or characters; ``Alt+Left`` holds the first."""
