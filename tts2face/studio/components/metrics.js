@@ -2,7 +2,7 @@
 
 export const metrics = (window.__studio = window.__studio ?? {});
 
-const PAUSE_MS = 300; // between two pieces of work of which the second begins a new measure
+const PAUSE_MS = 1000; // between two pieces of work of which the second begins a new measure
 
 /** Mean time of a repeated piece of work over a second, written to `metrics` under two names. */
 export class Meter {
