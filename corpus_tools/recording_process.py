@@ -31,7 +31,7 @@ from tts2face.limited_process import ProcessLimits, limit_process
 IN_FRONT_OF_A_CAMERA = {  # parts of findings, and what a person can do who is just recording
     "correct the words": "read exactly what is shown",
     "check the transcript": "read exactly what is shown",
-    "give the original sound": "keep the mouth in view and read it again",
+    "give the original sound or record it again": "keep the mouth in view and read it again",
     "cut the video": "stay in the picture",
     # Other words than the prompt's are aligned with pauses, which then count as speech.
     "record in a quieter room": "record in a quieter room, and read exactly what is shown",

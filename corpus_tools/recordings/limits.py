@@ -51,7 +51,10 @@ PHONES = (
     "its phones could not be recognised well (confidence {value:.0f}, limit {bound:.0f}); "
     "write the transcript into a .txt beside it"
 )
-LIPS = "lip motion does not match the sound (correlation {value:.2f}, limit {bound:.2f}); give the original sound"
+LIPS = (
+    "lip motion does not match the sound (correlation {value:.2f}, limit {bound:.2f}); "
+    "give the original sound or record it again"
+)
 LIMITS = (
     # The median is -7300 for other sentences of GRID's small grammar, -10500 for unrelated text if it aligns at all.
     Limit("confidence", -6000.0, LEAST_CONFIDENCE, True, WORDS),

@@ -96,7 +96,8 @@ def test_weak_agreement_is_a_warning() -> None:
     weak = SyncEstimate(0.0, 0.3, 60.0, 0.3, 60.0)
     assert weak.problem is None
     assert weak.warnings == (
-        "lip motion does not match the sound (correlation 0.30, limit 0.35); give the original sound",
+        "lip motion does not match the sound (correlation 0.30, limit 0.35); "
+        "give the original sound or record it again",
     )
 
 
