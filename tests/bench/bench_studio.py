@@ -78,9 +78,9 @@ def processor_ms(browser: Browser, frames: Callable[[], float]) -> str:
     before, first = processor_s(browser.driver), frames()
     time.sleep(PLAYED_S)
     after, n = processor_s(browser.driver), frames() - first
-    each = {kind: 1000 * (after[kind] - before.get(kind, 0.0)) / max(n, 1) for kind in after}
-    each = {kind: spent for kind, spent in each.items() if spent > 0.05}  # less than none where a process has ended
-    parts = ", ".join(f"{kind} {spent:.1f}" for kind, spent in each.items())
+    spent = {kind: 1000 * (after[kind] - before.get(kind, 0.0)) / max(n, 1) for kind in after}
+    each = {kind: ms for kind, ms in spent.items() if ms > 0.05}  # of a kind whose process has ended it is less than 0
+    parts = ", ".join(f"{kind} {ms:.1f}" for kind, ms in each.items())
     return f"{n / PLAYED_S:.1f} frames/s; processor time of a frame {sum(each.values()):.1f} ms ({parts})"
 
 

@@ -163,7 +163,7 @@ class Browser:
         self._perform([{"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": actions}])
 
     def double_click(self, x: float, y: float) -> None:
-        """Press the mouse twice at a place; they count as two however long a busy browser takes."""
+        """Press the mouse twice at a place: a double click also where a busy browser takes long over the first."""
         place = {"x": round(x), "y": round(y)}
         self.devtools("Input.dispatchMouseEvent", type="mouseMoved", **place)
         for count in (1, 2):
