@@ -7,7 +7,18 @@ from typing import Any
 
 import pytest
 
-STUDIO = "tests/studio/"
+pytest_plugins = ["tests.started", "tests.running"]
+
+TESTS = Path(__file__).resolve().parent
+GROUPS = {  # name of a folder and of a marker: what the tests in it do
+    "server": "start servers, workers or databases",
+    "browser": "drive a browser",
+    "build": "make talkers, faces or styles of recordings",
+    "commands": "run command lines of the documentation",
+    "fuzz": "try many generated or hostile inputs",
+}
+DEFAULT = f"smoke or not ({' or '.join(GROUPS)})"  # as in pyproject.toml
+SHARED_SERVER = "host"  # fixture
 SHARED = Path(os.environ.get("TTS2FACE_SHARED", Path(__file__).resolve().parents[2] / "shared"))
 
 
@@ -73,16 +84,43 @@ def face_model() -> Path:
         pytest.skip(str(missing))
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the markers of the slow groups; tests that are named by their path run whatever group they are in."""
+    for name, content in GROUPS.items():
+        config.addinivalue_line("markers", f"{name}: tests in folders of this name: {content}")
+    config.addinivalue_line("markers", "smoke: one test of a promise; it runs by default though its folder does not")
+    if config.args_source == pytest.Config.ArgsSource.ARGS and config.option.markexpr == DEFAULT:
+        config.option.markexpr = ""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark tests by their folders, and sort them: those of a shared server first, files of the default run last.
+
+    Tests that share a server belong to one group of pytest-xdist, so that a run starts that server once.
+    """
+    for item in items:
+        folders = item.path.relative_to(TESTS).parts[:-1]
+        for name in GROUPS.keys() & set(folders):
+            item.add_marker(name)
+        if SHARED_SERVER in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.xdist_group("browser" if "browser" in folders else SHARED_SERVER))
+    items.sort(key=lambda item: (item.get_closest_marker("xdist_group") is None, not _groups(item)))
+
+
+def _groups(item: pytest.Item) -> set[str]:
+    return GROUPS.keys() & {marker.name for marker in item.iter_markers()}
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """One process runs the tests of the studio: two browsers that draw at once are too slow for what a page must do."""
-    if config.getvalue("dist") != "loadfile":
-        return None
-    from xdist.scheduler import LoadFileScheduling
+    """The tests of a group of pytest-xdist run in one process, and those of a file that are in none."""
+    from xdist.scheduler import LoadGroupScheduling
 
-    class Scheduler(LoadFileScheduling):
+    class Scheduler(LoadGroupScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            return STUDIO if nodeid.startswith(STUDIO) else super()._split_scope(nodeid)
+            return super()._split_scope(nodeid).split("::")[0]
 
     return Scheduler(config, log)
 

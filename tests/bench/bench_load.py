@@ -7,8 +7,8 @@ import argparse
 import asyncio
 import time
 
-from tests.service.conftest import RunningService
-from tests.service.test_load import Usage, speak_many, usage, wait_until_idle
+from tests.running import RunningService, ServeProcess
+from tests.service.server.test_load import Usage, speak_many, usage, wait_until_idle
 
 N_ROWS = 5
 KEEP_ALIVE_S = 1.0
@@ -34,7 +34,7 @@ def main() -> None:
     parser.add_argument("--at-once", type=int, default=8)
     parser.add_argument("--processes", type=int, default=2)
     chosen = parser.parse_args()
-    running = RunningService(processes=chosen.processes, environment={
+    running = ServeProcess(processes=chosen.processes, environment={
         "TTS2FACE_SERVE_KEEP_ALIVE_S": str(KEEP_ALIVE_S), "TTS2FACE_SERVE_WORKERS": "0",
     })  # fmt: skip
     try:

@@ -13,7 +13,7 @@ from pathlib import Path
 import httpx
 
 from tests.bench.sentences import sentences
-from tests.service.conftest import RunningService
+from tests.running import RunningService, ServeProcess
 from tts2face.service.access.keys import add_key
 from tts2face.studio.projects.bundle import read_bundle
 
@@ -63,7 +63,7 @@ def main() -> None:
         keys = [add_key(file, name, ["speak"]) for name in ("ann", "bob")]
         limits = {"PREVIEWS_MB": chosen.previews_mb, "SENTENCES_MB": chosen.sentences_mb}
         variables = {f"TTS2FACE_SERVE_{name}": str(value) for name, value in limits.items()}
-        running = RunningService("--keys", str(file), environment=variables, processes=2)
+        running = ServeProcess("--keys", str(file), environment=variables, processes=2)
         try:
             running.wait_until_ready()
             clients = [

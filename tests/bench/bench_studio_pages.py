@@ -13,10 +13,10 @@ from pathlib import Path
 
 import httpx
 
-from tests.service.conftest import RunningService
+from tests.running import RunningService, ServeProcess
 from tests.studio.browser import Browser, wait_until
 from tests.studio.served import slowness
-from tests.studio.test_projects_http import create, edit, preview
+from tests.studio.server.test_projects_http import create, edit, preview
 
 ROUNDS = 3
 SHOWN = "const s = window.__studio; return Boolean(s && s.frames > 0 && s.face_ms && s.view && s.view.duration > 0)"
@@ -61,7 +61,7 @@ DRAGS = 20
 
 def main() -> None:
     """Print all figures."""
-    running = RunningService(environment={"TTS2FACE_SERVE_WARM_STUDIO": "true"}, processes=2)
+    running = ServeProcess(environment={"TTS2FACE_SERVE_WARM_STUDIO": "true"}, processes=2)
     try:
         running.wait_until_ready()
         _wait_for_face(running)

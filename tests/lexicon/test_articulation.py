@@ -9,19 +9,19 @@ from lexicon.errors import InputError
 from lexicon.phones import PHONES
 
 
-@pytest.mark.parametrize("label", PHONES)
-def test_targets_follow_from_the_features_of_the_phone(label: str) -> None:
-    phone = PHONES[label]
-    for target in visible_targets(label):
-        assert all(value is None or 0 <= value <= 1 for value in astuple(target))
-        assert (target.rounding is None) == (target.spreading is None)
-        assert not (target.rounding or 0) * (target.spreading or 0)  # never both
-        assert bool(target.lip_contact) == (phone.place == "bilabial")
-        if not phone.is_vowel:
-            assert not target.opening
-            assert bool(target.rounding) == (bool(phone.rounding) and phone.place != "bilabial")
-        if phone.kind == "silence":
-            assert not any(astuple(target))
+def test_targets_follow_from_the_features_of_the_phone(subtests: pytest.Subtests) -> None:
+    for label, phone in PHONES.items():
+        with subtests.test(label):
+            for target in visible_targets(label):
+                assert all(value is None or 0 <= value <= 1 for value in astuple(target))
+                assert (target.rounding is None) == (target.spreading is None)
+                assert not (target.rounding or 0) * (target.spreading or 0)  # never both
+                assert bool(target.lip_contact) == (phone.place == "bilabial")
+                if not phone.is_vowel:
+                    assert not target.opening
+                    assert bool(target.rounding) == (bool(phone.rounding) and phone.place != "bilabial")
+                if phone.kind == "silence":
+                    assert not any(astuple(target))
 
 
 def test_classes_hold_in_every_language() -> None:

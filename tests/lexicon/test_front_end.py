@@ -28,10 +28,11 @@ PIECES = re.split(
 )
 
 
-@pytest.mark.parametrize(("text", "ipa"), SENTENCES)
-def test_decided_readings(text: str, ipa: str) -> None:
+def test_decided_readings(subtests: pytest.Subtests) -> None:
     """The differences between this front end and that of the voice were decided one by one (docs/front-end.md)."""
-    assert " ".join(word.ipa + word.mark for word in pronounce(text).words) == ipa
+    for text, ipa in SENTENCES:
+        with subtests.test(text):
+            assert " ".join(word.ipa + word.mark for word in pronounce(text).words) == ipa
 
 
 @pytest.mark.parametrize(
@@ -99,9 +100,10 @@ def check_printed_is_spoken(text: str) -> None:
             assert PHONE_OF_LETTER[letters[place]] == {"ɚ": "ə"}.get(phone, phone) or letters[place] == "ᵻ"
 
 
-@pytest.mark.parametrize("text", [text for text, _ in SENTENCES])
-def test_printed_phones_are_spoken_and_aligned(text: str) -> None:
-    check_printed_is_spoken(text)
+def test_printed_phones_are_spoken_and_aligned(subtests: pytest.Subtests) -> None:
+    for text, _ in SENTENCES:
+        with subtests.test(text):
+            check_printed_is_spoken(text)
 
 
 def test_printed_phones_of_marked_texts_are_spoken() -> None:

@@ -10,9 +10,10 @@ TABLE = Path(__file__).with_name("normalization.tsv")
 CASES = [line.split("\t") for line in TABLE.read_text(encoding="utf-8").splitlines()[1:]]
 
 
-@pytest.mark.parametrize(("written", "spoken"), CASES, ids=[written for written, _ in CASES])
-def test_written_forms_are_normalised(written: str, spoken: str) -> None:
-    assert normalize(written.replace("\\n", "\n")) == spoken
+def test_written_forms_are_normalised(subtests: pytest.Subtests) -> None:
+    for written, spoken in CASES:
+        with subtests.test(written):
+            assert normalize(written.replace("\\n", "\n")) == spoken
 
 
 def test_the_table_is_large() -> None:

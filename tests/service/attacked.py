@@ -5,21 +5,16 @@ from collections.abc import Iterator
 import httpx
 import pytest
 
-from tests.service.conftest import RunningService
+from tests.running import HostService, RunningService
 
 SPEECH = "/v1/audio/speech"
-SETTINGS = {"HEAD_S": "1.5", "BODY_S": "2", "STALL_S": "2", "BODY_MB": "2", "SOUND_S": "20", "MESSAGE_KB": "64"}
+SETTINGS = {"head_s": 1.5, "body_s": 2, "stall_s": 2, "body_mb": 2, "sound_s": 20, "message_kb": 64, "workers": 0}
 
 
 @pytest.fixture(scope="module")
-def attacked() -> Iterator[RunningService]:
-    running = RunningService(environment={f"TTS2FACE_SERVE_{name}": value for name, value in SETTINGS.items()})
-    try:
-        running.wait_until_ready()
+def attacked(host: HostService) -> Iterator[RunningService]:
+    with host(**SETTINGS) as running:
         yield running
-    finally:
-        log = running.close()
-    assert running.process.returncode == 0, log[-3000:]
     assert not [event for event in running.events() if event["event"] == "defect"]
 
 

@@ -1,30 +1,28 @@
 """Requests of jobs, and waiting for them."""
 
-import time
 from typing import Any
 
 import httpx
+
+from tests.running import eventually
 
 CLIP = {"text": "Hi.", "voice": "espeak", "format": "curves", "fps": 5}
 SMALL = {"size": "64x64", "supersampling": 1, "fps": 5, "voice": "espeak"}
 
 
 def wait_for_database(url: str) -> None:
-    deadline = time.monotonic() + 120
-    while not httpx.get(f"{url}/readyz").json()["checks"]["database"]:
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
+    eventually(lambda: httpx.get(f"{url}/readyz").json()["checks"]["database"], 120)
 
 
 def finished(api: httpx.Client, job: dict[str, Any]) -> dict[str, Any]:
     """A job after its end."""
-    deadline = time.monotonic() + 240
-    while True:
+
+    def end() -> dict[str, Any] | None:
         found: dict[str, Any] = api.get(f"/v1/jobs/{job['id']}").json()
-        if found["state"] not in {"waiting", "running"}:
-            return found
-        assert time.monotonic() < deadline, found
-        time.sleep(0.2)
+        return None if found["state"] in {"waiting", "running"} else found
+
+    ended: dict[str, Any] = eventually(end, 240, lambda: f"{job['id']} has not ended")
+    return ended
 
 
 def submit(api: httpx.Client, request: dict[str, Any], kind: str = "clip", **options: Any) -> httpx.Response:

@@ -4,19 +4,16 @@ import asyncio
 import json
 import logging
 import os
-import signal
 from collections.abc import AsyncIterator
-from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
 
-from tests.service.conftest import RunningService
 from tts2face.service import logs
 from tts2face.service.access.exchange import Receive, Scope, Send
 from tts2face.service.access.guard import Guard
-from tts2face.service.access.keys import LOCAL_KEY, add_key, remove_key
+from tts2face.service.access.keys import LOCAL_KEY
 from tts2face.service.logs import LOG, LineFormatter, log_event
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.state import ServiceState
@@ -117,49 +114,6 @@ def test_texts_are_logged_if_the_setting_says_so(caplog: pytest.LogCaptureFixtur
     with caplog.at_level(logging.INFO, LOG.name):
         asyncio.run(make())
     assert [one.fields for one in caplog.records] == ([{"text": "my words"}] if log_text else [])  # type: ignore[attr-defined]
-
-
-def test_every_line_of_a_request_has_its_id_and_none_its_text(service: RunningService) -> None:
-    body = {"text": "Zebras graze quietly.", "style": "gleeful", "format": "curves"}
-    httpx.post(f"{service.url}/v1/clips", json=body, headers={"x-request-id": "id-11"}, timeout=60)
-    made = service.wait_for_event("request", id="id-11")
-    assert (made["status"], made["code"], made["path"]) == (400, "invalid_request", "/v1/clips")
-    assert "Zebras" not in "".join(service.lines)
-    assert all({"time", "level", "event"} <= set(event) for event in service.events())
-
-
-def test_server_timing_names_the_stages(client: httpx.Client) -> None:
-    answer = client.post("/v1/audio/speech", json={"input": "Hello.", "model": "tts-1", "voice": "alloy"})
-    timing = dict(part.split(";dur=") for part in answer.headers["server-timing"].split(", "))
-    assert set(timing) == {"queue", "synthesis", "total"}
-    assert float(timing["queue"]) + float(timing["synthesis"]) <= float(timing["total"]) + 1.0
-
-
-def test_keys_are_read_again_on_sighup(tmp_path: Path) -> None:
-    path = tmp_path / "keys.toml"
-    first = add_key(path, "first", ["speak"])
-    running = RunningService(environment={"TTS2FACE_SERVE_KEYS": str(path)})
-
-    def status(secret: str) -> int:
-        answer = httpx.get(f"{running.url}/v1/models", headers={"authorization": f"Bearer {secret}"})
-        return answer.status_code
-
-    try:
-        second = add_key(path, "second", ["speak"])
-        assert (status(first), status(second)) == (200, 401)
-        running.process.send_signal(signal.SIGHUP)
-        running.wait_for_event("keys reloaded", keys=["first", "second"])
-        assert (status(first), status(second)) == (200, 200)
-        remove_key(path, "first")
-        running.process.send_signal(signal.SIGHUP)
-        running.wait_for_event("keys reloaded", keys=["second"])
-        assert (status(first), status(second)) == (401, 200)
-        path.write_text("[[key]]\nname = 1")
-        running.process.send_signal(signal.SIGHUP)
-        assert "without name or hash" in running.wait_for_event("keys not reloaded")["reason"]
-        assert status(second) == 200
-    finally:
-        running.close()
 
 
 def test_nobody_waits_for_a_reader_of_the_log(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,12 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
 from cli.main import run
 from lexicon.errors import DataError, InputError
-from tests.service.conftest import running_service
 from tts2face.service.access.keys import LOCAL_KEY, ApiKey, add_key, find_key, read_keys, remove_key
 from tts2face.service.access.rate_limits import RateLimits
 from tts2face.service.errors import RefusedError
@@ -216,14 +214,3 @@ def test_wrong_files_of_keys_are_refused(tmp_path: Path, content: str, reason: s
 def test_names_of_keys_are_plain(tmp_path: Path, name: str) -> None:
     with pytest.raises(InputError, match="a key's name consists of"):
         add_key(tmp_path / "keys.toml", name, ["speak"])
-
-
-def test_jobs_use_the_seconds_of_speech_too(tmp_path: Path) -> None:
-    """By their texts, as they are made later and elsewhere."""
-    path = tmp_path / "keys.toml"
-    headers = {"authorization": f"Bearer {add_key(path, 'a', ['speak'], speech_s_per_day=10)}"}
-    with running_service(environment={"TTS2FACE_SERVE_KEYS": str(path), "TTS2FACE_SERVE_WORKERS": "0"}) as running:
-        job = {"kind": "clip", "request": {"text": "We were away a year ago. " * 12}}
-        answers = [httpx.post(f"{running.url}/v1/jobs", json=job, headers=headers, timeout=60) for _ in range(2)]
-        assert [answer.status_code for answer in answers] == [202, 429], answers[0].text
-        assert int(answers[1].headers["retry-after"]) > HOUR_S

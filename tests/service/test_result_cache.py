@@ -6,11 +6,9 @@ from contextlib import aclosing
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 
 from lexicon.errors import BackendError
-from tests.service.conftest import running_service
 from tts2face.service.synthesis.messages import Message, MessageKind
 from tts2face.service.synthesis.result_cache import ResultCache, work_hash
 from tts2face.service.synthesis.work import Work
@@ -143,15 +141,3 @@ def test_a_model_file_that_was_replaced_counts(tmp_path: Path) -> None:
     before = work_hash(Work(models={"talker": str(model)}))
     model.write_bytes(b"12")
     assert work_hash(Work(models={"talker": str(model)})) != before
-
-
-def test_the_service_answers_from_its_cache(tmp_path: Path) -> None:
-    environment = {"TTS2FACE_SERVE_CACHE_MB": "10", "TTS2FACE_SERVE_DATA": str(tmp_path)}
-    with running_service(environment=environment) as running:
-        body = {"text": "Hello there.", "format": "mp4", "size": "64x64", "supersampling": 1}
-        first, second = (httpx.post(f"{running.url}/v1/clips", json=body, timeout=60.0) for _ in range(2))
-        assert first.content == second.content
-        lines = httpx.get(f"{running.url}/metrics").text.splitlines()
-        assert "tts2face_cache_hits 1.0" in lines
-        assert "tts2face_cache_misses 1.0" in lines
-        assert [path.stat().st_size > len(first.content) for path in (tmp_path / "cache").iterdir()] == [True]

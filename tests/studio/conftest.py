@@ -7,10 +7,9 @@ import httpx
 import pytest
 
 from tests.conftest import SHARED
-from tests.service.conftest import RunningService
+from tests.running import RunningService
 from tests.studio.browser import Browser, open_browser
 from tests.studio.fake_camera import write_fake_media
-from tests.studio.served import service_with_harness
 
 pytest.importorskip("nicegui", reason="needs `pip install 'tts2face[studio]'`")
 
@@ -18,11 +17,10 @@ SPOKEN = SHARED / "recordings" / "grid_s1" / "clips" / "bbaf2n.mkv"  # "bin blue
 
 
 @pytest.fixture(scope="session")
-def studio_service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningService]:
-    with service_with_harness(tmp_path_factory.mktemp("harness")) as running:
-        running.wait_until_ready()
-        yield running
-        assert not [line for line in running.lines if "Traceback" in line]
+def studio_service(service: RunningService) -> Iterator[RunningService]:
+    """The service of the run, with the harness."""
+    yield service
+    assert not [event for event in service.events() if "traceback" in event]
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.service.conftest import RunningService, running_service
+from tests.running import ServeProcess, serve_process
 from tests.studio.browser import Browser, wait_until
 
 HARNESS = "/studio/harness"  # path of the page
@@ -21,9 +21,9 @@ CALIBRATION = (
 CALIBRATION_MS = 75
 
 
-def service_with_harness(folder: Path) -> AbstractContextManager[RunningService]:
+def service_with_harness(folder: Path) -> AbstractContextManager[ServeProcess]:
     """A service with the harness, which keeps its files in a folder."""
-    return running_service(program=("-m", "tests.studio.harness", str(folder)), is_ready=False)
+    return serve_process(program=("-m", "tests.studio.harness", str(folder)), is_ready=False)
 
 
 def create_project(browser: Browser, url: str, text: str) -> str:

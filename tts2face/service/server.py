@@ -36,9 +36,17 @@ def serve(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> None:
     disable_telemetry()
     configure_logs(settings.log_format, with_text=settings.log_text)
     _allow_files(settings.connections)
+    server = make_server(settings, mounts)
+    server.run()
+    if server.force_exit:
+        sys.exit(FORCED_CODE)
+
+
+def make_server(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> "DrainingServer":
+    """Server of an application with the given settings, before it runs."""
     app = create_app(settings, mounts)
     http, socket_class = connection_classes(settings)
-    server = DrainingServer(uvicorn.Config(
+    return DrainingServer(uvicorn.Config(
         app, host=settings.host, port=settings.port, http=http, ws=socket_class,  # type: ignore[arg-type]
         loop="asyncio",  # whatever else is installed
         log_config=None, log_level="warning", access_log=False, server_header=False, proxy_headers=False,
@@ -46,9 +54,6 @@ def serve(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> None:
         timeout_keep_alive=settings.keep_alive_s,  # type: ignore[arg-type]
         h11_max_incomplete_event_size=1024 * settings.head_kb,
     ), app.state.service)  # fmt: skip
-    server.run()
-    if server.force_exit:
-        sys.exit(FORCED_CODE)
 
 
 class DrainingServer(uvicorn.Server):

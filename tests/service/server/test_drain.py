@@ -1,0 +1,172 @@
+"""What a server does on SIGTERM: running clips finish, new requests are refused, nothing is left behind."""
+
+import asyncio
+import io
+import json
+import os
+import signal
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import av
+import httpx
+import pytest
+import websockets
+
+from tests.running import RunningService, ServeProcess
+
+LONG = "We were away a year ago, but Bob may move five big maps. " * 5
+CLIP = {"text": LONG, "size": "128x128"}
+
+
+def children(pid: int) -> list[int]:
+    """Processes that a process has started, and theirs."""
+    found = subprocess.run(["ps", "-eo", "pid,ppid"], capture_output=True, text=True, check=True).stdout.split()[2:]
+    parents = {int(child): int(parent) for child, parent in zip(found[::2], found[1::2], strict=True)}
+    own = [child for child, parent in parents.items() if parent == pid]
+    return own + [later for one in own for later in children(one)]
+
+
+def is_running(pid: int) -> bool:
+    """Whether a process exists and is no zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def wait_until_gone(pids: list[int]) -> None:
+    deadline = time.monotonic() + 60
+    while any(map(is_running, pids)):
+        assert time.monotonic() < deadline, pids
+        time.sleep(0.05)
+
+
+@pytest.fixture
+def own() -> Iterator[RunningService]:
+    """A service of one test, which ends it."""
+    running = ServeProcess(environment={"TTS2FACE_SERVE_DRAIN_S": "120", "TTS2FACE_SERVE_WORKERS": "0"})
+    try:
+        running.wait_until_ready()
+        yield running
+    finally:
+        running.process.kill()
+        running.close()
+
+
+def own_children(pid: int) -> list[int]:
+    """Processes that a process has started itself."""
+    return [child for child in children(pid) if Path(f"/proc/{child}/stat").read_text().split()[3] == str(pid)]
+
+
+def send_all(service: RunningService, number: signal.Signals) -> None:
+    """Send a signal to the synthesis processes: SIGSTOP keeps a clip unfinished on any machine."""
+    for pid in own_children(service.process.pid):
+        os.kill(pid, number)
+
+
+class Download(threading.Thread):
+    """A clip that is received in the background; `has_begun` after its first bytes."""
+
+    def __init__(self, url: str) -> None:
+        super().__init__(daemon=True)
+        self.url, self.content, self.error = url, b"", None
+        self.has_begun = threading.Event()
+        self.error: Exception | None
+        self.start()
+
+    def run(self) -> None:
+        try:
+            with httpx.stream("POST", f"{self.url}/v1/clips", json=CLIP, timeout=120) as answer:
+                for part in answer.iter_bytes():
+                    self.content += part
+                    self.has_begun.set()
+        except httpx.HTTPError as error:
+            self.error = error
+        finally:
+            self.has_begun.set()
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="needs /proc")
+def test_a_running_clip_finishes_after_sigterm(own: RunningService) -> None:
+    processes = children(own.process.pid)
+    assert processes
+    download = Download(own.url)
+    assert download.has_begun.wait(60)
+    send_all(own, signal.SIGSTOP)
+    own.process.send_signal(signal.SIGTERM)
+    own.wait_for_event("draining")
+    ready = httpx.get(f"{own.url}/readyz")
+    assert (ready.status_code, ready.json()["checks"]["accepting"]) == (503, False)
+    assert httpx.get(f"{own.url}/healthz").status_code == 200
+    refused = httpx.post(f"{own.url}/v1/audio/speech", json={"input": "Hello.", "model": "tts-1", "voice": "alloy"})
+    assert (refused.status_code, refused.json()["error"]["code"]) == (503, "draining")
+    assert int(refused.headers["retry-after"]) >= 1
+    send_all(own, signal.SIGCONT)
+    download.join(120)
+    assert download.error is None
+    with av.open(io.BytesIO(download.content)) as movie:
+        assert sum(1 for _ in movie.decode(video=0)) > 30 * 10
+    assert own.process.wait(60) == 0
+    wait_until_gone(processes)
+
+
+def test_a_second_signal_ends_the_server_at_once(own: RunningService) -> None:
+    processes = children(own.process.pid)
+    download = Download(own.url)
+    assert download.has_begun.wait(60)
+    send_all(own, signal.SIGSTOP)
+    own.process.send_signal(signal.SIGTERM)
+    own.wait_for_event("draining")
+    own.process.send_signal(signal.SIGTERM)
+    assert own.process.wait(60) == 128 + signal.SIGTERM
+    download.join(60)
+    assert isinstance(download.error, httpx.RemoteProtocolError)  # the client sees that the clip is incomplete
+    wait_until_gone(processes)
+
+
+def test_streams_that_take_too_long_are_cut(tmp_path: Path) -> None:
+    own = ServeProcess(environment={"TTS2FACE_SERVE_DRAIN_S": "0.2", "TTS2FACE_SERVE_WORKERS": "0"})
+    try:
+        own.wait_until_ready()
+        processes = children(own.process.pid)
+        download = Download(own.url)
+        assert download.has_begun.wait(60)
+        send_all(own, signal.SIGSTOP)
+        own.close()
+        download.join(60)
+        assert isinstance(download.error, httpx.RemoteProtocolError)
+        assert any(event["event"] == "request" and event["cut"] for event in own.events())
+        wait_until_gone(processes)
+    finally:
+        own.process.kill()
+
+
+@pytest.mark.parametrize("path", ["/v1/stream", "/"])
+def test_websockets_get_a_message_and_the_code_of_a_restart(own: RunningService, path: str) -> None:
+    async def run() -> tuple[list[object], int | None]:
+        address = own.url.replace("http", "ws", 1) + path
+        async with websockets.connect(address, max_size=None) as connection:
+            if path == "/v1/stream":
+                await connection.send(json.dumps({"type": "start"}))
+                await connection.recv()
+            os.kill(own.process.pid, signal.SIGTERM)
+            came: list[object] = []
+            try:
+                while True:
+                    message = await asyncio.wait_for(connection.recv(), 60)
+                    came.append(json.loads(message) if isinstance(message, str) else message)
+            except websockets.ConnectionClosed as closed:
+                return came, closed.rcvd.code if closed.rcvd else None
+
+    came, code = asyncio.run(run())
+    errors = [one for one in came if isinstance(one, dict) and one["type"] == "error"]
+    assert [(one["code"], one["message"]) for one in errors] == [
+        ("draining", "the service is shutting down; connect again")
+    ]
+    assert code == 1012
+    assert own.process.wait(60) == 0
+    assert not any(event["event"] == "defect" for event in own.events())

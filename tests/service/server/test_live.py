@@ -1,0 +1,265 @@
+"""Live streams against a running service."""
+
+import asyncio
+import json
+import time
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+import websockets
+
+import tts2face
+from tests.running import RunningService
+from tts2face.exports.arkit import arkit_projection
+
+WORDS = ["Hello", "there,", "how", "are", "you?", "I", "am", "well.", "And"]
+
+
+class Live:
+    """A live stream and everything it has sent, with the seconds at which it came."""
+
+    def __init__(self, connection: Any) -> None:
+        self.connection = connection
+        self.came: list[tuple[float, Any]] = []
+
+    async def send(self, **content: Any) -> None:
+        await self.connection.send(json.dumps(content))
+
+    async def receive_until(self, kind: str, *, timeout_s: float = 30.0) -> dict[str, Any]:
+        async with asyncio.timeout(timeout_s):
+            while True:
+                message = await self.connection.recv()
+                content = message if isinstance(message, bytes) else json.loads(message)
+                self.came.append((time.monotonic(), content))
+                if isinstance(content, dict) and content["type"] == kind:
+                    return content
+
+    def events(self, kind: str) -> list[dict[str, Any]]:
+        return [one for _, one in self.came if isinstance(one, dict) and one["type"] == kind]
+
+    @property
+    def sound(self) -> bytes:
+        return b"".join(one for _, one in self.came if isinstance(one, bytes))
+
+
+def converse(service: RunningService, talk: Any, **options: Any) -> Live:
+    async def run() -> Live:
+        address = service.url.replace("http", "ws", 1) + "/v1/stream"
+        async with websockets.connect(address, max_size=None) as connection:
+            live = Live(connection)
+            await live.send(type="start", **options)
+            await talk(live)
+            return live
+
+    return asyncio.run(run())
+
+
+def test_sentences_are_spoken_as_soon_as_they_are_complete(service: RunningService) -> None:
+    async def talk(live: Live) -> None:
+        for word in WORDS[:6]:
+            await live.send(type="text", text=f"{word} ")
+        first = await live.receive_until("speech")
+        assert first["text"] == "Hello there, how are you?"
+        for word in WORDS[6:]:
+            await live.send(type="text", text=f"{word} ")
+        await live.send(type="end")
+        await live.receive_until("done")
+
+    live = converse(service, talk, with_idle=False)
+    spoken = live.events("speech")
+    assert [one["text"] for one in spoken] == ["Hello there, how are you?", "I am well.", "And"]
+    assert spoken[1]["begin"] == pytest.approx(spoken[0]["begin"] + spoken[0]["seconds"], abs=0.01)
+    assert [word for word, *_ in spoken[0]["words"]] == ["Hello", "there", "how", "are", "you"]
+    assert spoken[0]["phones"][0][0] == "sil"
+    assert all(one["begin"] <= begin < end for one in spoken for _, begin, end in one["words"])
+    assert len(live.sound) == 2 * round(sum(one["seconds"] for one in spoken) * 24_000)
+    curves = live.events("curves")
+    assert len(curves) == 3
+    weights = np.concatenate([one["weights"] for one in curves])
+    assert weights.shape[1] == len(curves[0]["names"]) == 52
+    assert weights[:, curves[0]["names"].index("jawOpen")].max() > 0.1
+    assert len(weights) == round(sum(one["seconds"] for one in spoken) * 30)
+
+
+def test_a_living_face_fills_the_silence_in_real_time(service: RunningService) -> None:
+    async def talk(live: Live) -> None:
+        begin = time.monotonic()
+        while time.monotonic() < begin + 2.0:
+            await live.receive_until("curves")
+        await live.send(type="text", text="Hello there. ")
+        await live.send(type="flush")
+        await live.receive_until("speech")
+        await live.receive_until("curves")
+
+    live = converse(service, talk)
+    curves = live.events("curves")
+    began = live.came[0][0]
+    ends = [one["begin"] + len(one["weights"]) / one["fps"] for one in curves]
+    assert [one["begin"] for one in curves[1:]] == pytest.approx(ends[:-1], abs=1e-3)  # without a gap
+    idle = [(at - began, one) for at, one in live.came if isinstance(one, dict) and one["type"] == "curves"][:-1]
+    for at, one in idle[3:]:
+        assert -0.3 < one["begin"] - at < 0.7  # near the clock, neither late nor far ahead
+    assert np.ptp(np.concatenate([one["head"] for _, one in idle]), axis=0)[:3].max() > 0.001  # radians
+
+
+def test_cancel_forgets_the_text_that_waits(service: RunningService) -> None:
+    async def talk(live: Live) -> None:
+        await live.send(type="text", text="One sentence. " * 30)
+        await live.receive_until("speech")
+        await live.send(type="cancel")
+        cancelled = time.monotonic()
+        await live.receive_until("cancelled")
+        assert time.monotonic() - cancelled < 2.0
+        await live.send(type="text", text="A new one.")
+        await live.send(type="end")
+        await live.receive_until("done")
+
+    live = converse(service, talk, with_idle=False)
+    spoken = [one["text"] for one in live.events("speech")]
+    assert spoken[-1] == "A new one."
+    assert len(spoken) < 20
+
+
+LONG = "The garden behind the old house near the river had been green for years. "
+
+
+@pytest.mark.parametrize("name", ["cancel", "interrupt"])
+def test_cancel_interrupts_a_sentence(service: RunningService, name: str) -> None:
+    """The sentence that is being made is not sent, and the next one is spoken."""
+
+    async def talk(live: Live) -> None:
+        await live.send(type="text", text=LONG)
+        await live.send(type="flush")
+        await asyncio.sleep(0.1)
+        await live.send(type=name)
+        await live.receive_until("cancelled")
+        await live.send(type="text", text="A new one.")
+        await live.send(type="end")
+        await live.receive_until("done")
+
+    live = converse(service, talk, with_idle=False)
+    assert [one["text"] for one in live.events("speech")][-1] == "A new one."
+    assert live.events("error") == []
+    (cancelled,) = live.events("cancelled")
+    assert cancelled["after_ms"] >= 0
+    assert live.events("speech")[-1]["begin"] == pytest.approx(cancelled["at"], abs=1e-3)
+
+
+def test_a_client_that_leaves_frees_its_work(service: RunningService, client: httpx.Client) -> None:
+    def measure(name: str) -> float:
+        lines = client.get("/metrics").text.splitlines()
+        return next(float(line.split()[-1]) for line in lines if line.startswith(name))
+
+    before = measure("tts2face_cancel_seconds_count")
+
+    async def talk(live: Live) -> None:
+        await live.send(type="text", text=LONG * 5)
+        await live.receive_until("speech")
+
+    converse(service, talk, with_idle=False)
+    deadline = time.monotonic() + 30
+    while measure("tts2face_cancel_seconds_count") == before or measure("tts2face_load") > 0:
+        assert time.monotonic() < deadline, "the work of a client that left was not cancelled"
+        time.sleep(0.05)
+
+
+def speech_samples(rate: int) -> np.ndarray:
+    """16-bit samples of a spoken sentence."""
+    import soxr
+
+    sound = tts2face.Session().clip("Bob may move five big maps.", gestures="none").speech.waveform
+    return np.clip(soxr.resample(sound.samples, sound.rate, rate) * 32767, -32768, 32767).astype("<i2")
+
+
+@pytest.mark.parametrize(("rate", "tolerance"), [(16_000, 0.0), (24_000, 0.02)])
+def test_curves_of_a_microphone_are_those_of_python(service: RunningService, rate: int, tolerance: float) -> None:
+    """Equal at 16 kHz; within a fiftieth of a weight at other rates, as resampling depends on the blocks a little."""
+    samples = speech_samples(rate)
+
+    async def talk(live: Live) -> None:
+        for begin in range(0, len(samples), rate // 10):
+            await live.connection.send(samples[begin : begin + rate // 10].tobytes())
+        await live.send(type="end")
+        await live.receive_until("done")
+
+    live = converse(service, talk, input="audio", rate=rate)
+    received = np.concatenate([one["weights"] for one in live.events("curves")])
+    session = tts2face.Session()
+    lips = session.listen(rate)
+    parts = [lips.add_samples(samples.astype(np.float32) / 32768), lips.finish()]
+    motion = np.concatenate([part.values for part in parts if part is not None])
+    channels = next(part.channels for part in parts if part is not None)
+    expected = arkit_projection(channels, session.mesh, "the test").weights(motion)
+    assert np.abs(received - expected).max() <= tolerance + 5e-5  # sent with four decimals
+    assert len(received) == pytest.approx(len(samples) / rate * lips.fps, abs=1.01)
+    assert np.ptp(received[:, live.events("curves")[0]["names"].index("jawOpen")]) > 0.1
+    (listening,) = live.events("listening")
+    assert listening["look_ahead_s"] == pytest.approx(lips.look_ahead_s, abs=1e-4)
+    begins = [one["begin"] for one in live.events("curves")]
+    ends = [one["begin"] + len(one["weights"]) / one["fps"] for one in live.events("curves")]
+    assert begins == pytest.approx([0.0, *ends[:-1]], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("block", "reason"),
+    [
+        (b"123", "a block of sound has 3 bytes; send 16-bit samples"),
+        (bytes(70_000), "a block of sound has 70000 bytes"),
+        ('{"type": "text", "text": "Hello."}', "16-bit samples, or JSON with one of the types end"),
+    ],
+)
+def test_wrong_sound_is_refused_and_the_stream_goes_on(
+    service: RunningService, block: bytes | str, reason: str
+) -> None:
+    async def talk(live: Live) -> None:
+        await live.connection.send(block)
+        await live.connection.send(bytes(32_000))
+        await live.send(type="end")
+        await live.receive_until("done")
+
+    live = converse(service, talk, input="audio")
+    assert [reason in one["message"] for one in live.events("error")] == [True]
+    assert sum(len(one["weights"]) for one in live.events("curves")) == 25
+
+
+def test_a_stream_of_text_refuses_sound(service: RunningService) -> None:
+    async def talk(live: Live) -> None:
+        await live.connection.send(b"1234")
+        await live.receive_until("error")
+
+    live = converse(service, talk, with_idle=False)
+    assert "a message must be JSON with one of the types cancel" in live.events("error")[0]["message"]
+
+
+def test_a_sentence_that_cannot_be_spoken_does_not_end_the_stream(service: RunningService) -> None:
+    async def talk(live: Live) -> None:
+        await live.send(type="text", text="漢字. Hello there. ")
+        await live.send(type="fly")
+        await live.send(type="end")
+        await live.receive_until("done")
+
+    live = converse(service, talk, with_idle=False)
+    assert [one["text"] for one in live.events("speech")] == ["Hello there."]
+    messages = " ".join(one["message"] for one in live.events("error"))
+    assert "cannot read 漢字" in messages
+    assert "one of the types cancel, end, flush, interrupt, text" in messages
+
+
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        ({"fps": 1000}, "fps: Input should be less than"),
+        ({"voice": "/tmp/x.onnx"}, "there is no voice"),
+        ({"song": "la"}, "song: Extra inputs"),
+        ({"input": "audio", "rate": 1.0}, "rate: Input should be a valid integer"),
+        ({"input": "audio", "voice": "heart"}, "voice: Extra inputs"),
+        ({"input": "pictures"}, "input: Input should be 'text'"),
+    ],
+)
+def test_wrong_options_are_refused(service: RunningService, options: dict[str, Any], reason: str) -> None:
+    async def talk(live: Live) -> None:
+        assert reason in (await live.receive_until("error"))["message"]
+
+    converse(service, talk, **options)
