@@ -27,7 +27,7 @@ from scipy.spatial import cKDTree
 from corpus_tools.prompts.coverage import count_units, sentence_units
 from corpus_tools.recording_process import prompts_answer
 from tests.service.conftest import RunningService, running_service
-from tests.studio.browser import Browser, open_browser
+from tests.studio.chromium import Browser, open_browser
 from tests.studio.fake_camera import write_fake_media
 from tests.studio.served import Page
 from tts2face.service.access.keys import LOCAL_KEY

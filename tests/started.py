@@ -10,14 +10,12 @@ import os
 import select
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 RUN = "TTS2FACE_TEST_RUN"
 PARENT_S = 1.0  # a process that pytest has forked can hold its pipe: the end of pytest itself is seen after this time
-_WATCHDOGS: list["subprocess.Popen[bytes]"] = []  # their standard input is open until pytest ends
 
 
 def pytest_configure(config: object) -> None:
@@ -27,24 +25,45 @@ def pytest_configure(config: object) -> None:
     folder = tempfile.mkdtemp(prefix="tts2face-tests-")
     os.chmod(folder, 0o711)  # PostgreSQL runs as another user
     os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", tempfile.gettempdir())  # what pytest keeps for a look stays there
-    without_run = {name: value for name, value in os.environ.items() if name != RUN}
-    command = [sys.executable, "-S", __file__, folder.rsplit("-", 1)[1], folder]
-    _WATCHDOGS.append(subprocess.Popen(command, stdin=subprocess.PIPE, env=without_run, start_new_session=True))
-    os.environ |= {RUN: command[-2], "TMPDIR": folder}
+    run, without_run = folder.rsplit("-", 1)[1], {name: os.environ[name] for name in os.environ if name != RUN}
+    watched, _ = os.pipe()  # its other end is open until pytest ends
+    os.posix_spawn(
+        sys.executable, [sys.executable, "-S", __file__, run, folder], without_run,
+        file_actions=[(os.POSIX_SPAWN_DUP2, watched, 0)], setsid=True,
+    )  # fmt: skip
+    os.close(watched)
+    os.environ |= {RUN: run, "TMPDIR": folder}
     tempfile.tempdir = folder
+
+
+def running_processes() -> dict[int, int]:
+    """Number of the parent of each process that has not ended."""
+    found = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            state, parent = path.read_text().rpartition(")")[2].split()[:2]
+            if state != "Z":  # ended, but for its parent's look at how
+                found[int(path.parent.name)] = int(parent)
+    return found
+
+
+def children(number: int) -> list[int]:
+    """Processes that a process has started, and theirs."""
+    parents, found = running_processes(), [number]
+    for one in found:  # grows
+        found += [child for child, parent in parents.items() if parent == one]
+    return found[1:]
 
 
 def processes_of(run: str) -> list[int]:
     """Numbers of the processes of a run, and of those that these have started."""
-    entry, parents, found = f"{RUN}={run}".encode(), {}, []
-    for path in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError, IndexError):
-            parents[int(path.name)] = int((path / "stat").read_text().rpartition(")")[2].split()[1])
-            if entry in (path / "environ").read_bytes().split(b"\0"):
-                found.append(int(path.name))
-    for number in found:  # grows: programs that write a title of their own over their environment are children
-        found += [child for child, parent in parents.items() if parent == number and child not in found]
-    return found
+    entry, found = f"{RUN}={run}".encode(), set()
+    for number in running_processes():
+        with contextlib.suppress(OSError):
+            if entry in Path(f"/proc/{number}/environ").read_bytes().split(b"\0"):
+                # Children may have an environment of their own, or have written a title over it.
+                found |= {number, *children(number)}
+    return sorted(found)
 
 
 def end(run: str, folder: str) -> None:

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.studio.browser import Browser
+from tests.studio.chromium import Browser
 from tests.studio.harness import TEXT
 from tests.studio.served import HARNESS, Page, create_project, service_with_harness
 from tts2face.studio.components.stage import COMPONENTS

@@ -14,7 +14,7 @@ from pathlib import Path
 import httpx
 
 from tests.running import RunningService, ServeProcess
-from tests.studio.browser import Browser, wait_until
+from tests.studio.chromium import Browser, wait_until
 from tests.studio.served import slowness
 from tests.studio.server.test_projects_http import create, edit, preview
 

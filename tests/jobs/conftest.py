@@ -7,7 +7,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from tempfile import mkdtemp
@@ -16,6 +15,8 @@ import pytest
 
 pytest.importorskip("dbos", reason="needs the extra [batch]")
 
+from tests.running import eventually
+from tests.started import children, running_processes
 from tts2face.batch.segment import Segment, input_hashes
 from tts2face.session_cache import Models
 
@@ -42,7 +43,7 @@ class Postgres:
         if self._as_user and shutil.which("runuser") is None:
             pytest.skip("PostgreSQL does not run as a superuser, and runuser is missing")
         self._bin, self._settings = folder, settings
-        self.folder = Path(mkdtemp(prefix="tts2face-pg-", dir="/tmp"))
+        self.folder = Path(mkdtemp(prefix="tts2face-pg-"))
         if self._as_user:
             shutil.chown(self.folder, "postgres")
         with socket.socket() as free:
@@ -79,12 +80,12 @@ class Postgres:
         for number in family:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(number, signal.SIGKILL)
-        wait_until(lambda: not _parents().keys() & set(family))  # a zombie still holds the folder
+        eventually(lambda: not running_processes().keys() & set(family))
 
     def processes(self) -> list[int]:
         """Numbers of the processes of the server."""
         main = int((self.folder / "data" / "postmaster.pid").read_text().split()[0])
-        return [main, *(number for number, parent in _parents().items() if parent == main)]
+        return [main, *children(main)]
 
     def put(self, path: Path) -> Path:
         """A copy of a file that the server's user can read."""
@@ -107,15 +108,6 @@ class Postgres:
         with psycopg.connect(f"{server}/postgres", autocommit=True) as connection:
             connection.execute(f"CREATE DATABASE {name}")
         return f"{server}/{name}"
-
-
-def _parents() -> dict[int, int]:
-    """Parent of each process."""
-    found = {}
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError):
-            found[int(path.parent.name)] = int(path.read_text().rpartition(")")[2].split()[1])
-    return found
 
 
 @pytest.fixture(scope="session")
@@ -170,13 +162,6 @@ def segments() -> Callable[..., dict[str, Segment]]:
         return {one.address: one for one in made}
 
     return make
-
-
-def wait_until(condition: Callable[[], bool], seconds: float = 30.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "waited too long"
-        time.sleep(0.1)
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import pytest
 
 from tests.conftest import SHARED
 from tests.running import RunningService
-from tests.studio.browser import Browser, open_browser
+from tests.studio.chromium import Browser, open_browser
 from tests.studio.fake_camera import write_fake_media
 
 pytest.importorskip("nicegui", reason="needs `pip install 'tts2face[studio]'`")

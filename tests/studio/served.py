@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tests.running import ServeProcess, serve_process
-from tests.studio.browser import Browser, wait_until
+from tests.studio.chromium import Browser, wait_until
 
 HARNESS = "/studio/harness"  # path of the page
 MOUTH = (slice(0.60, 0.74), slice(-0.107, 0.107))  # down and from the middle across, of the height in the front view

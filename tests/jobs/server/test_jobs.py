@@ -16,7 +16,8 @@ import pytest
 
 from cli.main import run
 from lexicon.errors import BackendError, InputError
-from tests.jobs.conftest import ROOT, Postgres, StartWorker, wait_until
+from tests.jobs.conftest import ROOT, Postgres, StartWorker
+from tests.running import eventually
 from tts2face.batch.segment import Segment
 from tts2face.batch.store import open_store
 from tts2face.jobs.control import cancel_jobs, list_jobs, prune_jobs, retry_jobs, show_job
@@ -96,13 +97,13 @@ def test_work_of_a_vanished_worker_is_taken_over_within_ten_seconds(
     work = segments("Slow words.")
     first = start_worker(database, 60.0)
     queue(database, work)
-    wait_until(lambda: [one.state for one in list_jobs(database)] == ["running"])
+    eventually(lambda: [one.state for one in list_jobs(database)] == ["running"])
     start_worker(database, 0.1)
     with Workers(database_url(database)) as workers:
-        wait_until(lambda: len(workers.alive()) == 2)
+        eventually(lambda: len(workers.alive()) == 2)
     os.kill(first.pid, signal.SIGKILL)
     killed = time.monotonic()
-    wait_until(lambda: len(rendered()) == 1, 12.0)
+    eventually(lambda: len(rendered()) == 1, 12.0)
     assert time.monotonic() - killed < 10.0
     assert DEAD_AFTER_S < 10.0
 
@@ -115,7 +116,7 @@ def test_a_restarted_database_strands_nothing(
     work = segments(*(f"Words {number}." for number in range(24)))
     first, _ = start_worker(database, 0.4), start_worker(database, 0.4)
     queue(database, work)
-    wait_until(lambda: len(rendered()) >= 4)
+    eventually(lambda: len(rendered()) >= 4)
     first.kill()
     time.sleep(4.0)  # its death is about to be noticed
     postgres.stop()
@@ -141,7 +142,7 @@ def test_a_double_start_costs_time_and_nothing_else(
             client.enqueue(options, address, segment.as_json())
     start_worker(database, 1.0)
     start_worker(database, 1.0)
-    wait_until(lambda: [one.state for one in list_jobs(database)] == ["done", "done"])
+    eventually(lambda: [one.state for one in list_jobs(database)] == ["done", "done"])
     assert 1 <= len(rendered()) <= 2
     assert list(open_store(tmp_path / "store").addresses()) == [address]
 
@@ -156,7 +157,7 @@ def test_poison_fails_with_its_reason_while_the_rest_goes_on(
     failed = list_jobs(database, ["failed"])
     assert [(one.text, one.reason) for one in failed] == [("These are wrong.", "these words are wrong")]
     assert retry_jobs(database) == 1
-    wait_until(lambda: len(list_jobs(database, ["failed"])) == 2)  # the second try fails, too
+    eventually(lambda: len(list_jobs(database, ["failed"])) == 2)  # the second try fails, too
 
 
 def test_a_segment_that_kills_its_worker_ends_as_failed(
@@ -182,7 +183,7 @@ def test_smaller_priorities_are_taken_first(
     queue(database, late, priority=20)
     queue(database, early, priority=5)
     start_worker(database, 0.05)
-    wait_until(lambda: len(rendered()) == 7)
+    eventually(lambda: len(rendered()) == 7)
     assert next(iter(early)) in [address for address, *_ in rendered()[:2]]  # a worker holds two jobs at a time
 
 
@@ -214,7 +215,7 @@ def test_jobs_are_listed_shown_cancelled_and_pruned(
     with pytest.raises(InputError, match="there is no state 'lost'"):
         list_jobs(database, ["lost"])
     start_worker(database)
-    wait_until(lambda: len(list_jobs(database, ["done"])) == 2)
+    eventually(lambda: len(list_jobs(database, ["done"])) == 2)
     assert prune_jobs(database, older_than_s=3600.0) == 0
     assert prune_jobs(database) == 3
     assert list_jobs(database) == ()

@@ -7,10 +7,11 @@ import pytest
 
 pytest.importorskip("dbos", reason="needs the extra [batch]")
 
-from tests.jobs.conftest import Postgres, wait_until
+from tests.jobs.conftest import Postgres
 from tests.jobs.series import make_series
 from tests.jobs.server.test_series import COMMAND, DRAFT, check_outputs, start_worker
 from tests.jobs.watch import StoreWatch
+from tests.running import eventually
 from tts2face.jobs.control import list_jobs
 
 N_CUES = 12
@@ -30,7 +31,7 @@ def test_killing_everything_at_once_loses_nothing(kind: str, tmp_path: Path, req
     with StoreWatch(store) as watch:
         processes = [subprocess.Popen(batch), *(start_worker(database, store, log) for _ in range(N_WORKERS))]
         try:
-            wait_until(lambda: len(watch.stored) >= 8, TIMEOUT_S)
+            eventually(lambda: len(watch.stored) >= 8, TIMEOUT_S)
         finally:
             for one in processes:
                 one.kill()

@@ -15,11 +15,11 @@ import pytest
 pytest.importorskip("dbos", reason="needs the extra [batch]")
 pytest.importorskip("fastapi", reason="needs the extra [service]")
 
-from tests.jobs.conftest import _parents, wait_until
 from tests.jobs.watch import StoreWatch
-from tests.running import ServeProcess
+from tests.running import ServeProcess, eventually
 from tests.service.job_requests import wait_for_database
 from tests.service.receiver import Receiver
+from tests.started import running_processes
 from tts2face.jobs.connection import JobDatabase
 from tts2face.jobs.control import list_jobs
 from tts2face.jobs.database import database_url
@@ -66,7 +66,7 @@ class Machines:
 
     def kill_worker_of_server(self) -> None:
         """Kill the server's own worker; the server starts another one."""
-        parents = _parents()
+        parents = running_processes()
         for number in [one for one, parent in parents.items() if parent == self.server.process.pid]:
             if b"tts2face.jobs.worker" in Path(f"/proc/{number}/cmdline").read_bytes():
                 os.kill(number, signal.SIGKILL)
@@ -76,7 +76,7 @@ class Machines:
         return found
 
     def wait_for(self, n_done: int) -> None:
-        wait_until(lambda: self._counts()["done"] >= n_done, TIMEOUT_S)
+        eventually(lambda: self._counts()["done"] >= n_done, TIMEOUT_S)
 
     def _counts(self) -> Counter[str]:
         found = self.jobs()
@@ -120,7 +120,7 @@ def test_jobs_survive_the_death_of_servers_and_workers(
             machines.start_worker()
             machines.wait_for(N_JOBS)
             check_jobs(machines, names)
-            wait_until(lambda: {name for name, _ in receiver.messages} == set(names), TIMEOUT_S)
+            eventually(lambda: {name for name, _ in receiver.messages} == set(names), TIMEOUT_S)
         finally:
             machines.close()
     assert receiver.wrong == []
@@ -154,7 +154,7 @@ def check_jobs(machines: Machines, names: list[str]) -> None:
         database.close()
     assert dict(map(tuple, ends)) == dict(map(tuple, results)) == dict.fromkeys(names, 1)
     with open_client(url) as client:
-        wait_until(lambda: {one.status for one in client.list_workflows(name="run_job")} == {"SUCCESS"})
+        eventually(lambda: {one.status for one in client.list_workflows(name="run_job")} == {"SUCCESS"})
     for name in names[:: max(1, N_JOBS // 5)]:
         (result,) = machines.api.get(f"/v1/jobs/{name}").json()["results"]
         assert len(machines.api.get(result["url"]).content) == result["bytes"] > 0

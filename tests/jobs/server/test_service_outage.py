@@ -9,9 +9,9 @@ import pytest
 pytest.importorskip("dbos", reason="needs the extra [batch]")
 pytest.importorskip("fastapi", reason="needs the extra [service]")
 
-from tests.jobs.conftest import Postgres, wait_until
+from tests.jobs.conftest import Postgres
 from tests.jobs.watch import StoreWatch
-from tests.running import ServeProcess
+from tests.running import ServeProcess, eventually
 from tests.service.job_requests import submit
 
 N_JOBS = 12
@@ -27,11 +27,11 @@ def test_jobs_wait_for_the_database_and_streams_go_on(postgres: Postgres, tmp_pa
     with StoreWatch(tmp_path / "store") as watch, httpx.Client(base_url=running.url, timeout=60.0) as api:
         try:
             names = [submit(api, {**CLIP, "text": f"Number {number}."}).json()["id"] for number in range(N_JOBS)]
-            wait_until(lambda: n_done(api) >= 2, TIMEOUT_S)
+            eventually(lambda: n_done(api) >= 2, TIMEOUT_S)
             with api.stream("GET", f"/v1/jobs/{names[-1]}/events") as events:
                 postgres.stop()
                 stopped = time.monotonic()
-                wait_until(lambda: api.get("/readyz").status_code == 503)
+                eventually(lambda: api.get("/readyz").status_code == 503)
                 assert api.get("/readyz").json()["checks"] == {
                     "models": True, "disk": True, "database": False, "accepting": True,
                 }  # fmt: skip
@@ -50,8 +50,8 @@ def test_jobs_wait_for_the_database_and_streams_go_on(postgres: Postgres, tmp_pa
                 postgres.start()
                 lines = list(events.iter_lines())  # up to the end of the job
             assert '"state": "done"' in "".join(lines)
-            wait_until(lambda: n_done(api) == N_JOBS, TIMEOUT_S)
-            wait_until(lambda: api.get("/readyz").status_code == 200)
+            eventually(lambda: n_done(api) == N_JOBS, TIMEOUT_S)
+            eventually(lambda: api.get("/readyz").status_code == 200)
         finally:
             running.close()
     assert [one["event"] for one in running.events() if one["event"].startswith("jobs ")] == [

@@ -13,9 +13,10 @@ pytest.importorskip("dbos", reason="needs the extra [batch]")
 from cli.main import run
 from lexicon.errors import BackendError
 from tests.batch.test_prune import age, fill, manifest
-from tests.jobs.conftest import Postgres, StartWorker, wait_until
+from tests.jobs.conftest import Postgres, StartWorker
 from tests.jobs.server.test_jobs import collect, queue
 from tests.jobs.stub_worker import Stub
+from tests.running import eventually
 from tts2face.batch.segment import Segment
 from tts2face.batch.store import FolderStore, open_store
 from tts2face.jobs.control import cancel_jobs, list_jobs, prune_jobs
@@ -57,7 +58,7 @@ def test_work_of_an_owner_that_is_not_in_the_table_is_returned(
     work = segments("Slow words.")
     first = start_worker(database, 60.0)
     queue(database, work)
-    wait_until(lambda: [one.state for one in list_jobs(database)] == ["running"])
+    eventually(lambda: [one.state for one in list_jobs(database)] == ["running"])
     first.kill()
     first.wait()
     with Workers(database_url(database)) as workers:
@@ -80,7 +81,7 @@ def test_a_dead_worker_of_another_version_is_reported_once(
         connection.execute("INSERT INTO tts2face_workers VALUES ('old', 0, 'there')")
     start_worker(str(path), 0.0)
     log = tmp_path / "workers.log"
-    wait_until(lambda: "took over from 1 workers" in log.read_text())
+    eventually(lambda: "took over from 1 workers" in log.read_text())
     time.sleep(2 * BEAT_S + 0.5)
     assert log.read_text().count("took over") == 1
     assert [one.state for one in list_jobs(str(path))] == ["running"]
@@ -170,7 +171,7 @@ def test_an_outage_of_the_database_is_two_lines(
     postgres.start()
     assert set(collect(database, work, tmp_path).values()) == {""}
     log = tmp_path / "workers.log"
-    wait_until(lambda: "reached again" in log.read_text())
+    eventually(lambda: "reached again" in log.read_text())
     first.kill()
     lines = log.read_text().splitlines()
     assert len(lines) == 2, lines

@@ -5,9 +5,7 @@ import io
 import json
 import os
 import signal
-import subprocess
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,33 +14,15 @@ import httpx
 import pytest
 import websockets
 
-from tests.running import RunningService, ServeProcess
+from tests.running import RunningService, ServeProcess, eventually
+from tests.started import children, running_processes
 
 LONG = "We were away a year ago, but Bob may move five big maps. " * 5
 CLIP = {"text": LONG, "size": "128x128"}
 
 
-def children(pid: int) -> list[int]:
-    """Processes that a process has started, and theirs."""
-    found = subprocess.run(["ps", "-eo", "pid,ppid"], capture_output=True, text=True, check=True).stdout.split()[2:]
-    parents = {int(child): int(parent) for child, parent in zip(found[::2], found[1::2], strict=True)}
-    own = [child for child, parent in parents.items() if parent == pid]
-    return own + [later for one in own for later in children(one)]
-
-
-def is_running(pid: int) -> bool:
-    """Whether a process exists and is no zombie."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except OSError:
-        return False
-
-
 def wait_until_gone(pids: list[int]) -> None:
-    deadline = time.monotonic() + 60
-    while any(map(is_running, pids)):
-        assert time.monotonic() < deadline, pids
-        time.sleep(0.05)
+    eventually(lambda: not set(pids) & running_processes().keys())
 
 
 @pytest.fixture
@@ -57,15 +37,11 @@ def own() -> Iterator[RunningService]:
         running.close()
 
 
-def own_children(pid: int) -> list[int]:
-    """Processes that a process has started itself."""
-    return [child for child in children(pid) if Path(f"/proc/{child}/stat").read_text().split()[3] == str(pid)]
-
-
 def send_all(service: RunningService, number: signal.Signals) -> None:
     """Send a signal to the synthesis processes: SIGSTOP keeps a clip unfinished on any machine."""
-    for pid in own_children(service.process.pid):
-        os.kill(pid, number)
+    for pid, parent in running_processes().items():
+        if parent == service.process.pid:
+            os.kill(pid, number)
 
 
 class Download(threading.Thread):

@@ -15,7 +15,7 @@ import websockets
 
 from tests.running import HostService, RunningService
 from tests.service.raw import connect, request
-from tests.service.server.test_drain import children
+from tests.started import children
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="needs /proc")
 SPEECH = {"input": "Hello there.", "model": "tts-1", "voice": "alloy", "response_format": "pcm"}

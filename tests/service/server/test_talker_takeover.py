@@ -11,9 +11,9 @@ import pytest
 
 import tts2face
 from lexicon.errors import BackendError
-from tests.jobs.conftest import _parents, wait_until
-from tests.running import HostService, RunningService
+from tests.running import HostService, RunningService, eventually
 from tests.service.job_requests import finished
+from tests.started import running_processes
 from tts2face.video.landmark_models import find_bundle
 
 TEXT = "We were away a year ago. Bob may move. The boy will buy a pie for you."
@@ -27,7 +27,7 @@ def running(host: HostService) -> Iterator[RunningService]:
 
 def children(parent: int, module: str) -> list[int]:
     """Processes of a Python module that a process has started."""
-    found = [number for number, its_parent in _parents().items() if its_parent == parent]
+    found = [number for number, its_parent in running_processes().items() if its_parent == parent]
     return [number for number in found if module.encode() in Path(f"/proc/{number}/cmdline").read_bytes()]
 
 
@@ -42,11 +42,11 @@ def test_a_talker_is_built_after_the_death_of_its_worker(running: RunningService
         form = {"job": json.dumps({"kind": "talker", "request": {"name": "anna"}})}
         files = {"video": take.read_bytes(), "transcript": TEXT.encode()}
         job = client.post("/v1/talkers/build", data=form, files=files).json()
-        wait_until(lambda: client.get(f"/v1/jobs/{job['id']}").json()["progress"]["done"] > 0, 120.0)
+        eventually(lambda: client.get(f"/v1/jobs/{job['id']}").json()["progress"]["done"] > 0, 120.0)
         (worker,) = children(running.process.pid, "tts2face.jobs.worker")
         (builder,) = children(worker, "corpus_tools.build_process")
         os.kill(worker, signal.SIGKILL)
-        wait_until(lambda: builder not in _parents(), 30.0)
+        eventually(lambda: builder not in running_processes(), 30.0)
         ended = finished(client, job)
         assert (ended["state"], ended["error"]) == ("done", None), ended
         assert [one["name"] for one in client.get("/v1/talkers").json()["data"]] == ["grid_s1", "anna"]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests.exports.programs import node_package
-from tests.studio.browser import Browser, wait_until
+from tests.studio.chromium import Browser, wait_until
 from tests.studio.served import Page, create_project
 from tts2face.studio.projects.renders import formats
 from tts2face.video.media import read_frames, read_sound

@@ -3,7 +3,7 @@
 import httpx
 
 from tests.running import RunningService
-from tests.studio.browser import Browser, wait_until
+from tests.studio.chromium import Browser, wait_until
 from tests.studio.server.test_projects_http import create, preview
 
 LOADED = "const s = window.__studio; return Boolean(s && s.face_ms && s.frames > 0 && s.view?.duration > 1)"

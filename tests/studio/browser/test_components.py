@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from tests.studio.browser import wait_until
+from tests.studio.chromium import wait_until
 from tests.studio.served import HARNESS, Page
 
 SILENCE_S, SPEECH_S = (0.01, 0.03), (0.55, 0.95, 2.0, 2.4, 2.6)  # of the harness's sentence

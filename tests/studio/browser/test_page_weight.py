@@ -4,7 +4,7 @@ import httpx
 import pytest
 
 from tests.running import RunningService
-from tests.studio.browser import Browser, wait_until
+from tests.studio.chromium import Browser, wait_until
 
 MOST_BYTES = 2_500_000
 SHOWN = "const s = window.__studio; return Boolean(s && s.frames > 0 && s.face_ms && s.view && s.view.duration > 0)"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.running import RunningService
-from tests.studio.browser import Browser
+from tests.studio.chromium import Browser
 from tts2face.models.palette import read_palette
 
 TAKE_S = 4.0

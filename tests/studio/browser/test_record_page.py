@@ -8,7 +8,7 @@ import pytest
 
 from corpus_tools.prompts.coverage import count_units, sentence_units
 from corpus_tools.recording_process import prompts_answer
-from tests.studio.browser import Browser
+from tests.studio.chromium import Browser
 from tts2face.models.talker import load_talker
 from tts2face.service.access.keys import LOCAL_KEY
 from tts2face.studio.recording.store import RecordingStore
