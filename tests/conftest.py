@@ -19,6 +19,7 @@ GROUPS = {  # name of a folder and of a marker: what the tests in it do
 }
 DEFAULT = f"smoke or not ({' or '.join(GROUPS)})"  # as in pyproject.toml
 SHARED_SERVER = "host"  # fixture
+SKIPPED = "tts2face/skipped"  # in pytest's cache
 SHARED = Path(os.environ.get("TTS2FACE_SHARED", Path(__file__).resolve().parents[2] / "shared"))
 
 
@@ -90,17 +91,23 @@ def pytest_configure(config: pytest.Config) -> None:
     for name, content in GROUPS.items():
         config.addinivalue_line("markers", f"{name}: tests in folders of this name: {content}")
     config.addinivalue_line("markers", "smoke: one test of a promise; it runs by default though its folder does not")
+    config.addinivalue_line(
+        "markers", "skipped: tests that the last run has skipped, for a machine that has now what they need"
+    )
     if config.args_source == pytest.Config.ArgsSource.ARGS and config.option.markexpr == DEFAULT:
         config.option.markexpr = ""
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark tests by their folders, and sort them: those of a shared server first, files of the default run last.
 
     Tests that share a server belong to one group of pytest-xdist, so that a run starts that server once.
     """
+    skipped = set(config.cache.get(SKIPPED, [])) if config.cache else set()
     for item in items:
+        if item.nodeid in skipped:
+            item.add_marker("skipped")
         folders = item.path.relative_to(TESTS).parts[:-1]
         for name in GROUPS.keys() & set(folders):
             item.add_marker(name)
@@ -127,7 +134,10 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Name what was skipped and why, one line for each reason."""
-    reasons = Counter(str(report.longrepr[2]) for report in terminalreporter.stats.get("skipped", []))
+    skipped = terminalreporter.stats.get("skipped", [])
+    if terminalreporter.config.cache:
+        terminalreporter.config.cache.set(SKIPPED, sorted(report.nodeid for report in skipped))
+    reasons = Counter(str(report.longrepr[2]) for report in skipped)
     if reasons:
         terminalreporter.section("skipped tests")
     for reason, number in reasons.most_common():

@@ -12,7 +12,7 @@ from corpus_tools.pooling.lip_observations import MIN_PART_S, lip_observations
 from corpus_tools.pooling.pooled_speech import PooledSpeech, spoken_sequence, talker_features
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE
-from tests.corpus_tools.test_people import person, write_tracks
+from tests.corpus_tools.build.test_people import person, write_tracks
 from tts2face.models.talker import Talker, load_talker
 
 

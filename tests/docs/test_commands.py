@@ -1,7 +1,7 @@
 """Every command line of the documentation is parsed by the real command line; those of README and cli.md are executed.
 
 `tests.docs.blocks.NOT_EXECUTED` lists what is not executed, with the reason; lines that need video of a
-person are executed by `tests/doors/test_command_line.py`.
+person are executed by `tests/doors/commands`.
 """
 
 import pytest

@@ -27,8 +27,8 @@ from corpus_tools.report.learning_curve import WRITERS
 from corpus_tools.training.adapt_talker import Base
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import InputError
+from tests.corpus_tools.build.test_people import write_tracks
 from tests.corpus_tools.speaking import FPS, observation
-from tests.corpus_tools.test_people import write_tracks
 from tts2face.models.talker import write_talker
 
 TRAIN = [observation(number) for number in range(16)]

@@ -169,7 +169,7 @@ import sys
 from pathlib import Path
 from corpus_tools.pooling import base_phrases
 from corpus_tools.training import train_phone_network
-from tests.corpus_tools.test_base_phrases import PASSES, network_bytes
+from tests.corpus_tools.build.test_base_phrases import PASSES, network_bytes
 base_phrases.N_PHRASES, train_phone_network.MIN_FRAMES, train_phone_network.TRAINING = 40, 100, PASSES
 print(network_bytes(Path(sys.argv[1])))
 """

@@ -1,0 +1,111 @@
+"""Every command line of the documentation that needs video of a person, on rendered takes."""
+
+import functools
+import shlex
+import subprocess
+import sys
+import wave
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from lexicon import errors
+from tests.docs.blocks import lines_that_need_a_person
+from tts2face.video.landmark_models import find_bundle
+from tts2face.video.media import read_sound
+
+COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
+SMALL = ["--size", "64x64", "--fps", "5"]
+N_RECORDINGS = 6
+OUTPUTS = {".talker", ".palette", ".html", ".face"}  # what the README's commands write and others read
+BUILT_BY = {"me.talker": "--appearance", "mine.palette": "corpus gestures"}
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def readme_commands() -> list[str]:
+    return lines_that_need_a_person()
+
+
+@pytest.fixture(scope="module")
+def materials(rendered_takes: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files that the README's commands read, from rendered takes."""
+    folder = tmp_path_factory.mktemp("materials")
+    (folder / "chapter.txt").write_text("Chapter one. It was late.", encoding="utf-8")
+    (folder / "speech.txt").write_text("bin blue at f two now", encoding="utf-8")
+    take = rendered_takes / "clips" / "bbaf2n.mkv"
+    sound = read_sound(take, 16_000)
+    with wave.open(str(folder / "speech.wav"), "wb") as file:
+        file.setparams((1, 2, sound.rate, 0, "NONE", ""))
+        file.writeframes((sound.samples * 32767).astype("<i2").tobytes())
+    for name in ("take.mp4", "me.mp4"):
+        (folder / name).symlink_to(take)
+    few = folder / "recordings"
+    (few / "clips").mkdir(parents=True)
+    (few / "align").mkdir()
+    rows = (rendered_takes / "manifest.csv").read_text(encoding="utf-8").splitlines()[: 1 + N_RECORDINGS]
+    (few / "manifest.csv").write_text("\n".join(rows), encoding="utf-8")
+    for row in rows[1:]:
+        for part in (f"clips/{row.split(',')[0]}.mkv", f"align/{row.split(',')[0]}.align"):
+            (few / part).symlink_to(rendered_takes / part)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def built(materials: Path) -> Callable[[str], None]:
+    """Runs a command of the README in the folder of the materials, once: what it makes, other commands read."""
+
+    @functools.cache
+    def make(line: str) -> None:
+        done = run_line(line, materials)
+        assert done.returncode == 0, done.stderr
+
+    return make
+
+
+def run_line(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """A command of the README, at a small size."""
+    echoed, _, command = line.rpartition("| ")
+    words = shlex.split(command)[1:]
+    if words[0] not in {"phones", "corpus", "report", "voices", "identities", "styles"}:
+        words += SMALL
+    given = shlex.split(echoed)[1] if echoed else None
+    return subprocess.run([*COMMAND, *words], cwd=folder, input=given, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("line", readme_commands())
+def test_every_command_of_the_readme_works(
+    line: str, here: Path, materials: Path, built: Callable[[str], None]
+) -> None:
+    sources = {name: sign for name, sign in BUILT_BY.items() if name in line and sign not in line}
+    if "corpus" in line or "mimic" in line or sources:
+        require_landmark_model()
+    for sign in sources.values():
+        built(*(one for one in readme_commands() if sign in one))
+    if any(sign in line for sign in BUILT_BY.values()):
+        folder = materials
+        built(line)
+    else:
+        folder = here
+        for path in materials.iterdir():
+            if path.suffix not in OUTPUTS or path.name in sources:
+                (here / path.name).symlink_to(path)
+        done = run_line(line.replace("--hold-out 100", "--hold-out 2"), here)
+        assert done.returncode == 0, done.stderr
+    words = shlex.split(line)
+    for flag in ("--out", "--explain", "--report"):
+        if flag in words:
+            assert (folder / words[words.index(flag) + 1]).exists()
+
+
+def require_landmark_model() -> None:
+    pytest.importorskip("ai_edge_litert", reason="needs `pip install 'tts2face[capture]'`")
+    try:
+        find_bundle()
+    except errors.BackendError as missing:
+        pytest.skip(str(missing))
