@@ -33,26 +33,21 @@ def shared_recordings() -> Path:
 
 
 @pytest.fixture(scope="session")
-def run_folder(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Path:
-    """Temporary folder of the whole run, which the processes of pytest-xdist share."""
-    base = tmp_path_factory.getbasetemp()
-    return base.parent if hasattr(request.config, "workerinput") else base
-
-
-@pytest.fixture(scope="session")
-def rendered_takes(run_folder: Path) -> Path:
+def rendered_takes() -> Path:
     """Videos of a speaking head with transcripts and word times; see `tests.rendered_takes`."""
-    from tests.rendered_takes import made_once, render_takes
+    from tests.kept import kept_folder
+    from tests.rendered_takes import render_takes
 
-    return made_once(run_folder / "rendered_takes", render_takes)
+    return kept_folder(render_takes)
 
 
 @pytest.fixture(scope="session")
-def rendered_capture(run_folder: Path) -> Path:
+def rendered_capture() -> Path:
     """A Live Link Face capture of a speaking face; its sound is in the same folder."""
-    from tests.rendered_takes import CAPTURE_NAME, made_once, write_capture
+    from tests.kept import kept_folder
+    from tests.rendered_takes import CAPTURE_NAME, write_capture
 
-    return made_once(run_folder / "rendered_capture", write_capture) / f"{CAPTURE_NAME}.csv"
+    return kept_folder(write_capture) / f"{CAPTURE_NAME}.csv"
 
 
 @pytest.fixture(scope="session", params=["rendered", "real"])

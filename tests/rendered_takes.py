@@ -7,8 +7,7 @@ its sentence in GRID's code, ``bbaf2n`` is "bin blue at F two now". Twelve takes
 
 import csv
 import shutil
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -99,7 +98,6 @@ def copy_takes(takes: Path, clips: tuple[str, ...], folder: Path) -> Path:
 
 def write_capture(folder: Path) -> None:
     """Write a Live Link Face capture of 52 ARKit weights and the head at 60 fps, and its sound, as a face speaks."""
-    folder.mkdir(parents=True)
     session = Session("grid_s1", "head")
     text = " [pause 1] ".join(f"{transcript(name)}." for name in NAMES[3:8])
     clip = session.clip(f"[pause 1] {text} [pause 1]", fps=CAPTURE_FPS, style="measured")
@@ -143,35 +141,6 @@ def write_sound(path: Path, samples: np.ndarray, rate: int) -> None:
             frame.sample_rate, frame.pts = rate, at
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
-
-
-def made_once(folder: Path, make: Callable[[Path], None], timeout_s: float = 900.0) -> Path:
-    """Folder that one of several processes makes while the others wait for it.
-
-    Raises
-    ------
-    TimeoutError
-        Another process has been making it for longer than `timeout_s`.
-    """
-    partial = folder.with_name(f"{folder.name}.partial")
-    deadline = time.monotonic() + timeout_s
-    while not folder.is_dir():
-        try:
-            partial.mkdir(parents=True)
-        except FileExistsError:
-            if time.monotonic() > deadline:
-                raise TimeoutError(f"{partial} has not been finished within {timeout_s:g} s") from None
-            time.sleep(0.2)
-            continue
-        if folder.is_dir():  # finished between the two checks
-            partial.rmdir()
-            break
-        try:
-            make(partial / "made")
-            (partial / "made").rename(folder)
-        finally:
-            shutil.rmtree(partial)
-    return folder
 
 
 def _remux(source: Path, target: Path) -> None:

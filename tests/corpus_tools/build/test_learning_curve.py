@@ -29,6 +29,7 @@ from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import InputError
 from tests.corpus_tools.build.test_people import write_tracks
 from tests.corpus_tools.speaking import FPS, observation
+from tests.kept import kept
 from tts2face.models.talker import write_talker
 
 TRAIN = [observation(number) for number in range(16)]
@@ -38,15 +39,23 @@ SECONDS = sum(len(one.landmarks) for one in TRAIN) / FPS
 
 @pytest.fixture(scope="module")
 def base() -> Base:
-    """Another person, whose lips open half as far."""
+    return another_person()
+
+
+def another_person() -> Base:
+    """Lips that open half as far."""
     return Base.of(learn_talker([observation(200 + n, 0.5) for n in range(12)], metadata=EVALUATION_METADATA))
 
 
 @pytest.fixture(scope="module")
-def curve(base: Base) -> LearningCurve:
+def curve() -> LearningCurve:
+    return kept(learning_curve)
+
+
+def learning_curve() -> LearningCurve:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("corpus_tools.evaluation.learning_curve.N_CHOICES", 2)
-        return measure_learning_curve(TRAIN, TEST, base, amounts_s=[5.0, 10.0])
+        return measure_learning_curve(TRAIN, TEST, another_person(), amounts_s=[5.0, 10.0])
 
 
 def names(part: Sequence[Observation]) -> list[str]:

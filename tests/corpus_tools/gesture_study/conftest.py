@@ -4,8 +4,13 @@ import pytest
 
 from corpus_tools.gesture_study.analysis import GestureStudy, Options, study_gestures
 from tests.corpus_tools.gesture_study.made_palette import made_palette
+from tests.kept import kept
 
 
 @pytest.fixture(scope="session")
 def found() -> GestureStudy:
+    return kept(made_study)
+
+
+def made_study() -> GestureStudy:
     return study_gestures("made", made_palette(), Options(one_in=4, halves=10, clips=2))

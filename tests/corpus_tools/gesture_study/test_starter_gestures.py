@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from corpus_tools.gesture_study.analysis import MotionComparison, Options, StyleStudy, TraitComparison, study_gestures
-from lexicon.errors import InputError
+from tests.kept import kept
 from tts2face.models.palette import load_palette
 
 NO_JITTER = 1.3  # times the recorded power above 6 Hz
@@ -13,11 +13,11 @@ NO_JITTER = 1.3  # times the recorded power above 6 Hz
 
 @pytest.fixture(scope="module")
 def style() -> StyleStudy:
-    try:
-        palette = load_palette("starter")
-    except InputError:
-        pytest.skip("no starter palette is installed")
-    return study_gestures("starter", replace(palette, derivations={}), Options()).styles[0]
+    return kept(starter_style)
+
+
+def starter_style() -> StyleStudy:
+    return study_gestures("starter", replace(load_palette("starter"), derivations={}), Options()).styles[0]
 
 
 def compared(style: StyleStudy, name: str) -> TraitComparison:

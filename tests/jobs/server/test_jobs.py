@@ -293,6 +293,7 @@ def test_a_worker_of_a_file_opens_no_connection(segments: Segments, tmp_path: Pa
     assert [one.state for one in list_jobs(database)] == ["done"]
 
 
+@pytest.mark.smoke
 def test_the_batch_command_works_with_a_database(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     subtitles = tmp_path / "one.srt"
     subtitles.write_text("1\n00:00:00,000 --> 00:00:01,000\nHello.\n\n2\n00:00:01,000 --> 00:00:02,000\nBob.\n")

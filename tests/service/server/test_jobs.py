@@ -38,6 +38,7 @@ def api(jobs: RunningService) -> Iterator[httpx.Client]:
         yield made
 
 
+@pytest.mark.smoke
 def test_a_clip_has_the_bytes_of_its_stream(api: httpx.Client) -> None:
     for format in ("curves", "mp4", "wav"):
         request = {**CLIP, **SMALL, "format": format}

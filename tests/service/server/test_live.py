@@ -56,6 +56,7 @@ def converse(service: RunningService, talk: Any, **options: Any) -> Live:
     return asyncio.run(run())
 
 
+@pytest.mark.smoke
 def test_sentences_are_spoken_as_soon_as_they_are_complete(service: RunningService) -> None:
     async def talk(live: Live) -> None:
         for word in WORDS[:6]:

@@ -32,6 +32,7 @@ def samples(content: bytes) -> np.ndarray:
         return np.concatenate([frame.to_ndarray().ravel() for frame in file.decode(audio=0)])
 
 
+@pytest.mark.smoke
 def test_the_openai_client_gets_the_sound_of_the_clip(official: openai.OpenAI) -> None:
     content = official.audio.speech.create(model="tts-1", voice="alloy", input=TEXT, response_format="pcm").content
     sound = tts2face.Session().clip(TEXT).speech.waveform
@@ -88,6 +89,7 @@ def test_visemes_and_curves_as_lines(client: httpx.Client) -> None:
     assert max(openings) > 0.05 + min(openings)
 
 
+@pytest.mark.smoke
 def test_a_clip_has_the_motion_of_python(client: httpx.Client, tmp_path: Path) -> None:
     """HTTP gives the same bytes as the same request in Python."""
     options = {"style": "delighted", "seed": 7, "fps": 25}
@@ -162,6 +164,7 @@ process.exit(0);
 """
 
 
+@pytest.mark.smoke
 @pytest.mark.parametrize("scheme", ["http", "ws"])
 def test_the_headtts_client_works_unchanged(service: RunningService, tmp_path: Path, scheme: str) -> None:
     node = shutil.which("node")

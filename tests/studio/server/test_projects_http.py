@@ -57,6 +57,7 @@ def number(studio: httpx.Client) -> str:
     return create(studio)
 
 
+@pytest.mark.smoke
 def test_the_preview_is_the_clip_of_the_saved_project(studio: httpx.Client, number: str, data: Path) -> None:
     header, *_ = preview(studio, number)
     text, occurrence = header["sentences"][0][:2]

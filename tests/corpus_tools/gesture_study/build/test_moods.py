@@ -13,6 +13,7 @@ from cli.main import run
 from corpus_tools.gesture_study.moods import MoodOptions, MoodStudy, confusion_matrix, study_moods
 from corpus_tools.gesture_study.write_moods import mood_rows, moods_csv, moods_json, moods_png
 from lexicon.errors import BackendError, InputError
+from tests.kept import kept
 from tts2face.session import Session
 
 SIX = ("neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperated")
@@ -21,9 +22,13 @@ SIX = ("neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperat
 @pytest.fixture(scope="module")
 def study() -> MoodStudy:
     try:
-        return study_moods(Session("grid_s1", "head"), MoodOptions(seeds=4, first_seed=40, frames=6))
+        return kept(six_moods)
     except BackendError as missing:
         pytest.skip(f"the outside check cannot run: {missing}")
+
+
+def six_moods() -> MoodStudy:
+    return study_moods(Session("grid_s1", "head"), MoodOptions(seeds=4, first_seed=40, frames=6))
 
 
 def test_the_classifier_recognises_classes_of_known_means() -> None:
