@@ -1,0 +1,160 @@
+"""Counts of the code that may only shrink: what is listed here is to go, and nothing is to join it.
+
+Circles among files are counted by `test_import_graph.py`; there are none.
+"""
+
+import ast
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from tests.api.test_import_graph import PACKAGES, ROOT
+
+Find = Callable[[str, str], Iterator[str]]  # of the text and the name of a module
+
+# Places that start Python, outside the room of child processes, which is to start all of them.
+PROCESS_ROOM = "tts2face.child_process"
+STARTS_PYTHON = (
+    "corpus_tools.head.source", "corpus_tools.setup_models", "tts2face.batch.render_process", "tts2face.jobs.engine",
+    "tts2face.jobs.talker_job", "tts2face.render.vtk_renderer", "tts2face.service.synthesis.remote_aligner",
+    "tts2face.service.synthesis.warm_process", "tts2face.service.uploads.upload_folder",
+    "tts2face.studio.puppetry.live_camera", "tts2face.studio.recording.take_checks",
+    "tts2face.studio.recording.talker_building", "tts2face.studio.take_tools", "tts2face.synthesis.warm_up",
+    "tts2face.voice.espeak",
+)  # fmt: skip
+# Modules that read JSON or TOML themselves; `lexicon.inputs` does it for others.
+PARSES = (
+    "corpus_tools.head.assets", "lexicon.inputs", "lexicon.part_of_speech", "tts2face.batch.cast",
+    "tts2face.batch.render_process", "tts2face.characters.shape_mapping", "tts2face.child_process",
+    "tts2face.jobs.job_records", "tts2face.jobs.job_table", "tts2face.jobs.resource_table",
+    "tts2face.service.access.keys", "tts2face.service.orders.job_kinds", "tts2face.service.routes.answers",
+    "tts2face.service.settings", "tts2face.service.state", "tts2face.service.synthesis.alignment_process",
+    "tts2face.service.synthesis.remote_aligner", "tts2face.service.synthesis.synthesis_process",
+    "tts2face.service.synthesis.warm_process", "tts2face.storage.tensors", "tts2face.studio.projects.bundle",
+    "tts2face.studio.requests", "tts2face.voice.espeak", "tts2face.voice.espeak_child",
+)  # fmt: skip
+# Strings that name a module of a package above their own.
+NAMES_HIGHER = (
+    "tts2face.jobs.talker_job: corpus_tools.build_process",
+    "tts2face.studio.recording.take_checks: corpus_tools.recording_process",
+    "tts2face.studio.reports.reports: corpus_tools.report_process",
+    "tts2face.studio.take_tools: corpus_tools.take_process",
+)
+PARSERS = {"json": {"load", "loads", "JSONDecoder"}, "tomllib": {"load", "loads"}}
+
+
+@cache
+def texts() -> dict[str, str]:
+    """Texts of all modules by dotted name."""
+    paths = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
+    return {module_name(path): path.read_text(encoding="utf-8") for path in paths}
+
+
+def module_name(path: Path) -> str:
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+
+
+def uses(text: str, wanted: dict[str, set[str]]) -> Iterator[str]:
+    """Names of modules that are read as ``module.name``, also under another name, or imported from them."""
+    if not any(module in text for module in wanted):  # most files: not parsed, which takes a hundred times as long
+        return
+    tree, aliases = ast.parse(text), {name: name for name in wanted}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            aliases |= {one.asname: one.name for one in node.names if one.asname and one.name in wanted}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            module = aliases.get(node.value.id, "")
+            if node.attr in wanted.get(module, ()):
+                yield f"{module}.{node.attr}"
+        elif isinstance(node, ast.ImportFrom) and node.module in wanted:
+            yield from (f"{node.module}.{one.name}" for one in node.names if one.name in wanted[node.module])
+
+
+def starts_of_python(text: str, name: str) -> Iterator[str]:
+    """The module, once for each time that it reads the path of Python."""
+    if name != PROCESS_ROOM and "executable" in text:
+        yield from (name for _ in uses(text, {"sys": {"executable"}}))
+
+
+def parsers(text: str, name: str) -> Iterator[str]:
+    """The module, if it reads JSON or TOML."""
+    if any(uses(text, PARSERS)):
+        yield name
+
+
+def higher_names(text: str, name: str) -> Iterator[str]:
+    """Strings that contain the dotted name of a module of a higher package; docstrings may."""
+    higher = PACKAGES[PACKAGES.index(name.partition(".")[0]) + 1 :]
+    pattern = re.compile(rf"\b(?:{'|'.join(higher)})(?:\.\w+)+")
+    if not higher or not pattern.search(text):
+        return
+    tree = ast.parse(text)
+    docstrings = {
+        id(node.body[0].value)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
+        and node.body
+        and isinstance(node.body[0], ast.Expr)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in docstrings:
+            named = (one[0] for one in pattern.finditer(node.value))
+            yield from (f"{name}: {one}" for one in named if is_module(one))
+
+
+def is_module(name: str) -> bool:
+    """Whether a dotted name begins with a module below a package: a logger of another name is none."""
+    path = ROOT.joinpath(*name.split(".")[:2])
+    return path.is_dir() or path.with_suffix(".py").is_file()
+
+
+COUNTS: dict[str, tuple[Find, tuple[str, ...], str]] = {
+    "starts of Python": (starts_of_python, STARTS_PYTHON, f"start it in {PROCESS_ROOM}"),
+    "readers of JSON or TOML": (parsers, PARSES, "use lexicon.inputs.parse_json or a reader that exists"),
+    "names of higher modules": (higher_names, NAMES_HIGHER, "let the higher package pass what is needed"),
+}
+
+
+def difference(found: list[str], listed: tuple[str, ...], remedy: str) -> list[str]:
+    """What is found and not listed, with the remedy, and what is listed and no longer found."""
+    new, gone = Counter(found) - Counter(listed), Counter(listed) - Counter(found)
+    return [f"new: {one}; {remedy}" for one in new.elements()] + [
+        f"gone: {one}; remove it from the list in {Path(__file__).name}" for one in gone.elements()
+    ]
+
+
+@pytest.mark.parametrize("what", COUNTS)
+def test_exceptions_only_become_fewer(what: str) -> None:
+    find, listed, remedy = COUNTS[what]
+    found = [one for name, text in texts().items() for one in find(text, name)]
+    wrong = difference(found, listed, remedy)
+    assert not wrong, "\n".join(wrong)
+
+
+def test_every_way_to_write_an_exception_is_found() -> None:
+    made = (
+        '"""Serves corpus_tools.report_process."""\n'
+        "import json as j, sys\nfrom json import loads, dumps\nfrom sys import executable\nimport tomllib\n"
+        'run(sys.executable, "-m", "corpus_tools.build_process", f"cli.main {loads}", "tts2face.api", "cli.nothing")\n'
+        "j.load(file); j.dumps({}); tomllib.loads(text)\n"
+    )
+    assert list(starts_of_python(made, "tts2face.x")) == ["tts2face.x"] * 2
+    assert list(starts_of_python(made, PROCESS_ROOM)) == []
+    assert sorted(uses(made, PARSERS)) == ["json.load", "json.loads", "tomllib.loads"]
+    assert list(higher_names(made, "tts2face.x")) == [
+        "tts2face.x: corpus_tools.build_process", "tts2face.x: cli.main"
+    ]  # fmt: skip
+    assert "lexicon.x: tts2face.api" in list(higher_names(made, "lexicon.x"))
+    assert list(higher_names(made, "cli.x")) == []
+
+
+def test_what_is_new_and_what_is_gone_is_named() -> None:
+    assert difference(["a", "b", "b"], ("b", "c"), "move it") == [
+        "new: a; move it", "new: b; move it", "gone: c; remove it from the list in test_structure.py"
+    ]  # fmt: skip
+    assert difference(["b", "a"], ("a", "b"), "") == []
