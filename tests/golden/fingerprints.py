@@ -92,8 +92,11 @@ def is_here(machine: Mapping[str, Any]) -> bool:
 def differences(found: Fingerprint, known: Fingerprint, *, is_same_machine: bool) -> list[str]:
     """What differs from a kept fingerprint: anything on the same machine, else figures beyond their tolerance."""
     if is_same_machine:
+        here, there = _flat(found), _flat(known)
         return [
-            f"{key} {found.get(key)}, not {known.get(key)}" for key in found | known if found.get(key) != known.get(key)
+            f"{key} is {here.get(key)!s:.40}, not {there.get(key)!s:.40}"
+            for key in here | there
+            if here.get(key) != there.get(key)
         ]
     wrong = [
         f"{key} {found[key]}, not about {known[key]}"
@@ -105,6 +108,15 @@ def differences(found: Fingerprint, known: Fingerprint, *, is_same_machine: bool
         share = np.abs(here - there).sum() / there.sum() if here.shape == there.shape else np.inf
         wrong += [f"means differ by {share:.3f} of their sum"] if share > MEANS else []
     return wrong
+
+
+def _flat(found: Fingerprint) -> Fingerprint:
+    """Hashes of single files with the name of the file, in place of the objects that hold them."""
+    return {
+        f"{key} {name}".strip(): one
+        for key, value in found.items()
+        for name, one in (value.items() if isinstance(value, dict) else (("", value),))
+    }
 
 
 def renewed(machines: Sequence[Mapping[str, Any]], found: Mapping[str, Fingerprint]) -> list[dict[str, Any]]:
