@@ -1,11 +1,19 @@
 """The errors of tts2face: three kinds, by who can correct them.
 
-Every message states what is wrong, which value, and what to do.
+Every message states what is wrong, which value, and what to do. Values of any length may stand in it: of a word of more
+than 1,000 characters, the first 60 remain.
 """
+
+import re
+
+_LONG_WORD = re.compile(r"(\S{60})\S{940,}")
 
 
 class Tts2faceError(Exception):
     """Base class of all errors; never raised itself."""
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(_LONG_WORD.sub(r"\1...", str(message)))
 
 
 class InputError(Tts2faceError, ValueError):

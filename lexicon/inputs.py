@@ -1,21 +1,24 @@
-"""Bounded reading of files and streams given by a user: UTF-8 text, JSON and CSV."""
+"""Bounded reading of files and streams given by a user: UTF-8 text, JSON, TOML and CSV."""
 
 import csv
+import errno
 import json
 import math
 import re
 import stat
 from collections.abc import Iterable
+from functools import partial
 from io import StringIO
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar
 
 from lexicon.errors import DataError, InputError
+from lexicon.json_values import LARGEST_NUMBER, check_type, format_value
 
 LARGEST_TEXT_BYTES = 16 << 20  # 16 MiB of text to speak; at 15 characters a second about 300 hours
 LARGEST_JSON_BYTES = 10_000_000  # an hour of timeline spans, one a second in each feature, takes 2 MB
 LARGEST_TABLE_BYTES = 200_000_000  # an hour of Live Link Face at 60 frames/s takes 180 MB
-MAX_DEPTH = 64  # nesting of lists and objects; the supported formats need 5
+MAX_DEPTH = 64  # nesting of lists, objects and tables; the supported formats need 5
 MAX_NUMBER_CHARACTERS = 400  # characters; a double has at most 310 digits before the point
 _FILE_KINDS = (
     (stat.S_ISDIR, "a folder"),
@@ -25,7 +28,9 @@ _FILE_KINDS = (
     (stat.S_ISBLK, "a device"),
 )
 _TOKENS = re.compile(r'"(?:[^"\\]|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)  # a whole string, or one bracket
+_QUOTED = re.compile(r'"(?:[^"\\]|\\.)*+"?|\'[^\']*+\'?')  # a text on one line of TOML, closed or not
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
+Number = TypeVar("Number", int, float)
 
 
 def check_regular_file(path: Path) -> None:
@@ -43,6 +48,16 @@ def check_regular_file(path: Path) -> None:
     kind = next((name for is_kind, name in _FILE_KINDS if is_kind(mode)), None)
     if kind is not None:
         raise DataError(f"{path} is {kind}, not a file; remove it or use a file")
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is a file of a name, which may be longer than any file's."""
+    try:
+        return path.is_file()
+    except OSError as refused:
+        if refused.errno != errno.ENAMETOOLONG:
+            raise
+        return False
 
 
 def read_bounded(file: BinaryIO, name: str, largest: int) -> bytes:
@@ -141,8 +156,8 @@ def parse_json(content: str, name: str) -> Any:
             content,
             object_pairs_hook=_refuse_duplicates,
             parse_constant=_refuse_constant,
-            parse_int=_parse_integer,
-            parse_float=_parse_number,
+            parse_int=partial(_parse_number, kind=int),
+            parse_float=partial(_parse_number, kind=float),
         )
     except json.JSONDecodeError as broken:
         raise DataError(f"{name}, line {broken.lineno}: not JSON ({broken.msg}); correct it there") from broken
@@ -151,6 +166,58 @@ def parse_json(content: str, name: str) -> Any:
     if _SURROGATE.search(content):
         _check_characters(parsed, name)
     return parsed
+
+
+def parse_toml(content: str, name: str) -> dict[str, Any]:
+    """Content of a TOML text.
+
+    Raises
+    ------
+    DataError
+        It is not TOML, is nested deeper than `MAX_DEPTH`, or contains a number that is too large or not finite; the
+        message begins with `name`.
+    """
+    import tomllib
+
+    for number, line in enumerate(content.split("\n"), 1):  # tomllib takes n^2 to n^3 steps for a key of n parts
+        if line.count(".") > MAX_DEPTH < _QUOTED.sub("", line).partition("#")[0].count("."):
+            raise DataError(
+                f"{name}, line {number}: has more than {MAX_DEPTH} dots outside quotes; shorten its keys or divide it"
+            )
+    try:
+        parsed = tomllib.loads(content)
+    except tomllib.TOMLDecodeError as broken:
+        raise DataError(f"{name} is not TOML ({broken}); correct it there") from broken
+    except RecursionError as deep:
+        raise DataError(f"{name} is not TOML of at most {MAX_DEPTH} levels of tables; nest it less") from deep
+    except ValueError as long:  # a whole number of more than 4,300 digits
+        raise DataError(f"{name} contains a number of thousands of digits; shorten it") from long
+    _check_tables(parsed, name)
+    return parsed
+
+
+def _check_tables(parsed: dict[str, Any], name: str) -> None:
+    """Check the numbers and the depth of parsed TOML."""
+    level: list[tuple[str, Any]] = list(parsed.items())
+    for _ in range(MAX_DEPTH):
+        inner: list[tuple[str, Any]] = []
+        for key, value in level:
+            if isinstance(value, dict):
+                inner += value.items()
+            elif isinstance(value, list):
+                inner += [(key, one) for one in value]
+            elif type(value) in (int, float):
+                _check_number(key, value, name)
+        level = inner
+    if level:
+        raise DataError(f"{name} is nested too deep: at most {MAX_DEPTH} levels of tables and lists are allowed")
+
+
+def _check_number(key: str, value: float, name: str) -> None:
+    try:
+        check_type(key[:40], value, type(value))
+    except InputError as wrong:
+        raise DataError(f"{name}: {wrong}") from wrong
 
 
 def _check_depth(content: str, name: str) -> None:
@@ -185,22 +252,13 @@ def _refuse_constant(written: str) -> Any:
     raise InputError(f"{written} is not a JSON number; use a finite number")
 
 
-def _parse_integer(written: str) -> int:
-    _check_length(written)
-    return int(written)
-
-
-def _parse_number(written: str) -> float:
-    _check_length(written)
-    value = float(written)
-    if value in (float("inf"), float("-inf")):
-        raise InputError(f"the number {written[:20]} is too large; the maximum is 1.8e308")
-    return value
-
-
-def _check_length(written: str) -> None:
+def _parse_number(written: str, kind: type[Number]) -> Number:
     if len(written) > MAX_NUMBER_CHARACTERS:
         raise InputError(f"a number of {len(written)} characters is too long ({written[:20]}...); shorten it")
+    value = kind(written)
+    if abs(value) > LARGEST_NUMBER:
+        raise InputError(f"the number {written[:20]} is too large; the maximum is 1.8e308")
+    return value
 
 
 def check_limits(what: str, value: float, limits: tuple[float, float], unit: str = "") -> None:
@@ -213,4 +271,5 @@ def check_limits(what: str, value: float, limits: tuple[float, float], unit: str
     """
     low, high = limits
     if not low <= value <= high:
-        raise InputError(f"{what} must lie between {low:g} and {high:g}{unit}, not {value:.12g}{unit}")
+        shown = format_value(value) if isinstance(value, int) else f"{value:.12g}"
+        raise InputError(f"{what} must lie between {low:g} and {high:g}{unit}, not {shown}{unit}")

@@ -1,13 +1,19 @@
-"""Checks of the values in parsed JSON; a wrong one is refused with its name, itself, and what to give."""
+"""Checks of values in parsed JSON and of options; a wrong one is refused with its name, itself, and what to give."""
 
 import json
 import math
+import sys
 from collections.abc import Mapping
-from types import MappingProxyType
-from typing import Any
+from dataclasses import fields
+from numbers import Integral, Real
+from pathlib import Path
+from types import MappingProxyType, NoneType
+from typing import Any, get_args
 
 from lexicon.errors import InputError
 
+LARGEST_NUMBER = sys.float_info.max  # 1.8e308; Python's whole numbers have no limit
+MAX_SHOWN_BITS = 200  # of a whole number in a message: 60 digits
 EXPECTED: Mapping[type, str] = MappingProxyType({
     float: "a number",
     int: "a whole number",
@@ -15,6 +21,7 @@ EXPECTED: Mapping[type, str] = MappingProxyType({
     bool: "true or false",
     list: "a list in square brackets",
     dict: "an object in curly brackets",
+    Path: "a path",
 })  # fmt: skip
 
 
@@ -55,10 +62,12 @@ def check_type(name: str, value: Any, kind: type) -> Any:
     Raises
     ------
     InputError
-        It has another type, or is infinite or too large for a float.
+        It has another type, is no finite number, or is larger than `LARGEST_NUMBER`.
     """
+    if kind in (int, float) and isinstance(value, int) and abs(value) > LARGEST_NUMBER:
+        raise InputError(f"{name} is too large a number; the maximum is 1.8e308")
     if kind is float and is_number(value):
-        return _as_float(name, value)
+        return float(value)
     if kind is not float and type(value) is kind:
         return value
     raise InputError(f"{name} must be {EXPECTED[kind]}, not {format_value(value)}")
@@ -69,18 +78,44 @@ def check_list(name: str, value: Any, kind: type) -> list[Any]:
     return [check_type(f"each value of {name}", one, kind) for one in check_type(name, value, list)]
 
 
+def check_fields(options: Any) -> None:
+    """Refuse values of a dataclass of options that are not of the types of its fields; texts become paths, and paths texts.
+
+    Raises
+    ------
+    InputError
+        A value has another type, is no finite number, or is a path with the character U+0000.
+    """
+    for one in fields(options):
+        value, kinds = getattr(options, one.name), get_args(one.type) or (one.type,)
+        if value is None and NoneType in kinds:
+            continue
+        kind = kinds[0]
+        if isinstance(value, str | Path) and kind in (str, Path):
+            value = kind(value)
+            if kind is Path and "\0" in str(value):
+                raise InputError(f"{one.name} is a path with the character U+0000, {format_value(value)}; remove it")
+            object.__setattr__(options, one.name, value)
+        elif not (isinstance(value, _NUMBERS.get(kind, ())) and is_number(value)):
+            check_type(one.name, value, kind)
+
+
 def is_number(value: Any) -> bool:
-    """Whether a value is a number of JSON, which has no infinity, and is no boolean."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and -math.inf < value < math.inf
+    """Whether a value is a number that a float can hold, and is no boolean."""
+    try:
+        return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:
+        return False
 
 
 def format_value(value: Any) -> str:
     """The beginning of a value, for messages."""
-    return json.dumps(value, ensure_ascii=False)[:40]
-
-
-def _as_float(name: str, value: float) -> float:
+    if isinstance(value, int) and value.bit_length() > MAX_SHOWN_BITS:
+        return "a number of more than 60 digits"
     try:
-        return float(value)
-    except OverflowError as huge:
-        raise InputError(f"{name} is too large a number") from huge
+        return json.dumps(value, ensure_ascii=False, default=str)[:40]
+    except (ValueError, TypeError, RecursionError):  # of Python alone: a list that contains itself, keys of any kind
+        return f"a {type(value).__name__}"
+
+
+_NUMBERS: Mapping[Any, Any] = MappingProxyType({int: Integral, float: Real})  # also those of numpy and fractions

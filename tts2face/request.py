@@ -9,6 +9,7 @@ from typing import Any
 
 from lexicon.errors import InputError
 from lexicon.inputs import check_limits
+from lexicon.json_values import check_fields, is_number
 
 RATE_LIMITS = (0.5, 2.0)
 VOLUME_LIMITS = (0.0, 2.0)
@@ -38,7 +39,8 @@ class Request:
     Raises
     ------
     InputError
-        The language does not exist, a number lies outside its range, or two options exclude each other.
+        An option has a value of another type, the language does not exist, a number lies outside its range, or two
+        options exclude each other.
     """
 
     text: str = option("", "Text to speak.")
@@ -114,13 +116,13 @@ class Request:
         return self.audio is None and self.idle is None
 
     def __post_init__(self) -> None:
-        """Reject numbers outside their range and options that exclude each other."""
+        """Reject values of other types, numbers outside their range, and options that exclude each other."""
         from lexicon.languages import language_code
 
+        if is_number(self.articulation):
+            object.__setattr__(self, "articulation", f"{self.articulation:g}")
+        check_fields(self)
         object.__setattr__(self, "language", language_code(self.language))
-        for name in ("audio", "dictionary", "timeline"):
-            if isinstance(getattr(self, name), str):
-                object.__setattr__(self, name, Path(getattr(self, name)))
         check_limits("rate", self.rate, RATE_LIMITS)
         check_limits("volume", self.volume, VOLUME_LIMITS)
         check_limits("fps", self.fps, FPS_LIMITS)
@@ -160,8 +162,6 @@ def parse_articulation(given: str) -> float:
 def _check_articulation(request: Request) -> None:
     if request.articulation is None:
         return
-    if not isinstance(request.articulation, str):
-        object.__setattr__(request, "articulation", f"{request.articulation:g}")
     parse_articulation(request.articulation)
     if request.idle is not None:
         raise InputError("--articulation has no effect with --idle; remove one of them")

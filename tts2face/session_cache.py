@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lexicon.json_values import check_fields
+
 if TYPE_CHECKING:
     from tts2face.session import Session
     from tts2face.voice.pool import VoicePool
@@ -15,7 +17,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Models:
-    """Models that show and move a speaker, by name or path."""
+    """Models that show and move a speaker, by name or path.
+
+    Raises
+    ------
+    InputError
+        A name is no text.
+    """
 
     talker: str = "grid_s1"
     face: str = "head"
@@ -23,6 +31,10 @@ class Models:
     palette: str | None = "starter"
     hair: str | None = None
     hair_color: str | None = None
+
+    def __post_init__(self) -> None:
+        """Reject values of other types."""
+        check_fields(self)
 
     def open_session(self, voices: "VoicePool | None" = None, *, memory_mb: float = 0.0) -> "Session":
         """Session of these models; raises as `Session`."""

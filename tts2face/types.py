@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence, WordSpan, concatenate_phones
 
+MAX_RATE_HZ = 1e6  # of samples or frames; the fastest converters of sound have 768 kHz
 HEAD_CHANNELS = ("pitch", "yaw", "roll", "x", "y", "z")  # radians (nod down, turn to own left, tilt) and mm
 
 
@@ -65,7 +66,7 @@ class Waveform:
     Raises
     ------
     InputError
-        The samples are not a finite vector in [-1, 1], or the rate is not above 0.
+        The samples are not a finite vector in [-1, 1], or the rate is not above 0 and at most `MAX_RATE_HZ`.
     """
 
     samples: NDArray[np.float32]
@@ -73,8 +74,8 @@ class Waveform:
 
     def __init__(self, samples: ArrayLike, rate: int) -> None:
         locked = _checked_read_only(samples, "samples", 1)
-        if rate <= 0:
-            raise InputError(f"a waveform's rate must be above 0 Hz, not {rate}")
+        if not 0 < rate <= MAX_RATE_HZ:
+            raise InputError(f"a waveform's rate must be above 0 and at most {MAX_RATE_HZ:g} Hz, not {rate:g}")
         if locked.size and float(np.abs(locked).max()) > 1.0:
             raise InputError(f"samples must lie in [-1, 1]; the largest is {float(np.abs(locked).max()):.3f}")
         object.__setattr__(self, "samples", locked)
@@ -102,7 +103,8 @@ class Trajectory:
     Raises
     ------
     InputError
-        The values are not a finite matrix with one column for each channel, names repeat, or `fps` is not above 0.
+        The values are not a finite matrix with one column for each channel, names repeat, or `fps` is not above 0
+        and at most `MAX_RATE_HZ`.
     """
 
     channels: tuple[str, ...]
@@ -115,8 +117,8 @@ class Trajectory:
             raise InputError("trajectory channels must have different names")
         if locked.shape[1] != len(channels):
             raise InputError(f"{len(channels)} channels need {len(channels)} columns, not {locked.shape[1]}")
-        if not fps > 0:
-            raise InputError(f"frames per second must be above 0, not {fps}")
+        if not 0 < fps <= MAX_RATE_HZ:
+            raise InputError(f"frames per second must be above 0 and at most {MAX_RATE_HZ:g}, not {fps}")
         object.__setattr__(self, "channels", tuple(channels))
         object.__setattr__(self, "values", locked)
         object.__setattr__(self, "fps", float(fps))

@@ -264,6 +264,22 @@ def test_wrong_options_are_refused(options: dict, message: str | None, tmp_path:
         import_face(character, **{"landmarks": table} | options)
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        ("map.toml", "[shapes]\njawOpen = {Open = 1" + "0" * 400 + "}", "Open is too large a number; the maximum"),
+        ("map.toml", "[shapes]\njawOpen = {Open = true}", "jawOpen: the gain of Open must be a number, not true"),
+        ("map.toml", "[shapes]\njawOpen = [1]", r"jawOpen: give a name or a table of names with gains, not \[1\]"),
+        ("map.tsv", "jawOpen\tOpen\t1" + "0" * 400, "map.tsv, line 1: .* is not a number; correct it"),
+        ("map.tsv", "jawOpen\tOpen\t11", "line 1: the gain 11 is not within 10"),
+    ],
+)
+def test_a_wrong_mapping_is_refused(name: str, content: str, reason: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(content, encoding="utf-8")
+    with pytest.raises(DataError, match=reason):
+        read_mapping(tmp_path / name)
+
+
 def test_a_source_that_does_not_exist_is_named(tmp_path: Path) -> None:
     character = write_character_file(tmp_path / "character.glb")
     (tmp_path / "map.tsv").write_text("jawOpen\tMouthWide\n")

@@ -171,7 +171,8 @@ def test_refuses_impossible_requests(voice: ExemplarModel):
     for change, reason in [
         ({"context": 0}, "context must be"),
         ({"context": MAX_CONTEXT + 1}, "context must be"),
-        ({"k": 0}, "at least 1"),
+        ({"k": 2**31}, "the number of exemplars must be 1 to 10000, not 2147483648"),
+        ({"k": 0}, "the number of exemplars must be 1 to 10000, not 0"),
     ]:
         with pytest.raises(InputError, match=reason):
             moved(voice, SENTENCE, **change)

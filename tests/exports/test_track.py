@@ -66,7 +66,7 @@ def test_other_programs_read_it_as_json_and_may_format_it(tmp_path):
         (lambda text: text.replace("tts2face-track", "other"), "its format is 'other', not 'tts2face-track'"),
         (lambda text: text.replace('"version": 1', '"version": 2'), "has version 2 of the track format"),
         (lambda text: text.replace('"pitch"', '"nod"'), "its head_channels are not pitch"),
-        (lambda text: text.replace('"fps": 30.0', '"fps": "x"'), "channels, fps or rate is missing"),
+        (lambda text: text.replace('"fps": 30.0', '"fps": "x"'), 'fps must be a number, not "x"'),
         (lambda text: text.replace('"fps": 30.0', '"fps": -1'), "piece 1: frames per second must be above 0"),
         (lambda text: text.replace('"words"', '"word"'), "piece 1: a piece needs exactly motion, head"),
         (lambda text: text.replace('"samples": "', '"samples": "*'), "piece 1: .*base64"),

@@ -1,5 +1,6 @@
 """Haircuts: files, fit to a head, colours, and painted scalps."""
 
+import zlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from tts2face.models.hair_file import read_hair, write_hair
 from tts2face.render.camera import camera_matrices
 from tts2face.render.draw import draw
 from tts2face.render.picture import Picture
+from tts2face.storage.tensors import read_tensors, write_tensors
 
 GREEN = "#10c020"
 
@@ -147,6 +149,18 @@ def test_hair_of_another_layout_is_refused() -> None:
 def test_unknown_hair_is_refused(folder: Path, options: dict[str, str], reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         load_face(str(folder / "dressed.face"), **options)
+
+
+def test_a_picture_of_too_many_pixels_is_refused_before_it_is_decoded(tmp_path: Path) -> None:
+    write_hair(tmp_path / "cap.hair", cap(tiny_face()))
+    arrays, header = read_tensors(tmp_path / "cap.hair", "hair", 1)
+    picture = bytearray(arrays["alpha"].tobytes())
+    picture[16:24] = (20_000).to_bytes(4, "big") * 2  # width and height of a PNG
+    picture[29:33] = zlib.crc32(picture[12:29]).to_bytes(4, "big")
+    wrong = {**arrays, "alpha": np.frombuffer(bytes(picture), np.uint8)}
+    write_tensors(tmp_path / "wrong.hair", "hair", 1, wrong, header)
+    with pytest.raises(DataError, match=r"the texture of .*wrong\.hair is too large; at most 100 million"):
+        read_hair(tmp_path / "wrong.hair")
 
 
 def test_hair_for_a_face_without_haircuts_is_refused(folder: Path) -> None:

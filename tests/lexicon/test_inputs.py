@@ -1,20 +1,28 @@
+import math
 import os
 import re
 import socket
+from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
-from lexicon.errors import DataError
+from lexicon.errors import DataError, InputError
 from lexicon.inputs import (
     MAX_DEPTH,
+    check_limits,
     check_regular_file,
     parse_json,
+    parse_toml,
     read_bounded,
     read_json,
     read_table,
     read_text,
 )
+from lexicon.json_values import check_fields
 
 
 @pytest.mark.parametrize(
@@ -46,6 +54,99 @@ def test_json_that_is_read() -> None:
     assert parse_json(nested, "a.json") is not None
     brackets = '["' + "[{" * 200 + '", "\\"[", "\\ud83d\\ude00", 12345678901234567890, -1.5e3]'
     assert parse_json(brackets, "a.json") == ["[{" * 200, '"[', "😀", 12345678901234567890, -1500.0]
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("a = ", r"a\.toml is not TOML \(Invalid value"),
+        ("a = " + "[" * 5000, r"a\.toml is not TOML of at most 64 levels"),
+        ("a = " + "[" * 65 + "]" * 65, r"a\.toml is nested too deep: at most 64"),
+        ("a.a" * 70 + " = 1", r"a\.toml, line 1: has more than 64 dots outside quotes"),
+        ("\n[" + "a." * 5000 + "a]", r"a\.toml, line 2: has more than 64 dots outside quotes"),
+        ("a = " + "7" * 5000, r"a\.toml contains a number of thousands of digits"),
+        ("a = 1" + "0" * 400, r"a\.toml: a is too large a number; the maximum is 1\.8e308"),
+        ("b = [{a = 0x" + "f" * 5000 + "}]", r"a\.toml: a is too large a number"),
+        ("a = 1e999", r"a\.toml: a must be a number, not Infinity"),
+        ("[b]\na = nan", r"a\.toml: a must be a number, not NaN"),
+    ],
+)
+def test_toml_that_is_refused(content: str, reason: str) -> None:
+    with pytest.raises(DataError, match=reason):
+        parse_toml(content, "a.toml")
+
+
+def test_toml_that_is_read() -> None:
+    hosts = [f"{number}.example.org" for number in range(70)]
+    assert parse_toml(f"a = {hosts!r} # {'.' * 70}\n[b]\nc = -1.5\nd = {2**63}", "a.toml") == {
+        "a": hosts,
+        "b": {"c": -1.5, "d": 2**63},
+    }
+
+
+def test_a_key_of_many_parts_is_refused_before_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tomllib.loads", lambda content: pytest.fail("read, in the cube of the parts"))
+    with pytest.raises(DataError, match="has more than 64 dots"):
+        parse_toml("a." * 100_000 + "a = 1", "a.toml")
+
+
+def test_text_of_quotes_is_read_once() -> None:
+    with pytest.raises(DataError, match="not TOML"):  # takes minutes if the rest of the line is tried from each quote
+        parse_toml('"' + '\\"' * 300_000 + "." * 70, "a.toml")
+
+
+@pytest.mark.parametrize(("value", "shown"), [(10**400, "a number of more than 60 digits"), (10**20, "1" + "0" * 20)])
+def test_a_number_of_any_size_outside_its_limits_is_named(value: int, shown: str) -> None:
+    with pytest.raises(InputError, match=f"x must lie between 0 and 1 s, not {shown} s"):
+        check_limits("x", value, (0, 1), " s")
+
+
+def test_of_a_word_without_end_a_message_shows_the_beginning() -> None:
+    assert str(InputError(f"there is no {'x' * 5000}; choose y")) == f"there is no {'x' * 60}... choose y"
+    assert len(str(DataError(f"{'x' * 900} is missing"))) == 911
+
+
+@dataclass(frozen=True)
+class Options:
+    """Fields of all types that options have."""
+
+    text: str = ""
+    count: int = 0
+    factor: float = 1.0
+    switch: bool = False
+    file: Path | None = None
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@pytest.mark.parametrize(
+    ("given", "reason"),
+    [
+        ({"text": 7}, "text must be a text in quotes, not 7"),
+        ({"text": None}, "text must be a text in quotes, not null"),
+        ({"count": 1.5}, r"count must be a whole number, not 1\.5"),
+        ({"count": True}, "count must be a whole number, not true"),
+        ({"count": 10**5000}, "count is too large a number; the maximum is 1.8e308"),
+        ({"factor": "3"}, 'factor must be a number, not "3"'),
+        ({"factor": math.inf}, "factor must be a number, not Infinity"),
+        ({"switch": 1}, "switch must be true or false, not 1"),
+        ({"file": 7}, "file must be a path, not 7"),
+        ({"file": "a\0b"}, r"file is a path with the character U\+0000"),
+        ({"text": [10**5000]}, "text must be a text in quotes, not a list"),
+        ({"text": Fraction(1, 2)}, 'text must be a text in quotes, not "1/2"'),
+    ],
+)
+def test_options_of_another_type_are_refused(given: dict[str, Any], reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        Options(**given)
+
+
+def test_options_of_python_users_are_taken() -> None:
+    assert Options(file="a", text=Path("b")) == Options(file=Path("a"), text="b")  # type: ignore[arg-type]
+    for number in (np.float32(0.5), Fraction(30_000, 1001), 2):
+        assert Options(factor=number).factor == number  # type: ignore[arg-type]
+    assert Options(count=np.int64(3)).count == 3  # type: ignore[arg-type]
 
 
 def test_files_are_read_to_a_size_and_no_further(tmp_path: Path) -> None:
@@ -137,3 +238,9 @@ def test_nothing_else_reads_json_from_outside() -> None:
         if (count := len(re.findall(r"json\.loads?\(", path.read_text(encoding="utf-8"))))
     }
     assert found == own
+
+
+def test_nothing_else_reads_toml() -> None:
+    root = Path(__file__).parents[2]
+    paths = [path for room in ("cli", "corpus_tools", "lexicon", "tts2face") for path in (root / room).rglob("*.py")]
+    assert [path.name for path in paths if "tomllib" in path.read_text(encoding="utf-8")] == ["inputs.py"]

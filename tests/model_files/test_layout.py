@@ -1,6 +1,7 @@
 """Validation of model files: one array or key of a valid file is changed, and the error names the reason."""
 
 import json
+import zlib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -105,6 +106,11 @@ def _noise(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {"shape_deltas": deltas.astype(np.int16), "shape_steps": np.full_like(arrays["shape_steps"], 0.1)}
 
 
+def _without_occlusion_bytes(arrays: dict, header: dict) -> None:
+    arrays["occlusion"] = np.frombuffer(zlib.compress(b"0" * 100), np.uint8)
+    del header["occlusion_bytes"]
+
+
 def _deep(levels: int) -> list:
     nested: list = []
     for _ in range(levels):
@@ -118,11 +124,12 @@ def _deep(levels: int) -> list:
         ("face", _array("limits", lambda a: a.astype(np.float64)), "limits is float64, not float32"),
         ("face", _array("pivot", lambda a: a[:2]), "pivot has the shape (2,), not (3)"),
         ("face", _array("colours", lambda a: a[1:]), "colours has the shape"),
-        ("face", _array("texture", lambda a: a[:40]), "the texture cannot be decoded"),
+        ("face", _array("texture", lambda a: a[:40]), "cannot read the texture of"),
         ("face", _array("vertices", np.zeros_like), "vertices span 0 x 0 mm"),
         ("face", _array("vertices", np.random.default_rng(0).permutation), "triangles at rest cover"),
         ("face", lambda a, h: a.update(_noise(a)), "triangles with jawOpen cover"),
         ("face", lambda a, h: a.pop("uv"), "has only one of uv and texture"),
+        ("face", _without_occlusion_bytes, "the occlusion is not of"),
         ("face", lambda a, h: a.update(extra=a["pivot"]), "holds the array 'extra', which no face has"),
         ("face", lambda a, h: h["parts"][1].update(first=3), "the part 'eye_left' begins at 3, not at"),
         ("face", lambda a, h: h["parts"][0].update(opacity="1"), "parts[0]: opacity is '1', not a number from"),

@@ -19,7 +19,7 @@ import numpy as np
 from corpus_tools.show_talker import describe
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tests.model_files.mutations import mutate
+from tests.fuzz.mutations import mutate_model
 from tts2face.catalogue import identities
 from tts2face.exemplar.appearance_trajectory import appearance_trajectory, build_appearance_exemplars
 from tts2face.exemplar.synthesis import blend_trajectory, build_exemplar_model, select_tokens
@@ -107,7 +107,7 @@ def main(kind: str, file: str, first: int, last: int) -> None:
         out = Path(folder) / f"mutated.{kind}"
         for seed in (-1, *range(first, last)):
             faulthandler.dump_traceback_later(HANG_S, exit=True)
-            what = "nothing" if seed < 0 else mutate(source, kind, out, seed)
+            what = "nothing" if seed < 0 else mutate_model(source, kind, out, seed)
             begin = time.process_time()
             answer = outcome(kind, source if seed < 0 else out)
             row = {"seed": seed, "what": what, "seconds": time.process_time() - begin, "answer": answer}

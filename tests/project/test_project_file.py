@@ -1,7 +1,10 @@
 """Project files: everything is written and read back, and what is wrong is named."""
 
 import json
+from dataclasses import fields
+from itertools import product
 from pathlib import Path
+from typing import Any, get_args
 
 import pytest
 
@@ -15,6 +18,11 @@ from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.session_cache import Models
 from tts2face.synthesis.phone_edges import SentenceEdges
+
+VALUES = (
+    None, True, False, -1, 0, 1, 2.5, -0.5, 1e308, 2**31, 10**300, "", "x", "1", "a\0b", "x" * 5000, [], [[]],
+    [1, 2, 3], {}, {"x": 1},
+)  # fmt: skip
 
 
 @pytest.fixture
@@ -75,7 +83,7 @@ def test_silent_features_are_the_muted_and_those_that_are_not_solo(whole: Projec
         ({"name": ""}, "name: a project needs a name of 1 to 200 characters"),
         ({"request": {"speed": 2}}, "request: there is no option 'speed'; choose"),
         ({"request": {"rate": 9}}, "request: rate must lie between 0.5 and 2, not 9"),
-        ({"request": {"rate": "fast"}}, "request: an option has a value of the wrong kind"),
+        ({"request": {"rate": "fast"}}, 'request: rate must be a number, not "fast"'),
         ({"request": {"timeline": "t.json"}}, "name: a project has its own timeline"),
         ({"models": []}, r"models: give an object in curly brackets, not \[\]"),
         ({"picture": {"size": "9"}}, "picture: "),
@@ -96,6 +104,34 @@ def test_projects_that_are_wrong_are_refused(change: dict, reason: str, tmp_path
     path.write_text(json.dumps({"format": "tts2face project", "version": 1} | change), encoding="utf-8")
     with pytest.raises(DataError, match=reason):
         load_project(path)
+
+
+def is_of_type(value: Any, kind: type) -> bool:
+    if isinstance(value, bool):
+        return kind is bool
+    return isinstance(value, {Path: str, float: int | float}.get(kind, kind))
+
+
+def test_an_option_of_a_wrong_type_is_refused_by_its_name(tmp_path: Path) -> None:
+    wrong = []
+    for part, options in (("request", Request), ("models", Models), ("picture", Picture)):
+        for option, value in product(fields(options), VALUES):
+            kinds = (*(get_args(option.type) or (option.type,)), *((float,) if option.name == "articulation" else ()))
+            content = {"format": "tts2face project", "version": 1, part: {option.name: value}}
+            (tmp_path / "p.json").write_text(json.dumps(content), encoding="utf-8")
+            reason = ""
+            try:
+                load_project(tmp_path / "p.json")
+            except DataError as refused:
+                reason = str(refused)
+            if not any(is_of_type(value, kind) for kind in kinds) and f"{part}: {option.name} must be" not in reason:
+                wrong.append((option.name, value, reason))
+    assert wrong == []
+
+
+def test_a_name_of_another_type_is_refused() -> None:
+    with pytest.raises(InputError, match="the name must be a text in quotes, not 7"):
+        Project(name=7)  # type: ignore[arg-type]
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:

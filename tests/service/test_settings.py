@@ -36,11 +36,14 @@ def test_shown_settings_are_a_settings_file(tmp_path: Path, capsys: pytest.Captu
     ("content", "reason"),
     [
         ("prot = 1", "unknown setting 'prot'; the settings are host, port"),
-        ("port = '80'", "port in .* must be a whole number, not '80'"),
+        ("port = '80'", 'serve.toml: port must be a whole number, not "80"'),
         ("port = 70000", "port must lie between 0 and 65535, not 70000"),
-        ("hosts = 'a'", "hosts in .* must be a list of texts"),
+        ("hosts = 'a'", "hosts must be a list in square brackets"),
         ("log_text = 1", "must be true or false"),
-        ("port = ", "cannot be read"),
+        ("body_mb = 1" + "0" * 400, "body_mb is too large a number"),
+        ("workers = 0x" + "f" * 5000, "workers is too large a number"),
+        ("workers = 1" + "0" * 70, "workers must lie between 0 and 256, not a number of more than 60 digits"),
+        ("port = ", "the settings file .*serve.toml is not TOML"),
         ("host = '0.0.0.0'", "open to everybody who reaches 0.0.0.0; create a key"),
         ("host = 'example.org'", "open to everybody"),
     ],
@@ -54,7 +57,7 @@ def test_wrong_settings_are_refused(tmp_path: Path, content: str, reason: str) -
 
 @pytest.mark.parametrize(
     ("variable", "value", "reason"),
-    [("PROT", "1", "unknown setting 'prot'"), ("PORT", "x", "TTS2FACE_SERVE_PORT must be a whole number, not 'x'")],
+    [("PROT", "1", "unknown setting 'prot'"), ("PORT", "x", 'TTS2FACE_SERVE_PORT must be a whole number, not "x"')],
 )
 def test_wrong_variables_are_refused(variable: str, value: str, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
@@ -91,4 +94,7 @@ def test_wrong_keys_are_refused(tmp_path: Path) -> None:
         read_keys(tmp_path / "none.toml")
     path.write_text("[[key]]\nname = 'a'\n")
     with pytest.raises(DataError, match="a key without name or hash"):
+        read_keys(path)
+    path.write_text("[[key]]\nname = 'a'\nhash = 'b'\nscopes = 7\n")
+    with pytest.raises(DataError, match="a key whose name, hash or scopes are no plain texts"):
         read_keys(path)

@@ -177,7 +177,7 @@ def test_options_change_alone() -> None:
         ({"kind": "request", "options": {"rate": "fast"}}, "rate must be a number"),
         ({"kind": "request", "options": {"rate": 9}}, "rate"),
         ({"kind": "request", "options": {"text": None}}, "text must be a text"),
-        ({"kind": "request", "options": {"text": ["a"]}}, "text must be a single value"),
+        ({"kind": "request", "options": {"text": ["a"]}}, "text must be a text in quotes, not"),
         ({"kind": "name", "name": " "}, "a project needs a name"),
     ],
 )  # fmt: skip

@@ -12,7 +12,6 @@
     style = "delighted"
 """
 
-import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields
 from fnmatch import fnmatchcase
@@ -20,8 +19,10 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import read_text
+from lexicon.inputs import is_file, parse_toml, read_text
+from lexicon.json_values import check_type, format_value
 from tts2face.request import Request
+from tts2face.session_cache import Models
 from tts2face.subtitles.cue import Cue
 
 MODEL_NAMES = ("talker", "face", "identity", "palette", "hair", "hair_color")
@@ -85,11 +86,7 @@ def read_cast(path: Path) -> Cast:
         content = read_text(path, MAX_CAST_BYTES)
     except OSError as refused:
         raise InputError(f"cannot read the cast {path}: {refused.strerror}; check the path") from refused
-    try:
-        tables = tomllib.loads(content)
-    except (tomllib.TOMLDecodeError, RecursionError) as broken:
-        raise DataError(f"{path} is not TOML ({broken}); correct it there") from broken
-    return cast_from_tables(tables, str(path), path.parent)
+    return cast_from_tables(parse_toml(content, str(path)), str(path), path.parent)
 
 
 def cast_from_tables(tables: Mapping[str, Any], place: str, folder: Path | None = None) -> Cast:
@@ -117,8 +114,10 @@ def _role(table: Mapping[str, Any], place: str, folder: Path | None) -> Role:
     if not patterns:
         raise DataError(f"{place} has no pattern; give {', '.join(PATTERN_NAMES)}")
     for name, pattern in patterns.items():
-        if not isinstance(pattern, str):
-            raise DataError(f"{place}: {name} must be a text in quotes, not {pattern!r}")
+        try:
+            check_type(name, pattern, str)
+        except InputError as wrong:
+            raise DataError(f"{place}: {wrong}") from wrong
     rest = {name: value for name, value in table.items() if name not in PATTERN_NAMES}
     return Role(patterns, _settings(rest, place, folder))
 
@@ -128,14 +127,13 @@ def _settings(table: Mapping[str, Any], place: str, folder: Path | None) -> dict
         if name not in (*MODEL_NAMES, *REQUEST_NAMES):
             known = ", ".join((*PATTERN_NAMES, *MODEL_NAMES, *REQUEST_NAMES))
             raise DataError(f"{place}: there is no setting {name!r}; use {known}")
-        if not isinstance(value, str | int | float | bool):
-            raise DataError(f"{place}: {name} must be a text, a number or true or false, not {value!r}")
-        if name in MODEL_NAMES and not isinstance(value, str):
-            raise DataError(f"{place}: {name} must be a text in quotes, not {value!r}")
+        if value is None:
+            raise DataError(f"{place}: {name} must be a text, a number or true or false, not {format_value(value)}")
     settings = {name: _resolve(name, value, folder) for name, value in table.items()}
     try:
         Request(**{name: value for name, value in settings.items() if name in REQUEST_NAMES})
-    except (InputError, TypeError, AttributeError) as wrong:
+        Models(**{name: value for name, value in settings.items() if name in MODEL_NAMES})
+    except InputError as wrong:
         raise DataError(f"{place}: {wrong}") from wrong
     return settings
 
@@ -144,6 +142,6 @@ def _resolve(name: str, value: Any, folder: Path | None) -> Any:
     """A path relative to the folder of the cast, where there is such a file; else the value."""
     if folder is None:
         return value
-    if name in PATH_NAMES and isinstance(value, str) and Path(value).suffix and (folder / value).exists():
+    if name in PATH_NAMES and isinstance(value, str) and Path(value).suffix and is_file(folder / value):
         return str(folder / value)
     return value

@@ -1,12 +1,12 @@
 """Mapping from the shapes of a face to morph targets and expressions of a character, and its files (TSV, TOML)."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import read_text
+from lexicon.inputs import parse_cell, parse_toml, read_text
+from lexicon.json_values import check_type, format_value
 
 MAX_GAIN = 10.0
 MAX_MAPPING_BYTES = 1_000_000
@@ -89,16 +89,12 @@ def _table_rows(text: str, path: Path) -> list[tuple[str, str, str, float]]:
         place = f"{path}, line {number}"
         if len(cells) not in (2, 3):
             raise DataError(f"{place}: has {len(cells)} columns; give shape, source and gain, separated by tabs")
-        rows.append((place, cells[0], cells[1], _gain(cells[2] if len(cells) == 3 else "1", place)))
+        rows.append((place, cells[0], cells[1], parse_cell(cells[2], path, number) if len(cells) == 3 else 1.0))
     return rows
 
 
 def _toml_rows(text: str, path: Path) -> list[tuple[str, str, str, float]]:
-    try:
-        content = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise DataError(f"{path} is not TOML ({error}); correct it there") from error
-    shapes = content.get("shapes")
+    shapes = parse_toml(text, str(path)).get("shapes")
     if not isinstance(shapes, dict):
         raise DataError(f'{path} has no table [shapes]; add one with lines such as jawOpen = "MouthOpen"')
     rows = []
@@ -106,13 +102,11 @@ def _toml_rows(text: str, path: Path) -> list[tuple[str, str, str, float]]:
         place = f"{path}, {shape}"
         sources = {value: 1.0} if isinstance(value, str) else value
         if not isinstance(sources, dict):
-            raise DataError(f"{place}: give a name or a table of names with gains, not {value!r:.40}")
-        rows += [(place, shape, name, _gain(gain, place)) for name, gain in sources.items()]
+            raise DataError(f"{place}: give a name or a table of names with gains, not {format_value(value)}")
+        try:
+            rows += [
+                (place, shape, name, check_type(f"the gain of {name}", gain, float)) for name, gain in sources.items()
+            ]
+        except InputError as wrong:
+            raise DataError(f"{place}: {wrong}") from wrong
     return rows
-
-
-def _gain(value: object, place: str) -> float:
-    try:
-        return float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError) as error:
-        raise DataError(f"{place}: the gain {value!r:.40} is not a number; correct it") from error

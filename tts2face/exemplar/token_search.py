@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
+from lexicon.json_values import format_value
 from tts2face.compilation import kernel
 from tts2face.exemplar.tokens import MAX_CONTEXT, Tokens
 
+MAX_EXEMPLARS = 10_000  # of a phone; an hour of recordings has half as many of the most frequent one
 N_GROUP_CONTEXT = 3  # neighbours either side that are alike in a group; the default context
 _ROUNDING = 1e-9  # a bound may fall below the score it bounds by rounding; scores are of order 1
 
@@ -95,7 +97,7 @@ def best_tokens(query: TokenQuery, index: ContextIndex, *, context: int, k: int,
     Raises
     ------
     InputError
-        `context` is not 1 to `MAX_CONTEXT`, `k` is below 1, or `duration` below 0.
+        `context` is not 1 to `MAX_CONTEXT`, `k` is not 1 to `MAX_EXEMPLARS`, or `duration` below 0.
 
     Notes
     -----
@@ -104,9 +106,9 @@ def best_tokens(query: TokenQuery, index: ContextIndex, *, context: int, k: int,
     are visited by increasing difference from the query's duration.
     """
     if not 1 <= context <= MAX_CONTEXT:
-        raise InputError(f"context must be 1 to {MAX_CONTEXT} phones, not {context}")
-    if k < 1:
-        raise InputError(f"the number of exemplars must be at least 1, not {k}")
+        raise InputError(f"context must be 1 to {MAX_CONTEXT} phones, not {format_value(context)}")
+    if not 1 <= k <= MAX_EXEMPLARS:
+        raise InputError(f"the number of exemplars must be 1 to {MAX_EXEMPLARS}, not {format_value(k)}")
     if not duration >= 0:
         raise InputError(f"the weight of durations must be 0 or more, not {duration}")
     tokens = np.full((len(query.phone), k), -1, np.int32)

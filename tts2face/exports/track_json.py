@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import check_regular_file, parse_json
+from lexicon.json_values import check_list, check_type
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.exports.parts import Part, Target, frame_rows
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
@@ -167,12 +168,13 @@ def _check_header(header: Mapping[str, Any], path: Path) -> Mapping[str, Any]:
         raise DataError(f"{path} has version {header.get('version')} of the track format; this program reads {VERSION}")
     if header.get("head_channels") != list(HEAD_CHANNELS):
         raise _not_a_track(path, f"its head_channels are not {', '.join(HEAD_CHANNELS)}")
-    if not all(isinstance(header.get(name), kind) for name, kind in _HEADER_KINDS.items()):
-        raise _not_a_track(path, "channels, fps or rate is missing or of another type")
+    try:
+        check_list("channels", header.get("channels"), str)
+        for name, kind in (("fps", float), ("rate", int)):
+            check_type(name, header.get(name), kind)
+    except InputError as wrong:
+        raise _not_a_track(path, str(wrong)) from wrong
     return header
-
-
-_HEADER_KINDS: Mapping[str, Any] = {"channels": list, "fps": (int, float), "rate": int}
 
 
 def _parse_piece(piece: Any, header: Mapping[str, Any], name: str) -> TrackPiece:
@@ -180,8 +182,8 @@ def _parse_piece(piece: Any, header: Mapping[str, Any], name: str) -> TrackPiece
         raise DataError(f"{name}: a piece needs exactly {', '.join(_PIECE_NAMES)}; export the track again")
     try:
         samples = np.frombuffer(base64.b64decode(piece["samples"], validate=True), "<f4")
-        phones = PhoneSequence(piece["phones"], piece["edges"])
-        words = tuple(WordSpan(str(text), int(first), int(last)) for text, first, last in piece["words"])
+        phones = PhoneSequence(check_list("phones", piece["phones"], str), check_list("edges", piece["edges"], float))
+        words = tuple(_word(*check_type("each word", word, list)) for word in check_type("words", piece["words"], list))
         fps = float(header["fps"])
         return TrackPiece(
             Clip(
@@ -189,12 +191,19 @@ def _parse_piece(piece: Any, header: Mapping[str, Any], name: str) -> TrackPiece
                 Trajectory(HEAD_CHANNELS, _rows(piece["head"], len(HEAD_CHANNELS)), fps),
                 Speech(Waveform(samples, header["rate"]), phones, words),
             ),
-            str(piece["text"]),
+            check_type("text", piece["text"], str),
         )
     except (TypeError, ValueError) as wrong:  # InputError, wrong base64, rows of unequal length
         raise DataError(f"{name}: {wrong}; export the track again") from wrong
 
 
+def _word(text: Any, first: Any, last: Any) -> WordSpan:
+    return WordSpan(
+        check_type("a word", text, str), *(check_type("a phone of a word", at, int) for at in (first, last))
+    )
+
+
 def _rows(values: Any, width: int) -> NDArray[np.float32]:
-    rows = np.array(values, np.float64).astype(np.float32)
+    with np.errstate(over="ignore"):  # infinity is refused
+        rows = np.array(values, np.float64).astype(np.float32)
     return rows.reshape(-1, width) if not rows.size else rows

@@ -179,7 +179,7 @@ def _read_occlusion(
     if "occlusion" not in arrays:
         return None
     n_poses = 2 if WIDE_OPEN in header["shape_names"] else 1
-    shape = (n_poses, len(arrays["vertices"]), int(header["occlusion_bytes"]))
+    shape = (n_poses, len(arrays["vertices"]), header.get("occlusion_bytes", 0))
     return decode_occlusion(arrays["occlusion"], shape, path)
 
 

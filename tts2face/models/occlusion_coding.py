@@ -33,5 +33,7 @@ def decode_occlusion(content: NDArray[Any], shape: tuple[int, int, int], path: P
     except zlib.error as error:
         raise DataError(f"{path}: the occlusion cannot be inflated ({error}); build or copy the file again") from error
     if not size or len(bits) != size:
-        raise DataError(f"{path}: the occlusion is not of {shape[1]} vertices; build or copy the file again")
+        raise DataError(
+            f"{path}: the occlusion is not of {shape[1]} vertices with {shape[2]} bytes; build or copy the file again"
+        )
     return np.frombuffer(bits, np.uint8).reshape(shape)

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import DataError
+from tts2face.storage.picture_files import open_picture
 
 JPEG_QUALITY = 92
-MAX_TEXTURE_SIDE_PX = 8192  # pixels per side: 200 MB when decoded
 
 
 def texture_tensors(number: int) -> tuple[str, str]:
@@ -53,14 +52,6 @@ def _encode(pixels: NDArray[np.uint8], kind: str, **options: Any) -> NDArray[np.
 
 
 def _decode(content: NDArray[np.uint8], kind: str, mode: str, path: Path) -> NDArray[np.uint8]:
-    from PIL import Image
-
-    try:
-        with Image.open(io.BytesIO(content.tobytes()), formats=[kind]) as image:
-            if max(image.size) > MAX_TEXTURE_SIDE_PX:
-                raise DataError(
-                    f"{path}: the texture has {image.size} pixels; reduce it to at most {MAX_TEXTURE_SIDE_PX} per side"
-                )
-            return np.array(image.convert(mode))
-    except (OSError, SyntaxError) as error:
-        raise DataError(f"{path}: the texture cannot be decoded ({error}); build or copy the file again") from error
+    what = f"the texture of {path}"
+    with open_picture(content.tobytes(), what, [kind], advice="build or copy the file again") as image:
+        return np.array(image.convert(mode))

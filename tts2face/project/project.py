@@ -7,6 +7,7 @@ from types import MappingProxyType
 from lexicon.dictionary import Dictionary, parse_dictionary
 from lexicon.errors import InputError
 from lexicon.ipa import Segment
+from lexicon.json_values import check_type
 from tts2face.exemplar.options import ExcludedToken
 from tts2face.gesture.spans import Gains, check_feature
 from tts2face.gesture.timeline import Timeline
@@ -46,7 +47,7 @@ class Project:
     Raises
     ------
     InputError
-        A feature is unknown, the name is too long, or the request has a timeline file.
+        A feature is unknown, the name is no text or too long, or the request has a timeline file.
     DataError
         A pronunciation is invalid.
     """
@@ -64,6 +65,7 @@ class Project:
 
     def __post_init__(self) -> None:
         """Refuse unknown features, a long name, a second timeline and wrong pronunciations."""
+        check_type("the name", self.name, str)
         if not self.name.strip() or len(self.name) > MAX_NAME:
             raise InputError(f"a project needs a name of 1 to {MAX_NAME} characters, not {self.name[:40]!r}")
         for feature in (*self.muted, *self.solo):

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
+from lexicon.inputs import LARGEST_JSON_BYTES, is_file, parse_json, read_text
 from lexicon.json_values import check_list, check_mapping, check_object, check_type
 from tts2face.exemplar.options import ExcludedToken
 from tts2face.gesture.timeline_file import parse_timeline_object, timeline_json
@@ -75,7 +75,7 @@ def parse_project(content: Any, name: str, folder: Path) -> Project:
     return part(
         "name",
         lambda title: Project(
-            check_type("the name", title, str),
+            title,
             part("request", lambda given: _options(Request, given, folder, REQUEST_FILES), {}),
             part("models", lambda given: _options(Models, given, folder, MODEL_FILES), {}),
             part("picture", lambda given: _options(Picture, given, folder, PICTURE_FILES), {}),
@@ -135,12 +135,9 @@ def _options(kind: type[Options], given: Any, folder: Path, files: tuple[str, ..
             raise InputError(f"there is no option {name!r}; choose {', '.join(sorted(known))}")
     for name in files:
         value = chosen.get(name)
-        if isinstance(value, str) and (folder / value).is_file():
+        if isinstance(value, str) and is_file(folder / value):
             chosen[name] = str(folder / value)
-    try:
-        return kind(**chosen)
-    except TypeError as wrong:
-        raise InputError(f"an option has a value of the wrong kind ({wrong}); compare `tts2face --help`") from wrong
+    return kind(**chosen)
 
 
 def _options_json(options: Options, default: Options, folder: Path, files: tuple[str, ...]) -> dict[str, Any]:
@@ -149,7 +146,7 @@ def _options_json(options: Options, default: Options, folder: Path, files: tuple
         value = getattr(options, option.name)
         if value == getattr(default, option.name):
             continue
-        if option.name in files and Path(value).is_file():
+        if option.name in files and is_file(Path(value)):
             value = os.path.relpath(value, folder)
         chosen[option.name] = str(value) if isinstance(value, Path) else value
     return chosen

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lexicon.errors import InputError
+from lexicon.inputs import is_file
+from lexicon.json_values import check_fields
 from tts2face.render.camera_views import CameraView, parse_camera
 from tts2face.request import option
 
@@ -30,7 +32,7 @@ class Picture:
     Raises
     ------
     InputError
-        An option is out of range or unknown.
+        An option has a value of another type, is out of range or unknown.
     """
 
     size: str = option(
@@ -48,6 +50,7 @@ class Picture:
 
     def __post_init__(self) -> None:
         """Validate every option."""
+        check_fields(self)
         parse_size(self.size)
         parse_camera(self.camera)
         parse_background(self.background)
@@ -132,6 +135,6 @@ def parse_background(background: str) -> tuple[int, int, int] | Path | str:
             f"there is no background {background!r}; give studio, transparent, #rrggbb, an image file, "
             f"or one of {', '.join(COLOURS)}"
         )
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"there is no background image {background}; check the path")
     return path

@@ -3,14 +3,14 @@
 import ipaddress
 import os
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from lexicon.errors import InputError
-from lexicon.inputs import check_limits, read_text
+from lexicon.errors import DataError, InputError
+from lexicon.inputs import check_limits, parse_toml, read_text
+from lexicon.json_values import EXPECTED, check_list, check_type, format_value
 from tts2face.storage.user_folders import user_data
 
 PREFIX = "TTS2FACE_SERVE_"  # of environment variables: TTS2FACE_SERVE_PORT
@@ -193,9 +193,11 @@ def read_settings(
 
 def _read_file(path: Path) -> dict[str, Any]:
     try:
-        content = tomllib.loads(read_text(path, MAX_SETTINGS_BYTES))
-    except (OSError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"the settings {path} cannot be read: {error}") from error
+        content = parse_toml(read_text(path, MAX_SETTINGS_BYTES), f"the settings file {path}")
+    except DataError as wrong:
+        raise InputError(str(wrong)) from wrong
+    except OSError as refused:
+        raise InputError(f"the settings file {path} cannot be read: {refused.strerror}; check the path") from refused
     return {name: _convert(_field(name, f"file {path}"), value, str(path)) for name, value in content.items()}
 
 
@@ -209,15 +211,12 @@ def _field(name: str, source: str) -> Any:
 def _convert(one: Any, value: Any, source: str) -> Any:
     """A value of a TOML file in the type of its setting."""
     kind = _kind(one)
-    if kind is tuple and isinstance(value, list) and all(isinstance(item, str) for item in value):
-        return tuple(value)
-    if kind is Path and isinstance(value, str):
-        return Path(value)
-    if kind is float and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
-    if type(value) is kind:
-        return value
-    raise InputError(f"{one.name} in {source} must be {_describe(kind)}, not {value!r}")
+    try:
+        if kind is tuple:
+            return tuple(check_list(one.name, value, str))
+        return kind(check_type(one.name, value, str if kind is Path else kind))
+    except InputError as wrong:
+        raise InputError(f"{source}: {wrong}") from wrong
 
 
 def _parse(one: Any, text: str, source: str) -> Any:
@@ -232,18 +231,13 @@ def _parse(one: Any, text: str, source: str) -> Any:
             return kind(text)
     except ValueError:
         pass
-    raise InputError(f"{source} must be {_describe(kind)}, not {text!r}")
+    raise InputError(f"{source} must be {EXPECTED[kind]}, not {format_value(text)}")
 
 
 def _kind(one: Any) -> Any:
     if one.name in {"keys", "data"}:
         return Path
     return tuple if isinstance(one.default, tuple) else type(one.default)
-
-
-def _describe(kind: Any) -> str:
-    names = {int: "a whole number", float: "a number", bool: "true or false", tuple: "a list of texts", Path: "a path"}
-    return names.get(kind, "a text")
 
 
 def _toml(value: Any) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
+from lexicon.inputs import is_file
 from lexicon.ipa import Segment
 from lexicon.mark_parser import parse_marks
 from lexicon.marked_text import MarkedText
@@ -84,7 +85,7 @@ def prepare(request: Request) -> PreparedRequest:
     DataError
         The timeline file or the dictionary is invalid.
     """
-    if request.audio is not None and not request.audio.is_file():
+    if request.audio is not None and not is_file(request.audio):
         raise InputError(f"there is no recording {request.audio}; check the path")
     prepared = PreparedRequest(
         request,

@@ -4,14 +4,13 @@ import hashlib
 import hmac
 import re
 import secrets
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import read_text
+from lexicon.inputs import parse_toml, read_text
 from tts2face.storage.files import write_atomically
 
 SCOPES = ("speak", "build", "admin")  # synthesis; uploads and talkers; everybody's jobs and metrics
@@ -71,13 +70,11 @@ def read_keys(path: Path) -> tuple[ApiKey, ...]:
         It is no file of keys.
     """
     try:
-        content = tomllib.loads(read_text(path, MAX_FILE_BYTES))
+        content = parse_toml(read_text(path, MAX_FILE_BYTES), str(path))
     except FileNotFoundError as missing:
         raise InputError(
             f"there is no file of keys {path}; create it with `tts2face keys add NAME --file {path}`"
         ) from missing
-    except tomllib.TOMLDecodeError as wrong:
-        raise DataError(f"{path} is no file of keys: {wrong}") from wrong
     if not isinstance(listed := content.get("key", []), list):
         raise DataError(f"{path} has a key that is no table [[key]]; write it with `tts2face keys`")
     found = tuple(_key(path, one) for one in listed)
@@ -137,12 +134,14 @@ def write_keys(path: Path, keys: Sequence[ApiKey]) -> None:
 def _key(path: Path, content: Any) -> ApiKey:
     if not isinstance(content, dict) or not set(content) <= NAMES or not {"name", "hash"} <= set(content):
         raise DataError(f"{path} has a key without name or hash, or with other names than {', '.join(sorted(NAMES))}")
-    texts = (content["name"], content["hash"], *content.get("scopes", ()))
-    if not all(isinstance(text, str) for text in texts) or not NAME.fullmatch(content["name"]):
+    scopes = content.get("scopes", ["speak"])
+    texts = (content["name"], content["hash"], *(scopes if isinstance(scopes, list) else [scopes]))
+    is_plain = isinstance(scopes, list) and all(isinstance(text, str) for text in texts)
+    if not is_plain or not NAME.fullmatch(content["name"]):
         raise DataError(
             f"{path} has a key whose name, hash or scopes are no plain texts; write it with `tts2face keys`"
         )
-    key = ApiKey(**{**content, "scopes": tuple(content.get("scopes", ("speak",)))})
+    key = ApiKey(**{**content, "scopes": tuple(scopes)})
     try:
         _check_scopes(key.scopes)
         _check_limits({limit: getattr(key, limit) for limit in LIMITS})

@@ -3,7 +3,6 @@
 `tts2face.jobs.job_kinds` executes them.
 """
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -11,8 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 from starlette.datastructures import UploadFile
 
-from lexicon.errors import DataError
-from lexicon.inputs import check_limits
+from lexicon.inputs import check_limits, parse_toml
 from tts2face.batch.cast import MODEL_NAMES, cast_from_tables
 from tts2face.batch.options import BatchOptions
 from tts2face.jobs.clip_job import BACKGROUND, FILES
@@ -159,10 +157,7 @@ def _cast_tables(cast: dict[str, Any] | str) -> dict[str, Any]:
     """Tables of a cast after their check."""
     if isinstance(cast, str):
         check_limits("characters of cast", len(cast), (0, MAX_CAST_CHARACTERS))
-        try:
-            cast = tomllib.loads(cast)
-        except (tomllib.TOMLDecodeError, RecursionError) as broken:
-            raise DataError(f"cast is not TOML ({broken}); correct it") from broken
+        cast = parse_toml(cast, "cast")
     cast_from_tables(cast, "the cast")
     return cast
 
