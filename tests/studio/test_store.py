@@ -1,7 +1,9 @@
 """Projects on disk."""
 
+import io
 import json
 import os
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +14,7 @@ from tts2face.project.project import Project
 from tts2face.project.project_file import load_project
 from tts2face.request import Request
 from tts2face.storage.temporary import Temporary
+from tts2face.studio.projects.archive import archive
 from tts2face.studio.projects.history import History
 from tts2face.studio.projects.store import ASSETS, HISTORY, PROJECT, ProjectStore
 
@@ -32,6 +35,19 @@ def test_a_project_and_its_history_come_back(store: ProjectStore) -> None:
     assert back.present == history.present
     assert [(one.project, one.topic) for one in back.past] == [(one.project, one.topic) for one in history.past]
     assert [one.project.name for one in back.future] == ["Three"]
+
+
+def test_an_archive_has_the_same_bytes_at_any_time(tmp_path: Path) -> None:
+    words = tmp_path / "words.txt"
+    archives = []
+    for seconds in (1_000_000_000, 1_500_000_000):
+        words.write_text("Nguyen W IH1 N\n", encoding="utf-8")
+        os.utime(words, (seconds, seconds))
+        archives.append(archive(replace(PROJECT_ONE, request=Request(text="Hello.", dictionary=words))))
+    assert archives[0] == archives[1]
+    with zipfile.ZipFile(io.BytesIO(archives[0])) as packed:
+        assert packed.read("words.txt") == words.read_bytes()
+        assert {member.date_time[0] for member in packed.infolist()} == {1980}
 
 
 def test_the_file_is_the_one_of_the_command_line(store: ProjectStore, tmp_path: Path) -> None:

@@ -35,10 +35,12 @@ MP4_MOVIE = MovieKind(
     MappingProxyType({"crf": "18", "preset": "veryfast", "profile": "high"}),
     MappingProxyType({"movflags": "+faststart"}),
 )  # fmt: skip
+_NO_RANDOM_IDS = {"fflags": "+bitexact"}  # of segments and tracks: equal clips are equal bytes
 WEBM_MOVIE = MovieKind(
     "webm", "libvpx-vp9", "libopus", 96_000,
     MappingProxyType({"crf": "24", "deadline": "realtime", "cpu-used": "6", "row-mt": "1", "tile-columns": "1",
                       "auto-alt-ref": "0", "lag-in-frames": "0"}),
+    MappingProxyType(_NO_RANDOM_IDS),
 )  # fmt: skip
 
 
@@ -46,7 +48,7 @@ MOV_MOVIE = MovieKind(
     "mov", "libx264", "pcm_s16le", 768_000, MP4_MOVIE.video_options
 )  # uncompressed sound, for editing
 MKV_MOVIE = MovieKind(
-    "matroska", "libvpx-vp9", "pcm_s16le", 768_000, WEBM_MOVIE.video_options
+    "matroska", "libvpx-vp9", "pcm_s16le", 768_000, WEBM_MOVIE.video_options, WEBM_MOVIE.container_options
 )  # parts that are joined into .webm
 
 # Movies that are sent while they are made: fragments of a fifth of a second that refer to no later picture.
@@ -58,7 +60,7 @@ STREAMED_MP4 = MovieKind(
 )  # fmt: skip
 STREAMED_WEBM = MovieKind(
     "webm", "libvpx-vp9", "libopus", 96_000, WEBM_MOVIE.video_options,
-    MappingProxyType({"live": "1", "cluster_time_limit": "200", "flush_packets": "1"}),
+    MappingProxyType({**_NO_RANDOM_IDS, "live": "1", "cluster_time_limit": "200", "flush_packets": "1"}),
 )  # fmt: skip
 
 

@@ -112,7 +112,8 @@ class _CodecEncoder:
         import av
 
         self._buffer, self._rate, self._n_samples = WriteBuffer(), rate, 0
-        self._container: Any = av.open(self._buffer, "w", format=kind.container, options={"flush_packets": "1"})
+        options = {"flush_packets": "1"} | ({"fflags": "+bitexact"} if kind.container == "ogg" else {})  # no random id
+        self._container: Any = av.open(self._buffer, "w", format=kind.container, options=options)
         self._stream: Any = self._container.add_stream(kind.codec, rate=kind.rate or rate, layout="mono")
         if kind.bits:
             self._stream.codec_context.bit_rate = kind.bits
