@@ -42,18 +42,23 @@ def english_segments(texts: Sequence[str], marks: Sequence[str], own: Dictionary
 
 def _sentence_segments(forms: Sequence[str], marks: Sequence[str], own: Dictionary) -> list[tuple[Segment, ...] | None]:
     """Phones of the words of one sentence; None where spelling rules are needed."""
-    found: list[tuple[Segment, ...] | None] = []
     tokens: list[str] = []
     places: list[int] = []
     for form, mark in zip(forms, marks, strict=True):
         places.append(len(tokens))
         tokens += [form, mark] if mark else [form]
-    for at, form in enumerate(forms):
-        if own.lookup(form) is None and is_homograph(form) and not is_initialism(form):
-            found.append(homograph_segments(tokens, places[at]))
-        else:
-            found.append(look_up_word(form, is_letter=_is_letter(forms, marks, at), own=own.lookup))
-    return found
+    several = {
+        places[at]
+        for at, form in enumerate(forms)
+        if own.lookup(form) is None and is_homograph(form) and not is_initialism(form)
+    }
+    by_context = homograph_segments(tokens, several)
+    return [
+        by_context[place]
+        if place in several
+        else look_up_word(form, is_letter=_is_letter(forms, marks, at), own=own.lookup)
+        for at, (form, place) in enumerate(zip(forms, places, strict=True))
+    ]
 
 
 def _is_letter(forms: Sequence[str], marks: Sequence[str], at: int) -> bool:

@@ -6,7 +6,7 @@ table is read so only where it is capitalised (Polish).
 """
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 
@@ -14,6 +14,7 @@ from lexicon.dictionary import arpabet_segments, word_set
 from lexicon.english import add_s
 from lexicon.ipa import Segment
 from lexicon.part_of_speech import tag_words
+from lexicon.verb_tense import tense_tag
 
 NEAR_WORDS = 9  # words on each side that are searched for evidence
 # Weights of the evidence: a neighbour outweighs the tag, which outweighs the topic.
@@ -60,45 +61,50 @@ def is_homograph(word: str) -> bool:
 
 
 def _readings_of(word: str) -> tuple[Reading, ...]:
-    """Readings of a spelling, or of its stem with the ending -s."""
+    """Readings of a spelling, or of its stem with the ending -s, which no past takes."""
     table = _readings()
     own = table.get(word) or table.get(word.lower())
     if own or not word.endswith("s") or word.endswith("ss"):
         return own or ()
     stem = table.get(word[:-1]) or table.get(word[:-1].lower()) or ()
-    return tuple(replace(reading, segments=add_s(reading.segments)) for reading in stem)
+    return tuple(replace(reading, segments=add_s(reading.segments)) for reading in stem if "VBD" not in reading.tags)
 
 
-def homograph_segments(words: Sequence[str], at: int) -> tuple[Segment, ...] | None:
-    """Phones of a word of a sentence by its context; None if its spelling has one reading.
+def homograph_segments(words: Sequence[str], places: Iterable[int]) -> dict[int, tuple[Segment, ...]]:
+    """Phones of words of a sentence by their context, by index; none for a spelling without readings.
 
     Parameters
     ----------
     words
         Words and punctuation marks of the sentence.
-    at
-        Index of the word.
+    places
+        Indices of the words.
 
     Raises
     ------
     BackendError, DataError
         The tagger is missing or damaged.
     """
-    readings = _readings_of(words[at])
-    if not readings:
-        return None
-    if len(readings) == 1:
-        return readings[0].segments
+    found: dict[int, tuple[Segment, ...]] = {}
     lower = [word.lower() for word in words]
-    tag = _likely_tag(words, lower, at)
-    return max(readings, key=lambda reading: _evidence(reading, lower, at, tag)).segments
+    tags: Sequence[str] = ()
+    for at in places:
+        readings = _readings_of(words[at])
+        if len(readings) > 1:
+            tags = tags or tag_words(tuple(words))
+            tense = tense_tag(tags, lower, at) if _is_past_like_present(readings) else ""
+            tag = tense or _likely_tag(tags[at], lower, at)
+            readings = (max(readings, key=lambda reading: _evidence(reading, lower, at, tag, is_sure=tense != "")),)
+        if readings:
+            found[at] = readings[0].segments
+    return found
 
 
-def _likely_tag(words: Sequence[str], lower: Sequence[str], at: int) -> str:
+def _likely_tag(tag: str, lower: Sequence[str], at: int) -> str:
     """The tagger's tag, corrected where the word before allows only a verb or only a noun."""
-    tag = tag_words(tuple(words))[at]
     place = at - 1
-    while place > 0 and (lower[place] in _ADVERBS or lower[place].endswith("ly")):
+    first = max(at - NEAR_WORDS, 0)
+    while place > first and (lower[place] in _ADVERBS or lower[place].endswith("ly")):
         place -= 1
     before, two_before = (lower[place] if place >= 0 else ""), (lower[place - 1] if place > 0 else "")
     if before in _HAVE or (before in _PRONOUNS and two_before in _HAVE):  # have never read, have you read
@@ -109,8 +115,15 @@ def _likely_tag(words: Sequence[str], lower: Sequence[str], at: int) -> str:
     return "NN" if before in _BEFORE_NOUN and tag in {"VB", "VBP", "VBZ"} else tag
 
 
-def _evidence(reading: Reading, lower: Sequence[str], at: int, tag: str) -> float:
+def _is_past_like_present(readings: Sequence[Reading]) -> bool:
+    """Whether the past of a verb is spelled as its present (read), unlike that of another verb (wound)."""
+    return any({"VBD", "VBP"} <= set(reading.tags) for reading in readings)
+
+
+def _evidence(reading: Reading, lower: Sequence[str], at: int, tag: str, *, is_sure: bool) -> float:
     score = _TAG_WEIGHT * any(_is_tag(tag, own) for own in reading.tags)
+    if is_sure:
+        return score
     before = lower[at - 1] if at else "."
     after = lower[at + 1] if at + 1 < len(lower) else "."
     score += _NEIGHBOUR_WEIGHT * (

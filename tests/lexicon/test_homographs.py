@@ -3,6 +3,7 @@
 import csv
 import gzip
 import json
+import re
 from importlib import util
 from pathlib import Path
 
@@ -58,6 +59,29 @@ def test_inflected_homographs(text: str, word: str, arpabet: str) -> None:
     assert is_right({"text": text, "word": word, "arpabet": arpabet})
 
 
+def test_read_follows_the_tense_of_its_sentence() -> None:
+    """By auxiliaries, also before the subject of a question, the subject, times, and verbs beside it."""
+    sentences = {
+        "R IY1 D Z": "It reads well. My brother always reads the news. She reads and writes Arabic.",
+        "R EH1 D": "I read that last night. Yesterday I read three chapters. Have they ever read it? Has your mother "
+        "read it? It was read aloud. The teacher read a story. She sat down and read the letter. Everyone in the room "
+        "read the note. He got up, read the sign, and turned back. The students read Hamlet last term. When I was "
+        "young, I read every day. The committee has not yet read it. Who read this?",
+        "R IY1 D": "They read every day. Read it aloud! Never read in the dark. Open your book and read page nine. "
+        "Does he read much? Did your brother read it? What did you read yesterday? Why don't we read it now? People "
+        "who read live longer. When you read this, I will be gone. I watched her read the letter. On Sundays they read "
+        "the Bible. Please read the label. To read is to travel.",
+    }
+    wrong = [
+        (names, sentence)
+        for names, text in sentences.items()
+        for sentence in re.split(r"(?<=[.?!]) ", text)
+        for word in pronounce(sentence).words
+        if word.text.lower() in {"read", "reads"} and word.arpabet != tuple(names.split())
+    ]
+    assert not wrong
+
+
 def test_the_user_dictionary_takes_precedence() -> None:
     own = parse_dictionary("lead L AH1 D")
     assert pronounce("They lead the lead pipe.", dictionary=own).words[1].arpabet == ("L", "AH1", "D")
@@ -65,7 +89,7 @@ def test_the_user_dictionary_takes_precedence() -> None:
 
 def test_a_spelling_without_readings_is_none() -> None:
     assert not is_homograph("table")
-    assert homograph_segments(["the", "table"], 1) is None
+    assert homograph_segments(["the", "table"], [1]) == {}
 
 
 def test_tags_are_those_of_the_tagger_of_hibari() -> None:
