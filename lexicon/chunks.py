@@ -7,8 +7,8 @@ from lexicon.errors import InputError
 from lexicon.sentence_ends import ends_sentence
 
 # A sentence ends at ., !, ? or … (with closing quotes) before a space that no lower-case letter follows, at an end mark
-# of East Asian or Indic writing, or at a blank line.
-_END = re.compile(r"""[.!?…]+["'”’)\]]*(?=\s+[^\sa-z])|[。！？｡।॥؟۔]+["'”’」』）]*|\n\s*\n""")
+# of East Asian or Indic writing, or at a blank line. A run of marks is tried once, from its first mark, and as a whole.
+_END = re.compile(r"""(?<![.!?…])[.!?…]++["'”’)\]]*+(?=\s++[^a-z])|[。！？｡।॥؟۔]+["'”’」』）]*|\n\s*\n""")
 _CLAUSE = re.compile(r"[,;:—–、，；：،؛](?=\s)|[、，；：]")
 # Words before which an English phrase may end where a sentence has no clause mark, the better places first.
 _PHRASE_BEGINS = (
@@ -18,15 +18,16 @@ _PHRASE_BEGINS = (
 _PHRASE_PLACES = tuple(re.compile(rf"(?<!\d)\s(?=(?:{words.replace(' ', '|')})\s(?!\d))") for words in _PHRASE_BEGINS)
 _BETWEEN_WORDS = re.compile(r"(?<=[^\W\d_A-Z])\s(?=[^\W\d_A-Z])")
 _MIN_PHRASE_CHARACTERS = 20  # of either part; shorter ones sound like words of their own
+_MAX_WORD_CHARACTERS = 600  # a longer word, as of digits, is divided; addresses are shorter
 _CONTEXT_BEFORE, _CONTEXT_AFTER = 24, 40  # characters around a full stop by which an abbreviation is recognised
 
 
 def split_chunks(text: str, limit: int, language: str = "en-us") -> Iterator[str]:
-    """Sentences of a text, none longer than `limit` characters unless a single word is.
+    """Sentences of a text, none longer than `limit` characters unless a single word is, of up to 600 characters.
 
     A longer sentence is split after the last clause mark within the limit, else at the last space, and in text without
-    either (Chinese, Japanese) after `limit` characters. Only white space is dropped. Abbreviations are those of the
-    language (`lexicon.sentence_ends`).
+    either (Chinese, Japanese, a longer word) after `limit` characters. Only white space is dropped. Abbreviations are
+    those of the language (`lexicon.sentence_ends`).
 
     Raises
     ------
@@ -64,6 +65,13 @@ def split_phrase(sentence: str, limit: int) -> tuple[str, str]:
     return sentence, ""
 
 
+def middle_place(text: str) -> int:
+    """Index of the space that is nearest to the middle of a text; of the middle in a text without spaces."""
+    middle = len(text) // 2
+    places = [place for place in (text.rfind(" ", 0, middle), text.find(" ", middle)) if place >= 0]
+    return min(places, key=lambda place: abs(place - middle), default=middle)
+
+
 def _is_abbreviated(text: str, begin: int, end: "re.Match[str]", language: str) -> bool:
     """Whether the full stop of a possible sentence end belongs to an abbreviation."""
     if end.group().rstrip("\"'”’)]") != ".":
@@ -73,23 +81,28 @@ def _is_abbreviated(text: str, begin: int, end: "re.Match[str]", language: str) 
 
 
 def _split_sentence(sentence: str, limit: int) -> Iterator[str]:
-    rest = " ".join(sentence.split())
-    while len(rest) > limit:
-        at = _cut_position(rest, limit)
-        yield rest[:at].rstrip()
-        rest = rest[at:].lstrip()
-    if rest:
-        yield rest
+    text, begin = " ".join(sentence.split()), 0
+    while len(text) - begin > limit:
+        end = _cut_position(text, begin, limit)
+        yield text[begin:end].rstrip()
+        begin = end + text.startswith(" ", end)
+    if begin < len(text):
+        yield text[begin:]
 
 
-def _cut_position(text: str, limit: int) -> int:
-    """Index at which a text longer than the limit is split."""
-    clauses = [match.end() for match in _CLAUSE.finditer(text, limit // 3, limit)]
+def _cut_position(text: str, begin: int, limit: int) -> int:
+    """Index at which a text whose rest from `begin` is longer than the limit is split."""
+    end = begin + limit
+    clauses = [match.end() for match in _CLAUSE.finditer(text, begin + limit // 3, end)]
     if clauses:
         return clauses[-1]
-    space = text.rfind(" ", 1, limit + 1)
+    space = text.rfind(" ", begin + 1, end + 1)
     if space > 0:
         return space
-    word_end = text.find(" ", limit)
-    is_word = text[limit - 1].isascii() and text[limit].isascii()
-    return (word_end if word_end > 0 else len(text)) if is_word else limit
+    if not (text[end - 1].isascii() and text[end].isascii()):
+        return end
+    longest = begin + max(limit, _MAX_WORD_CHARACTERS)
+    word_end = text.find(" ", end, longest + 1)
+    if word_end > 0:
+        return word_end
+    return len(text) if len(text) <= longest else end

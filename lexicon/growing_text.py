@@ -8,7 +8,9 @@ from lexicon.inputs import LARGEST_TEXT_BYTES
 from lexicon.sentences import MAX_SENTENCE_CHARACTERS, n_letters
 
 _MAY_END = re.compile(r"[.!?…。！？｡।॥؟۔\n]|.{300}", re.DOTALL)
-_OPEN_MARK = re.compile(r"\[[^\]\[]{0,200}$|<[^<>]{0,1000}$")  # a mark or tag that is not yet complete
+_OPEN_MARK = re.compile(r"\[[^\]\[]{0,200}\Z|<[^<>]{0,1000}\Z")  # a mark or tag that is not yet complete
+_MAX_OPEN_CHARACTERS = 1001
+_SPACES = re.compile(r"\s{2,}")
 
 
 class GrowingText:
@@ -27,13 +29,15 @@ class GrowingText:
 
     def add(self, part: str) -> list[str]:
         """Append text; the sentences that are complete now."""
-        self._text += part
+        kept = self._text.rstrip()
+        self._text = kept + _SPACES.sub(_shortened, self._text[len(kept) :] + part)
         if len(self._text) > LARGEST_TEXT_BYTES:
             raise InputError("the text is too long; end it, or send sentences")
-        if not _MAY_END.search(self._text) or _OPEN_MARK.search(self._text):
+        if not _MAY_END.search(self._text):
             return []
-        chunks = list(split_chunks(self._text, MAX_SENTENCE_CHARACTERS, self._language))
-        complete = chunks[:-1]
+        open_mark = _OPEN_MARK.search(self._text, max(len(self._text) - _MAX_OPEN_CHARACTERS, 0))
+        end = open_mark.start() if open_mark else len(self._text)
+        complete = list(split_chunks(self._text[:end], MAX_SENTENCE_CHARACTERS, self._language))[:-1]
         self._drop(sum(n_letters(chunk) for chunk in complete))
         return complete
 
@@ -53,3 +57,8 @@ class GrowingText:
             letters -= not self._text[at].isspace()
             at += 1
         self._text = self._text[at:]
+
+
+def _shortened(spaces: "re.Match[str]") -> str:
+    """White space with the same meaning in at most two characters, so that waiting text does not grow by it."""
+    return "\n" * min(spaces.group().count("\n"), 2) or " "

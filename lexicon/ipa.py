@@ -6,6 +6,7 @@ standard IPA.
 
 import functools
 import unicodedata
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -82,11 +83,11 @@ def _apply_mark(segments: list[Segment], mark: str) -> bool:
 def _apply_stress(segments: Sequence[Segment], marks: Sequence[tuple[int, int]]) -> tuple[Segment, ...]:
     """Assign each stress mark (index of the next phone, stress) to the first syllabic phone from that index."""
     stressed = list(segments)
+    syllabic = [at for at, segment in enumerate(segments) if segment.is_syllabic]
     for start, stress in marks:
-        for at in range(start, len(stressed)):
-            if stressed[at].is_syllabic:
-                stressed[at] = replace(stressed[at], stress=stress)
-                break
+        number = bisect_left(syllabic, start)
+        if number < len(syllabic):
+            stressed[syllabic[number]] = replace(stressed[syllabic[number]], stress=stress)
     return tuple(stressed)
 
 

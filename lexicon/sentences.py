@@ -4,17 +4,23 @@ Positions are counted in letters, that is in characters other than white space, 
 changes only its white space.
 """
 
+import unicodedata
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from lexicon.chunks import split_chunks, split_phrase
+from lexicon.chunks import middle_place, split_chunks, split_phrase
+from lexicon.dictionary import word_key
 from lexicon.given_pronunciations import TextWord, words_with_given_phones
+from lexicon.ipa import Segment
 from lexicon.marked_text import Mark, MarkedText, NodMark, PauseMark, PhoneMark, StyleRun
 from lexicon.spoken_form import spoken_form
 
 MAX_SENTENCE_CHARACTERS = 300  # longer sentences are split at a clause mark or a space
+# Letters of the spoken form; a sentence with more (of numbers, symbols, given phones) is divided. 65 s of English.
+MAX_SPOKEN_LETTERS = 1000
+_DIGIT_LETTERS, _SYMBOL_LETTERS = 5, 10  # of the words that espeak-ng speaks for one in other languages than English
 FIRST_PIECE_CHARACTERS = 90  # of a text; its first sound and picture wait for this piece (docs/decisions)
 
 
@@ -96,8 +102,12 @@ class Sentence:
         )
 
 
-def split_sentences(text: MarkedText, language: str) -> Iterator[Sentence]:
+def split_sentences(
+    text: MarkedText, language: str, own: Mapping[str, tuple[Segment, ...]] | None = None
+) -> Iterator[Sentence]:
     """Sentences that contain words, lazily and in linear time.
+
+    `own` has the user's pronunciations by `word_key`, which count for the length of a sentence.
 
     Sentence boundaries are those of the text without marks. A pause or a change of rate, voice or language within a
     sentence begins a new phrase. A first sentence of more than `FIRST_PIECE_CHARACTERS` is divided after its first
@@ -112,7 +122,7 @@ def split_sentences(text: MarkedText, language: str) -> Iterator[Sentence]:
     others = [mark for mark in placed.marks if not isinstance(mark, PauseMark | PhoneMark)]
     pending: Sentence | None = None
     leading_pause, end, n_used = sum(mark.seconds for mark in pauses[:1] if mark.at == 0), 0, 0
-    for chunk, is_cut in _pieces(text.text, language):
+    for chunk, is_cut in _pieces(placed, language, own or {}):
         begin, end = end, end + n_letters(chunk)
         runs = _overlapping_runs(placed.runs, starts, begin, end)
         inside = pauses[bisect_right(pause_positions, begin) : bisect_right(pause_positions, end)]
@@ -139,13 +149,46 @@ def split_sentences(text: MarkedText, language: str) -> Iterator[Sentence]:
         yield replace(pending, marks=(*pending.marks, *others[n_used:]))
 
 
-def _pieces(text: str, language: str) -> Iterator[tuple[str, bool]]:
+def _pieces(placed: MarkedText, language: str, own: Mapping[str, tuple[Segment, ...]]) -> Iterator[tuple[str, bool]]:
     """Parts of a text that become sentences, and whether the written sentence continues after a part."""
-    for number, chunk in enumerate(split_chunks(text, MAX_SENTENCE_CHARACTERS, language)):
+    phones = [mark for mark in placed.marks if isinstance(mark, PhoneMark)]
+    starts, begin = [mark.at for mark in phones], 0
+    for number, chunk in enumerate(split_chunks(placed.text, MAX_SENTENCE_CHARACTERS, language)):
         first, rest = split_phrase(chunk, FIRST_PIECE_CHARACTERS) if number == 0 else (chunk, "")
-        yield first, bool(rest)
-        if rest:
-            yield rest, False
+        waiting = [rest, first] if rest else [first]
+        while waiting:
+            part = waiting.pop()
+            end = begin + n_letters(part)
+            given = phones[bisect_left(starts, begin) : bisect_left(starts, end)]
+            is_long = _spoken_letters(part, language, given, own) > MAX_SPOKEN_LETTERS
+            at = _dividing_place(part, begin, given) if is_long else 0
+            if at > 0:
+                waiting += [part[at:], part[:at].rstrip()]
+                continue
+            begin = end
+            yield part, bool(waiting)
+
+
+def _spoken_letters(
+    chunk: str, language: str, given: Sequence[PhoneMark], own: Mapping[str, tuple[Segment, ...]]
+) -> int:
+    """About the number of letters of the spoken form of a text, where each given phone is a letter."""
+    text = spoken_form(chunk, language)
+    n = len(text) + sum(len(mark.segments) for mark in given)
+    if not language.startswith("en"):
+        n += (_DIGIT_LETTERS - 1) * sum(map(str.isdigit, text))
+        n += (_SYMBOL_LETTERS - 1) * sum(unicodedata.category(character)[0] == "S" for character in text)
+    if own:
+        n += sum(len(own.get(word_key(word.strip(".,;:!?")), ())) for word in text.split())
+    return n
+
+
+def _dividing_place(chunk: str, begin: int, given: Sequence[PhoneMark]) -> int:
+    """Index near the middle of a chunk that is not within a word with given phones; 0 if there is none."""
+    places = [at for at, character in enumerate(chunk) if not character.isspace()]
+    at = begin + bisect_left(places, middle_place(chunk))
+    at = next((mark.at if mark.at > begin else mark.end for mark in given if mark.at < at < mark.end), at)
+    return places[at - begin] if begin < at < begin + len(places) else 0
 
 
 def _continued_phrase(phrase: Phrase, *, is_cut: bool) -> Phrase:

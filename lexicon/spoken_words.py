@@ -26,7 +26,7 @@ def pronounce_marked(
     """
     language = language_code(language)
     words: list[Word] = []
-    for sentence in split_sentences(text, language):
+    for sentence in split_sentences(text, language, dictionary.entries if dictionary else None):
         for phrase in sentence.utterances:
             words += pronounce_phrase(phrase, phrase.language or language, dictionary)
     if not words:

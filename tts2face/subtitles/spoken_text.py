@@ -19,7 +19,7 @@ _INVISIBLE = re.compile(r"[\u200b-\u200f\u202a-\u202e\u2060-\u2069\ufeff\u00ad]"
 # Additions of subtitles for the deaf: noises in brackets, lyrics between notes.
 _NOISE = re.compile(
     r"\[[^\]]*(?:\]|$)|\([^()]*\)|（[^（）]*）|【[^【】]*】|［[^［］]*］"
-    r"|[♪♫♬♩][^♪♫♬♩]*(?:[♪♫♬♩]+|$)|(?m:^\s*#\s.*(?:\s#)?\s*$)"
+    r"|[♪♫♬♩][^♪♫♬♩]*(?:[♪♫♬♩]+|$)|(?m:^[^\S\n]*#\s.*(?:\s#)?\s*$)"
 )
 _LABEL = re.compile(
     r"^(?P<lead>\s*(?:[-–—‐]\s*|>>\s*|•\s*)?)(?P<label>[^\W\d_][^:：\n?!,;]{0,40}?)\s*(?::(?=\s|$)|：)", re.MULTILINE
@@ -27,7 +27,7 @@ _LABEL = re.compile(
 _DASH = re.compile(r"^\s*(?:[-–—‐]\s*(?=\S)|>>\s*|•\s*)", re.MULTILINE)
 
 
-_VOICE = re.compile(r"<v(?:\.[^\s.>]+)*\s+([^>]+)>")
+_VOICE = re.compile(r"<v(?:\.[^\s.<>]+)*\s([^<>]+)>")
 _VOICE_MARK = re.compile(r"^\s*\x02([^\x03]*)\x03")
 
 
@@ -66,7 +66,7 @@ def spoken_text(written: str) -> SpokenText:
         parts[-1][1].append(rest)
     spoken = [CuePart(speaker, " ".join(" ".join(words).split())) for speaker, words in parts]
     spoken = [part for part in spoken if any(character.isalnum() for character in part.text)]
-    shown = " ".join(re.sub(r"\x02[^\x03]*\x03", "", plain).split())
+    shown = " ".join(re.sub(r"\x02[^\x02\x03]*\x03", "", plain).split())
     return SpokenText(" ".join(part.text for part in spoken), shown, tuple(spoken))
 
 

@@ -71,7 +71,7 @@ class PreparedRequest:
 
     def sentences(self) -> Iterator[Sentence]:
         """Sentences of the text in order."""
-        return split_sentences(self.text, self.request.language)
+        return split_sentences(self.text, self.request.language, self.dictionary)
 
 
 def prepare(request: Request) -> PreparedRequest:

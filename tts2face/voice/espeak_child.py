@@ -73,7 +73,8 @@ def _start_library() -> tuple[Any, int]:
 
 def _decode_event(event: _Event) -> tuple[int, int, Any] | None:
     if event.type == PHONEME_EVENT:
-        return PHONEME_EVENT, event.sample, bytes(event.name.string).split(b"\0")[0].decode("utf-8", "replace")
+        name = bytes(event.name.string).split(b"\0")[0]  # espeak-ng cuts it after 8 bytes, also within a character
+        return PHONEME_EVENT, event.sample, name.decode("utf-8", "ignore")
     if event.type == WORD_EVENT:
         return WORD_EVENT, event.sample, (event.text_position - 1, event.length)
     return None
