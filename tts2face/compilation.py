@@ -9,19 +9,34 @@ import stat
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import numba
+from numba.core.caching import FunctionCache
+from numba.core.runtime import rtsys
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 CACHE_VARIABLE = "NUMBA_CACHE_DIR"  # set by the user; numba reads it itself
 
 
+class KernelCache(FunctionCache):  # type: ignore[misc]
+    """Compiled code of a kernel on disk, which is loaded without the compiler.
+
+    numba's own class first registers all that its compiler can compile, which takes most of the time of the first
+    kernel of a process. Compiled code needs its run time only, and the compiler registers everything itself.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Compiled code for a signature; None if it is not in the cache."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
+
+
 def kernel(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
     """Compile a function at its first call, cache the code on disk, and release the GIL while it runs."""
-    compiled: Callable[Arguments, Result] = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    return compiled
+    return _compiled(function, fastmath=False)
 
 
 def vectorized_kernel(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
@@ -30,16 +45,20 @@ def vectorized_kernel(function: Callable[Arguments, Result]) -> Callable[Argumen
     Such a kernel calls only inlined ones: which others the compiler inlines depends on what is in the cache, and with
     `fastmath` the result would, too.
     """
-    compiled: Callable[Arguments, Result] = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=True)(
-        function
-    )
-    return compiled
+    return _compiled(function, fastmath=True)
 
 
 def inlined_kernel(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
     """Compile a function inline in each kernel that calls it."""
     compiled: Callable[Arguments, Result] = numba.njit(inline="always", error_model="numpy")(function)
     return compiled
+
+
+def _compiled(function: Callable[Arguments, Result], *, fastmath: bool) -> Callable[Arguments, Result]:
+    compiled: Any = numba.njit(nogil=True, error_model="numpy", fastmath=fastmath)(function)
+    compiled._cache = KernelCache(function)
+    found: Callable[Arguments, Result] = compiled
+    return found
 
 
 def cache_folder(package: Path) -> Path | None:
