@@ -6,6 +6,7 @@ the model. An `Aligner` is not thread-safe.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -63,15 +64,22 @@ class SpeechAligner(Protocol):
 
 
 class Aligner:
-    """Forced aligner; not thread-safe."""
+    """Forced aligner, whose acoustic model is loaded when it is first used; not thread-safe."""
 
     def __init__(self) -> None:
+        self._names: dict[tuple[tuple[str, ...], ...], str] = {}
+
+    def load(self) -> None:
+        """Load the acoustic model, for instance before a process forks."""
+        _ = self._decoder
+
+    @cached_property
+    def _decoder(self) -> Any:
         from pocketsphinx import Decoder
 
-        self._decoder: Any = Decoder(
+        return Decoder(
             lm=None, loglevel="FATAL", bestpath=False, frate=FRAME_RATE, beam=1e-100, wbeam=1e-80, pbeam=1e-100
         )
-        self._names: dict[tuple[tuple[str, ...], ...], str] = {}
 
     def align(self, sound: Waveform, words: Sequence[tuple[str, Pronunciations]]) -> Alignment:
         """Align the phones of words with a sound.

@@ -24,6 +24,11 @@ MAX_LETTERS = 400  # the model accepts at most this many letters in one call
 DURATION_STEP_S = 0.025  # length of one step of the model's durations
 BOUNDARY_DELAY_S = 0.045  # delay of the model's own boundaries against its sound (41-51 ms)
 DURATION_TENSOR = "/Cast_32_output_0"  # internal tensor of the ONNX graph: steps of 25 ms for each letter
+# A network that returns its input: Hibari's constructor loads one, with an arena, and loading the voice's takes 0.1 s.
+IDENTITY_NETWORK = (
+    b'\x08\x08B\x02\x10\x11:+\n\x10\n\x01x\x12\x01y"\x08Identity\x12\x01e'
+    b"Z\t\n\x01x\x12\x04\n\x02\x08\x01b\t\n\x01y\x12\x04\n\x02\x08\x01"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,10 +59,12 @@ class NeuralVoice:
         disable_telemetry()
         try:
             from hibari import Hibari
+            from hibari.voices import voice_path
         except ImportError as missing:
             raise BackendError("the voice heart needs hibari-tts; run: pip install hibari-tts") from missing
-        self._model: Any = Hibari(voice="heart", threads=1)
-        session = _session_without_arena(self._model.model_path)
+        self._path = Path(voice_path("heart"))
+        self._model: Any = Hibari(voice="heart", model=IDENTITY_NETWORK, threads=1)
+        session = _session_without_arena(str(self._path))
         self._model.sess = session if run is None else _OwnRun(session, run)
         self._aligner: SpeechAligner = aligner or Aligner()
         pronounce_content("Hello.", LANGUAGE, {})  # reads the dictionary while other models are loaded
@@ -118,7 +125,7 @@ class NeuralVoice:
         disable_telemetry()
         import onnxruntime
 
-        graph = add_graph_output(Path(self._model.model_path).read_bytes(), DURATION_TENSOR)
+        graph = add_graph_output(self._path.read_bytes(), DURATION_TENSOR)
         session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
         inputs = {
             "ids": np.array([self._model.ids(letters)], np.int64),

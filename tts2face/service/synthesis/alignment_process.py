@@ -79,6 +79,7 @@ def main() -> None:
     """Keep a worker until standard input ends."""
     answers = claim_standard_output()
     aligner = Aligner()
+    aligner.load()  # once for all workers
     worker = 0
     signal.signal(CANCEL, lambda *_: os.kill(worker, signal.SIGKILL) if worker else None)
     while True:
