@@ -95,11 +95,10 @@ def _phone_statistics(
     z: NDArray[np.floating], phone: NDArray[np.integer], counts: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """(P, S, D) mean and variance of the tokens of each phone; few tokens borrow the variance within all phones."""
-    sums = np.zeros((len(counts), *z.shape[1:]))
-    np.add.at(sums, phone, z)
+    members = [np.flatnonzero(phone == label) for label in range(len(counts))]
+    sums = np.stack([z[rows].sum(axis=0, dtype=np.float64) for rows in members])  # `np.add.at` takes 20 times as long
     mean = sums / np.maximum(counts, 1.0)[:, None, None]
-    scatter = np.zeros_like(sums)
-    np.add.at(scatter, phone, np.square(z - mean[phone]))
+    scatter = np.stack([np.square(z[rows] - mean[label]).sum(axis=0) for label, rows in enumerate(members)])
     pooled = scatter.sum(0) / max(1, len(z)) + 1e-6
     n = counts[:, None, None]
     return mean, (scatter + PRIOR_TOKENS * pooled) / (n + PRIOR_TOKENS)

@@ -4,9 +4,7 @@ Recorded blinks are removed from the lids, whose remaining motion is sampled as 
 opening are played at pauses and phrase ends.
 """
 
-from collections.abc import Iterator
 from copy import copy, deepcopy
-from itertools import pairwise
 from statistics import NormalDist
 
 import numpy as np
@@ -32,64 +30,107 @@ PAUSE_DB = -20.0  # intensity of a pause, relative to the mean level of speech
 PHRASE_END_FRAMES = 3  # of a pause, after which a phrase has ended; most closures of plosives are shorter
 
 Float32Array = NDArray[np.float32]
+IntArray = NDArray[np.int64]
 
 
-def find_blinks(lids: FloatArray) -> Iterator[tuple[int, int]]:
-    """First frame and frame behind the last one of each complete blink in lid closures (T,), with its slow edges."""
-    closed = lids > OPEN
-    ends = np.flatnonzero(closed[:-1] & ~closed[1:]) + 1
-    for begin in (np.flatnonzero(~closed[:-1] & closed[1:]) + 1).tolist():
-        end = int(ends[ends > begin].min(initial=len(lids)))
-        if end == len(lids) or float(lids[begin:end].max()) <= SHUT:
-            continue
-        first, last = begin - 1, end
-        while first > max(0, begin - MAX_EDGE) and lids[first - 1] < lids[first]:
-            first -= 1
-        while last < min(len(lids) - 1, end + MAX_EDGE) and lids[last + 1] < lids[last]:
-            last += 1
-        yield first, last + 1
+def find_blinks(closure: FloatArray, lengths: NDArray[np.integer]) -> IntArray:
+    """First frame and frame behind the last one (B, 2) of each complete blink, with its slow edges.
+
+    Parameters
+    ----------
+    closure : (T,)
+        Of the lids, recording after recording.
+    lengths : (R,)
+        Frames of each recording.
+    """
+    borders = np.concatenate([[0], np.cumsum(lengths)])
+    closed, begins_recording = closure > OPEN, np.zeros(len(closure) + 1, bool)
+    begins_recording[borders] = True
+    changes = np.flatnonzero((closed[1:] != closed[:-1]) & ~begins_recording[1:-1]) + 1
+    begins, opened = changes[closed[changes]], changes[~closed[changes]]
+    ends = np.append(opened, len(closure))[np.searchsorted(opened, begins)]
+    after = borders[np.searchsorted(borders, begins, side="right")]  # the recording
+    begins, ends = begins[ends < after], ends[ends < after]
+    if not len(begins):
+        return np.zeros((0, 2), np.int64)
+    is_shut = np.maximum.reduceat(closure, np.stack([begins, ends], axis=1).ravel())[::2] > SHUT
+    begins, ends = begins[is_shut], ends[is_shut]
+    recording = np.searchsorted(borders, begins, side="right")
+    lowest = np.maximum(borders[recording - 1], begins - MAX_EDGE)
+    highest = np.minimum(borders[recording] - 1, ends + MAX_EDGE)
+    first, last = begins - 1, ends.copy()
+    for _ in range(MAX_EDGE):
+        first -= (first > lowest) & (closure[first - 1] < closure[first])
+        last += (last < highest) & (closure[np.minimum(last + 1, highest)] < closure[last])
+    return np.stack([first, last + 1], axis=1)
 
 
 def blink_profiles(style: Style) -> tuple[FloatArray, ...]:
     """Profiles (n, 2) of recorded blinks, 0 at rest and 1 closed; at most `MAX_PROFILES`, of all recordings."""
-    profiles = []
-    taper = np.linspace(0.0, 1.0, N_TAPER_FRAMES + 1)[:-1, None]
-    for part in _recordings(style):
-        rest = _rest(part)
-        for first, end in find_blinks(part.mean(axis=1)):
-            blink = np.clip((part[first:end] - rest) / (1.0 - rest), 0.0, 1.0)
-            profile = np.concatenate([taper * blink[0], blink, taper[::-1] * blink[-1]])
-            closure = profile.mean(axis=1)
-            n_closings = (np.diff((closure > SHUT).astype(int)) > 0).sum()
-            seconds = (closure > OPEN).sum() / GESTURE_FPS
-            is_usual = closure.max() >= FULL and PROFILE_LIMITS_S[0] <= seconds <= PROFILE_LIMITS_S[1]
-            if n_closings == 1 and is_usual:
-                profiles.append(profile)
-    chosen = np.linspace(0, len(profiles) - 1, min(len(profiles), MAX_PROFILES)).round().astype(int)
-    return tuple(profiles[at] for at in chosen)
+    lids = style.motion["blink"].astype(np.float64)
+    blinks = find_blinks(lids.mean(axis=1), style.lengths)
+    if not len(blinks):
+        return ()
+    recording = np.searchsorted(np.cumsum(style.lengths), blinks[:, 0], side="right")
+    sizes = blinks[:, 1] - blinks[:, 0]
+    of_blink, step = _steps(sizes + 2 * N_TAPER_FRAMES)
+    step -= N_TAPER_FRAMES
+    outside = np.maximum(np.maximum(-step, step - sizes[of_blink] + 1), 0)
+    taper = np.linspace(0.0, 1.0, N_TAPER_FRAMES + 1)[N_TAPER_FRAMES - outside]
+    frames = np.clip(blinks[of_blink, 0] + step, blinks[of_blink, 0], blinks[of_blink, 1] - 1)
+    rests = _rests(lids, style.lengths)[recording[of_blink]]
+    profiles = taper[:, None] * np.clip((lids[frames] - rests) / (1.0 - rests), 0.0, 1.0)
+    borders = np.concatenate([[0], np.cumsum(sizes + 2 * N_TAPER_FRAMES)])
+    usual = np.flatnonzero(_are_usual(profiles.mean(axis=1), borders[:-1]))
+    chosen = usual[np.linspace(0, len(usual) - 1, min(len(usual), MAX_PROFILES)).round().astype(int)]
+    return tuple(profiles[borders[number] : borders[number + 1]].copy() for number in chosen)
 
 
-def _rest(lids: FloatArray) -> FloatArray:
-    """(2,) median closure of open lids."""
+def _are_usual(closure: FloatArray, begins: IntArray) -> NDArray[np.bool_]:
+    """(B,) whether profiles close once, fully, and for a usual time; closures (T,) of all, with the first frame of each."""
+    is_shut = closure > SHUT
+    shuts = np.concatenate([[False], is_shut[1:] & ~is_shut[:-1]])
+    shuts[begins] = False
+    n_closings, n_closed = (np.add.reduceat(found.astype(int), begins) for found in (shuts, closure > OPEN))
+    seconds = n_closed / GESTURE_FPS
+    is_full = np.maximum.reduceat(closure, begins) >= FULL
+    shortest, longest = PROFILE_LIMITS_S
+    return np.asarray((n_closings == 1) & is_full & (shortest <= seconds) & (seconds <= longest))
+
+
+def _rests(lids: FloatArray, lengths: NDArray[np.integer]) -> FloatArray:
+    """(R, 2) median closure of the open lids (T, 2) of each recording."""
     is_open = lids.mean(axis=1) < OPEN
-    return np.asarray(np.median(lids[is_open], axis=0)) if is_open.any() else np.zeros(lids.shape[1])
+    recording = np.repeat(np.arange(len(lengths)), lengths)[is_open]
+    counts = np.bincount(recording, minlength=len(lengths))
+    first, known = np.cumsum(counts) - counts, counts > 0
+    rests = np.zeros((len(lengths), 2))
+    for side in range(2):
+        values = lids[is_open, side]
+        ordered = values[np.lexsort((values, recording))]
+        middle = ordered[(first + (counts - 1) // 2)[known]] + ordered[(first + counts // 2)[known]]
+        rests[known, side] = middle / 2
+    return rests
+
+
+def _steps(sizes: IntArray) -> tuple[IntArray, IntArray]:
+    """Number (T,) of the span and step (T,) within it, for spans of the given sizes (B,), one after the other."""
+    span = np.repeat(np.arange(len(sizes)), sizes)
+    return span, np.arange(len(span)) - (np.cumsum(sizes) - sizes)[span]
 
 
 def lids_without_blinks(style: Style) -> Float32Array:
     """Recorded lid closures (T, 2) with straight lines in place of blinks, at most `HALF_OPEN`."""
-    opened = []
-    for part in _recordings(style):
-        lids = part.copy()
-        for first, end in find_blinks(part.mean(axis=1)):
-            lids[first:end] = np.linspace(part[first], part[end - 1], end - first)
-        opened.append(np.minimum(lids, HALF_OPEN))  # also blinks that a recording cuts
-    return np.concatenate(opened).astype(np.float32)
-
-
-def _recordings(style: Style) -> Iterator[FloatArray]:
-    edges = [0, *np.cumsum(style.lengths).tolist()]
-    for first, end in pairwise(edges):
-        yield style.motion["blink"][first:end].astype(np.float64)
+    lids = style.motion["blink"].astype(np.float64)
+    blinks = find_blinks(lids.mean(axis=1), style.lengths)
+    span, step = _steps(blinks[:, 1] - blinks[:, 0])
+    begin, last = lids[blinks[:, 0]], lids[blinks[:, 1] - 1]
+    slope = (last - begin) / (blinks[:, 1] - blinks[:, 0] - 1)[:, None]
+    lines = begin[span] + step[:, None] * slope[span]
+    opened = lids.copy()
+    opened[blinks[span, 0] + step] = lines
+    opened[blinks[:, 1] - 1] = last
+    return np.minimum(opened, HALF_OPEN).astype(np.float32)  # also blinks that a recording cuts
 
 
 class BlinkPresentation:

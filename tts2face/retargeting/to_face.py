@@ -4,6 +4,7 @@ Bounded least squares within each shape's limits; Theobald et al. 2007, eq. 5 (i
 an orthonormal target basis without limits.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -257,6 +258,8 @@ def contact_gaps(talker: Talker) -> FloatArray:
     apart, mean = inner_lip_gaps(model.basis[:n_speech]), inner_lip_gaps(model.mean)
     minima = [np.zeros((0, len(mean)))]
     for utterance in talker.utterances:
+        if BILABIALS.isdisjoint(utterance.phones.phones):
+            continue
         gaps = ordered_product(utterance.shape[:, :n_speech].astype(np.float64), apart) + mean
         minima.append(_bilabial_minima(gaps, utterance.phones, talker.fps))
     bilabial_gaps = np.concatenate(minima)
@@ -271,7 +274,9 @@ def _bilabial_minima(gaps: FloatArray, phones: PhoneSequence, fps: float) -> Flo
     """Rows (B, P) of gaps (T, P): the frame of each bilabial at which the middle pair is closest."""
     rows = []
     for phone, start, end in zip(phones.phones, phones.edges[:-1], phones.edges[1:], strict=True):
-        first, last = int(np.floor(start * fps)), int(np.ceil(end * fps)) + 1
-        if phone in BILABIALS and len(gaps[first:last]):
+        if phone not in BILABIALS:
+            continue
+        first, last = math.floor(start * fps), math.ceil(end * fps) + 1
+        if len(gaps[first:last]):
             rows.append(first + int(gaps[first:last, MIDDLE_PAIR].argmin()))
     return gaps[rows]
