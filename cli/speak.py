@@ -20,8 +20,10 @@ if TYPE_CHECKING:
     from tts2face.exemplar.explanation import PhoneExplanation
     from tts2face.session import Session
     from tts2face.speech.text_fit import TextMismatch
-    from tts2face.synthesis.clip_stream import Piece
     from tts2face.synthesis.prepared_request import PreparedRequest
+    from tts2face.synthesis.speech_stream import Piece
+    from tts2face.synthesis.written_clip import WrittenClip
+    from tts2face.types import Progress
     from tts2face.voice.pool import VoicePool
 
 EXPLANATION_SUFFIXES = (".json", ".txt")
@@ -65,6 +67,11 @@ def run_prepared(prepared: "PreparedRequest", picture: Picture, options: SpeakOp
 
     voices = VoicePool()
     preload_voice(voices, prepared)  # beside the imports of the session, and loading of talker and face
+    if not _write_speech(prepared, picture, options, voices):
+        _write_clip(prepared, picture, options, voices)
+
+
+def _write_clip(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions, voices: "VoicePool") -> None:
     session = _open_session(options, voices)
     explanations: list[PhoneExplanation] = []
 
@@ -134,20 +141,45 @@ def _write_files(
     on_piece: Callable[["Piece"], None],
 ) -> None:
     """Write the clip and the exports, or only the exports."""
-    began = time.perf_counter()
     request, picture = request_and_picture
-    with progress_bar("writing" if options.out is None else "rendering", options.quiet) as on_progress:
+
+    def write(on_progress: "Progress | None") -> "WrittenClip":
         if options.out is None:
-            written = session.export(request, options.exports, on_progress=on_progress, on_piece=on_piece)
-        else:
-            written = session.write(
-                request,
-                options.out,
-                picture=picture,
-                exports=options.exports,
-                on_progress=on_progress,
-                on_piece=on_piece,
-            )
+            return session.export(request, options.exports, on_progress=on_progress, on_piece=on_piece)
+        return session.write(
+            request,
+            options.out,
+            picture=picture,
+            exports=options.exports,
+            on_progress=on_progress,
+            on_piece=on_piece,
+        )
+
+    _report_writing(write, options)
+
+
+def _write_speech(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions, voices: "VoicePool") -> bool:
+    """Write exports that hold no motion without loading the shipped models; False if models are needed or chosen."""
+    if options.out is not None or not options.exports or options.explain is not None or options.view:
+        return False
+    if options.models != Models():  # others are checked while they are loaded
+        return False
+    from tts2face.synthesis.output_files import plan_outputs
+    from tts2face.synthesis.prepared_request import input_paths
+    from tts2face.synthesis.speech_output import is_speech_only, write_speech
+
+    outputs = plan_outputs(None, options.exports, input_paths(prepared.request, picture))
+    if not is_speech_only(prepared, outputs):
+        return False
+    _report_writing(lambda on_progress: write_speech(prepared, outputs, voices, on_progress), options)
+    return True
+
+
+def _report_writing(write: "Callable[[Progress | None], WrittenClip]", options: SpeakOptions) -> None:
+    """Write with a progress bar and print a summary."""
+    began = time.perf_counter()
+    with progress_bar("writing" if options.out is None else "rendering", options.quiet) as on_progress:
+        written = write(on_progress)
     _warn_mismatches(written.mismatches)
     if options.quiet:
         return
@@ -173,7 +205,7 @@ def _open_session(options: SpeakOptions, voices: "VoicePool") -> "Session":
     if options.out is not None:
         check_output(options.out)
     session = options.models.open_session(voices)
-    if not kernels_are_compiled():
+    if not kernels_are_compiled(draws=options.out is not None or options.view):
         if not options.quiet:
             write_message("first run on this machine: compiling kernels (about ten seconds, once)")
         compile_kernels()

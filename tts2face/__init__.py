@@ -59,8 +59,8 @@ if TYPE_CHECKING:
     from tts2face.subtitles.cue import Subtitles as Subtitles
     from tts2face.subtitles.reader import read_subtitles as read_subtitles
     from tts2face.synthesis.animated_face import AnimatedFace as AnimatedFace
-    from tts2face.synthesis.clip_stream import Piece as Piece
     from tts2face.synthesis.performance import Performance as Performance
+    from tts2face.synthesis.speech_stream import Piece as Piece
     from tts2face.synthesis.written_clip import WrittenClip as WrittenClip
     from tts2face.types import Chunk as Chunk
     from tts2face.types import Clip as Clip
@@ -164,7 +164,7 @@ _MODULES = {
     "tts2face.synthesis.animated_face": ("AnimatedFace",),
     "tts2face.subtitles.cue": ("Cue", "Subtitles"),
     "tts2face.subtitles.reader": ("read_subtitles",),
-    "tts2face.synthesis.clip_stream": ("Piece",),
+    "tts2face.synthesis.speech_stream": ("Piece",),
     "tts2face.synthesis.performance": ("Performance",),
     "tts2face.synthesis.written_clip": ("WrittenClip",),
     "tts2face.types": ("Chunk", "Clip", "Speech", "Trajectory", "Waveform"),

@@ -15,7 +15,7 @@ from tts2face.render.encode import write_clips
 from tts2face.render.picture import Picture
 from tts2face.storage.overwrite import refuse_overwriting
 from tts2face.synthesis.animated_face import AnimatedFace
-from tts2face.synthesis.clip_stream import Piece
+from tts2face.synthesis.speech_stream import Piece
 from tts2face.types import Clip, concatenate_clips
 
 

@@ -14,7 +14,6 @@ from tts2face.request import Request
 from tts2face.speech.features import FEATURE_RATE
 from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.byte_stream import StreamFormat, encode_stream
-from tts2face.synthesis.clip_stream import Piece, SpeechSpan, TimedSpeech, measure_speech, timed_speech
 from tts2face.synthesis.fixed_length import Length, clips_of_length
 from tts2face.synthesis.live_lips import LiveLips
 from tts2face.synthesis.live_speech import LiveSpeech
@@ -24,6 +23,7 @@ from tts2face.synthesis.performance_output import write_take
 from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare_request, split_picture
 from tts2face.synthesis.sentence_memory import SentenceMemory
 from tts2face.synthesis.session_models import SessionModels, shown_face
+from tts2face.synthesis.speech_stream import Piece, SpeechSpan, TimedSpeech, measure_speech, timed_speech
 from tts2face.synthesis.written_clip import RequestSteps, WrittenClip, write_pieces
 from tts2face.types import Chunk, Clip, Progress, concatenate_clips
 from tts2face.voice.pool import VoicePool
@@ -139,7 +139,7 @@ class Session:
         The last utterances are kept, so that a following `stream` of the same text does not speak it again.
         """
         prepared = prepare_request(text, options)
-        return measure_speech(prepared, self._models.for_request(prepared, keeps_utterances=True))
+        return measure_speech(prepared, self._models.for_request(prepared, keeps_utterances=True).speech)
 
     def stream_to_length(self, text: str | Request | PreparedRequest, n_frames: int, **options: Any) -> Iterator[Clip]:
         """Synthesise the clip of a text or request in pieces with `n_frames` frames in total.
@@ -158,7 +158,7 @@ class Session:
         Arguments and errors as `clip`; a recording is refused.
         """
         prepared = prepare_request(text, options)
-        return timed_speech(prepared, self._models.for_request(prepared))
+        return timed_speech(prepared, self._models.for_request(prepared).speech)
 
     def live(self, **options: Any) -> LiveSpeech:
         """A clip without an end, extended by `say` and `idle` of the result; options and errors as `clip`."""

@@ -14,7 +14,7 @@ from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.session import Session
 from tts2face.speech.bs1770 import integrated_loudness
-from tts2face.synthesis.clip_stream import Piece
+from tts2face.synthesis.speech_stream import Piece
 from tts2face.types import Waveform, concatenate_clips
 from tts2face.voice import level
 

@@ -17,7 +17,7 @@ from tts2face.models.talker import load_talker
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.session import Session
-from tts2face.synthesis.clip_stream import Piece
+from tts2face.synthesis.speech_stream import Piece
 from tts2face.types import concatenate_clips
 from tts2face.video.media import read_media_info
 

@@ -14,8 +14,8 @@ from tts2face.project.project import Project
 from tts2face.project.project_file import load_project, save_project
 from tts2face.request import Request
 from tts2face.session import Session
-from tts2face.synthesis.clip_stream import Piece
 from tts2face.synthesis.phone_edges import SentenceEdges
+from tts2face.synthesis.speech_stream import Piece
 
 TEXT = "Bob may move. Five maps were there. Bob may move."
 PROJECT = Project(request=Request(text=TEXT, voice="espeak"))

@@ -1,14 +1,20 @@
 """Cache folder of the compiled kernels where the package cannot be written."""
 
 import os
+import subprocess
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from numba.core.dispatcher import Dispatcher
 
 from tts2face import compilation
 from tts2face.compilation import CACHE_VARIABLE, cache_folder
-from tts2face.render import raster, shade, strand_light, strands
+from tts2face.exemplar import recorded_motion
+from tts2face.render import draw, raster, shade, strand_light, strands
+from tts2face.speech.bs1770 import filter_biquad
 from tts2face.synthesis import warm_up
 from tts2face.synthesis.warm_up import kernels_are_compiled
 
@@ -56,24 +62,35 @@ def test_a_folder_that_the_user_sets_is_kept(tmp_path, monkeypatch):
     assert cache_folder(tmp_path) is None
 
 
-def test_kernels_count_as_compiled_once_they_lie_on_disk(monkeypatch, tmp_path):
-    monkeypatch.setattr(raster, "draw_band", SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path))))
-    assert not kernels_are_compiled()
-    (tmp_path / "raster.draw_band-1.py311.nbi").write_bytes(b"")
-    assert kernels_are_compiled()
-    os.utime(tmp_path / "raster.draw_band-1.py311.nbi", (0, 0))  # older than the source
-    assert not kernels_are_compiled()
+@pytest.fixture
+def indexes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> dict[str, Path]:
+    """Index files of a kernel of motion and of one of drawing, which do not exist."""
+    stats = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path)))
+    monkeypatch.setattr(raster, "draw_band", stats)
+    monkeypatch.setattr(recorded_motion, "sample_tokens", stats)
+    names = {"motion": "recorded_motion.sample_tokens", "drawing": "raster.draw_band"}
+    return {what: tmp_path / f"{name}-1.py311.nbi" for what, name in names.items()}
 
 
-def test_a_cache_that_is_older_than_its_source_is_compiled_once_only(monkeypatch, tmp_path):
-    index = tmp_path / "raster.draw_band-1.py311.nbi"
-    index.write_bytes(b"")
-    os.utime(index, (0, 0))  # numba still uses it if the source has the same content as before
-    monkeypatch.setattr(raster, "draw_band", SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path))))
-    monkeypatch.setattr(warm_up, "draw", lambda *arguments, **options: None)
+def test_kernels_count_as_compiled_once_they_lie_on_disk(indexes):
+    assert not kernels_are_compiled(draws=False)
+    indexes["motion"].write_bytes(b"")
+    assert kernels_are_compiled(draws=False)
+    assert not kernels_are_compiled(draws=True)
+    indexes["drawing"].write_bytes(b"")
+    assert kernels_are_compiled(draws=True)
+    os.utime(indexes["motion"], (0, 0))  # older than the source
+    assert not kernels_are_compiled(draws=True)
+
+
+def test_a_cache_that_is_older_than_its_source_is_compiled_once_only(monkeypatch, indexes):
+    for index in indexes.values():
+        index.write_bytes(b"")
+        os.utime(index, (0, 0))  # numba still uses it if the source has the same content as before
+    monkeypatch.setattr(draw, "draw", lambda *arguments, **options: None)
     monkeypatch.setattr(warm_up, "COMPILE_CHILD_CODE", "")
     warm_up.compile_kernels()
-    assert kernels_are_compiled()
+    assert kernels_are_compiled(draws=True)
 
 
 @pytest.mark.parametrize("module", [raster, shade, strand_light, strands], ids=lambda module: module.__name__)
@@ -87,3 +104,19 @@ def test_kernels_that_may_reorder_sums_call_inlined_ones_only(module):
 
 def test_some_kernels_may_reorder_sums():
     assert shade.shade_fragments.targetoptions["fastmath"]
+
+
+COMPILED_ONLY = """
+import sys
+import numpy as np
+from tts2face.speech.bs1770 import filter_biquad
+filtered = filter_biquad(np.ones(3), np.ones(3), np.ones(4))
+print(filtered.tolist(), sum(filter_biquad.stats.cache_hits.values()), "numba.np.linalg" in sys.modules)
+"""
+
+
+def test_a_compiled_kernel_is_loaded_without_the_compiler():
+    ones = np.ones(3)
+    wanted = filter_biquad(ones, ones, np.ones(4)).tolist()  # compiles it where the cache is empty
+    found = subprocess.run([sys.executable, "-c", COMPILED_ONLY], check=True, capture_output=True, text=True)
+    assert found.stdout.split("\n")[0] == f"{wanted} 1 False"

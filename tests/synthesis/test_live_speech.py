@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import tts2face
-from tts2face.synthesis.clip_stream import Piece
 from tts2face.synthesis.live_speech import LiveSpeech
+from tts2face.synthesis.speech_stream import Piece
 from tts2face.voice.pool import VoicePool
 
 LONG = "the garden behind the old house near the river had been green for years and nobody knew it " * 3

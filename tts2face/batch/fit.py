@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from lexicon.errors import InputError
 from tts2face.batch.options import CUT_PAUSES, REPORT
 from tts2face.request import RATE_LIMITS
-from tts2face.synthesis.clip_stream import SpeechSpan
+from tts2face.synthesis.speech_stream import SpeechSpan
 
 MAX_STEPS = 4  # of the search for a rate; two are usual
 AIM = 0.985  # of the cue's time, so that rounding of durations by the voice does not need another step

@@ -36,6 +36,8 @@ class FormatInfo:
         Whether it consists of lines of text that can be sent while they are made.
     package
         Package that it needs besides those of tts2face.
+    is_clip, is_sound
+        Whether it holds the whole clip as it is, and whether it holds nothing but the sound.
     """
 
     name: str
@@ -49,6 +51,13 @@ class FormatInfo:
     has_sound_beside: bool = False
     has_lines: bool = False
     package: str | None = None
+    is_clip: bool = False
+    is_sound: bool = False
+
+    @property
+    def has_motion(self) -> bool:
+        """Whether it holds motion of the face or head."""
+        return self.has_frames or self.is_clip
 
     @property
     def uses_face(self) -> bool:
@@ -71,7 +80,7 @@ LIVELINK_FPS = 60.0  # of the Live Link Face app
 
 FORMATS = (
     FormatInfo("track", (".track.json", ".json"), "lossless clip: motion, head, phones, words, sound",
-               ("track_json", "TrackWriter")),
+               ("track_json", "TrackWriter"), is_clip=True),
     FormatInfo("livelink", (".csv",), "ARKit-52 weights and head angles, as Live Link Face records them",
                ("livelink_csv", "LiveLinkWriter"), has_frames=True, default_fps=LIVELINK_FPS, uses_shapes=True,
                has_lines=True),
@@ -100,7 +109,7 @@ FORMATS = (
     FormatInfo("words-srt", (".words.srt",), "SubRip, one cue for each word", ("captions", "WordSrtWriter")),
     FormatInfo("karaoke-vtt", (".karaoke.vtt",), "WebVTT sentences with a time before each word",
                ("captions", "KaraokeVttWriter")),
-    FormatInfo("wav", (".wav",), "the sound, 16-bit PCM", ("wav", "WavWriter")),
+    FormatInfo("wav", (".wav",), "the sound, 16-bit PCM", ("wav", "WavWriter"), is_sound=True),
 )  # fmt: skip
 _BY_NAME = {one.name: one for one in FORMATS}
 _BY_SUFFIX = {suffix: one for one in FORMATS for suffix in one.suffixes}

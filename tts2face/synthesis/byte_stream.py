@@ -14,9 +14,9 @@ from tts2face.models.face import Face
 from tts2face.render.movie_stream import MOVIE_KINDS, encode_movie, find_movie_kind
 from tts2face.render.picture import Picture
 from tts2face.render.sound_stream import SOUND_KINDS, encode_sound
-from tts2face.synthesis.clip_stream import Piece, sounds
 from tts2face.synthesis.prepared_request import PreparedRequest
 from tts2face.synthesis.session_models import SessionModels
+from tts2face.synthesis.speech_stream import Piece, sounds
 from tts2face.types import Chunk
 
 BLOCK_BYTES = 1 << 18  # of a file that is read when it is complete
@@ -66,7 +66,7 @@ def encode_stream(prepared: PreparedRequest, models: SessionModels, format: Stre
         return encode_movie(clips, renderer, name, threads=format.threads)
     if name in SOUND_KINDS:
         if request.audio is None:
-            return encode_sound(sounds(prepared, models.for_request(prepared)), name)
+            return encode_sound(sounds(prepared, models.for_request(prepared).speech), name)
         return encode_sound((piece.clip.speech.waveform for piece in models.pieces(prepared)), name)
     if name not in LINE_FORMATS:
         return encode_whole(models.pieces(prepared), name, models.face(has_gestures=request.has_gestures).mesh)

@@ -12,8 +12,8 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.clock import first_sample
 from tts2face.numeric import smoothstep
 from tts2face.request import IDLE_LIMITS_S, Request
-from tts2face.synthesis.clip_stream import Piece
 from tts2face.synthesis.prepared_request import PreparedRequest, prepare
+from tts2face.synthesis.speech_stream import Piece
 from tts2face.types import Clip, Speech, Trajectory, Waveform
 
 EASE_S = 0.25  # from and to rest; a head turns back within a quarter of a second

@@ -6,9 +6,10 @@ from dataclasses import replace
 from lexicon.errors import InputError
 from tts2face.clock import exact_rate
 from tts2face.request import Request
-from tts2face.synthesis.clip_stream import Piece, pieces_from
+from tts2face.synthesis.clip_stream import pieces_from
 from tts2face.synthesis.prepared_request import prepare
 from tts2face.synthesis.session_models import SessionModels
+from tts2face.synthesis.speech_stream import Piece
 
 UNUSED_IDLE_S = 1.0  # of the request from which the gestures of the whole are made
 

@@ -15,7 +15,6 @@ from tts2face.face.gesture_transfer import GestureFace, gesture_face
 from tts2face.models.face import Face
 from tts2face.models.palette import Palette
 from tts2face.models.talker import Talker
-from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
 from tts2face.retargeting.articulation import DEFAULT_ARTICULATION, Articulator, build_articulator
@@ -106,6 +105,8 @@ class MeshFace:
 
     def renderer(self, picture: Picture) -> FrameRenderer:
         """Create the renderer of the mesh."""
+        from tts2face.render.draw import mesh_renderer  # exports draw nothing
+
         return mesh_renderer(self.mesh, picture)
 
 

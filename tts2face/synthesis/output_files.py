@@ -4,15 +4,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from lexicon.errors import InputError
 from tts2face.exports.writer import ExportFile, ExportWriter, mesh_of, plan_exports
-from tts2face.render.encode import ClipWriter
 from tts2face.render.output_path import check_output
-from tts2face.render.renderer import FrameRenderer
 from tts2face.storage.overwrite import AnyPath, refuse_overwriting
-from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.types import Clip, Progress
+
+if TYPE_CHECKING:
+    from tts2face.render.encode import ClipWriter
+    from tts2face.render.renderer import FrameRenderer
+    from tts2face.synthesis.animated_face import AnimatedFace
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +43,7 @@ class OutputFiles:
         """Paths of the exports."""
         return tuple(file.path for file in self.exports)
 
-    def check_face(self, face: AnimatedFace) -> None:
+    def check_face(self, face: "AnimatedFace") -> None:
         """Reject exports that a face cannot fill.
 
         Raises
@@ -52,12 +55,14 @@ class OutputFiles:
 
     @contextmanager
     def open(
-        self, face: AnimatedFace, renderer: FrameRenderer | None, on_frames: Progress | None
+        self, face: "AnimatedFace | None", renderer: "FrameRenderer | None", on_frames: Progress | None
     ) -> Iterator["OpenOutputs"]:
         """Writer of consecutive clips to all files; errors as `ClipWriter` and `ExportWriter`.
 
         Parameters
         ----------
+        face
+            Animated face of the clips; None if no file holds its mesh or shapes.
         renderer
             Draws the clips; None if `out` is None.
         on_frames
@@ -66,6 +71,8 @@ class OutputFiles:
         with ExitStack() as stack:
             film = None
             if self.out is not None and renderer is not None:
+                from tts2face.render.encode import ClipWriter  # not for exports alone
+
                 film = stack.enter_context(ClipWriter(self.out, renderer, on_progress=on_frames))
             exports = stack.enter_context(ExportWriter(self.exports, face=mesh_of(face, self.exports)))
             yield OpenOutputs(film, exports)
@@ -75,7 +82,7 @@ class OutputFiles:
 class OpenOutputs:
     """Writers of a film and of exports."""
 
-    film: ClipWriter | None
+    film: "ClipWriter | None"
     exports: ExportWriter
 
     def add(self, clip: Clip, text: str = "") -> None:

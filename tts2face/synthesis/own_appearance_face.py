@@ -22,7 +22,6 @@ from tts2face.models.palette import MEASURED_STYLE, Palette
 from tts2face.models.talker import Talker
 from tts2face.own_face.appearance_regression import AppearanceRegression, fit_appearance_regression
 from tts2face.own_face.gestures import OwnFaceGestures, build_own_face_gestures
-from tts2face.render.own_face import own_face_renderer
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
 from tts2face.request import NATURAL
@@ -129,6 +128,8 @@ class OwnAppearanceFace:
 
     def renderer(self, picture: Picture) -> FrameRenderer:
         """Create the renderer that draws the face over the talker's video."""
+        from tts2face.render.own_face import own_face_renderer  # exports draw nothing
+
         return own_face_renderer(self.talker, picture, self.gestures)
 
 

@@ -23,12 +23,13 @@ from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
 from tts2face.request import OWN_FACE, Request
 from tts2face.synthesis.animated_face import AnimatedFace
-from tts2face.synthesis.clip_stream import Piece, SynthesisModels, pieces
+from tts2face.synthesis.clip_stream import SynthesisModels, pieces
 from tts2face.synthesis.gesture_layer import GestureLayer
 from tts2face.synthesis.mesh_face import mesh_face
 from tts2face.synthesis.own_appearance_face import own_appearance_face
 from tts2face.synthesis.prepared_request import PreparedRequest
 from tts2face.synthesis.sentence_memory import NO_MEMORY, SentenceMemory
+from tts2face.synthesis.speech_stream import Piece, SpeechModels
 from tts2face.synthesis.voice_preload import preload_voice
 from tts2face.voice.engine import Voice
 from tts2face.voice.pool import VoicePool
@@ -179,7 +180,8 @@ class SessionModels:
         exemplars = self._exemplars if not prepared.excluded else self._exemplars_without(prepared.excluded)
         face = self.face(has_gestures=request.has_gestures)
         face.check_articulation(request.articulation_factor)
-        return SynthesisModels(self.talker, exemplars, face, load_voice, self._voices.give_way, self._memory)
+        speech = SpeechModels(load_voice, self._voices.give_way, self._memory)
+        return SynthesisModels(self.talker, exemplars, face, speech)
 
     def preload_voice(self, prepared: PreparedRequest) -> None:
         """Load the voice of a request's text in a thread, while the face is prepared."""

@@ -7,23 +7,18 @@ drawing kernels, because numba compiles one kernel at a time in each process.
 import subprocess
 import sys
 from contextlib import suppress
+from itertools import chain
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.exemplar import recorded_motion
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_parts import keep_parts
 from tts2face.models.talker import Talker
-from tts2face.render import raster
-from tts2face.render.camera import camera_matrices
-from tts2face.render.draw import draw
-from tts2face.render.materials import STRANDS
 from tts2face.render.picture import Picture
-from tts2face.render.picture_kernels import allocate_buffers, arrange_cards, blend_strands
-from tts2face.render.strand_light import light_strands
-from tts2face.render.studio_light import FIRST_LIGHT_ROW, LAMPS
-from tts2face.render.surface import build_surface
 
 COMPILE_CHILD_CODE = """
 import os
@@ -36,10 +31,15 @@ CHILD_WORK = ("compile_motion", "compile_strands")
 COMPILE_TIMEOUT_S = 120.0
 
 
-def kernels_are_compiled() -> bool:
-    """Whether the drawing kernels are in the disk cache; compiling them delays the first picture by some seconds."""
-    source = Path(raster.__file__).stat().st_mtime
-    return any(index.stat().st_mtime >= source for index in _cache_indexes())
+def kernels_are_compiled(*, draws: bool) -> bool:
+    """Whether the kernels of motion, and those of drawing if it `draws`, are in the disk cache.
+
+    Compiling them delays the first result by some seconds.
+    """
+    return all(
+        any(index.stat().st_mtime >= Path(module.__file__ or "").stat().st_mtime for index in indexes)
+        for module, indexes in _cache_indexes(draws=draws).items()
+    )
 
 
 def compile_kernels() -> None:
@@ -48,6 +48,9 @@ def compile_kernels() -> None:
     If a child process fails, its kernels are compiled at their first use. numba keeps cached code whose source
     file was replaced by one of the same content, so that the age of the cache does not show by itself that it is valid.
     """
+    from tts2face.render.draw import draw
+    from tts2face.render.materials import STRANDS
+
     face = keep_parts(load_face("head"), lambda part: part.kind != STRANDS)
     children = [_start_child(work) for work in CHILD_WORK]
     try:
@@ -63,7 +66,7 @@ def compile_kernels() -> None:
             child.wait()
             if child.stdin is not None:
                 child.stdin.close()
-    for index in _cache_indexes():
+    for index in chain.from_iterable(_cache_indexes(draws=True).values()):
         with suppress(OSError):  # a cache that this user may only read
             index.touch()
 
@@ -77,13 +80,29 @@ def _start_child(work: str) -> "subprocess.Popen[bytes]":
     )
 
 
-def _cache_indexes() -> list[Path]:
-    folder = Path(str(raster.draw_band.stats.cache_path))  # type: ignore[attr-defined]
-    return list(folder.glob("raster.draw_band-*.nbi"))
+def _cache_indexes(*, draws: bool) -> dict[ModuleType, list[Path]]:
+    """Index files of one kernel of each kind, by its module."""
+    kernels: list[tuple[ModuleType, str]] = [(recorded_motion, "sample_tokens")]
+    if draws:
+        from tts2face.render import raster
+
+        kernels.append((raster, "draw_band"))
+    return {module: _index_files(module, name) for module, name in kernels}
+
+
+def _index_files(module: ModuleType, name: str) -> list[Path]:
+    folder = Path(str(getattr(module, name).stats.cache_path))
+    return list(folder.glob(f"{module.__name__.rpartition('.')[2]}.{name}-*.nbi"))
 
 
 def compile_strands() -> None:
     """Compile the kernels of hair, lashes and brows, a quarter of the drawing kernels' time, without the others."""
+    from tts2face.render.camera import camera_matrices
+    from tts2face.render.picture_kernels import allocate_buffers, arrange_cards, blend_strands
+    from tts2face.render.strand_light import light_strands
+    from tts2face.render.studio_light import FIRST_LIGHT_ROW, LAMPS
+    from tts2face.render.surface import build_surface
+
     face, picture = load_face("head"), Picture(size="16x16")
     surface, optics = build_surface(face), camera_matrices(picture.view, face, (16, 16))
     buffers, cards = allocate_buffers(surface, (16, 16), picture.samples_per_side), surface.strands

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from tts2face.prefetch import Prefetch
 from tts2face.speech.text_fit import TextMismatch
-from tts2face.synthesis.clip_stream import Piece
 from tts2face.synthesis.marked_speech import MarkTime
 from tts2face.synthesis.output_files import OpenOutputs, OutputFiles
+from tts2face.synthesis.speech_stream import Piece
 from tts2face.types import Progress
 
 N_PIECES_AHEAD = 2  # pieces synthesised before they are drawn

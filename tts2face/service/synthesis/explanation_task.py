@@ -19,7 +19,7 @@ from tts2face.types import Chunk, Trajectory
 
 if TYPE_CHECKING:
     from tts2face.session import Session
-    from tts2face.synthesis.clip_stream import Piece
+    from tts2face.synthesis.speech_stream import Piece
 
 MAX_EXAMPLES = 12  # of an explained phone
 N_DECIMALS = 2  # of outlines, mm

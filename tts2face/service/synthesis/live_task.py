@@ -21,8 +21,8 @@ from tts2face.types import Chunk, Clip, Trajectory
 
 if TYPE_CHECKING:
     from tts2face.session import Session
-    from tts2face.synthesis.clip_stream import Piece
     from tts2face.synthesis.live_speech import LiveSpeech
+    from tts2face.synthesis.speech_stream import Piece
 
 IDLE_S = 0.2  # of idle motion at a time, so that speech can begin soon
 LEAD_S = 0.3  # by which idle motion is ahead of the clock

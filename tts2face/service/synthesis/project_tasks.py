@@ -27,7 +27,7 @@ from tts2face.types import Chunk
 
 if TYPE_CHECKING:
     from tts2face.session import Session
-    from tts2face.synthesis.clip_stream import Piece
+    from tts2face.synthesis.speech_stream import Piece
 
 DIGEST_BYTES = 12
 BLOCK_BYTES = 1 << 18
