@@ -65,7 +65,8 @@ class FaceRig:
 
 def build_rig(face: Face) -> FaceRig:
     """Rig of a face; shapes keep only the vertices that they move."""
-    moved_vertices = [np.flatnonzero(np.any(shape != 0, axis=1)).astype(np.int32) for shape in face.shapes]
+    moves = [(shape[:, 0] != 0) | (shape[:, 1] != 0) | (shape[:, 2] != 0) for shape in face.shapes]
+    moved_vertices = [np.flatnonzero(moved).astype(np.int32) for moved in moves]
     starts = np.concatenate([[0], np.cumsum([len(indices) for indices in moved_vertices])]).astype(np.int64)
     deltas = [shape[indices] for shape, indices in zip(face.shapes, moved_vertices, strict=True)]
     turns = np.zeros((len(face.eyes), len(face.shape_names), 3), np.float32)

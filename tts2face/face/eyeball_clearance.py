@@ -62,7 +62,8 @@ class EyeballClearance:
         if len(self.lids):
             gazes = np.ascontiguousarray(turns[:, :, 2])
             moved = np.zeros((len(self.lids), 3), np.float32)
-            _push_out((self.lids, self.eyes, self.margins), (self.profiles, centres, gazes), vertices, moved)
+            largest = self.profiles.max() + self.margins.max()
+            _push_out((self.lids, self.eyes, self.margins, largest), (self.profiles, centres, gazes), vertices, moved)
             _follow(self.followers, self.roots, self.shares, moved, vertices)
 
 
@@ -144,11 +145,13 @@ def _bind_followers(
 
 @kernel
 def _push_out(skin, balls, vertices, moved):  # type: ignore[no-untyped-def]
-    """Move the skin's vertices radially out of the eyeballs; writes their displacements."""
-    lids, eyes, margins = skin
+    """Move the skin's vertices radially out of the eyeballs; writes their displacements.
+
+    ``largest`` is an argument because a kernel that calls `max` of an array loads scipy.linalg, a tenth of a second.
+    """
+    lids, eyes, margins, largest = skin
     profiles, centres, gazes = balls
     n_steps = profiles.shape[1] - 1
-    largest = profiles.max() + margins.max()
     for i in range(len(lids)):
         v, e = lids[i], eyes[i]
         x, y, z = vertices[v, 0] - centres[e, 0], vertices[v, 1] - centres[e, 1], vertices[v, 2] - centres[e, 2]

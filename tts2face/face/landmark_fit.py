@@ -22,7 +22,8 @@ def landmark_positions(face: Face) -> FloatArray:
 def landmark_motion(face: Face, shapes: NDArray[np.integer]) -> FloatArray:
     """Landmark motion (L, 3, k) per weight of the shapes with indices `shapes` (k,), mm."""
     mixed = face.landmark_weights.astype(np.float64)[..., None]
-    return np.stack([(face.shapes[k][face.landmark_vertices] * mixed).sum(axis=1) for k in shapes], axis=-1)
+    moved = face.shapes[np.asarray(shapes)[:, None, None], face.landmark_vertices]
+    return np.ascontiguousarray(np.moveaxis((moved * mixed).sum(axis=2), 0, -1))
 
 
 def scatter_landmarks(face: Face, values: FloatArray) -> FloatArray:

@@ -166,11 +166,10 @@ def _paint_scalp(face: Face, hair: Hair, srgb: NDArray[np.float64]) -> tuple[Tex
 
     skin = face.textures[0]
     size = skin.pixels.shape[1::-1]
-    cover = (
-        np.asarray(Image.fromarray(hair.scalp).resize(size, Image.Resampling.BILINEAR), np.float32)[:, :, None] / 255
-    )
-    covered = cover[:, :, 0] > 0
-    light, cover = decode_srgb(np.arange(256) / 255.0)[skin.pixels[covered]], cover[covered]
-    pixels = np.array(skin.pixels)
-    pixels[covered] = encode_srgb(light * (1 - cover) + decode_srgb(srgb) * cover)
+    cover = np.asarray(Image.fromarray(hair.scalp).resize(size, Image.Resampling.BILINEAR))
+    light = decode_srgb(np.arange(256) / 255.0)[:, None]
+    share = np.arange(256, dtype=np.float32)[:, None, None] / 255
+    mixed = encode_srgb(light * (1 - share) + decode_srgb(srgb) * share)  # (256, 256, 3) by cover and skin
+    pixels, covered = np.array(skin.pixels), cover > 0
+    pixels[covered] = mixed[cover[covered][:, None], skin.pixels[covered], np.arange(3)]
     return (Texture(pixels, skin.alpha), *face.textures[1:])
