@@ -18,10 +18,10 @@ from cli.lists import LISTS
 from cli.mimic import mimic
 from cli.process import (
     BROKEN_PIPE_CODE,
+    INTERRUPTION,
     discard_output,
     error_message,
     exit_code,
-    raise_on_signals,
     repair_streams,
     return_large_blocks,
     signal_exit_code,
@@ -37,6 +37,7 @@ from tts2face.render.picture import Picture
 from tts2face.request import GESTURES, Request
 from tts2face.session_cache import Models
 
+UNCHANGED = "an output that was not complete yet is as it was before"  # also after the first of several outputs
 Shell = Literal["bash", "zsh", "fish", "powershell"]
 
 app = App(
@@ -190,24 +191,28 @@ def run(arguments: Sequence[str]) -> int:
         check_options(app, arguments)
         app(list(arguments), exit_on_error=False, print_error=False, result_action="return_none")
         sys.stdout.flush()
-    except BrokenPipeError:
-        discard_output()
-        return BROKEN_PIPE_CODE
-    except (Tts2faceError, CycloptsError, OSError) as refused:
-        if isinstance(refused, OSError) and refused.filename is None:
+    except BaseException as ended:
+        INTERRUPTION.end()
+        if INTERRUPTION.number or isinstance(ended, KeyboardInterrupt):  # whatever the interruption has led to
+            what_remains = "; ".join(getattr(ended, "__notes__", ())) or UNCHANGED
+            write_message(f"\ntts2face: interrupted; {what_remains}")
+            return signal_exit_code(ended)
+        if isinstance(ended, BrokenPipeError):
             discard_output()
-        write_message(f"tts2face: {error_message(refused)}")
-        return exit_code(refused)
-    except KeyboardInterrupt as interrupt:
-        what_remains = "; ".join(getattr(interrupt, "__notes__", ())) or "no output was written"
-        write_message(f"\ntts2face: interrupted; {what_remains}")
-        return signal_exit_code(interrupt)
+            return BROKEN_PIPE_CODE
+        if isinstance(ended, (Tts2faceError, CycloptsError, OSError)):
+            if isinstance(ended, OSError) and ended.filename is None:
+                discard_output()
+            write_message(f"tts2face: {error_message(ended)}")
+            return exit_code(ended)
+        raise
+    INTERRUPTION.end()
     return 0
 
 
 def main() -> None:
     """Entry point of the ``tts2face`` command."""
     repair_streams()
-    raise_on_signals()
+    INTERRUPTION.install()
     return_large_blocks()
     sys.exit(run(sys.argv[1:]))

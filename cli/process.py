@@ -7,6 +7,9 @@ import errno
 import os
 import signal
 import sys
+import threading
+import time
+import weakref
 from collections.abc import Mapping
 from io import TextIOWrapper
 from types import FrameType
@@ -14,6 +17,7 @@ from types import FrameType
 from cyclopts import CycloptsError
 
 from lexicon.errors import BackendError, DataError, InputError
+from tts2face.storage.temporary import remove_held
 
 EXIT_CODES: Mapping[type[Exception], int] = {InputError: 2, CycloptsError: 2, DataError: 3, BackendError: 4, OSError: 4}
 BROKEN_PIPE_CODE = 141  # 128 + SIGPIPE, as shells report it
@@ -21,7 +25,10 @@ PATH_ERRNOS = frozenset({errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR, errno.
 MAX_QUOTED_CHARACTERS = 60  # characters of a path in a message
 ESCAPE_HANDLER = "tts2face.escapes"  # name of the error handler for characters that the terminal cannot show
 REFUSING_HANDLERS = frozenset({"strict", "surrogateescape"})  # the second is Python's default in the C locale
-SIGNAL_NAMES = ("SIGTERM", "SIGHUP")  # sent by a service manager or `kill`, and when a terminal is closed
+SIGNAL_NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # Ctrl-C, a service manager or `kill`, a terminal that is closed
+REPEAT_S = 0.02  # until an interruption that was dropped is raised again: a callback of the compiler takes about 1 ms
+SAME_SIGNAL_S = 0.5  # in which signals count as one: `timeout` and some service managers send each twice
+SHOW_CURSOR = b"\x1b[?25h"
 TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3  # parameter numbers of mallopt in glibc's malloc.h
 LARGE_BYTES = 1 << 20  # arrays of at least this size are mapped one by one; pictures of 512 x 512 are smaller
 
@@ -53,24 +60,91 @@ class Terminated(KeyboardInterrupt):
         self.number = number
 
 
-def raise_on_signals() -> None:
-    """Raise `Terminated` in the main thread on SIGTERM and SIGHUP; ignored signals (``nohup``) stay ignored."""
-    for name in SIGNAL_NAMES:
-        number = getattr(signal, name, None)  # Windows has no SIGHUP
-        if number is not None and signal.getsignal(number) is signal.SIG_DFL:
-            signal.signal(number, _terminate)
+class Interruption:
+    """The first termination signal of this process, raised in the main thread until the command has ended of it.
+
+    An exception that a signal raises inside a callback of compiled code is dropped there, and so may be one inside a
+    library that catches everything. The interruption is then raised again, a moment later. A second signal ends the
+    process at once, even while compiled code runs or the clean-up hangs.
+
+    Attributes
+    ----------
+    number
+        Number of the first signal; 0 before it.
+    """
+
+    def __init__(self) -> None:
+        self.number = 0
+        self._is_over = False
+        self._raised: weakref.ref[Terminated] | None = None
+
+    def install(self) -> None:
+        """Watch for SIGINT, SIGTERM and SIGHUP from now on; ignored signals (``nohup``) stay ignored."""
+        for name in SIGNAL_NAMES:
+            number = getattr(signal, name, None)  # Windows has no SIGHUP
+            if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+                signal.signal(number, self._note)
+        show = sys.unraisablehook
+        sys.unraisablehook = lambda dropped: None if self.number else show(dropped)
+        if hasattr(signal, "setitimer"):  # not on Windows, where a second Ctrl-C is needed after one that was dropped
+            signal.signal(signal.SIGALRM, self._raise_again)
+            reader, writer = os.pipe()
+            os.set_blocking(writer, False)
+            signal.set_wakeup_fd(writer, warn_on_full_buffer=False)  # its thread runs while compiled code occupies this
+            threading.Thread(target=self._watch_second, args=(reader,), name="signals", daemon=True).start()
+
+    def end(self) -> None:
+        """Raise nothing more: the command has ended."""
+        self._is_over = True
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        if self.number == 0 and not self._is_over:
+            self.number = number
+            raise self._interrupt()
+        if not hasattr(signal, "setitimer"):
+            _exit_at_once(number)
+
+    def _raise_again(self, number: int, frame: FrameType | None) -> None:
+        if self.number and not self._is_over:
+            raise self._interrupt()
+
+    def _interrupt(self) -> Terminated:
+        """A new exception, whose end is noticed; no frame of this module holds it."""
+        interrupt = Terminated(self.number)
+        self._raised = weakref.ref(interrupt, self._note_dropped)
+        return interrupt
+
+    def _note_dropped(self, _: object) -> None:
+        if not self._is_over and hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, REPEAT_S)
+
+    def _watch_second(self, reader: int) -> None:
+        numbers = {getattr(signal, name) for name in SIGNAL_NAMES}
+        first_s: float | None = None
+        while read := os.read(reader, 1):
+            if read[0] not in numbers:
+                continue
+            first_s = first_s or time.monotonic()
+            is_too_late = self._is_over and self.number == 0  # no code is left that it could interrupt
+            if is_too_late or time.monotonic() - first_s > SAME_SIGNAL_S:
+                _exit_at_once(read[0])
 
 
-def _terminate(number: int, frame: FrameType | None) -> None:
-    for name in SIGNAL_NAMES:  # a second signal must not interrupt the clean-up
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
-    raise Terminated(number)
+INTERRUPTION = Interruption()
 
 
-def signal_exit_code(interrupt: KeyboardInterrupt) -> int:
+def _exit_at_once(number: int) -> None:
+    """End this process without any clean-up but that of the files that it was writing."""
+    with contextlib.suppress(OSError):
+        if os.isatty(2):
+            os.write(2, SHOW_CURSOR)  # a progress bar hides it
+        remove_held()
+    os._exit(128 + number)
+
+
+def signal_exit_code(interrupt: BaseException) -> int:
     """Exit code after a signal by the convention of shells: 128 + its number (130 Ctrl-C, 143 SIGTERM, 129 SIGHUP)."""
-    return 128 + (interrupt.number if isinstance(interrupt, Terminated) else signal.SIGINT)
+    return 128 + (interrupt.number if isinstance(interrupt, Terminated) else INTERRUPTION.number or signal.SIGINT)
 
 
 def repair_streams() -> None:

@@ -1,5 +1,6 @@
 """Commands ended by a signal leave neither files nor processes."""
 
+import os
 import shutil
 import signal
 import subprocess
@@ -11,6 +12,8 @@ from pathlib import Path
 import pytest
 
 COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
+ROOT = str(Path(__file__).parents[2])
+UNCHANGED = "an output that was not complete yet is as it was before"
 TEXT = "This is a rather long sentence that takes some time to speak. " * 20
 PATIENCE_S = 120.0
 POOL = """
@@ -22,9 +25,50 @@ def start(folder):
     (Path(folder) / str(os.getpid())).touch()
 
 if __name__ == "__main__":
-    from cli.process import raise_on_signals
-    raise_on_signals()
+    from cli.process import INTERRUPTION
+    INTERRUPTION.install()
     list(map_unordered([600.0, 600.0], time.sleep, start, (sys.argv[1],), 2))
+"""
+
+COMPILER = """
+import ctypes, os, signal, sys, time
+from pathlib import Path
+from cli.main import app, main
+from tts2face.storage.temporary import Temporary
+
+@app.command
+def dropped(number: int):
+    "Twice the signal within a callback of compiled code, where the first exception is dropped."
+    called = []
+
+    @ctypes.CFUNCTYPE(None)
+    def callback():
+        called.append(1)
+        os.kill(os.getpid(), number)
+        os.kill(os.getpid(), number)
+
+    with Temporary(Path("x.mp4")):
+        callback()
+        assert called
+        print("goes on", flush=True)
+        time.sleep(600)
+
+@app.command
+def replaced(number: int):
+    "The exception leads to another one, as in numba."
+    try:
+        os.kill(os.getpid(), number)
+        time.sleep(600)
+    finally:
+        raise RuntimeError("no compiled object yet")
+
+@app.command
+def stuck():
+    "Compiled code that does not return, so that no handler runs in the main thread."
+    with Temporary(Path("x.mp4")):
+        ctypes.CDLL(None).system(b"echo begins; read line")
+
+main()
 """
 
 pytestmark = pytest.mark.skipif(
@@ -51,11 +95,63 @@ def start_command(here: Path) -> "subprocess.Popen[str]":
 
 @pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
 def test_a_signal_leaves_no_files_and_no_processes(tmp_path: Path, name: str, code: int) -> None:
+    earlier = tmp_path / "x.mp4"
+    earlier.write_bytes(b"of an earlier run")
     with start_command(tmp_path) as process:
         process.send_signal(getattr(signal, name))
         _, message = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == code
-    assert "interrupted; no output was written" in message
+    assert f"interrupted; {UNCHANGED}" in message
+    assert list(tmp_path.iterdir()) == [earlier]
+    assert earlier.read_bytes() == b"of an earlier run"
+
+
+def run_script(here: Path, *arguments: str) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [sys.executable, "-c", COMPILER, *arguments],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=here,
+        env={**os.environ, "PYTHONPATH": ROOT},
+    )
+
+
+def test_a_signal_whose_exception_is_dropped_or_replaced_ends_the_command(tmp_path: Path) -> None:
+    """Signals that come twice at once, as from `timeout`, are one."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    started = [
+        (number, run_script(tmp_path, command, str(int(number))))
+        for number in numbers
+        for command in ("dropped", "replaced")
+    ]
+    wrong = []
+    for number, process in started:
+        with process:
+            try:
+                _, message = process.communicate(timeout=PATIENCE_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                message = "goes on"
+        if process.returncode != 128 + number or message.strip() != f"tts2face: interrupted; {UNCHANGED}":
+            wrong.append((number.name, process.args[3:], process.returncode, message))
+    assert wrong == []
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_second_signal_ends_the_process_at_once(tmp_path: Path) -> None:
+    """Also while compiled code runs; what it was writing is removed."""
+    with run_script(tmp_path, "stuck") as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "begins\n"
+        end = time.monotonic() + PATIENCE_S
+        while process.poll() is None and time.monotonic() < end:
+            process.send_signal(signal.SIGTERM)
+            time.sleep(0.1)
+        code = process.poll()
+        process.kill()
+    assert code == 128 + signal.SIGTERM
     assert list(tmp_path.iterdir()) == []
 
 

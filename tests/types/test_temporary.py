@@ -107,3 +107,33 @@ def test_one_that_another_process_removes_before_it_is_locked_is_made_again(
     assert n_made == 2
     with pytest.raises(FileNotFoundError):
         Temporary(tmp_path / "missing" / "job")
+
+
+def test_an_earlier_folder_is_whole_until_the_new_one_takes_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An interruption at any renaming leaves the earlier pictures."""
+    target = tmp_path / "pictures"
+    target.mkdir()
+    (target / "000000.png").write_bytes(b"earlier")
+    rename, failures = os.replace, iter([True, False, True])
+
+    def replace_once(source: Path, to: Path) -> None:
+        if next(failures, False):
+            raise KeyboardInterrupt
+        rename(source, to)
+
+    def write() -> None:
+        with Temporary(target, is_folder=True) as new:
+            (new.path / "000000.png").write_bytes(b"new")
+            new.replace(target)
+
+    monkeypatch.setattr(os, "replace", replace_once)
+    for _ in range(2):  # at the first renaming, and at the second
+        with pytest.raises(KeyboardInterrupt):
+            write()
+        assert [path.name for path in tmp_path.iterdir()] == ["pictures"]
+        assert (target / "000000.png").read_bytes() == b"earlier"
+    write()
+    assert [path.name for path in tmp_path.iterdir()] == ["pictures"]
+    assert (target / "000000.png").read_bytes() == b"new"

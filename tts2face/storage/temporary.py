@@ -20,6 +20,7 @@ except ImportError:  # Windows
 
 NAME_INFIX = ".tts2face-"  # part of the names of all temporary files
 LOCK_ERRORS = (BlockingIOError, FileNotFoundError)
+_HELD: set[Path] = set()  # temporary files and folders of this process
 MAX_NAME_BYTES = 100  # of the target's name; file systems allow 255 in total
 
 
@@ -51,6 +52,7 @@ class Temporary:
                 self.path = _create(target, is_folder)
             except OSError:  # a file system without locks, where it is not removed
                 break
+        _HELD.add(self.path)
 
     def __enter__(self) -> "Temporary":
         """Return itself."""
@@ -63,10 +65,17 @@ class Temporary:
         self.remove()
 
     def replace(self, target: Path) -> None:
-        """Rename it to the target; a folder replaces an existing folder."""
+        """Rename it to the target; a folder replaces an existing folder, which stays whole until then."""
         if self.path.is_dir() and target.is_dir():
-            shutil.rmtree(target)
-        os.replace(self.path, target)
+            with Temporary(target, is_folder=True) as earlier:
+                os.replace(target, earlier.path)  # onto an empty folder
+                try:
+                    os.replace(self.path, target)
+                except BaseException:
+                    os.replace(earlier.path, target)
+                    raise
+        else:
+            os.replace(self.path, target)
         self._release()
 
     def remove(self) -> None:
@@ -75,9 +84,16 @@ class Temporary:
         self._release()
 
     def _release(self) -> None:
+        _HELD.discard(self.path)
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
+
+
+def remove_held() -> None:
+    """Remove all temporary files and folders of this process, which ends without further clean-up."""
+    for path in tuple(_HELD):
+        _remove(path)
 
 
 def remove_left_behind(target: Path) -> None:
