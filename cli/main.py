@@ -18,7 +18,9 @@ from cli.lists import LISTS
 from cli.mimic import mimic
 from cli.process import (
     BROKEN_PIPE_CODE,
+    INTERRUPTED,
     INTERRUPTION,
+    UNCHANGED,
     discard_output,
     error_message,
     exit_code,
@@ -36,8 +38,8 @@ from tts2face import __version__
 from tts2face.render.picture import Picture
 from tts2face.request import GESTURES, Request
 from tts2face.session_cache import Models
+from tts2face.storage.temporary import remove_held
 
-UNCHANGED = "an output that was not complete yet is as it was before"  # also after the first of several outputs
 Shell = Literal["bash", "zsh", "fish", "powershell"]
 
 app = App(
@@ -195,7 +197,7 @@ def run(arguments: Sequence[str]) -> int:
         INTERRUPTION.end()
         if INTERRUPTION.number or isinstance(ended, KeyboardInterrupt):  # whatever the interruption has led to
             what_remains = "; ".join(getattr(ended, "__notes__", ())) or UNCHANGED
-            write_message(f"\ntts2face: interrupted; {what_remains}")
+            write_message(f"\n{INTERRUPTED.format(what_remains)}")
             return signal_exit_code(ended)
         if isinstance(ended, BrokenPipeError):
             discard_output()
@@ -215,4 +217,7 @@ def main() -> None:
     repair_streams()
     INTERRUPTION.install()
     return_large_blocks()
-    sys.exit(run(sys.argv[1:]))
+    code = run(sys.argv[1:])
+    if INTERRUPTION.number:
+        remove_held()  # what no context had taken over when the signal came
+    sys.exit(code)

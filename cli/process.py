@@ -5,6 +5,7 @@ import contextlib
 import ctypes
 import errno
 import os
+import select
 import signal
 import sys
 import threading
@@ -28,7 +29,10 @@ REFUSING_HANDLERS = frozenset({"strict", "surrogateescape"})  # the second is Py
 SIGNAL_NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # Ctrl-C, a service manager or `kill`, a terminal that is closed
 REPEAT_S = 0.02  # until an interruption that was dropped is raised again: a callback of the compiler takes about 1 ms
 SAME_SIGNAL_S = 0.5  # in which signals count as one: `timeout` and some service managers send each twice
-SHOW_CURSOR = b"\x1b[?25h"
+HANDLED_S = 2.0  # after which compiled code that does not return is ended with the process: one kernel takes 3 s
+SHOW_CURSOR = b"\x1b[?25h"  # a progress bar hides it
+INTERRUPTED = "tts2face: interrupted; {}"
+UNCHANGED = "an output that was not complete yet is as it was before"  # also after the first of several outputs
 TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3  # parameter numbers of mallopt in glibc's malloc.h
 LARGE_BYTES = 1 << 20  # arrays of at least this size are mapped one by one; pictures of 512 x 512 are smaller
 
@@ -64,8 +68,8 @@ class Interruption:
     """The first termination signal of this process, raised in the main thread until the command has ended of it.
 
     An exception that a signal raises inside a callback of compiled code is dropped there, and so may be one inside a
-    library that catches everything. The interruption is then raised again, a moment later. A second signal ends the
-    process at once, even while compiled code runs or the clean-up hangs.
+    library that catches everything. The interruption is then raised again, a moment later. Compiled code that does not
+    return ends with the process after two seconds; a second signal ends it at once, even while the clean-up hangs.
 
     Attributes
     ----------
@@ -91,7 +95,7 @@ class Interruption:
             reader, writer = os.pipe()
             os.set_blocking(writer, False)
             signal.set_wakeup_fd(writer, warn_on_full_buffer=False)  # its thread runs while compiled code occupies this
-            threading.Thread(target=self._watch_second, args=(reader,), name="signals", daemon=True).start()
+            threading.Thread(target=self._watch, args=(reader,), name="signals", daemon=True).start()
 
     def end(self) -> None:
         """Raise nothing more: the command has ended."""
@@ -118,16 +122,23 @@ class Interruption:
         if not self._is_over and hasattr(signal, "setitimer"):
             signal.setitimer(signal.ITIMER_REAL, REPEAT_S)
 
-    def _watch_second(self, reader: int) -> None:
+    def _watch(self, reader: int) -> None:
+        """End the process on a second signal, or if compiled code keeps the first one from being raised."""
         numbers = {getattr(signal, name) for name in SIGNAL_NAMES}
-        first_s: float | None = None
-        while read := os.read(reader, 1):
-            if read[0] not in numbers:
+        first, first_s = 0, 0.0
+        while True:
+            if not select.select([reader], [], [], HANDLED_S if first else None)[0]:
+                if not self._is_over and (self._raised is None or self._raised() is None):
+                    _exit_at_once(first)
                 continue
-            first_s = first_s or time.monotonic()
+            number = os.read(reader, 1)[0]
+            if number not in numbers:
+                continue
+            if not first:
+                first, first_s = number, time.monotonic()
             is_too_late = self._is_over and self.number == 0  # no code is left that it could interrupt
             if is_too_late or time.monotonic() - first_s > SAME_SIGNAL_S:
-                _exit_at_once(read[0])
+                _exit_at_once(number)
 
 
 INTERRUPTION = Interruption()
@@ -136,9 +147,8 @@ INTERRUPTION = Interruption()
 def _exit_at_once(number: int) -> None:
     """End this process without any clean-up but that of the files that it was writing."""
     with contextlib.suppress(OSError):
-        if os.isatty(2):
-            os.write(2, SHOW_CURSOR)  # a progress bar hides it
         remove_held()
+        os.write(2, (SHOW_CURSOR if os.isatty(2) else b"") + f"\n{INTERRUPTED.format(UNCHANGED)}\n".encode())
     os._exit(128 + number)
 
 

@@ -4,6 +4,7 @@ import io
 import json
 import os
 import queue
+import signal
 import sys
 import threading
 import time
@@ -62,12 +63,15 @@ def received_order() -> tuple[dict[str, Any], TextIO]:
 def exit_after(wait: Callable[[], object]) -> None:
     """Exit this process as soon as `wait`, which runs in a background thread, returns or raises.
 
+    Ctrl-C, which the terminal sends to the parent, too, is left to the parent.
+
     Parameters
     ----------
     wait
         Blocking read from a pipe whose other end only the parent holds; it returns when the parent closes the pipe or
         terminates.
     """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_exit_after, args=(wait,), name="exit_after", daemon=True).start()
 
 

@@ -4,8 +4,10 @@ import csv
 import json
 import os
 import signal
+import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import ClassVar
 
 import av
 import numpy as np
@@ -269,6 +271,47 @@ def test_a_damaged_result_is_rendered_again(plan_of: Planner, voices: list[FakeV
     for path in out.glob("*.mp4"):
         path.unlink()
     assert run_batch(plan_of(), out).n_rendered == 3
+
+
+class SlowProcess:
+    """A rendering process whose first segment is done at once, and whose further ones only end when it is closed."""
+
+    made: ClassVar[list["SlowProcess"]] = []
+
+    def __init__(self, core: int | None) -> None:
+        self.closed, self.is_closed, self.ends = threading.Event(), False, []
+        self.made.append(self)
+
+    def render(self, segment: Segment, out: Path) -> SegmentResult:
+        if segment.request["text"] != "Hello there.":
+            self.ends.append(self.closed.wait(3.0))
+            raise ChildDiedError("the rendering process ended: killed")
+        out.write_bytes(b"movie")
+        return SegmentResult(15, 10.0)
+
+    def close(self) -> None:
+        self.is_closed = True
+        self.closed.set()
+
+
+def test_an_interrupted_batch_ends_its_processes_while_they_render(
+    plan_of: Planner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(SlowProcess, "made", [])
+    monkeypatch.setattr(engines, "RenderProcess", SlowProcess)
+    rendering = LocalEngine(2).render(plan_of().segments, FolderStore(tmp_path / "store"))
+    assert next(rendering).result is not None
+    rendering.close()  # as an exception of the loop over it does
+    assert [process.is_closed for process in SlowProcess.made] == [True, True]
+    assert all(end for process in SlowProcess.made for end in process.ends)  # not one was waited for
+
+
+def test_a_closed_process_is_not_started_again(plan_of: Planner, tmp_path: Path) -> None:
+    process = RenderProcess()
+    process.close()
+    with pytest.raises(BackendError, match="the rendering process was closed"):
+        process.render(plan_of().outputs[0].segments[0], tmp_path / "x.mov")
+    assert process.pid is None
 
 
 def test_a_child_process_renders_the_same_bytes_and_dies_alone(plan_of: Planner, tmp_path: Path) -> None:

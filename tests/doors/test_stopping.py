@@ -11,9 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from cli.process import UNCHANGED
+
 COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
 ROOT = str(Path(__file__).parents[2])
-UNCHANGED = "an output that was not complete yet is as it was before"
 TEXT = "This is a rather long sentence that takes some time to speak. " * 20
 PATIENCE_S = 120.0
 POOL = """
@@ -140,18 +141,23 @@ def test_a_signal_whose_exception_is_dropped_or_replaced_ends_the_command(tmp_pa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_second_signal_ends_the_process_at_once(tmp_path: Path) -> None:
-    """Also while compiled code runs; what it was writing is removed."""
+@pytest.mark.parametrize("n_signals", [1, 100])
+def test_compiled_code_that_does_not_return_ends_with_the_process(tmp_path: Path, n_signals: int) -> None:
+    """A while after the first signal, or at once with the second one; what it was writing is removed."""
     with run_script(tmp_path, "stuck") as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "begins\n"
-        end = time.monotonic() + PATIENCE_S
+        sent, end = 0, time.monotonic() + PATIENCE_S
         while process.poll() is None and time.monotonic() < end:
-            process.send_signal(signal.SIGTERM)
+            if sent < n_signals:
+                process.send_signal(signal.SIGTERM)
+                sent += 1
             time.sleep(0.1)
         code = process.poll()
         process.kill()
+        _, message = process.communicate()
     assert code == 128 + signal.SIGTERM
+    assert message.strip() == f"tts2face: interrupted; {UNCHANGED}"
     assert list(tmp_path.iterdir()) == []
 
 

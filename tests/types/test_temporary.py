@@ -3,14 +3,13 @@
 import os
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tts2face.storage.files import write_atomically
-from tts2face.storage.temporary import NAME_INFIX, Temporary
+from tts2face.storage.temporary import NAME_INFIX, Temporary, remove_held
 
 pytest.importorskip("fcntl", reason="without file locks nothing that was left behind is removed")
 
@@ -91,22 +90,35 @@ def test_a_name_of_the_greatest_length_can_be_written(tmp_path: Path) -> None:
 def test_one_that_another_process_removes_before_it_is_locked_is_made_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_folder: bool
 ) -> None:
-    name = "mkdtemp" if is_folder else "mkstemp"
-    make, n_made = getattr(tempfile, name), 0
+    name = "mkdir" if is_folder else "touch"
+    make, made = getattr(Path, name), []
 
-    def make_and_remove(**options: Any) -> Any:
-        nonlocal n_made
-        made, n_made = make(**options), n_made + 1
-        if n_made == 1:
-            Path(made).rmdir() if is_folder else Path(made[1]).unlink()
-        return made
+    def make_and_remove(path: Path, **options: Any) -> None:
+        make(path, **options)
+        made.append(path)
+        if len(made) == 1:
+            path.rmdir() if is_folder else path.unlink()
 
-    monkeypatch.setattr(tempfile, name, make_and_remove)
+    monkeypatch.setattr(Path, name, make_and_remove)
     with Temporary(tmp_path / "job", is_folder=is_folder) as mine:
         assert mine.path.exists()
-    assert n_made == 2
+    assert len(made) == 2
     with pytest.raises(FileNotFoundError):
         Temporary(tmp_path / "missing" / "job")
+
+
+def test_one_that_is_interrupted_while_it_is_made_is_removed_with_all_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted_chmod(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "chmod", interrupted_chmod)
+    with pytest.raises(KeyboardInterrupt):
+        Temporary(tmp_path / "clip.mp4")
+    assert len(list(tmp_path.iterdir())) == 1
+    remove_held()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_earlier_folder_is_whole_until_the_new_one_takes_its_place(

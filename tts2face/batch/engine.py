@@ -6,8 +6,7 @@ import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -66,34 +65,44 @@ class LocalEngine:
             for segment in segments.values():
                 yield render_into(store, segment, renderer, self.on_message)
             return
-        with _processes(self.n_jobs) as free, ThreadPoolExecutor(self.n_jobs) as pool:
+        waiting: queue.SimpleQueue[Segment] = queue.SimpleQueue()
+        for segment in segments.values():
+            waiting.put(segment)
+        done: queue.SimpleQueue[Rendered | Exception] = queue.SimpleQueue()
+        with _processes(min(self.n_jobs, len(segments))) as processes:
+            for process in processes:  # daemons: one that waits for a full disk does not keep the command from ending
+                arguments = (process, waiting, partial(render_into, store, on_message=self.on_message), done)
+                threading.Thread(target=_render_waiting, args=arguments, name="render", daemon=True).start()
+            for _ in segments:
+                found = done.get()
+                if isinstance(found, Exception):
+                    raise found
+                yield found
 
-            def work(segment: Segment) -> Rendered:
-                process = free.get()
-                try:
-                    return render_into(store, segment, process, self.on_message)
-                finally:
-                    free.put(process)
 
-            waiting = [pool.submit(work, segment) for segment in segments.values()]
+def _render_waiting(
+    process: RenderProcess,
+    waiting: "queue.SimpleQueue[Segment]",
+    render: Callable[..., Rendered],
+    done: "queue.SimpleQueue[Rendered | Exception]",
+) -> None:
+    """Render segments by a process until none waits, or the process has been closed."""
+    with suppress(queue.Empty):
+        while not process.is_closed:
+            segment = waiting.get_nowait()
             try:
-                for finished in as_completed(waiting):
-                    yield finished.result()
-            finally:
-                for one in waiting:
-                    one.cancel()
+                done.put(render(segment=segment, renderer=process))
+            except Exception as defect:  # noqa: BLE001 - raised again by the thread that waits for the results
+                done.put(defect)
 
 
 @contextmanager
-def _processes(n_jobs: int) -> Iterator["queue.Queue[RenderProcess]"]:
-    """Child processes, each bound to a core."""
+def _processes(n_jobs: int) -> Iterator[list[RenderProcess]]:
+    """Child processes, each bound to a core; they end at once with the context, whatever they render."""
     cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
     processes = [RenderProcess(cores[number % len(cores)] if cores else None) for number in range(n_jobs)]
-    free: queue.Queue[RenderProcess] = queue.Queue()
-    for process in processes:
-        free.put(process)
     try:
-        yield free
+        yield processes
     finally:
         for process in processes:
             process.close()

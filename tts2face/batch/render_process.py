@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from tts2face.batch.render_segment import SegmentRenderer
 
 KINDS: dict[str, type[Tts2faceError]] = {"InputError": InputError, "DataError": DataError, "BackendError": BackendError}
+KILL_AGAIN_S = 0.05
 MAX_SHOWN_CHARACTERS = 300  # of the standard error of a child that ended
 
 
@@ -42,6 +43,7 @@ class RenderProcess:
         self._child: subprocess.Popen[bytes] | None = None
         self._errors: Any = None
         self._lock = threading.Lock()
+        self.is_closed = False
 
     @property
     def pid(self) -> int | None:
@@ -57,8 +59,12 @@ class RenderProcess:
             As `SegmentRenderer.render`.
         ChildDiedError
             The child ended.
+        BackendError
+            The process was closed.
         """
         with self._lock:
+            if self.is_closed:
+                raise BackendError("the rendering process was closed; run again")
             child = self._child or self._start()
             request = json.dumps({"segment": segment.as_json(), "out": str(out)})
             try:
@@ -81,10 +87,15 @@ class RenderProcess:
             child.kill()
 
     def close(self) -> None:
-        """End the child process."""
-        if self._child is not None:
-            self._child.kill()
+        """End the child process at once and for good, also while another thread waits for it."""
+        self.is_closed = True
+        self.kill()
+        while not self._lock.acquire(timeout=KILL_AGAIN_S):  # the other thread was about to start the child
+            self.kill()
+        try:
             self._end()
+        finally:
+            self._lock.release()
 
     def _start(self) -> subprocess.Popen[bytes]:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the child

@@ -8,8 +8,8 @@ not removed.
 import contextlib
 import errno
 import os
+import secrets
 import shutil
-import tempfile
 from pathlib import Path
 from types import TracebackType
 
@@ -52,7 +52,6 @@ class Temporary:
                 self.path = _create(target, is_folder)
             except OSError:  # a file system without locks, where it is not removed
                 break
-        _HELD.add(self.path)
 
     def __enter__(self) -> "Temporary":
         """Return itself."""
@@ -133,14 +132,14 @@ def _create(target: Path, is_folder: bool) -> Path:
 
 
 def _create_once(target: Path, is_folder: bool) -> Path:
+    path = target.parent / f"{_name_prefix(target)}{secrets.token_hex(8)}"
+    _HELD.add(path)  # before it exists: an interruption may come between any two statements
     if is_folder:
-        folder = Path(tempfile.mkdtemp(prefix=_name_prefix(target), dir=target.parent))
-        folder.chmod(0o755)
-        return folder
-    handle, name = tempfile.mkstemp(prefix=_name_prefix(target), dir=target.parent)
-    os.close(handle)
-    os.chmod(name, 0o644)
-    return Path(name)
+        path.mkdir()
+    else:
+        path.touch(exist_ok=False)
+    path.chmod(0o755 if is_folder else 0o644)
+    return path
 
 
 def _lock_file(path: Path) -> int:
