@@ -103,6 +103,16 @@ def shown_url(url: str) -> str:
     return f"{scheme}://{user.partition(':')[0]}@{after}"
 
 
+def _waiting_query(kind: str) -> str:
+    """Query for one job of this version that waits in a queue, in the engine's table."""
+    table = "workflow_status" if kind == "sqlite" else "dbos.workflow_status"
+    queues = ", ".join(f"'{name}'" for name in (QUEUE, JOB_QUEUE, TALKER_QUEUE))
+    return (
+        f"SELECT 1 FROM {table} WHERE status = 'ENQUEUED' AND queue_name IN ({queues}) "
+        f"AND application_version = '{APPLICATION_VERSION}' LIMIT 1"
+    )
+
+
 class Workers:
     """Table of workers with the time of their last sign of life, by the clock of the database."""
 
@@ -111,7 +121,10 @@ class Workers:
 
         self._sql = sqlalchemy.text
         self._now = NOW[database_kind(url)]
+        self._waiting = _waiting_query(database_kind(url))
+        self._database_error = sqlalchemy.exc.SQLAlchemyError
         self._engine = open_engine(url)
+        self._looking: Any = None
 
     def __enter__(self) -> "Workers":
         """Return itself."""
@@ -119,6 +132,8 @@ class Workers:
 
     def __exit__(self, *_: object) -> None:
         """Close the connections."""
+        if self._looking is not None:
+            self._looking.close()
         self._engine.dispose()
 
     def create(self) -> None:
@@ -145,6 +160,25 @@ class Workers:
         with self._engine.begin() as connection:
             connection.execute(self._sql(_BEAT.format(now=self._now)), {"id": executor_id, "place": place[:200]})
             return {str(row[0]) for row in connection.execute(self._sql(query), {"age": DEAD_AFTER_S})}
+
+    def has_waiting(self) -> bool:
+        """Whether a job waits in a queue; for one thread, which asks often: on a connection that stays open.
+
+        Raises
+        ------
+        DatabaseAwayError
+            The database cannot be reached.
+        """
+        try:
+            if self._looking is None:
+                self._looking = self._engine.connect().execution_options(isolation_level="AUTOCOMMIT")
+            return self._looking.connection.driver_connection.execute(self._waiting).fetchone() is not None
+        except (self._engine.dialect.dbapi.Error, self._database_error) as away:
+            looking, self._looking = self._looking, None
+            if looking is not None:
+                looking.invalidate()
+                looking.close()
+            raise DatabaseAwayError(f"the database cannot be reached ({database_reason(away)}); try again") from away
 
     def leave(self, executor_id: str) -> None:
         """Note that a worker ends; the others take its jobs over without waiting."""

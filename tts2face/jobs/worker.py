@@ -42,6 +42,7 @@ from tts2face.jobs.database import (
     quiet_dbos,
 )
 from tts2face.jobs.job_runner import JobRunner, job_blobs
+from tts2face.jobs.pauses import EnginePauses
 from tts2face.jobs.segment_worker import SegmentWorker
 from tts2face.jobs.takeover import is_cancelled, list_running, poll_interval, return_work
 
@@ -94,6 +95,8 @@ class Worker:
         self.executor_id = f"{uuid.uuid4().hex[:20]}"
         self._place = f"{socket.gethostname()}, process {os.getpid()}"
         self._stopped = threading.Event()
+        self._pauses = EnginePauses()
+        self._look_s = poll_interval(1)
         self._vanished: set[str] = set()
         self._next_all_work_s = 0.0
         self._noting = threading.Lock()
@@ -110,7 +113,7 @@ class Worker:
         prepare_database(self._url)
         from dbos import DBOS
 
-        DBOS(
+        engine = DBOS(
             config={
                 "name": APPLICATION,
                 "system_database_url": self._url,
@@ -127,14 +130,17 @@ class Worker:
 
         @DBOS.workflow(name=WORKFLOW, max_recovery_attempts=MAX_DEATHS)
         def render_segment(address: str, content: dict[str, Any]) -> dict[str, Any]:
-            return self._segments.work(str(DBOS.workflow_id), address, content)
+            with self._pauses.busy():
+                return self._segments.work(str(DBOS.workflow_id), address, content)
 
         @DBOS.workflow(name=JOB_WORKFLOW, max_recovery_attempts=MAX_JOB_DEATHS)
         def run_job(job_id: str) -> str:
-            return self._jobs.run(job_id)
+            with self._pauses.busy():
+                return self._jobs.run(job_id)
 
         with Workers(self._url) as workers:
             self._launch(workers)
+            self._pauses.install(engine)
             beats = threading.Thread(target=self._beat, args=(workers,), name="beat", daemon=True)
             beats.start()
             try:
@@ -144,6 +150,7 @@ class Worker:
                 self._stopped.set()
                 beats.join(2 * BEAT_S)
                 self._segments.close()
+                self._pauses.wake()
                 DBOS.destroy(workflow_completion_timeout_sec=0)
                 with contextlib.suppress(Exception):
                     workers.leave(self.executor_id)
@@ -157,10 +164,9 @@ class Worker:
         try:
             workers.beat(self.executor_id, self._place)
             DBOS.launch()
-            interval_s = poll_interval(len(workers.alive()))
-            DBOS.register_queue(QUEUE, worker_concurrency=N_TAKEN, polling_interval_sec=interval_s)
-            DBOS.register_queue(JOB_QUEUE, worker_concurrency=N_JOBS, polling_interval_sec=interval_s)
-            DBOS.register_queue(TALKER_QUEUE, worker_concurrency=N_TALKERS, polling_interval_sec=interval_s)
+            self._look_s = poll_interval(len(workers.alive()))
+            for queue, n_places in ((QUEUE, N_TAKEN), (JOB_QUEUE, N_JOBS), (TALKER_QUEUE, N_TALKERS)):
+                DBOS.register_queue(queue, worker_concurrency=n_places, polling_interval_sec=self._look_s)
         except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException) as away:
             raise BackendError(f"the worker cannot start: {database_reason(away)}; check the database") from away
 
@@ -169,13 +175,18 @@ class Worker:
         self._stopped.set()
 
     def _beat(self, workers: Workers) -> None:
-        """Give signs of life, also while the database is away for a time."""
+        """Give signs of life and look for work, also while the database is away for a time."""
         import sqlalchemy
 
-        while not self._stopped.wait(BEAT_S):
+        next_beat_s = time.monotonic() + BEAT_S
+        while not self._stopped.wait(self._look_s if self._is_reached else BEAT_S):
             try:
-                self._vanished = workers.beat(self.executor_id, self._place)
-            except sqlalchemy.exc.SQLAlchemyError as away:
+                if not self._pauses.is_awake and workers.has_waiting():
+                    self._pauses.wake()
+                if time.monotonic() >= next_beat_s:
+                    next_beat_s = time.monotonic() + BEAT_S
+                    self._vanished = workers.beat(self.executor_id, self._place)
+            except (sqlalchemy.exc.SQLAlchemyError, DatabaseAwayError) as away:
                 self._note_database(away)
             else:
                 self._note_database(None)
@@ -213,13 +224,12 @@ class Worker:
                     else f"the database cannot be reached ({type(away).__name__}); trying again"
                 )
 
-    @staticmethod
-    def _look_at_all_work(workers: Workers) -> set[str]:
+    def _look_at_all_work(self, workers: Workers) -> set[str]:
         """Owners of running work that give no sign of life; the interval of the queue follows the number of workers."""
         from dbos import DBOS
 
         alive = set(workers.alive())
-        wanted = poll_interval(len(alive))
+        wanted = self._look_s = poll_interval(len(alive))
         for name in (QUEUE, JOB_QUEUE, TALKER_QUEUE):
             queue = DBOS.retrieve_queue(name)
             if queue is not None and not 0.8 < wanted / queue.polling_interval_sec < 1.25:
