@@ -1,9 +1,12 @@
-"""Progress bars on standard error."""
+"""Progress bars on standard error, and messages of what delays a first run."""
 
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from cli.process import write_message
+
+COMPILATION = "tts2face.compilation"  # name of its logger; the module itself would load numba
 Progress = Callable[[int, int], None]  # as in `tts2face.types`, which would load numpy for --help
 
 
@@ -15,11 +18,37 @@ def progress_bar(description: str, quiet: bool = False) -> Iterator[Progress | N
 
 
 @contextmanager
+def compilation_messages(quiet: bool = False) -> Iterator[None]:
+    """Say, unless quiet, that kernels are compiled and how many have been."""
+    import logging
+
+    log = logging.getLogger(COMPILATION)
+    if quiet or log.handlers:  # an outer context says it
+        yield
+        return
+    handler = logging.Handler()
+    handler.emit = lambda record: write_message(record.getMessage())  # type: ignore[method-assign]
+    log.addHandler(handler)
+    log.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+
+
+@contextmanager
 def stage_bar(quiet: bool = False) -> Iterator[Callable[[str], Progress] | None]:
     """Progress bar that restarts with each named stage; None if quiet or if standard error is no terminal."""
-    if quiet or not sys.stderr.isatty():
-        yield None
-        return
+    with compilation_messages(quiet):
+        if quiet or not sys.stderr.isatty():
+            yield None
+            return
+        with _bar() as begin_stage:
+            yield begin_stage
+
+
+@contextmanager
+def _bar() -> Iterator[Callable[[str], Progress]]:
     from rich.console import Console
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar

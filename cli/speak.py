@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cli.process import write_message
-from cli.progress import progress_bar
+from cli.progress import compilation_messages, progress_bar
 from lexicon.errors import InputError
 from tts2face.render.picture import Picture
 from tts2face.request import OWN_FACE, Request
@@ -62,6 +62,11 @@ def run_request(request: Request, picture: Picture, options: SpeakOptions) -> No
 def run_prepared(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions) -> None:
     """Write, explain or show a clip of a prepared request."""
     _check_options(prepared.request, picture, options)
+    with compilation_messages(options.quiet):
+        _make(prepared, picture, options)
+
+
+def _make(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions) -> None:
     from tts2face.synthesis.voice_preload import preload_voice
     from tts2face.voice.pool import VoicePool
 
@@ -206,8 +211,6 @@ def _open_session(options: SpeakOptions, voices: "VoicePool") -> "Session":
         check_output(options.out)
     session = options.models.open_session(voices)
     if not kernels_are_compiled(draws=options.out is not None or options.view):
-        if not options.quiet:
-            write_message("first run on this machine: compiling kernels (about ten seconds, once)")
         compile_kernels()
     return session
 

@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial import cKDTree
+from tests.service.conftest import RunningService, running_service
 
 from corpus_tools.prompts.coverage import count_units, sentence_units
 from corpus_tools.recording_process import prompts_answer
-from tests.service.conftest import RunningService, running_service
 from tests.studio.chromium import Browser, open_browser
 from tests.studio.fake_camera import write_fake_media
 from tests.studio.served import Page

@@ -2,21 +2,28 @@
 
 All kernels of the package use these decorators; numba is imported in this module only. If neither the package's folder
 nor the user's cache folder is writable, compiled code is cached in a private temporary folder.
+
+Compilation delays a first run by up to half a minute; it is logged at the level INFO.
 """
 
+import logging
 import os
 import stat
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import numba
+from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.runtime import rtsys
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
+LOG = logging.getLogger(__name__)
+REPORT_S = 5.0  # between two messages of a compilation
 CACHE_VARIABLE = "NUMBA_CACHE_DIR"  # set by the user; numba reads it itself
 
 
@@ -102,3 +109,27 @@ def _private_folder() -> Path:
 _FOLDER = cache_folder(Path(__file__).parent)
 if _FOLDER is not None:
     numba.config.CACHE_DIR = str(_FOLDER)
+
+
+class _Compilations(event.Listener):  # type: ignore[misc]
+    """Logs that functions are compiled: the first one, and now and then how many there have been."""
+
+    def __init__(self) -> None:
+        self.n_functions, self._next_s = 0, 0.0
+
+    def on_start(self, event: Any) -> None:
+        """Count the function whose compilation begins; functions from the disk cache never come here."""
+        self.n_functions += 1
+        if time.monotonic() >= self._next_s:
+            so_far = "" if self.n_functions == 1 else f": {self.n_functions} functions so far"
+            LOG.info(
+                "compiling kernels, once on this machine%s", so_far, extra={"fields": {"functions": self.n_functions}}
+            )
+            self._next_s = time.monotonic() + REPORT_S
+
+    def on_end(self, event: Any) -> None:
+        """Ignore the end of a compilation."""
+
+
+COMPILATIONS = _Compilations()
+event.register("numba:compile", COMPILATIONS)

@@ -10,10 +10,10 @@ import pytest
 pytest.importorskip("dbos", reason="needs the extra [batch]")
 
 import sqlalchemy
+from tests.jobs.test_jobs import queue
 
 from tests.jobs.conftest import wait_until
 from tests.jobs.stub_worker import Stub
-from tests.jobs.test_jobs import queue
 from tts2face.batch.segment import Segment
 from tts2face.jobs import pauses, worker
 from tts2face.jobs.pauses import IDLE_S, EnginePauses

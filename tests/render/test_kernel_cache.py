@@ -1,19 +1,23 @@
 """Cache folder of the compiled kernels where the package cannot be written."""
 
+import logging
 import os
 import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import numba
 import numpy as np
 import pytest
 from numba.core.dispatcher import Dispatcher
 
+from cli.progress import COMPILATION, compilation_messages, progress_bar
 from tts2face import compilation
 from tts2face.compilation import CACHE_VARIABLE, cache_folder
 from tts2face.exemplar import recorded_motion
 from tts2face.render import draw, raster, shade, strand_light, strands
+from tts2face.service.logs import LineFormatter
 from tts2face.speech.bs1770 import filter_biquad
 from tts2face.synthesis import warm_up
 from tts2face.synthesis.warm_up import kernels_are_compiled
@@ -120,3 +124,26 @@ def test_a_compiled_kernel_is_loaded_without_the_compiler():
     wanted = filter_biquad(ones, ones, np.ones(4)).tolist()  # compiles it where the cache is empty
     found = subprocess.run([sys.executable, "-c", COMPILED_ONLY], check=True, capture_output=True, text=True)
     assert found.stdout.split("\n")[0] == f"{wanted} 1 False"
+
+
+def test_compilation_is_announced_with_its_progress_unless_quiet(monkeypatch, capsys):
+    """By whatever command compiles, also within its progress bar, and once."""
+    monkeypatch.setattr(compilation, "REPORT_S", 0.0)
+    monkeypatch.setattr(compilation.COMPILATIONS, "_next_s", 0.0)
+    with compilation_messages(), progress_bar("rendering"):
+        numba.njit(lambda x: x + 1)(1)
+        numba.njit(lambda x: x + 2)(1)
+    first, second = capsys.readouterr().err.splitlines()[-2:]
+    for line in (first, second):
+        assert line.startswith("compiling kernels, once on this machine")
+    assert second.endswith("functions so far")
+    with compilation_messages(quiet=True), progress_bar("rendering", quiet=True):
+        numba.njit(lambda x: x + 3)(1)
+    assert capsys.readouterr().err == ""
+
+
+def test_compilation_is_an_event_of_the_service(caplog):
+    with caplog.at_level(logging.INFO, COMPILATION):
+        compilation.LOG.info("compiling kernels", extra={"fields": {"functions": 3}})
+    line = LineFormatter("text").format(caplog.records[-1])
+    assert line.endswith('INFO "compiling kernels" functions=3')

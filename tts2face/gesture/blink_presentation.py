@@ -87,7 +87,7 @@ def blink_profiles(style: Style) -> tuple[FloatArray, ...]:
 
 
 def _are_usual(closure: FloatArray, begins: IntArray) -> NDArray[np.bool_]:
-    """(B,) whether profiles close once, fully, and for a usual time; closures (T,) of all, with the first frame of each."""
+    """(B,) whether profiles close once, fully, and for a usual time; `begins`: first frames of `closures` (T,)."""
     is_shut = closure > SHUT
     shuts = np.concatenate([[False], is_shut[1:] & ~is_shut[:-1]])
     shuts[begins] = False

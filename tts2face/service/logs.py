@@ -13,6 +13,7 @@ from contextvars import ContextVar
 from typing import Any, TextIO
 
 LOG = logging.getLogger("tts2face.service")
+PACKAGE = "tts2face."  # begin of the names of loggers whose records are events without texts
 REQUEST_ID: ContextVar[str | None] = ContextVar("request_id", default=None)
 MAX_LINES = 10_000  # that wait to be written
 CLOSE_S = 1.0  # in which they are written at the end
@@ -58,7 +59,7 @@ class LineFormatter(logging.Formatter):
         return head + "".join(f" {name}={json.dumps(value, default=str)}" for name, value in content.items())
 
     def _fields(self, record: logging.LogRecord) -> dict[str, Any]:
-        if record.name == LOG.name and isinstance(fields := getattr(record, "fields", None), dict):
+        if record.name.startswith(PACKAGE) and isinstance(fields := getattr(record, "fields", None), dict):
             return {"event": record.getMessage(), **fields}
         message = record.getMessage()
         lines = message.splitlines() or [""]

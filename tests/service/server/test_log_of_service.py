@@ -18,6 +18,10 @@ def test_every_line_of_a_request_has_its_id_and_none_its_text(service: RunningSe
     assert all({"time", "level", "event"} <= set(event) for event in service.events())
 
 
+def test_the_log_says_when_a_process_can_serve(service: RunningService) -> None:
+    assert service.host.wait_for_event("synthesis process ready")["seconds"] > 0.0
+
+
 def test_server_timing_names_the_stages(client: httpx.Client) -> None:
     answer = client.post("/v1/audio/speech", json={"input": "Hello.", "model": "tts-1", "voice": "alloy"})
     timing = dict(part.split(";dur=") for part in answer.headers["server-timing"].split(", "))

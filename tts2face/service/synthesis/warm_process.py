@@ -3,6 +3,7 @@
 import asyncio
 import json
 import sys
+import time
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -11,7 +12,7 @@ from typing import Any
 from lexicon.errors import BackendError
 from tts2face.batch.render_process import KINDS as ERROR_KINDS
 from tts2face.child_process import child_environment
-from tts2face.service.logs import REQUEST_ID
+from tts2face.service.logs import REQUEST_ID, log_event
 from tts2face.service.synthesis.messages import DEFECT, HEADER, MAX_PAYLOAD_BYTES, Message, MessageKind
 from tts2face.service.synthesis.work import Work
 
@@ -140,6 +141,7 @@ class WarmProcess:
 
     async def _distribute(self, child: asyncio.subprocess.Process) -> None:
         assert child.stdout is not None
+        began = time.monotonic()
         while True:
             try:
                 head = await child.stdout.readexactly(HEADER.size)
@@ -152,6 +154,7 @@ class WarmProcess:
             message = Message(number, MessageKind(kind), payload, seconds)
             if message.kind == MessageKind.READY:
                 self.is_ready = True
+                log_event("synthesis process ready", process=child.pid, seconds=round(time.monotonic() - began, 3))
                 self._on_change()
             elif message.kind == MessageKind.CANCELLED:
                 self.on_cancelled(json.loads(payload)["seconds"])
