@@ -1,6 +1,11 @@
 """Shared fixtures: takes rendered by the project, and the folder of real recordings, which are not part of it."""
 
 import os
+
+os.environ.setdefault(
+    "OPENBLAS_NUM_THREADS", "1"
+)  # before numpy is loaded: threads for tiny matrices cost more than they save
+
 from collections import Counter
 from pathlib import Path
 from typing import Any
