@@ -79,7 +79,7 @@ def check_list(name: str, value: Any, kind: type) -> list[Any]:
 
 
 def check_fields(options: Any) -> None:
-    """Refuse values of a dataclass of options that are not of the types of its fields; texts and paths are converted.
+    """Refuse options, a dataclass, whose values are not of the types of its fields; texts and paths become each other.
 
     Raises
     ------

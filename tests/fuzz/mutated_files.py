@@ -38,14 +38,14 @@ MOST_S = 5.0  # of processor time for one file; usual are milliseconds
 MOST_CHARACTERS = 4_000  # of a message, which may name all choices
 REFUSALS = (InputError, DataError, BackendError)
 
-PROJECT = {
+PROJECT: dict[str, Any] = {
     "format": "tts2face project",
     "version": 1,
     "name": "Scene",
     "request": {
         "text": "Tea for two.", "seed": 3, "style": "delighted", "rate": 1.25, "volume": 0.5, "voice": "espeak",
         "language": "en-gb", "context": 2, "exemplars": 8, "articulation": "1.5", "fps": 25.0, "gestures": "fields",
-        "gain": "head=1.5", "expression": "happy=0.5@1-2", "pitch": True, "plain_delivery": True, "dictionary": "d.txt",
+        "gain": "head=1.5", "expression": "happy=0.5@1-2", "pitch": True, "plain_delivery": True,
     },
     "models": {
         "talker": "grid_s1", "face": "head", "identity": "kofi", "palette": "starter", "hair": "bob01",
@@ -158,7 +158,9 @@ def use_timeline(path: Path) -> None:
 
 def kinds(folder: Path) -> dict[str, tuple[Kind, ...]]:
     """Kinds of files by name, with the files from which they are made in a folder."""
-    (folder / "d.txt").write_text("tea T IY1\n", encoding="utf-8")
+    dictionary = folder / "words.txt"
+    dictionary.write_text("tea T IY1\n", encoding="utf-8")
+    project = PROJECT | {"request": {**PROJECT["request"], "dictionary": str(dictionary)}}
     made = {kind: folder / f"made.{kind}" for kind in ("talker", "face", "palette", "hair")}
     write_made_talker(made["talker"], has_face=True)
     write_made_face(made["face"])
@@ -176,7 +178,7 @@ def kinds(folder: Path) -> dict[str, tuple[Kind, ...]]:
             model(made["palette"], read_palette),
             model(made["hair"], lambda path: attach_hair(bare, read_hair(path), "#ff0000")),
         ),
-        "project": (document(".json", PROJECT, json_bytes, use_request),),
+        "project": (document(".json", project, json_bytes, use_request),),
         "timeline": (document(".json", timeline_json(WHOLE), json_bytes, use_timeline),),
         "cast": (document(".toml", CAST, toml_bytes, read_cast),),
         "mapping": (document(".toml", MAPPING, toml_bytes, read_mapping), table(MAPPING_TABLE, read_mapping)),

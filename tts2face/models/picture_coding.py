@@ -53,5 +53,5 @@ def _encode(pixels: NDArray[np.uint8], kind: str, **options: Any) -> NDArray[np.
 
 def _decode(content: NDArray[np.uint8], kind: str, mode: str, path: Path) -> NDArray[np.uint8]:
     what = f"the texture of {path}"
-    with open_picture(content.tobytes(), what, [kind], advice="build or copy the file again") as image:
+    with open_picture(content.tobytes(), what, (kind,), advice="build or copy the file again") as image:
         return np.array(image.convert(mode))

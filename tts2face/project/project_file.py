@@ -72,22 +72,18 @@ def parse_project(content: Any, name: str, folder: Path) -> Project:
         except (InputError, DataError) as wrong:
             raise DataError(f"{name}, {key}: {wrong}") from wrong
 
-    return part(
-        "name",
-        lambda title: Project(
-            title,
-            part("request", lambda given: _options(Request, given, folder, REQUEST_FILES), {}),
-            part("models", lambda given: _options(Models, given, folder, MODEL_FILES), {}),
-            part("picture", lambda given: _options(Picture, given, folder, PICTURE_FILES), {}),
-            part("timeline", lambda given: parse_timeline_object(check_mapping(given)), {}),
-            part("pronunciations", _pronunciations, {}),
-            part("edges", lambda given: tuple(map(_sentence_edges, check_type("edges", given, list))), []),
-            part("excluded", lambda given: tuple(map(_excluded, check_type("excluded", given, list))), []),
-            part("muted", lambda given: frozenset(check_list("muted", given, str)), []),
-            part("solo", lambda given: frozenset(check_list("solo", given, str)), []),
-        ),
-        "untitled",
+    parts = (
+        part("request", lambda given: _options(Request, given, folder, REQUEST_FILES), {}),
+        part("models", lambda given: _options(Models, given, folder, MODEL_FILES), {}),
+        part("picture", lambda given: _options(Picture, given, folder, PICTURE_FILES), {}),
+        part("timeline", lambda given: parse_timeline_object(check_mapping(given)), {}),
+        part("pronunciations", _pronunciations, {}),
+        part("edges", lambda given: tuple(map(_sentence_edges, check_type("edges", given, list))), []),
+        part("excluded", lambda given: tuple(map(_excluded, check_type("excluded", given, list))), []),
+        part("muted", lambda given: frozenset(check_list("muted", given, str)), []),
+        part("solo", lambda given: frozenset(check_list("solo", given, str)), []),
     )
+    return part("name", lambda title: Project(title, *parts), "untitled")
 
 
 def project_json(project: Project, folder: Path) -> dict[str, Any]:

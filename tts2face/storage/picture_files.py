@@ -2,7 +2,7 @@
 
 import io
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +19,7 @@ MAX_PIXELS = 100_000_000  # 300 MB as RGB; a small file can declare any size
 def open_picture(
     file: Path | bytes,
     what: str,
-    formats: Sequence[str] | None = None,
+    formats: tuple[str, ...] | None = None,
     *,
     advice: str = "give a PNG, JPEG or WebP picture",
 ) -> Iterator["Picture"]:
