@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tts2face.models.face import Face
 from tts2face.models.palette import Derivation, Palette
@@ -13,13 +13,9 @@ from tts2face.render.renderer import FrameRenderer
 from tts2face.request import Request
 from tts2face.speech.features import FEATURE_RATE
 from tts2face.synthesis.animated_face import AnimatedFace
-from tts2face.synthesis.byte_stream import StreamFormat, encode_stream
 from tts2face.synthesis.fixed_length import Length, clips_of_length
-from tts2face.synthesis.live_lips import LiveLips
 from tts2face.synthesis.live_speech import LiveSpeech
 from tts2face.synthesis.output_files import OutputFiles, plan_outputs
-from tts2face.synthesis.performance import Performance
-from tts2face.synthesis.performance_output import write_take
 from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, prepare_request, split_picture
 from tts2face.synthesis.sentence_memory import SentenceMemory
 from tts2face.synthesis.session_models import SessionModels, shown_face
@@ -27,6 +23,10 @@ from tts2face.synthesis.speech_stream import Piece, SpeechSpan, TimedSpeech, mea
 from tts2face.synthesis.written_clip import RequestSteps, WrittenClip, write_pieces
 from tts2face.types import Chunk, Clip, Progress, concatenate_clips
 from tts2face.voice.pool import VoicePool
+
+if TYPE_CHECKING:  # imports of less common calls
+    from tts2face.synthesis.live_lips import LiveLips
+    from tts2face.synthesis.performance import Performance
 
 
 class Session:
@@ -164,8 +164,10 @@ class Session:
         """A clip without an end, extended by `say` and `idle` of the result; options and errors as `clip`."""
         return LiveSpeech(Request(**options), self._models)
 
-    def listen(self, rate: int = FEATURE_RATE, *, audio_map: str | None = None) -> LiveLips:
+    def listen(self, rate: int = FEATURE_RATE, *, audio_map: str | None = None) -> "LiveLips":
         """Lip motion of speech that is still being spoken; arguments and errors as `LiveLips`."""
+        from tts2face.synthesis.live_lips import LiveLips
+
         return LiveLips(self._models, rate, audio_map)
 
     def stream_file(
@@ -197,6 +199,8 @@ class Session:
         """
         picture, options = split_picture(picture, options)
         prepared = prepare_request(text, options)
+        from tts2face.synthesis.byte_stream import StreamFormat, encode_stream
+
         return encode_stream(prepared, self._models, StreamFormat(format, picture, threads))
 
     def write(
@@ -272,7 +276,7 @@ class Session:
 
     def write_performance(
         self,
-        performance: Performance,
+        performance: "Performance",
         out: str | Path | None,
         *,
         picture: Picture | None = None,
@@ -298,6 +302,8 @@ class Session:
         picture = picture or Picture()
         inputs = {"the take": performance.take, "audio": performance.audio, "model": performance.model}
         outputs = plan_outputs(out, exports, inputs | {"background": picture.background})
+        from tts2face.synthesis.performance_output import write_take
+
         return write_take(performance, self._models, (outputs, picture), stages)
 
     def renderer(self, picture: Picture, *, has_gestures: bool = True) -> FrameRenderer:

@@ -7,7 +7,7 @@ the protocol only.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,10 @@ from tts2face.models.palette import Palette
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
 from tts2face.types import GiveWay, Trajectory, keep_on
-from tts2face.video.livelink import FaceCapture
-from tts2face.video.take import Take
+
+if TYPE_CHECKING:
+    from tts2face.video.livelink import FaceCapture
+    from tts2face.video.take import Take
 
 NO_PALETTE = "this face was prepared without a palette and has no gestures; prepare it with a palette"
 
@@ -65,7 +67,7 @@ class AnimatedFace(Protocol):
     def motion_of_parameters(self, speech: Trajectory) -> Trajectory:
         """Speech motion (T, K) from the talker's speech parameters (T, S)."""
 
-    def motion_of_take(self, take: Take, *, gain: float = 1.0) -> Trajectory:
+    def motion_of_take(self, take: "Take", *, gain: float = 1.0) -> Trajectory:
         """Motion (T, K) of a performer tracked in a video; `gain` multiplies it.
 
         Raises
@@ -74,7 +76,7 @@ class AnimatedFace(Protocol):
             The take is too short, or the face lacks landmarks or shapes.
         """
 
-    def motion_of_capture(self, capture: FaceCapture, *, gain: float = 1.0) -> Trajectory:
+    def motion_of_capture(self, capture: "FaceCapture", *, gain: float = 1.0) -> Trajectory:
         """Motion (T, K) of an ARKit capture: shapes of the same name take its weights, clipped to their limits.
 
         Raises
@@ -83,7 +85,7 @@ class AnimatedFace(Protocol):
             The face has no such shapes.
         """
 
-    def with_motion_of(self, take: Take) -> "AnimatedFace":
+    def with_motion_of(self, take: "Take") -> "AnimatedFace":
         """Extend the face by the lip motion of a take that the talker's recordings lack (T07, section 3.1).
 
         Raises

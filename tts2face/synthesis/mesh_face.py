@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +18,13 @@ from tts2face.models.talker import Talker
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
 from tts2face.retargeting.articulation import DEFAULT_ARTICULATION, Articulator, build_articulator
-from tts2face.retargeting.performer import build_performer_retargeter, match_shapes
 from tts2face.retargeting.to_face import Retargeter, build_retargeter
 from tts2face.synthesis.animated_face import NO_PALETTE, AnimatedFace, FaceMotion, Gestures
 from tts2face.types import GiveWay, Trajectory, keep_on
-from tts2face.video.livelink import FaceCapture
-from tts2face.video.take import Take
+
+if TYPE_CHECKING:
+    from tts2face.video.livelink import FaceCapture
+    from tts2face.video.take import Take
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,16 +69,20 @@ class MeshFace:
         """Shape weights (T, K) from the talker's speech parameters (T, S)."""
         return self.retargeter.retarget(speech)
 
-    def motion_of_take(self, take: Take, *, gain: float = 1.0) -> Trajectory:
+    def motion_of_take(self, take: "Take", *, gain: float = 1.0) -> Trajectory:
         """Shape weights (T, K) of a performer: lips by least squares on landmarks, eyes and brows from scores."""
+        from tts2face.retargeting.performer import build_performer_retargeter
+
         retargeter = build_performer_retargeter(take.landmarks, take.scores, self.face)
         return retargeter.weights(take.landmarks, take.scores, gain=gain)
 
-    def motion_of_capture(self, capture: FaceCapture, *, gain: float = 1.0) -> Trajectory:
+    def motion_of_capture(self, capture: "FaceCapture", *, gain: float = 1.0) -> Trajectory:
         """Shape weights (T, K) of an ARKit capture, matched by name; the gain does not apply to the gaze."""
+        from tts2face.retargeting.performer import match_shapes
+
         return match_shapes(capture.weights, self.face, gain=gain)
 
-    def with_motion_of(self, take: Take) -> "AnimatedFace":
+    def with_motion_of(self, take: "Take") -> "AnimatedFace":
         """Raise InputError: the shapes of a mesh are fixed."""
         del take
         raise InputError("missing motion can be appended to a talker's own face only; choose --face self")

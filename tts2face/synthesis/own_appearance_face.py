@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,10 @@ from tts2face.request import NATURAL
 from tts2face.retargeting.performer import lip_model
 from tts2face.synthesis.animated_face import NO_PALETTE, AnimatedFace, FaceMotion, Gestures
 from tts2face.types import GiveWay, Trajectory, keep_on, resting_head
-from tts2face.video.livelink import FaceCapture
-from tts2face.video.take import Take
+
+if TYPE_CHECKING:
+    from tts2face.video.livelink import FaceCapture
+    from tts2face.video.take import Take
 
 FIXED_FEATURES = ("gaze", "head", *SPEECH_GAINS)  # features that a talker's own video fixes
 
@@ -75,14 +77,14 @@ class OwnAppearanceFace:
         """Speech parameters with appearance parameters regressed on them, (T, K)."""
         return self.regression.motion(speech)
 
-    def motion_of_take(self, take: Take, *, gain: float = 1.0) -> Trajectory:
+    def motion_of_take(self, take: "Take", *, gain: float = 1.0) -> Trajectory:
         """Motion (T, K) of a performer, cloned by inner products (Theobald et al. 2007, eq. 5)."""
         model = lip_model(take.landmarks)
         names = tuple(f"shape{i}" for i in range(model.n_speech))
         speech = Trajectory(names, model.parameters(take.landmarks), take.fps)
         return self.regression.motion(build_parameter_transfer(model, self.talker.model, gain=gain).clone(speech))
 
-    def motion_of_capture(self, capture: FaceCapture, *, gain: float = 1.0) -> Trajectory:
+    def motion_of_capture(self, capture: "FaceCapture", *, gain: float = 1.0) -> Trajectory:
         """Raise InputError: a capture has no landmarks to clone."""
         del capture, gain
         raise InputError(
@@ -90,7 +92,7 @@ class OwnAppearanceFace:
             "or a .face file"
         )
 
-    def with_motion_of(self, take: Take) -> "AnimatedFace":
+    def with_motion_of(self, take: "Take") -> "AnimatedFace":
         """Add the modes of a take that the shape model lacks."""
         talker = extend_talker(lip_model(take.landmarks), self.talker)
         return replace(self, talker=talker, regression=fit_appearance_regression(talker))

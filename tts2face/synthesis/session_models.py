@@ -26,7 +26,6 @@ from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.clip_stream import SynthesisModels, pieces
 from tts2face.synthesis.gesture_layer import GestureLayer
 from tts2face.synthesis.mesh_face import mesh_face
-from tts2face.synthesis.own_appearance_face import own_appearance_face
 from tts2face.synthesis.prepared_request import PreparedRequest
 from tts2face.synthesis.sentence_memory import NO_MEMORY, SentenceMemory
 from tts2face.synthesis.speech_stream import Piece, SpeechModels
@@ -100,11 +99,14 @@ class SessionModels:
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
         self._voices = voices or VoicePool()
         self._without: tuple[tuple[ExcludedToken, ...], ExemplarModel] | None = None
-        self.speech_face: AnimatedFace = (
-            own_appearance_face(self.talker, self._exemplars)
-            if mesh is None
-            else mesh_face(self.talker, self._exemplars, mesh)
-        )
+        self.speech_face: AnimatedFace = self._make_face()
+
+    def _make_face(self) -> AnimatedFace:
+        if self._mesh is not None:
+            return mesh_face(self.talker, self._exemplars, self._mesh)
+        from tts2face.synthesis.own_appearance_face import own_appearance_face
+
+        return own_appearance_face(self.talker, self._exemplars)
 
     @property
     def palette(self) -> Palette | None:
