@@ -2,9 +2,7 @@
 
 import os
 
-os.environ.setdefault(
-    "OPENBLAS_NUM_THREADS", "1"
-)  # before numpy is loaded: threads for tiny matrices cost more than they save
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the processes of a run share the cores; numpy reads it when loaded
 
 from collections import Counter
 from pathlib import Path

@@ -46,23 +46,3 @@ def test_a_name_that_does_not_exist_is_an_attribute_error() -> None:
 
 def test_lazy_names_and_names_for_type_checkers_are_the_same() -> None:
     assert sorted(tts2face._HOMES) == sorted(tts2face.__all__)
-
-
-def test_a_script_that_uses_the_package_passes_mypy_strict(tmp_path: Path) -> None:
-    script = tmp_path / "script.py"
-    script.write_text(
-        "import tts2face\n"
-        "session = tts2face.Session(talker='grid_s1', face='head')\n"
-        "clip: tts2face.Clip = session.clip('Hello there.', style='delighted')\n"
-        "rate: int = clip.speech.waveform.rate\n"
-        "names: tuple[str, ...] = clip.motion.channels\n"
-        "for piece in session.stream('A long text.', fps=25):\n"
-        "    part: tts2face.Clip = piece.clip\n"
-        "tts2face.write_clip(clip, session.face, 'again.mp4')\n"
-        "styles: list[str] = [style.name for style in tts2face.styles()]\n"
-    )
-    answer = subprocess.run(
-        [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache"), str(script)],
-        capture_output=True, text=True, check=False, cwd=Path(tts2face.__file__).parents[1],
-    )  # fmt: skip
-    assert answer.returncode == 0, answer.stdout

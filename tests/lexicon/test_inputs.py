@@ -238,9 +238,3 @@ def test_nothing_else_reads_json_from_outside() -> None:
         if (count := len(re.findall(r"json\.loads?\(", path.read_text(encoding="utf-8"))))
     }
     assert found == own
-
-
-def test_nothing_else_reads_toml() -> None:
-    root = Path(__file__).parents[2]
-    paths = [path for room in ("cli", "corpus_tools", "lexicon", "tts2face") for path in (root / room).rglob("*.py")]
-    assert [path.name for path in paths if "tomllib" in path.read_text(encoding="utf-8")] == ["inputs.py"]
