@@ -28,9 +28,9 @@ STARTS_PYTHON = (
 )  # fmt: skip
 # Modules that read JSON or TOML themselves; `lexicon.inputs` does it for others.
 PARSES = (
-    "corpus_tools.head.assets", "lexicon.inputs", "lexicon.part_of_speech",
-    "tts2face.batch.render_process", "tts2face.child_process",
-    "tts2face.jobs.job_records", "tts2face.jobs.job_table", "tts2face.jobs.resource_table", "tts2face.service.routes.answers", "tts2face.service.state", "tts2face.service.synthesis.alignment_process",
+    "corpus_tools.head.assets", "lexicon.inputs", "lexicon.part_of_speech", "tts2face.batch.render_process",
+    "tts2face.child_process", "tts2face.jobs.job_records", "tts2face.jobs.job_table", "tts2face.jobs.resource_table",
+    "tts2face.service.routes.answers", "tts2face.service.state", "tts2face.service.synthesis.alignment_process",
     "tts2face.service.synthesis.remote_aligner", "tts2face.service.synthesis.synthesis_process",
     "tts2face.service.synthesis.warm_process", "tts2face.storage.tensors", "tts2face.studio.projects.bundle",
     "tts2face.studio.requests", "tts2face.voice.espeak", "tts2face.voice.espeak_child",
