@@ -194,6 +194,12 @@ def test_a_crash_of_espeak_is_reported() -> None:
         load_voice("espeak", "de").speak(words)
 
 
+def test_a_name_that_espeak_cuts_within_a_character_is_read() -> None:
+    """Names of phones have 8 bytes in its events, and ˈaɪʊɹ, its way to report this word's vowels, has 9."""
+    speech = load_voice("espeak", "en-us").speak([SpokenWord("tower", parse_ipa("tˈaʊəɹ"))])
+    assert phones_by_word(speech) == {"tower": "taʊəɹ"}
+
+
 @pytest.mark.parametrize("name", ["heart", "espeak"])
 def test_very_long_words_are_spoken_in_english(name: str) -> None:
     speech = load_voice(name, "en-us").speak("-".join(["straightforwardness"] * 14) + " may")
