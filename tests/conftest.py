@@ -16,7 +16,7 @@ TESTS = Path(__file__).resolve().parent
 GROUPS = {  # name of a folder and of a marker: what the tests in it do
     "server": "start servers, workers or databases",
     "browser": "drive a browser",
-    "build": "make talkers, faces or styles of recordings",
+    "build": "make talkers, faces or styles of recordings, and faces of characters",
     "commands": "run command lines of the documentation",
     "fuzz": "try many generated or hostile inputs",
 }

@@ -73,6 +73,7 @@ def test_shapes_and_landmarks_come_back(name: str, tmp_path: Path) -> None:
     assert {shape for eye in face.eyes for shape in eye.turns} == {shape for eye in head.eyes for shape in eye.turns}
 
 
+@pytest.mark.smoke
 def test_speech_moves_an_imported_face_as_the_face_it_was_made_of(plain: ImportedFace) -> None:
     """Without a score map, which a character gets by `face calibrate` only."""
     talker, head = load_talker("grid_s1"), replace(shipped_head(), scores=None)
@@ -280,6 +281,7 @@ def test_a_wrong_mapping_is_refused(name: str, content: str, reason: str, tmp_pa
         read_mapping(tmp_path / name)
 
 
+@pytest.mark.smoke
 def test_a_source_that_does_not_exist_is_named(tmp_path: Path) -> None:
     character = write_character_file(tmp_path / "character.glb")
     (tmp_path / "map.tsv").write_text("jawOpen\tMouthWide\n")

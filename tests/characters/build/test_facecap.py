@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import BackendError
-from tests.characters.test_animation import Played
+from tests.characters.build.test_animation import Played
 from tests.exports import programs
 from tts2face.characters.animation import write_character
 from tts2face.characters.gltf_character import read_gltf_character
