@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-pytest_plugins = ["tests.started", "tests.running"]
+pytest_plugins = ["tests.started", "tests.running", "tests.models_once"]
 
 TESTS = Path(__file__).resolve().parent
 GROUPS = {  # name of a folder and of a marker: what the tests in it do

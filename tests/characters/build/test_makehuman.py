@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from lexicon.errors import BackendError
-from tests.characters.makehuman import makehuman, write_obj_folder, write_rigged
 from tests.characters.build.test_animation import Played, made_clip
+from tests.characters.makehuman import makehuman, write_obj_folder, write_rigged
 from tts2face.characters.animation import write_character
 from tts2face.characters.importing import ImportedFace, import_face
 from tts2face.characters.landmark_table import landmark_table

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.characters.made import METRES, Variant, shipped_head, write_character_file, write_landmarks
 from tests.characters.build.test_animation import FPS, N_FRAMES, Played, made_clip
+from tests.characters.made import METRES, Variant, shipped_head, write_character_file, write_landmarks
 from tests.exports import programs
 from tts2face.characters.animation import write_character
 from tts2face.characters.bone_tracks import NECK_SHARE, share_of_rotation
