@@ -1,7 +1,8 @@
 """From text to a finished clip: speed, cold start, memory.
 
 Run: ``python tests/bench/bench_clip.py`` (``--minutes 10`` for the long text). A reference loop of plain numpy runs
-before and after, so that figures of different machines and times can be compared.
+before and after, so that figures of different machines and times can be compared. ``--start`` prints only the processor
+time of commands in new processes; with ``--beside ../other``, in turn with those of another working copy.
 """
 
 import argparse
@@ -59,6 +60,49 @@ def whole_clip(folder: Path, n_runs: int = 3) -> None:
     spent = time.perf_counter() - began
     print(f"drawing and encoding alone: {frames / spent:.0f} frames/s")
     print(f"reference loop: {before:.2f} s before, {reference_s():.2f} s after")
+
+
+FIRST_FRAME = """
+import os, sys, time
+from tts2face.render.draw import MeshRenderer
+frames = MeshRenderer.frames
+def first(*arguments, **options):
+    for _ in frames(*arguments, **options):
+        print(time.process_time(), flush=True)
+        os._exit(0)
+MeshRenderer.frames = first
+from cli.main import run
+run(sys.argv[1:])
+"""
+STARTS = {"wav": ("start.wav", COMMAND), "csv": ("start.csv", COMMAND), "first frame": ("start.mp4", FIRST_FRAME)}
+
+
+def start_cpu(folder: Path, trees: list[Path], n_runs: int = 5) -> None:
+    """Median processor seconds of one sentence in a new process on one core, with compiled kernels on disk."""
+    for what, (name, code) in STARTS.items():
+        spent: dict[Path, list[float]] = {tree: [] for tree in trees}
+        for run in range(n_runs + 1):
+            for tree in trees:
+                (folder / name).unlink(missing_ok=True)
+                seconds = _cpu_of(["-c", code, SHORT, "--out", str(folder / name), "--quiet"], tree)
+                if run:  # the first one warms the disk
+                    spent[tree].append(seconds)
+        medians = [float(np.median(spent[tree])) for tree in trees]
+        print(f"{what}: " + "; ".join(f"{tree} {median:.2f} s" for tree, median in zip(trees, medians, strict=True)))
+        if len(medians) > 1:
+            print(f"    {medians[0] / medians[1]:.2f} of the other's")
+
+
+def _cpu_of(arguments: list[str], tree: Path) -> float:
+    """Processor seconds of a Python process in a working copy: those it prints, or those until it ends."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    environment["PYTHONPATH"] = str(tree.resolve())
+    before = child_cpu_s()
+    done = subprocess.run(
+        [sys.executable, *arguments], check=True, capture_output=True, text=True, env=environment,
+        preexec_fn=lambda: os.sched_setaffinity(0, {max(os.sched_getaffinity(0))}),
+    )  # fmt: skip
+    return float(done.stdout) if done.stdout else child_cpu_s() - before
 
 
 def cold_start(folder: Path) -> None:
@@ -120,8 +164,14 @@ def main() -> None:
     """Print the figures of docs/performance.md."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=0.0, help="also speak a text of so many minutes")
-    minutes = parser.parse_args().minutes
+    parser.add_argument("--start", action="store_true", help="processor time of commands in new processes only")
+    parser.add_argument("--beside", type=Path, help="another working copy, whose commands run in turn with these")
+    chosen = parser.parse_args()
+    minutes = chosen.minutes
     with tempfile.TemporaryDirectory() as name:
+        start_cpu(Path(name), [Path.cwd(), *([chosen.beside] if chosen.beside else [])])
+        if chosen.start:
+            return
         if minutes:
             long_text(Path(name), minutes)
         whole_clip(Path(name))

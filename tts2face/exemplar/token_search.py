@@ -70,7 +70,10 @@ def context_index(
         order = order[is_kept[order]]
     keys = np.column_stack([tokens.phone, near])[order]
     firsts = np.flatnonzero(np.concatenate([[True], (keys[1:] != keys[:-1]).any(1)]))
-    likeness = [np.maximum.reduceat(similarity[column[order]], firsts, axis=0) for column in tokens.context.T]
+    likeness = [similarity[column] for column in keys[firsts, 1:].T]  # the same within a group
+    likeness += [
+        np.maximum.reduceat(similarity[column[order]], firsts, axis=0) for column in tokens.context.T[len(likeness) :]
+    ]
     return ContextIndex(
         order,
         np.concatenate([firsts, [len(order)]]).astype(np.int32),

@@ -13,11 +13,14 @@ from tts2face.face.landmark_fit import axis_scales, landmark_motion, landmark_po
 from tts2face.models.face import Eye, Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS, N_MESH_LANDMARKS
+from tts2face.storage.disk_cache import computed_once
 
 DEFAULT_FACE = "head"
 SOFT_PARTS = ("lash", "brow")  # substrings of the names of parts that move with the skin
 SUPPORT = 0.3  # relative to the distance of the outer eye corners, about 27 mm: from a brow to its lid
 MERGE_DISTANCE = 0.02  # relative to the same distance: landmarks closer than 2 mm, as on closed lips, are merged
+MIN_CACHED_POINTS = 5000  # fewer are interpolated as fast as a file is read
+CACHE_KIND, CACHE_VERSION = "displacements", 1  # raised when the interpolant of the same motion changes
 DIGITS = 5  # decimals of a displacement in mm; the last bits of a solver depend on its threads
 MAX_CARRIED_WEIGHT = 1.5  # upper limit of transferred shapes, whose effect may be smaller than on the default head
 EYEBALL_RETRACTION_FACTOR = 1.5  # relative to the default head: transferred lids follow the eyeball less closely
@@ -75,9 +78,28 @@ def spread_landmark_motion(
         places[numbers], displacements[numbers].reshape(len(numbers), -1), MERGE_DISTANCE * size
     )
     soft = soft_vertices(face)
-    interpolated = fit_local_interpolant(centres, merged, SUPPORT * size)(face.vertices[soft])
-    shapes[:, soft] = np.round(interpolated, DIGITS).reshape(len(soft), -1, 3).transpose(1, 0, 2)
+    interpolated = _interpolate((centres, merged, SUPPORT * size), face.vertices[soft])
+    shapes[:, soft] = interpolated.reshape(len(soft), -1, 3).transpose(1, 0, 2)
     return shapes
+
+
+def _interpolate(known: tuple[FloatArray, FloatArray, float], points: Float32Array) -> Float32Array:
+    """Displacements (P, E) at points (P, 3), from centres (N, 3), their displacements (N, E) and the support, in mm."""
+
+    def compute() -> dict[str, Float32Array]:
+        return {"moved": np.round(fit_local_interpolant(*known)(points), DIGITS).astype(np.float32)}
+
+    if len(points) < MIN_CACHED_POINTS:
+        return compute()["moved"]
+    centres, displacements, support = known
+    shape = (len(points), displacements.shape[1])
+    return computed_once(
+        CACHE_KIND,
+        CACHE_VERSION,
+        [centres, displacements, repr(float(support)), points],
+        compute,
+        lambda kept: "moved" in kept and kept["moved"].dtype == np.float32 and kept["moved"].shape == shape,
+    )["moved"]
 
 
 def append_shapes(face: Face, names: Sequence[str], shapes: Float32Array, limits: NDArray[np.floating]) -> Face:

@@ -16,7 +16,7 @@ from tts2face.gesture.field_kernels import MIN_MOMENT_GAP, SEARCH_SLACK, generat
 from tts2face.gesture.kd_tree import KdTree, build_tree, count_nodes
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.numeric import principal_axes
-from tts2face.storage.disk_cache import fingerprint, read_cached, write_cached
+from tts2face.storage.disk_cache import computed_once
 
 N_SEARCH_AXES = 8  # principal axes of the windows in which the search tree is built
 AXES_STRIDE = 8  # the axes are computed from every eighth window; all windows give the same axes
@@ -197,12 +197,13 @@ def build_field(
     unindexed = Field(scaled, weighted, starts, NO_AXES, NO_TREE, scale, weights, 1.0, options)
     if len(usable) < MIN_CACHED_MOMENTS:
         return _index_field(unindexed, usable)
-    name = fingerprint([scaled, weighted, lengths, repr(options)])
-    kept = read_cached(CACHE_KIND, CACHE_VERSION, name)
-    if kept is None or not _is_index(kept, unindexed, usable):
-        made = _index_field(unindexed, usable)
-        write_cached(CACHE_KIND, CACHE_VERSION, name, _index_arrays(made))
-        return made
+    kept = computed_once(
+        CACHE_KIND,
+        CACHE_VERSION,
+        [scaled, weighted, lengths, repr(options)],
+        lambda: _index_arrays(_index_field(unindexed, usable)),
+        lambda found: _is_index(found, unindexed, usable),
+    )
     tree = KdTree(*(np.array(kept[f"tree_{name}"]) for name in TREE_ARRAYS))
     return replace(unindexed, axes=np.array(kept["axes"]), tree=tree, median_distance=float(kept["median_distance"][0]))
 

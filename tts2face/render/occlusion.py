@@ -22,7 +22,7 @@ from tts2face.render.fragments import face_normals, vertex_normals
 from tts2face.render.picture_kernels import allocate_buffers, draw_samples, project_surface
 from tts2face.render.raster import GRID_SHIFT, HOLES, NOT_DRAWN, transform_to_camera
 from tts2face.render.surface import Surface, build_surface
-from tts2face.storage.disk_cache import fingerprint, read_cached, write_cached
+from tts2face.storage.disk_cache import computed_once
 
 N_DIRECTIONS = 128  # docs/decisions/112-occlusion.md: more change the light by less than its smoothing
 VIEW_SAMPLES = 192  # samples along a side of the views: 1.5 mm each on a head
@@ -57,25 +57,22 @@ def occlusion_of(face: Face, surface: Surface, threads: int) -> Bits:
         return face.occlusion
     if len(face.vertices) < MIN_CACHED_VERTICES:
         return _trace(face, surface, threads, N_DIRECTIONS)
-    name = _fingerprint(face)
-    kept = (read_cached(CACHE_KIND, CACHE_VERSION, name) or {}).get("bits")
-    if (
-        kept is not None
-        and kept.dtype == np.uint8
-        and kept.shape[:2] == (len(occlusion_poses(face)), len(face.vertices))
-    ):
-        return np.asarray(kept, np.uint8)
-    bits = _trace(face, surface, threads, N_DIRECTIONS)
-    write_cached(CACHE_KIND, CACHE_VERSION, name, {"bits": bits})
-    return bits
+    shape = (len(occlusion_poses(face)), len(face.vertices))
+    return computed_once(
+        CACHE_KIND,
+        CACHE_VERSION,
+        _geometry(face),
+        lambda: {"bits": _trace(face, surface, threads, N_DIRECTIONS)},
+        lambda kept: "bits" in kept and kept["bits"].dtype == np.uint8 and kept["bits"].shape[:2] == shape,
+    )["bits"]
 
 
-def _fingerprint(face: Face) -> str:
-    """Name of a face's geometry: vertices, triangles, jaw, and what of its parts is drawn."""
+def _geometry(face: Face) -> list[NDArray[Any] | str]:
+    """Vertices, triangles, jaw of a face, and what of its parts is drawn."""
     jaw = [face.shapes[face.shape_names.index("jawOpen")]] if "jawOpen" in face.shape_names else []
     parts = repr([(part.count, part.opacity, part.cutout, part.kind) for part in face.parts])
     alphas = ["" if texture.alpha is None else texture.alpha for texture in face.textures]
-    return fingerprint([face.vertices, face.triangles, occlusion_poses(face), *jaw, parts, *alphas])
+    return [face.vertices, face.triangles, occlusion_poses(face), *jaw, parts, *alphas]
 
 
 def occlusion_poses(face: Face) -> NDArray[np.float32]:

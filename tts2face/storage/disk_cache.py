@@ -1,7 +1,8 @@
 """Computed arrays in the user's cache folder, by a fingerprint of what they were computed from."""
 
 import hashlib
-from collections.abc import Iterable
+import zlib
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -28,10 +29,30 @@ def fingerprint(parts: Iterable[NDArray[Any] | str]) -> str:
     return content.hexdigest()
 
 
+def computed_once(
+    kind: str,
+    version: int,
+    parts: Iterable[NDArray[Any] | str],
+    compute: Callable[[], Arrays],
+    fits: Callable[[Arrays], bool],
+) -> Arrays:
+    """Arrays that follow from `parts` alone: those of the cache folder if they fit, else computed and kept there.
+
+    `version` is raised when `compute` changes its result.
+    """
+    name = fingerprint(parts)
+    found: Arrays | None = read_cached(kind, version, name)
+    if found is None or not fits(found):
+        found = compute()
+        write_cached(kind, version, name, found)
+    return found
+
+
 def read_cached(kind: str, version: int, name: str) -> dict[str, NDArray[Any]] | None:
     """Arrays that `write_cached` kept under a name; None without them, or if they are damaged or of another version."""
     with suppress(InputError, DataError):
-        return read_tensors(_folder(kind) / name, kind, version)[0]
+        arrays, metadata = read_tensors(_folder(kind) / name, kind, version)
+        return arrays if metadata.get("checksum") == _checksum(arrays) else None
     return None
 
 
@@ -40,10 +61,18 @@ def write_cached(kind: str, version: int, name: str, arrays: Arrays) -> None:
     folder = _folder(kind)
     with suppress(BackendError, OSError):
         folder.mkdir(parents=True, exist_ok=True)
-        write_tensors(folder / name, kind, version, arrays, {})
+        write_tensors(folder / name, kind, version, arrays, {"checksum": _checksum(arrays)})
         files = sorted(folder.iterdir(), key=lambda path: path.stat().st_mtime)
         for path in files[:-MAX_FILES]:
             path.unlink(missing_ok=True)
+
+
+def _checksum(arrays: Arrays) -> int:
+    """CRC-32 of the bytes of arrays, by which a damaged file is noticed."""
+    found = 0
+    for name in sorted(arrays):
+        found = zlib.crc32(np.ascontiguousarray(arrays[name]).reshape(-1).view(np.uint8), found)
+    return found
 
 
 def _folder(kind: str) -> Path:
