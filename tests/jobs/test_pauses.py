@@ -10,18 +10,16 @@ import pytest
 pytest.importorskip("dbos", reason="needs the extra [batch]")
 
 import sqlalchemy
-from tests.jobs.test_jobs import queue
 
-from tests.jobs.conftest import wait_until
+from tests.jobs.server.test_jobs import queue
 from tests.jobs.stub_worker import Stub
+from tests.running import eventually
 from tts2face.batch.segment import Segment
 from tts2face.jobs import pauses, worker
 from tts2face.jobs.pauses import IDLE_S, EnginePauses
 
 N_BEATS = 8  # while the worker has nothing to do
-MAX_STATEMENTS = (
-    12  # of the engine meanwhile, which are the last ones of a look; it had about 60 with each look at 0.2 s
-)
+MAX_STATEMENTS = 12  # of the engine meanwhile, the last ones of a look; it had about 60 with each look at 0.2 s
 
 
 def test_a_worker_without_work_asks_little_and_finds_new_work(
@@ -72,19 +70,19 @@ def test_the_engine_looks_while_there_is_work_and_then_sleeps(monkeypatch: pytes
     thread = threading.Thread(target=engine.run, daemon=True)
     with paused.busy():
         thread.start()
-        wait_until(lambda: engine.n_looks > 20)
-    wait_until(lambda: not paused.is_awake)
+        eventually(lambda: engine.n_looks > 20)
+    eventually(lambda: not paused.is_awake)
 
     def rests() -> bool:
         before = engine.n_looks
         thread.join(0.1)
         return engine.n_looks == before
 
-    wait_until(rests)
+    eventually(rests)
     n_looks = engine.n_looks
     monkeypatch.setattr(pauses, "AWAKE_S", 60.0)
     paused.wake()
-    wait_until(lambda: engine.n_looks > n_looks + 20)
+    eventually(lambda: engine.n_looks > n_looks + 20)
     engine.background_thread_stop_events[0].set()
     thread.join(5.0)
     assert not thread.is_alive()
