@@ -110,7 +110,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         for name in GROUPS.keys() & set(folders):
             item.add_marker(name)
         if SHARED_SERVER in getattr(item, "fixturenames", ()):
-            item.add_marker(pytest.mark.xdist_group("browser" if "browser" in folders else SHARED_SERVER))
+            is_apart = "browser" in folders and not item.get_closest_marker("smoke")
+            item.add_marker(pytest.mark.xdist_group("browser" if is_apart else SHARED_SERVER))
     items.sort(key=lambda item: (item.get_closest_marker("xdist_group") is None, not _groups(item)))
 
 
