@@ -99,7 +99,7 @@ def _cpu_of(arguments: list[str], tree: Path) -> float:
     environment["PYTHONPATH"] = str(tree.resolve())
     before = child_cpu_s()
     done = subprocess.run(
-        [sys.executable, *arguments], check=True, capture_output=True, text=True, env=environment,
+        [sys.executable, *arguments], check=True, capture_output=True, text=True, env=environment, cwd=tree,
         preexec_fn=lambda: os.sched_setaffinity(0, {max(os.sched_getaffinity(0))}),
     )  # fmt: skip
     return float(done.stdout) if done.stdout else child_cpu_s() - before

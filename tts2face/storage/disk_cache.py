@@ -71,7 +71,7 @@ def _checksum(arrays: Arrays) -> int:
     """CRC-32 of the bytes of arrays, by which a damaged file is noticed."""
     found = 0
     for name in sorted(arrays):
-        found = zlib.crc32(np.ascontiguousarray(arrays[name]).reshape(-1).view(np.uint8), found)
+        found = zlib.crc32(np.ascontiguousarray(arrays[name]).reshape(-1).view(np.uint8).data, found)
     return found
 
 

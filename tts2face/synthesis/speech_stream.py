@@ -155,12 +155,13 @@ def sounds(prepared: PreparedRequest, models: SpeechModels) -> Iterator[Waveform
 def _sounds(prepared: PreparedRequest, models: SpeechModels) -> Iterator[TimedSpeech]:
     """Pieces of which only the sound is that of `timed_speech`: it is not aligned with its phones."""
     fps, first_frame = prepared.fps, 0
+
+    def speak(voice: Voice, sentence: Sentence, request: Request, voices: Voices) -> tuple[Waveform, int]:
+        return sentence_sound(voice, sentence, request, voices), sentence.n_characters
+
+    found: Iterator[tuple[Waveform, int]] = _spoken(prepared, models, speak)
     if prepared.request.idle is not None:
         found = ((spoken.sound, n_steps) for spoken, n_steps, _ in speak_sentences(prepared, models))
-    else:
-        found = _spoken(prepared, models, lambda voice, sentence, *rest: (
-            sentence_sound(voice, sentence, *rest), sentence.n_characters
-        ))  # fmt: skip
     for sound, n_steps in found:
         last_frame = first_frame + frame_count(sound.duration, float(fps))
         n_samples = first_sample(last_frame, sound.rate, fps) - first_sample(first_frame, sound.rate, fps)
