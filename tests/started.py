@@ -15,11 +15,16 @@ import tempfile
 from pathlib import Path
 
 RUN = "TTS2FACE_TEST_RUN"
+# A shell lets its background jobs ignore these, and so would the processes that tests send them to.
+IGNORED_IN_BACKGROUND = (signal.SIGINT, signal.SIGQUIT, signal.SIGHUP)
 PARENT_S = 1.0  # a process that pytest has forked can hold its pipe: the end of pytest itself is seen after this time
 
 
 def pytest_configure(config: object) -> None:
     """Start the watchdog; processes of pytest-xdist belong to the run that has started them."""
+    for number in IGNORED_IN_BACKGROUND:
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
     if hasattr(config, "workerinput") or not Path("/proc/self/environ").exists():
         return
     folder = tempfile.mkdtemp(prefix="tts2face-tests-")

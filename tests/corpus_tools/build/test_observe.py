@@ -152,7 +152,6 @@ def test_a_damaged_part_of_the_cache_is_made_again(few_takes, tmp_path, face_mod
         np.testing.assert_array_equal(one.landmarks, other.landmarks)
 
 
-@pytest.mark.smoke
 @ONLY_RENDERED
 def test_a_talker_is_built_with_its_provenance(few_takes, cache, tmp_path, face_model):
     (few_takes / "provenance.json").write_text('{"licence": "CC BY 4.0", "language": "en-gb"}')
