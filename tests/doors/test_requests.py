@@ -124,10 +124,14 @@ def test_pieces_end_on_frames_at_any_rate(fps: float, session: Session) -> None:
 
 
 def test_lips_rest_in_silence_and_at_both_ends(session: Session) -> None:
-    weights = session.clip(Request(text=TEXT, gestures="none")).motion.values
+    """They begin to move 0.2 s before the first sound; when that is differs a little between processors."""
+    spoken = session.clip(Request(text=TEXT, gestures="none"))
+    weights, first_sound_s = spoken.motion.values, spoken.speech.phones.edges[1]
+    n_resting = int((first_sound_s - 0.2) * spoken.motion.fps) + 1
+    assert n_resting >= 3
     for frame in (0, -1):
         assert np.abs(weights[frame] - weights[0]).max() < 1e-4
-    assert np.abs(np.diff(weights[:5], axis=0)).max() < 0.02
+    assert np.abs(np.diff(weights[:n_resting], axis=0)).max() < 0.02
 
 
 @pytest.mark.parametrize(
