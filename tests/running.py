@@ -26,10 +26,11 @@ HostService = Callable[..., "AbstractContextManager[HostedService]"]
 
 def eventually(condition: Callable[[], Any], seconds: float = 60.0, message: Callable[[], str] = str) -> Any:
     """The first true value of a condition; the test fails if there is none within some seconds."""
-    deadline = time.monotonic() + seconds
+    deadline, pause_s = time.monotonic() + seconds, 0.02
     while not (found := condition()):
         assert time.monotonic() < deadline, message() or f"not within {seconds:g} s"
-        time.sleep(0.02)
+        time.sleep(pause_s)
+        pause_s = min(1.3 * pause_s, 0.2)
     return found
 
 
@@ -136,7 +137,12 @@ class ServeProcess(LoggedProcess, RunningService):
 @contextmanager
 def serve_process(*arguments: str, is_ready: bool = True, **options: Any) -> Iterator[ServeProcess]:
     """A service that ends with the block; `is_ready`: with its synthesis processes; parameters as `ServeProcess`."""
-    running = ServeProcess(*arguments, **options)
+    with _until_the_end(ServeProcess(*arguments, **options), is_ready=is_ready) as running:
+        yield running
+
+
+@contextmanager
+def _until_the_end(running: Any, *, is_ready: bool) -> Iterator[Any]:
     try:
         if is_ready:
             running.wait_until_ready()
@@ -203,12 +209,8 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HostService]:
     def start(*, studio: bool = False, is_ready: bool = True, **settings: Any) -> Iterator[HostedService]:
         names = {name if name.isupper() else PREFIX + name.upper(): str(value) for name, value in settings.items()}
         running = HostedService(process, next(numbers), names, studio=studio)
-        try:
-            if is_ready:
-                running.wait_until_ready()
+        with _until_the_end(running, is_ready=is_ready):
             yield running
-        finally:
-            running.close()
 
     yield start
     process.end()

@@ -10,14 +10,16 @@ import asyncio
 import json
 import os
 import sys
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tts2face.service import state as service_state
 from tts2face.service.logs import configure_logs, log_event
 from tts2face.service.server import DrainingServer, make_server
-from tts2face.service.settings import read_settings
+from tts2face.service.settings import ServiceSettings, read_settings
 from tts2face.service.synthesis.pool import Pool, PoolSettings
 from tts2face.telemetry import disable_telemetry
 
@@ -64,7 +66,7 @@ class Host:
         os.environ |= order["variables"]
         try:
             settings = replace(read_settings(), port=0, processes=1, studio=order["studio"])
-            server = make_server(settings, self._mounts() if order["studio"] else [])
+            server = self._make_server(settings, self._mounts() if order["studio"] else [])
         finally:
             for name in order["variables"]:
                 del os.environ[name]
@@ -74,12 +76,26 @@ class Host:
         port = server.servers[0].sockets[0].getsockname()[1]
         return log_event("started", number=order["number"], url=f"http://127.0.0.1:{port}")
 
+    def _make_server(self, settings: ServiceSettings, mounts: list[Any]) -> DrainingServer:
+        """A server whose metrics, and those of the earlier ones, hear of works that were cancelled."""
+        known = [] if self._pool is None else [process.on_cancelled for process in self._pool.processes]
+        server = make_server(settings, mounts)
+        assert self._pool is not None
+        for process, earlier in zip(self._pool.processes, known, strict=False):
+            process.on_cancelled = partial(_call_both, earlier, process.on_cancelled)
+        return server
+
     def _mounts(self) -> list[Any]:
         from tests.studio.harness import add_page
         from tts2face.studio.app import mount_studio
 
         add_page(self._folder)
         return [mount_studio]
+
+
+def _call_both(one: Callable[[float], None], other: Callable[[float], None], seconds: float) -> None:
+    one(seconds)
+    other(seconds)
 
 
 async def main(folder: Path) -> None:
