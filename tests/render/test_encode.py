@@ -248,7 +248,7 @@ def test_a_folder_that_cannot_be_written_is_refused(tmp_path, renderer, monkeypa
     def refuse(*_, **__):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("tempfile.mkstemp", refuse)
+    monkeypatch.setattr("pathlib.Path.touch", refuse)
     with (
         pytest.raises(BackendError, match=r"cannot write .*a\.mp4: Permission denied"),
         ClipWriter(tmp_path / "a.mp4", renderer),
