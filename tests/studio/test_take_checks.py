@@ -58,7 +58,7 @@ def test_takes_that_were_not_checked_are_checked_after_a_restart(tmp_path, rende
     assert takes[0].key
 
 
-def test_a_file_that_is_no_video_is_refused_with_one_sentence(tmp_path):
+def test_a_file_that_is_no_video_is_refused_with_one_sentence(tmp_path, face_model):
     store = RecordingStore(tmp_path)
     number = store.create("ada", "Ada", {"prompts": [{"text": "Hello there."}], "running": {}})
     (tmp_path / "upload").write_bytes(b"no video at all" * 100)
