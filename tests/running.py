@@ -24,11 +24,11 @@ REMOVED = (PREFIX, "OTEL_", "PYTEST")
 HostService = Callable[..., "AbstractContextManager[HostedService]"]
 
 
-def eventually(condition: Callable[[], Any], seconds: float = 60.0, message: Callable[[], str] = str) -> Any:
-    """The first true value of a condition; the test fails if there is none within some seconds."""
+def eventually(condition: Callable[[], Any], seconds: float = 60.0, what: str | Callable[[], str] = "") -> Any:
+    """The first true value of a condition; the test fails, and says `what`, if there is none within some seconds."""
     deadline, pause_s = time.monotonic() + seconds, 0.02
     while not (found := condition()):
-        assert time.monotonic() < deadline, message() or f"not within {seconds:g} s"
+        assert time.monotonic() < deadline, f"not within {seconds:g} s: {what() if callable(what) else what}"
         time.sleep(pause_s)
         pause_s = min(1.3 * pause_s, 0.2)
     return found

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import httpx
 
-from tests.running import RunningService, ServeProcess
-from tests.studio.chromium import Browser, wait_until
+from tests.running import RunningService, ServeProcess, eventually
+from tests.studio.chromium import Browser
 from tests.studio.served import slowness
 from tests.studio.server.test_projects_http import create, edit, preview
 
@@ -78,7 +78,7 @@ def main() -> None:
 
 def _wait_for_face(running: RunningService) -> None:
     begin, folder = time.monotonic(), Path(running.data.name) / "studio" / "faces"
-    wait_until(lambda: list(folder.glob("*.glb.gz")), 300, "the face is made")
+    eventually(lambda: list(folder.glob("*.glb.gz")), 300, "the face is made")
     print(f"face made {time.monotonic() - begin:.1f} s after the first process was ready")
 
 
@@ -101,22 +101,22 @@ def _measure_edges(url: str) -> None:
 
 def _measure(browser: Browser, url: str, number: int) -> None:
     browser.open(f"{url}/studio/")
-    wait_until(lambda: browser.run("return document.querySelectorAll('textarea').length"), 60, "the list is shown")
+    eventually(lambda: browser.run("return document.querySelectorAll('textarea').length"), 60, "the list is shown")
     begin = time.monotonic()
-    wait_until(lambda: browser.run(CLICK, "open the example"), 30, "the button is there")
-    wait_until(lambda: browser.run(SHOWN), 120, "the example is shown")
+    eventually(lambda: browser.run(CLICK, "open the example"), 30, "the button is there")
+    eventually(lambda: browser.run(SHOWN), 120, "the example is shown")
     shown = time.monotonic() - begin
     browser.run("document.querySelector('.studio-play').click()")
-    wait_until(lambda: browser.run(TIME) > 0, 30, "the example plays")
+    eventually(lambda: browser.run(TIME) > 0, 30, "the example plays")
     played = time.monotonic() - begin
     sent = browser.run(SENT) / 1e6
     browser.run("document.querySelector('.studio-play').click()")
     spoken = {}
     for text in TEXTS:
         browser.run(SPEAK, f"{text} {number}")
-        spoken = wait_until(lambda: browser.run("return window.spoken.motion ? window.spoken : null"), 60, "it speaks")
+        spoken = eventually(lambda: browser.run("return window.spoken.motion ? window.spoken : null"), 60, "it speaks")
         print(f"  from Enter to sound {spoken['sound']:.0f} ms, to motion {spoken['motion']:.0f} ms")
-        wait_until(
+        eventually(
             lambda: browser.run("return import('tts2face-studio/clock.js').then((m) => !m.clock.playing)"), 60, ""
         )
     print(

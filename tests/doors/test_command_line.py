@@ -6,7 +6,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import fields
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import pytest
 from cli.main import run
 from cli.process import EXIT_CODES
 from lexicon import errors
+from tests.running import eventually
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 
@@ -139,10 +139,7 @@ def test_text_from_standard_input_and_from_a_file(here: Path) -> None:
 def test_an_interruption_leaves_no_files(here: Path) -> None:
     text = "This is a rather long sentence that takes some time to speak. " * 20
     process = subprocess.Popen([*COMMAND, text, "--out", "x.mp4"], stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 60
-    while not list(here.glob(".x*")) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert list(here.glob(".x*"))
+    eventually(lambda: list(here.glob(".x*")))
     process.send_signal(signal.SIGINT)
     _, captured = process.communicate(timeout=60)
     assert process.returncode == 130, captured

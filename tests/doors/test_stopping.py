@@ -1,17 +1,17 @@
 """Commands ended by a signal leave neither files nor processes."""
 
 import os
-import shutil
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from cli.process import UNCHANGED
+from tests.running import eventually
+from tests.started import running_processes
 
 COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
 ROOT = str(Path(__file__).parents[2])
@@ -73,15 +73,8 @@ main()
 """
 
 pytestmark = pytest.mark.skipif(
-    not hasattr(signal, "SIGHUP") or shutil.which("ps") is None, reason="needs POSIX signals and ps"
+    not hasattr(signal, "SIGHUP") or not Path("/proc/self/stat").exists(), reason="needs POSIX signals and /proc"
 )
-
-
-def wait_until(holds: Callable[[], object]) -> None:
-    deadline = time.monotonic() + PATIENCE_S
-    while not holds():
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
 
 
 def start_command(here: Path) -> "subprocess.Popen[str]":
@@ -89,7 +82,7 @@ def start_command(here: Path) -> "subprocess.Popen[str]":
     process = subprocess.Popen(
         [*COMMAND, TEXT, "--out", "x.mp4", "--size", "64x64"], stderr=subprocess.PIPE, text=True, cwd=here
     )
-    wait_until(lambda: list(here.glob(".x*")) or process.poll() is not None)
+    eventually(lambda: list(here.glob(".x*")) or process.poll() is not None)
     assert process.poll() is None
     return process
 
@@ -169,12 +162,6 @@ def test_files_of_a_killed_command_are_removed_by_the_next_one(tmp_path: Path) -
     assert [path.name for path in tmp_path.iterdir()] == ["x.mp4"]
 
 
-def is_running(number: int) -> bool:
-    """Whether a process is running; a zombie is not."""
-    status = subprocess.run(["ps", "-o", "stat=", "-p", str(number)], capture_output=True, text=True, check=False)
-    return status.stdout.strip() not in {"", "Z"} and not status.stdout.startswith("Z")
-
-
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP", "SIGKILL"])
 def test_processes_of_a_pool_end_with_their_parent(tmp_path: Path, name: str) -> None:
     script = tmp_path / "pool_script.py"
@@ -182,11 +169,11 @@ def test_processes_of_a_pool_end_with_their_parent(tmp_path: Path, name: str) ->
     started = tmp_path / "started"
     started.mkdir()
     with subprocess.Popen([sys.executable, str(script), str(started)], stderr=subprocess.DEVNULL) as process:
-        wait_until(lambda: len(list(started.iterdir())) == 2)
-        children = [int(path.name) for path in started.iterdir()]
-        assert all(is_running(child) for child in children)
+        eventually(lambda: len(list(started.iterdir())) == 2)
+        children = {int(path.name) for path in started.iterdir()}
+        assert children <= running_processes().keys()
         process.send_signal(getattr(signal, name))
         ended = time.monotonic()
         process.wait(PATIENCE_S)
-        wait_until(lambda: not any(is_running(child) for child in children))
+        eventually(lambda: not children & running_processes().keys())
     assert time.monotonic() - ended < 15.0  # their tasks take ten minutes

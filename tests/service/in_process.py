@@ -1,13 +1,13 @@
 """The service in the process of a test: its application without sockets and without synthesis processes."""
 
 import queue
-import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from starlette.testclient import TestClient
 
+from tests.running import eventually
 from tts2face.service.app import create_app
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.synthesis.messages import Message, MessageKind
@@ -48,8 +48,5 @@ def service_client(settings: ServiceSettings, sessions: SessionCache) -> Iterato
     app = create_app(settings)
     app.state.service.pool.processes[:] = [SessionProcess(sessions)]
     with TestClient(app, base_url="http://localhost") as client:
-        deadline = time.monotonic() + START_S
-        while not client.get("/readyz").json()["checks"]["database"]:
-            assert time.monotonic() < deadline, "the database does not open"
-            time.sleep(0.02)
+        eventually(lambda: client.get("/readyz").json()["checks"]["database"], START_S)
         yield client

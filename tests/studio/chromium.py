@@ -6,7 +6,6 @@ import json
 import shutil
 import socket
 import subprocess
-import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator, Sequence
@@ -17,6 +16,8 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
+
+from tests.running import eventually
 
 CLICK = """
     // the name of an icon is a line of its own
@@ -80,7 +81,7 @@ class Browser:
             ["chromedriver", f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
         self._root = f"http://127.0.0.1:{port}"
-        wait_until(self._is_ready, 30, "chromedriver starts")
+        eventually(self._is_ready, 30, "chromedriver starts")
         options = {"args": [*ARGUMENTS, f"--window-size={size[0]},{size[1]}", *arguments]}
         logs = {"browser": "ALL", "performance": "ALL"}
         timeouts = {"script": 1000 * SCRIPT_S, "pageLoad": 1000 * SCRIPT_S}
@@ -111,12 +112,11 @@ class Browser:
 
     def wait(self, script: str, *arguments: Any, seconds: float = WAIT_S) -> Any:
         """First true value of a function body in the page."""
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            if found := self.run(script, *arguments):
-                return found
-            time.sleep(0.05)
-        raise AssertionError(f"not within {seconds:g} s: {script} {arguments}; page: {self.text()[:1500]}")
+
+        def what() -> str:
+            return f"{script} {arguments}; page: {self.text()[:1500]}"
+
+        return eventually(lambda: self.run(script, *arguments), seconds, what)
 
     def text(self) -> str:
         """Visible text of the page."""
@@ -237,14 +237,3 @@ def open_browser(size: tuple[int, int] = (1280, 1180), arguments: Sequence[str] 
         yield window
     finally:
         window.close()
-
-
-def wait_until(holds: Any, seconds: float, what: str) -> Any:
-    """First true value of a function that is called again and again."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        value = holds()
-        if value:
-            return value
-        time.sleep(0.1)
-    raise AssertionError(f"did not happen within {seconds:g} s: {what}")

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tests.running import ServeProcess, serve_process
-from tests.studio.chromium import Browser, wait_until
+from tests.running import ServeProcess, eventually, serve_process
+from tests.studio.chromium import Browser
 
 HARNESS = "/studio/harness"  # path of the page
 MOUTH = (slice(0.60, 0.74), slice(-0.107, 0.107))  # down and from the middle across, of the height in the front view
@@ -43,7 +43,7 @@ class Page:
         if url:
             browser.open(url)
         ready = "const s = window.__studio; return Boolean(s && s.face_ms && s.frames > 0 && s.view?.duration > 1)"
-        wait_until(lambda: browser.run(ready), 120, "face and sound are loaded")
+        eventually(lambda: browser.run(ready), 120, "face and sound are loaded")
         self.grid = browser.box(".studio-grid")
         self.rows = {row["id"]: row for row in browser.run("return window.__studio.rows")}
 
@@ -65,7 +65,7 @@ class Page:
             found: list[dict[str, Any]] = json.loads(self.browser.run(script))
             return found if len(found) >= n else []
 
-        return list(wait_until(received, 20, f"{n} edits"))
+        return list(eventually(received, 20, f"{n} edits"))
 
     def focus(self) -> None:
         """Give the keyboard to the timeline."""
@@ -83,7 +83,7 @@ class Page:
         """Move the playhead by the ruler, and wait for the sharp picture of a stage at rest."""
         place = self.at("ruler", time)
         self.browser.drag([place, place])
-        wait_until(lambda: abs(self.measure("time") - time) < 0.02 and self.measure("is_sharp"), 30, "drawn")
+        eventually(lambda: abs(self.measure("time") - time) < 0.02 and self.measure("is_sharp"), 30, "drawn")
 
     def mouth(self, time: float) -> np.ndarray:
         """Pixels of the mouth at a time."""

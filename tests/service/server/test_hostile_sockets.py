@@ -4,13 +4,12 @@ import asyncio
 import json
 import os
 import struct
-import time
 from pathlib import Path
 
 import pytest
 import websockets
 
-from tests.running import HostService, RunningService
+from tests.running import HostService, RunningService, eventually
 from tests.service.attacked import alive, attacked
 from tests.service.raw import ask, connect, head
 
@@ -120,9 +119,7 @@ def test_too_many_connections_get_503(host: HostService) -> None:
         assert (answer.status, answer.code, answer.headers["retry-after"]) == (503, "busy", "2")
         for connection in held:
             connection.close()
-        deadline = time.monotonic() + 60
-        while ask(running.url, head("GET", "/healthz")).status != 200:
-            assert time.monotonic() < deadline
+        eventually(lambda: ask(running.url, head("GET", "/healthz")).status == 200)
 
 
 @pytest.mark.parametrize("path", PATHS)

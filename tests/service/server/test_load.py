@@ -13,7 +13,7 @@ import httpx
 import pytest
 import websockets
 
-from tests.running import HostService, RunningService
+from tests.running import HostService, RunningService, eventually
 from tests.service.raw import connect, request
 from tests.started import children
 
@@ -53,11 +53,8 @@ def usage(service: RunningService) -> Usage:
 
 def wait_until_idle(service: RunningService) -> None:
     """Wait until no work runs or waits and all connections are closed."""
-    deadline = time.monotonic() + 120
     quiet = {"tts2face_waiting 0.0", "tts2face_load 0.0"}
-    while not quiet <= set(httpx.get(f"{service.url}/metrics").text.splitlines()):
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
+    eventually(lambda: quiet <= set(httpx.get(f"{service.url}/metrics").text.splitlines()), 120.0)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ import httpx
 import pytest
 
 from lexicon.errors import BackendError, InputError
-from tests.running import HostService, RunningService, ServeProcess
+from tests.running import HostService, RunningService, ServeProcess, eventually
 from tts2face.service.tracing import is_tracing_requested, tracing_from_environment
 
 pytest.importorskip("opentelemetry.sdk", reason="needs `pip install 'tts2face[otel]'`")
@@ -59,13 +59,10 @@ class Collector:
         return f"http://127.0.0.1:{self.server.server_address[1]}"
 
     def wait_for_span(self, name: str) -> Any:
-        deadline = time.monotonic() + 60
-        while True:
-            found = [span for span in list(self.spans) if span.name == name]
-            if found:
-                return found[0]
-            assert time.monotonic() < deadline, [span.name for span in self.spans]
-            time.sleep(0.05)
+        def find() -> Any:
+            return next((span for span in list(self.spans) if span.name == name), None)
+
+        return eventually(find, what=lambda: f"{name} is not among {[span.name for span in list(self.spans)]}")
 
     def close(self) -> None:
         self.server.shutdown()

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from tests.exports.programs import node_package
-from tests.studio.chromium import Browser, wait_until
+from tests.running import eventually
+from tests.studio.chromium import Browser
 from tests.studio.served import Page, create_project
 from tts2face.studio.projects.renders import formats
 from tts2face.video.media import read_frames, read_sound
@@ -37,7 +38,7 @@ class Project:
 
     def wait_for(self, part: str) -> Any:
         """A part of the project, once it is there."""
-        return wait_until(lambda: self.content().get(part), 30, f"the project has {part}")
+        return eventually(lambda: self.content().get(part), 30, f"the project has {part}")
 
     def files(self, n: int) -> dict[str, bytes]:
         """Files of the project by suffix, once there are n and all are complete."""
@@ -47,7 +48,7 @@ class Project:
             assert not [one for one in found if one["state"] == "failed"], found
             return found if len(found) == n and all(one["state"] == "done" for one in found) else []
 
-        made = wait_until(done, 240, f"{n} files are made")
+        made = eventually(done, 240, f"{n} files are made")
         address = f"{self._address}/renders"
         return {
             Path(one["name"]).suffix: self._studio.get(f"{address}/{one['id']}/file").content for one in made
@@ -116,7 +117,7 @@ def correct_word(page: Page, project: Project) -> None:
 def undo(page: Page, project: Project) -> None:
     page.focus()
     page.browser.press("Control+z")
-    wait_until(lambda: "pronunciations" not in project.content(), 10, "the correction is taken back")
+    eventually(lambda: "pronunciations" not in project.content(), 10, "the correction is taken back")
     page.browser.wait("return !document.querySelector('#studio-redo').disabled")
     page.browser.press("Control+Shift+z")
     assert project.wait_for("pronunciations") == {"maps": "/mɑps/"}
@@ -214,11 +215,11 @@ def test_styles_of_another_tab_are_offered_when_the_page_is_seen_again(
     try:
         studio.post("/api/styles", json={"name": "half glad", "mix": {"source": "grid_s1"}}).raise_for_status()
         browser.run("document.querySelector('[aria-label=Palette]').click()")
-        wait_until(lambda: is_offered("my styles"), 30, "the own palette is offered")
+        eventually(lambda: is_offered("my styles"), 30, "the own palette is offered")
         browser.click("my styles")
-        wait_until(lambda: "half glad" in browser.run(texts), 30, "the own palette is chosen")
+        eventually(lambda: "half glad" in browser.run(texts), 30, "the own palette is chosen")
         studio.post("/api/styles", json={"name": "very glad", "mix": {"source": "grid_s1"}}).raise_for_status()
-        wait_until(lambda: is_offered("very glad"), 30, "the new style is offered")
+        eventually(lambda: is_offered("very glad"), 30, "the new style is offered")
     finally:
         for name in ("half glad", "very glad"):
             studio.delete(f"/api/styles/{name}")

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from tests.studio.chromium import wait_until
+from tests.running import eventually
 from tests.studio.served import HARNESS, Page
 
 SILENCE_S, SPEECH_S = (0.01, 0.03), (0.55, 0.95, 2.0, 2.4, 2.6)  # of the harness's sentence
@@ -43,15 +43,15 @@ def test_mouth_moves_with_speech_and_rests_in_silence(page):
 def test_views_differ_and_the_picture_covers_the_head(page):
     front = page.browser.picture(".studio-stage canvas").astype(np.float64)
     page.browser.run("document.querySelector('.studio-views button:nth-of-type(3)').click()")
-    wait_until(lambda: np.abs(page.browser.picture(".studio-stage canvas") - front).mean() > 5, 20, "profile")
+    eventually(lambda: np.abs(page.browser.picture(".studio-stage canvas") - front).mean() > 5, 20, "profile")
     assert page.browser.run("return document.querySelector('.studio-views [aria-pressed=true]').innerText") == "Profile"
 
 
 def test_time_follows_the_sound_and_measures_are_reported(page):
     page.browser.press("Tab")
     page.play()
-    wait_until(lambda: page.measure("time") > 1.5, 30, "plays")
-    wait_until(lambda: page.measure("fps") and page.measure("timeline_ms") is not None, 30, "measures")
+    eventually(lambda: page.measure("time") > 1.5, 30, "plays")
+    eventually(lambda: page.measure("fps") and page.measure("timeline_ms") is not None, 30, "measures")
     assert page.measure("js_ms") > 0
     page.pause()
     stopped = page.measure("time")
@@ -75,12 +75,12 @@ def test_a_page_at_rest_does_nothing_until_it_plays_or_changes(page):
     page.browser.wait("return window.called > 5", seconds=20)
     page.pause()
     page.browser.wait("return window.__studio.is_sharp")
-    wait_until(rests, 20, "the page rests")
+    eventually(rests, 20, "the page rests")
     drawn = page.measure("frames")
     page.focus()
     page.browser.press("Right")
-    wait_until(lambda: page.measure("frames") > drawn, 10, "the head is drawn at another time")
-    wait_until(rests, 20, "the page rests")
+    eventually(lambda: page.measure("frames") > drawn, 10, "the head is drawn at another time")
+    eventually(rests, 20, "the page rests")
 
 
 CHANGE_FACE = """
@@ -154,7 +154,7 @@ def test_keys_reach_rows_and_elements(page):
     page.focus()
     page.browser.press("Down", "Down", "Down", "Right", "Right")
     active = "return document.getElementById(document.activeElement.getAttribute('aria-activedescendant')).innerText"
-    wait_until(lambda: "phone" in page.browser.run(active), 10, "a phone has the focus")
+    eventually(lambda: "phone" in page.browser.run(active), 10, "a phone has the focus")
     page.browser.press("Alt+Right")
     (edit,) = page.edits(1)
     assert edit["kind"] == "edge"
@@ -194,7 +194,7 @@ def test_lanes_are_muted_and_get_new_seeds(page):
         {"kind": "seed", "feature": "head", "seed": 1},
     ]
     pressed = "return document.querySelector('[aria-label=\"Mute Brows\"]').getAttribute('aria-pressed')"
-    wait_until(lambda: page.browser.run(pressed) == "true", 10, "the lane is muted")
+    eventually(lambda: page.browser.run(pressed) == "true", 10, "the lane is muted")
 
 
 def test_ten_minutes_zoom(browser, address):

@@ -3,8 +3,8 @@
 import httpx
 import pytest
 
-from tests.running import RunningService
-from tests.studio.chromium import Browser, wait_until
+from tests.running import RunningService, eventually
+from tests.studio.chromium import Browser
 
 MOST_BYTES = 2_500_000
 SHOWN = "const s = window.__studio; return Boolean(s && s.frames > 0 && s.face_ms && s.view && s.view.duration > 0)"
@@ -17,7 +17,7 @@ RECEIVED = """
 def received(browser: Browser, address: str) -> dict[str, int]:
     """Bytes of each file of a page that came over the network."""
     browser.open(address)
-    wait_until(lambda: browser.run(SHOWN), 120, "face and sound are shown")
+    eventually(lambda: browser.run(SHOWN), 120, "face and sound are shown")
     sizes = dict[str, int]()
     for one, size in browser.run(RECEIVED):
         name = one.partition("?")[0].rpartition("/")[2]

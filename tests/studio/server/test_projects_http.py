@@ -14,7 +14,7 @@ import pygltflib
 import pytest
 from PIL import Image
 
-from tests.running import serve_process
+from tests.running import eventually, serve_process
 from tts2face.project.project_file import load_project
 from tts2face.session import Session
 from tts2face.studio.projects.bundle import read_bundle
@@ -46,10 +46,7 @@ def project_file(data: Path, number: str) -> Path:
 
 
 def wait_until_saved(studio: httpx.Client, number: str, data: Path, name: str) -> None:
-    deadline = time.monotonic() + 10
-    while json.loads(project_file(data, number).read_text())["name"] != name:
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    eventually(lambda: json.loads(project_file(data, number).read_text())["name"] == name)
 
 
 @pytest.fixture
@@ -217,10 +214,7 @@ def test_files_are_queued_made_downloaded_and_deleted(studio: httpx.Client, numb
     preview(studio, number)
     address = f"/api/projects/{number}/renders"
     started = {form: studio.post(address, json={"format": form}).json()["id"] for form in ("webm", "srt", "glb", "wav")}
-    deadline = time.monotonic() + 120
-    while any(one["state"] in {"waiting", "running"} for one in studio.get(address).json()):
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
+    eventually(lambda: not {one["state"] for one in studio.get(address).json()} & {"waiting", "running"}, 120.0)
     assert {one["state"] for one in studio.get(address).json()} == {"done"}
     files = {form: studio.get(f"{address}/{one}/file") for form, one in started.items()}
     assert files["webm"].content[:4] == b"\x1a\x45\xdf\xa3"
@@ -330,10 +324,7 @@ def test_a_killed_server_loses_nothing_older_than_a_second_and_makes_its_files_l
         with again as restarted, httpx.Client(base_url=f"{restarted.url}/studio", timeout=60.0) as client:
             back = client.get(f"/api/projects/{number}/project.json").json()
             undone = client.post(f"/api/projects/{number}/undo").json()
-            deadline = time.monotonic() + 120
-            while {one["state"] for one in client.get(address).json()} != {"done"}:
-                assert time.monotonic() < deadline
-                time.sleep(0.1)
+            eventually(lambda: {one["state"] for one in client.get(address).json()} == {"done"}, 120.0)
             made = {one["id"] for one in client.get(address).json()}
         folder = project_file(Path(running.data.name), number).parent / "renders"
         assert {path.suffix for path in folder.iterdir()} == {".mp4"}

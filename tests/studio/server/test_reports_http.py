@@ -1,10 +1,11 @@
 """Reports over HTTP: made by a process, kept, shown as a page that can do nothing, and deleted."""
 
-import time
 from pathlib import Path
 
 import httpx
 import pytest
+
+from tests.running import eventually
 
 pytest.importorskip("matplotlib", reason="needs `pip install 'tts2face[report]'`")
 pytest.importorskip("sklearn", reason="needs `pip install 'tts2face[report]'`")
@@ -21,10 +22,7 @@ def test_a_report_is_made_kept_and_deleted(studio: httpx.Client, data: Path) -> 
     assert started.status_code == 202
     number = started.json()["id"]
     assert studio.get(f"{REPORTS}/{number}/page").status_code == 400  # not made yet
-    deadline = time.monotonic() + 180
-    while state(studio, number)["state"] in {"waiting", "running"}:
-        assert time.monotonic() < deadline
-        time.sleep(0.2)
+    eventually(lambda: state(studio, number)["state"] not in {"waiting", "running"}, 180.0)
     assert state(studio, number)["state"] == "done", state(studio, number)
     page = studio.get(f"{REPORTS}/{number}/page")
     assert "<h1>Similarity of phones: grid_s1</h1>" in page.text
@@ -44,9 +42,8 @@ def test_a_report_is_made_kept_and_deleted(studio: httpx.Client, data: Path) -> 
 def test_a_report_that_waits_or_runs_is_cancelled(studio: httpx.Client, data: Path) -> None:
     number = studio.post(REPORTS, json={"kind": "gestures", "model": "starter"}).json()["id"]
     assert studio.delete(f"{REPORTS}/{number}").status_code == 204
-    time.sleep(0.3)
     assert studio.get(REPORTS).json() == []
-    assert not (data / "studio" / "reports" / number).exists()
+    eventually(lambda: not (data / "studio" / "reports" / number).exists())
 
 
 def test_what_cannot_be_reported_is_refused(studio: httpx.Client) -> None:

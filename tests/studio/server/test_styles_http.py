@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 
 from tests.corpus_tools.test_take_process import write_table
+from tests.running import eventually
 from tests.studio.server.test_projects_http import create, edit, preview
 from tts2face.models.palette import load_palette, read_palette
 from tts2face.project.project_file import load_project
@@ -36,13 +37,11 @@ def owned(studio: httpx.Client, data: Path):
 
 
 def wait_for_take(studio: httpx.Client) -> dict[str, Any]:
-    deadline = time.monotonic() + 120
-    while True:
+    def made() -> dict[str, Any] | None:
         take: dict[str, Any] = studio.get("/api/styles").json()["take"]
-        if not take["doing"]:
-            return take
-        assert time.monotonic() < deadline, take
-        time.sleep(0.1)
+        return None if take["doing"] else take
+
+    return dict(eventually(made, 120.0))
 
 
 def mix(studio: httpx.Client, name: str, **changes: Any) -> None:

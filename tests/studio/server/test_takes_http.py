@@ -3,7 +3,6 @@
 import io
 import json
 import struct
-import time
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from PIL import Image
 from websockets.sync.client import connect
 
 from tests.corpus_tools.test_take_process import write_table
-from tests.running import RunningService
+from tests.running import RunningService, eventually
 from tests.studio.server.test_styles_http import owned, wait_for_take  # noqa: F401 - a fixture
 from tts2face.session import Session
 from tts2face.studio.projects.bundle import read_bundle
@@ -33,13 +32,11 @@ def put(studio: httpx.Client, content: bytes, **headers: str) -> str:
 
 
 def wait_until_read(studio: httpx.Client, number: str) -> dict[str, Any]:
-    deadline = time.monotonic() + 120
-    while True:
+    def read() -> dict[str, Any] | None:
         (take,) = [one for one in studio.get("/api/takes").json() if one["id"] == number]
-        if take["state"] in {READY, FAILED}:
-            return dict(take)
-        assert time.monotonic() < deadline, take
-        time.sleep(0.1)
+        return take if take["state"] in {READY, FAILED} else None
+
+    return dict(eventually(read, 120.0))
 
 
 @pytest.fixture
