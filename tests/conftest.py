@@ -4,6 +4,7 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the processes of a run share the cores; numpy reads it when loaded
 
+import gc
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -102,7 +103,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
     Tests that share a server belong to one group of pytest-xdist, so that a run starts that server once.
     """
-    skipped = set(config.cache.get(SKIPPED, [])) if config.cache else set()
+    cache = getattr(config, "cache", None)  # absent with `-p no:cacheprovider`
+    skipped = set(cache.get(SKIPPED, [])) if cache else set()
     for item in items:
         if item.nodeid in skipped:
             item.add_marker("skipped")
@@ -113,6 +115,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             is_apart = "browser" in folders and not item.get_closest_marker("smoke")
             item.add_marker(pytest.mark.xdist_group("browser" if is_apart else SHARED_SERVER))
     items.sort(key=lambda item: (item.get_closest_marker("xdist_group") is None, not _groups(item)))
+
+
+def pytest_collection_finish() -> None:
+    """Keep Python's collector from looking through all tests again and again."""
+    gc.collect()
+    gc.freeze()
 
 
 def _groups(item: pytest.Item) -> set[str]:
@@ -134,8 +142,8 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Name what was skipped and why, one line for each reason."""
     skipped = terminalreporter.stats.get("skipped", [])
-    if terminalreporter.config.cache:
-        terminalreporter.config.cache.set(SKIPPED, sorted(report.nodeid for report in skipped))
+    if cache := getattr(terminalreporter.config, "cache", None):
+        cache.set(SKIPPED, sorted(report.nodeid for report in skipped))
     reasons = Counter(str(report.longrepr[2]) for report in skipped)
     if reasons:
         terminalreporter.section("skipped tests")

@@ -4,35 +4,11 @@ import numpy as np
 import pytest
 
 from tests.face.posing import posed_vertices
-from tts2face.catalogue import identities
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
-from tts2face.models.landmarks import INNER_LIP_UPPER, LOWER_LIP_INNER_MID
+from tts2face.models.landmarks import INNER_LIP_UPPER
 from tts2face.storage.files import find_file
 
-CLOSED = (
-    {},
-    {"mouthPress": 1.0},
-    {"mouthPucker": 1.0},
-    {"mouthPress": 1.0, "mouthRollUpper": 1.0, "mouthRollLower": 1.0},
-    {"mouthRollUpper": 1.0},
-    {"mouthRollLower": 1.0},
-    {"mouthShrugLower": 1.0},
-    {"jawOpen": 0.3, "mouthClose": 0.3},
-    {"mouthSmile": 1.0},
-    {"cheekPuff": 1.0},
-)  # lips that are closed, as for /p b m/
-DRAWN_BACK = (
-    {"jawOpen": 0.15, "mouthSmile": 0.6},
-    {"jawOpen": 0.3, "mouthSmile": 1.0},
-    {"jawOpen": 0.15, "mouthStretch": 1.0},
-    {"jawOpen": 0.15, "mouthFunnel": 1.0},
-    {"jawOpen": 0.7},
-    {"jawOpen": 1.0},
-    {"jawOpen": 0.7, "mouthSmile": 0.7},
-    {"jawOpen": 1.0, "mouthSmile": 0.7},
-    {"jawOpen": 1.0, "mouthSmile": 1.0},
-)
 FRONT_Z = 8.0  # mm; teeth further back are behind the cheeks
 
 
@@ -66,30 +42,6 @@ def uncovered(face: Face, posed: np.ndarray, inner: np.ndarray) -> np.ndarray:
         depth = a[inside, 2] + one[inside] * (b - a)[inside, 2] + two[inside] * (c - a)[inside, 2]
         covered[number] = (depth > z).any()
     return ~covered
-
-
-@pytest.mark.parametrize("name", ["head", "cartoon", *(entry.name for entry in identities())])
-def test_no_tooth_or_gum_comes_through_closed_lips(name: str) -> None:
-    is_face = name in ("head", "cartoon")
-    face = read_face(find_file(name if is_face else "head", "face"), None if is_face else name)
-    inner = part_vertices(face, "teeth_upper", "teeth_lower", "gums_upper", "gums_lower", "tongue")
-    inner = inner[face.vertices[inner, 2] > FRONT_Z][::3]
-    for shown in CLOSED:
-        seen = uncovered(face, posed_vertices(face, weights(face, shown)), inner)
-        assert seen.mean() < (0.01 if shown else 1e-9), f"{shown}: {seen.sum()} of {len(seen)} vertices"
-
-
-@pytest.mark.parametrize("name", ["head", "cartoon", *(entry.name for entry in identities())])
-def test_lower_gums_stay_inside_when_a_smile_draws_the_lip_back(name: str) -> None:
-    is_face = name in ("head", "cartoon")
-    face = read_face(find_file(name if is_face else "head", "face"), None if is_face else name)
-    inner = part_vertices(face, "teeth_lower", "gums_lower")
-    inner = inner[face.vertices[inner, 2] > FRONT_Z]
-    for shown in DRAWN_BACK:
-        posed = posed_vertices(face, weights(face, shown))
-        lip = np.einsum("lk,lkd->ld", face.landmark_weights, posed[face.landmark_vertices])[LOWER_LIP_INNER_MID]
-        below = inner[posed[inner, 1] < lip[1] - 4]
-        assert not uncovered(face, posed, below).any(), shown
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import load_palette
 from tts2face.types import Waveform
 
-FPS, RATE, SECONDS = 30.0, 8_000, 60
+FPS, RATE, SECONDS = 30.0, 8_000, 30
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def test_silence_in_short_pieces_moves_as_in_long_ones(fields: GestureFields, ki
     def values(n_frames: int) -> dict[str, np.ndarray]:
         stream = kind(fields, style="neutral", seed=0, fps=FPS)
         silence = Waveform(np.zeros(round(n_frames / FPS * RATE), np.float32), RATE)
-        parts = [stream.next(silence, n_frames, Timeline()) for _ in range(int(20 * FPS) // n_frames)]
+        parts = [stream.next(silence, n_frames, Timeline()) for _ in range(int(10 * FPS) // n_frames)]
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
     short, long = values(6), values(300)

@@ -4,6 +4,7 @@ import csv
 import gzip
 import json
 import re
+from collections.abc import Iterator
 from importlib import util
 from pathlib import Path
 
@@ -113,26 +114,30 @@ def test_a_contraction_has_the_tag_of_its_first_part() -> None:
     assert tag_words(("She's", "here"))[0] == "PRP"
 
 
-def test_a_missing_tagger_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(util, "find_spec", lambda name: None)
+def forget() -> None:
     part_of_speech._model.cache_clear()
     tag_words.cache_clear()
+
+
+@pytest.fixture
+def _no_tagger() -> Iterator[None]:
+    """None is loaded before the test and after it."""
+    forget()
+    yield
+    forget()
+
+
+@pytest.mark.usefixtures("_no_tagger")
+def test_a_missing_tagger_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(util, "find_spec", lambda name: None)
     with pytest.raises(BackendError, match="pip install hibari-tts"):
         tag_words(("a", "bow"))
 
 
+@pytest.mark.usefixtures("_no_tagger")
 def test_a_damaged_tagger_is_reported(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     broken = tmp_path / "tagger.json.gz"
     broken.write_bytes(gzip.compress(b'{"tags":["NN"]}'))
     monkeypatch.setattr(part_of_speech, "_model_path", lambda: broken)
-    part_of_speech._model.cache_clear()
-    tag_words.cache_clear()
     with pytest.raises(DataError, match=r"is damaged .*reinstall hibari-tts"):
         tag_words(("a", "bow"))
-
-
-@pytest.fixture(autouse=True)
-def _fresh_model() -> object:
-    yield
-    part_of_speech._model.cache_clear()
-    tag_words.cache_clear()

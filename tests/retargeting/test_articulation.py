@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.face.posing import posed_vertices
-from tts2face.catalogue import identities
 from tts2face.exemplar.options import THEOBALD_2007, SynthesisOptions
 from tts2face.exemplar.synthesis import ExemplarModel, select_tokens
 from tts2face.face.landmark_fit import landmark_positions, scatter_landmarks
@@ -242,18 +241,6 @@ def test_the_published_method_is_not_changed(spoken: Spoken, talker: Talker, exe
     motion = animated.motion_of_tokens(selection, fps=FPS, n_frames=60)
     lips = Trajectory(exemplars.channels, lips_of(selection, exemplars, 60), FPS)
     np.testing.assert_array_equal(motion.values, animated.retargeter.retarget(lips).values)
-
-
-@pytest.mark.parametrize("identity", [None, *(entry.name for entry in identities("head"))])
-def test_the_lower_lip_touches_the_upper_incisors(
-    identity: str | None, talker: Talker, exemplars: ExemplarModel
-) -> None:
-    face = named_face(identity)
-    spoken = Spoken(face, talker, exemplars, sequence("s f i n v ɑ f u"))
-    for at in spoken.middles("f", "v"):
-        assert tooth_distance(face, spoken.clear.values[at]) <= 0.5
-        assert tooth_distance(face, spoken.recorded.values[at]) <= 0.5
-    assert spoken.widths(spoken.clear)[spoken.middles("u")].mean() <= 0.87
 
 
 def test_lips_meet_in_the_pauses_of_a_clip(spoken: Spoken) -> None:

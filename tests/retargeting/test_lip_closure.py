@@ -5,7 +5,6 @@ import pytest
 from numpy.typing import NDArray
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.catalogue import identities
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.exemplar.synthesis import ExemplarModel, select_tokens
 from tts2face.face.gesture_transfer import gesture_face
@@ -77,17 +76,6 @@ def test_every_bilabial_closes_along_the_whole_line(
             if label == SILENCE
         ]
         assert max(pause.max(axis=1).min() for pause in pauses) <= PAUSE_MM
-
-
-@pytest.mark.parametrize("name", [None, "cartoon", *(entry.name for entry in identities("head"))])
-def test_bilabials_close_on_all_shipped_faces(name: str | None, talker: Talker, exemplars: ExemplarModel) -> None:
-    """Up to a gap that landmarks have at rest, where it is larger than contacts can close."""
-    face = load_face("cartoon") if name == "cartoon" else load_face("head", name, hair="bald")
-    mouth = build_lip_constraints(face)
-    phones = sequence(TEXTS[0], 0.07)
-    gaps = gaps_of(face, speak(face, (talker, exemplars), phones, 1.5, FPS).values)[middles(phones, FPS)]
-    at_rest = gaps_of(face, np.zeros((1, mouth.gaps.shape[1]), np.float32))[0]
-    assert (gaps <= np.maximum(at_rest - 0.5, CLOSED_MM)).all()
 
 
 def test_expressions_keep_bilabials_closed(talker: Talker, exemplars: ExemplarModel) -> None:

@@ -65,16 +65,16 @@ def test_an_interrupted_sentence_does_not_change_what_follows(
     """Wherever it is interrupted: the gestures continue from the last piece that was made."""
     turns.restart()
     live = session.live(gestures=gestures)
-    list(live.say("Hello there."))
+    list(live.say("Hi."))
     n_runs = len(turns.seconds)
     expected = continue_idly(live)
     for number in range(n_runs):
         turns.restart()
         live = session.live(gestures=gestures)
-        list(live.say("Hello there."))
+        list(live.say("Hi."))
         turns.restart(number)
         with pytest.raises(InterruptedSpeechError):
-            list(live.say("Hello there."))
+            list(live.say("Hi."))
         turns.restart()
         found = continue_idly(live)
         assert found.begin == expected.begin

@@ -224,7 +224,6 @@ def test_another_file_or_face_is_refused(folder: Path) -> None:
     assert not (folder / "x.glb").exists()
 
 
-@pytest.mark.smoke
 def test_an_export_is_the_animated_character(tmp_path: Path) -> None:
     character = write_character_file(tmp_path / "character.glb")
     table = write_landmarks(tmp_path / "landmarks.tsv")

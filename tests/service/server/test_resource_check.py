@@ -51,7 +51,7 @@ def check(kind: str, source: Path, folder: Path, most: float = MOST_BYTES) -> tu
     [
         ("talker", {"n_utterances": 6, "has_own_face": False, "language": "not stated"}),
         ("face", {"identities": ["older"], "summary": "mesh with 4 shapes"}),
-        ("palette", {}),
+        pytest.param("palette", {}, marks=pytest.mark.smoke),
         ("dictionary", {"n_words": 2}),
     ],
 )
@@ -68,6 +68,7 @@ def test_a_file_is_described_and_drawn(files: dict[str, Path], tmp_path: Path, k
         assert len(np.unique(np.asarray(picture))) > 20  # shows something
 
 
+@pytest.mark.smoke
 def test_a_talker_with_a_face_needs_the_consent_of_the_person(tmp_path: Path) -> None:
     path = tmp_path / "a.talker"
     write_made_talker(path, has_face=True)
@@ -97,6 +98,7 @@ def _default_picture(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.smoke
 def test_a_face_does_not_keep_paths_of_the_machine_that_made_it(files: dict[str, Path], tmp_path: Path) -> None:
     """The file of a character that a face names would be read by exports."""
     arrays, header = read_tensors(files["face"], "face", 1)
@@ -168,12 +170,13 @@ def test_other_files_are_refused(tmp_path: Path, kind: str, make: Callable[[Path
     assert str(tmp_path) not in message
 
 
+@pytest.mark.smoke
 def test_another_kind_is_refused(files: dict[str, Path], tmp_path: Path) -> None:
     code, message, _ = check("palette", files["face"], tmp_path)
     assert (code, message) == (REFUSED, "it is not a palette file; give one that tts2face wrote")
 
 
-@pytest.mark.parametrize("kind", ["talker", "face", "palette"])
+@pytest.mark.parametrize("kind", ["talker", "face", pytest.param("palette", marks=pytest.mark.smoke)])
 def test_a_truncated_file_is_refused(files: dict[str, Path], tmp_path: Path, kind: str) -> None:
     (tmp_path / "given").write_bytes(files[kind].read_bytes()[:-100])
     code, message, _ = check(kind, tmp_path / "given", tmp_path)
@@ -207,6 +210,7 @@ def test_a_face_that_unpacks_to_gigabytes_ends_its_process_only(files: dict[str,
     assert (code, "Traceback" in message, "memory" in message) == (REFUSED, False, True), message
 
 
+@pytest.mark.smoke
 def test_what_is_stored_has_a_limit(files: dict[str, Path], tmp_path: Path) -> None:
     code, message, _ = check("dictionary", files["dictionary"], tmp_path, most=20)
     assert (code, message) == (REFUSED, "it has more than 2e-05 MB as a dictionary")

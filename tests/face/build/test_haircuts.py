@@ -38,6 +38,7 @@ def solid_points(hair: Hair, vertices: np.ndarray) -> np.ndarray:
     return points[hair.alpha[texel[:, 1], texel[:, 0]] > SOLID]
 
 
+@pytest.mark.smoke
 def test_there_are_ten_and_cropped() -> None:
     assert len(ALL_HAIR) == 11
     assert "cropped" in ALL_HAIR

@@ -88,6 +88,7 @@ def test_silence_shows_a_living_face(plan_of: Planner, voices: list[FakeVoice], 
     assert np.abs(np.diff(silence, axis=0)).mean() > 0.05
 
 
+@pytest.mark.smoke
 def test_cues_become_clips_of_their_length(plan_of: Planner, voices: list[FakeVoice], tmp_path: Path) -> None:
     out = tmp_path / "out"
     run_batch(plan_of(max_rate=1.2, overflow="report"), out)
@@ -101,6 +102,7 @@ def test_cues_become_clips_of_their_length(plan_of: Planner, voices: list[FakeVo
         assert len(row["sha256"]) == 64
 
 
+@pytest.mark.smoke
 def test_a_second_run_does_nothing_and_a_changed_cue_renders_one(
     plan_of: Planner, voices: list[FakeVoice], tmp_path: Path
 ) -> None:
@@ -137,6 +139,7 @@ class FailingEngine:
         yield from LocalEngine().render(good, store)
 
 
+@pytest.mark.smoke
 def test_a_failed_segment_is_named_and_the_rest_goes_on(
     plan_of: Planner, voices: list[FakeVoice], tmp_path: Path
 ) -> None:
@@ -147,6 +150,7 @@ def test_a_failed_segment_is_named_and_the_rest_goes_on(
     assert run_batch(plan_of(), out).n_made == 1
 
 
+@pytest.mark.smoke
 @pytest.mark.parametrize("name", ["taken", "taken/clips"])
 def test_a_folder_that_cannot_be_written_is_named_before_anything_is_rendered(
     name: str, plan_of: Planner, voices: list[FakeVoice], tmp_path: Path
@@ -169,6 +173,7 @@ class InterruptedEngine:
             raise KeyboardInterrupt
 
 
+@pytest.mark.smoke
 def test_an_interrupted_batch_keeps_what_is_finished_and_says_how_to_continue(
     voices: list[FakeVoice], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -197,6 +202,7 @@ def test_a_recording_is_used_in_place_of_a_voice(plan_of: Planner, voices: list[
     assert segment.request["audio"] == str(recordings / "one-0001.mp4")
 
 
+@pytest.mark.smoke
 def test_outputs_never_replace_recordings(plan_of: Planner, tmp_path: Path) -> None:
     for number in (1, 2, 3):
         (tmp_path / f"one-{number:04d}.mp4").write_bytes(b"recorded")
@@ -219,6 +225,7 @@ class DyingRenderer:
         return SegmentResult(15, 10.0)
 
 
+@pytest.mark.smoke
 @pytest.mark.parametrize(("n_deaths", "n_calls", "is_stored"), [(0, 1, True), (2, 3, True), (9, 3, False)])
 def test_a_segment_whose_process_ends_is_tried_three_times(
     n_deaths: int, n_calls: int, is_stored: bool, plan_of: Planner, tmp_path: Path
@@ -233,6 +240,7 @@ def test_a_segment_whose_process_ends_is_tried_three_times(
     assert not list((tmp_path / "store" / "scratch").iterdir())
 
 
+@pytest.mark.smoke
 def test_a_full_disk_pauses_and_says_so(plan_of: Planner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     free = iter([0, 0, 1 << 40, 1 << 40, 1 << 40])
     monkeypatch.setattr(engines, "free_bytes", lambda _: next(free))
@@ -244,6 +252,7 @@ def test_a_full_disk_pauses_and_says_so(plan_of: Planner, tmp_path: Path, monkey
     assert [message.split(":")[0] for message in messages] == ["paused", "continued"]
 
 
+@pytest.mark.smoke
 def test_an_error_of_a_full_disk_is_tried_again(
     plan_of: Planner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -306,6 +315,7 @@ def test_an_interrupted_batch_ends_its_processes_while_they_render(
     assert all(end for process in SlowProcess.made for end in process.ends)  # not one was waited for
 
 
+@pytest.mark.smoke
 def test_a_closed_process_is_not_started_again(plan_of: Planner, tmp_path: Path) -> None:
     process = RenderProcess()
     process.close()
@@ -339,6 +349,7 @@ def test_a_child_process_renders_the_same_bytes_and_dies_alone(plan_of: Planner,
         process.close()
 
 
+@pytest.mark.smoke
 def test_the_command_plans_makes_and_reports(
     voices: list[FakeVoice], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -107,7 +107,7 @@ def clips(monkeypatch: pytest.MonkeyPatch) -> list[list[Clip]]:
     return found
 
 
-@pytest.mark.parametrize("per", ["scene", "file", "film"])
+@pytest.mark.parametrize("per", ["scene", "file", pytest.param("film", marks=pytest.mark.smoke)])
 def test_lips_and_sound_follow_the_track_within_a_frame(
     per: str, dub: Path, spoken: list, clips: list[list[Clip]], tmp_path: Path
 ) -> None:
@@ -168,18 +168,21 @@ def test_other_words_and_silence_in_the_track_are_warnings(dub: Path, tmp_path: 
     ]
 
 
+@pytest.mark.smoke
 def test_recordings_of_a_file_and_of_its_cues_are_not_mixed(dub: Path) -> None:
     write_wav(dub / "one-0001.wav", np.zeros(RATE))
     with pytest.raises(InputError, match=r"one\.wav is a recording of the whole of .*one-0001\.wav one of a cue"):
         plan(dub)
 
 
+@pytest.mark.smoke
 def test_two_recordings_of_a_file_are_refused(dub: Path) -> None:
     (dub / "one.mp3").write_bytes(b"")
     with pytest.raises(InputError, match=r"are both recordings of"):
         plan(dub)
 
 
+@pytest.mark.smoke
 def test_margins_share_gaps() -> None:
     cues = [
         Cue(number, begin, end, "abc", 1) for number, (begin, end) in enumerate([(0.2, 1), (1.5, 2), (2, 3), (9, 10)])
@@ -188,6 +191,7 @@ def test_margins_share_gaps() -> None:
     assert found == [(0, 12, 2, 10), (12, 20, 15, 20), (20, 35, 20, 30), (85, 105, 90, 100)]
 
 
+@pytest.mark.smoke
 def test_sample_positions_are_those_of_frames(dub: Path) -> None:
     for segment in plan(dub, per="file").segments.values():
         if segment.audio_begin is not None:

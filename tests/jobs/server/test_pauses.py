@@ -63,6 +63,7 @@ class FakeEngine:
             self.n_looks += 1
 
 
+@pytest.mark.smoke
 def test_the_engine_looks_while_there_is_work_and_then_sleeps(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pauses, "AWAKE_S", 0.0)
     engine, paused = FakeEngine(), EnginePauses()
@@ -88,6 +89,7 @@ def test_the_engine_looks_while_there_is_work_and_then_sleeps(monkeypatch: pytes
     assert not thread.is_alive()
 
 
+@pytest.mark.smoke
 def test_the_engine_still_has_the_events_whose_waiting_is_replaced() -> None:
     from dbos import DBOS
 

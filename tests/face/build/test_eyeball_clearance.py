@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.face.people import PEOPLE
 from tests.face.posing import posed_vertices
-from tts2face.catalogue import identities
 from tts2face.face.deformation import build_rig, eye_rotations
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 
-PEOPLE = [("cartoon", None), ("head", None), *(("head", entry.name) for entry in identities())]
 BOTH = ("Left", "Right")
 SMILE = {"eyeSquint": 0.8, "cheekSquint": 1.0, "mouthSmile": 1.0}
 MOODS = (SMILE, {"browDown": 1.0, "eyeSquint": 0.5, "noseSneer": 0.5, "cheekSquint": 0.3}, {"eyeWide": 1.0}, {})
@@ -65,6 +64,7 @@ def test_no_sum_of_shapes_moves_skin_into_an_eyeball(name: str, person: str | No
     assert uncorrected > 0.3  # the shapes alone
 
 
+@pytest.mark.smoke
 def test_lashes_follow_the_lids() -> None:
     face = load_face("cartoon", hair="bald")
     rig = build_rig(face)

@@ -10,7 +10,13 @@ SERVICE_PAGE = "http.md"  # its examples need a service: tests/service/server/te
 WITH_EXAMPLES = [page for page in PAGES if code_blocks(page, "python") and page.name != SERVICE_PAGE]
 
 
-@pytest.mark.parametrize("page", WITH_EXAMPLES, ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=[pytest.mark.smoke] * (page.name == "python.md"), id=page.name)
+        for page in WITH_EXAMPLES
+    ],
+)
 def test_python_examples_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     namespace: dict[str, object] = {}
@@ -18,6 +24,7 @@ def test_python_examples_run(page: Path, tmp_path: Path, monkeypatch: pytest.Mon
         exec(compile(block, str(page), "exec"), namespace)
 
 
+@pytest.mark.smoke
 def test_pages_with_examples_are_found() -> None:
     assert {"python.md", "animator.md", "batch.md", "subtitles.md", "speech-science.md", "developer.md"} <= {
         page.name for page in WITH_EXAMPLES

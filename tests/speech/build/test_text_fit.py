@@ -41,6 +41,7 @@ def alignment(*confidences: float) -> Alignment:
     return Alignment(PhoneSequence(phones, edges), words, float(np.mean(confidences)), scores)
 
 
+@pytest.mark.smoke
 def test_consecutive_words_with_low_likelihood_are_found() -> None:
     found = alignment(*[-4000.0] * 6, *[-11000.0] * 4, *[-4000.0] * 6)
     (misfit,) = find_misfits(found, is_english=True)
@@ -50,22 +51,26 @@ def test_consecutive_words_with_low_likelihood_are_found() -> None:
     assert (mismatch.begin, mismatch.end, mismatch.confidence) == pytest.approx((3.0, 4.9, -11000.0))
 
 
+@pytest.mark.smoke
 def test_a_single_word_is_not_enough() -> None:
     assert find_misfits(alignment(*[-3000.0] * 4, -9000.0, *[-3000.0] * 4), is_english=True) == []
 
 
+@pytest.mark.smoke
 def test_other_languages_have_another_limit() -> None:
     found = alignment(*[(LEAST_LOCAL_CONFIDENCE + LEAST_FOREIGN_CONFIDENCE) / 2] * 5)
     assert find_misfits(found, is_english=True) == [(0, 5)]
     assert find_misfits(found, is_english=False) == []
 
 
+@pytest.mark.smoke
 def test_what_surrounds_a_span_is_cut_between_words() -> None:
     first, last, begin, end = extend_range(alignment(*[-4000.0] * 20), 8, 10)
     assert (first, last) == (5, 13)
     assert (begin, end) == pytest.approx((2.45, 6.45))
 
 
+@pytest.mark.smoke
 def test_a_mismatch_has_its_time_and_words() -> None:
     mismatch = TextMismatch(1.0, 2.5, ("one", "two"), -9000.0).shift(2.0)
     assert mismatch.sentence == ("the text does not fit the recording from 3.0 to 4.5 s (one two); check the words")
@@ -73,6 +78,7 @@ def test_a_mismatch_has_its_time_and_words() -> None:
     assert "(a b c d ... h i j)" in long.sentence
 
 
+@pytest.mark.smoke
 def test_another_text_for_the_project_s_own_voice() -> None:
     speech = load_voice("heart", "en-us").speak(RIGHT[1])
     assert align_recording(speech.waveform, pronounce_transcript(RIGHT[1], "en-us"))[2] == ()

@@ -14,7 +14,7 @@ from tests.running import eventually
 from tests.started import running_processes
 
 COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
-ROOT = str(Path(__file__).parents[2])
+ROOT = str(Path(__file__).parents[3])
 TEXT = "This is a rather long sentence that takes some time to speak. " * 20
 PATIENCE_S = 120.0
 POOL = """
@@ -87,7 +87,9 @@ def start_command(here: Path) -> "subprocess.Popen[str]":
     return process
 
 
-@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143), ("SIGHUP", 129)])
+@pytest.mark.parametrize(
+    ("name", "code"), [("SIGINT", 130), pytest.param("SIGTERM", 143, marks=pytest.mark.smoke), ("SIGHUP", 129)]
+)
 def test_a_signal_leaves_no_files_and_no_processes(tmp_path: Path, name: str, code: int) -> None:
     earlier = tmp_path / "x.mp4"
     earlier.write_bytes(b"of an earlier run")
@@ -112,6 +114,7 @@ def run_script(here: Path, *arguments: str) -> "subprocess.Popen[str]":
     )
 
 
+@pytest.mark.smoke
 def test_a_signal_whose_exception_is_dropped_or_replaced_ends_the_command(tmp_path: Path) -> None:
     """Signals that come twice at once, as from `timeout`, are one."""
     numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -134,7 +137,7 @@ def test_a_signal_whose_exception_is_dropped_or_replaced_ends_the_command(tmp_pa
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("n_signals", [1, 100])
+@pytest.mark.parametrize("n_signals", [1, pytest.param(100, marks=pytest.mark.smoke)])
 def test_compiled_code_that_does_not_return_ends_with_the_process(tmp_path: Path, n_signals: int) -> None:
     """A while after the first signal, or at once with the second one; what it was writing is removed."""
     with run_script(tmp_path, "stuck") as process:
@@ -162,7 +165,7 @@ def test_files_of_a_killed_command_are_removed_by_the_next_one(tmp_path: Path) -
     assert [path.name for path in tmp_path.iterdir()] == ["x.mp4"]
 
 
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP", "SIGKILL"])
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP", pytest.param("SIGKILL", marks=pytest.mark.smoke)])
 def test_processes_of_a_pool_end_with_their_parent(tmp_path: Path, name: str) -> None:
     script = tmp_path / "pool_script.py"
     script.write_text(POOL)

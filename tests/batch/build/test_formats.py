@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from lexicon.errors import BackendError, InputError
+from tests.batch.build.test_run import AAC_SMEAR_S, decoded, manifest, spans
 from tests.batch.conftest import FPS, SMALL, SRT, Planner
-from tests.batch.test_run import AAC_SMEAR_S, decoded, manifest, spans
 from tests.render.tiny_talker import own_talker
 from tests.synthesis.fake_voice import LEAD, LETTER, FakeVoice
 from tts2face import load_clip
@@ -115,6 +115,7 @@ def test_exports_are_made_again_only_where_needed(plan_of: Planner, voices: list
     assert (changed.n_rendered, changed.n_made) == (2, 1)
 
 
+@pytest.mark.smoke
 def test_exports_alone_draw_nothing(plan_of: Planner, voices: list[FakeVoice], tmp_path: Path) -> None:
     out = tmp_path / "out"
     plan = plan_of(per="film", format="none", exports=("npz", "bvh"))
@@ -129,6 +130,7 @@ def test_exports_alone_draw_nothing(plan_of: Planner, voices: list[FakeVoice], t
     assert run_batch(plan, out).n_current == 1
 
 
+@pytest.mark.smoke
 def test_faces_of_one_export_must_be_equal(plan_of: Planner) -> None:
     cast = Cast(roles=(Role({"speaker": "ANN"}, {"face": "cartoon"}),))
     assert len(plan_of(cast=cast, exports=("glb",)).outputs) == 3
@@ -136,6 +138,7 @@ def test_faces_of_one_export_must_be_equal(plan_of: Planner) -> None:
         plan_of(cast=cast, per="scene", exports=("glb",))
 
 
+@pytest.mark.smoke
 def test_exports_with_a_mesh_need_a_face_with_one(plan_of: Planner) -> None:
     cast = Cast(default={"face": "self"})
     assert plan_of(cast=cast, exports=("srt",)).outputs
@@ -143,12 +146,14 @@ def test_exports_with_a_mesh_need_a_face_with_one(plan_of: Planner) -> None:
         plan_of(cast=cast, exports=("glb",))
 
 
+@pytest.mark.smoke
 def test_a_missing_package_is_named_before_anything_is_rendered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(formats, "find_spec", lambda _: None)
     with pytest.raises(BackendError, match=r"\.usda needs the package pxr"):
         BatchOptions(exports=("usda",))
 
 
+@pytest.mark.smoke
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
@@ -163,18 +168,21 @@ def test_wrong_formats_are_refused(options: dict[str, object], reason: str) -> N
         BatchOptions(**options)
 
 
+@pytest.mark.smoke
 def test_transparent_mov_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.srt").write_text(SRT, encoding="utf-8")
     with pytest.raises(InputError, match=r"\.mov has no transparency; choose --format webm"):
         plan_batch([tmp_path / "a.srt"], BatchOptions(format="mov"), picture=Picture(background="transparent"))
 
 
+@pytest.mark.smoke
 def test_endings_and_names_select_a_format() -> None:
     assert [batch_format(name)[0] for name in ("glb", ".usdc", "livelink", "track.json", "textgrid")] == [
         ".glb", ".usdc", ".csv", ".track.json", ".textgrid"
     ]  # fmt: skip
 
 
+@pytest.mark.smoke
 def test_sound_beside_keeps_points_in_the_name() -> None:
     assert sound_name("Show.S01E01-0001.glb") == "Show.S01E01-0001.wav"
     assert sound_name("hello.rhubarb.json") == "hello.wav"

@@ -1,0 +1,11 @@
+"""The shipped people, for tests that look at each of them; by default a run looks at the plain head alone."""
+
+import pytest
+
+from tts2face.catalogue import identities
+
+PEOPLE = [  # face and identity
+    pytest.param("head", None, marks=pytest.mark.smoke, id="head"),
+    pytest.param("cartoon", None, id="cartoon"),
+    *(pytest.param("head", entry.name, id=entry.name) for entry in identities("head")),
+]
