@@ -15,10 +15,10 @@ pytest_plugins = ["tests.started", "tests.running", "tests.models_once"]
 
 TESTS = Path(__file__).resolve().parent
 GROUPS = {  # name of a folder and of a marker: what the tests in it do
-    "server": "start servers, workers or databases",
+    "server": "start servers, workers, databases or their processes",
     "browser": "drive a browser",
-    "build": "make talkers, faces or styles of recordings, and faces of characters",
-    "commands": "run command lines of the documentation",
+    "build": "make talkers, faces, styles or films, and look at every shipped person",
+    "commands": "run command lines and examples of the documentation, or the package in processes of their own",
     "fuzz": "try many generated or hostile inputs",
 }
 DEFAULT = f"smoke or not ({' or '.join(GROUPS)})"  # as in pyproject.toml

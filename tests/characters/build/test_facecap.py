@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lexicon.errors import BackendError
 from tests.characters.build.test_animation import Played
 from tests.exports import programs
 from tts2face.characters.animation import write_character
@@ -16,7 +15,6 @@ from tts2face.characters.importing import ImportedFace, import_face
 from tts2face.characters.shape_names import ARKIT_SHAPES, guess_mapping
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.session import Session
-from tts2face.video.landmark_models import find_bundle
 
 
 @pytest.fixture(scope="module")
@@ -29,12 +27,7 @@ def path() -> Path:
 
 
 @pytest.fixture(scope="module")
-def imported(path: Path) -> ImportedFace:
-    try:
-        find_bundle()
-    except BackendError as missing:
-        pytest.skip(str(missing))
-    pytest.importorskip("ai_edge_litert", reason="needs the extra [capture]")
+def imported(path: Path, face_model: Path) -> ImportedFace:
     return import_face(path)
 
 

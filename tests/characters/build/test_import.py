@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from cli.main import run
-from lexicon.errors import BackendError, DataError, InputError
+from lexicon.errors import DataError, InputError
 from tests.characters.made import Variant, shipped_head, write_character_file, write_landmarks
 from tts2face.characters.importing import ImportedFace, import_face
 from tts2face.characters.landmark_table import landmark_table, read_landmark_table
@@ -23,7 +23,6 @@ from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
 from tts2face.retargeting.to_face import build_retargeter
 from tts2face.types import Trajectory
-from tts2face.video.landmark_models import find_bundle
 
 PLACE_MM = 0.02  # of a landmark after its table with 7 digits; quantised files have steps of 0.015 mm
 ORIGIN_MM = 0.7  # between the centre of the eyeball that built the head and that of the sphere fitted to it
@@ -199,12 +198,8 @@ def test_a_folder_of_obj_files(tmp_path: Path) -> None:
         import_face(folder)
 
 
+@pytest.mark.usefixtures("face_model")
 def test_tracked_landmarks_lie_near_the_true_ones(tmp_path: Path) -> None:
-    try:
-        find_bundle()
-    except BackendError as missing:
-        pytest.skip(str(missing))
-    pytest.importorskip("ai_edge_litert", reason="needs the extra [capture]")
     character = write_character_file(tmp_path / "tracked.glb", Variant(turn_deg=180.0))
     imported = import_face(character)
     face, head = imported.face, shipped_head()

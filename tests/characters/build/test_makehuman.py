@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lexicon.errors import BackendError
 from tests.characters.build.test_animation import Played, made_clip
 from tests.characters.makehuman import makehuman, write_obj_folder, write_rigged
 from tts2face.characters.animation import write_character
@@ -15,7 +14,6 @@ from tts2face.characters.shape_names import ARKIT_SHAPES
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.shape_transfer import eye_distance
 from tts2face.models.face import Face
-from tts2face.video.landmark_models import find_bundle
 
 BONES = {
     "default": {"neck": "neck01", "head": "head"},
@@ -30,14 +28,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def tracked(folder: Path) -> ImportedFace:
+def tracked(folder: Path, face_model: Path) -> ImportedFace:
     """The body with the default rig, its landmarks found by tracking, and their table in the folder."""
     source = makehuman()
-    try:
-        find_bundle()
-    except BackendError as missing:
-        pytest.skip(str(missing))
-    pytest.importorskip("ai_edge_litert", reason="needs the extra [capture]")
     imported = import_face(write_rigged(folder / "default.glb", source, "default"))
     (folder / "landmarks.tsv").write_text(landmark_table(imported.report.landmarks))
     return imported

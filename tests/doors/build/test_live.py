@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from lexicon.errors import BackendError
 from tests.corpus_tools.films import join_clips
 from tts2face.models.face_loading import load_face
 from tts2face.retargeting.performer import build_performer_retargeter
 from tts2face.synthesis.live_capture import CALIBRATION_S, LiveCapture, LivePose, track_poses
 from tts2face.video.blendshapes import BlendshapeReader
-from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import TimedFrame, read_frames
 from tts2face.video.streaming_tracker import StreamingTracker
 from tts2face.video.take import read_take
@@ -22,16 +20,7 @@ FPS = 25.0
 
 
 @pytest.fixture(scope="module")
-def bundle() -> Path:
-    pytest.importorskip("ai_edge_litert", reason="needs `pip install 'tts2face[capture]'`")
-    try:
-        return find_bundle(None)
-    except BackendError as missing:
-        pytest.skip(str(missing))
-
-
-@pytest.fixture(scope="module")
-def recording(shared_recordings: Path, bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def recording(shared_recordings: Path, face_model: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     clips = sorted((shared_recordings / "grid_s1" / "clips").iterdir())[:4]
     out = tmp_path_factory.mktemp("film") / "person.mp4"
     join_clips(clips, out)
@@ -39,14 +28,16 @@ def recording(shared_recordings: Path, bundle: Path, tmp_path_factory: pytest.Te
 
 
 @pytest.fixture(scope="module")
-def live(recording: Path, bundle: Path) -> list[LivePose | None]:
+def live(recording: Path, face_model: Path) -> list[LivePose | None]:
     return list(
-        track_poses(read_frames(recording), load_face("head"), FaceTracker(bundle), BlendshapeReader(bundle), FPS)
+        track_poses(
+            read_frames(recording), load_face("head"), FaceTracker(face_model), BlendshapeReader(face_model), FPS
+        )
     )
 
 
 def test_live_capture_calibrates_and_then_follows_the_person(
-    live: list[LivePose | None], recording: Path, bundle: Path
+    live: list[LivePose | None], recording: Path, face_model: Path
 ) -> None:
     """Compared with the take read as a whole, which includes later frames."""
     head = load_face("head")
@@ -54,7 +45,7 @@ def test_live_capture_calibrates_and_then_follows_the_person(
     assert all(pose is None for pose in live[:learnt])
     followed = live[learnt + 1 :]
     assert all(pose is not None for pose in followed)
-    take = read_take(recording, StreamingTracker(bundle), BlendshapeReader(bundle))
+    take = read_take(recording, StreamingTracker(face_model), BlendshapeReader(face_model))
     weights_of_take = build_performer_retargeter(take.landmarks, take.scores, head).weights(take.landmarks, take.scores)
     weights = np.array([pose.weights for pose in followed if pose is not None])
     whole = weights_of_take.values[learnt + 1 : learnt + 1 + len(weights)]
@@ -65,14 +56,14 @@ def test_live_capture_calibrates_and_then_follows_the_person(
     assert (weights <= head.limits[:, 1] + 1e-6).all()
 
 
-def test_without_a_face_the_head_waits(bundle: Path) -> None:
+def test_without_a_face_the_head_waits(face_model: Path) -> None:
     blank = [TimedFrame(number / FPS, np.full((64, 64, 3), 90, np.uint8)) for number in range(5)]
-    found = list(track_poses(blank, load_face("head"), FaceTracker(bundle), BlendshapeReader(bundle), FPS))
+    found = list(track_poses(blank, load_face("head"), FaceTracker(face_model), BlendshapeReader(face_model), FPS))
     assert found == [None] * 5
 
 
-def test_an_actor_gives_each_pose_once(recording: Path, bundle: Path) -> None:
-    with LiveCapture(read_frames(recording), load_face("head"), FPS, bundle) as actor:
+def test_an_actor_gives_each_pose_once(recording: Path, face_model: Path) -> None:
+    with LiveCapture(read_frames(recording), load_face("head"), FPS, face_model) as actor:
         actor._thread.join()
         now = actor.latest_pose()
         assert now is not None

@@ -10,24 +10,13 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from lexicon.errors import BackendError
 from tests.rendered_takes import ONLY_RENDERED
 from tts2face.retargeting.performer import eye_aperture
-from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import read_frames, read_media_info
 from tts2face.video.pose import head_angles, remove_pose
 from tts2face.video.track import FaceTracker
 
 FPS = 25.0
-
-
-@pytest.fixture(scope="module")
-def bundle() -> Path:
-    pytest.importorskip("cv2", reason="needs `pip install 'tts2face[capture]'`")
-    try:
-        return find_bundle(None)
-    except BackendError as missing:
-        pytest.skip(str(missing))
 
 
 @pytest.fixture(scope="module")
@@ -41,9 +30,9 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def tracked_motion(path: Path, bundle: Path) -> tuple[np.ndarray, np.ndarray]:
+def tracked_motion(path: Path, face_model: Path) -> tuple[np.ndarray, np.ndarray]:
     """(T, 478, 3) landmarks in mm and (T, 3) head angles in degrees relative to their median."""
-    points = FaceTracker(bundle).track(lambda: (picture.pixels for picture in read_frames(path)), FPS).points
+    points = FaceTracker(face_model).track(lambda: (picture.pixels for picture in read_frames(path)), FPS).points
     posed = remove_pose(points, FPS)
     angles = np.degrees(head_angles(posed.rotations))
     return posed.landmarks, angles - np.median(angles, axis=0)
@@ -54,13 +43,15 @@ def gap(landmarks: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("face", ["head", "cartoon"])
-def test_lips_lids_and_head_of_the_clip_are_the_performer_s(face: str, film: Path, bundle: Path, here: Path) -> None:
-    assert run(["mimic", str(film), "--face", face, "--out", "m.mp4", "--quiet", "--model", str(bundle)]) == 0
+def test_lips_lids_and_head_of_the_clip_are_the_performer_s(
+    face: str, film: Path, face_model: Path, here: Path
+) -> None:
+    assert run(["mimic", str(film), "--face", face, "--out", "m.mp4", "--quiet", "--model", str(face_model)]) == 0
     facts = read_media_info(here / "m.mp4")
     assert facts.fps == FPS
     assert facts.rate == 48_000
-    source, source_head = tracked_motion(film, bundle)
-    shown, shown_head = tracked_motion(here / "m.mp4", bundle)
+    source, source_head = tracked_motion(film, face_model)
+    shown, shown_head = tracked_motion(here / "m.mp4", face_model)
     assert len(shown) == len(source)
     assert np.corrcoef(gap(source), gap(shown))[0, 1] >= 0.94
     assert (np.abs(source_head - shown_head).mean(axis=0) <= 1.0).all()
@@ -81,10 +72,10 @@ def test_a_capture_moves_the_shapes_of_its_names(capture: Path, here: Path) -> N
 
 @ONLY_RENDERED
 def test_a_video_without_sound_gives_a_silent_clip_and_a_message(
-    film: Path, bundle: Path, here: Path, capsys: pytest.CaptureFixture[str]
+    film: Path, face_model: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_video(here / "mute.mp4", [picture.pixels for picture in read_frames(film)][:20])
-    assert run(["mimic", "mute.mp4", "--out", "m.mp4", "--size", "64x64", "--model", str(bundle)]) == 0
+    assert run(["mimic", "mute.mp4", "--out", "m.mp4", "--size", "64x64", "--model", str(face_model)]) == 0
     assert "contains no sound; the clip is silent" in capsys.readouterr().err
     assert (here / "m.mp4").exists()
 
@@ -102,7 +93,7 @@ def write_video(path: Path, pictures: list[np.ndarray]) -> None:
 
 @ONLY_RENDERED
 def test_films_that_cannot_drive_a_face_are_refused(
-    film: Path, bundle: Path, here: Path, capsys: pytest.CaptureFixture[str]
+    film: Path, face_model: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pictures = [picture.pixels for picture in read_frames(film)][:30]
     blue = np.zeros_like(pictures[0])
@@ -121,7 +112,7 @@ def test_films_that_cannot_drive_a_face_are_refused(
         "none.mp4": "there is no recording",
     }.items():
         before = sorted(here.iterdir())
-        assert run(["mimic", name, "--out", "m.mp4", "--quiet", "--model", str(bundle)]) != 0
+        assert run(["mimic", name, "--out", "m.mp4", "--quiet", "--model", str(face_model)]) != 0
         assert reason in capsys.readouterr().err
         assert sorted(here.iterdir()) == before
 
@@ -166,7 +157,7 @@ def test_captures_that_cannot_be_read_are_refused(
 
 
 @ONLY_RENDERED
-def test_a_copy_with_another_name_gives_the_same_bytes(film: Path, bundle: Path, here: Path) -> None:
+def test_a_copy_with_another_name_gives_the_same_bytes(film: Path, face_model: Path, here: Path) -> None:
     shutil.copy(film, here / "take.mkv")
     for source, out in ((str(film), "a"), ("take.mkv", "b")):
         words = [
@@ -180,7 +171,7 @@ def test_a_copy_with_another_name_gives_the_same_bytes(film: Path, bundle: Path,
             "5",
             "--quiet",
             "--model",
-            str(bundle),
+            str(face_model),
         ]
         assert run(words) == 0
     names = sorted(path.name for path in (here / "a").iterdir())

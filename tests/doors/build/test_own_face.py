@@ -9,24 +9,14 @@ import pytest
 
 from cli.main import run
 from corpus_tools.clone_talker import build_appearance_transfer
-from lexicon.errors import BackendError
 from tests.rendered_takes import ONLY_RENDERED, manifest_rows
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.talker import read_talker
-from tts2face.video.landmark_models import find_bundle
 from tts2face.video.track import FaceTracker
 
 N_RECORDINGS = 10
 CONSENT = "The speakers of GRID agreed to research and publication"
 TEXT = "Bob may move. We were away."
-
-
-@pytest.fixture(scope="module")
-def bundle() -> Path:
-    try:
-        return find_bundle(None)
-    except BackendError as missing:
-        pytest.skip(str(missing))
 
 
 @pytest.fixture(scope="module")
@@ -45,10 +35,10 @@ def recordings(takes: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def talker(recordings: Path, bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def talker(recordings: Path, face_model: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("talker") / "me.talker"
     words = ["corpus", "build", str(recordings), "--out", str(out), "--appearance", "--consent", CONSENT]
-    assert run([*words, "--jobs", "1", "--cache", str(out.parent / "cache"), "--model", str(bundle)]) == 0
+    assert run([*words, "--jobs", "1", "--cache", str(out.parent / "cache"), "--model", str(face_model)]) == 0
     return out
 
 
@@ -75,8 +65,8 @@ def test_the_file_contains_the_consent_and_is_small(talker: Path) -> None:
     )
 
 
-def test_the_clip_shows_a_face_whose_lips_part_and_close(pictures: np.ndarray, bundle: Path) -> None:
-    points = FaceTracker(bundle).track(lambda: iter(pictures), 25.0).points
+def test_the_clip_shows_a_face_whose_lips_part_and_close(pictures: np.ndarray, face_model: Path) -> None:
+    points = FaceTracker(face_model).track(lambda: iter(pictures), 25.0).points
     assert not np.isnan(points).any()
     gap = np.linalg.norm(points[:, UPPER_LIP_INNER_MID] - points[:, LOWER_LIP_INNER_MID], axis=1)
     eyes = np.linalg.norm(points[:, EYE_OUTER_LEFT] - points[:, EYE_OUTER_RIGHT], axis=1)
@@ -144,7 +134,7 @@ def test_an_appearance_cloned_to_its_own_talker_is_unchanged(talker: Path) -> No
 
 
 @ONLY_RENDERED
-def test_a_take_moves_lips_as_the_talker_never_did(talker: Path, bundle: Path, tmp_path: Path) -> None:
+def test_a_take_moves_lips_as_the_talker_never_did(talker: Path, face_model: Path, tmp_path: Path) -> None:
     take = tmp_path / "surprised.mp4"
     speak = ["Oh no, wow.", "--expression", "surprised=1,happy=0.6", "--fps", "25", "--size", "360x360", "--quiet"]
     assert run([*speak, "--out", str(take)]) == 0
@@ -152,6 +142,6 @@ def test_a_take_moves_lips_as_the_talker_never_did(talker: Path, bundle: Path, t
     for flags in ((), ("--append-missing",)):
         out = tmp_path / f"m{len(flags)}.mp4"
         words = ["mimic", str(take), "--talker", str(talker), "--face", "self", "--out", str(out), *flags]
-        assert run([*words, "--quiet", "--model", str(bundle)]) == 0
+        assert run([*words, "--quiet", "--model", str(face_model)]) == 0
         made[flags] = out.read_bytes()
     assert made[()] != made[("--append-missing",)]

@@ -15,7 +15,6 @@ import pytest
 from PIL import Image
 from safetensors.numpy import save
 
-from lexicon.errors import BackendError
 from tests.characters.made import write_character_file
 from tests.model_files.made import write_made_models, write_made_talker
 from tts2face.characters.binding import KEY
@@ -24,7 +23,6 @@ from tts2face.models.face_file import read_face
 from tts2face.service.uploads.decode_process import REFUSED
 from tts2face.storage.files import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
-from tts2face.video.landmark_models import find_bundle
 
 MOST_BYTES = 50e6
 WORDS = b"Siobhan  SH IH0 V AO1 N\nNguyen /\xc5\x8bwi\xc9\x99n/ # a name\n"
@@ -109,11 +107,8 @@ def test_a_face_does_not_keep_paths_of_the_machine_that_made_it(files: dict[str,
     assert KEY not in read_face(checked / "content").metadata
 
 
+@pytest.mark.usefixtures("face_model")
 def test_a_character_becomes_a_face(tmp_path: Path) -> None:
-    try:
-        find_bundle(None)
-    except BackendError as missing:
-        pytest.skip(str(missing))
     write_character_file(tmp_path / "avatar")
     code, message, checked = check("face", tmp_path / "avatar", tmp_path)
     assert (code, message) == (0, "")

@@ -17,15 +17,13 @@ import pytest
 from numpy.typing import NDArray
 
 import tts2face
-from lexicon.errors import BackendError
 from tests.conftest import SHARED
 from tests.rendered_takes import transcript
 from tests.running import HostService, eventually
 from tests.service.job_requests import finished
-from tests.service.test_resource_check import WORDS
+from tests.service.server.test_resource_check import WORDS
 from tts2face.models.talker import load_talker
 from tts2face.service.access.keys import add_key
-from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import read_sound
 
 TEXT = "We were away a year ago. Bob may move. The boy will buy a pie for you. She saw the ship near the shore."
@@ -104,17 +102,10 @@ def sound() -> bytes:
     return buffer.getvalue()
 
 
-def needs_landmarks() -> None:
-    try:
-        find_bundle(None)
-    except BackendError as missing:
-        pytest.skip(str(missing))
-
-
+@pytest.mark.usefixtures("face_model")
 def test_a_recording_becomes_a_talker_that_speaks(
     clients: dict[str, httpx.Client], build: Build, take: Path, tmp_path: Path
 ) -> None:
-    needs_landmarks()
     assert take.stat().st_size > 100_000  # larger than other bodies may be
     queued = build(take.read_bytes(), licence="CC0-1.0", language="en-gb")
     assert queued.status_code == 202, queued.text
@@ -148,11 +139,11 @@ def test_a_recording_becomes_a_talker_that_speaks(
     assert client.delete("/v1/talkers/anna").status_code == 204
 
 
+@pytest.mark.usefixtures("face_model")
 def test_a_recording_without_a_face_is_refused_with_the_reason(
     clients: dict[str, httpx.Client], build: Build, take: Path
 ) -> None:
     """The sound is that of the take, so that only the face is missing."""
-    needs_landmarks()
     spoken = read_sound(take, RATE)
     queued = build(movie(spoken.duration, samples=(spoken.samples * 32767).astype(np.int16)), name="nobody")
     assert queued.status_code == 202, queued.text
@@ -224,9 +215,9 @@ def test_words_may_be_sent_once(clients: dict[str, httpx.Client]) -> None:
     assert (none.status_code, "there is no recording" in none.text) == (422, True)
 
 
+@pytest.mark.usefixtures("face_model")
 def test_a_real_recording_becomes_a_talker(clients: dict[str, httpx.Client], build: Build) -> None:
     """One sentence of a real person, if the recordings are there."""
-    needs_landmarks()
     found = sorted((SHARED / "recordings" / "grid_s1" / "clips").glob("*.mkv"))
     if not found:
         pytest.skip("the recordings of real people are not part of the repository")

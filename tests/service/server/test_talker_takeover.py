@@ -10,11 +10,9 @@ import httpx
 import pytest
 
 import tts2face
-from lexicon.errors import BackendError
 from tests.running import HostService, RunningService, eventually
 from tests.service.job_requests import finished
 from tests.started import running_processes
-from tts2face.video.landmark_models import find_bundle
 
 TEXT = "We were away a year ago. Bob may move. The boy will buy a pie for you."
 
@@ -31,11 +29,8 @@ def children(parent: int, module: str) -> list[int]:
     return [number for number in found if module.encode() in Path(f"/proc/{number}/cmdline").read_bytes()]
 
 
+@pytest.mark.usefixtures("face_model")
 def test_a_talker_is_built_after_the_death_of_its_worker(running: RunningService, tmp_path: Path) -> None:
-    try:
-        find_bundle(None)
-    except BackendError as missing:
-        pytest.skip(str(missing))
     take = tmp_path / "take.mp4"
     tts2face.Session().write(TEXT, take, size="256x256", fps=25)
     with httpx.Client(base_url=running.url, timeout=60.0) as client:
