@@ -5,6 +5,7 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the processes of a run share the cores; numpy reads it when loaded
 
 import gc
+import zlib
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ GROUPS = {  # name of a folder and of a marker: what the tests in it do
 }
 DEFAULT = f"smoke or not ({' or '.join(GROUPS)})"  # as in pyproject.toml
 SHARED_SERVER = "host"  # fixture
+LONGEST_NAME = 200  # characters of a value in the name of a test
 SKIPPED = "tts2face/skipped"  # in pytest's cache
 SHARED = Path(os.environ.get("TTS2FACE_SHARED", Path(__file__).resolve().parents[2] / "shared"))
 
@@ -115,6 +117,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             is_apart = "browser" in folders and not item.get_closest_marker("smoke")
             item.add_marker(pytest.mark.xdist_group("browser" if is_apart else SHARED_SERVER))
     items.sort(key=lambda item: (item.get_closest_marker("xdist_group") is None, not _groups(item)))
+
+
+def pytest_make_parametrize_id(val: object) -> str | None:
+    """Short names of long values: a name stands in an environment variable of each child process."""
+    if not isinstance(val, str | bytes) or len(val) <= LONGEST_NAME:
+        return None
+    content = val.encode(errors="surrogatepass") if isinstance(val, str) else val
+    return f"{len(val)}-{zlib.crc32(content):08x}"
 
 
 def pytest_collection_finish() -> None:

@@ -16,7 +16,7 @@ import pytest
 pytest.importorskip("dbos", reason="needs the extra [batch]")
 
 from tests.running import eventually
-from tests.started import children, running_processes
+from tests.started import children
 from tts2face.batch.segment import Segment, input_hashes
 from tts2face.session_cache import Models
 
@@ -60,7 +60,9 @@ class Postgres:
             [*self._as_user, str(self._bin / command), *arguments], capture_output=True, text=True, check=False, cwd="/"
         )
         if answer.returncode:
-            reason = f"PostgreSQL does not start here: {(answer.stderr or answer.stdout).strip()[-200:]}"
+            log = self.folder / "log"
+            said = (answer.stderr or answer.stdout) + (log.read_text()[-900:] if log.is_file() else "")
+            reason = f"PostgreSQL does not start here: {said.strip()}"
             if self.has_started:
                 pytest.fail(reason)
             pytest.skip(reason)
@@ -76,11 +78,13 @@ class Postgres:
 
     def kill(self) -> None:
         """Kill the server and its processes, as `kill -9` does."""
+        os.kill(self.processes()[0], signal.SIGSTOP)  # it starts no process that would be missed
         family = self.processes()
         for number in family:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(number, signal.SIGKILL)
-        eventually(lambda: not running_processes().keys() & set(family))
+        # A server does not start while the number of the earlier one is in use, be it by a zombie.
+        eventually(lambda: not any(Path(f"/proc/{number}").exists() for number in family))
 
     def processes(self) -> list[int]:
         """Numbers of the processes of the server."""

@@ -216,7 +216,7 @@ def test_old_jobs_and_their_results_are_removed(host: HostService, tmp_path: Pat
     with host(data=tmp_path, results_days=30) as running, httpx.Client(base_url=running.url, timeout=60.0) as api:
         job = finished(api, submit(api, CLIP).json())
     assert len(list((tmp_path / "store" / "results").glob("??/*"))) == 1
-    with host(data=tmp_path, results_days=0.00001, workers=0) as running:
+    with host(data=tmp_path, results_days=1e-7, workers=0) as running:
         running.wait_for_event("old jobs removed", jobs=1)
         assert httpx.get(f"{running.url}/v1/jobs/{job['id']}").status_code == 404
     assert not list((tmp_path / "store" / "results").glob("??/*"))

@@ -23,10 +23,11 @@ def running(host: HostService) -> Iterator[RunningService]:
         yield service
 
 
-def children(parent: int, module: str) -> list[int]:
-    """Processes of a Python module that a process has started."""
+def children(parent: int, *words: str) -> list[int]:
+    """Processes that a process has started, with these words in their command lines."""
     found = [number for number, its_parent in running_processes().items() if its_parent == parent]
-    return [number for number in found if module.encode() in Path(f"/proc/{number}/cmdline").read_bytes()]
+    lines = {number: Path(f"/proc/{number}/cmdline").read_text() for number in found}
+    return [number for number, line in lines.items() if all(word in line for word in words)]
 
 
 @pytest.mark.usefixtures("face_model")
@@ -38,7 +39,7 @@ def test_a_talker_is_built_after_the_death_of_its_worker(running: RunningService
         files = {"video": take.read_bytes(), "transcript": TEXT.encode()}
         job = client.post("/v1/talkers/build", data=form, files=files).json()
         eventually(lambda: client.get(f"/v1/jobs/{job['id']}").json()["progress"]["done"] > 0, 120.0)
-        (worker,) = children(running.process.pid, "tts2face.jobs.worker")
+        (worker,) = children(running.process.pid, "tts2face.jobs.worker", running.data.name)
         (builder,) = children(worker, "corpus_tools.build_process")
         os.kill(worker, signal.SIGKILL)
         eventually(lambda: builder not in running_processes(), 30.0)
