@@ -29,15 +29,17 @@ def join_clips(sources: list[Path], out: Path, late_s: float = 0.0) -> list[tupl
     return spans
 
 
-def write_video(pictures: Sequence[np.ndarray], samples: np.ndarray, out: Path, fps: int = 25) -> None:
-    """Pictures (H, W, 3) and samples at 16 kHz as an MP4 with 44.1 kHz stereo sound."""
+def write_video(
+    pictures: Sequence[np.ndarray], samples: np.ndarray, out: Path, fps: int = 25, *, is_lossless: bool = False
+) -> None:
+    """Pictures (H, W, 3) and samples at 16 kHz as an MP4 with 44.1 kHz stereo sound, AAC or lossless."""
     import soxr
 
     with av.open(str(out), "w") as container:
         video = container.add_stream("libx264", rate=fps, options={"crf": "15"})
         video.height, video.width = (side // 2 * 2 for side in pictures[0].shape[:2])
         video.pix_fmt = "yuv420p"
-        audio = container.add_stream("aac", rate=44_100, layout="stereo")
+        audio = container.add_stream("alac" if is_lossless else "aac", rate=44_100, layout="stereo")
         for number, picture in enumerate(pictures):
             frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
             frame.pts, frame.time_base = number, Fraction(1, fps)
@@ -45,7 +47,8 @@ def write_video(pictures: Sequence[np.ndarray], samples: np.ndarray, out: Path, 
         samples = soxr.resample(samples.astype(np.float32), 16_000, 44_100)
         frame = av.AudioFrame.from_ndarray(np.stack([samples, samples]), "fltp", "stereo")
         frame.sample_rate = 44_100
-        container.mux(audio.encode(frame))
+        for one in av.AudioResampler(audio.format, "stereo", 44_100).resample(frame) if is_lossless else [frame]:
+            container.mux(audio.encode(one))
         container.mux(audio.encode(None))
         container.mux(video.encode(None))
 

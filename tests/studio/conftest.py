@@ -20,7 +20,7 @@ SPOKEN = SHARED / "recordings" / "grid_s1" / "clips" / "bbaf2n.mkv"  # "bin blue
 def studio_service(service: RunningService) -> Iterator[RunningService]:
     """The service of the run, with the harness."""
     yield service
-    assert not [event["traceback"] for event in service.events() if "traceback" in event]
+    assert not [event for event in service.events() if "traceback" in event]
 
 
 @pytest.fixture

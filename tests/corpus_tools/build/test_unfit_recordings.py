@@ -33,7 +33,8 @@ def found(rendered_takes: Path, face_model: Path, tmp_path_factory: pytest.TempP
     folder = tmp_path_factory.mktemp("unfit")
     write_video([mirrored_pair(pixels) for pixels in pictures], sound, folder / "crowd.mp4")
     write_video([*pictures[:30], *[pictures[30]] * 12, *pictures[42:]], sound, folder / "frozen.mp4")
-    write_video(pictures, np.clip(5 * sound / loud, -1, 1), folder / "clipped.mp4")
+    # AAC rounds off what was clipped: how much of it is left depends on the release of the encoder.
+    write_video(pictures, np.clip(5 * sound / loud, -1, 1), folder / "clipped.mp4", is_lossless=True)
     write_video(pictures, sound + 1.5 * noise, folder / "noisy.mp4")
     write_video(pictures, sound + noise / 3, folder / "hiss.mp4")
     write_video([*pictures[:35], *[grey] * 8, *pictures[43:]], sound, folder / "away.mp4")

@@ -113,9 +113,10 @@ async def confirm(question: str, action: str, do: Callable[[], Awaitable[None]])
         with ui.row():
             ui.button(action, on_click=lambda: dialog.submit(True)).props("color=negative")
             ui.button("Cancel", on_click=lambda: dialog.submit(False)).props("flat autofocus")
-    if await dialog:
-        await do()
+    is_sure = await dialog
     dialog.delete()
+    if is_sure:
+        await do()
 
 
 def _chosen_dark(request: HttpRequest) -> bool | None:

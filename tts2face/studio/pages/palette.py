@@ -198,7 +198,8 @@ class PalettePage:
 
         self._missing = [name for name in self._pictures if not store.swatch(self._key.name, name).is_file()]
         if self._missing:
-            ui.timer(0.0, lambda: self._draw_pictures(version), once=True)
+            with self._cards:  # what is on the page: the card with the button that was pressed may be gone
+                ui.timer(0.0, lambda: self._draw_pictures(version), once=True)
 
     async def _draw_pictures(self, version: int) -> None:
         """Show pictures that are not made yet, one after the other."""
