@@ -1,13 +1,18 @@
-"""Decorators that compile kernels with numba, and the choice of the cache folder for compiled code.
+"""Decorators that compile kernels with numba, and the cache of compiled code.
 
-All kernels of the package use these decorators; numba is imported in this module only. If neither the package's folder
-nor the user's cache folder is writable, compiled code is cached in a private temporary folder.
+All kernels of the package use these decorators; numba is imported in this module only. Compiled code is kept in the
+user's cache folder, by the content of the module and of what it takes from others: installations of the same code share
+it, and a changed module is never used with the code of an earlier one. If the folder cannot be written, a private
+temporary folder takes its place.
 
 Compilation delays a first run by up to half a minute; it is logged at the level INFO.
 """
 
+import hashlib
+import inspect
 import logging
 import os
+import shutil
 import stat
 import tempfile
 import time
@@ -16,15 +21,86 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 import numba
+import numpy as np
 from numba.core import event
-from numba.core.caching import FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.dispatcher import Dispatcher
 from numba.core.runtime import rtsys
+
+from tts2face.storage.user_folders import user_cache
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 LOG = logging.getLogger(__name__)
 REPORT_S = 5.0  # between two messages of a compilation
-CACHE_VARIABLE = "NUMBA_CACHE_DIR"  # set by the user; numba reads it itself
+CACHE_VARIABLE = "NUMBA_CACHE_DIR"  # set by the user
+N_VERSIONS = 4  # of the compiled kernels of a module that are kept
+
+
+class ModuleLocator(_CacheLocator):  # type: ignore[misc]
+    """Folder of the compiled kernels of a module: its name and a hash of all that its kernels are compiled of."""
+
+    def __init__(self, function: Callable[..., Any], path: str) -> None:
+        self._function, self._py_file = function, path
+        self._stamp = _stamp(path, function.__globals__)
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], path: str) -> "ModuleLocator":
+        """As numba asks for a locator."""
+        return cls(function, path)
+
+    def get_cache_path(self) -> str:
+        """Folder of the compiled code."""
+        return str(FOLDER / f"{Path(self._py_file).stem}-{self._stamp}")
+
+    def get_source_stamp(self) -> str:
+        """By which numba knows that compiled code is valid."""
+        return self._stamp
+
+    def get_disambiguator(self) -> str:
+        """Line of the function, as several of a module may have one name."""
+        return str(self._function.__code__.co_firstlineno)
+
+    def ensure_cache_path(self) -> None:
+        """Create the folder before code is saved, and remove those of the oldest versions of the module."""
+        super().ensure_cache_path()
+        versions = sorted(FOLDER.glob(f"{Path(self._py_file).stem}-*"), key=_time_of_change)
+        for folder in versions[:-N_VERSIONS]:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _time_of_change(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except OSError:  # another process has removed it
+        return 0.0
+
+
+_stamps: dict[str, str] = {}  # by the path of the module
+
+
+def _stamp(path: str, names: dict[str, Any]) -> str:
+    """Hash of a module's text, of the modules of the kernels that it imports, and of imported constants.
+
+    numba looks at the text of the module alone, and keeps code that calls kernels of another module as it was.
+    """
+    if path not in _stamps:
+        found = hashlib.sha256(Path(path).read_bytes())
+        for name, value in sorted(names.items()):
+            if isinstance(value, Dispatcher):
+                found.update(_stamps.get(inspect.getfile(value.py_func), "").encode())  # its own: not known yet
+            elif isinstance(value, np.ndarray):
+                found.update(name.encode() + value.tobytes())
+            elif isinstance(value, bool | int | float | str | tuple) and not name.startswith("__"):
+                found.update(f"{name}={value!r};".encode())
+        _stamps[path] = found.hexdigest()[:16]
+    return _stamps[path]
+
+
+class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
+    """What numba keeps of a kernel, in the folder of its module."""
+
+    _locator_classes = [ModuleLocator]  # noqa: RUF012 - as numba declares it
 
 
 class KernelCache(FunctionCache):  # type: ignore[misc]
@@ -33,6 +109,8 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
     numba's own class first registers all that its compiler can compile, which takes most of the time of the first
     kernel of a process. Compiled code needs its run time only, and the compiler registers everything itself.
     """
+
+    _impl_class = KernelCacheImpl
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Compiled code for a signature; None if it is not in the cache."""
@@ -68,19 +146,16 @@ def _compiled(function: Callable[Arguments, Result], *, fastmath: bool) -> Calla
     return found
 
 
-def cache_folder(package: Path) -> Path | None:
-    """Private cache folder for compiled kernels; None if numba's own choice is writable."""
-    if CACHE_VARIABLE in os.environ or _can_write(package / "__pycache__") or _can_write(_user_cache_folder()):
-        return None
-    return _private_folder()
-
-
-def _user_cache_folder() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser()) / "numba"
+def cache_folder() -> Path:
+    """Folder for compiled kernels: that of the user's choice, that of the user's cache, or a private temporary one."""
+    if chosen := os.environ.get(CACHE_VARIABLE):
+        return Path(chosen)
+    folder = user_cache() / "kernels"
+    return folder if _can_write(folder) else _private_folder()
 
 
 def _can_write(folder: Path) -> bool:
-    """Whether a folder is writable; a missing folder is created, as numba does."""
+    """Whether a folder is writable; a missing folder is created."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
@@ -106,9 +181,7 @@ def _private_folder() -> Path:
     return folder
 
 
-_FOLDER = cache_folder(Path(__file__).parent)
-if _FOLDER is not None:
-    numba.config.CACHE_DIR = str(_FOLDER)
+FOLDER = cache_folder()
 
 
 class _Compilations(event.Listener):  # type: ignore[misc]

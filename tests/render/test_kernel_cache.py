@@ -16,10 +16,9 @@ from cli.progress import COMPILATION, compilation_messages, progress_bar
 from tts2face import compilation
 from tts2face.compilation import CACHE_VARIABLE, cache_folder
 from tts2face.exemplar import recorded_motion
-from tts2face.render import draw, raster, shade, strand_light, strands
+from tts2face.render import raster, shade, strand_light, strands
 from tts2face.service.logs import LineFormatter
 from tts2face.speech.bs1770 import filter_biquad
-from tts2face.synthesis import warm_up
 from tts2face.synthesis.warm_up import kernels_are_compiled
 
 
@@ -32,11 +31,10 @@ def _locked(monkeypatch, tmp_path):
 
 @pytest.mark.usefixtures("_locked")
 def test_a_private_folder_is_used_where_nothing_else_can_be_written(tmp_path):
-    first = cache_folder(tmp_path / "package")
-    assert first is not None
+    first = cache_folder()
     assert first.parent == tmp_path
     assert first.stat().st_mode & 0o077 == 0
-    assert cache_folder(tmp_path / "package") == first  # another process finds the kernels again
+    assert cache_folder() == first  # another process finds the kernels again
 
 
 @pytest.mark.usefixtures("_locked")
@@ -44,14 +42,13 @@ def test_a_folder_that_others_can_write_is_not_trusted(tmp_path):
     taken = tmp_path / f"tts2face-kernels-{os.getuid()}"
     taken.mkdir()
     taken.chmod(0o777)
-    found = cache_folder(tmp_path / "package")
-    assert found is not None
-    assert found != taken
+    assert cache_folder() != taken
 
 
-def test_a_writable_package_needs_no_other_folder(tmp_path, monkeypatch):
+def test_kernels_lie_in_the_cache_of_the_user(tmp_path, monkeypatch):
     monkeypatch.delenv(CACHE_VARIABLE, raising=False)
-    assert cache_folder(tmp_path) is None
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert cache_folder() == tmp_path / "tts2face" / "kernels"
 
 
 def test_a_folder_below_a_file_cannot_be_written(tmp_path):
@@ -60,10 +57,10 @@ def test_a_folder_below_a_file_cannot_be_written(tmp_path):
     assert compilation._can_write(tmp_path / "new" / "numba")
 
 
-def test_a_folder_that_the_user_sets_is_kept(tmp_path, monkeypatch):
+def test_a_folder_that_the_user_sets_is_kept(monkeypatch):
     monkeypatch.setenv(CACHE_VARIABLE, "/chosen")
     monkeypatch.setattr(compilation, "_can_write", lambda folder: False)
-    assert cache_folder(tmp_path) is None
+    assert cache_folder() == Path("/chosen")
 
 
 @pytest.fixture
@@ -83,18 +80,48 @@ def test_kernels_count_as_compiled_once_they_lie_on_disk(indexes):
     assert not kernels_are_compiled(draws=True)
     indexes["drawing"].write_bytes(b"")
     assert kernels_are_compiled(draws=True)
-    os.utime(indexes["motion"], (0, 0))  # older than the source
-    assert not kernels_are_compiled(draws=True)
 
 
-def test_a_cache_that_is_older_than_its_source_is_compiled_once_only(monkeypatch, indexes):
-    for index in indexes.values():
-        index.write_bytes(b"")
-        os.utime(index, (0, 0))  # numba still uses it if the source has the same content as before
-    monkeypatch.setattr(draw, "draw", lambda *arguments, **options: None)
-    monkeypatch.setattr(warm_up, "COMPILE_CHILD_CODE", "")
-    warm_up.compile_kernels()
-    assert kernels_are_compiled(draws=True)
+CALLER = """
+from tests_made.callee import SCALE, value
+from tts2face.compilation import kernel
+
+@kernel
+def twice():
+    return 2 * SCALE * value()
+"""
+CALLEE = """
+from tts2face.compilation import kernel
+SCALE = {}
+
+@kernel
+def value():
+    return {}
+"""
+CALL = "from tests_made.caller import twice; print(twice(), sum(twice.stats.cache_hits.values()))"
+ROOT = Path(__file__).parents[2]
+
+
+def test_installations_share_code_that_is_compiled_of_the_same(tmp_path):
+    """A kernel is compiled again where one that it calls, or a constant, is another; old versions are removed."""
+
+    def call(where: str, scale: int, value: int) -> str:
+        package = tmp_path / where / "tests_made"
+        package.mkdir(parents=True, exist_ok=True)
+        (package / "caller.py").write_text(CALLER)
+        (package / "callee.py").write_text(CALLEE.format(scale, value))
+        paths = os.pathsep.join((str(package.parent), str(ROOT)))
+        environment = os.environ | {CACHE_VARIABLE: str(tmp_path / "kernels"), "PYTHONPATH": paths}
+        done = subprocess.run([sys.executable, "-c", CALL], env=environment, capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+
+    assert call("one", 1, 2) == "4 0"
+    assert call("two", 1, 2) == "4 1"
+    assert call("one", 1, 5) == "10 0"
+    assert call("one", 3, 5) == "30 0"
+    assert call("two", 1, 2) == "4 1"
+    assert [call("one", 1, value) for value in range(6, 10)] == [f"{2 * value} 0" for value in range(6, 10)]
+    assert len(list((tmp_path / "kernels").glob("caller-*"))) == compilation.N_VERSIONS
 
 
 @pytest.mark.parametrize("module", [raster, shade, strand_light, strands], ids=lambda module: module.__name__)

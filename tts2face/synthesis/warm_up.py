@@ -6,8 +6,6 @@ drawing kernels, because numba compiles one kernel at a time in each process.
 
 import subprocess
 import sys
-from contextlib import suppress
-from itertools import chain
 from pathlib import Path
 from types import ModuleType
 
@@ -36,17 +34,18 @@ def kernels_are_compiled(*, draws: bool) -> bool:
 
     Compiling them delays the first result by some seconds.
     """
-    return all(
-        any(index.stat().st_mtime >= Path(module.__file__ or "").stat().st_mtime for index in indexes)
-        for module, indexes in _cache_indexes(draws=draws).items()
-    )
+    kernels: list[tuple[ModuleType, str]] = [(recorded_motion, "sample_tokens")]
+    if draws:
+        from tts2face.render import raster
+
+        kernels.append((raster, "draw_band"))
+    return all(_index_files(module, name) for module, name in kernels)
 
 
 def compile_kernels() -> None:
-    """Compile all kernels that a clip needs, and mark the disk cache as new.
+    """Compile all kernels that a clip needs.
 
-    If a child process fails, its kernels are compiled at their first use. numba keeps cached code whose source
-    file was replaced by one of the same content, so that the age of the cache does not show by itself that it is valid.
+    If a child process fails, its kernels are compiled at their first use.
     """
     from tts2face.render.draw import draw
     from tts2face.render.materials import STRANDS
@@ -66,9 +65,6 @@ def compile_kernels() -> None:
             child.wait()
             if child.stdin is not None:
                 child.stdin.close()
-    for index in chain.from_iterable(_cache_indexes(draws=True).values()):
-        with suppress(OSError):  # a cache that this user may only read
-            index.touch()
 
 
 def _start_child(work: str) -> "subprocess.Popen[bytes]":
@@ -78,16 +74,6 @@ def _start_child(work: str) -> "subprocess.Popen[bytes]":
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-
-
-def _cache_indexes(*, draws: bool) -> dict[ModuleType, list[Path]]:
-    """Index files of one kernel of each kind, by its module."""
-    kernels: list[tuple[ModuleType, str]] = [(recorded_motion, "sample_tokens")]
-    if draws:
-        from tts2face.render import raster
-
-        kernels.append((raster, "draw_band"))
-    return {module: _index_files(module, name) for module, name in kernels}
 
 
 def _index_files(module: ModuleType, name: str) -> list[Path]:
