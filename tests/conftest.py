@@ -12,6 +12,10 @@ from typing import Any
 
 import pytest
 
+from tts2face.compilation import CACHE_VARIABLE, FOLDER
+
+os.environ.setdefault(CACHE_VARIABLE, str(FOLDER))  # processes with another home compile nothing again
+
 pytest_plugins = ["tests.started", "tests.running", "tests.models_once"]
 
 TESTS = Path(__file__).resolve().parent

@@ -30,7 +30,8 @@ def test_a_killed_run_leaves_no_processes_and_no_files(tmp_path: Path) -> None:
     (tmp_path / "test_it.py").write_text(STARTS)
     report = tmp_path / "report"
     command = [sys.executable, "-m", "pytest", "-p", "tests.started", "-c", os.devnull, "--rootdir", str(tmp_path)]
-    environment = os.environ | {"REPORT": str(report), "PYTHONPATH": str(TESTS.parent)}
+    own = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
+    environment = own | {"REPORT": str(report), "PYTHONPATH": str(TESTS.parent)}
     with subprocess.Popen([*command, str(tmp_path)], env=environment, stdout=subprocess.DEVNULL) as run:
         eventually(report.exists)
         shell, folder = report.read_text().split()

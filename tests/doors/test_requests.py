@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
+from tts2face.compilation import CACHE_VARIABLE, FOLDER
 from tts2face.models.face import Face
 from tts2face.models.talker import Talker
 from tts2face.request import GESTURES, Request
@@ -68,7 +69,7 @@ def test_a_plain_delivery_changes_the_clip_of_a_style(session: Session) -> None:
     assert plain.speech.waveform.samples.tobytes() == session.clip(TEXT).speech.waveform.samples.tobytes()
 
 
-def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip) -> None:
+def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip, tmp_path: Path) -> None:
     code = (
         "import sys; sys.path.insert(0, 'tests/doors')\n"
         "from test_requests import TEXT, digest\n"
@@ -76,6 +77,7 @@ def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip) ->
         "print(digest(Session('grid_s1', 'head').clip(Request(text=TEXT))))"
     )
     environment = {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PATH": ""}
+    environment |= {CACHE_VARIABLE: str(FOLDER), "HOME": str(tmp_path)}
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
     assert answer.stdout.strip() == digest(clip)
 
