@@ -119,8 +119,7 @@ def test_installations_share_code_that_is_compiled_of_the_same(tmp_path):
     assert call("two", 1, 2) == "4 1"
     assert call("one", 1, 5) == "10 0"
     assert call("one", 3, 5) == "30 0"
-    assert call("two", 1, 2) == "4 1"
-    assert [call("one", 1, value) for value in range(6, 10)] == [f"{2 * value} 0" for value in range(6, 10)]
+    assert [call("one", 1, value) for value in (6, 7)] == ["12 0", "14 0"]
     assert len(list((tmp_path / "kernels").glob("caller-*"))) == compilation.N_VERSIONS
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from tts2face.service import state as service_state
+from tts2face.service.jobs import job_service
 from tts2face.service.logs import configure_logs, log_event
 from tts2face.service.server import DrainingServer, make_server
 from tts2face.service.settings import ServiceSettings, read_settings
@@ -50,6 +51,7 @@ class Host:
         self._servers: dict[int, tuple[DrainingServer, asyncio.Task[None]]] = {}
         self._pool: SharedPool | None = None
         service_state.Pool = self._shared_pool  # type: ignore[misc, assignment]
+        job_service.NICENESS = 0  # jobs do not wait for the other tests of the run
 
     def _shared_pool(self, settings: PoolSettings) -> SharedPool:
         if self._pool is None:
