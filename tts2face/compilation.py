@@ -88,7 +88,8 @@ def _stamp(path: str, names: dict[str, Any]) -> str:
         found = hashlib.sha256(Path(path).read_bytes())
         for name, value in sorted(names.items()):
             if isinstance(value, Dispatcher):
-                found.update(_stamps.get(inspect.getfile(value.py_func), "").encode())  # its own: not known yet
+                other = inspect.getfile(value.py_func)
+                found.update(_stamp(other, value.py_func.__globals__).encode() if other != path else b"")
             elif isinstance(value, np.ndarray):
                 found.update(name.encode() + value.tobytes())
             elif isinstance(value, bool | int | float | str | tuple) and not name.startswith("__"):

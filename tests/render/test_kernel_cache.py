@@ -91,25 +91,26 @@ def twice():
     return 2 * SCALE * value()
 """
 CALLEE = """
-from tts2face.compilation import kernel
-SCALE = {}
+from tts2face.compilation import {kind}
+SCALE = {scale}
 
-@kernel
+@{kind}
 def value():
-    return {}
+    return {value}
 """
 CALL = "from tests_made.caller import twice; print(twice(), sum(twice.stats.cache_hits.values()))"
 ROOT = Path(__file__).parents[2]
 
 
-def test_installations_share_code_that_is_compiled_of_the_same(tmp_path):
+@pytest.mark.parametrize("kind", ["kernel", "inlined_kernel"])
+def test_installations_share_code_that_is_compiled_of_the_same(tmp_path, kind):
     """A kernel is compiled again where one that it calls, or a constant, is another; old versions are removed."""
 
     def call(where: str, scale: int, value: int) -> str:
         package = tmp_path / where / "tests_made"
         package.mkdir(parents=True, exist_ok=True)
         (package / "caller.py").write_text(CALLER)
-        (package / "callee.py").write_text(CALLEE.format(scale, value))
+        (package / "callee.py").write_text(CALLEE.format(kind=kind, scale=scale, value=value))
         paths = os.pathsep.join((str(package.parent), str(ROOT)))
         environment = os.environ | {CACHE_VARIABLE: str(tmp_path / "kernels"), "PYTHONPATH": paths}
         done = subprocess.run([sys.executable, "-c", CALL], env=environment, capture_output=True, text=True, check=True)

@@ -198,7 +198,7 @@ def test_a_killed_upload_leaves_nothing_visible(bucket: Bucket, tmp_path: Path) 
     )
     bucket.relay.limit = 3_000_000
     child = subprocess.Popen([sys.executable, "-c", upload, bucket.url, ADDRESS, str(movie)])
-    eventually(lambda: bucket.relay.n_bytes > bucket.relay.limit)
+    eventually(lambda: bucket.relay.n_bytes > bucket.relay.limit, 30.0)
     child.kill()
     child.wait()
     bucket.relay.restore()

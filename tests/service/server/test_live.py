@@ -160,7 +160,7 @@ def test_a_client_that_leaves_frees_its_work(service: RunningService, client: ht
         await live.receive_until("speech")
 
     converse(service, talk, with_idle=False)
-    eventually(lambda: measure("tts2face_cancel_seconds_count") != before and measure("tts2face_load") == 0)
+    eventually(lambda: measure("tts2face_cancel_seconds_count") != before and measure("tts2face_load") == 0, 30.0)
 
 
 def speech_samples(rate: int) -> np.ndarray:

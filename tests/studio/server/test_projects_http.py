@@ -46,7 +46,7 @@ def project_file(data: Path, number: str) -> Path:
 
 
 def wait_until_saved(studio: httpx.Client, number: str, data: Path, name: str) -> None:
-    eventually(lambda: json.loads(project_file(data, number).read_text())["name"] == name)
+    eventually(lambda: json.loads(project_file(data, number).read_text())["name"] == name, 10.0)
 
 
 @pytest.fixture

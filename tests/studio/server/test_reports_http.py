@@ -43,7 +43,7 @@ def test_a_report_that_waits_or_runs_is_cancelled(studio: httpx.Client, data: Pa
     number = studio.post(REPORTS, json={"kind": "gestures", "model": "starter"}).json()["id"]
     assert studio.delete(f"{REPORTS}/{number}").status_code == 204
     assert studio.get(REPORTS).json() == []
-    eventually(lambda: not (data / "studio" / "reports" / number).exists())
+    eventually(lambda: not (data / "studio" / "reports" / number).exists(), 1.0)
 
 
 def test_what_cannot_be_reported_is_refused(studio: httpx.Client) -> None:
