@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.compilation import kernel
+
 Floats = NDArray[np.float64]
 
 ISLANDS_TOP = 0.815  # v at which the layout of the shipped heads has mouth, neck and eye sockets, below the head
@@ -29,21 +31,34 @@ def find_texels(uv: Floats, triangles: NDArray[np.int64], side: int) -> Texels:
     """The texels whose centres lie in a triangle; where triangles overlap, in the last one."""
     places = uv * side - 0.5
     owner = np.full((side, side), -1)
-    for number, corners in enumerate(places[triangles]):
-        low, high = np.ceil(corners.min(axis=0) - 1e-9).astype(int), np.floor(corners.max(axis=0) + 1e-9).astype(int)
-        if (high < low).any():
-            continue
-        x, y = np.meshgrid(np.arange(low[0], high[0] + 1), np.arange(low[1], high[1] + 1))
-        inside = (_barycentric(corners, x.ravel(), y.ravel()) >= -1e-6).all(axis=1).reshape(x.shape)
-        owner[y[inside], x[inside]] = number
+    _find_owners(places[triangles], owner)
     rows, columns = np.nonzero(owner >= 0)
     chosen = triangles[owner[rows, columns]]
     weights = _barycentric(places[chosen].transpose(1, 2, 0), columns, rows)
     return Texels(rows, columns, chosen, weights)
 
 
+@kernel
+def _find_owners(corners, owner):  # type: ignore[no-untyped-def]
+    """Write into each texel the number of the last triangle (T, 3, 2) in which its centre lies."""
+    for number in range(len(corners)):
+        (ax, ay), (bx, by), (cx, cy) = corners[number]
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if abs(area) < 1e-12:
+            area = 1e-12
+        last = len(owner) - 1
+        low_x, high_x = max(0, np.ceil(min(ax, bx, cx) - 1e-9)), min(last, np.floor(max(ax, bx, cx) + 1e-9))
+        low_y, high_y = max(0, np.ceil(min(ay, by, cy) - 1e-9)), min(last, np.floor(max(ay, by, cy) + 1e-9))
+        for y in range(int(low_y), int(high_y) + 1):
+            for x in range(int(low_x), int(high_x) + 1):
+                second = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / area
+                third = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / area
+                if min(1 - second - third, second, third) >= -1e-6:
+                    owner[y, x] = number
+
+
 def _barycentric(corners: Floats, x: NDArray[np.int64], y: NDArray[np.int64]) -> Floats:
-    """(P, 3) weights of points in a triangle; `corners` is (3, 2) or (3, 2, P)."""
+    """(P, 3) weights of points in the triangles (3, 2, P)."""
     (ax, ay), (bx, by), (cx, cy) = corners
     area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
     area = np.where(np.abs(area) < 1e-12, 1e-12, area)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from corpus_tools.dense.mesh_fit import OPEN_JAW_WEIGHT, face_landmarks
 from corpus_tools.dense.texels import ISLANDS_TOP, Texels, find_texels
 from lexicon.errors import DataError
+from tts2face.compilation import kernel
 from tts2face.models.face import Face
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, LID_RINGS, N_MESH_LANDMARKS
 from tts2face.numeric import smoothstep
@@ -99,18 +100,29 @@ def polygon_depth(places: Floats, polygon: Floats, most: float) -> Floats:
     low, high = polygon.min(axis=0) - most, polygon.max(axis=0) + most
     near = np.flatnonzero(((places > low) & (places < high)).all(axis=1))
     depth = np.full(len(places), -most)
-    here = places[near]
-    least, inside = np.full(len(near), np.inf), np.zeros(len(near), bool)
-    for start, end in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        along = end - start
-        t = np.clip((here - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
-        least = np.minimum(least, np.linalg.norm(here - start - t[:, None] * along, axis=1))
-        spans = (start[1] > here[:, 1]) != (end[1] > here[:, 1])
-        if along[1] != 0:
-            inside ^= spans & (here[:, 0] < start[0] + (here[:, 1] - start[1]) * along[0] / along[1])
-    depth[near] = np.where(inside, least, -least)
+    depth[near] = _polygon_depths(places[near], polygon, np.empty(len(near)))
     clipped: Floats = np.clip(depth, -most, most)
     return clipped
+
+
+@kernel
+def _polygon_depths(places, polygon, depths):  # type: ignore[no-untyped-def]
+    """Write signed distances (P,) of points (P, 2) from a polygon's edge, positive inside (even-odd rule)."""
+    for number in range(len(places)):
+        x, y = places[number]
+        least, is_inside = np.inf, False
+        ax, ay = polygon[-1]
+        for corner in range(len(polygon)):
+            bx, by = polygon[corner]
+            along_x, along_y = bx - ax, by - ay
+            length = max(along_x * along_x + along_y * along_y, 1e-12)
+            t = min(max(((x - ax) * along_x + (y - ay) * along_y) / length, 0.0), 1.0)
+            least = min(least, np.hypot(x - ax - t * along_x, y - ay - t * along_y))
+            if (ay > y) != (by > y) and x < ax + (y - ay) * along_x / along_y:
+                is_inside = not is_inside
+            ax, ay = bx, by
+        depths[number] = least if is_inside else -least
+    return depths
 
 
 def soften_edges(share: Floats, texels: Texels, side: int) -> Floats:

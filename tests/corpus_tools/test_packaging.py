@@ -50,6 +50,11 @@ def test_a_wheel_has_no_head_builder() -> None:
     assert not [name for name in packages if f"{name}.".startswith(f"{BUILDER}.")]
 
 
+def test_type_checkers_of_users_read_the_types_of_the_package() -> None:
+    """PEP 561; that the types hold is checked by mypy, which reads the tests as well."""
+    assert all((ROOT / package / "py.typed").is_file() for package in ("tts2face", "lexicon"))
+
+
 def test_no_shipped_module_imports_the_head_builder() -> None:
     files = [file for name in shipped_packages() for file in (ROOT / name.replace(".", "/")).glob("*.py")]
     assert len(files) > 100

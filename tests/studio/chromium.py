@@ -42,7 +42,7 @@ KEYS = {
 }  # fmt: skip
 ARGUMENTS = (
     "--headless=new", "--no-sandbox", "--disable-gpu-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader", "--autoplay-policy=no-user-gesture-required", "--force-device-scale-factor=1",
+    "--enable-unsafe-swiftshader", "--autoplay-policy=no-user-gesture-required", "--force-device-scale-factor=0.5",
     "--mute-audio", "--disable-background-networking",
 )  # fmt: skip
 WAIT_S = 60.0

@@ -175,7 +175,7 @@ def _weight_tracks(
     other targets keep the file's default weights.
     """
     weights, driven = animated_targets
-    nodes, meshes = file.root.children("nodes"), file.root.children("meshes")
+    nodes, meshes = file.entries("nodes"), file.entries("meshes")
     tracks: list[Track] = []
     for number in sorted(tree.world):
         mesh = nodes[number].index("mesh", len(meshes), "meshes")

@@ -71,7 +71,7 @@ class BoneTracks:
             return [self._rotation_track("neck", neck), self._rotation_track("head", rest)]
         if "head" in self._character.bones:
             return [self._rotation_track("head", rotations)]
-        scenes = file.root.children("scenes")
+        scenes = file.entries("scenes")
         if not scenes:
             return []
         node = self._writer.add_node_above(HEAD_NODE, file.root.index("scene", len(scenes), "scenes") or 0)

@@ -64,7 +64,7 @@ class GlbWriter:
 
     def divide_matrix(self, node: int) -> None:
         """Replace the matrix of a node by translation, rotation and scale, as animations require."""
-        fields = self._file.root.children("nodes")[node]
+        fields = self._file.entries("nodes")[node]
         if not fields.has("matrix"):
             return
         matrix = local_matrix(fields)
@@ -98,7 +98,7 @@ class GlbWriter:
         """Move the content of all buffers into the first one; buffers without content stay as fallbacks."""
         places: dict[int, tuple[int, int]] = {}
         kept: list[dict[str, Any]] = []
-        for number, fields in enumerate(self._file.root.children("buffers")):
+        for number, fields in enumerate(self._file.entries("buffers")):
             is_embedded = number == 0 and self._file.binary is not None
             if not fields.has("uri") and not is_embedded:
                 kept.append(dict(fields.content))
@@ -119,7 +119,7 @@ class GlbWriter:
         for number, image in enumerate(self.root.get("images", [])):
             uri = image.get("uri", "")
             if uri and not uri.startswith("data:"):
-                content = self._file.uri(uri, self._file.root.children("images")[number])
+                content = self._file.uri(uri, self._file.entries("images")[number])
                 is_png = content[:4] == b"\x89PNG"
                 image.pop("uri")
                 image |= {"bufferView": self._add_view(content), "mimeType": "image/png" if is_png else "image/jpeg"}

@@ -68,11 +68,18 @@ class GltfFile:
     binary: bytes | None
     _buffers: dict[int, NDArray[np.uint8]] = field(default_factory=dict)
     _views: dict[int, NDArray[np.uint8]] = field(default_factory=dict)
+    _entries: dict[str, list[Fields]] = field(default_factory=dict)
     _decoded_bytes: int = 0
 
+    def entries(self, kind: str) -> list[Fields]:
+        """Entries of a list of the JSON, such as ``nodes``; empty if it is missing."""
+        if kind not in self._entries:
+            self._entries[kind] = self.root.children(kind)
+        return self._entries[kind]
+
     def count(self, kind: str) -> int:
-        """Number of entries of a list of the JSON, such as ``nodes``."""
-        return len(self.root.children(kind))
+        """Number of entries of a list of the JSON."""
+        return len(self.entries(kind))
 
     def accessor(self, number: int) -> NDArray[np.float64] | NDArray[np.int64]:
         """Elements (N, width) of an accessor: float64 for floats and normalised integers, otherwise int64.
@@ -82,7 +89,7 @@ class GltfFile:
         DataError
             It reaches beyond its buffer, has an unknown type, or contains numbers that are not finite.
         """
-        fields = self.root.children("accessors")[number]
+        fields = self.entries("accessors")[number]
         component = self._component(fields)
         kind = fields.text("type")
         if kind not in WIDTHS:
@@ -102,7 +109,7 @@ class GltfFile:
     def view(self, number: int) -> NDArray[np.uint8]:
         """Bytes of a buffer view, decompressed."""
         if number not in self._views:
-            fields = self.root.children("bufferViews")[number]
+            fields = self.entries("bufferViews")[number]
             extension = next((found for name in MESHOPT if (found := fields.extension(name))), None)
             self._views[number] = self._slice(fields) if extension is None else self._decode(extension)
         return self._views[number]
@@ -143,7 +150,7 @@ class GltfFile:
         self, view: int, offset: int, shape: tuple[int, int], component: type[np.integer[Any] | np.floating[Any]]
     ) -> NDArray[np.generic]:
         """Elements `shape` of a buffer view from a byte offset on; not copied."""
-        fields = self.root.children("bufferViews")[view]
+        fields = self.entries("bufferViews")[view]
         content, size = self.view(view), np.dtype(component).itemsize
         packed = shape[1] * size
         stride = fields.integer("byteStride", packed, high=MAX_STRIDE) or packed
@@ -192,7 +199,7 @@ class GltfFile:
     def buffer(self, number: int) -> NDArray[np.uint8]:
         """Bytes of a buffer, from the binary chunk, a data URI or a file beside this one."""
         if number not in self._buffers:
-            fields = self.root.children("buffers")[number]
+            fields = self.entries("buffers")[number]
             length = fields.integer("byteLength", low=1)
             if fields.has("uri"):
                 content = self.uri(fields.text("uri"), fields)

@@ -33,7 +33,7 @@ def read_gltf_character(path: Path) -> Character:
     materials = (*MaterialReader(file, notes).materials(), Material("plain"))
     names = {
         Target(number, target): name
-        for number, mesh in enumerate(file.root.children("meshes"))
+        for number, mesh in enumerate(file.entries("meshes"))
         for target, name in enumerate(target_names(mesh))
     }
     expressions, is_vrm0 = _expressions(file)
@@ -62,7 +62,7 @@ def _expressions(file: GltfFile) -> tuple[Expressions, bool]:
 
 
 def _vrm1_expressions(file: GltfFile, fields: Fields) -> Expressions:
-    nodes, found = file.root.children("nodes"), Expressions()
+    nodes, found = file.entries("nodes"), Expressions()
     for group in ("preset", "custom"):
         named = fields.child(group)
         for name in named.content:

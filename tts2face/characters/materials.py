@@ -37,7 +37,7 @@ class MaterialReader:
         """All materials of the file in order."""
         earlier = self._file.root.extension("VRM")
         toon = earlier.children("materialProperties") if earlier is not None else []
-        for number, fields in enumerate(self._file.root.children("materials")):
+        for number, fields in enumerate(self._file.entries("materials")):
             yield self._material(fields, toon[number] if number < len(toon) else None)
 
     def _material(self, fields: Fields, toon: Fields | None) -> Material:
@@ -68,7 +68,7 @@ class MaterialReader:
         )
 
     def _texture(self, number: int) -> NDArray[np.uint8] | None:
-        fields = self._file.root.children("textures")[number]
+        fields = self._file.entries("textures")[number]
         n_images = self._file.count("images")
         source = fields.index("source", n_images, "images")
         for name in ("EXT_texture_webp", "KHR_texture_basisu"):
@@ -78,7 +78,7 @@ class MaterialReader:
         if source is None:
             return None
         if source not in self._images:
-            self._images[source] = self._image(self._file.root.children("images")[source])
+            self._images[source] = self._image(self._file.entries("images")[source])
         return self._images[source]
 
     def _image(self, fields: Fields) -> NDArray[np.uint8] | None:

@@ -27,7 +27,7 @@ def read_pieces(file: GltfFile, tree: NodeTree) -> Iterator[Piece]:
     DataError
         A mesh or skin is damaged or too large, or is compressed with Draco.
     """
-    nodes, meshes = file.root.children("nodes"), file.root.children("meshes")
+    nodes, meshes = file.entries("nodes"), file.entries("meshes")
     n_vertices = 0
     for number in sorted(tree.world):
         mesh = nodes[number].index("mesh", len(meshes), "meshes")
@@ -133,14 +133,14 @@ class _Primitive:
 
     def _default_weights(self, mesh: int, n_targets: int) -> dict[int, float]:
         """Morph weights other than 0 that node or mesh give, by the number of the target."""
-        node = self._file.root.children("nodes")[self._node]
-        holder = node if node.has("weights") else self._file.root.children("meshes")[mesh]
+        node = self._file.entries("nodes")[self._node]
+        holder = node if node.has("weights") else self._file.entries("meshes")[mesh]
         weights = holder.numbers("weights", n_targets, None) if holder.has("weights") else None
         return {number: weight for number, weight in enumerate(weights or ()) if weight}
 
     def _skinning(self, tree: NodeTree, count: int) -> tuple[FloatArray, IntArray]:
         """Matrix (4, 4) or matrices (N, 4, 4) from mesh to world, and the node that each vertex follows most (N,)."""
-        nodes, skins = self._file.root.children("nodes"), self._file.root.children("skins")
+        nodes, skins = self._file.entries("nodes"), self._file.entries("skins")
         number = nodes[self._node].index("skin", len(skins), "skins")
         weights = [self._attribute(f"WEIGHTS_{n}", (4,), count) for n in (0, 1)]
         joints = [self._attribute(f"JOINTS_{n}", (4,), count) for n in (0, 1)]

@@ -36,6 +36,7 @@ from tts2face.models.landmarks import lip_opening
 from tts2face.models.talker import Talker, read_talker, write_talker
 
 PASSES = TrainingOptions(hidden=(24, 16), n_epochs=60, weight_decay=1e-4)
+FEW_PASSES = replace(PASSES, n_epochs=4)  # where it does not matter what the networks have learnt
 HIDDEN = "ɑ"  # the widest of the artificial phones; no other shares its features
 
 
@@ -138,6 +139,7 @@ def test_the_build_of_a_long_talker_states_the_base_of_its_networks(
 ) -> None:  # fmt: skip
     write_talker(tmp_path / "base.talker", replace(base, metadata={**base.metadata, "pooled": "lips, CC0"}))
     own = without_hidden(recordings[40:])
+    monkeypatch.setattr("corpus_tools.training.train_phone_network.TRAINING", FEW_PASSES)
     monkeypatch.setattr("corpus_tools.build_talker.observe", lambda *_, **__: Observations(tuple(own), (), ()))
     monkeypatch.setattr("corpus_tools.training.short_talker.MIN_OWN_MINUTES", 0.2)
     monkeypatch.setattr("corpus_tools.build_talker.add_score_map", lambda talker, _: talker)
@@ -169,16 +171,17 @@ import sys
 from pathlib import Path
 from corpus_tools.pooling import base_phrases
 from corpus_tools.training import train_phone_network
-from tests.corpus_tools.build.test_base_phrases import PASSES, network_bytes
-base_phrases.N_PHRASES, train_phone_network.MIN_FRAMES, train_phone_network.TRAINING = 40, 100, PASSES
+from tests.corpus_tools.build.test_base_phrases import FEW_PASSES, network_bytes
+base_phrases.N_PHRASES, train_phone_network.MIN_FRAMES, train_phone_network.TRAINING = 40, 100, FEW_PASSES
 print(network_bytes(Path(sys.argv[1])))
 """
 
 
 def test_networks_have_the_same_bytes_on_another_processor_and_with_other_numbers_of_threads(
-    base: Talker, tmp_path: Path
+    base: Talker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Code without the extensions of this processor stands for another machine."""
+    monkeypatch.setattr("corpus_tools.training.train_phone_network.TRAINING", FEW_PASSES)
     write_talker(tmp_path / "base.talker", base)
     other = {
         "NUMBA_CPU_NAME": "generic", "NUMBA_CACHE_DIR": str(tmp_path / "kernels"), "OPENBLAS_CORETYPE": "Nehalem",

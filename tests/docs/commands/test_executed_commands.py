@@ -124,6 +124,8 @@ def test_command_lines_of_readme_and_cli_page_work(
         words = _small(words)
     if words[:2] == ["report", "similarity"]:
         words += ["--halves", "2"]
+    if words[:2] == ["report", "moods"]:
+        words += ["--size", "160"]
     if words[:2] == ["face", "calibrate"]:  # takes minutes with the poses that a face needs
         monkeypatch.setattr("corpus_tools.training.calibrate_face.N_POSES", 40)
         monkeypatch.setattr("corpus_tools.training.calibrate_face.N_DRAWN", ((2, 2),))

@@ -1,10 +1,12 @@
-"""kill -9 of the server and of workers in the middle of 50 jobs: all finish, none twice."""
+"""kill -9 of the server and of workers in the middle of many jobs: all finish, none twice.
+
+`TTS2FACE_KILLED_JOBS` is their number (20).
+"""
 
 import os
 import signal
 import subprocess
 import sys
-import time
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -25,7 +27,7 @@ from tts2face.jobs.control import list_jobs
 from tts2face.jobs.database import database_url
 from tts2face.jobs.engine import open_client
 
-N_JOBS = int(os.environ.get("TTS2FACE_KILLED_JOBS", "50"))
+N_JOBS = int(os.environ.get("TTS2FACE_KILLED_JOBS", "20"))
 TIMEOUT_S = 240.0 + 4 * N_JOBS
 CLIP = {"voice": "espeak", "format": "oculus", "fps": 5}
 
@@ -112,7 +114,6 @@ def test_jobs_survive_the_death_of_servers_and_workers(
             machines.wait_for(N_JOBS // 4)
             machines.kill_server()
             machines.kill_worker()  # nobody is left
-            time.sleep(1.0)
             machines.start_server()
             assert [submit(machines.api, number, body) for number, body in enumerate(bodies)] == names
             machines.wait_for(N_JOBS // 2)

@@ -166,11 +166,11 @@ def test_an_outage_of_the_database_is_two_lines(
     work = segments("One.", "Two.")
     first = start_worker(database, 0.1)
     assert set(collect(database, segments("One."), tmp_path).values()) == {""}
+    log = tmp_path / "workers.log"
     postgres.stop()
-    time.sleep(6.0)
+    eventually(lambda: "cannot be reached" in log.read_text())
     postgres.start()
     assert set(collect(database, work, tmp_path).values()) == {""}
-    log = tmp_path / "workers.log"
     eventually(lambda: "reached again" in log.read_text())
     first.kill()
     lines = log.read_text().splitlines()

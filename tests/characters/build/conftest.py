@@ -1,0 +1,18 @@
+"""Characters are imported with few directions of light: no picture of them is judged."""
+
+from collections.abc import Iterator
+from functools import partial
+
+import pytest
+
+from tts2face.characters import importing
+from tts2face.render.occlusion import bake_occlusion
+
+N_DIRECTIONS = 8
+
+
+@pytest.fixture(scope="package", autouse=True)
+def few_directions() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(importing, "bake_occlusion", partial(bake_occlusion, n_directions=N_DIRECTIONS))
+        yield
