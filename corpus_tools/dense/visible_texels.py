@@ -100,7 +100,7 @@ def polygon_depth(places: Floats, polygon: Floats, most: float) -> Floats:
     low, high = polygon.min(axis=0) - most, polygon.max(axis=0) + most
     near = np.flatnonzero(((places > low) & (places < high)).all(axis=1))
     depth = np.full(len(places), -most)
-    depth[near] = _polygon_depths(places[near], polygon, np.empty(len(near)))
+    depth[near] = _polygon_depths(places[near], polygon, np.zeros(len(near)))
     clipped: Floats = np.clip(depth, -most, most)
     return clipped
 
