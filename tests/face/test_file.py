@@ -1,7 +1,9 @@
 """``.face`` files: round trip and validation."""
 
+import pickle
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import pytest
 from lexicon.errors import DataError, InputError
 from tests.face.posing import posed_vertices
 from tts2face.catalogue import IdentityEntry, identities
+from tts2face.models import face_file
 from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Part, Texture
 from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_loading import load_face
@@ -79,11 +82,22 @@ def test_a_face_round_trips(written: tuple[Face, Path]) -> None:
     assert posed_vertices(read, weights) == pytest.approx(posed_vertices(face, weights), abs=0.005)
 
 
+def test_textures_of_a_shipped_face_are_decoded_when_one_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    decoded = Mock(side_effect=face_file.decode_colours)
+    monkeypatch.setattr(face_file, "decode_colours", decoded)
+    face = load_face("head", "mei")
+    assert (len(face.textures) > 1, decoded.call_count) == (True, 0)
+    shapes = [texture.pixels.shape for texture in face.textures]
+    assert decoded.call_count == len(shapes) - 1  # the hair's is painted
+    assert [texture.pixels.shape for texture in pickle.loads(pickle.dumps(face.textures))] == shapes
+    assert decoded.call_count == len(shapes) - 1
+
+
 def test_a_face_without_texture_round_trips(tmp_path: Path) -> None:
     write_face(tmp_path / "plain.face", small_face(with_texture=False))
     read = read_face(tmp_path / "plain.face")
     assert read.uv is None
-    assert read.textures == ()
+    assert not read.textures
 
 
 def test_a_face_with_holes_round_trips(tmp_path: Path) -> None:

@@ -1,7 +1,8 @@
 """Reading and writing of ``.face`` files: a face in compact form, with identity presets."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Hairdo, Part, Texture
+from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Hairdo, LateTextures, Part, Texture
 from tts2face.models.face_layout import MAX_TEXTURES, SCORE_INPUTS, WIDE_OPEN, check_face, texture_number
 from tts2face.models.mesh_coding import decode_tangents, decode_uv, encode_tangents, encode_uv
 from tts2face.models.occlusion_coding import decode_occlusion, encode_occlusion
@@ -103,8 +104,10 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
     write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
 
 
-def read_face(path: Path, identity: str | None = None) -> Face:
+def read_face(path: Path, identity: str | None = None, *, checks_pictures: bool = True) -> Face:
     """Read a ``.face`` file, with an identity preset if given.
+
+    Textures are decoded at once where the file may be damaged (`checks_pictures`), otherwise when one is first drawn.
 
     Raises
     ------
@@ -120,6 +123,8 @@ def read_face(path: Path, identity: str | None = None) -> Face:
         offered = ", ".join(names) or "none"
         raise InputError(f"the face {path.stem} has no identity {identity!r}; it has: {offered}")
     face = _face_from_arrays(arrays, header, path)
+    if checks_pictures:
+        tuple(face.textures)
     return face if identity is None else _apply_identity(face, arrays, header, names.index(identity))
 
 
@@ -183,18 +188,19 @@ def _read_occlusion(
     return decode_occlusion(arrays["occlusion"], shape, path)
 
 
-def _read_textures(arrays: Mapping[str, NDArray[Any]], path: Path) -> tuple[Texture, ...]:
-    textures = []
-    for number in range(MAX_TEXTURES):
-        name, coverage = texture_tensors(number)
-        if name not in arrays:
-            break
-        pixels = decode_colours(arrays[name], path)
-        alpha = decode_coverage(arrays[coverage], path) if coverage in arrays else None
-        if alpha is not None and alpha.shape != pixels.shape[:2]:
-            raise DataError(f"{path}: a texture and its alpha differ in size; build or copy the face again")
-        textures.append(Texture(pixels, alpha))
-    return tuple(textures)
+def _read_textures(arrays: Mapping[str, NDArray[Any]], path: Path) -> LateTextures:
+    every = map(texture_tensors, range(MAX_TEXTURES))
+    names = list(takewhile(lambda pair: pair[0] in arrays, every))
+
+    def decode() -> Iterator[Texture]:
+        for name, coverage in names:
+            pixels = decode_colours(arrays[name], path)
+            alpha = decode_coverage(arrays[coverage], path) if coverage in arrays else None
+            if alpha is not None and alpha.shape != pixels.shape[:2]:
+                raise DataError(f"{path}: a texture and its alpha differ in size; build or copy the face again")
+            yield Texture(pixels, alpha)
+
+    return LateTextures(len(names), decode)
 
 
 def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Face:
@@ -250,16 +256,10 @@ def _apply_identity(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapp
     displacement = arrays[f"identity{number}"] * arrays[f"identity{number}_step"][0]
     name, tints, _ = header["identities"][number]
     hairdo = header.get("hairdos", {}).get(name)
-    colours, textures = face.colours.copy(), [texture.pixels.copy() for texture in face.textures]
+    colours = face.colours.copy()
     for part in face.parts:
-        tint = np.array(tints.get(part.name, (1.0, 1.0, 1.0)), np.float32)
         used = np.unique(face.triangles[part.first : part.first + part.count])
-        colours[used] = np.clip(face.colours[used] * tint, 0, 255).astype(np.uint8)
-        if part.is_textured and not np.all(tint == 1):
-            texture = textures[part.texture]
-            share = _part_texel_weights(face, part, texture.shape)[:, :, None]
-            tinted = texture * (1 + share * (tint - 1))
-            textures[part.texture] = np.clip(tinted, 0, np.maximum(texture, MAX_BRIGHTENED_LEVEL)).astype(np.uint8)
+        colours[used] = np.clip(face.colours[used] * _tint(tints, part), 0, 255).astype(np.uint8)
     eyes = [
         replace(
             eye, centre=eye.centre + displacement[eye.first : eye.first + eye.count].mean(axis=0).astype(np.float32)
@@ -271,7 +271,25 @@ def _apply_identity(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapp
         vertices=(face.vertices + displacement).astype(np.float32),
         eyes=tuple(eyes),
         colours=colours,
-        textures=tuple(Texture(pixels, old.alpha) for pixels, old in zip(textures, face.textures, strict=True)),
+        textures=LateTextures(len(face.textures), lambda: _tinted(face, tints)),
         hairdo=face.hairdo if hairdo is None else Hairdo(*hairdo),
         metadata={**face.metadata, "identity": name},
     )
+
+
+def _tint(tints: Mapping[str, Any], part: Part) -> NDArray[np.float32]:
+    return np.array(tints.get(part.name, (1.0, 1.0, 1.0)), np.float32)
+
+
+def _tinted(face: Face, tints: Mapping[str, Any]) -> Iterator[Texture]:
+    """The textures of a face in the tints of its parts."""
+    textures = [texture.pixels for texture in face.textures]
+    for part in face.parts:
+        tint = _tint(tints, part)
+        if part.is_textured and not np.all(tint == 1):
+            texture = textures[part.texture]
+            share = _part_texel_weights(face, part, texture.shape)[:, :, None]
+            tinted = texture * (1 + share * (tint - 1))
+            textures[part.texture] = np.clip(tinted, 0, np.maximum(texture, MAX_BRIGHTENED_LEVEL)).astype(np.uint8)
+    for pixels, old in zip(textures, face.textures, strict=True):
+        yield Texture(pixels, old.alpha)

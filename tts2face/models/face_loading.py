@@ -5,7 +5,7 @@ from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import KIND, read_face
 from tts2face.models.hair import BALD, attach_hair, parse_hair_colour
 from tts2face.models.hair_file import load_hair
-from tts2face.storage.files import find_file
+from tts2face.storage.files import SHIPPED_FOLDER, find_file
 
 
 def load_face(
@@ -31,7 +31,8 @@ def load_face(
     DataError
         A file is damaged, or the haircut belongs to another kind of head.
     """
-    face = read_face(find_file(name, KIND), identity)
+    path = find_file(name, KIND)
+    face = read_face(path, identity, checks_pictures=path.parent != SHIPPED_FOLDER)
     if face.hairdo is None:
         if hair not in (None, BALD) or hair_color is not None:
             raise InputError(f"no haircut fits the face {name}; remove --hair and --hair-color, or choose another face")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.colour import decode_srgb, encode_srgb
-from tts2face.models.face import Face, Hairdo, Part, Texture
+from tts2face.models.face import Face, Hairdo, LateTextures, Part, Texture
 
 HAIR_PART = "hair"
 BALD = "bald"  # haircut without hair
@@ -95,11 +95,10 @@ def attach_hair(face: Face, hair: Hair, colour: str) -> Face:
             f"has {len(face.vertices)}; choose another face or no hair"
         )
     srgb = parse_hair_colour(colour)
-    painted = _paint_scalp(face, hair, srgb)
     n_old, n_new = len(face.vertices), len(hair.vertices)
     uv = np.zeros((n_old, 2), np.float32) if face.uv is None else face.uv
     tangents = np.zeros((n_old, 3), np.float32) if face.tangents is None else face.tangents
-    part = replace(MATERIAL, first=len(face.triangles), count=len(hair.triangles), texture=len(painted))
+    part = replace(MATERIAL, first=len(face.triangles), count=len(hair.triangles), texture=len(face.textures))
     return replace(
         face,
         vertices=np.concatenate([face.vertices, fit_hair(face, hair)]),
@@ -108,7 +107,7 @@ def attach_hair(face: Face, hair: Hair, colour: str) -> Face:
         shapes=np.pad(face.shapes, ((0, 0), (0, n_new), (0, 0))),
         colours=np.concatenate([face.colours, np.tile(np.rint(255 * srgb).astype(np.uint8), (n_new, 1))]),
         uv=np.concatenate([uv, hair.uv]),
-        textures=(*painted, Texture(colour_relief(hair.relief, srgb), hair.alpha)),
+        textures=LateTextures(len(face.textures) + 1, lambda: _painted(face, hair, srgb)),
         tangents=np.concatenate([tangents, hair.tangents]),
         hairdo=Hairdo(str(hair.metadata.get("name", "")), colour),
         occlusion=_join_occlusion(face, hair),
@@ -158,18 +157,22 @@ def colour_relief(relief: NDArray[np.uint8], srgb: NDArray[np.float64]) -> NDArr
     return pixels
 
 
-def _paint_scalp(face: Face, hair: Hair, srgb: NDArray[np.float64]) -> tuple[Texture, ...]:
-    """The face's textures with the scalp in the colour of the hair."""
+def _painted(face: Face, hair: Hair, srgb: NDArray[np.float64]) -> tuple[Texture, ...]:
+    """The face's textures with the scalp in the colour of the hair, and that of the strands."""
+    strands = Texture(colour_relief(hair.relief, srgb), hair.alpha)
     if hair.scalp is None or not face.textures:
-        return face.textures
+        return (*face.textures, strands)
+    return (_paint_scalp(face.textures[0], hair.scalp, srgb), *face.textures[1:], strands)
+
+
+def _paint_scalp(skin: Texture, scalp: NDArray[np.uint8], srgb: NDArray[np.float64]) -> Texture:
     from PIL import Image
 
-    skin = face.textures[0]
     size = skin.pixels.shape[1::-1]
-    cover = np.asarray(Image.fromarray(hair.scalp).resize(size, Image.Resampling.BILINEAR))
+    cover = np.asarray(Image.fromarray(scalp).resize(size, Image.Resampling.BILINEAR))
     light = decode_srgb(np.arange(256) / 255.0)[:, None]
     share = np.arange(256, dtype=np.float32)[:, None, None] / 255
     mixed = encode_srgb(light * (1 - share) + decode_srgb(srgb) * share)  # (256, 256, 3) by cover and skin
     pixels, covered = np.array(skin.pixels), cover > 0
     pixels[covered] = mixed[cover[covered][:, None], skin.pixels[covered], np.arange(3)]
-    return (Texture(pixels, skin.alpha), *face.textures[1:])
+    return Texture(pixels, skin.alpha)

@@ -58,14 +58,15 @@ def build_surface(face: Face, *, scatters: bool = True) -> Surface:
     every = np.array(face.triangles, np.int32)
     rig = build_rig(face)
     starts, members = _triangles_by_vertex(face, every, part_of, rig)
-    texels, levels = pack_textures(face.textures, TONE_TABLES)
+    textures = tuple(face.textures)
+    texels, levels = pack_textures(textures, TONE_TABLES)
     materials = material_table(face, every, part_of)
     return Surface(
         rig=rig,
         triangles=every,
         colours=linear_light(face.colours),
         uv=np.array(face.uv, np.float32) if face.uv is not None else np.zeros((1, 2), np.float32),
-        textures=face.textures,
+        textures=textures,
         texels=texels,
         levels=levels,
         part_of=part_of,
