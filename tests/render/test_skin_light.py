@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from tests.render.stability import visible_triangles
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_parts import keep_parts
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import Picture
-from tts2face.render.stability import visible_triangles
 from tts2face.render.tone_tables import linear_light
 
 NECK_MM, FACE_MM = -105.0, (-95.0, 30.0)  # heights on the head

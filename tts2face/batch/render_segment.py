@@ -19,7 +19,6 @@ from tts2face.session import Session
 from tts2face.session_cache import SessionCache
 from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.temporary import Temporary
-from tts2face.synthesis.prepared_request import prepare
 from tts2face.types import frame_count
 
 
@@ -120,14 +119,3 @@ def _length(segment: Segment, fit: Fit, fps: float) -> tuple[int, list[str]]:
     if segment.fills_slot and segment.slot_frames is not None:
         return segment.slot_frames, warnings
     return max(segment.window_frames, frame_count(max(fit.speech_s, 1e-3), fps)), warnings
-
-
-def check_segment_text(segment: Segment) -> None:
-    """Refuse words that the voice cannot speak, before anything is rendered.
-
-    Raises
-    ------
-    InputError
-        As `prepare`.
-    """
-    prepare(Request(**segment.request))
