@@ -60,7 +60,10 @@ def test_the_openai_client_streams_events(official: openai.OpenAI) -> None:
 
 
 def test_the_openai_client_lists_models(official: openai.OpenAI) -> None:
-    assert [model.id for model in official.models.list()][:2] == ["grid_s1", "tts-1"]
+    """Shipped talkers first; those that other tests have uploaded to the service of the run may follow."""
+    names = [model.id for model in official.models.list()]
+    assert names[0] == "grid_s1"
+    assert "tts-1" in names
 
 
 @pytest.mark.parametrize(
