@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, overload
 
 import numpy as np
@@ -50,9 +49,10 @@ class LateTextures(Sequence[Texture]):
     def __init__(self, number: int, make: Callable[[], Iterable[Texture]]) -> None:
         self._number, self._make = number, make
 
-    @cached_property
     def _made(self) -> tuple[Texture, ...]:
-        return tuple(self._make())
+        made = tuple(self._make())
+        self._make = lambda: made  # what they are made of is forgotten
+        return made
 
     def __len__(self) -> int:
         """Their number; nothing is decoded."""
@@ -64,11 +64,11 @@ class LateTextures(Sequence[Texture]):
     def __getitem__(self, index: slice) -> tuple[Texture, ...]: ...
     def __getitem__(self, index: int | slice) -> Texture | tuple[Texture, ...]:
         """One or some of them."""
-        return self._made[index]
+        return self._made()[index]
 
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         """Another process gets them decoded."""
-        return tuple, (self._made,)
+        return tuple, (self._made(),)
 
 
 @dataclass(frozen=True, slots=True)

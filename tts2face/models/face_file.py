@@ -190,17 +190,18 @@ def _read_occlusion(
 
 def _read_textures(arrays: Mapping[str, NDArray[Any]], path: Path) -> LateTextures:
     every = map(texture_tensors, range(MAX_TEXTURES))
-    names = list(takewhile(lambda pair: pair[0] in arrays, every))
+    present = takewhile(lambda pair: pair[0] in arrays, every)
+    pictures = [(arrays[colours], arrays.get(coverage)) for colours, coverage in present]
 
     def decode() -> Iterator[Texture]:
-        for name, coverage in names:
-            pixels = decode_colours(arrays[name], path)
-            alpha = decode_coverage(arrays[coverage], path) if coverage in arrays else None
+        for colours, coverage in pictures:
+            pixels = decode_colours(colours, path)
+            alpha = None if coverage is None else decode_coverage(coverage, path)
             if alpha is not None and alpha.shape != pixels.shape[:2]:
                 raise DataError(f"{path}: a texture and its alpha differ in size; build or copy the face again")
             yield Texture(pixels, alpha)
 
-    return LateTextures(len(names), decode)
+    return LateTextures(len(pictures), decode)
 
 
 def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Face:

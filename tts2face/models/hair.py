@@ -1,7 +1,7 @@
 """Haircuts: hair cards that are fitted to a head and drawn in any colour."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -95,10 +95,11 @@ def attach_hair(face: Face, hair: Hair, colour: str) -> Face:
             f"has {len(face.vertices)}; choose another face or no hair"
         )
     srgb = parse_hair_colour(colour)
+    textures = face.textures  # the rest of the face is not kept for them
     n_old, n_new = len(face.vertices), len(hair.vertices)
     uv = np.zeros((n_old, 2), np.float32) if face.uv is None else face.uv
     tangents = np.zeros((n_old, 3), np.float32) if face.tangents is None else face.tangents
-    part = replace(MATERIAL, first=len(face.triangles), count=len(hair.triangles), texture=len(face.textures))
+    part = replace(MATERIAL, first=len(face.triangles), count=len(hair.triangles), texture=len(textures))
     return replace(
         face,
         vertices=np.concatenate([face.vertices, fit_hair(face, hair)]),
@@ -107,7 +108,7 @@ def attach_hair(face: Face, hair: Hair, colour: str) -> Face:
         shapes=np.pad(face.shapes, ((0, 0), (0, n_new), (0, 0))),
         colours=np.concatenate([face.colours, np.tile(np.rint(255 * srgb).astype(np.uint8), (n_new, 1))]),
         uv=np.concatenate([uv, hair.uv]),
-        textures=LateTextures(len(face.textures) + 1, lambda: _painted(face, hair, srgb)),
+        textures=LateTextures(len(textures) + 1, lambda: _painted(textures, hair, srgb)),
         tangents=np.concatenate([tangents, hair.tangents]),
         hairdo=Hairdo(str(hair.metadata.get("name", "")), colour),
         occlusion=_join_occlusion(face, hair),
@@ -157,12 +158,12 @@ def colour_relief(relief: NDArray[np.uint8], srgb: NDArray[np.float64]) -> NDArr
     return pixels
 
 
-def _painted(face: Face, hair: Hair, srgb: NDArray[np.float64]) -> tuple[Texture, ...]:
-    """The face's textures with the scalp in the colour of the hair, and that of the strands."""
+def _painted(textures: Sequence[Texture], hair: Hair, srgb: NDArray[np.float64]) -> tuple[Texture, ...]:
+    """A face's textures with the scalp in the colour of the hair, and that of the strands."""
     strands = Texture(colour_relief(hair.relief, srgb), hair.alpha)
-    if hair.scalp is None or not face.textures:
-        return (*face.textures, strands)
-    return (_paint_scalp(face.textures[0], hair.scalp, srgb), *face.textures[1:], strands)
+    if hair.scalp is None or not textures:
+        return (*textures, strands)
+    return (_paint_scalp(textures[0], hair.scalp, srgb), *textures[1:], strands)
 
 
 def _paint_scalp(skin: Texture, scalp: NDArray[np.uint8], srgb: NDArray[np.float64]) -> Texture:
