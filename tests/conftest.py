@@ -5,7 +5,6 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the processes of a run share the cores; numpy reads it when loaded
 
 import gc
-import zlib
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -123,12 +122,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: (item.get_closest_marker("xdist_group") is None, not _groups(item)))
 
 
-def pytest_make_parametrize_id(val: object) -> str | None:
-    """Short names of long values: a name stands in an environment variable of each child process."""
-    if not isinstance(val, str | bytes) or len(val) <= LONGEST_NAME:
-        return None
-    content = val.encode(errors="surrogatepass") if isinstance(val, str) else val
-    return f"{len(val)}-{zlib.crc32(content):08x}"
+def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
+    """Short names of long values: a name stands in an environment variable of each child process.
+
+    They do not depend on the value, which may be another one in each process: an encoder's output, say.
+    """
+    return argname if isinstance(val, str | bytes) and len(val) > LONGEST_NAME else None
 
 
 def pytest_collection_finish() -> None:

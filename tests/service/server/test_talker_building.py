@@ -154,26 +154,26 @@ def test_a_recording_without_a_face_is_refused_with_the_reason(
 
 
 @pytest.mark.parametrize(
-    ("content", "request_", "status", "reason"),
+    ("make", "request_", "status", "reason"),
     [
-        (b"", {}, 422, "video cannot be used: it is no video that can be decoded"),
-        (b"#EXTM3U\n#EXTINF:10,\nfile:///etc/passwd\n", {}, 422, "it is no video that can be decoded"),
-        (b"ffconcat version 1.0\nfile /etc/passwd\n", {}, 422, "it is no video that can be decoded"),
-        (sound(), {}, 422, "it is no video that can be decoded"),
-        (movie(side=64)[:3000], {}, 422, "it is no video that can be decoded"),
-        (movie(61.0, 16), {}, 422, "video cannot be used: it is longer than 60 s"),
-        (movie(0.5), {"appearance": True}, 422, "needs the consent of the person shown"),
-        (movie(0.5), {"consent": "I, Ann, agree."}, 422, "give appearance and consent, or neither"),
-        (movie(0.5), {"name": "../x"}, 422, "name: String should match pattern"),
-        (movie(0.5), {"name": "x" * 10_000}, 422, "name: String should match pattern"),
-        (movie(0.5), {"name": "tts-1"}, 409, "the talker tts-1 belongs to the service"),
-        (bytes(6_000_000), {}, 413, "the body is larger than 5 MB"),
+        (lambda: b"", {}, 422, "video cannot be used: it is no video that can be decoded"),
+        (lambda: b"#EXTM3U\n#EXTINF:10,\nfile:///etc/passwd\n", {}, 422, "it is no video that can be decoded"),
+        (lambda: b"ffconcat version 1.0\nfile /etc/passwd\n", {}, 422, "it is no video that can be decoded"),
+        (sound, {}, 422, "it is no video that can be decoded"),
+        (lambda: movie(side=64)[:3000], {}, 422, "it is no video that can be decoded"),
+        (lambda: movie(61.0, 16), {}, 422, "video cannot be used: it is longer than 60 s"),
+        (lambda: movie(0.5), {"appearance": True}, 422, "needs the consent of the person shown"),
+        (lambda: movie(0.5), {"consent": "I, Ann, agree."}, 422, "give appearance and consent, or neither"),
+        (lambda: movie(0.5), {"name": "../x"}, 422, "name: String should match pattern"),
+        (lambda: movie(0.5), {"name": "x" * 10_000}, 422, "name: String should match pattern"),
+        (lambda: movie(0.5), {"name": "tts-1"}, 409, "the talker tts-1 belongs to the service"),
+        (lambda: bytes(6_000_000), {}, 413, "the body is larger than 5 MB"),
     ],
 )
 def test_wrong_recordings_are_refused(
-    build: Build, content: bytes, request_: dict[str, Any], status: int, reason: str
+    build: Build, make: Callable[[], bytes], request_: dict[str, Any], status: int, reason: str
 ) -> None:
-    answer = build(content, **request_)
+    answer = build(make(), **request_)
     assert (answer.status_code, reason in answer.json()["error"]["message"]) == (status, True), answer.text
 
 
