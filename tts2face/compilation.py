@@ -22,7 +22,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numba
 import numpy as np
-from numba.core import event
+from numba.core import entrypoints, event
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
 from numba.core.dispatcher import Dispatcher
 from numba.core.runtime import rtsys
@@ -35,6 +35,8 @@ LOG = logging.getLogger(__name__)
 REPORT_S = 5.0  # between two messages of a compilation
 CACHE_VARIABLE = "NUMBA_CACHE_DIR"  # set by the user
 N_VERSIONS = 4  # of the compiled kernels of a module that are kept
+# Extensions of other packages are not loaded: no kernel uses their types, and looking for them takes 20 ms of a start.
+entrypoints._already_initialized = True
 
 
 class ModuleLocator(_CacheLocator):  # type: ignore[misc]

@@ -232,12 +232,10 @@ def build_hair(name: str, asset: Asset, cage: Cage, skin: Skin, head: Floats) ->
         triangles=cards.triangles.astype(np.int32),
         uv=cards.uv.astype(np.float32),
         tangents=tangents.astype(np.float32),
-        relief=relief,
-        alpha=alpha,
+        pictures=(relief, alpha, paint_scalp(skin, share, SCALP_SIDE, np.random.default_rng(SEED))),
         anchors=anchors.astype(np.int32),
         anchor_places=head[anchors].astype(np.float32),
         n_face_vertices=len(head),
-        scalp=paint_scalp(skin, share, SCALP_SIDE, np.random.default_rng(SEED)),
         metadata=_metadata(name, cut.summary) | {"data": PACKAGE},
     )
 
@@ -256,12 +254,14 @@ def build_cropped(skin: Skin, head: Floats) -> Hair:
         triangles=triangles.astype(np.int32),
         uv=uv.astype(np.float32),
         tangents=normals[used].astype(np.float32),
-        relief=np.full((FUZZ_SIDE, FUZZ_SIDE), 128, np.uint8),
-        alpha=paint_fuzz(skin.vertices[used], triangles, uv, generator),
+        pictures=(
+            np.full((FUZZ_SIDE, FUZZ_SIDE), 128, np.uint8),
+            paint_fuzz(skin.vertices[used], triangles, uv, generator),
+            paint_stubble(skin, STUBBLE_SIDE, generator),
+        ),
         anchors=anchors.astype(np.int32),
         anchor_places=head[anchors].astype(np.float32),
         n_face_vertices=len(head),
-        scalp=paint_stubble(skin, STUBBLE_SIDE, generator),
         metadata=_metadata(CROPPED, "cropped to a few millimetres"),
     )
 

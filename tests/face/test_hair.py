@@ -34,12 +34,14 @@ def cap(face: Face) -> Hair:
         triangles=triangles,
         uv=np.tile(np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32), (4, 1)),
         tangents=np.tile(np.array([0, 0, 1], np.float32), (16, 1)),
-        relief=np.full((8, 8), 128, np.uint8),
-        alpha=np.repeat(np.array([[0], [255]], np.uint8), 4, axis=0) * np.ones((1, 8), np.uint8),
+        pictures=(
+            np.full((8, 8), 128, np.uint8),
+            np.repeat(np.array([[0], [255]], np.uint8), 4, axis=0) * np.ones((1, 8), np.uint8),
+            np.full((4, 4), 255, np.uint8),
+        ),
         anchors=anchors,
         anchor_places=face.vertices[anchors].copy(),
         n_face_vertices=len(face.vertices),
-        scalp=np.full((4, 4), 255, np.uint8),
         metadata={"name": "cap", "summary": "four cards"},
     )
 
@@ -87,8 +89,12 @@ def test_hair_has_its_colour_and_the_scalp_below_it_too(folder: Path) -> None:
 
 def test_half_of_a_card_is_covered() -> None:
     bare = tiny_face(textured=True)
-    half = replace(cap(bare), scalp=None)
-    heads = (bare, attach_hair(bare, half, GREEN), attach_hair(bare, replace(half, alpha=half.alpha | 255), GREEN))
+    half = replace(cap(bare), pictures=cap(bare).pictures[:2])
+    heads = (
+        bare,
+        attach_hair(bare, half, GREEN),
+        attach_hair(bare, replace(half, pictures=(half.relief, half.alpha | 255)), GREEN),
+    )
     options = Picture(size="128x128", background="white", camera="0,60")
     pictures = [draw(face, np.zeros(len(face.shape_names)), picture=options).astype(int) for face in heads]
     skin, covered, cards = (picture[:, :, 1] - picture[:, :, ::2].max(axis=2) > 20 for picture in pictures)  # green
@@ -107,12 +113,12 @@ def test_a_sliver_of_hair_stays_within_its_corners(seed: int) -> None:
         triangles=np.int32([[0, 1, 2]]),
         uv=np.float32([[0, 0], [1, 0], [1, 1]]),
         tangents=np.float32([[1, 0, 0]] * 3),
-        alpha=np.full((8, 8), 255, np.uint8),
-        scalp=None,
+        pictures=(cap(bare).relief, np.full((8, 8), 255, np.uint8)),
     )
     options = Picture(size="256x256", background="white")
     seen, unseen = (
-        attach_hair(bare, one, GREEN) for one in (sliver, replace(sliver, alpha=np.zeros((8, 8), np.uint8)))
+        attach_hair(bare, one, GREEN)
+        for one in (sliver, replace(sliver, pictures=(sliver.relief, np.zeros((8, 8), np.uint8))))
     )
     hair, skin = (draw(face, np.zeros(len(face.shape_names)), picture=options).astype(int) for face in (seen, unseen))
     wall = (skin == 255).all(axis=2)

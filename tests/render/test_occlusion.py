@@ -45,7 +45,7 @@ def test_occlusion_of_another_size_is_refused() -> None:
 
 def test_a_haircut_adds_its_shadow_to_the_skin(tmp_path: Path) -> None:
     face = bake_occlusion(tiny_face(textured=True))
-    solid = replace(cap(face), scalp=None, alpha=np.full((8, 8), 255, np.uint8))
+    solid = replace(cap(face), pictures=(cap(face).relief, np.full((8, 8), 255, np.uint8)))
     write_hair(tmp_path / "cap.hair", bake_hair(face, solid))
     hair = read_hair(tmp_path / "cap.hair")
     haired = attach_hair(face, hair, "brown")

@@ -27,7 +27,7 @@ def test_hair_flickers_no_more_than_the_edge_of_skin() -> None:
     stripes = np.repeat(np.tile(np.array([40, 220], np.uint8), 32)[None, :], 64, axis=0)  # strands
     alpha = np.full((64, 64), 255, np.uint8)
     alpha[:, ::3] = 60
-    face = attach_hair(bare, replace(cap(bare), relief=stripes, alpha=alpha, scalp=None), "brown")
+    face = attach_hair(bare, replace(cap(bare), pictures=(stripes, alpha)), "brown")
     renderer = mesh_renderer(face, Picture(size="160x160", camera="0,35"))
     weights = np.zeros(len(face.shape_names), np.float32)
     turn = [renderer.draw(weights, np.radians([0.125 * i, 0.25 * i, 0, 0, 0, 0])) for i in range(N_FRAMES)]

@@ -1,6 +1,7 @@
 """Search for the recorded tokens in the most similar phone contexts (T07 section 3.3)."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from tts2face.exemplar.tokens import MAX_CONTEXT, Tokens
 
 MAX_EXEMPLARS = 10_000  # of a phone; an hour of recordings has half as many of the most frequent one
 N_GROUP_CONTEXT = 3  # neighbours either side that are alike in a group; the default context
+NO_LIKENESS = np.zeros((0, 0, 0))
 _ROUNDING = 1e-9  # a bound may fall below the score it bounds by rounding; scores are of order 1
 
 
@@ -27,23 +29,31 @@ class TokenQuery:
     log_durations: NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ContextIndex:
     """Tokens sorted into groups with the same phone and the same `N_GROUP_CONTEXT` neighbours either side.
 
     The tokens ``order[group_first[g]:group_first[g + 1]]`` form group g, the shortest first; the groups
-    ``phone_first[p]:phone_first[p + 1]`` belong to phone p. ``likeness[g, c, q]`` is the highest similarity of label q
-    to what any token of group g has in context column c: together with the difference of durations it bounds the
-    scores of a group from above.
+    ``phone_first[p]:phone_first[p + 1]`` belong to phone p.
     """
 
     order: NDArray[np.int32]
     group_first: NDArray[np.int32]
     phone_first: NDArray[np.int32]
-    likeness: NDArray[np.float64]
     context: NDArray[np.int32]
     log_durations: NDArray[np.float64]
     similarity: NDArray[np.float64]
+
+    @cached_property
+    def far_likeness(self) -> NDArray[np.float64]:
+        """(G, F, P) highest similarity of each label to what any token of a group has in each far context column.
+
+        Together with the neighbours that a group shares and the difference of durations it bounds the scores of a group
+        from above.
+        """
+        columns = self.context[self.order, 2 * N_GROUP_CONTEXT :].T
+        firsts = self.group_first[:-1]
+        return np.stack([np.maximum.reduceat(self.similarity[column], firsts, axis=0) for column in columns], axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,15 +80,10 @@ def context_index(
         order = order[is_kept[order]]
     keys = np.column_stack([tokens.phone, near])[order]
     firsts = np.flatnonzero(np.concatenate([[True], (keys[1:] != keys[:-1]).any(1)]))
-    likeness = [similarity[column] for column in keys[firsts, 1:].T]  # the same within a group
-    likeness += [
-        np.maximum.reduceat(similarity[column[order]], firsts, axis=0) for column in tokens.context.T[len(likeness) :]
-    ]
     return ContextIndex(
         order,
         np.concatenate([firsts, [len(order)]]).astype(np.int32),
         np.searchsorted(keys[firsts, 0], np.arange(len(tokens.inventory) + 1)).astype(np.int32),
-        np.stack(likeness, axis=1),
         tokens.context,
         durations,
         similarity,
@@ -119,7 +124,7 @@ def best_tokens(query: TokenQuery, index: ContextIndex, *, context: int, k: int,
     _search_groups(
         (query.phone, query.context, query.log_durations),
         (index.order, index.group_first, index.phone_first, index.context, index.log_durations),
-        index.likeness,
+        index.far_likeness if context > N_GROUP_CONTEXT else NO_LIKENESS,
         (index.similarity, context_weights(context), duration),
         tokens,
         scores,
@@ -155,25 +160,31 @@ def _insert_token(tokens, scores, token, score):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _score_bound(target, likeness, rule):  # type: ignore[no-untyped-def]
-    """Score that no token of a group exceeds."""
-    _, weights, _ = rule
+def _score_bound(target, token, group, rule):  # type: ignore[no-untyped-def]
+    """Score that no token of a group exceeds; `token`: context of one of its tokens, all of whose neighbours agree."""
+    similarity, weights, _ = rule
+    far_likeness, g = group
     total = _ROUNDING
-    for d in range(len(weights)):
+    for d in range(min(len(weights), N_GROUP_CONTEXT)):
         left, right = 2 * d, 2 * d + 1
-        total += weights[d] * (likeness[left, target[left]] + likeness[right, target[right]])
+        total += weights[d] * (similarity[token[left], target[left]] + similarity[token[right], target[right]])
+    for d in range(N_GROUP_CONTEXT, len(weights)):
+        left, right = 2 * d, 2 * d + 1
+        far = 2 * (d - N_GROUP_CONTEXT)
+        total += weights[d] * (far_likeness[g, far, target[left]] + far_likeness[g, far + 1, target[right]])
     return total
 
 
 @kernel
-def _search_groups(query, index, likeness, rule, tokens, scores):  # type: ignore[no-untyped-def]
+def _search_groups(query, index, far_likeness, rule, tokens, scores):  # type: ignore[no-untyped-def]
     phone, contexts, durations = query
     order, group_first, phone_first, token_contexts, token_durations = index
     for n in range(len(phone)):
         first, last = phone_first[phone[n]], phone_first[phone[n] + 1]
         bounds = np.zeros(last - first)
         for g in range(first, last):
-            bounds[g - first] = _score_bound(contexts[n], likeness[g], rule)
+            shared = token_contexts[order[group_first[g]]]
+            bounds[g - first] = _score_bound(contexts[n], shared, (far_likeness, g), rule)
         for _ in range(last - first):
             g = _argmax(bounds)
             bound = bounds[g]

@@ -6,6 +6,7 @@ basis expressions are shared between faces; D_j move landmarks, scaled to the fa
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -201,16 +202,17 @@ def gesture_face(face: Face, palette: Palette) -> GestureFace:
     """
     build_lip_constraints(face)  # raises for a face without lips before the transfer
     extended_face = add_expression_shapes(face)
-    regions: dict[str, slice] = {}
-    for name in REGION_FEATURES:
-        shapes = region_shapes(extended_face, palette.neutral.astype(np.float64), palette.regions[name])
-        first = len(extended_face.shape_names)
-        regions[name] = slice(first, first + len(shapes))
-        size = np.linalg.norm(palette.regions[name].modes, axis=2).max(axis=1)
-        largest_weight = MAX_MODE_MM / np.maximum(size.astype(np.float64), 1e-6)
-        extended_face = append_shapes(
-            extended_face, palette.channels(name), shapes, np.column_stack([-largest_weight, largest_weight])
-        )
+    neutral = palette.neutral.astype(np.float64)
+    shapes = [region_shapes(extended_face, neutral, palette.regions[name]) for name in REGION_FEATURES]
+    firsts = np.cumsum([len(extended_face.shape_names), *(len(moved) for moved in shapes)]).tolist()
+    regions = {name: slice(*ends) for name, ends in zip(REGION_FEATURES, pairwise(firsts), strict=True)}
+    sizes = np.concatenate(
+        [np.linalg.norm(palette.regions[name].modes, axis=2).max(axis=1) for name in REGION_FEATURES]
+    )
+    largest_weights = MAX_MODE_MM / np.maximum(sizes.astype(np.float64), 1e-6)
+    names = [channel for name in REGION_FEATURES for channel in palette.channels(name)]
+    limits = np.column_stack([-largest_weights, largest_weights])
+    extended_face = append_shapes(extended_face, names, np.concatenate(shapes), limits)
     mouth = build_lip_constraints(extended_face)
     return GestureFace(
         face=extended_face,

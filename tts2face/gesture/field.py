@@ -20,7 +20,7 @@ from tts2face.storage.disk_cache import computed_once
 
 N_SEARCH_AXES = 8  # principal axes of the windows in which the search tree is built
 AXES_STRIDE = 8  # the axes are computed from every eighth window; all windows give the same axes
-CACHE_KIND, CACHE_VERSION = "field", 1  # raised when the index of the same recordings changes
+CACHE_KIND, CACHE_VERSION = "field", 2  # raised when the index of the same recordings changes
 MIN_CACHED_MOMENTS = 5000  # fewer are indexed as fast as a file is read
 TREE_ARRAYS = tuple(field.name for field in fields(KdTree))
 N_DISTANCE_SAMPLES = 200  # moments from which the median nearest distance is estimated
@@ -189,23 +189,33 @@ def build_field(
         raise DataError(
             f"no recording of the style has {least} frames ({least / GESTURE_FPS:.1f} s); record longer ones"
         )
-    scale = float(np.sqrt(np.square(values - values.mean(axis=0)).sum(axis=1).mean())) or 1.0
-    spread = np.maximum(prosody.std(axis=0), 1e-6)
-    weights = (np.sqrt(np.array(options.alpha[: prosody.shape[1]])) / spread).astype(np.float32)
-    scaled = np.ascontiguousarray(values / np.float32(scale), np.float32)
-    weighted = np.ascontiguousarray(prosody * weights, np.float32)
-    unindexed = Field(scaled, weighted, starts, NO_AXES, NO_TREE, scale, weights, 1.0, options)
+
+    def unindexed(scale: float, weights: Float32Array) -> Field:
+        scaled = np.ascontiguousarray(values / np.float32(scale), np.float32)
+        weighted = np.ascontiguousarray(prosody * weights, np.float32)
+        return Field(scaled, weighted, starts, NO_AXES, NO_TREE, scale, weights, 1.0, options)
+
+    def indexed() -> Field:
+        scale = float(np.sqrt(np.square(values - values.mean(axis=0)).sum(axis=1).mean())) or 1.0
+        spread = np.maximum(prosody.std(axis=0), 1e-6)
+        weights = (np.sqrt(np.array(options.alpha[: prosody.shape[1]])) / spread).astype(np.float32)
+        return _index_field(unindexed(scale, weights), usable)
+
     if len(usable) < MIN_CACHED_MOMENTS:
-        return _index_field(unindexed, usable)
+        return indexed()
     kept = computed_once(
         CACHE_KIND,
         CACHE_VERSION,
-        [scaled, weighted, lengths, repr(options)],
-        lambda: _index_arrays(_index_field(unindexed, usable)),
-        lambda found: _is_index(found, unindexed, usable),
+        [values, prosody, lengths, repr(options)],
+        lambda: _index_arrays(indexed()),
+        lambda found: _is_index(found, values.shape[1], prosody.shape[1], options.history, usable),
     )
-    tree = KdTree(*(np.array(kept[f"tree_{name}"]) for name in TREE_ARRAYS))
-    return replace(unindexed, axes=np.array(kept["axes"]), tree=tree, median_distance=float(kept["median_distance"][0]))
+    return replace(
+        unindexed(float(kept["scale"][0]), np.array(kept["weights"])),
+        axes=np.array(kept["axes"]),
+        tree=KdTree(*(np.array(kept[f"tree_{name}"]) for name in TREE_ARRAYS)),
+        median_distance=float(kept["median_distance"][0]),
+    )
 
 
 def _index_field(field: Field, usable: NDArray[np.int64]) -> Field:
@@ -222,14 +232,23 @@ def _index_field(field: Field, usable: NDArray[np.int64]) -> Field:
 
 def _index_arrays(field: Field) -> dict[str, NDArray[Any]]:
     tree = {f"tree_{name}": getattr(field.tree, name) for name in TREE_ARRAYS}
-    return tree | {"axes": field.axes, "median_distance": np.array([field.median_distance])}
+    return tree | {
+        "axes": field.axes,
+        "scale": np.array([field.scale]),
+        "weights": field.weights,
+        "median_distance": np.array([field.median_distance]),
+    }
 
 
-def _is_index(kept: Mapping[str, NDArray[Any]], field: Field, usable: NDArray[np.int64]) -> bool:
-    """Whether arrays of a file are an index of the field's usable moments, which the kernels read without checks."""
-    width = field.options.history * (field.values.shape[1] + field.prosody.shape[1])
+def _is_index(
+    kept: Mapping[str, NDArray[Any]], n_values: int, n_sounds: int, history: int, usable: NDArray[np.int64]
+) -> bool:
+    """Whether arrays of a file are an index of the usable moments, which the kernels read without checks."""
+    width = history * (n_values + n_sounds)
     n_axes, n_nodes = min(N_SEARCH_AXES, width), count_nodes(len(usable))
     wanted = {
+        "scale": ("<f8", (1,)),
+        "weights": ("<f4", (n_sounds,)),
         "axes": ("<f4", (n_axes, width)),
         "median_distance": ("<f8", (1,)),
         "tree_places": ("<f4", (len(usable), n_axes)),

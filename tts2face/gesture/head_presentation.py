@@ -1,7 +1,9 @@
 """Presented head motion: the slow part of the recorded motion, scaled to what viewers see, and nods at accents."""
 
+from collections.abc import Mapping
 from copy import copy, deepcopy
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,7 @@ from tts2face.gesture.presentation import FloatArray, FrameContext, LowPass, fil
 from tts2face.gesture.prosody import prosody_features
 from tts2face.models.palette import GESTURE_FPS, Style
 from tts2face.numeric import smooth_gaussian, smoothstep
+from tts2face.storage.disk_cache import computed_once
 from tts2face.types import HEAD_CHANNELS, Waveform
 
 SLOW_HZ = 0.7  # cut-off of the part that is scaled: turns and tilts that last a phrase
@@ -34,6 +37,7 @@ ONSET_RAMP_S = 0.2  # a nod that would begin before its piece fades in
 ACCENT_STEP_S, ACCENT_SMOOTHING_S, ACCENT_GAP_S = 0.01, 0.06, 0.75
 ACCENT_DB = -8.0  # least smoothed intensity of an accent, relative to the mean level of speech
 ACCENT_RANGE_DB = 6.0  # from the weakest to the strongest accent
+CACHE_KIND, CACHE_VERSION = "head-spread", 1  # raised when the spread of the same recordings changes
 
 Float32Array = NDArray[np.float32]
 
@@ -66,9 +70,16 @@ def find_accents(sound: Waveform) -> FloatArray:
 
 def slow_scales(style: Style) -> FloatArray:
     """(6,) factors by which the slow part of a style's recorded head motion reaches `TARGET_SPREAD`; 1 or more."""
-    head = style.motion["head"].astype(np.float64)
-    middle = np.median(head, axis=0)
-    spread = filtered_spread(head - middle, SLOW_HZ)
+    recorded = style.motion["head"]
+
+    def compute() -> dict[str, FloatArray]:
+        head = recorded.astype(np.float64)
+        return {"spread": filtered_spread(head - np.median(head, axis=0), SLOW_HZ)}
+
+    def fits(kept: Mapping[str, NDArray[Any]]) -> bool:
+        return [(name, array.dtype.str, array.shape) for name, array in kept.items()] == [("spread", "<f8", (6,))]
+
+    spread = computed_once(CACHE_KIND, CACHE_VERSION, [recorded], compute, fits)["spread"]
     targets = np.array([TARGET_SPREAD.get(channel, 0.0) for channel in HEAD_CHANNELS])
     return np.clip(targets / np.maximum(spread, 1e-9), 1.0, MAX_SCALE)
 

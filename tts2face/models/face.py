@@ -1,8 +1,8 @@
 """Linear face model with everything needed to draw it."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,42 +33,6 @@ class Texture:
         for array in (self.pixels, self.alpha):
             if array is not None:
                 array.setflags(write=False)
-
-
-class LateTextures(Sequence[Texture]):
-    """Textures that are decoded and painted when one of them is first read: files of motion need none.
-
-    Parameters
-    ----------
-    number
-        How many there are.
-    make
-        Makes all of them; raises `DataError` where a picture is damaged.
-    """
-
-    def __init__(self, number: int, make: Callable[[], Iterable[Texture]]) -> None:
-        self._number, self._make = number, make
-
-    def _made(self) -> tuple[Texture, ...]:
-        made = tuple(self._make())
-        self._make = lambda: made  # what they are made of is forgotten
-        return made
-
-    def __len__(self) -> int:
-        """Their number; nothing is decoded."""
-        return self._number
-
-    @overload
-    def __getitem__(self, index: int) -> Texture: ...
-    @overload
-    def __getitem__(self, index: slice) -> tuple[Texture, ...]: ...
-    def __getitem__(self, index: int | slice) -> Texture | tuple[Texture, ...]:
-        """One or some of them."""
-        return self._made()[index]
-
-    def __reduce__(self) -> tuple[type, tuple[object, ...]]:
-        """Another process gets them decoded."""
-        return tuple, (self._made(),)
 
 
 @dataclass(frozen=True, slots=True)

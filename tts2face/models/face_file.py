@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Hairdo, LateTextures, Part, Texture
+from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Hairdo, Part, Texture
 from tts2face.models.face_layout import MAX_TEXTURES, SCORE_INPUTS, WIDE_OPEN, check_face, texture_number
+from tts2face.models.late import Late
 from tts2face.models.mesh_coding import decode_tangents, decode_uv, encode_tangents, encode_uv
 from tts2face.models.occlusion_coding import decode_occlusion, encode_occlusion
 from tts2face.models.picture_coding import (
@@ -188,7 +189,7 @@ def _read_occlusion(
     return decode_occlusion(arrays["occlusion"], shape, path)
 
 
-def _read_textures(arrays: Mapping[str, NDArray[Any]], path: Path) -> LateTextures:
+def _read_textures(arrays: Mapping[str, NDArray[Any]], path: Path) -> Late[Texture]:
     every = map(texture_tensors, range(MAX_TEXTURES))
     present = takewhile(lambda pair: pair[0] in arrays, every)
     pictures = [(arrays[colours], arrays.get(coverage)) for colours, coverage in present]
@@ -201,7 +202,7 @@ def _read_textures(arrays: Mapping[str, NDArray[Any]], path: Path) -> LateTextur
                 raise DataError(f"{path}: a texture and its alpha differ in size; build or copy the face again")
             yield Texture(pixels, alpha)
 
-    return LateTextures(len(pictures), decode)
+    return Late(len(pictures), decode)
 
 
 def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Face:
@@ -272,7 +273,7 @@ def _apply_identity(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapp
         vertices=(face.vertices + displacement).astype(np.float32),
         eyes=tuple(eyes),
         colours=colours,
-        textures=LateTextures(len(face.textures), lambda: _tinted(face, tints)),
+        textures=Late(len(face.textures), lambda: _tinted(face, tints)),
         hairdo=face.hairdo if hairdo is None else Hairdo(*hairdo),
         metadata={**face.metadata, "identity": name},
     )

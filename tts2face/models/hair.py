@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.colour import decode_srgb, encode_srgb
-from tts2face.models.face import Face, Hairdo, LateTextures, Part, Texture
+from tts2face.models.face import Face, Hairdo, Part, Texture
+from tts2face.models.late import Late
 
 HAIR_PART = "hair"
 BALD = "bald"  # haircut without hair
@@ -34,15 +35,15 @@ class Hair:
         Texture coordinates in [0, 1] from the top left corner.
     tangents : (V, 3)
         Unit vectors along the strands, from root to tip.
-    relief, alpha : (H, W), (H, W)
-        Linear light of the strands relative to the colour of the hair (128 = 1), and coverage, 0-255.
+    pictures : (H, W), (H, W), (h, w)
+        `relief`: linear light of the strands relative to the colour of the hair (128 = 1); `alpha`: their coverage,
+        0-255; and where there is one, `scalp`: coverage of the skin's texture by hair, painted in the hair's colour
+        under the cards, 0-255.
     anchors, anchor_places : (A,), (A, 3)
         Vertices of the head that carry the hair, and their places on the default head, mm: another head moves the hair
         as it moves these.
     n_face_vertices
         Number of vertices of heads of the layout.
-    scalp : (h, w)
-        Coverage of the skin's texture by hair, 0-255, painted in the hair's colour under the cards; None: none.
     metadata
         Name, summary, licence, attribution, and the command that built it.
     occlusion, skin_occlusion : (V, D / 8), (n_face_vertices, D / 8)
@@ -54,15 +55,28 @@ class Hair:
     triangles: NDArray[np.int32]
     uv: NDArray[np.float32]
     tangents: NDArray[np.float32]
-    relief: NDArray[np.uint8]
-    alpha: NDArray[np.uint8]
+    pictures: Sequence[NDArray[np.uint8]]
     anchors: NDArray[np.int32]
     anchor_places: NDArray[np.float32]
     n_face_vertices: int
-    scalp: NDArray[np.uint8] | None = None
     metadata: Mapping[str, Any] = field(default_factory=dict)
     occlusion: NDArray[np.uint8] | None = None
     skin_occlusion: NDArray[np.uint8] | None = None
+
+    @property
+    def relief(self) -> NDArray[np.uint8]:
+        """First of the pictures."""
+        return self.pictures[0]
+
+    @property
+    def alpha(self) -> NDArray[np.uint8]:
+        """Second of the pictures."""
+        return self.pictures[1]
+
+    @property
+    def scalp(self) -> NDArray[np.uint8] | None:
+        """Third of the pictures; None where nothing is painted."""
+        return self.pictures[2] if len(self.pictures) > 2 else None
 
 
 def parse_hair_colour(colour: str) -> NDArray[np.float64]:
@@ -108,7 +122,7 @@ def attach_hair(face: Face, hair: Hair, colour: str) -> Face:
         shapes=np.pad(face.shapes, ((0, 0), (0, n_new), (0, 0))),
         colours=np.concatenate([face.colours, np.tile(np.rint(255 * srgb).astype(np.uint8), (n_new, 1))]),
         uv=np.concatenate([uv, hair.uv]),
-        textures=LateTextures(len(textures) + 1, lambda: _painted(textures, hair, srgb)),
+        textures=Late(len(textures) + 1, lambda: _painted(textures, hair, srgb)),
         tangents=np.concatenate([tangents, hair.tangents]),
         hairdo=Hairdo(str(hair.metadata.get("name", "")), colour),
         occlusion=_join_occlusion(face, hair),

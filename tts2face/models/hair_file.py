@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.hair import BALD, Hair
+from tts2face.models.late import Late
 from tts2face.models.mesh_coding import decode_tangents, decode_uv, encode_tangents, encode_uv
 from tts2face.models.occlusion_coding import MAX_OCCLUSION_BYTES, decode_occlusion, encode_occlusion
 from tts2face.models.picture_coding import decode_colours, decode_coverage, encode_colours, encode_coverage
@@ -34,6 +35,7 @@ TENSORS: Mapping[str, Tensor] = {
     "occlusion": Tensor("uint8", ("bytes of occlusion",), is_optional=True),
     "skin_occlusion": Tensor("uint8", ("bytes of skin occlusion",), is_optional=True),
 }
+PICTURES = ("relief", "alpha", "scalp")
 MIN_ANCHORS = 4  # that are not in one plane: fewer do not determine the fit
 
 
@@ -60,8 +62,10 @@ def write_hair(path: Path, hair: Hair) -> None:
     write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
 
 
-def read_hair(path: Path) -> Hair:
+def read_hair(path: Path, *, checks_pictures: bool = True) -> Hair:
     """Read a ``.hair`` file.
+
+    Pictures are decoded at once where the file may be damaged (`checks_pictures`), otherwise when hair is first drawn.
 
     Raises
     ------
@@ -72,24 +76,39 @@ def read_hair(path: Path) -> Hair:
     """
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
     _check_hair(path, arrays, header)
-    relief, alpha = decode_colours(arrays["relief"], path, "L"), decode_coverage(arrays["alpha"], path)
-    if relief.shape != alpha.shape:
-        raise DataError(f"{path}: relief and alpha differ in size; build or copy the file again")
+    hair = _hair_from_arrays(arrays, header, path)
+    if checks_pictures:
+        tuple(hair.pictures)
+    return hair
+
+
+def _hair_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Hair:
     return Hair(
         vertices=arrays["vertices"],
         triangles=arrays["triangles"],
         uv=decode_uv(arrays["uv"]),
         tangents=decode_tangents(arrays["tangents"]),
-        relief=relief,
-        alpha=alpha,
+        pictures=_read_pictures(arrays, path),
         anchors=arrays["anchors"],
         anchor_places=arrays["anchor_places"],
         n_face_vertices=header["n_face_vertices"],
-        scalp=decode_coverage(arrays["scalp"], path) if "scalp" in arrays else None,
         metadata=header["metadata"],
         occlusion=_read_occlusion("occlusion", len(arrays["vertices"]), (arrays, header, path)),
         skin_occlusion=_read_occlusion("skin_occlusion", header["n_face_vertices"], (arrays, header, path)),
     )
+
+
+def _read_pictures(arrays: Mapping[str, NDArray[Any]], path: Path) -> Late[NDArray[np.uint8]]:
+    contents = {name: arrays[name] for name in PICTURES if name in arrays}
+
+    def decode() -> list[NDArray[np.uint8]]:
+        relief = decode_colours(contents["relief"], path, "L")
+        alpha, *scalp = (decode_coverage(content, path) for name, content in contents.items() if name != "relief")
+        if relief.shape != alpha.shape:
+            raise DataError(f"{path}: relief and alpha differ in size; build or copy the file again")
+        return [relief, alpha, *scalp]
+
+    return Late(len(contents), decode)
 
 
 def _read_occlusion(name: str, n_vertices: int, file: tuple[Any, Any, Path]) -> NDArray[np.uint8] | None:
@@ -112,7 +131,8 @@ def load_hair(name: str) -> Hair:
     """
     if not Path(name).suffix and name not in haircut_names():
         raise InputError(f"there is no haircut {name!r}; give {', '.join((BALD, *haircut_names()))}, or a .hair file")
-    return read_hair(find_file(name, KIND))
+    path = find_file(name, KIND)
+    return read_hair(path, checks_pictures=path.parent != SHIPPED_FOLDER)
 
 
 def haircut_names() -> tuple[str, ...]:
