@@ -30,17 +30,15 @@ class Texels:
 def find_texels(uv: Floats, triangles: NDArray[np.int64], side: int) -> Texels:
     """The texels whose centres lie in a triangle; where triangles overlap, in the last one."""
     places = uv * side - 0.5
-    owner = np.full((side, side), -1)
-    _find_owners(places[triangles], owner)
+    owner, weights = np.full((side, side), -1), np.zeros((side, side, 3))
+    _find_owners(places[triangles], owner, weights)
     rows, columns = np.nonzero(owner >= 0)
-    chosen = triangles[owner[rows, columns]]
-    weights = _barycentric(places[chosen].transpose(1, 2, 0), columns, rows)
-    return Texels(rows, columns, chosen, weights)
+    return Texels(rows, columns, triangles[owner[rows, columns]], weights[rows, columns])
 
 
 @kernel
-def _find_owners(corners, owner):  # type: ignore[no-untyped-def]
-    """Write into each texel the number of the last triangle (T, 3, 2) in which its centre lies."""
+def _find_owners(corners, owner, weights):  # type: ignore[no-untyped-def]
+    """Write into each texel the last triangle (T, 3, 2) in which its centre lies, and its barycentric weights there."""
     for number in range(len(corners)):
         (ax, ay), (bx, by), (cx, cy) = corners[number]
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
@@ -53,15 +51,7 @@ def _find_owners(corners, owner):  # type: ignore[no-untyped-def]
             for x in range(int(low_x), int(high_x) + 1):
                 second = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / area
                 third = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / area
-                if min(1 - second - third, second, third) >= -1e-6:
+                first = 1 - second - third
+                if min(first, second, third) >= -1e-6:
                     owner[y, x] = number
-
-
-def _barycentric(corners: Floats, x: NDArray[np.int64], y: NDArray[np.int64]) -> Floats:
-    """(P, 3) weights of points in the triangles (3, 2, P)."""
-    (ax, ay), (bx, by), (cx, cy) = corners
-    area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    area = np.where(np.abs(area) < 1e-12, 1e-12, area)
-    second = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / area
-    third = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / area
-    return np.stack([1 - second - third, second, third], axis=1)
+                    weights[y, x, 0], weights[y, x, 1], weights[y, x, 2] = first, second, third
