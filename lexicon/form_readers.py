@@ -244,8 +244,9 @@ def read_abbreviation(m: re.Match[str], previous: str) -> str:
 
 
 def read_dotted_letters(m: re.Match[str], _: str) -> str:
-    """F.B.I. is FBI."""
-    return _keep_full_stop(m.group().replace(".", "").upper(), m)
+    """F.B.I. is FBI; I.I. is I I, as II would be a number."""
+    letters = m.group().replace(".", "").upper()
+    return _keep_full_stop(" ".join(letters) if letters in _NEVER_LETTERS else letters, m)
 
 
 def read_address(m: re.Match[str], _: str) -> str:

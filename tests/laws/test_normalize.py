@@ -87,6 +87,7 @@ TEXTS = st.one_of(st.text(), st.lists(FORMS, max_size=12).map("".join), st.lists
 @example("\ud800")
 @example("#\u0370")
 @example("A.\u0370")
+@example("I.I")
 def test_normalising_twice_is_normalising_once(text: str) -> None:
     once = normalize(text)
     assert normalize(once) == once
