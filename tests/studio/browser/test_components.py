@@ -47,11 +47,20 @@ def test_views_differ_and_the_picture_covers_the_head(page):
     assert page.browser.run("return document.querySelector('.studio-views [aria-pressed=true]').innerText") == "Profile"
 
 
+def plays_until(page, is_done, what):
+    """Play until something has happened; again, if the clip ends before a busy browser has drawn enough of it."""
+
+    def is_done_now():
+        page.play()
+        return is_done()
+
+    eventually(is_done_now, 60, what)
+
+
 def test_time_follows_the_sound_and_measures_are_reported(page):
     page.browser.press("Tab")
-    page.play()
-    eventually(lambda: page.measure("time") > 1.5, 30, "plays")
-    eventually(lambda: page.measure("fps") and page.measure("timeline_ms") is not None, 30, "measures")
+    plays_until(page, lambda: page.measure("time") > 1.5, "plays")
+    plays_until(page, lambda: page.measure("fps") and page.measure("timeline_ms") is not None, "measures")
     assert page.measure("js_ms") > 0
     page.pause()
     stopped = page.measure("time")
@@ -71,8 +80,7 @@ def test_a_page_at_rest_does_nothing_until_it_plays_or_changes(page):
         return bool(page.browser.run("return window.called") == before)
 
     page.browser.run(COUNT_FRAMES)
-    page.play()
-    page.browser.wait("return window.called > 5", seconds=20)
+    plays_until(page, lambda: page.browser.run("return window.called > 5"), "frames")
     page.pause()
     page.browser.wait("return window.__studio.is_sharp")
     eventually(rests, 20, "the page rests")
