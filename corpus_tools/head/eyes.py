@@ -15,7 +15,6 @@ Floats = NDArray[np.float64]
 
 N_AROUND = 44
 RECEDE_MM = 1.6  # backward shift of an eyeball whose lids are shut, because blend shapes move lids on straight lines
-BULGE = 0.04  # of the radius, height of the cornea at its top
 BACK_RAD = 1.6  # angle from the gaze at which the eyeball ends; the rest is never visible
 GAZE_ANGLES = {
     "eyeLookUp": (-1, 0, 20.0),
@@ -33,7 +32,7 @@ LIMBUS, LID_SHADE, IRIS_GAIN = 0.62, 0.62, 1.75
 
 @dataclass(frozen=True, slots=True)
 class EyeStyle:
-    """Half angles of iris and pupil seen from the centre, radians, and the iris' colour.
+    """Half angles of iris and pupil seen from the centre, radians, the iris' colour, and the cornea's height.
 
     MakeHuman's eyeballs are a third too large, so a natural iris takes a smaller angle than on a real eye. The colour
     is light, so that a tint can produce any other.
@@ -42,6 +41,7 @@ class EyeStyle:
     iris: float = 0.385
     pupil: float = 0.15
     colour: tuple[float, float, float] = (0.44, 0.50, 0.46)
+    bulge: float = 0.04  # of the radius
 
 
 MATERIALS = {
@@ -58,13 +58,13 @@ def fit_eyeballs(cage: Cage, style: EyeStyle | None = None) -> tuple[Eyeball, Ey
         turns = {}
         for gaze, (about_x, about_y, degrees) in GAZE_ANGLES.items():
             turns[gaze + word] = np.radians(degrees) * np.array([about_x, sign * about_y, 0.0])
-        found.append(Eyeball(centre, radius, turns, style.iris, style.pupil))
+        found.append(Eyeball(centre, radius, turns, style.iris, style.pupil, style.bulge))
     return found[0], found[1]
 
 
 def ball_radius(ball: Eyeball, off: Floats) -> Floats:
     """Distance of the surface from the centre, mm, at angles from the gaze, radians."""
-    return ball.radius * (1.0 + BULGE * np.clip(1.0 - (off / (ball.iris * 1.15)) ** 2, 0, None) ** 1.3)
+    return ball.radius * (1.0 + ball.bulge * np.clip(1.0 - (off / (ball.iris * 1.15)) ** 2, 0, None) ** 1.3)
 
 
 def eyeball_piece(ball: Eyeball, side: str, style: EyeStyle) -> Piece:

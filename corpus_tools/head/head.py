@@ -94,7 +94,7 @@ def assemble_head(cage: Cage, reference: ReferenceHead, style: HeadStyle) -> Hea
     skin = clear_eyeballs(correct_shapes(close_lips(build_skin(cage), reference.lips)), balls)
     eyes = [eyeball_piece(ball, side, style.eyes) for ball, side in zip(balls, ("Left", "Right"), strict=True)]
     pieces = (
-        _flesh(skin, style),
+        skin_piece(skin, style.palette.skin, style.skin_material),
         *eyes,
         *_teeth_pieces(cage, skin, reference, jaw),
         tongue_piece(cage, jaw),
@@ -106,10 +106,10 @@ def assemble_head(cage: Cage, reference: ReferenceHead, style: HeadStyle) -> Hea
     return HeadPieces(pieces, (1, 2), balls, PIVOT)
 
 
-def _flesh(skin: Skin, style: HeadStyle) -> Piece:
-    """The skin."""
-    colours = np.tile(np.array(style.palette.skin), (len(skin.vertices), 1))
-    span = MaterialSpan("skin", triangulate(skin.quads), style.skin_material)
+def skin_piece(skin: Skin, colour: tuple[float, float, float], material: Mapping[str, Any]) -> Piece:
+    """The skin, of one colour where its texture is not drawn."""
+    span = MaterialSpan("skin", triangulate(skin.quads), material)
+    colours = np.tile(np.array(colour), (len(skin.vertices), 1))
     return Piece(skin.vertices, (span,), colours, skin.shapes, layout_coordinates(skin.source_uv))
 
 
@@ -122,13 +122,13 @@ def _teeth_pieces(cage: Cage, skin: Skin, reference: ReferenceHead, jaw: Jaw) ->
         points = fit_teeth(piece.vertices, reference.cage.vertices[strip], cage.vertices[strip])
         points = keep_behind(follow_lips(points, piece.vertices, ahead), skin.vertices, COVER_MM[name])
         pose, cover = COVERED_POSES[name]
-        points = _cover_in_pose(points, skin, jaw, pose, cover)
+        points = cover_in_pose(points, skin, jaw, pose, cover)
         moved = add_retreat(points, jaw.shapes(points), skin, reference.lips) if name == "lower" else {}
         pieces.append(Piece(points, piece.spans, piece.colours, moved))
     return pieces[0], pieces[1]
 
 
-def _cover_in_pose(points: Floats, skin: Skin, jaw: Jaw, pose: Mapping[str, float], cover: float) -> Floats:
+def cover_in_pose(points: Floats, skin: Skin, jaw: Jaw, pose: Mapping[str, float], cover: float) -> Floats:
     """Teeth and gums (N, 3) that stay `cover` mm behind the skin in a pose; the lower ones move with the jaw."""
     posed = skin.vertices + sum(weight * skin.shapes[name] for name, weight in pose.items())
     opened = pose.get("jawOpen", 0.0) * jaw.shapes(points)["jawOpen"]

@@ -41,7 +41,7 @@ class Piece:
 class Eyeball:
     """An eyeball: centre (3,), radius in mm, and its turns by gaze shape, rotation vectors (3,) in radians.
 
-    ``iris`` and ``pupil`` are half angles seen from the centre, radians.
+    ``iris`` and ``pupil`` are half angles seen from the centre, radians; ``bulge`` is the cornea's height in radii.
     """
 
     centre: Floats
@@ -49,6 +49,7 @@ class Eyeball:
     turns: Mapping[str, Floats]
     iris: float
     pupil: float
+    bulge: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,5 +1,6 @@
 """Corrections of MakeHuman's face units: smoother cheeks, stronger brows, lids that slide over the eyeballs."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -90,13 +91,31 @@ LID_SHAPES = ("eyeBlink", "eyeLookDown", "eyeLookUp", "eyeLookIn", "eyeLookOut",
 N_SPREAD = 4  # edges over which the correction decays
 
 
-def clear_eyeballs(skin: Skin, balls: tuple[Eyeball, Eyeball]) -> Skin:
-    """The skin with shapes that keep the lids outside the eyeballs at every weight."""
+def clear_eyeballs(
+    skin: Skin,
+    balls: tuple[Eyeball, Eyeball],
+    names: Sequence[str] = LID_SHAPES,
+    clear_mm: float = CLEAR_MM,
+    lining: NDArray[np.bool_] | None = None,
+) -> Skin:
+    """The skin with shapes that keep the lids outside the eyeballs at every weight.
+
+    Parameters
+    ----------
+    names
+        Shapes, without sides, that are corrected.
+    clear_mm
+        Between lid and eyeball.
+    lining : (N,)
+        Vertices that are not pushed; None for none.
+    """
     means = neighbour_means(skin)
     shapes, corrections = dict(skin.shapes), dict(skin.corrections)
     for ball, side in zip(balls, ("Left", "Right"), strict=True):
-        for name in (shape + side for shape in LID_SHAPES):
-            push = _push(skin.vertices, shapes[name], ball, name, means)
+        for name in (shape + side for shape in names):
+            push = _push(skin.vertices, (shapes[name], clear_mm), ball, name, means)
+            if lining is not None:
+                push[lining] = 0.0
             shapes[name] = shapes[name] + push
             corrections[name] = push
     return replace(skin, shapes=shapes, corrections=corrections)
@@ -113,12 +132,13 @@ def eyeball_overlap(vertices: Floats, ball: Eyeball, name: str, weight: float) -
     return depth
 
 
-def _push(vertices: Floats, moved: Floats, ball: Eyeball, name: str, means: sparse.csr_array) -> Floats:
-    """(N, 3) displacement that a shape needs to clear an eyeball."""
+def _push(vertices: Floats, shape: tuple[Floats, float], ball: Eyeball, name: str, means: sparse.csr_array) -> Floats:
+    """(N, 3) displacement that a shape, with its motion and clearance, needs to clear an eyeball."""
+    moved, clear_mm = shape
     rest_depth = eyeball_overlap(vertices, ball, "", 0.0)
     is_lid = (rest_depth < 0.1) & (rest_depth > -0.6 * ball.radius) & (vertices[:, 2] > ball.centre[2])
     is_lid &= np.linalg.norm(moved, axis=1) > 0.05
-    clear = np.minimum(CLEAR_MM, np.maximum(-rest_depth, 0.0))
+    clear = np.minimum(clear_mm, np.maximum(-rest_depth, 0.0))
     out = vertices + moved - ball.centre
     out = out * [0.8, 0.8, 1.0]
     out /= np.linalg.norm(out, axis=1, keepdims=True)

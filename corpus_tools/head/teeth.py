@@ -74,7 +74,7 @@ MATERIALS = {
 
 def arch_piece(arch: Arch, name: str) -> Piece:
     """Crowns and gum of an arch; its two spans are ``teeth_<name>`` and ``gums_<name>``."""
-    path = _path(arch.curve)
+    path = arch_path(arch.curve)
     points, colours, triangles, count = [], [], [], 0
     for side in (1.0, -1.0):
         along = 0.0
@@ -85,18 +85,21 @@ def arch_piece(arch: Arch, name: str) -> Piece:
             triangles.append(_tube_triangles(len(LEVELS), N_AROUND, closed_start=True) + count)
             count += len(crown)
             along += width
-    n_crowns = sum(len(block) for block in triangles)
-    gum = _gum(path, arch)
-    triangles.append(_tube_triangles(*_GUM_GRID, closed_start=False) + count)
-    points.append(gum)
-    colours.append(np.repeat(_light_along(arch), _GUM_GRID[1])[:, None] * GUM)
     vertices, faces = np.concatenate(points), np.concatenate(triangles)
-    faces = _wind_outward(vertices, faces, arch.up)
+    gum = gum_piece(path, arch, GUM)
     spans = (
-        MaterialSpan(f"teeth_{name}", faces[:n_crowns], MATERIALS["teeth"]),
-        MaterialSpan(f"gums_{name}", faces[n_crowns:], MATERIALS["gums"]),
+        MaterialSpan(f"teeth_{name}", _wind_outward(faces, arch.up), MATERIALS["teeth"]),
+        MaterialSpan(f"gums_{name}", gum.spans[0].triangles + count, MATERIALS["gums"]),
     )
-    return Piece(vertices, spans, np.concatenate(colours))
+    return Piece(np.concatenate([vertices, gum.vertices]), spans, np.concatenate([*colours, gum.colours]))
+
+
+def gum_piece(path: "ArchPath", arch: Arch, colour: Floats) -> Piece:
+    """The gum of an arch, darker towards its ends."""
+    vertices = _gum(path, arch)
+    faces = _wind_outward(_tube_triangles(*_GUM_GRID, closed_start=False), arch.up)
+    colours = np.repeat(_light_along(arch), _GUM_GRID[1])[:, None] * colour
+    return Piece(vertices, (MaterialSpan("gums", faces, MATERIALS["gums"]),), colours)
 
 
 def fit_teeth(points: Floats, before: Floats, after: Floats) -> Floats:
@@ -143,7 +146,8 @@ class ArchPath:
         return both[0], both[1]
 
 
-def _path(curve: Floats) -> ArchPath:
+def arch_path(curve: Floats) -> ArchPath:
+    """The curve of an arch, mirrored, from its points (K, 2) on the left."""
     from scipy.interpolate import CubicSpline
 
     mirrored = np.concatenate([curve[:0:-1] * [-1, 1], curve])
@@ -235,6 +239,6 @@ def _tube_triangles(n_rings: int, n_around: int, closed_start: bool) -> NDArray[
     return np.concatenate(faces).astype(np.int64)
 
 
-def _wind_outward(vertices: Floats, faces: NDArray[np.int64], up: float) -> NDArray[np.int64]:
+def _wind_outward(faces: NDArray[np.int64], up: float) -> NDArray[np.int64]:
     """Faces with outward winding; mirrored heights reverse it."""
     return faces if up < 0 else faces[:, ::-1]

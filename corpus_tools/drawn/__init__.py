@@ -1,0 +1,1 @@
+"""Drawn characters: designed heads of an animated film's kind, on the shipped heads' topology."""

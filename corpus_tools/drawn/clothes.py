@@ -1,0 +1,71 @@
+"""Clothes of a drawn character: a rolled collar over the shirt, and ear studs."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from corpus_tools.drawn.character import Collar, Colour
+from corpus_tools.drawn.fields import grid_triangles, wind_outward
+from corpus_tools.head.piece import MaterialSpan, Piece
+from corpus_tools.head.skin import Skin
+from tts2face.numeric import unit_vectors
+
+Floats = NDArray[np.float64]
+
+MATERIAL = {"specular": 0.02, "shininess": 6.0, "wrap": 0.6}
+ROLL_SHADE = 0.97  # of the shirt's colour
+N_KNOTS, N_AROUND, N_SECTION = 12, 96, 16
+STUD_MM, STUD_COLOUR, STUD_OFF = 3.6, (0.98, 0.80, 0.36), np.array([1.6, 0.0, 1.0])
+STUD_MATERIAL = {"specular": 0.6, "shininess": 60.0, "wrap": 0.3}
+STUD_GRID = (9, 16)
+
+
+def sweater_piece(shirt: Piece, collar: Collar, colour: Colour) -> Piece:
+    """A shirt of one colour with a rolled collar."""
+    points, triangles = _roll(collar)
+    faces = np.concatenate([shirt.spans[0].triangles, triangles + len(shirt.vertices)])
+    colours = np.concatenate([np.ones(len(shirt.vertices)), np.full(len(points), ROLL_SHADE)])[:, None] * colour
+    return Piece(np.concatenate([shirt.vertices, points]), (MaterialSpan("shirt", faces, MATERIAL),), colours)
+
+
+def _roll(collar: Collar) -> tuple[Floats, NDArray[np.int64]]:
+    """Points and triangles of a closed tube around the neck."""
+    turn = np.linspace(0, 2 * np.pi, N_KNOTS, endpoint=False)
+    forward = np.cos(turn)
+    knots = np.column_stack([
+        collar.across * np.sin(turn),
+        collar.back + (collar.front - collar.back) * (1 + forward) / 2,
+        collar.middle + np.where(forward > 0, collar.ahead, collar.behind) * forward,
+    ])  # fmt: skip
+    closed = np.concatenate([knots, knots[:1]])
+    path = CubicSpline(np.arange(N_KNOTS + 1) / N_KNOTS, closed, bc_type="periodic")(np.arange(N_AROUND) / N_AROUND)
+    along = unit_vectors(np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0))
+    out = unit_vectors((path - path.mean(axis=0)) * [1, 0, 1])
+    out = unit_vectors(out - (out * along).sum(axis=1)[:, None] * along)
+    up = np.cross(along, out)
+    up *= np.sign(up[:, 1:2])
+    tilt = np.radians(collar.tilt)
+    out, up = out * np.cos(tilt) + up * np.sin(tilt), up * np.cos(tilt) - out * np.sin(tilt)
+    section = np.linspace(0, 2 * np.pi, N_SECTION, endpoint=False)
+    across = collar.half_width * np.cos(section)[None, :, None] * out[:, None]
+    rings = path[:, None] + across + collar.half_height * np.sin(section)[None, :, None] * up[:, None]
+    points = rings.reshape(-1, 3)
+    triangles = grid_triangles(N_AROUND + 1, N_SECTION, is_closed=True) % len(points)
+    return points, wind_outward(points, triangles, path.mean(axis=0))
+
+
+def stud_pieces(skin: Skin) -> tuple[Piece, Piece]:
+    """Round studs on the lobes of both ears."""
+    row, column = np.meshgrid(np.arange(STUD_GRID[0]), np.arange(STUD_GRID[1]), indexing="ij")
+    down, around = (row / (STUD_GRID[0] - 1) * np.pi).ravel(), (column / STUD_GRID[1] * 2 * np.pi).ravel()
+    ball = np.column_stack([np.sin(down) * np.cos(around), np.cos(down), np.sin(down) * np.sin(around)])
+    triangles = wind_outward(ball, grid_triangles(*STUD_GRID, is_closed=True))
+    pieces = []
+    for sign in (1.0, -1.0):
+        x, y = sign * skin.vertices[:, 0], skin.vertices[:, 1]
+        ear = skin.vertices[(x > 66) & (y < -8) & (y > -60)]
+        lobe = ear[ear[:, 1] < ear[:, 1].min() + 9]
+        centre = lobe[np.argmax(sign * lobe[:, 0])] + STUD_OFF * [sign, 1, 1]
+        span = MaterialSpan("stud", triangles, STUD_MATERIAL)
+        pieces.append(Piece(centre + STUD_MM * ball, (span,), np.tile(STUD_COLOUR, (len(ball), 1))))
+    return pieces[0], pieces[1]

@@ -1,0 +1,72 @@
+"""Helpers of the drawn characters' geometry: bumps in space, smooth lines, surfaces in rows."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+from scipy.spatial import cKDTree
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def bump(points: Floats, centre: tuple[float, ...], reach: tuple[float, ...]) -> Floats:
+    """(P,) Gaussian with value 1 at the centre; `gaussian_bump` of the head is that of both sides."""
+    falling: Floats = np.exp(-(((points - np.array(centre)) / np.array(reach)) ** 2).sum(axis=1))
+    return falling
+
+
+def smooth_line(points: Iterable[Iterable[float]], n: int) -> Floats:
+    """(n, D) points at equal steps along the cubic spline through points (K, D)."""
+    known = np.array([tuple(point) for point in points], np.float64)
+    along = arc_length(known)
+    return np.asarray(CubicSpline(along, known)(np.linspace(0, along[-1], n)))
+
+
+def arc_length(points: Floats) -> Floats:
+    """(K,) length of a line of points (K, D) up to each of them."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def profile(knots: Iterable[tuple[float, float]], at: Floats) -> Floats:
+    """Values of a monotone cubic through (share, value) at shares (n,)."""
+    return np.asarray(PchipInterpolator(*np.array(list(knots)).T)(at))
+
+
+def smooth_rows(values: Floats, spread: float) -> Floats:
+    """Values (n, ...) after a Gaussian along their first axis, in steps."""
+    return np.asarray(gaussian_filter1d(values, spread, axis=0, mode="nearest"))
+
+
+def grid_triangles(n_rows: int, n_columns: int, *, is_closed: bool = False) -> Ints:
+    """(F, 3) triangles of a surface stored row by row; a closed one joins its last column to its first."""
+    steps = n_columns if is_closed else n_columns - 1
+    row, column = (grid.ravel() for grid in np.meshgrid(np.arange(n_rows - 1), np.arange(steps), indexing="ij"))
+    here, beside = row * n_columns + column, row * n_columns + (column + 1) % n_columns
+    return np.concatenate(
+        [
+            np.stack([here, beside, beside + n_columns], axis=1),
+            np.stack([here, beside + n_columns, here + n_columns], axis=1),
+        ]
+    ).astype(np.int64)
+
+
+def wind_outward(points: Floats, triangles: Ints, about: Floats | float = 0.0) -> Ints:
+    """Triangles (F, 3) of a closed surface whose normals point away from `about`."""
+    a, b, c = (points[triangles] - about).transpose(1, 0, 2)
+    return triangles if np.einsum("fc,fc->f", a, np.cross(b, c)).sum() > 0 else triangles[:, ::-1]
+
+
+class Front:
+    """What lies in front, seen along z, of lines that must not sink into a surface (N, 3)."""
+
+    def __init__(self, surface: Floats) -> None:
+        self._depth, self._places = surface[:, 2], cKDTree(surface[:, :2])
+
+    def lacking(self, points: Floats, gap: float) -> Floats:
+        """(n,) mm by which points (n, 3) of a line must come forward to lie `gap` in front of the surface, smoothed."""
+        near = self._places.query(points[:, :2], 4)[1]
+        lack = np.maximum(self._depth[near].max(axis=1) + gap - points[:, 2], 0)
+        return np.asarray(gaussian_filter1d(maximum_filter1d(lack, 5), 3))

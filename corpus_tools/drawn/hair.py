@@ -1,0 +1,193 @@
+"""Hair of large sculpted locks over a shell, as one opaque part."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial import cKDTree
+
+from corpus_tools.drawn.character import Hairstyle, Lock, Palette
+from corpus_tools.drawn.fields import arc_length, grid_triangles, profile, smooth_rows, wind_outward
+from corpus_tools.head.piece import MaterialSpan, Piece
+from corpus_tools.head.skin import Skin, vertex_normals
+from corpus_tools.head.subdivide import triangulate
+from tts2face.numeric import smoothstep, unit_vectors
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# The volume of the hair: an ellipsoid, and below its middle a drop; half sizes in mm.
+MIDDLE = np.array([0.0, 30.0, -58.0])
+ACROSS, UP, AHEAD, BEHIND, DOWN = 80.0, 92.0, 100.0, 96.0, 118.0
+LOWEST_DEG = 60.0  # elevation of the lowest tips, below the middle
+DEPTH = (AHEAD + BEHIND) / 2
+N_ALONG, N_TOP, N_UNDER = 36, 11, 4
+TIP_DENSITY = 1.35  # exponent by which rings are closer at the tip
+SHADE_ALONG = ((0, 0.72), (0.15, 0.92), (0.45, 1.06), (0.8, 1.0), (1, 0.92))
+RIM_SHADE, UNDER_SHADE, END_SHADE, SHELL_SHADE = 0.74, 0.80, 0.6, 0.95
+TIP_SHARE, GLOW_SHARE = 0.9, 0.80  # of the colours of the tips, and of the highlight
+GLOW_DEG, GLOW_WIDTH_DEG, GLOW_TOWARDS = 42.0, 14.0, np.array([-0.5, 0.3, 0.8])  # one broad highlight
+# Matt: a gloss of .20 made it lilac plastic in the cool rim lights.
+MATERIAL = {"specular": 0.05, "shininess": 10.0, "wrap": 0.5}
+
+
+def hair_piece(skin: Skin, style: Hairstyle, palette: Palette) -> Piece:
+    """The hair of a character."""
+    scalp = Scalp(skin, style)
+    tubes = [scalp.shell(), *(lock_tube(lock, scalp) for lock in style.locks)]
+    points, faces, colours, count = [], [], [], 0
+    for number, tube in enumerate(tubes):
+        colour = _colours(tube, palette)
+        if style.fade and number == 0:
+            own = np.array(palette.skin) * 0.62
+            colour = own + (colour - own) * scalp.fade()[:, None]
+        points.append(tube.points)
+        faces.append(tube.triangles + count)
+        colours.append(colour)
+        count += len(tube.points)
+    span = MaterialSpan("hair", np.concatenate(faces), MATERIAL)
+    return Piece(np.concatenate(points), (span,), np.concatenate(colours))
+
+
+def hair_cover(skin: Skin, style: Hairstyle) -> Floats:
+    """(N,) share of the skin that hair covers, painted in its colour."""
+    return smoothstep(height_over_hairline(skin.vertices, style), -1.0, 2.0)
+
+
+def on_volume(azimuth: float, elevation: float, lift: float) -> Floats:
+    """Point (3,) over the volume of the hair at an azimuth and elevation in degrees."""
+    turn = np.radians(azimuth)
+    half = np.array([ACROSS, UP, AHEAD if np.cos(turn) > 0 else BEHIND])
+    if elevation >= 0:
+        up = np.radians(elevation)
+        place = half * [np.cos(up) * np.sin(turn), np.sin(up), np.cos(up) * np.cos(turn)]
+        normal = place / half**2
+    else:
+        down = -elevation / LOWEST_DEG
+        bulge = 1 + 0.05 * np.sin(down * np.pi) - 0.10 * down**2
+        place = np.array([half[0] * bulge * np.sin(turn), -DOWN * down, half[2] * bulge * np.cos(turn)])
+        normal = place / half**2 * [1, 0, 1]
+    return np.asarray(MIDDLE + place + lift * normal / np.linalg.norm(normal))
+
+
+def height_over_hairline(points: Floats, style: Hairstyle) -> Floats:
+    """(N,) height over the edge of the hair in about degrees, below 0 where none grows: also around the ears."""
+    off = (points - MIDDLE) / [ACROSS, UP, DEPTH]
+    azimuth = np.degrees(np.arctan2(points[:, 0], points[:, 2] - MIDDLE[2]))
+    elevation = np.degrees(np.arctan2(off[:, 1], np.hypot(off[:, 0], off[:, 2])))
+    mirrored = np.column_stack([np.abs(points[:, 0]), points[:, 1:]])
+    off_ear = np.linalg.norm((mirrored - [78, -8, -66]) / [24, 30, 16], axis=1)
+    height: Floats = np.minimum(elevation - np.interp(azimuth, *np.array(style.hairline).T), (off_ear - 1.02) * 30)
+    return np.where(points[:, 1] < -75, -6.0, height)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tube:
+    """Points (N, 3), triangles (F, 3), shade (N,) and place from root to tip (N,) of a lock or the shell."""
+
+    points: Floats
+    triangles: Ints
+    shade: Floats
+    along: Floats
+
+
+class Scalp:
+    """The skin that hair grows on and stays outside of."""
+
+    def __init__(self, skin: Skin, style: Hairstyle) -> None:
+        self._skin, self._style = skin, style
+        self._height = height_over_hairline(skin.vertices, style)
+        self._normals = vertex_normals(skin.vertices, skin.quads, skin.base)
+        x, y, z = skin.vertices.T
+        in_mouth = (y < -45) & (np.abs(x) < 25) & (z > -5) & (z < 20)
+        self._rows = np.flatnonzero((y > -120) & ~in_mouth)
+        self._places = cKDTree(skin.vertices[self._rows])
+        triangles = triangulate(skin.quads)
+        self._used, packed = np.unique(triangles[self._height[triangles].max(axis=1) > -1], return_inverse=True)
+        self._triangles = packed.reshape(-1, 3).astype(np.int64)
+
+    def keep_outside(self, points: Floats, clearance: float) -> Floats:
+        """Points (N, 3) at least `clearance` mm above the skin near them."""
+        distance, near = (np.asarray(found) for found in self._places.query(points, 6))
+        places, normals = self._skin.vertices[self._rows[near]], self._normals[self._rows[near]]
+        heights = np.einsum("pkd,pkd->pk", points[:, None] - places, normals)
+        lowest, row = heights.argmin(axis=1), np.arange(len(points))
+        lack = np.maximum(clearance - heights[row, lowest], 0) * (distance[:, 0] < 45)
+        moved: Floats = points + lack[:, None] * normals[row, lowest]
+        return moved
+
+    def shell(self) -> Tube:
+        """The cap under the locks; it sinks through the skin along a level line, so that its edge is smooth."""
+        height, lift = self._height[self._used], self._style.shell_lift
+        up = np.where(height > 0, lift * (1 - np.exp(-np.maximum(height, 0) / 5.0)), 0.8 * np.maximum(height, -3.0))
+        points = self._skin.vertices[self._used] + up[:, None] * self._normals[self._used]
+        return Tube(points, self._triangles, np.full(len(points), SHELL_SHADE), np.zeros(len(points)))
+
+    def fade(self) -> Floats:
+        """(N,) share of its own colour that cropped hair has at the points of the shell."""
+        return smoothstep(self._height[self._used], -1.0, self._style.fade)
+
+
+def lock_tube(lock: Lock, scalp: Scalp) -> Tube:
+    """The surface of a lock: rings with a lens-shaped top and a hollow underside, and a cap at either end."""
+    known = np.array([on_volume(*place) for place in lock.path])
+    length = arc_length(known)
+    at = 1 - (1 - np.linspace(0, 1, N_ALONG)) ** TIP_DENSITY
+    middle = smooth_rows(scalp.keep_outside(CubicSpline(length / length[-1], known)(at), lock.clearance), 1.2)
+    along = unit_vectors(np.gradient(middle, axis=0))
+    axis = np.column_stack([np.zeros(N_ALONG), np.clip(middle[:, 1], -200, MIDDLE[1]), np.full(N_ALONG, MIDDLE[2])])
+    out = unit_vectors((middle - axis) / np.array([ACROSS, UP, DEPTH]) ** 2)
+    out = unit_vectors(out - (out * along).sum(axis=1)[:, None] * along)
+    side = np.cross(along, out)
+    half, thick = _sizes(lock, at)
+    place = np.sin(np.linspace(-1, 1, N_TOP) * np.pi / 2)
+    lens = 1 - np.abs(place) ** 2.2
+    ridge = 1 + 0.10 * np.cos(np.pi * (lock.ridges + 0.5) * place) * lens
+    under = np.linspace(1, -1, N_UNDER + 2)[1:-1]
+    across = half[:, None] * np.concatenate([place, under])
+    up = thick[:, None] * np.concatenate([lens * ridge, -lock.hollow * (1 - under**2)])
+    rings = middle[:, None] + across[..., None] * side[:, None] + up[..., None] * out[:, None]
+    shade = np.concatenate([RIM_SHADE + (1 - RIM_SHADE) * lens**0.6, np.full(N_UNDER, UNDER_SHADE)])
+    shades = (profile(SHADE_ALONG, at)[:, None] * shade).ravel()
+    points, triangles = _capped(rings)
+    return Tube(
+        points,
+        wind_outward(points, triangles),
+        np.concatenate([shades, [END_SHADE, END_SHADE]]),
+        np.concatenate([np.repeat(at, rings.shape[1]), [0.0, 1.0]]),
+    )
+
+
+def _sizes(lock: Lock, at: Floats) -> tuple[Floats, Floats]:
+    """Half width and thickness (n,) of a lock along it, mm; both run out at the tip."""
+    end = np.clip((at - 0.5) / 0.5, 0, 1)
+    blunt = lock.bluntness
+    widths = profile(((0, lock.root), (0.2, 0.9), (0.5, 1), (1, 1 + 0.35 * (lock.tip - 1))), at)
+    half = lock.half_width * widths * (1 - end ** (2.0 + blunt)) ** (0.80 - 0.3 * blunt)
+    thick = lock.thickness * profile(((0, 0.45), (0.2, 0.9), (0.55, 1), (1, 0.9)), at) * (1 - end**2.4) ** 0.6
+    return np.maximum(half, 0.15), np.maximum(thick, 0.1)
+
+
+def _capped(rings: Floats) -> tuple[Floats, Ints]:
+    """Points and triangles of a tube of rings (n, k, 3) with a fan at either end."""
+    n, k = rings.shape[:2]
+    column = np.arange(k)
+    fans = []
+    for number, first in enumerate((0, (n - 1) * k)):
+        fan = np.stack([np.full(k, n * k + number), first + (column + 1) % k, first + column], axis=1)
+        fans.append(fan if number == 0 else fan[:, ::-1])
+    points = np.concatenate([rings.reshape(-1, 3), rings[[0, -1]].mean(axis=1)])
+    return points, np.concatenate([grid_triangles(n, k, is_closed=True), *fans])
+
+
+def _colours(tube: Tube, palette: Palette) -> Floats:
+    """(N, 3) colours of a lock: lighter tips, darker rims, and a broad highlight around the crown."""
+    own, tip, light = np.array(palette.hair), np.array(palette.hair_tip), np.array(palette.hair_light)
+    off = tube.points - MIDDLE
+    elevation = np.degrees(np.arcsin(np.clip(unit_vectors(off / [ACROSS, UP, DEPTH])[:, 1], -1, 1)))
+    towards = 0.72 + 0.28 * np.clip(unit_vectors(off) @ GLOW_TOWARDS, -1, 1)
+    glow = np.exp(-(((elevation - GLOW_DEG) / GLOW_WIDTH_DEG) ** 2)) * towards * np.clip((tube.shade - 0.7) / 0.3, 0, 1)
+    colour = (own + TIP_SHARE * (tip - own) * tube.along[:, None] ** 1.6) * tube.shade[:, None]
+    mixed: Floats = colour + GLOW_SHARE * glow[:, None] * (light - colour)
+    return mixed

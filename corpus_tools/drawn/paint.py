@@ -1,0 +1,175 @@
+"""Textures of a drawn character: skin in soft gradients, computed per texel, and an iris of clean rings."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates
+from scipy.spatial import cKDTree
+
+from corpus_tools.dense.texels import Texels, find_texels
+from corpus_tools.drawn.character import Colour, Palette
+from corpus_tools.head.eyes import EDGE_RAD, TEXTURE_SIDE, EyeStyle
+from corpus_tools.head.layout import layout_coordinates
+from corpus_tools.head.lids import LidEdge
+from corpus_tools.head.noise import gaussian_bump
+from corpus_tools.head.skin import Skin
+from corpus_tools.head.source import SourceMesh
+from corpus_tools.head.subdivide import triangulate
+from tts2face.numeric import smoothstep
+
+Floats = NDArray[np.float64]
+
+SIDE = 1024  # pixels of the square texture
+NEAR_MM = 14.0  # from a line, as far as a tint along it may reach
+FRONT_Z, FRONT_TINT_Z = (-40.0, -5.0), -20.0  # tints whose centre lies before the second fade out over the first
+LID_LINE_MM, SHUT_LINE_MM, LID_LINE = 1.5, 1.8, 0.85  # reach of the dark edge, open and shut, and its strength
+CREASE_OFF_MM, CREASE_MM, CREASE = 5.0, 2.6, 0.28
+WATERLINE_MM, WATERLINE = 1.0, 0.45
+MOUTH_ISLAND = (0.75, 0.93, 0.14)  # MakeHuman's island of the mouth: low u, high u, high v
+FRECKLE_SEED, FRECKLE = 3, (0.80, 0.68, 0.60)
+HAIR_SHADE = 0.9  # of the colour of hair, on the skin under it
+SPOKES = ((23, 0.5, 0.3), (37, 0.35, 1.9), (52, 0.25, 4.0))  # of the iris: number, strength, phase
+
+
+def paint_skin(
+    source: SourceMesh, skin: Skin, lids: Sequence[LidEdge], palette: Palette, mouth_y: float, hair: Floats
+) -> NDArray[np.uint8]:
+    """(SIDE, SIDE, 3) texture of the skin.
+
+    `mouth_y` is the height of the middle of the line between the lips, `hair` (N,) the share of the skin under hair.
+    """
+    texels = find_texels(layout_coordinates(skin.source_uv), triangulate(skin.quads), SIDE)
+    place, where = texels.interpolate(skin.vertices), texels.interpolate(skin.source_uv)
+    colour = _Paint(np.tile(np.array(palette.skin), (len(place), 1)))
+    front = smoothstep(place[:, 2], *FRONT_Z)
+    for centre, reach, factor in palette.tints:
+        colour.tint(gaussian_bump(place, centre, reach) * (front if centre[2] > FRONT_TINT_Z else 1), factor)
+    colour.tint(_mask(source, "ears", 6, where), palette.ears)
+    colour.tint(_mask(source, "eyelids", 5, where), palette.lids)
+    share = smoothstep(_mask(source, "lips", 3.2, where), 0.12, 0.88) * palette.lip_strength
+    colour.blend(share, _lips(place, palette, mouth_y))
+    colour.blend(*_mouth(source, place, where, palette))
+    _paint_lids(colour, texels, skin, lids, palette)
+    _sprinkle(colour, place, palette.n_freckles)
+    colour.blend(texels.interpolate(hair[:, None])[:, 0], HAIR_SHADE * np.array(palette.hair))
+    picture, known = np.zeros((SIDE, SIDE, 3)), np.zeros((SIDE, SIDE), bool)
+    picture[texels.rows, texels.columns], known[texels.rows, texels.columns] = colour.values, True
+    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
+    return _as_bytes(picture[tuple(nearest)])
+
+
+class _Paint:
+    """Colours (P, 3) of texels that are tinted and painted over."""
+
+    def __init__(self, values: Floats) -> None:
+        self.values = values
+
+    def tint(self, share: Floats, factor: Colour) -> None:
+        """Multiply by a colour's factors, where the share (P,) is 1."""
+        self.values = self.values * (1 + share[:, None] * (np.array(factor) - 1))
+
+    def blend(self, share: Floats, colours: Floats) -> None:
+        """Paint over by colours (3,) or (P, 3), where the share (P,) is 1."""
+        self.values = self.values + share[:, None] * (colours - self.values)
+
+
+def _mask(source: SourceMesh, name: str, blur: float, where: Floats) -> Floats:
+    """(P,) values of a blurred mask of the source at coordinates (P, 2), v up."""
+    mask = gaussian_filter(source.mask(name), blur)
+    height, width = mask.shape
+    at = [(1 - where[:, 1]) * (height - 1), where[:, 0] * (width - 1)]
+    values: Floats = map_coordinates(mask, at, order=1, mode="nearest")
+    return values
+
+
+def _lips(place: Floats, palette: Palette, mouth_y: float) -> Floats:
+    """(P, 3) colour of the lips: the upper one darker, both deeper towards the line between them."""
+    upper = smoothstep(place[:, 1], mouth_y - 0.6, mouth_y + 2.2)
+    line = np.exp(-(((place[:, 1] - mouth_y) / 1.3) ** 2)) * (np.abs(place[:, 0]) < 40)
+    darker = 1 - 0.10 * upper[:, None] * np.array([0.8, 1, 1])
+    return np.asarray(np.array(palette.lips) * darker * (1 - 0.16 * line[:, None]))
+
+
+def _mouth(source: SourceMesh, place: Floats, where: Floats, palette: Palette) -> tuple[Floats, Floats]:
+    """Share (P,) and colour (P, 3) of the inside of the mouth: dark towards the throat, lips towards the front."""
+    low_u, high_u, high_v = MOUTH_ISLAND
+    in_island = (where[:, 0] > low_u) & (where[:, 0] < high_u) & (where[:, 1] < high_v)
+    share = np.maximum(_mask(source, "inside-mouth", 2.0, where), in_island)
+    colour = np.array(palette.cavity) * (1 - 0.55 * smoothstep(-place[:, 2], -15.0, 25.0))[:, None]
+    near = smoothstep(place[:, 2], 20.0, 28.0)[:, None]
+    return smoothstep(share, 0.15, 0.95), colour + near * (0.93 * np.array(palette.lips) - colour)
+
+
+def _paint_lids(colour: _Paint, texels: Texels, skin: Skin, lids: Sequence[LidEdge], palette: Palette) -> None:
+    """The dark edge of the upper lid, the shadow of its crease, and the waterline of the lower one."""
+    place = texels.interpolate(skin.vertices)
+    shut = skin.vertices + skin.shapes["eyeBlinkLeft"] + skin.shapes["eyeBlinkRight"]
+    shut_place = texels.interpolate(shut)
+    for edge in lids:
+        upper = skin.vertices[edge.upper]
+        distance = _distance(place, upper)
+        shut_distance = _distance(shut_place, shut[edge.upper])  # not the skin that is folded behind the edge
+        line = np.minimum(_near(distance, LID_LINE_MM), _near(shut_distance, SHUT_LINE_MM))
+        colour.tint(LID_LINE * line, palette.lid_line)
+        order = np.argsort(upper[:, 0])
+        is_above = place[:, 1] > np.interp(place[:, 0], upper[order, 0], upper[order, 1])
+        colour.tint(CREASE * _near(distance - CREASE_OFF_MM, CREASE_MM) * is_above, palette.crease)
+        colour.tint(WATERLINE * _near(_distance(place, skin.vertices[edge.lower]), WATERLINE_MM), palette.waterline)
+
+
+def _distance(place: Floats, line: Floats) -> Floats:
+    """(P,) distance in mm of points from a line (K, 3); infinite beyond `NEAR_MM`."""
+    fine = np.linspace(0, len(line) - 1, 12 * len(line))
+    dense = np.stack([np.interp(fine, np.arange(len(line)), line[:, axis]) for axis in range(3)], axis=1)
+    return np.asarray(cKDTree(dense).query(place, distance_upper_bound=NEAR_MM)[0])
+
+
+def _near(distance: Floats, reach: float) -> Floats:
+    return np.asarray(np.exp(-((distance / reach) ** 2)))
+
+
+def _sprinkle(colour: _Paint, place: Floats, number: int) -> None:
+    """Freckles across the nose and cheeks."""
+    generator = np.random.default_rng(FRECKLE_SEED)
+    for _ in range(number):
+        x = generator.normal(0, 17)
+        y = -24 - 0.012 * x * x + generator.normal(0, 5)
+        size = generator.uniform(0.45, 0.8)
+        squared = ((place[:, :2] - [x, y]) ** 2).sum(axis=1)
+        is_near = (squared < 9) & (place[:, 2] > 0)
+        strength = generator.uniform(0.25, 0.6)
+        colour.tint(np.where(is_near, strength * np.exp(-squared / size**2), 0.0), FRECKLE)
+
+
+def _as_bytes(colours: Floats) -> NDArray[np.uint8]:
+    return np.asarray(np.rint(255 * np.clip(colours, 0, 1)), np.uint8)
+
+
+def paint_eye(style: EyeStyle, palette: Palette) -> NDArray[np.uint8]:
+    """(TEXTURE_SIDE, TEXTURE_SIDE, 3) texture of an eyeball: a dark ring, a light crescent opposite the key light."""
+    grid = (np.arange(TEXTURE_SIDE) + 0.5) / TEXTURE_SIDE - 0.5
+    across, up = np.meshgrid(grid, -grid)
+    off, turn = 2 * EDGE_RAD * np.hypot(across, up), np.arctan2(up, across)
+    radius, pupil = off / style.iris, style.pupil / style.iris
+    pixel = 2 * EDGE_RAD / TEXTURE_SIDE / style.iris
+    dark, middle = np.array(palette.iris_dark), np.array(palette.iris)
+    iris = dark + (middle - dark) * np.clip(1.5 * smoothstep(radius, pupil, 0.93)[..., None], 0, 1)
+    # light gathers in the lower half: the transparent look of a drawn eye
+    low = (
+        np.clip(0.30 - 0.75 * np.sin(turn), 0, 1)
+        * smoothstep(radius, 0.30, 0.62)
+        * (1 - smoothstep(radius, 0.74, 0.95))
+    )
+    iris = iris + 0.95 * low[..., None] * (np.array(palette.iris_light) - iris)
+    spokes = sum(strength * np.cos(number * turn + phase) for number, strength, phase in SPOKES)
+    ring = smoothstep(radius, 0.35, 0.6) * (1 - smoothstep(radius, 0.8, 0.95))
+    iris = iris * (1 + 0.05 * (spokes * ring)[..., None])
+    iris = iris + smoothstep(radius, 0.80, 0.95)[..., None] * (np.array(palette.iris_rim) - iris)
+    is_pupil = 1 - smoothstep(radius, pupil - 1.5 * pixel, pupil + 2.5 * pixel + 0.03)[..., None]
+    iris = iris + is_pupil * (np.array(palette.pupil) - iris)
+    far = smoothstep(off, style.iris + 0.10, 1.0)[..., None]
+    white = np.array(palette.sclera) * (1 - far * np.array([0.05, 0.11, 0.11]))
+    white = white * (1 - 0.12 * np.exp(-(((off - style.iris) / 0.05) ** 2))[..., None])
+    border = smoothstep(off, style.iris - 0.012, style.iris + 0.020)[..., None]
+    return _as_bytes(iris + border * (white - iris))

@@ -1,0 +1,139 @@
+"""Drawn characters: their tables, the map of space, and the surfaces of locks and rolls."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from corpus_tools.drawn.build_drawn import CAST
+from corpus_tools.drawn.character import Character, Palette
+from corpus_tools.drawn.clothes import _roll
+from corpus_tools.drawn.fields import Front, grid_triangles, smooth_line, wind_outward
+from corpus_tools.drawn.hair import LOWEST_DEG, MIDDLE, Scalp, height_over_hairline, lock_tube, on_volume
+from corpus_tools.drawn.paint import paint_eye
+from corpus_tools.drawn.sculpt import apply_proportions
+from corpus_tools.head.skin import Skin
+from tts2face.models.face_loading import load_face
+
+EYES = [np.array([31.0, 0.0, 0.0]), np.array([-31.0, 0.0, 0.0])]
+EVERYBODY = pytest.mark.parametrize("character", CAST.values(), ids=list(CAST))
+
+
+def ball(radius: float = 70.0) -> Skin:
+    """A ball about the middle of the hair, in place of a skull."""
+    n_down, n_around = 24, 48
+    down, around = np.meshgrid(np.linspace(0.05, np.pi - 0.05, n_down), np.arange(n_around) / n_around * 2 * np.pi)
+    towards = np.stack([np.sin(down) * np.cos(around), np.cos(down), np.sin(down) * np.sin(around)], axis=-1)
+    points = MIDDLE + radius * towards.reshape(-1, 3)
+    row, column = (grid.ravel() for grid in np.meshgrid(np.arange(n_around), np.arange(n_down - 1), indexing="ij"))
+    here, beside = row * n_down + column, (row + 1) % n_around * n_down + column
+    quads = np.stack([here, beside, beside + 1, here + 1], axis=1)
+    return Skin(points, {}, quads, np.zeros((len(points), 2)), points)
+
+
+@EVERYBODY
+def test_tables_are_within_their_ranges(character: Character) -> None:
+    for one in fields(Palette):
+        value = getattr(character.palette, one.name)
+        if isinstance(value, tuple) and one.name not in ("tints", "ears", "lids"):
+            assert all(0 <= part <= 1 for part in value), one.name
+    for profile in (character.brow.half_width, character.brow.thickness, character.lashes):
+        shares = [share for share, _ in profile]
+        assert (shares[0], shares[-1], shares) == (0, 1, sorted(set(shares)))
+        assert min(value for _, value in profile) >= 0
+    turns = [turn for turn, _ in character.hair.hairline]
+    assert (turns[0], turns[-1], turns) == (-180, 180, sorted(set(turns)))
+    assert all(-LOWEST_DEG <= height <= 90 for lock in character.hair.locks for _, height, _ in lock.path)
+    names = set(load_face("head").shape_names)
+    assert {f"{name}{side}" for name in character.rest for side in ("Left", "Right")} <= names
+
+
+@EVERYBODY
+def test_the_map_of_space_turns_nothing_inside_out(character: Character) -> None:
+    """Its Jacobian determinant stays above 0 where faces are, so that surfaces neither fold nor meet."""
+    axes = np.linspace(-85, 85, 35), np.linspace(-140, 120, 53), np.linspace(-120, 60, 37)
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    step = 0.01
+    columns = [
+        apply_proportions(points + step * axis, EYES, character.proportions)
+        - apply_proportions(points - step * axis, EYES, character.proportions)
+        for axis in np.eye(3)
+    ]
+    jacobian = np.stack(columns, axis=-1) / (2 * step)
+    on_midline = np.abs(points[:, 0]) < 2 * step  # cheeks part there by some hundredths of a millimetre
+    assert np.linalg.det(jacobian)[~on_midline].min() > 0.05
+
+
+@EVERYBODY
+def test_locks_are_closed_and_face_outwards(character: Character) -> None:
+    scalp = Scalp(ball(), character.hair)
+    for lock in character.hair.locks:
+        tube = lock_tube(lock, scalp)
+        sides = np.sort(np.stack([tube.triangles, np.roll(tube.triangles, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+        assert (np.unique(sides, axis=0, return_counts=True)[1] == 2).all()
+        a, b, c = tube.points[tube.triangles].transpose(1, 0, 2)
+        assert np.einsum("fc,fc->f", a, np.cross(b, c)).sum() > 0  # six times the volume
+        assert np.isfinite(tube.points).all()
+        assert np.ptp(tube.along) == 1
+
+
+def test_the_volume_of_hair_is_continuous_and_lift_is_its_distance() -> None:
+    for turn in range(-180, 180, 15):
+        above, below = (on_volume(turn, height, 0.0) for height in (1e-6, -1e-6))
+        assert np.linalg.norm(above - below) < 1e-3
+        for height in (-50.0, -10.0, 20.0, 70.0):
+            assert np.linalg.norm(on_volume(turn, height, 7.0) - on_volume(turn, height, 0.0)) == pytest.approx(7.0)
+
+
+@EVERYBODY
+def test_hair_grows_over_the_crown_and_not_in_the_face_or_on_the_ears(character: Character) -> None:
+    crown, chin, forehead, ear = np.array([[0.0, 120, -58], [0, -80, 20], [0, 40, 40], [78, -8, -66]])
+    heights = height_over_hairline(np.stack([crown, chin, forehead, ear]), character.hair)
+    assert heights[0] > 20
+    assert (heights[1:] < 0).all()
+
+
+def test_hair_stays_outside_of_the_skin() -> None:
+    scalp = Scalp(ball(), CAST["ada"].hair)
+    inside = MIDDLE + 20 * np.random.default_rng(3).normal(size=(50, 3)) + [0, 60, 0]
+    away = np.linalg.norm(scalp.keep_outside(inside, 3.0) - MIDDLE, axis=1)
+    assert (away > np.minimum(70.0, np.linalg.norm(inside - MIDDLE, axis=1)) - 1e-9).all()
+    near = MIDDLE + 68.0 * (inside - MIDDLE) / np.linalg.norm(inside - MIDDLE, axis=1, keepdims=True)
+    assert np.abs(np.linalg.norm(scalp.keep_outside(near, 3.0) - MIDDLE, axis=1) - 73.0).max() < 1.0
+
+
+@EVERYBODY
+def test_a_roll_goes_around_the_neck(character: Character) -> None:
+    points, triangles = _roll(character.collar)
+    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    assert (np.unique(sides, axis=0, return_counts=True)[1] == 2).all()
+    front, back = points[points[:, 2].argmax()], points[points[:, 2].argmin()]
+    assert front[1] < back[1]  # higher behind
+
+
+@EVERYBODY
+def test_an_iris_has_a_dark_ring_and_a_black_pupil(character: Character) -> None:
+    pixels = paint_eye(character.eyes, character.palette).astype(int)
+    row = pixels[len(pixels) // 2].sum(axis=1)
+    half = len(row) // 2
+    light = [row[half], row[half + int(0.7 * character.eyes.iris / 2.2 * len(row))], row[-20]]
+    assert light[0] < light[1] < light[2]
+    limbus = row[half + int(0.96 * character.eyes.iris / 2.2 * len(row))]
+    assert limbus < light[1]
+
+
+def test_surfaces_in_rows() -> None:
+    open_grid, closed = grid_triangles(3, 4), grid_triangles(3, 4, is_closed=True)
+    assert (len(open_grid), len(closed), closed.max()) == (12, 16, 11)
+    line = smooth_line([(0, 0), (1, 1), (3, 1)], 9)
+    assert np.allclose(line[[0, -1]], [[0, 0], [3, 1]])
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    inward = np.array([[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]])
+    assert np.array_equal(wind_outward(corners, inward, corners.mean(axis=0)), inward[:, ::-1])
+
+
+def test_lines_come_in_front_of_a_surface() -> None:
+    wall = Front(np.array([[x, y, 0.0] for x in range(10) for y in range(10)]))
+    line = np.array([[x, 5.0, -1.0] for x in range(10)])
+    assert np.allclose(wall.lacking(line, 0.5), 1.5)
+    assert np.allclose(wall.lacking(line + np.array([0, 0, 9]), 0.5), 0.0)
