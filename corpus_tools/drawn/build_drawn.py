@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from corpus_tools.drawn.brows import brow_piece
 from corpus_tools.drawn.character import Character
@@ -17,7 +18,7 @@ from corpus_tools.drawn.hair import hair_cover, hair_piece
 from corpus_tools.drawn.lashes import lash_piece
 from corpus_tools.drawn.lids import find_lining, shut_lids, still_lining, tuck_lining
 from corpus_tools.drawn.man import MAN
-from corpus_tools.drawn.paint import paint_eye, paint_skin
+from corpus_tools.drawn.paint import paint_eye, paint_skin, vertex_masks
 from corpus_tools.drawn.sculpt import drawn_cage
 from corpus_tools.drawn.teeth import teeth_pieces
 from corpus_tools.drawn.woman import WOMAN
@@ -65,6 +66,14 @@ def drawn_face(source: SourceMesh, character: Character) -> Face:
     about = {"name": character.name, "summary": character.summary, **METADATA}
     about["made_by"] = "python -m corpus_tools.drawn.build_drawn"
     return add_landmarks(assemble_face(built, shape_names(cage), textures, about), skin.base)
+
+
+def face_masks(source: SourceMesh, character: Character, face: Face) -> dict[str, NDArray[np.float64]]:
+    """Shares (V,) of a character's vertices that are lips and the inside of the mouth, for its film light."""
+    skin = build_skin(drawn_cage(source, character.targets, character.proportions))
+    rest = replace(skin, vertices=face.vertices[: len(skin.vertices)].astype(np.float64))
+    n_others = len(face.vertices) - len(skin.vertices)
+    return {name: np.append(share, np.zeros(n_others)) for name, share in vertex_masks(source, rest).items()}
 
 
 def _reference(source: SourceMesh) -> ReferenceHead:

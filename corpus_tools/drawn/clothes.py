@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from corpus_tools.drawn.atlas import COLLAR, SHIRT, cut_seam, in_tile
 from corpus_tools.drawn.character import Collar, Colour
 from corpus_tools.drawn.fields import grid_triangles, wind_outward
 from corpus_tools.head.piece import MaterialSpan, Piece
@@ -21,15 +22,22 @@ STUD_GRID = (9, 16)
 
 
 def sweater_piece(shirt: Piece, collar: Collar, colour: Colour) -> Piece:
-    """A shirt of one colour with a rolled collar."""
-    points, triangles = _roll(collar)
-    faces = np.concatenate([shirt.spans[0].triangles, triangles + len(shirt.vertices)])
-    colours = np.concatenate([np.ones(len(shirt.vertices)), np.full(len(points), ROLL_SHADE)])[:, None] * colour
-    return Piece(np.concatenate([shirt.vertices, points]), (MaterialSpan("shirt", faces, MATERIAL),), colours)
+    """A shirt of one colour with a rolled collar; both are cut open at the back, for the texture."""
+    off = shirt.vertices - [0.0, 0.0, collar.middle]
+    turn = np.arctan2(off[:, 0], off[:, 2]) / (2 * np.pi) + 0.5
+    rows, body, turn = cut_seam(shirt.spans[0].triangles, turn)
+    radius, height = np.hypot(off[rows, 0], off[rows, 2]), shirt.vertices[rows, 1]
+    down = np.hypot(radius - radius.min(), height.max() - height)  # from the collar outwards: around the neck as well
+    points, triangles, places = _roll(collar)
+    faces = np.concatenate([body, triangles + len(rows)])
+    colours = np.concatenate([np.ones(len(rows)), np.full(len(points), ROLL_SHADE)])[:, None] * colour
+    uv = np.concatenate([in_tile(SHIRT, turn / turn.max(), down / down.max()), in_tile(COLLAR, *places.T)])
+    vertices = np.concatenate([shirt.vertices[rows], points])
+    return Piece(vertices, (MaterialSpan("shirt", faces, MATERIAL),), colours, uv=uv)
 
 
-def _roll(collar: Collar) -> tuple[Floats, NDArray[np.int64]]:
-    """Points and triangles of a closed tube around the neck."""
+def _roll(collar: Collar) -> tuple[Floats, NDArray[np.int64], Floats]:
+    """Points, triangles, and places (N, 2) around the neck and around the roll, of a closed tube around the neck."""
     turn = np.linspace(0, 2 * np.pi, N_KNOTS, endpoint=False)
     forward = np.cos(turn)
     knots = np.column_stack([
@@ -49,9 +57,11 @@ def _roll(collar: Collar) -> tuple[Floats, NDArray[np.int64]]:
     section = np.linspace(0, 2 * np.pi, N_SECTION, endpoint=False)
     across = collar.half_width * np.cos(section)[None, :, None] * out[:, None]
     rings = path[:, None] + across + collar.half_height * np.sin(section)[None, :, None] * up[:, None]
-    points = rings.reshape(-1, 3)
-    triangles = grid_triangles(N_AROUND + 1, N_SECTION, is_closed=True) % len(points)
-    return points, wind_outward(points, triangles, path.mean(axis=0))
+    rings = rings[np.append(np.arange(N_AROUND), 0)][:, np.append(np.arange(N_SECTION), 0)]  # cut open both ways
+    points, triangles = rings.reshape(-1, 3), grid_triangles(N_AROUND + 1, N_SECTION + 1)
+    grid = np.meshgrid(np.linspace(0, 1, N_AROUND + 1), np.linspace(0, 1, N_SECTION + 1), indexing="ij")
+    places = np.stack(grid, axis=-1).reshape(-1, 2)
+    return points, wind_outward(points, triangles, path.mean(axis=0)), places
 
 
 def stud_pieces(skin: Skin) -> tuple[Piece, Piece]:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial import cKDTree
 
+from corpus_tools.drawn.atlas import hair_tiles, in_tile
 from corpus_tools.drawn.character import Hairstyle, Lock, Palette
 from corpus_tools.drawn.fields import arc_length, grid_triangles, profile, smooth_rows, wind_outward
 from corpus_tools.head.piece import MaterialSpan, Piece
@@ -33,11 +34,11 @@ MATERIAL = {"specular": 0.05, "shininess": 10.0, "wrap": 0.5}
 
 
 def hair_piece(skin: Skin, style: Hairstyle, palette: Palette) -> Piece:
-    """The hair of a character."""
+    """The hair of a character, with a tile of the texture for the shell and for each lock."""
     scalp = Scalp(skin, style)
     tubes = [scalp.shell(), *(lock_tube(lock, scalp) for lock in style.locks)]
-    points, faces, colours, count = [], [], [], 0
-    for number, tube in enumerate(tubes):
+    points, faces, colours, uv, count = [], [], [], [], 0
+    for number, (tube, tile) in enumerate(zip(tubes, hair_tiles(len(tubes)), strict=True)):
         colour = _colours(tube, palette)
         if style.fade and number == 0:
             own = np.array(palette.skin) * 0.62
@@ -45,9 +46,16 @@ def hair_piece(skin: Skin, style: Hairstyle, palette: Palette) -> Piece:
         points.append(tube.points)
         faces.append(tube.triangles + count)
         colours.append(colour)
+        uv.append(in_tile(tile, *tube.places.T))
         count += len(tube.points)
     span = MaterialSpan("hair", np.concatenate(faces), MATERIAL)
-    return Piece(np.concatenate(points), (span,), np.concatenate(colours))
+    return Piece(
+        np.concatenate(points),
+        (span,),
+        np.concatenate(colours),
+        uv=np.concatenate(uv),
+        tangents=np.concatenate([tube.tangents for tube in tubes]),
+    )
 
 
 def hair_cover(skin: Skin, style: Hairstyle) -> Floats:
@@ -84,12 +92,26 @@ def height_over_hairline(points: Floats, style: Hairstyle) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tube:
-    """Points (N, 3), triangles (F, 3), shade (N,) and place from root to tip (N,) of a lock or the shell."""
+    """A lock or the shell.
+
+    Parameters
+    ----------
+    points, triangles : (N, 3), (F, 3)
+    shade : (N,)
+    along : (N,)
+        From the root, 0, to the tip.
+    places : (N, 2)
+        Across and down within its tile of the texture.
+    tangents : (N, 3)
+        Unit vectors along the hair.
+    """
 
     points: Floats
     triangles: Ints
     shade: Floats
     along: Floats
+    places: Floats
+    tangents: Floats
 
 
 class Scalp:
@@ -122,7 +144,12 @@ class Scalp:
         height, lift = self._height[self._used], self._style.shell_lift
         up = np.where(height > 0, lift * (1 - np.exp(-np.maximum(height, 0) / 5.0)), 0.8 * np.maximum(height, -3.0))
         points = self._skin.vertices[self._used] + up[:, None] * self._normals[self._used]
-        return Tube(points, self._triangles, np.full(len(points), SHELL_SHADE), np.zeros(len(points)))
+        flat = points[:, [0, 2]] - points[:, [0, 2]].min(axis=0)  # from above: the locks hide most of it
+        off = points - MIDDLE
+        down = np.cross(np.cross(off, [0.0, -1.0, 0.0]), off)
+        n = len(points)
+        shade, tangents = np.full(n, SHELL_SHADE), unit_vectors(down + 1e-9)
+        return Tube(points, self._triangles, shade, np.zeros(n), flat / flat.max(axis=0), tangents)
 
     def fade(self) -> Floats:
         """(N,) share of its own colour that cropped hair has at the points of the shell."""
@@ -149,13 +176,20 @@ def lock_tube(lock: Lock, scalp: Scalp) -> Tube:
     up = thick[:, None] * np.concatenate([lens * ridge, -lock.hollow * (1 - under**2)])
     rings = middle[:, None] + across[..., None] * side[:, None] + up[..., None] * out[:, None]
     shade = np.concatenate([RIM_SHADE + (1 - RIM_SHADE) * lens**0.6, np.full(N_UNDER, UNDER_SHADE)])
-    shades = (profile(SHADE_ALONG, at)[:, None] * shade).ravel()
+    closed = np.append(np.arange(N_TOP + N_UNDER), 0)  # the texture is cut open along the first column
+    rings, shade = rings[:, closed], shade[closed]
     points, triangles = _capped(rings)
+    far = arc_length(rings.mean(axis=1))
+    around = np.linspace(0, 1, len(closed))
+    grid = np.stack(np.meshgrid(around, far / far[-1]), axis=-1).reshape(-1, 2)
+    tangents = unit_vectors(np.gradient(rings, axis=0) + 1e-9)
     return Tube(
         points,
         wind_outward(points, triangles),
-        np.concatenate([shades, [END_SHADE, END_SHADE]]),
-        np.concatenate([np.repeat(at, rings.shape[1]), [0.0, 1.0]]),
+        np.concatenate([(profile(SHADE_ALONG, at)[:, None] * shade).ravel(), [END_SHADE, END_SHADE]]),
+        np.concatenate([np.repeat(at, len(closed)), [0.0, 1.0]]),
+        np.concatenate([grid, [[0.4, 0.0], [0.4, 1.0]]]),
+        np.concatenate([tangents.reshape(-1, 3), along[[0, -1]]]),
     )
 
 
@@ -170,15 +204,15 @@ def _sizes(lock: Lock, at: Floats) -> tuple[Floats, Floats]:
 
 
 def _capped(rings: Floats) -> tuple[Floats, Ints]:
-    """Points and triangles of a tube of rings (n, k, 3) with a fan at either end."""
+    """Points and triangles of a tube of rings (n, k, 3), whose last column is the first, with a fan at either end."""
     n, k = rings.shape[:2]
-    column = np.arange(k)
+    column = np.arange(k - 1)
     fans = []
     for number, first in enumerate((0, (n - 1) * k)):
-        fan = np.stack([np.full(k, n * k + number), first + (column + 1) % k, first + column], axis=1)
+        fan = np.stack([np.full(k - 1, n * k + number), first + column + 1, first + column], axis=1)
         fans.append(fan if number == 0 else fan[:, ::-1])
-    points = np.concatenate([rings.reshape(-1, 3), rings[[0, -1]].mean(axis=1)])
-    return points, np.concatenate([grid_triangles(n, k, is_closed=True), *fans])
+    points = np.concatenate([rings.reshape(-1, 3), rings[[0, -1], 1:].mean(axis=1)])
+    return points, np.concatenate([grid_triangles(n, k), *fans])
 
 
 def _colours(tube: Tube, palette: Palette) -> Floats:

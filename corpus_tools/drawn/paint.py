@@ -27,6 +27,7 @@ LID_LINE_MM, SHUT_LINE_MM, LID_LINE = 1.5, 1.8, 0.85  # reach of the dark edge, 
 CREASE_OFF_MM, CREASE_MM, CREASE = 5.0, 2.6, 0.28
 WATERLINE_MM, WATERLINE = 1.0, 0.45
 MOUTH_ISLAND = (0.75, 0.93, 0.14)  # MakeHuman's island of the mouth: low u, high u, high v
+LIP_Z = (20.0, 28.0)  # depth in mm over which the inside of the mouth becomes the lips
 FRECKLE_SEED, FRECKLE = 3, (0.80, 0.68, 0.60)
 HAIR_SHADE = 0.9  # of the colour of hair, on the skin under it
 SPOKES = ((23, 0.5, 0.3), (37, 0.35, 1.9), (52, 0.25, 4.0))  # of the iris: number, strength, phase
@@ -57,6 +58,13 @@ def paint_skin(
     picture[texels.rows, texels.columns], known[texels.rows, texels.columns] = colour.values, True
     nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
     return _as_bytes(picture[tuple(nearest)])
+
+
+def vertex_masks(source: SourceMesh, skin: Skin) -> dict[str, Floats]:
+    """Shares (N,) of the skin's vertices that are ``lips``, and ``inner``, the inside of the mouth behind them."""
+    lips = smoothstep(_mask(source, "lips", 3.2, skin.source_uv), 0.12, 0.88)
+    inner = _in_mouth(source, skin.source_uv) * (1 - smoothstep(skin.vertices[:, 2], *LIP_Z))
+    return {"lips": lips, "inner": inner}
 
 
 class _Paint:
@@ -93,12 +101,16 @@ def _lips(place: Floats, palette: Palette, mouth_y: float) -> Floats:
 
 def _mouth(source: SourceMesh, place: Floats, where: Floats, palette: Palette) -> tuple[Floats, Floats]:
     """Share (P,) and colour (P, 3) of the inside of the mouth: dark towards the throat, lips towards the front."""
+    colour = np.array(palette.cavity) * (1 - 0.55 * smoothstep(-place[:, 2], -15.0, 25.0))[:, None]
+    near = smoothstep(place[:, 2], *LIP_Z)[:, None]
+    return _in_mouth(source, where), colour + near * (0.93 * np.array(palette.lips) - colour)
+
+
+def _in_mouth(source: SourceMesh, where: Floats) -> Floats:
+    """(P,) share of places (P, 2) in MakeHuman's layout that is the inside of the mouth."""
     low_u, high_u, high_v = MOUTH_ISLAND
     in_island = (where[:, 0] > low_u) & (where[:, 0] < high_u) & (where[:, 1] < high_v)
-    share = np.maximum(_mask(source, "inside-mouth", 2.0, where), in_island)
-    colour = np.array(palette.cavity) * (1 - 0.55 * smoothstep(-place[:, 2], -15.0, 25.0))[:, None]
-    near = smoothstep(place[:, 2], 20.0, 28.0)[:, None]
-    return smoothstep(share, 0.15, 0.95), colour + near * (0.93 * np.array(palette.lips) - colour)
+    return smoothstep(np.maximum(_mask(source, "inside-mouth", 2.0, where), in_island), 0.15, 0.95)
 
 
 def _paint_lids(colour: _Paint, texels: Texels, skin: Skin, lids: Sequence[LidEdge], palette: Palette) -> None:

@@ -5,6 +5,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from corpus_tools.drawn.atlas import COLLAR, MARGIN, SHIRT, cut_seam, hair_tiles, in_tile
 from corpus_tools.drawn.build_drawn import CAST
 from corpus_tools.drawn.character import Character, Palette
 from corpus_tools.drawn.clothes import _roll
@@ -13,6 +14,7 @@ from corpus_tools.drawn.hair import LOWEST_DEG, MIDDLE, Scalp, height_over_hairl
 from corpus_tools.drawn.paint import paint_eye
 from corpus_tools.drawn.sculpt import apply_proportions
 from corpus_tools.head.skin import Skin
+from lexicon.errors import DataError
 from tts2face.models.face_loading import load_face
 
 EYES = [np.array([31.0, 0.0, 0.0]), np.array([-31.0, 0.0, 0.0])]
@@ -29,6 +31,14 @@ def ball(radius: float = 70.0) -> Skin:
     here, beside = row * n_down + column, (row + 1) % n_around * n_down + column
     quads = np.stack([here, beside, beside + 1, here + 1], axis=1)
     return Skin(points, {}, quads, np.zeros((len(points), 2)), points)
+
+
+def closed_sides(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """How many triangles use each side of a surface; vertices at one place are one, sides of no length left out."""
+    _, weld = np.unique(np.rint(points * 1e4).astype(np.int64), axis=0, return_inverse=True)
+    corners = weld.ravel()[triangles]
+    sides = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    return np.unique(sides[sides[:, 0] != sides[:, 1]], axis=0, return_counts=True)[1]
 
 
 @EVERYBODY
@@ -69,11 +79,12 @@ def test_locks_are_closed_and_face_outwards(character: Character) -> None:
     scalp = Scalp(ball(), character.hair)
     for lock in character.hair.locks:
         tube = lock_tube(lock, scalp)
-        sides = np.sort(np.stack([tube.triangles, np.roll(tube.triangles, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-        assert (np.unique(sides, axis=0, return_counts=True)[1] == 2).all()
+        assert (closed_sides(tube.points, tube.triangles) == 2).all()
         a, b, c = tube.points[tube.triangles].transpose(1, 0, 2)
         assert np.einsum("fc,fc->f", a, np.cross(b, c)).sum() > 0  # six times the volume
         assert np.isfinite(tube.points).all()
+        assert (tube.places.min(), tube.places.max()) == (0, 1)
+        assert np.abs(np.linalg.norm(tube.tangents, axis=1) - 1).max() < 1e-6
         assert np.ptp(tube.along) == 1
 
 
@@ -104,9 +115,9 @@ def test_hair_stays_outside_of_the_skin() -> None:
 
 @EVERYBODY
 def test_a_roll_goes_around_the_neck(character: Character) -> None:
-    points, triangles = _roll(character.collar)
-    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    assert (np.unique(sides, axis=0, return_counts=True)[1] == 2).all()
+    points, triangles, places = _roll(character.collar)
+    assert (closed_sides(points, triangles) == 2).all()
+    assert (places.min(), places.max()) == (0, 1)
     front, back = points[points[:, 2].argmax()], points[points[:, 2].argmin()]
     assert front[1] < back[1]  # higher behind
 
@@ -137,3 +148,28 @@ def test_lines_come_in_front_of_a_surface() -> None:
     line = np.array([[x, 5.0, -1.0] for x in range(10)])
     assert np.allclose(wall.lacking(line, 0.5), 1.5)
     assert np.allclose(wall.lacking(line + np.array([0, 0, 9]), 0.5), 0.0)
+
+
+def test_tiles_of_the_texture_do_not_overlap() -> None:
+    tiles = [*hair_tiles(24), SHIRT, COLLAR]
+    area = sum((right - left) * (bottom - top) for left, right, top, bottom in tiles)
+    assert area == pytest.approx(1.0)
+    corners = np.array([[0.0, 0.0], [1.0, 1.0]])
+    spans = [in_tile(tile, *corners.T) for tile in tiles]
+    assert all(span.min() > 0 and span.max() < 1 and (np.diff(span, axis=0) > 0.02).all() for span in spans)
+    for number, one in enumerate(spans):
+        for other in spans[:number]:
+            apart = np.maximum(one[0] - other[1], other[0] - one[1]).max()
+            assert apart > MARGIN
+    with pytest.raises(DataError, match="tiles for 24 locks, not 25"):
+        hair_tiles(25)
+
+
+def test_a_surface_around_an_axis_is_cut_where_its_turn_jumps() -> None:
+    turn = np.array([0.05, 0.3, 0.5, 0.7, 0.95])
+    triangles = np.array([[0, 4, 3], [1, 2, 3], [0, 1, 2]])
+    vertices, cut, turns = cut_seam(triangles, turn)
+    assert vertices.tolist() == [0, 1, 2, 3, 4, 0]
+    assert np.array_equal(vertices[cut], triangles)
+    assert cut.tolist() == [[5, 4, 3], [1, 2, 3], [0, 1, 2]]
+    assert turns[5] == pytest.approx(1.05)

@@ -1,0 +1,165 @@
+"""What a character is made of and lit by: one table of choices, in the path tracer's terms.
+
+Lengths of lamps and the wall are in decimetres, about the middle between the eyes; x is the person's left, y up, z
+towards the viewer. Colours are linear light, or sRGB where a field says so.
+"""
+
+from dataclasses import dataclass, field
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SkinLook:
+    """Skin: its painted texture with light scattered below it.
+
+    ``scatter_mm`` is the mean free path of red light, ``scatter`` that of red, green and blue relative to it.
+    ``lip_colour`` and ``inner_colour`` (sRGB) are mixed in at lips and inside the mouth.
+    """
+
+    gain: Vector = (1.06, 1.02, 1.0)
+    saturation: float = 0.97
+    scatter_mm: float = 2.8
+    scatter: Vector = (1.0, 0.40, 0.24)
+    specular: float = 0.48
+    roughness: float = 0.40
+    sheen: float = 0.12
+    bump: float = 0.09
+    lip_colour: Vector = (0.80, 0.30, 0.31)
+    lip_share: float = 0.35
+    lip_roughness: float = 0.26
+    inner_colour: Vector = (0.58, 0.19, 0.18)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HairLook:
+    """Sculpted hair: colours of the vertices with streaks along the locks, and gloss across them."""
+
+    gain: Vector = (1.8, 1.5, 1.35)
+    roughness: float = 0.50
+    anisotropy: float = 0.90
+    specular: float = 0.26
+    specular_tint: Vector = (1.0, 0.6, 0.36)
+    sheen: float = 0.2
+    sheen_tint: Vector = (1.0, 0.7, 0.5)
+    streaks: float = 0.42
+    variation: float = 0.5
+    bump: float = 0.22
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClothLook:
+    """Wool: ribs around the collar, columns of stitches below it."""
+
+    roughness: float = 0.92
+    sheen: float = 0.6
+    sheen_tint: Vector = (1.0, 0.88, 0.62)
+    bump: float = 0.5
+    ribs: int = 92
+    column_mm: float = 4.2
+    groove: Vector = (0.55, 0.42, 0.30)
+    depth: float = 0.75
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EyeLook:
+    """Eyeballs: their texture times ``gain``, and a cornea of ``height`` and ``bulge``, in radii, over them."""
+
+    gain: float = 1.45
+    roughness: float = 0.35
+    scatter: float = 0.15
+    height: float = 0.004
+    bulge: float = 0.012
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lamp:
+    """A rectangle that shines towards a target; ``parts`` names the only parts that it lights, empty for all."""
+
+    place: Vector
+    target: Vector
+    width: float
+    height: float
+    watts: float
+    colour: Vector
+    parts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Box:
+    """A box before the wall; it glows if ``glow`` is above 0. ``colour`` is sRGB."""
+
+    low: Vector
+    high: Vector
+    colour: Vector
+    glow: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wall:
+    """The wall behind, out of focus; ``colour`` is sRGB."""
+
+    depth: float = -9.0
+    colour: Vector = (0.30, 0.42, 0.47)
+    lamps: tuple[Lamp, ...] = ()
+    boxes: tuple[Box, ...] = ()
+    f_stop: float = 0.35
+
+
+def _amber(place: Vector, target: Vector, watts: float, colour: Vector, size: float) -> Lamp:
+    return Lamp(place=place, target=target, width=size, height=size, watts=watts, colour=colour)
+
+
+LAMPS = {
+    "key": Lamp(
+        place=(-3.4, 3.4, 4.9), target=(0, -0.2, 0), width=2.2, height=2.6, watts=460, colour=(1, 0.84, 0.67)
+    ),
+    "fill": Lamp(place=(4.8, 0, 4.6), target=(0, -0.3, 0), width=4.5, height=4.5, watts=34, colour=(0.74, 0.86, 1)),
+    "left rim": Lamp(
+        place=(-4.2, 2.4, -3), target=(0, 0.1, -0.6), width=1, height=3, watts=170, colour=(0.70, 0.84, 1)
+    ),
+    "right rim": Lamp(
+        place=(4.6, 2, -2), target=(0, 0, -0.5), width=1, height=3, watts=560, colour=(0.78, 0.89, 1)
+    ),
+    "floor": Lamp(place=(0, -4, 3.4), target=(0, -0.5, 0), width=3, height=3, watts=40, colour=(1, 0.74, 0.55)),
+    "top": Lamp(
+        place=(-0.8, 5.2, -0.6), target=(0, 0.8, -0.6), width=2.6, height=1.2, watts=110, colour=(1, 0.88, 0.74)
+    ),
+    "mouth": Lamp(
+        place=(0, -1.6, 6.5), target=(0, -0.6, 0), width=0.6, height=0.6, watts=26, colour=(1, 0.92, 0.85),
+        parts=("teeth", "gums", "tongue"),
+    ),
+}  # fmt: skip
+WALL = Wall(
+    lamps=(
+        _amber((5.0, 3.2, -6.5), (3.0, 1.2, -9.0), 1000, (1, 0.66, 0.36), 1.5),
+        _amber((-6, 4, -4), (-4, 1, -9), 150, (0.55, 0.75, 1.0), 2.0),
+    ),
+    boxes=(
+        Box(low=(1.6, -6, -8.4), high=(4.4, 0.6, -7.6), colour=(0.5, 0.33, 0.24)),
+        Box(low=(-7, -6, -8.6), high=(-3.6, 3.2, -8.2), colour=(0.2, 0.3, 0.36)),
+        Box(low=(2.3, 0.6, -8.1), high=(2.7, 1.6, -7.8), colour=(0.95, 0.75, 0.45), glow=6),
+        Box(low=(-2.6, 2.3, -8.5), high=(-2.3, 2.6, -8.3), colour=(1, 0.7, 0.4), glow=10),
+        Box(low=(4.4, 2.0, -8.5), high=(4.6, 2.2, -8.3), colour=(1, 0.75, 0.5), glow=10),
+        Box(low=(-6.2, 0.4, -8.2), high=(-5.6, 1.2, -8.0), colour=(0.7, 0.9, 1.0), glow=3),
+    ),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Look:
+    """Materials, lamps, wall and exposure of a character.
+
+    Key to fill 13 in power, about 3 stops: at 52 to 85 W of fill the face is flat. The right rim grazes the cheek; a
+    left rim of 230 W turns hair to lilac plastic.
+    """
+
+    skin: SkinLook = field(default_factory=SkinLook)
+    hair: HairLook = field(default_factory=HairLook)
+    cloth: ClothLook = field(default_factory=ClothLook)
+    eye: EyeLook = field(default_factory=EyeLook)
+    lamps: dict[str, Lamp] = field(default_factory=lambda: dict(LAMPS))
+    sky: Vector = (0.55, 0.66, 0.85)
+    sky_strength: float = 0.13
+    exposure: float = 0.63  # stops
+    wall: Wall = field(default_factory=lambda: WALL)
