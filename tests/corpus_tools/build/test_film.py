@@ -2,6 +2,7 @@
 
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,9 @@ from PIL import Image
 
 from corpus_tools.drawn.build_drawn import CAST, drawn_face, face_masks
 from corpus_tools.film.look import LAMPS, Look
+from corpus_tools.film.poses import expression_pose, farthest
 from tests.characters.makehuman import makehuman
+from tts2face.models.face_loading import load_face
 from tts2face.render.camera_views import CameraView
 
 SIDE, SAMPLES = 96, 2
@@ -23,15 +26,22 @@ def test_lamps_shine_towards_the_face_and_the_key_is_the_strongest_from_in_front
         assert np.linalg.norm(np.subtract(lamp.place, lamp.target)) > 3
 
 
-def test_a_character_is_traced_in_its_light(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def scene() -> Any:
+    """The drawn woman before the camera."""
     if find_spec("bpy") is None:
         pytest.skip("Blender's package bpy is not installed")
-    source, character = makehuman(), CAST["ada"]
-    face = drawn_face(source, character)
     from corpus_tools.film.scene import FilmScene
 
-    scene = FilmScene(face, Look(), face_masks(source, character, face))
-    scene.look_from(CameraView(0, 3, share=0.86), SIDE)
+    source, character = makehuman(), CAST["ada"]
+    face = drawn_face(source, character)
+    made = FilmScene(face, Look(), face_masks(source, character, face))
+    made.look_from(CameraView(0, 3, share=0.86), SIDE)
+    return made
+
+
+def test_a_character_is_traced_in_its_light(scene: Any, tmp_path: Path) -> None:
+    face = scene.face
     shut = np.zeros(len(face.shape_names))
     shut[[face.shape_names.index(f"eyeBlink{side}") for side in ("Left", "Right")]] = 1.0
     pictures = {}
@@ -46,3 +56,33 @@ def test_a_character_is_traced_in_its_light(tmp_path: Path) -> None:
     assert 250 > red > green > blue > 30  # skin, hair and wool are warm
     eyes = slice(int(0.45 * SIDE), int(0.6 * SIDE))
     assert np.abs(pictures["shut"] - rest)[eyes].mean() > 4 * np.abs(pictures["shut"] - rest)[int(0.8 * SIDE) :].mean()
+
+
+def test_light_is_baked_into_texels_and_vertices(scene: Any) -> None:
+    from corpus_tools.film.bake import bake_texels, bake_vertices, displayed, table_levels, view_table
+
+    scene.pose(np.zeros(len(scene.face.shape_names)), np.zeros(6))
+    skin = bake_texels(scene, ["skin"], SIDE, SAMPLES)
+    lit = skin[skin.max(axis=2) > 0.05]
+    assert len(lit) > 0.2 * SIDE**2
+    assert (lit.mean(axis=0) == np.sort(lit.mean(axis=0))[::-1]).all()  # red, green, blue
+    eyes = bake_vertices(scene, ["ball0", "ball1"], SAMPLES)
+    assert all(light.max() > 0.2 for light in eyes.values())
+    assert scene.objects["ball0"][0].data.materials[0] == scene.materials["eye"]  # as before
+    table = view_table()
+    grey = np.arange(len(table))
+    greys = table[grey, grey, grey].mean(axis=1)
+    assert (np.diff(greys) >= 0).all()
+    assert (greys[0], greys[-1]) == (0, 1)
+    assert table[16, 16, 16] == pytest.approx(displayed(np.full((1, 3), table_levels()[16], np.float32))[0], abs=1e-3)
+
+
+def test_poses_lie_far_apart() -> None:
+    face = load_face("head", hair="bald")
+    frames = np.zeros((40, len(face.shape_names)), np.float32)
+    frames[:, 3] = np.linspace(0, 1, 40)
+    frames[20, 7] = 2.0
+    assert farthest(frames, frames[:1], face, 3) == [20, 39, 19]
+    blink = expression_pose(face, {"eyeBlink": 0.5, "jawOpen": 1.0})
+    shown = {name for name, weight in zip(face.shape_names, blink, strict=True) if weight}
+    assert shown == {"eyeBlinkLeft", "eyeBlinkRight", "jawOpen"}

@@ -1,0 +1,94 @@
+"""Poses whose light is baked: expressions, frames of speech that lie far apart, and turns of the head."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.models.face import Face
+from tts2face.models.talker import load_talker
+from tts2face.session import Session
+
+Float32Array = NDArray[np.float32]
+
+EXPRESSIONS: Mapping[str, Mapping[str, float]] = {
+    "smile": {"mouthSmile": 0.8, "cheekSquint": 0.5, "eyeSquint": 0.2},
+    "a": {"jawOpen": 0.6},
+    "i": {"mouthStretch": 0.4, "mouthSmile": 0.3, "jawOpen": 0.1},
+    "u": {"mouthPucker": 0.8, "mouthFunnel": 0.3, "jawOpen": 0.1},
+    "f": {"mouthRollLower": 0.6, "mouthUpperUp": 0.2, "jawOpen": 0.05},
+    "blink": {"eyeBlink": 1.0},
+    "half shut": {"eyeBlink": 0.5},
+    "sad": {"browInnerUp": 0.8, "mouthFrown": 0.5, "eyeBlink": 0.15},
+    "angry": {"browDown": 0.9, "noseSneer": 0.4, "mouthPress": 0.4},
+    "surprised": {"browInnerUp": 0.8, "browOuterUp": 0.8, "eyeWide": 0.8, "jawOpen": 0.35},
+    "grin": {"mouthSmile": 1.0, "mouthUpperUp": 0.3, "jawOpen": 0.3, "cheekSquint": 0.8},
+}  # shapes of both sides without their side
+SPOKEN: Mapping[str, Sequence[str]] = {
+    "neutral": ("People who move to Boston often choose a house by the sea; my father would have found that funny.",),
+    "delighted": ("Peter, please show us the five big apples. I was afraid everybody had gone away.",),
+    "depressed": ("Who knew that you would join us? Thin things, she should choose blue shoes, maybe.",),
+    "annoyed": ("Who knew that you would join us? Five big maps were moved by Bob a year ago.",),
+    "exaggerated": ("People who move to Boston often choose a house by the sea. Peter, show us five apples.",),
+}  # styles, and what is said in them
+N_SPEECH = 26
+GAZE_SHARE = 0.4  # of the gaze in the distance between poses
+TURNS_DEG = ((-20, 0), (-10, 0), (10, 0), (20, 0), (0, -12), (0, 12), (14, -8), (-14, 8))  # yaw and pitch
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LitPose:
+    """Weights (K,) of a face's shapes and the head's pose (6,), rad and mm."""
+
+    name: str
+    weights: Float32Array
+    head: Float32Array
+
+
+def lit_poses(face: Face) -> list[LitPose]:
+    """The pose at rest, then expressions, frames of speech and turns of the head."""
+    still = np.zeros(6, np.float32)
+    poses = [LitPose("rest", np.zeros(len(face.shape_names), np.float32), still)]
+    poses += [LitPose(name, expression_pose(face, shown), still) for name, shown in EXPRESSIONS.items()]
+    known = np.stack([pose.weights for pose in poses])
+    frames = spoken_weights(face)
+    poses += [LitPose(f"speech {at}", frames[at], still) for at in farthest(frames, known, face, N_SPEECH)]
+    for yaw, pitch in TURNS_DEG:
+        head = np.radians([pitch, yaw, 0, 0, 0, 0]).astype(np.float32)
+        poses.append(LitPose(f"head {yaw} {pitch}", poses[0].weights, head))
+    return poses
+
+
+def expression_pose(face: Face, shown: Mapping[str, float]) -> Float32Array:
+    """(K,) weights of shapes that are named without their sides; those that the face lacks are left out."""
+    weights = np.zeros(len(face.shape_names), np.float32)
+    for number, name in enumerate(face.shape_names):
+        weights[number] = shown.get(name, shown.get(name.removesuffix("Left").removesuffix("Right"), 0.0))
+    return weights
+
+
+def spoken_weights(face: Face) -> Float32Array:
+    """(T, K) weights of speech in several styles, of the face's own shapes."""
+    session = Session(load_talker("grid_s1"), face)
+    frames = []
+    for style, texts in SPOKEN.items():
+        for text in texts:
+            motion = session.clip(text, style=style).motion
+            frames.append(motion.values[:, [motion.channels.index(name) for name in face.shape_names]])
+    return np.concatenate(frames).astype(np.float32)
+
+
+def farthest(frames: Float32Array, known: Float32Array, face: Face, number: int) -> list[int]:
+    """Indices of the frames (T, K) that lie farthest from the known poses (P, K) and from each other, one by one.
+
+    Source: Gonzalez 1985, farthest-point clustering.
+    """
+    share = np.array([GAZE_SHARE if name.startswith("eyeLook") else 1.0 for name in face.shape_names], np.float32)
+    scaled = frames * share
+    nearest = np.min([((scaled - one * share) ** 2).sum(axis=1) for one in known], axis=0)
+    chosen = []
+    for _ in range(number):
+        chosen.append(int(nearest.argmax()))
+        nearest = np.minimum(nearest, ((scaled - scaled[chosen[-1]]) ** 2).sum(axis=1))
+    return chosen
