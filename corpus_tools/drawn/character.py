@@ -59,7 +59,7 @@ class Palette:
     """Colours of a character.
 
     ``tints`` are applied to the skin in their order. ``hair`` is the colour of a lock's middle, ``hair_tip`` that of
-    its tip, ``hair_light`` that of the highlight.
+    its tip.
     """
 
     skin: Colour
@@ -75,7 +75,6 @@ class Palette:
     waterline: Colour
     hair: Colour
     hair_tip: Colour
-    hair_light: Colour
     brows: Colour
     lashes: Colour
     iris_dark: Colour

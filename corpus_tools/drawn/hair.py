@@ -27,8 +27,7 @@ N_ALONG, N_TOP, N_UNDER = 36, 11, 4
 TIP_DENSITY = 1.35  # exponent by which rings are closer at the tip
 SHADE_ALONG = ((0, 0.72), (0.15, 0.92), (0.45, 1.06), (0.8, 1.0), (1, 0.92))
 RIM_SHADE, UNDER_SHADE, END_SHADE, SHELL_SHADE = 0.74, 0.80, 0.6, 0.95
-TIP_SHARE, GLOW_SHARE = 0.9, 0.80  # of the colours of the tips, and of the highlight
-GLOW_DEG, GLOW_WIDTH_DEG, GLOW_TOWARDS = 42.0, 14.0, np.array([-0.5, 0.3, 0.8])  # one broad highlight
+TIP_SHARE, PAINTED_SHADE = 0.9, 0.25  # of the colours of the tips, and of the shade: the light brings the rest
 # Matt: a gloss of .20 made it lilac plastic in the cool rim lights.
 MATERIAL = {"specular": 0.05, "shininess": 10.0, "wrap": 0.5}
 
@@ -216,12 +215,8 @@ def _capped(rings: Floats) -> tuple[Floats, Ints]:
 
 
 def _colours(tube: Tube, palette: Palette) -> Floats:
-    """(N, 3) colours of a lock: lighter tips, darker rims, and a broad highlight around the crown."""
-    own, tip, light = np.array(palette.hair), np.array(palette.hair_tip), np.array(palette.hair_light)
-    off = tube.points - MIDDLE
-    elevation = np.degrees(np.arcsin(np.clip(unit_vectors(off / [ACROSS, UP, DEPTH])[:, 1], -1, 1)))
-    towards = 0.72 + 0.28 * np.clip(unit_vectors(off) @ GLOW_TOWARDS, -1, 1)
-    glow = np.exp(-(((elevation - GLOW_DEG) / GLOW_WIDTH_DEG) ** 2)) * towards * np.clip((tube.shade - 0.7) / 0.3, 0, 1)
-    colour = (own + TIP_SHARE * (tip - own) * tube.along[:, None] ** 1.6) * tube.shade[:, None]
-    mixed: Floats = colour + GLOW_SHARE * glow[:, None] * (light - colour)
+    """(N, 3) colours of a lock: lighter tips, slightly darker rims; highlights are left to the light."""
+    own, tip = np.array(palette.hair), np.array(palette.hair_tip)
+    shade = 1 - PAINTED_SHADE * (1 - tube.shade[:, None])
+    mixed: Floats = (own + TIP_SHARE * (tip - own) * tube.along[:, None] ** 1.6) * shade
     return mixed
