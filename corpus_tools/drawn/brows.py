@@ -5,11 +5,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from corpus_tools.drawn.character import Brow, Colour
-from corpus_tools.drawn.fields import grid_triangles, profile, smooth_line, smooth_rows
+from corpus_tools.drawn.fields import profile, smooth_line, smooth_rows
 from corpus_tools.head.correspondence import nearest_surface_points
 from corpus_tools.head.piece import MaterialSpan, Piece
 from corpus_tools.head.skin import Skin, vertex_normals
-from corpus_tools.head.subdivide import triangulate
+from corpus_tools.head.subdivide import grid_triangles, triangulate
 from tts2face.numeric import unit_vectors
 
 Floats = NDArray[np.float64]

@@ -68,12 +68,12 @@ def drawn_face(source: SourceMesh, character: Character) -> Face:
     return add_landmarks(assemble_face(built, shape_names(cage), textures, about), skin.base)
 
 
-def face_masks(source: SourceMesh, character: Character, face: Face) -> dict[str, NDArray[np.float64]]:
+def face_masks(source: SourceMesh, face: Face) -> dict[str, NDArray[np.float64]]:
     """Shares (V,) of a character's vertices that are lips and the inside of the mouth, for its film light."""
-    skin = build_skin(drawn_cage(source, character.targets, character.proportions))
-    rest = replace(skin, vertices=face.vertices[: len(skin.vertices)].astype(np.float64))
-    n_others = len(face.vertices) - len(skin.vertices)
-    return {name: np.append(share, np.zeros(n_others)) for name, share in vertex_masks(source, rest).items()}
+    where = build_skin(build_cage(source, {})).source_uv  # the same for everybody
+    masks = vertex_masks(source, where, face.vertices[: len(where), 2].astype(np.float64))
+    n_others = len(face.vertices) - len(where)
+    return {name: np.append(share, np.zeros(n_others)) for name, share in masks.items()}
 
 
 def _reference(source: SourceMesh) -> ReferenceHead:
@@ -118,7 +118,7 @@ def build_character(source: SourceMesh, character: Character, out: Path, report:
     report(f"{character.name}: shape")
     face = drawn_face(source, character)
     report(f"{character.name}: occlusion")
-    skin = build_skin(drawn_cage(source, character.targets, character.proportions))
+    skin = build_skin(build_cage(source, DEFAULT_PERSON))
     write_face(out, scatter_in_mouth(bake_occlusion(face, available_cores()), skin))
     report(f"{character.name}: calibration")
     calibrate_face_file(str(out), out)

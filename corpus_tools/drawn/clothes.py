@@ -6,9 +6,10 @@ from scipy.interpolate import CubicSpline
 
 from corpus_tools.drawn.atlas import COLLAR, SHIRT, cut_seam, in_tile
 from corpus_tools.drawn.character import Collar, Colour
-from corpus_tools.drawn.fields import grid_triangles, wind_outward
+from corpus_tools.drawn.fields import wind_outward
 from corpus_tools.head.piece import MaterialSpan, Piece
 from corpus_tools.head.skin import Skin
+from corpus_tools.head.subdivide import grid_triangles
 from tts2face.numeric import unit_vectors
 
 Floats = NDArray[np.float64]

@@ -11,7 +11,7 @@ from corpus_tools.drawn.fields import bump
 from corpus_tools.drawn.lids import keep_outside
 from corpus_tools.head.lids import LidEdge
 from corpus_tools.head.piece import Eyeball
-from corpus_tools.head.shapes import neighbour_means
+from corpus_tools.head.shapes import neighbour_means, smoothed
 from corpus_tools.head.skin import Skin
 from tts2face.numeric import smoothstep
 
@@ -32,10 +32,7 @@ def soften(skin: Skin, lids: Sequence[LidEdge]) -> Skin:
     off_mouth = smoothstep(np.linalg.norm((places - [0, -59, 24]) * [0.80, 1.25, 0.5], axis=1), *MOUTH_MM)
     for names, share, n_means in ((SMILES, off_mouth * off_lids, N_SMILE_MEANS), (SQUINTS, off_lids, N_SQUINT_MEANS)):
         for name in (stem + side for stem in names for side, _ in SIDES):
-            smooth = shapes[name]
-            for _ in range(n_means):
-                smooth = 0.3 * smooth + 0.7 * (means @ smooth)
-            shapes[name] = shapes[name] + share[:, None] * (smooth - shapes[name])
+            shapes[name] = smoothed(shapes[name], share, means, n_means)
     for side, sign in SIDES:
         outward = np.array([sign, 1.0, 1.0])
         corner = bump(places, (sign * 22, -58, 20), (11, 9, 20))

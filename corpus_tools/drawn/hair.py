@@ -9,10 +9,10 @@ from scipy.spatial import cKDTree
 
 from corpus_tools.drawn.atlas import hair_tiles, in_tile
 from corpus_tools.drawn.character import Hairstyle, Lock, Palette
-from corpus_tools.drawn.fields import arc_length, grid_triangles, profile, smooth_rows, wind_outward
+from corpus_tools.drawn.fields import arc_length, profile, smooth_rows, wind_outward
 from corpus_tools.head.piece import MaterialSpan, Piece
 from corpus_tools.head.skin import Skin, vertex_normals
-from corpus_tools.head.subdivide import triangulate
+from corpus_tools.head.subdivide import grid_triangles, triangulate
 from tts2face.numeric import smoothstep, unit_vectors
 
 Floats = NDArray[np.float64]

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.drawn.character import Colour, Profile
-from corpus_tools.drawn.fields import Front, arc_length, grid_triangles, profile
+from corpus_tools.drawn.fields import Front, arc_length, profile
 from corpus_tools.head.lids import LidEdge
 from corpus_tools.head.piece import Eyeball, MaterialSpan, Piece
 from corpus_tools.head.skin import Skin
+from corpus_tools.head.subdivide import grid_triangles
 from tts2face.numeric import smoothstep, unit_vectors
 
 Floats = NDArray[np.float64]

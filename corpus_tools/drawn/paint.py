@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates
-from scipy.spatial import cKDTree
+from scipy.ndimage import gaussian_filter
 
 from corpus_tools.dense.texels import Texels, find_texels
 from corpus_tools.drawn.character import Colour, Palette
@@ -16,6 +15,7 @@ from corpus_tools.head.noise import gaussian_bump
 from corpus_tools.head.skin import Skin
 from corpus_tools.head.source import SourceMesh
 from corpus_tools.head.subdivide import triangulate
+from corpus_tools.head.texture import INNER_LIP_Z, fill_gaps, in_mouth, line_distance, sample_mask
 from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
@@ -26,8 +26,6 @@ FRONT_Z, FRONT_TINT_Z = (-40.0, -5.0), -20.0  # tints whose centre lies before t
 LID_LINE_MM, SHUT_LINE_MM, LID_LINE = 1.5, 1.8, 0.85  # reach of the dark edge, open and shut, and its strength
 CREASE_OFF_MM, CREASE_MM, CREASE = 5.0, 2.6, 0.28
 WATERLINE_MM, WATERLINE = 1.0, 0.45
-MOUTH_ISLAND = (0.75, 0.93, 0.14)  # MakeHuman's island of the mouth: low u, high u, high v
-LIP_Z = (20.0, 28.0)  # depth in mm over which the inside of the mouth becomes the lips
 FRECKLE_SEED, FRECKLE = 3, (0.80, 0.68, 0.60)
 HAIR_SHADE = 0.9  # of the colour of hair, on the skin under it
 SPOKES = ((23, 0.5, 0.3), (37, 0.35, 1.9), (52, 0.25, 4.0))  # of the iris: number, strength, phase
@@ -54,16 +52,16 @@ def paint_skin(
     _paint_lids(colour, texels, skin, lids, palette)
     _sprinkle(colour, place, palette.n_freckles)
     colour.blend(texels.interpolate(hair[:, None])[:, 0], HAIR_SHADE * np.array(palette.hair))
-    picture, known = np.zeros((SIDE, SIDE, 3)), np.zeros((SIDE, SIDE), bool)
-    picture[texels.rows, texels.columns], known[texels.rows, texels.columns] = colour.values, True
-    nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
-    return _as_bytes(picture[tuple(nearest)])
+    return fill_gaps(texels, colour.values, SIDE)
 
 
-def vertex_masks(source: SourceMesh, skin: Skin) -> dict[str, Floats]:
-    """Shares (N,) of the skin's vertices that are ``lips``, and ``inner``, the inside of the mouth behind them."""
-    lips = smoothstep(_mask(source, "lips", 3.2, skin.source_uv), 0.12, 0.88)
-    inner = _in_mouth(source, skin.source_uv) * (1 - smoothstep(skin.vertices[:, 2], *LIP_Z))
+def vertex_masks(source: SourceMesh, source_uv: Floats, depth: Floats) -> dict[str, Floats]:
+    """Shares (N,) of the skin's vertices that are ``lips``, and ``inner``, the inside of the mouth behind them.
+
+    `source_uv` (N, 2) are their coordinates in MakeHuman's layout, `depth` (N,) their z in mm.
+    """
+    lips = smoothstep(_mask(source, "lips", 3.2, source_uv), 0.12, 0.88)
+    inner = _in_mouth(source, source_uv) * (1 - smoothstep(depth, *INNER_LIP_Z))
     return {"lips": lips, "inner": inner}
 
 
@@ -84,11 +82,7 @@ class _Paint:
 
 def _mask(source: SourceMesh, name: str, blur: float, where: Floats) -> Floats:
     """(P,) values of a blurred mask of the source at coordinates (P, 2), v up."""
-    mask = gaussian_filter(source.mask(name), blur)
-    height, width = mask.shape
-    at = [(1 - where[:, 1]) * (height - 1), where[:, 0] * (width - 1)]
-    values: Floats = map_coordinates(mask, at, order=1, mode="nearest")
-    return values
+    return sample_mask(gaussian_filter(source.mask(name), blur), where)
 
 
 def _lips(place: Floats, palette: Palette, mouth_y: float) -> Floats:
@@ -102,15 +96,13 @@ def _lips(place: Floats, palette: Palette, mouth_y: float) -> Floats:
 def _mouth(source: SourceMesh, place: Floats, where: Floats, palette: Palette) -> tuple[Floats, Floats]:
     """Share (P,) and colour (P, 3) of the inside of the mouth: dark towards the throat, lips towards the front."""
     colour = np.array(palette.cavity) * (1 - 0.55 * smoothstep(-place[:, 2], -15.0, 25.0))[:, None]
-    near = smoothstep(place[:, 2], *LIP_Z)[:, None]
+    near = smoothstep(place[:, 2], *INNER_LIP_Z)[:, None]
     return _in_mouth(source, where), colour + near * (0.93 * np.array(palette.lips) - colour)
 
 
 def _in_mouth(source: SourceMesh, where: Floats) -> Floats:
     """(P,) share of places (P, 2) in MakeHuman's layout that is the inside of the mouth."""
-    low_u, high_u, high_v = MOUTH_ISLAND
-    in_island = (where[:, 0] > low_u) & (where[:, 0] < high_u) & (where[:, 1] < high_v)
-    return smoothstep(np.maximum(_mask(source, "inside-mouth", 2.0, where), in_island), 0.15, 0.95)
+    return smoothstep(np.maximum(_mask(source, "inside-mouth", 2.0, where), in_mouth(where)), 0.15, 0.95)
 
 
 def _paint_lids(colour: _Paint, texels: Texels, skin: Skin, lids: Sequence[LidEdge], palette: Palette) -> None:
@@ -120,21 +112,18 @@ def _paint_lids(colour: _Paint, texels: Texels, skin: Skin, lids: Sequence[LidEd
     shut_place = texels.interpolate(shut)
     for edge in lids:
         upper = skin.vertices[edge.upper]
-        distance = _distance(place, upper)
-        shut_distance = _distance(shut_place, shut[edge.upper])  # not the skin that is folded behind the edge
+        distance = line_distance(place, upper, NEAR_MM)
+        shut_distance = line_distance(
+            shut_place, shut[edge.upper], NEAR_MM
+        )  # not the skin that is folded behind the edge
         line = np.minimum(_near(distance, LID_LINE_MM), _near(shut_distance, SHUT_LINE_MM))
         colour.tint(LID_LINE * line, palette.lid_line)
         order = np.argsort(upper[:, 0])
         is_above = place[:, 1] > np.interp(place[:, 0], upper[order, 0], upper[order, 1])
         colour.tint(CREASE * _near(distance - CREASE_OFF_MM, CREASE_MM) * is_above, palette.crease)
-        colour.tint(WATERLINE * _near(_distance(place, skin.vertices[edge.lower]), WATERLINE_MM), palette.waterline)
-
-
-def _distance(place: Floats, line: Floats) -> Floats:
-    """(P,) distance in mm of points from a line (K, 3); infinite beyond `NEAR_MM`."""
-    fine = np.linspace(0, len(line) - 1, 12 * len(line))
-    dense = np.stack([np.interp(fine, np.arange(len(line)), line[:, axis]) for axis in range(3)], axis=1)
-    return np.asarray(cKDTree(dense).query(place, distance_upper_bound=NEAR_MM)[0])
+        colour.tint(
+            WATERLINE * _near(line_distance(place, skin.vertices[edge.lower], NEAR_MM), WATERLINE_MM), palette.waterline
+        )
 
 
 def _near(distance: Floats, reach: float) -> Floats:

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
-from corpus_tools.drawn.fields import grid_triangles
 from corpus_tools.head.cage import Cage
 from corpus_tools.head.head import COVERED_POSES, ReferenceHead, cover_in_pose
 from corpus_tools.head.jaw import Jaw
@@ -14,6 +13,7 @@ from corpus_tools.head.lips import lip_front
 from corpus_tools.head.piece import MaterialSpan, Piece
 from corpus_tools.head.retreat import add_retreat
 from corpus_tools.head.skin import Skin
+from corpus_tools.head.subdivide import grid_triangles
 from corpus_tools.head.teeth import (
     COVER_MM,
     LOWER,

@@ -9,6 +9,7 @@ from corpus_tools.head.eyes import RECEDE_MM, ball_radius
 from corpus_tools.head.piece import Eyeball, MaterialSpan, Piece
 from corpus_tools.head.rings import EdgeRings, find_narrowest_ring
 from corpus_tools.head.skin import Skin
+from corpus_tools.head.subdivide import grid_triangles
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -52,7 +53,7 @@ def wet_piece(skin: Skin, balls: tuple[Eyeball, Eyeball], edges: tuple[LidEdge, 
         angle = np.arccos(np.clip(off[:, 2] / distance, -1, 1))
         on_ball = ball.centre + off * ((ball_radius(ball, angle) + WET_OFF_MM) / distance)[:, None]
         points += [rim, on_ball]
-        triangles.append(strip_triangles(len(line)) + count)
+        triangles.append(grid_triangles(2, len(line)) + count)
         shapes += [line, line]
         count += 2 * len(line)
     rows = np.concatenate(shapes)
@@ -66,9 +67,3 @@ def wet_piece(skin: Skin, balls: tuple[Eyeball, Eyeball], edges: tuple[LidEdge, 
         np.tile(WET_COLOUR, (len(vertices), 1)),
         moved,
     )
-
-
-def strip_triangles(n: int) -> Ints:
-    """(2 n - 2, 3) triangles between a row of n points and the row of n points that follows it, towards the viewer."""
-    low = np.arange(n - 1)
-    return np.concatenate([np.stack([low, low + 1, low + n + 1], 1), np.stack([low, low + n + 1, low + n], 1)])

@@ -47,10 +47,7 @@ def correct_shapes(skin: Skin) -> Skin:
     share = smoothstep(np.linalg.norm(off, axis=1), NEAR, FAR) * below
     shapes = dict(skin.shapes)
     for name in SMOOTHED_SHAPES:
-        smooth = shapes[name]
-        for _ in range(N_MEANS):
-            smooth = 0.3 * smooth + 0.7 * (means @ smooth)
-        shapes[name] = shapes[name] + share[:, None] * (smooth - shapes[name])
+        shapes[name] = smoothed(shapes[name], share, means, N_MEANS)
     for name, factor in SHAPE_GAINS.items():
         shapes[name] = factor * shapes[name]
     for name in BROW_DOWN:
@@ -64,10 +61,15 @@ def _smooth_rounding(skin: Skin, shapes: dict[str, Floats], means: sparse.csr_ar
     off = 100.0 * np.linalg.norm((skin.base - UPPER_LIP) * [0.45, 1.0, 0.6], axis=1)
     share = smoothstep(off, *LIP_NEAR_MM) * (1 - smoothstep(off, *LIP_FAR_MM)) * (skin.base[:, 1] > LIP_TOP)
     for name in ROUND_SHAPES:
-        smooth = shapes[name]
-        for _ in range(N_ROUND_MEANS):
-            smooth = 0.3 * smooth + 0.7 * (means @ smooth)
-        shapes[name] = shapes[name] + share[:, None] * (smooth - shapes[name])
+        shapes[name] = smoothed(shapes[name], share, means, N_ROUND_MEANS)
+
+
+def smoothed(moved: Floats, share: Floats, means: sparse.csr_array, number: int) -> Floats:
+    """A shape (N, 3) after so many averages over neighbours, where its share (N,) is 1."""
+    smooth = moved
+    for _ in range(number):
+        smooth = 0.3 * smooth + 0.7 * (means @ smooth)
+    return moved + share[:, None] * (smooth - moved)
 
 
 def neighbour_means(skin: Skin) -> sparse.csr_array:

@@ -58,6 +58,19 @@ def triangulate(quads: NDArray[np.integer]) -> NDArray[np.int64]:
     return np.stack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]], axis=1).reshape(-1, 3).astype(np.int64)
 
 
+def grid_triangles(n_rows: int, n_columns: int, *, is_closed: bool = False) -> NDArray[np.int64]:
+    """(F, 3) triangles of a surface stored row by row; a closed one joins its last column to its first."""
+    steps = n_columns if is_closed else n_columns - 1
+    row, column = (grid.ravel() for grid in np.meshgrid(np.arange(n_rows - 1), np.arange(steps), indexing="ij"))
+    here, beside = row * n_columns + column, row * n_columns + (column + 1) % n_columns
+    return np.concatenate(
+        [
+            np.stack([here, beside, beside + n_columns], axis=1),
+            np.stack([here, beside + n_columns, here + n_columns], axis=1),
+        ]
+    ).astype(np.int64)
+
+
 def _edges(quads: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Edges (E, 2) and the edge of each side of each quad (4 F,)."""
     sides = np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.head.cage import SCALE
 from corpus_tools.head.piece import MaterialSpan, Piece
+from corpus_tools.head.subdivide import grid_triangles
 from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
@@ -230,9 +231,7 @@ def _gum(path: ArchPath, arch: Arch) -> Floats:
 
 def _tube_triangles(n_rings: int, n_around: int, closed_start: bool) -> NDArray[np.int64]:
     """Triangles between consecutive closed rings; `closed_start` adds a cap whose vertex follows the last ring."""
-    row, column = (grid.ravel() for grid in np.meshgrid(np.arange(n_rings - 1), np.arange(n_around), indexing="ij"))
-    a, b = row * n_around + column, row * n_around + (column + 1) % n_around
-    faces = [np.stack([a, b, b + n_around], 1), np.stack([a, b + n_around, a + n_around], 1)]
+    faces = [grid_triangles(n_rings, n_around, is_closed=True)]
     if closed_start:
         k = np.arange(n_around)
         faces.append(np.stack([np.full(n_around, n_rings * n_around), (k + 1) % n_around, k], 1))

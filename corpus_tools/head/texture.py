@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates
 from scipy.spatial import cKDTree
 
-from corpus_tools.dense.texels import find_texels
+from corpus_tools.dense.texels import Texels, find_texels
 from corpus_tools.head.cards import BROW_COLOUR
 from corpus_tools.head.layout import SIDE, layout_coordinates
 from corpus_tools.head.lids import LidEdge
@@ -60,14 +60,14 @@ def paint_texture(
     place = texels.interpolate(skin.vertices)
     where = texels.interpolate(skin.source_uv)
     colour = _flesh(place, where, source, palette, generator)
-    lips = _sample_mask(gaussian_filter(source.mask("lips"), 2.5), where)
+    lips = sample_mask(gaussian_filter(source.mask("lips"), 2.5), where)
     colour += _lip_share(lips)[:, None] * (_lip_colour(place, palette, generator) - colour)
-    inside = np.maximum(_sample_mask(gaussian_filter(source.mask("inside-mouth"), 2.0), where), _in_mouth(where))
+    inside = np.maximum(sample_mask(gaussian_filter(source.mask("inside-mouth"), 2.0), where), in_mouth(where))
     colour += smoothstep(inside, 0.15, 0.95)[:, None] * (_cavity_colour(place, palette) - colour)
     for edge in lids:
         colour *= 1 - UPPER_LINE * _beside(place, skin.vertices[edge.upper])[:, None] * LINE_TINT
         colour *= 1 - LOWER_LINE * _beside(place, skin.vertices[edge.lower])[:, None] * LINE_TINT
-    return _fill_gaps(texels.rows, texels.columns, colour)
+    return fill_gaps(texels, colour, SIDE)
 
 
 def _flesh(
@@ -77,8 +77,8 @@ def _flesh(
     factors = np.ones((len(place), 3))
     for centre, reach, tint in TINTS:
         factors *= 1 + strength * gaussian_bump(place, centre, reach)[:, None] * (np.array(tint) - 1)
-    factors *= 1 - strength * _sample_mask(source.mask("ears"), where)[:, None] * np.array([0.0, 0.10, 0.09])
-    factors *= 1 - strength * _sample_mask(gaussian_filter(source.mask("eyelids"), 3), where)[:, None] * np.array(
+    factors *= 1 - strength * sample_mask(source.mask("ears"), where)[:, None] * np.array([0.0, 0.10, 0.09])
+    factors *= 1 - strength * sample_mask(gaussian_filter(source.mask("eyelids"), 3), where)[:, None] * np.array(
         [0.04, 0.10, 0.09]
     )
     factors *= 1 - strength * 0.07 * _fold(place)[:, None] * np.array([0.7, 1.0, 1.0])
@@ -130,28 +130,34 @@ def _cavity_colour(place: Floats, palette: HeadColours) -> Floats:
 
 def _beside(place: Floats, line: Floats) -> Floats:
     """(P,) 1 on a line of points (L, 3), falling off beside it."""
-    fine = np.linspace(0, len(line) - 1, 12 * len(line))
-    dense = np.stack([np.interp(fine, np.arange(len(line)), line[:, k]) for k in range(3)], axis=1)
-    near: Floats = np.exp(-((cKDTree(dense).query(place, distance_upper_bound=6.0)[0] / LINE_MM) ** 2))
+    near: Floats = np.exp(-((line_distance(place, line, 6.0) / LINE_MM) ** 2))
     return near
 
 
-def _in_mouth(where: Floats) -> Floats:
+def line_distance(place: Floats, line: Floats, most: float) -> Floats:
+    """(P,) distance of points from a line of points (L, 3), mm; infinite beyond `most`."""
+    fine = np.linspace(0, len(line) - 1, 12 * len(line))
+    dense = np.stack([np.interp(fine, np.arange(len(line)), line[:, k]) for k in range(3)], axis=1)
+    return np.asarray(cKDTree(dense).query(place, distance_upper_bound=most)[0])
+
+
+def in_mouth(where: Floats) -> Floats:
     """(P,) 1 on the island of the mouth's cavity, fading to the lips' colour at its rim."""
     inside = (where[:, 0] > 0.75) & (where[:, 0] < 0.93) & (where[:, 1] < 0.14)
     return inside.astype(float)
 
 
-def _sample_mask(mask: Floats, where: Floats) -> Floats:
+def sample_mask(mask: Floats, where: Floats) -> Floats:
+    """(P,) values of a mask of the source at coordinates (P, 2), v up."""
     height, width = mask.shape
     return map_coordinates(mask, [(1 - where[:, 1]) * (height - 1), where[:, 0] * (width - 1)], order=1, mode="nearest")
 
 
-def _fill_gaps(rows: NDArray[np.int64], columns: NDArray[np.int64], colour: Floats) -> NDArray[np.uint8]:
-    """The texture; texels off the surface take the nearest colour on it."""
-    picture = np.zeros((SIDE, SIDE, 3))
-    known = np.zeros((SIDE, SIDE), bool)
-    picture[rows, columns], known[rows, columns] = colour, True
+def fill_gaps(texels: Texels, colour: Floats, side: int) -> NDArray[np.uint8]:
+    """(side, side, 3) texture of the colours (P, 3) of texels; those off the surface take the nearest one on it."""
+    picture = np.zeros((side, side, 3))
+    known = np.zeros((side, side), bool)
+    picture[texels.rows, texels.columns], known[texels.rows, texels.columns] = colour, True
     nearest = distance_transform_edt(~known, return_distances=False, return_indices=True)
     filled: NDArray[np.uint8] = np.rint(np.clip(picture[tuple(nearest)], 0, 1) * 255).astype(np.uint8)
     return filled

@@ -9,11 +9,12 @@ from corpus_tools.drawn.atlas import COLLAR, MARGIN, SHIRT, cut_seam, hair_tiles
 from corpus_tools.drawn.build_drawn import CAST
 from corpus_tools.drawn.character import Character, Palette
 from corpus_tools.drawn.clothes import _roll
-from corpus_tools.drawn.fields import Front, grid_triangles, smooth_line, wind_outward
+from corpus_tools.drawn.fields import Front, smooth_line, wind_outward
 from corpus_tools.drawn.hair import LOWEST_DEG, MIDDLE, Scalp, height_over_hairline, lock_tube, on_volume
 from corpus_tools.drawn.paint import paint_eye
 from corpus_tools.drawn.sculpt import apply_proportions
 from corpus_tools.head.skin import Skin
+from corpus_tools.head.subdivide import grid_triangles
 from lexicon.errors import DataError
 from tts2face.models.face_loading import load_face
 

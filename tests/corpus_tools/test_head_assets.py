@@ -21,8 +21,8 @@ from corpus_tools.head.haircut import (
     split_seams,
     trim_fringe,
 )
-from corpus_tools.head.lids import strip_triangles
 from corpus_tools.head.strands import Cards, StrandStyle, bake_strands, strand_angles, strand_tangents
+from corpus_tools.head.subdivide import grid_triangles
 from corpus_tools.head.teeth import LOWER, UPPER, follow_lips
 from corpus_tools.head.tongue import shape_tip
 from lexicon.errors import DataError
@@ -128,7 +128,7 @@ def strip(x: float) -> Cards:
     y = np.linspace(90.0, -60.0, 16)
     vertices = np.concatenate([np.column_stack([np.full(16, x + side), y, np.full(16, 60.0)]) for side in (0.0, 1.0)])
     uv = np.column_stack([np.repeat([0.0, 1.0], 16), np.tile(np.linspace(0, 1, 16), 2)])
-    return Cards(vertices, strip_triangles(16), uv, np.arange(32))
+    return Cards(vertices, grid_triangles(2, 16), uv, np.arange(32))
 
 
 def test_a_trimmed_fringe_ends_above_the_brows():

@@ -35,7 +35,7 @@ def scene() -> Any:
 
     source, character = makehuman(), CAST["ada"]
     face = drawn_face(source, character)
-    made = FilmScene(face, Look(), face_masks(source, character, face))
+    made = FilmScene(face, Look(), face_masks(source, face))
     made.look_from(CameraView(0, 3, share=0.86), SIDE)
     return made
 
