@@ -14,10 +14,12 @@ from tts2face.numeric import unit_vectors
 
 Floats = NDArray[np.float64]
 
-N_ALONG, N_ACROSS = 40, 7
+N_ALONG, N_ACROSS = 96, 7
 LIFT_MM, RIM_SINK_MM = 0.9, 1.6  # of the ribbon above the skin, and of its rims into it
 FOREHEAD_MM = 130.0  # twice the radius of the forehead that the ribbon bends around
-SMOOTH_STEPS = 2.5  # spread along the brow of its place, normals and motion
+SMOOTH_STEPS = N_ALONG / 16  # spread along the brow of its place, normals and motion
+N_HAIRS, SLANT = 11, 1.3  # along the brow, and how far they lean outwards over half its width, in hairs
+GROOVE, FRINGE, SHADE = 0.28, 0.07, 0.30  # shares of thickness, width and brightness that are less between hairs
 OWN_SHARE = 0.5  # of the motion across the brow that is kept
 AHEAD_SHARE = 0.18  # of a rise by which the brow comes forward: it drowns in the raised forehead else
 MATERIAL = {"specular": 0.05, "shininess": 10.0, "wrap": 0.5}
@@ -43,7 +45,15 @@ def brow_piece(skin: Skin, brow: Brow, colour: Colour) -> Piece:
         if np.abs(follow).max() > 1e-3:
             shapes[name] = follow.reshape(-1, 3)
     span = MaterialSpan("brows", np.concatenate(faces), MATERIAL)
-    return Piece(vertices, (span,), np.tile(colour, (len(vertices), 1)), shapes)
+    bright = 1 - SHADE * _between_hairs().ravel()
+    return Piece(vertices, (span,), np.array(colour) * np.tile(bright, 2)[:, None], shapes)
+
+
+def _between_hairs() -> Floats:
+    """(`N_ALONG`, `N_ACROSS`) 0 on the hairs to 1 between them; they grow upwards and lean outwards."""
+    along, place = np.linspace(0, 1, N_ALONG)[:, None], np.linspace(-1, 1, N_ACROSS)
+    between: Floats = 0.5 - 0.5 * np.cos(2 * np.pi * (N_HAIRS * along - SLANT * place))
+    return between
 
 
 def _forehead(skin: Skin) -> NDArray[np.int64]:
@@ -66,8 +76,9 @@ def _ribbon(skin: Skin, triangles: NDArray[np.int64], brow: Brow, sign: float) -
     normal = unit_vectors(smooth_rows(normal, SMOOTH_STEPS))
     across = sign * unit_vectors(np.cross(normal, unit_vectors(np.gradient(on_skin, axis=0))))
     place = np.linspace(-1, 1, N_ACROSS)
-    off = width[:, None] * place
-    lens = height[:, None] * np.sqrt(np.clip(1 - place**2, 0, 1))
+    between = _between_hairs()
+    off = width[:, None] * place * (1 - FRINGE * between)
+    lens = height[:, None] * np.sqrt(np.clip(1 - place**2, 0, 1)) * (1 - GROOVE * between)
     lift = lens + LIFT_MM - RIM_SINK_MM * (np.abs(place) > 0.99) - off**2 / FOREHEAD_MM
     points = on_skin[:, None] + off[..., None] * across[:, None] + lift[..., None] * normal[:, None]
     return np.asarray(points.reshape(-1, 3))

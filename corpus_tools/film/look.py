@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 
 Vector = tuple[float, float, float]
 
+WHITE = 0.95  # of the eyeballs while their light is baked
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SkinLook:
@@ -129,7 +131,7 @@ LAMPS = {
         place=(-0.8, 5.2, -0.6), target=(0, 0.8, -0.6), width=2.6, height=1.2, watts=110, colour=(1, 0.88, 0.74)
     ),
     "mouth": Lamp(
-        place=(0, -1.6, 6.5), target=(0, -0.6, 0), width=0.6, height=0.6, watts=26, colour=(1, 0.92, 0.85),
+        place=(0, -1.6, 6.5), target=(0, -0.6, 0), width=0.6, height=0.6, watts=80, colour=(1, 0.92, 0.85),
         parts=("teeth", "gums", "tongue"),
     ),
 }  # fmt: skip
@@ -166,3 +168,11 @@ class Look:
     sky_strength: float = 0.13
     exposure: float = 0.63  # stops
     wall: Wall = field(default_factory=lambda: WALL)
+
+
+LOOKS: dict[str, Look] = {}  # of characters that are not lit as the drawn woman is
+
+
+def look_of(name: str) -> Look:
+    """Materials and lamps of a character."""
+    return LOOKS.get(name, Look())

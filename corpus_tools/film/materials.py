@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from corpus_tools.film.look import ClothLook, EyeLook, HairLook, Look, SkinLook
+from corpus_tools.film.look import WHITE, ClothLook, EyeLook, HairLook, Look, SkinLook
 from corpus_tools.film.nodes import Shader, rgba
 from tts2face.models.face import Texture
 
@@ -36,7 +36,7 @@ def part_materials(look: Look, skin: Texture, eye: Texture) -> dict[str, Any]:
 def white() -> Any:
     """What eyeballs are baked in: their light alone."""
     shader = Shader("white")
-    surface = shader.principled(Base_Color=rgba((0.95, 0.95, 0.95)), Roughness=0.4, Specular_IOR_Level=0.0)
+    surface = shader.principled(Base_Color=rgba((WHITE,) * 3), Roughness=0.4, Specular_IOR_Level=0.0)
     surface.inputs["Subsurface Weight"].default_value = 0.2
     surface.inputs["Subsurface Scale"].default_value = 1 / UNIT_MM
     return shader.finished(surface.outputs[0])

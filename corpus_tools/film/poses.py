@@ -20,6 +20,15 @@ EXPRESSIONS: Mapping[str, Mapping[str, float]] = {
     "f": {"mouthRollLower": 0.6, "mouthUpperUp": 0.2, "jawOpen": 0.05},
     "blink": {"eyeBlink": 1.0},
     "half shut": {"eyeBlink": 0.5},
+    "nearly shut": {"eyeBlink": 0.75},
+    "shut under lowered brows": {"eyeBlink": 1.0, "browDown": 0.9},
+    "shut under raised brows": {"eyeBlink": 1.0, "browInnerUp": 0.8, "browOuterUp": 0.8},
+    "looks down": {"eyeLookDown": 0.8},
+    "looks up": {"eyeLookUp": 0.8},
+    "squint": {"eyeSquint": 0.8, "cheekSquint": 0.8},
+    "funnel": {"mouthFunnel": 0.8, "jawOpen": 0.2},
+    "teeth": {"mouthUpperUp": 0.9, "mouthLowerDown": 0.8, "mouthStretch": 0.3},
+    "rolled": {"mouthRollUpper": 0.8, "mouthRollLower": 0.4},
     "sad": {"browInnerUp": 0.8, "mouthFrown": 0.5, "eyeBlink": 0.15},
     "angry": {"browDown": 0.9, "noseSneer": 0.4, "mouthPress": 0.4},
     "surprised": {"browInnerUp": 0.8, "browOuterUp": 0.8, "eyeWide": 0.8, "jawOpen": 0.35},
@@ -32,6 +41,13 @@ SPOKEN: Mapping[str, Sequence[str]] = {
     "annoyed": ("Who knew that you would join us? Five big maps were moved by Bob a year ago.",),
     "exaggerated": ("People who move to Boston often choose a house by the sea. Peter, show us five apples.",),
 }  # styles, and what is said in them
+HELD_OUT: Mapping[str, Sequence[str]] = {
+    "delighted": ("Would you bring both of these oranges upstairs before we leave for the theatre?",),
+    "neutral": ("Every morning the old ferry carries forty passengers and a very small dog.",),
+    "annoyed": ("No! Put that back, or I shall have to phone your mother.",),
+}  # said in poses on which light is measured, never fitted
+HELD_OUT_TURNS_DEG = ((12, 6), (-14, -5), (8, 4), (-6, 8), (17, 2), (-10, -9))  # of half of them
+N_HELD_OUT = 12
 N_SPEECH = 26
 GAZE_SHARE = 0.4  # of the gaze in the distance between poses
 TURNS_DEG = ((-20, 0), (-10, 0), (10, 0), (20, 0), (0, -12), (0, 12), (14, -8), (-14, 8))  # yaw and pitch
@@ -60,6 +76,17 @@ def lit_poses(face: Face) -> list[LitPose]:
     return poses
 
 
+def held_out_poses(face: Face) -> list[LitPose]:
+    """Poses of other speech, half of them with the head turned."""
+    frames = spoken_weights(face, HELD_OUT)
+    chosen = farthest(frames, np.zeros((1, len(face.shape_names)), np.float32), face, N_HELD_OUT)
+    heads = [(0, 0)] * (N_HELD_OUT - len(HELD_OUT_TURNS_DEG)) + list(HELD_OUT_TURNS_DEG)
+    return [
+        LitPose(f"test {number}", frames[at], np.radians([pitch, yaw, 0, 0, 0, 0]).astype(np.float32))
+        for number, (at, (yaw, pitch)) in enumerate(zip(chosen, heads, strict=True))
+    ]
+
+
 def expression_pose(face: Face, shown: Mapping[str, float]) -> Float32Array:
     """(K,) weights of shapes that are named without their sides; those that the face lacks are left out."""
     weights = np.zeros(len(face.shape_names), np.float32)
@@ -68,11 +95,11 @@ def expression_pose(face: Face, shown: Mapping[str, float]) -> Float32Array:
     return weights
 
 
-def spoken_weights(face: Face) -> Float32Array:
-    """(T, K) weights of speech in several styles, of the face's own shapes."""
+def spoken_weights(face: Face, spoken: Mapping[str, Sequence[str]] = SPOKEN) -> Float32Array:
+    """(T, K) weights of what is said in each style, of the face's own shapes."""
     session = Session(load_talker("grid_s1"), face)
     frames = []
-    for style, texts in SPOKEN.items():
+    for style, texts in spoken.items():
         for text in texts:
             motion = session.clip(text, style=style).motion
             frames.append(motion.values[:, [motion.channels.index(name) for name in face.shape_names]])

@@ -13,6 +13,7 @@ from corpus_tools.drawn.atlas import COLLAR, strand_places
 from corpus_tools.film.look import Lamp, Look
 from corpus_tools.film.materials import UNIT_MM, part_materials
 from corpus_tools.film.nodes import Shader, rgba
+from corpus_tools.film.weld import weld_vertices
 from tts2face.colour import decode_srgb
 from tts2face.face.deformation import build_rig, eye_rotations, head_transform
 from tts2face.models.face import Face
@@ -162,6 +163,18 @@ class FilmScene:
                     receivers.objects.link(made)
             self.lamps[name].light_linking.receiver_collection = receivers
 
+    def mirrored_lamps(self) -> NDArray[np.float32]:
+        """(L, 17) lamps that light all parts, as `tts2face.models.baked_light` describes them."""
+        rows = []
+        for name, lamp in self.look.lamps.items():
+            if lamp.parts:
+                continue
+            place = np.array(self.lamps[name].matrix_basis)  # the one in the world is not computed yet
+            radiance = np.array(lamp.colour) * lamp.watts / (np.pi * lamp.width * lamp.height)
+            size = (lamp.width * UNIT_MM / 2, lamp.height * UNIT_MM / 2)
+            rows.append(np.concatenate([place[:3, 3] * UNIT_MM, *place[:3, :2].T, -place[:3, 2], size, radiance]))
+        return np.array(rows, np.float32)
+
     def look_from(self, view: CameraView, side: int) -> None:
         """Place the camera as the renderer does, for square pictures of a side in pixels."""
         camera = camera_matrices(view, self.face, (side, side))
@@ -195,15 +208,6 @@ class FilmScene:
         for made, _ in self.objects.values():
             made.hide_render = False
         focus.use_dof = False
-
-
-def weld_vertices(face: Face) -> tuple[Ints, Ints]:
-    """First vertex (W,) of each group at one place that moves alike, and the group (V,) of each vertex."""
-    weights = np.cos(np.arange(1, len(face.shape_names) + 1))  # arbitrary ones that separate different motions
-    mixed = np.einsum("k,kvc->vc", weights, face.shapes.astype(np.float64))
-    keys = np.rint(1000 * np.column_stack([face.vertices, mixed])).astype(np.int64)
-    _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    return first, group.ravel()
 
 
 def _set(mesh: Any, name: str, kind: str, values: Floats) -> None:

@@ -37,7 +37,7 @@ def test_occlusion_of_another_size_is_refused() -> None:
     bits = np.arange(64, dtype=np.uint8).reshape(2, 4, 8)
     content = encode_occlusion(bits)
     np.testing.assert_array_equal(decode_occlusion(content, (2, 4, 8), Path("a.face")), bits)
-    with pytest.raises(DataError, match="not of 5 vertices"):
+    with pytest.raises(DataError, match="is not of 80 bytes"):
         decode_occlusion(content, (2, 5, 8), Path("a.face"))
     with pytest.raises(DataError, match="cannot be inflated"):
         decode_occlusion(content[2:], (2, 4, 8), Path("a.face"))

@@ -14,9 +14,9 @@ from tts2face.models.face import Face
 from tts2face.models.face_parts import keep_parts
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.render.camera import camera_matrices
-from tts2face.render.draw import MeshRenderer, mesh_renderer
+from tts2face.render.draw import MeshRenderer
 from tts2face.render.picture import Picture
-from tts2face.render.scene import Scene
+from tts2face.render.scene import Scene, build_scene
 from tts2face.render.studio_light import lamp_directions, light_table
 from tts2face.video.track import MIN_SCORE, FaceTracker
 
@@ -54,9 +54,8 @@ class CharacterViews:
     def __init__(self, face: Face, model: Path | None = None) -> None:
         self.face = face
         self._tracker = FaceTracker(model)
-        self._renderer: MeshRenderer = mesh_renderer(
-            keep_parts(face, lambda part: not part.name.startswith(BEHIND_LIPS)), _picture(0, 0)
-        )
+        bare = keep_parts(face, lambda part: not part.name.startswith(BEHIND_LIPS))
+        self._shown: Scene = build_scene(bare, _picture(0, 0))
 
     def read(self, view: tuple[float, float], weights: NDArray[np.float32]) -> tuple[FloatArray, float]:
         """Landmarks (478, 2) in pixels of a view (yaw and pitch in degrees), and the score; NaN without a face."""
@@ -74,7 +73,7 @@ class CharacterViews:
     ) -> tuple[SurfacePoints, FloatArray]:
         """Points of the mesh at pixels of a view, and how much the surface faces it."""
         camera = camera_matrices(_picture(*view).view, self.face, (SIDE_PX, SIDE_PX))
-        positions = self._renderer.scene.surface.rig.pose(weights).astype(np.float64)
+        positions = self._shown.surface.rig.pose(weights).astype(np.float64)
         return points_under_pixels(pixels, positions, triangles, camera)
 
     def _scene(self, view: tuple[float, float]) -> Scene:
@@ -82,7 +81,7 @@ class CharacterViews:
         side = SIDE_PX * picture.samples_per_side
         optics = camera_matrices(picture.view, self.face, (side, side))
         lights = light_table(lamp_directions(picture.view), optics)
-        return replace(self._renderer.scene, picture=picture, optics=optics, lights=lights)
+        return replace(self._shown, picture=picture, optics=optics, lights=lights)
 
 
 def locate_landmarks(views: CharacterViews) -> LocatedLandmarks:

@@ -1,6 +1,6 @@
 """Reading and writing of ``.face`` files: a face in compact form, with identity presets."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import takewhile
 from pathlib import Path
@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from tts2face.models.baked_light import BakedLight
 from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Hairdo, Part, Texture
-from tts2face.models.face_layout import MAX_TEXTURES, SCORE_INPUTS, WIDE_OPEN, check_face, texture_number
+from tts2face.models.face_layout import LIGHT, MAX_TEXTURES, SCORE_INPUTS, WIDE_OPEN, check_face, texture_number
 from tts2face.models.late import Late
+from tts2face.models.light_coding import decode_light, encode_light
 from tts2face.models.mesh_coding import decode_tangents, decode_uv, encode_tangents, encode_uv
 from tts2face.models.occlusion_coding import decode_occlusion, encode_occlusion
 from tts2face.models.picture_coding import (
@@ -78,10 +80,7 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
     if face.occlusion is not None:
         arrays["occlusion"] = encode_occlusion(face.occlusion)
     presets = dict(identities or {})
-    for number, preset in enumerate(presets.values()):
-        steps, step = _quantise(preset.displacement)
-        arrays[f"identity{number}"] = steps
-        arrays[f"identity{number}_step"] = np.array([step], np.float32)
+    arrays |= _pack_identities(presets)
     header = {
         "parts": [_part_fields(part) for part in face.parts],
         "shape_names": list(face.shape_names),
@@ -102,6 +101,8 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
     if face.scores is not None:
         arrays |= score_map_arrays(face.scores)
         header[SCORE_INPUTS] = list(face.scores.inputs)
+    for light in face.light:
+        arrays[LIGHT], header[LIGHT] = encode_light(light)
     write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
 
 
@@ -126,7 +127,16 @@ def read_face(path: Path, identity: str | None = None, *, checks_pictures: bool 
     face = _face_from_arrays(arrays, header, path)
     if checks_pictures:
         tuple(face.textures)
+        tuple(face.light)
     return face if identity is None else _apply_identity(face, arrays, header, names.index(identity))
+
+
+def _pack_identities(presets: Mapping[str, Identity]) -> dict[str, NDArray[Any]]:
+    arrays: dict[str, NDArray[Any]] = {}
+    for number, preset in enumerate(presets.values()):
+        steps, step = _quantise(preset.displacement)
+        arrays |= {f"identity{number}": steps, f"identity{number}_step": np.array([step], np.float32)}
+    return arrays
 
 
 def _quantise(values: NDArray[np.floating]) -> tuple[NDArray[np.int16], float]:
@@ -205,6 +215,14 @@ def _read_textures(arrays: Mapping[str, NDArray[Any]], path: Path) -> Late[Textu
     return Late(len(pictures), decode)
 
 
+def _read_light(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Sequence[BakedLight]:
+    if LIGHT not in arrays:
+        return ()
+    names = {"vertices": "vertices", "triangles": "triangles", "shapes": "shape_steps"}
+    sizes = {what: len(arrays[name]) for what, name in names.items()}
+    return Late(1, lambda: [decode_light(arrays[LIGHT], header[LIGHT], sizes, path)])
+
+
 def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Face:
     eyes = [
         Eye(
@@ -237,6 +255,7 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
         pivot=arrays["pivot"],
         metadata=header["metadata"],
         scores=score_map_from_arrays(arrays, tuple(header.get(SCORE_INPUTS, ()))),
+        light=_read_light(arrays, header, path),
     )
 
 

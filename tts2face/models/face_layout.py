@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.models.baked_light import OPENING_LANDMARKS
 from tts2face.models.face import PART_KINDS
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.occlusion_coding import MAX_OCCLUSION_BYTES
@@ -32,6 +33,7 @@ from tts2face.storage.schema import (
 )
 
 SCORE_INPUTS = "score_inputs"  # key of the metadata: names of the shapes that the score map reads
+LIGHT = "light"  # array of baked light, and the key of the metadata that describes it
 MAX_TEXTURES = 16
 MAX_WEIGHT = 100.0  # of a shape; common shapes have 0 to 1, gesture modes up to about 30
 MAX_STEP_MM = 0.1  # 16 bits of it are 3 m
@@ -81,6 +83,7 @@ TENSORS: Mapping[str, Tensor] = {
     "uv": Tensor("uint16", ("vertices", 2), is_optional=True),
     "tangents": Tensor("int8", ("vertices", 3), is_optional=True),
     "occlusion": Tensor("uint8", ("bytes of occlusion",), is_optional=True),
+    LIGHT: Tensor("uint8", ("bytes of light",), is_optional=True),
     "landmarks": Tensor("int32", ("landmarks",), may_be_empty=True),
     "landmark_vertices": Tensor("int32", ("landmarks", N_CORNERS), may_be_empty=True),
     "landmark_weights": Tensor("float32", ("landmarks", N_CORNERS), -SUM_WITHIN, 1 + SUM_WITHIN, may_be_empty=True),
@@ -118,6 +121,7 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
         contents.indices(name, n_vertices, "vertices")
     contents.indices("landmarks", N_LANDMARKS, "landmarks of the face mesh")
     contents.distinct("landmarks")
+    _check_light(contents)
     _check_textures(contents)
     _check_places(contents)
     _check_shapes(contents, n_vertices)
@@ -138,6 +142,14 @@ def _check_textures(contents: Contents) -> None:
         contents.require(own < n_textures or own <= 0, f"the part {part['name']!r} has no texture {own}")
         has_alpha = own >= 0 and texture_tensors(own)[1] in arrays
         contents.require(has_alpha or not part.get("cutout", False), "has a part with cutout, but no alpha")
+
+
+def _check_light(contents: Contents) -> None:
+    """Light itself is checked when it is inflated."""
+    arrays, header = contents.arrays, contents.header
+    contents.require((LIGHT in arrays) == (LIGHT in header), "has only one of light and what describes it")
+    lacks = set(OPENING_LANDMARKS) - set(arrays["landmarks"].tolist())
+    contents.require(LIGHT not in arrays or not lacks, f"has light, but not the landmark {min(lacks, default=0)}")
 
 
 def texture_number(part: Mapping[str, Any]) -> int:

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +13,9 @@ from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face import Face
 from tts2face.prefetch import map_in_order
 from tts2face.render import vtk_renderer
-from tts2face.render.picture import HIGH, PYVISTA, Picture
-from tts2face.render.picture_kernels import DrawingBuffers, allocate_buffers, draw_surface
-from tts2face.render.scene import Scene, available_cores, build_scene
+from tts2face.render.film.scene import LitScene, build_lit_scene
+from tts2face.render.picture import PYVISTA, Picture
+from tts2face.render.scene import Scene, available_cores, build_scene, draw_background
 from tts2face.types import Clip
 
 
@@ -22,7 +23,7 @@ from tts2face.types import Clip
 class MeshRenderer:
     """Renderer of a mesh face; implements `tts2face.render.renderer.FrameRenderer`."""
 
-    scene: Scene
+    scene: Scene | LitScene
 
     @property
     def picture(self) -> Picture:
@@ -47,11 +48,11 @@ class MeshRenderer:
         del first  # a mesh has no background video
         values = self._weights(clip)
         poses = zip(values, clip.head.values, strict=True)
-        if self.picture.renderer == PYVISTA:
+        if self.picture.renderer == PYVISTA and isinstance(self.scene, Scene):
             yield from vtk_renderer.render_frames(self.scene, poses)
             return
         n_threads = threads or available_cores()
-        free_buffers = deque(self._allocate_buffers() for _ in range(n_threads))
+        free_buffers = deque(self.scene.allocate_buffers() for _ in range(n_threads))
 
         def draw_one(pose: tuple[NDArray[np.float32], NDArray[np.float32]]) -> NDArray[np.uint8]:
             buffers = free_buffers.popleft()
@@ -78,10 +79,10 @@ class MeshRenderer:
         if np.shape(weights) != (n_shapes,):
             raise InputError(f"the face has {n_shapes} shapes, not weights of shape {np.shape(weights)}")
         pose = np.asarray(weights, np.float32), np.asarray(head, np.float32)
-        if self.picture.renderer == PYVISTA:
+        if self.picture.renderer == PYVISTA and isinstance(self.scene, Scene):
             (pixels,) = vtk_renderer.render_frames(self.scene, [pose])
             return pixels
-        return self._draw(*pose, self._allocate_buffers())
+        return self._draw(*pose, self.scene.allocate_buffers())
 
     def _weights(self, clip: Clip) -> NDArray[np.float32]:
         names = self.scene.face.shape_names
@@ -94,18 +95,11 @@ class MeshRenderer:
             return clip.motion.values
         return np.pad(clip.motion.values, ((0, 0), (0, len(names) - n_channels)))
 
-    def _allocate_buffers(self) -> DrawingBuffers:
-        picture = self.picture
-        size, side = (picture.width, picture.height), picture.samples_per_side
-        return allocate_buffers(self.scene.surface, size, side, samples_all=picture.quality == HIGH)
-
-    def _draw(
-        self, weights: NDArray[np.float32], head: NDArray[np.float32], buffers: DrawingBuffers
-    ) -> NDArray[np.uint8]:
+    def _draw(self, weights: NDArray[np.float32], head: NDArray[np.float32], buffers: Any) -> NDArray[np.uint8]:
         scene, picture = self.scene, self.picture
         pixels = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
         pixels[:, :, :3] = scene.background
-        draw_surface(scene.pose(weights, head), scene.surface, scene.optics, buffers, pixels)
+        scene.draw(weights, head, buffers, pixels)
         return pixels
 
 
@@ -119,6 +113,9 @@ def mesh_renderer(face: Face, picture: Picture) -> MeshRenderer:
     """
     if picture.renderer == PYVISTA:
         vtk_renderer.require_gl()
+    elif face.light:
+        background = draw_background(picture, face.light[0].backdrop)
+        return MeshRenderer(build_lit_scene(face, face.light[0], picture, background))
     return MeshRenderer(build_scene(face, picture))
 
 

@@ -3,6 +3,7 @@
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,15 @@ from tts2face.render.camera import CameraMatrices, camera_matrices
 from tts2face.render.camera_views import CameraView
 from tts2face.render.fragment_rows import OPEN_SURFACE
 from tts2face.render.occlusion import occlusion_poses
-from tts2face.render.picture import DRAFT, STUDIO, Picture, parse_background
-from tts2face.render.picture_kernels import Pose, allocate_buffers, draw_samples, project_surface
+from tts2face.render.picture import DRAFT, HIGH, STUDIO, Picture, parse_background
+from tts2face.render.picture_kernels import (
+    DrawingBuffers,
+    Pose,
+    allocate_buffers,
+    draw_samples,
+    draw_surface,
+    project_surface,
+)
 from tts2face.render.raster import NOT_DRAWN
 from tts2face.render.soft_shadows import Exposure, compute_exposure
 from tts2face.render.studio_light import FIRST_LIGHT_ROW, lamp_directions, light_table
@@ -46,6 +54,21 @@ class Scene:
         turn = (view[:, :3] @ head_transform(head, surface.rig.pivot)[:, :3]).astype(np.float32)
         eyes = surface.eyes.table((points, weights, head), view, lamps)
         return Pose(points, self.lights, self.exposure.at(weights), eyes, turn)
+
+    def allocate_buffers(self) -> DrawingBuffers:
+        """Buffers for pictures of this scene."""
+        picture, size = self.picture, (self.picture.width, self.picture.height)
+        return allocate_buffers(self.surface, size, picture.samples_per_side, samples_all=picture.quality == HIGH)
+
+    def draw(
+        self,
+        weights: NDArray[np.float32],
+        head: NDArray[np.float32],
+        buffers: DrawingBuffers,
+        pixels: NDArray[np.uint8],
+    ) -> None:
+        """Draw the face with shape weights (K,) and a head pose (6,) over the background in `pixels`, in place."""
+        draw_surface(self.pose(weights, head), self.surface, self.optics, buffers, pixels)
 
 
 def build_scene(face: Face, picture: Picture) -> Scene:
@@ -89,8 +112,8 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def draw_background(picture: Picture) -> NDArray[np.uint8]:
-    """Background (H, W, 3) of a picture, sRGB; black for a transparent picture.
+def draw_background(picture: Picture, studio: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:
+    """Background (H, W, 3) of a picture, sRGB; black for a transparent picture; a face may have its own studio.
 
     Raises
     ------
@@ -102,6 +125,10 @@ def draw_background(picture: Picture) -> NDArray[np.uint8]:
         return _load_image(kind, picture.width, picture.height)
     plain = np.zeros((picture.height, picture.width, 3), np.uint8)
     if kind == STUDIO:
+        if studio is not None:
+            from PIL import Image
+
+            return _fitted(Image.fromarray(studio), picture.width, picture.height)
         return _draw_studio(picture.width, picture.height)
     if isinstance(kind, tuple):
         plain[:] = kind
@@ -120,8 +147,12 @@ def _draw_studio(width: int, height: int) -> NDArray[np.uint8]:
 
 
 def _load_image(path: Path, width: int, height: int) -> NDArray[np.uint8]:
-    """Image scaled and cropped to fill the picture."""
+    with open_picture(path, "the background image") as file:
+        return _fitted(file.convert("RGB"), width, height)
+
+
+def _fitted(image: Any, width: int, height: int) -> NDArray[np.uint8]:
+    """Image of Pillow scaled and cropped to fill the picture."""
     from PIL import Image, ImageOps
 
-    with open_picture(path, "the background image") as file:
-        return np.array(ImageOps.fit(file.convert("RGB"), (width, height), Image.Resampling.LANCZOS))
+    return np.array(ImageOps.fit(image, (width, height), Image.Resampling.LANCZOS))

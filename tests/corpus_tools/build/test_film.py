@@ -14,6 +14,7 @@ from corpus_tools.film.poses import expression_pose, farthest
 from tests.characters.makehuman import makehuman
 from tts2face.models.face_loading import load_face
 from tts2face.render.camera_views import CameraView
+from tts2face.render.film.view_transform import table_levels
 
 SIDE, SAMPLES = 96, 2
 
@@ -59,10 +60,10 @@ def test_a_character_is_traced_in_its_light(scene: Any, tmp_path: Path) -> None:
 
 
 def test_light_is_baked_into_texels_and_vertices(scene: Any) -> None:
-    from corpus_tools.film.bake import bake_texels, bake_vertices, displayed, table_levels, view_table
+    from corpus_tools.film.bake import TexelBake, bake_vertices, displayed, view_table
 
     scene.pose(np.zeros(len(scene.face.shape_names)), np.zeros(6))
-    skin = bake_texels(scene, ["skin"], SIDE, SAMPLES)
+    skin = TexelBake(scene, ["skin"], SIDE).light(SAMPLES)
     lit = skin[skin.max(axis=2) > 0.05]
     assert len(lit) > 0.2 * SIDE**2
     assert (lit.mean(axis=0) == np.sort(lit.mean(axis=0))[::-1]).all()  # red, green, blue

@@ -1,0 +1,57 @@
+"""Eyes: the mirror image of the lamps, and the view transform."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import RegularGridInterpolator
+
+from tts2face.render.film.eyes import LAMP_LIGHT, REFRACTION, look_up, mirror_lamps
+from tts2face.render.film.view_transform import table_levels
+
+CAMERA = np.zeros(15, np.float32)
+SKY = np.array([0.1, 0.2, 0.3], np.float32)
+
+
+def lamp_at(z: float, facing: float) -> np.ndarray:
+    row = np.zeros(17, np.float32)
+    row[2], row[3], row[7], row[11], row[12:14] = z, 1.0, 1.0, facing, 50.0
+    row[LAMP_LIGHT:] = 7.0
+    return row
+
+
+def mirrored(lamps, normal=(0.0, 0.0, 1.0), point=(0.0, 0.0, -500.0)):
+    light = np.zeros(3, np.float32)
+    rows = np.array(lamps, np.float32).reshape(-1, 17)
+    mirror_lamps(*(np.array(one, np.float32) for one in (point, normal)), CAMERA, rows, SKY, light)
+    return light
+
+
+def test_an_eye_mirrors_the_lamp_behind_the_camera_by_fresnels_share() -> None:
+    share = ((REFRACTION - 1) / (REFRACTION + 1)) ** 2
+    assert mirrored([lamp_at(300, -1)]) == pytest.approx(share * (SKY + 7), rel=1e-4)
+    assert mirrored([lamp_at(300, 1)]) == pytest.approx(share * SKY, rel=1e-4)  # it shines the other way
+    assert mirrored([lamp_at(-900, -1)]) == pytest.approx(share * SKY, rel=1e-4)  # it stands behind the eye
+    assert mirrored([lamp_at(300, -1)], normal=(0, 0, -1)) == pytest.approx(0)
+
+
+def test_a_mirrored_lamp_has_soft_edges_and_the_rim_mirrors_more() -> None:
+    tilts = np.radians(np.linspace(0, 4, 60))
+    seen = [mirrored([lamp_at(0, -1)], normal=(np.sin(a), 0, np.cos(a)))[0] for a in tilts]
+    assert (np.diff(seen) < 1e-4).all()
+    between = [value for value in seen if 1.2 * seen[-1] < value < 0.8 * seen[0]]
+    assert len(between) >= 3
+    flat = mirrored([], normal=(np.sin(1.4), 0, np.cos(1.4)))
+    assert (flat > 5 * mirrored([])).all()
+
+
+def test_the_view_transform_is_read_between_its_entries() -> None:
+    rng = np.random.default_rng(0)
+    levels = table_levels()
+    view = rng.uniform(0, 255, (33, 33, 33, 3)).astype(np.float32)
+    places = np.log(levels + 0.004)
+    exact = RegularGridInterpolator((places,) * 3, view)
+    for light in rng.uniform(0, 12, (50, 3)).astype(np.float32):
+        colour = np.zeros(3, np.float32)
+        look_up(view, light, colour)
+        assert colour == pytest.approx(exact(np.log(light + 0.004))[0], abs=0.2)
+    look_up(view, np.array([-1, 99, 0], np.float32), colour)
+    assert colour == pytest.approx(view[0, 32, 0], abs=0.5)

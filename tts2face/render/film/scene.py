@@ -1,0 +1,264 @@
+"""Scene of a face with baked light: everything that is constant over the frames of a clip, and one frame."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.face.deformation import eye_rotations, head_transform
+from tts2face.models.baked_light import LEAST_SIDE, BakedLight
+from tts2face.models.face import Face
+from tts2face.render.camera import CameraMatrices, camera_matrices
+from tts2face.render.film.eyes import CENTRE, N_EYE_COLUMNS, TURN, colour_eyes
+from tts2face.render.film.light import add_modes, pack_change, write_colours
+from tts2face.render.film.pose_features import (
+    Cardinal,
+    Features,
+    Opening,
+    camera_weights,
+    opening_weights,
+    turn_weights,
+    yaw_and_pitch_deg,
+)
+from tts2face.render.film.shading import (
+    AT_RED,
+    CHANGE_CODING,
+    COLOUR_CODING,
+    N_VALUES,
+    add_texels,
+    compose,
+    evaluate,
+    fetch,
+    find_texels,
+    lay_planes,
+    list_fragments,
+)
+from tts2face.render.film.surface import TEXELS_A_PIXEL, LitSurface, build_surface, stack_pages, still_change
+from tts2face.render.film.visibility import BLOCK, RED, X, find_nearest, project
+from tts2face.render.picture import Picture
+
+Float32Array = NDArray[np.float32]
+
+BLINK_SHRINK = 0.075  # of the ball behind a shut lid, times its weight to the fourth power
+BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")  # of the face's eyes
+BAND_PIXELS = 32_768
+
+
+@dataclass(slots=True, eq=False)
+class LitBuffers:
+    """Buffers for drawing one picture at a time, by bands of rows of pixels; the kernels describe them."""
+
+    band_rows: int
+    table: Float32Array
+    nearest: NDArray[np.int64]
+    triangle: NDArray[np.int32]
+    place: Float32Array
+    samples: NDArray[np.int32]
+    pixels: NDArray[np.int32]
+    done: NDArray[np.int32]
+    frame: int
+    planes: Float32Array
+    values: Float32Array
+    texel: NDArray[np.int32]
+    share: Float32Array
+    corners: NDArray[np.int32]
+    light: Float32Array
+    mouth: Float32Array
+    balls: Float32Array
+    change: Float32Array
+    changed: NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LitScene:
+    """A face with baked light, its camera and its background; built by `build_lit_scene`."""
+
+    face: Face
+    picture: Picture
+    background: NDArray[np.uint8]
+    surface: LitSurface
+    optics: CameraMatrices
+    camera: Float32Array
+    texels: NDArray[np.int32]
+    texture_size: tuple[int, int]
+    from_camera: Float32Array
+    view: Float32Array
+    features: Features
+    opening: Opening
+    turns: Cardinal
+
+    def allocate_buffers(self) -> LitBuffers:
+        """Buffers for pictures of this scene."""
+        light, surface, picture = self.surface.light, self.surface, self.picture
+        side, n_triangles = picture.samples_per_side, len(surface.triangles)
+        rows = max(1, BAND_PIXELS // picture.width)
+        n_fragments = picture.width * rows * side * side
+        changed, _ = still_change(light.turn_side)
+        return LitBuffers(
+            band_rows=rows,
+            table=surface.template.copy(),
+            nearest=np.zeros((picture.height * side, picture.width * side + BLOCK), np.int64),
+            triangle=np.zeros(n_fragments, np.int32),
+            place=np.zeros((2, n_fragments), np.float32),
+            samples=np.zeros(n_fragments, np.int32),
+            pixels=np.zeros(picture.width * rows + 1, np.int32),
+            done=np.zeros(n_triangles, np.int32),
+            frame=0,
+            planes=np.zeros((n_triangles, 3, N_VALUES), np.float32),
+            values=np.zeros((N_VALUES, n_fragments), np.float32),
+            texel=np.zeros(n_fragments, np.int32),
+            share=np.zeros((2, n_fragments), np.float32),
+            corners=np.zeros((4, n_fragments), np.int32),
+            light=np.zeros((len(light.rows), 3), np.float32),
+            mouth=np.zeros((len(light.mouth_rows), 3), np.float32),
+            balls=np.zeros((len(light.ball_rows), 3), np.float32),
+            change=np.zeros((3, light.n_texels), np.float32),
+            changed=changed,
+        )
+
+    def draw(self, weights: Float32Array, head: Float32Array, buffers: LitBuffers, pixels: NDArray[np.uint8]) -> None:
+        """Draw the face with shape weights (K,) and a head pose (6,) over the background in `pixels`, in place."""
+        surface, side = self.surface, self.picture.samples_per_side
+        points = self.pose(weights, head)
+        self.light_pose(weights, head, points, buffers)
+        optics = (self.optics.view.astype(np.float32), self.optics.lens.astype(np.float32))
+        project(points, surface.source, *optics, buffers.table)
+        find_nearest(buffers.table, surface.triangles, buffers.nearest)
+        buffers.frame += 1
+        eyes = (self._eye_rows(weights, head), surface.eye_texture, self.camera)
+        light = (self._lamps(head), surface.light.sky, self.view)
+        rows = buffers.band_rows
+        for first in range(0, len(pixels), rows):
+            band = pixels[first : first + rows]
+            place = (side, first * side)
+            found = (buffers.triangle, *buffers.place)
+            nearest = buffers.nearest[first * side : (first + rows) * side]
+            starts = buffers.pixels[: band.shape[0] * band.shape[1] + 1]
+            count = list_fragments(nearest, place, surface.piece_of, (*found, buffers.samples), starts)
+            if count:
+                self._colour(found, count, buffers)
+                shapes = (buffers.table, surface.triangles, surface.eye_of)
+                colour_eyes(found, count, shapes, eyes, light, buffers.values[AT_RED:])
+                compose(starts, buffers.samples, side * side, buffers.values[AT_RED:], band)
+
+    def _colour(self, found: Any, count: int, buffers: LitBuffers) -> None:
+        """Write the colours of fragments; on eyeballs, the light."""
+        surface, values = self.surface, buffers.values
+        marks = (buffers.done, buffers.frame)
+        lay_planes(buffers.triangle, count, buffers.table, surface.triangles, marks, buffers.planes)
+        evaluate(found[0], found[1], found[2], count, buffers.planes, values)
+        width = surface.light.turn_side
+        change = (buffers.changed, (width, len(buffers.changed) // width))
+        for (texels, size), coding in (((self.texels, self.texture_size), COLOUR_CODING), (change, CHANGE_CODING)):
+            find_texels(values, count, size, buffers.texel, buffers.share)
+            fetch(texels, size[0], buffers.texel, count, buffers.corners)
+            add_texels(buffers.corners, buffers.share, count, coding, values)
+
+    def pose(self, weights: Float32Array, head: Float32Array) -> Float32Array:
+        """(V, 3) vertices, mm; eyeballs look ahead, and are smaller behind shut lids."""
+        face = self.face
+        points = self.surface.rig.pose(weights, head)
+        moved = head_transform(head, face.pivot)
+        for number, eye in enumerate(face.eyes):
+            span = slice(eye.first, eye.first + eye.count)
+            share = 1 - BLINK_SHRINK * _weight(face, weights, BLINKS[number]) ** 4
+            ball = eye.centre + share * (face.vertices[span] - eye.centre)
+            points[span] = ball @ moved[:, :3].T + moved[:, 3]
+        return points
+
+    def light_pose(self, weights: Float32Array, head: Float32Array, points: Float32Array, buffers: LitBuffers) -> None:
+        """Write the light of a pose into the table and the texels of change."""
+        light, table = self.surface.light, buffers.table
+        turn = self.turns.at(yaw_and_pitch_deg(head))
+        features = np.concatenate([self.features.of(weights), turn])
+        opened = opening_weights(light.openings, self.opening.measures(points, head))
+        for base, modes, weight, out in (
+            (light.base, light.modes, features @ light.mode_weights, buffers.light),
+            (np.zeros_like(buffers.mouth), light.mouth, opened, buffers.mouth),
+            (light.ball_base, light.ball_modes, features @ light.ball_weights, buffers.balls),
+            (self.from_camera, light.turn_modes, turn @ light.turn_weights, buffers.change),
+        ):
+            add_modes(base.reshape(-1), modes.reshape(len(modes), base.size), weight, out.reshape(-1))
+        pack_change(buffers.change, buffers.changed)
+        at = 0
+        for lit in (buffers.light, buffers.mouth, buffers.balls):
+            write_colours(lit, table[at : at + len(lit)], RED)
+            at += len(lit)
+
+    def _eye_rows(self, weights: Float32Array, head: Float32Array) -> Float32Array:
+        moved = head_transform(head, self.face.pivot)
+        rows = np.zeros((len(self.face.eyes), N_EYE_COLUMNS), np.float32)
+        for row, eye, turn in zip(
+            rows, self.face.eyes, eye_rotations(self.surface.rig.eye_turns, weights), strict=True
+        ):
+            row[CENTRE : CENTRE + 3] = moved[:, :3] @ eye.centre + moved[:, 3]
+            row[TURN : TURN + 9] = (moved[:, :3] @ turn).ravel()
+        return rows
+
+    def _lamps(self, head: Float32Array) -> Float32Array:
+        light = self.surface.light
+        if not light.head_lamps:
+            return light.lamps
+        lamps, moved = light.lamps.copy(), head_transform(head, self.face.pivot)
+        own = lamps[-light.head_lamps :]
+        own[:, :3] = own[:, :3] @ moved[:, :3].T + moved[:, 3]
+        for first in (3, 6, 9):
+            own[:, first : first + 3] = own[:, first : first + 3] @ moved[:, :3].T
+        return lamps
+
+
+def _weight(face: Face, weights: Float32Array, name: str) -> float:
+    return float(weights[face.shape_names.index(name)]) if name in face.shape_names else 0.0
+
+
+def build_lit_scene(face: Face, light: BakedLight, picture: Picture, background: NDArray[np.uint8]) -> LitScene:
+    """Scene of a face with baked light before a background (H, W, 3)."""
+    side = picture.samples_per_side
+    surface = build_surface(face, light)
+    optics = camera_matrices(picture.view, face, (picture.width * side, picture.height * side))
+    texels, size = stack_pages(light.pages, _level(surface, optics, side))
+    axes = optics.view[:, :3]
+    place = -axes.T @ optics.view[:, 3]
+    camera = np.concatenate([place, axes.ravel(), optics.lens[:3]]).astype(np.float32)
+    return LitScene(
+        face=face,
+        picture=picture,
+        background=background,
+        surface=surface,
+        optics=optics,
+        camera=camera,
+        texels=texels,
+        texture_size=size,
+        from_camera=_from_camera(light, picture.view.yaw_deg),
+        view=light.view.astype(np.float32),
+        features=Features.of_shapes(face.shape_names),
+        opening=Opening.of_face(face),
+        turns=turn_weights(light.turns_deg),
+    )
+
+
+def _level(surface: LitSurface, optics: CameraMatrices, side: int) -> int:
+    """How often the texels are halved so that they are not much smaller than pixels, over the skin that is seen."""
+    table = surface.template.copy()
+    view, lens = optics.view.astype(np.float32), optics.lens.astype(np.float32)
+    project(surface.rig.rest, surface.source, view, lens, table)
+    corners = table[surface.triangles]
+    edges = corners[:, 1:] - corners[:, :1]
+    seen = edges[:, 0, X] * edges[:, 1, X + 1] - edges[:, 0, X + 1] * edges[:, 1, X]
+    places = edges[:, :, 3:5] * np.array([surface.light.pages.shape[1], surface.light.pages.shape[1] * 2], np.float32)
+    texels = np.abs(places[:, 0, 0] * places[:, 1, 1] - places[:, 0, 1] * places[:, 1, 0])
+    ahead = (seen < 0) & (texels > 0)
+    ratio = math.sqrt(float(texels[ahead].sum()) / max(float(-seen[ahead].sum()) / side**2, 1.0))
+    most = int(math.log2(surface.light.pages.shape[1] / LEAST_SIDE))
+    return max(0, min(most, math.ceil(math.log2(max(ratio, 1e-3) / TEXELS_A_PIXEL))))
+
+
+def _from_camera(light: BakedLight, yaw_deg: float) -> Float32Array:
+    """(3, N) change of light in texels from a camera, at rest; before the head's turns."""
+    change = np.zeros((3, light.n_texels), np.float32)
+    weights = camera_weights(light.camera_yaws_deg).at(np.array([yaw_deg]))
+    second = slice(light.turn_side**2, 2 * light.turn_side**2)
+    change[:, second] = np.einsum("y,ycn->cn", weights * light.camera_sizes, light.camera_modes.astype(np.float32))
+    return change

@@ -1,0 +1,141 @@
+"""Surface of a face with baked light in the arrays that the kernels take."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+from tts2face.colour import decode_srgb
+from tts2face.face.deformation import FaceRig, build_rig
+from tts2face.models.baked_light import BLACK_SHARE, N_PAGES, BakedLight
+from tts2face.models.face import Face
+from tts2face.render.film.light import LIGHT_BITS, LIGHT_ZERO
+from tts2face.render.film.visibility import MAX_TRIANGLES, N_COLUMNS, RED, U, V
+
+DARK = (17.0, 6.0, 5.5)  # colour of skin that is seen from behind, in the mouth
+TEXELS_A_PIXEL = 1.0  # beyond which the next smaller texels are read
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LitSurface:
+    """Constant arrays for drawing a face with baked light.
+
+    Rows of the table of projected vertices: those of ``light.rows``, ``light.mouth_rows`` and ``light.ball_rows``, then
+    vertices with constant light.
+
+    Attributes
+    ----------
+    source : (V,)
+        Vertex of the face of each row.
+    template : (V, 8)
+        Texture coordinates, and the light that is constant.
+    triangles : (D, 3)
+        Rows of the table, counter-clockwise as they are drawn.
+    piece_of, eye_of : (D,)
+        Connected piece of each triangle, such as a lock of hair; its eye, -1 of none.
+    eye_texture : (S, S, 3)
+        Linear light.
+    """
+
+    face: Face
+    light: BakedLight
+    rig: FaceRig
+    source: NDArray[np.int32]
+    template: NDArray[np.float32]
+    triangles: NDArray[np.int32]
+    piece_of: NDArray[np.int32]
+    eye_of: NDArray[np.int32]
+    eye_texture: NDArray[np.float32]
+
+
+def build_surface(face: Face, light: BakedLight) -> LitSurface:
+    """Surface of a face.
+
+    Raises
+    ------
+    DataError
+        The face has more triangles than a picture can tell apart.
+    """
+    if len(light.triangles) > MAX_TRIANGLES:
+        raise DataError(f"a face with light may have {MAX_TRIANGLES} triangles, not {len(light.triangles)}")
+    backs = light.triangles < 0
+    numbers = np.where(backs, ~light.triangles, light.triangles)
+    corners = face.triangles[numbers]
+    corners[backs] = corners[backs][:, ::-1]
+    part_of = np.repeat(np.arange(len(face.parts), dtype=np.int32), [part.count for part in face.parts])[numbers]
+    pages = np.array([light.page_of.get(part.name, N_PAGES) for part in face.parts])
+    n_vertices = len(face.vertices)
+    dark = backs & (pages[part_of] == 0) & light.is_inside
+    keys = corners + np.where(dark, n_vertices, 0)[:, None]  # a vertex of the dark is another row
+    lit = np.concatenate([light.rows, light.mouth_rows, light.ball_rows])
+    others = np.setdiff1d(keys, lit)
+    order = np.concatenate([lit, others])
+    row_of = np.zeros(2 * n_vertices, np.int32)
+    row_of[order] = np.arange(len(order))
+    page_of = np.full(2 * n_vertices, N_PAGES)
+    page_of[keys] = np.where(dark, N_PAGES, pages[part_of])[:, None]
+    source = (order % n_vertices).astype(np.int32)
+    uv = np.zeros((n_vertices, 2)) if face.uv is None else face.uv
+    template = np.zeros((len(order), N_COLUMNS), np.float32)
+    template[:, U : V + 1] = page_places(uv[source].astype(np.float64), page_of[order], light.turn_side)
+    template[order >= n_vertices, RED:] = DARK
+    eye_of = np.full(len(corners), -1, np.int32)
+    for number, eye in enumerate(face.eyes):
+        eye_of[((corners >= eye.first) & (corners < eye.first + eye.count)).all(axis=1)] = number
+    iris = next((part for part in face.parts if part.name == "iris"), None)
+    picture = face.textures[iris.texture].pixels if iris is not None else np.full((2, 2, 3), 255, np.uint8)
+    return LitSurface(
+        face=face,
+        light=light,
+        rig=build_rig(face),
+        source=source,
+        template=template,
+        triangles=np.ascontiguousarray(row_of[keys]),
+        piece_of=_pieces(face, corners),
+        eye_of=eye_of,
+        eye_texture=(decode_srgb(picture / 255.0) * light.eye_gain).astype(np.float32),
+    )
+
+
+def _pieces(face: Face, corners: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(D,) number of the connected piece of each triangle (D, 3): pieces of one part have edges over each other."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    n = len(face.vertices)
+    a, b, c = corners.T
+    edges = (np.concatenate([a, b]), np.concatenate([b, c]))
+    joined = coo_matrix((np.ones(len(edges[0]), np.int8), edges), shape=(n, n))
+    pieces: NDArray[np.int32] = connected_components(joined, directed=False)[1][a].astype(np.int32)
+    return pieces
+
+
+def page_places(uv: NDArray[np.float64], page: NDArray[np.int64], least_side: int) -> NDArray[np.float64]:
+    """(N, 2) places in both pages, one above the other, of places (N, 2) in a page (N,); `N_PAGES` is the black below.
+
+    Half a texel of pages of `least_side` is kept from their edges.
+    """
+    half = 0.5 / least_side
+    inside = np.clip(uv[:, 1], half, 1 - half)
+    down = np.where(page < N_PAGES, page + inside, N_PAGES + 0.5 / BLACK_SHARE)
+    return np.column_stack([np.where(page < N_PAGES, uv[:, 0], 0.5), down / (N_PAGES + 1 / BLACK_SHARE)])
+
+
+def stack_pages(pages: NDArray[np.uint8], level: int) -> tuple[NDArray[np.int32], tuple[int, int]]:
+    """Texels (N,) of three numbers of 8 bits, of pages (2, S, S, 3) halved `level` times; and (width, height)."""
+    shrunk = pages.astype(np.float64)
+    for _ in range(level):
+        shrunk = (shrunk[:, ::2, ::2] + shrunk[:, 1::2, ::2] + shrunk[:, ::2, 1::2] + shrunk[:, 1::2, 1::2]) / 4
+    side = shrunk.shape[1]
+    black = np.zeros((side // BLACK_SHARE, side, 3))
+    numbers = np.rint(np.concatenate([*shrunk, black])).astype(np.int32)
+    packed = numbers[:, :, 0] | numbers[:, :, 1] << 8 | numbers[:, :, 2] << 16
+    return packed.ravel(), (side, len(packed))
+
+
+def still_change(side: int) -> tuple[NDArray[np.int32], tuple[int, int]]:
+    """Texels of no change of light, for pages of a side, and (width, height)."""
+    height = N_PAGES * side + side // BLACK_SHARE
+    zero = int(LIGHT_ZERO)
+    return np.full(height * side, zero | zero << LIGHT_BITS | zero << 2 * LIGHT_BITS, np.int32), (side, height)

@@ -1,0 +1,106 @@
+"""The nearest triangle of each sample: spans of rows, and one integer for depth and triangle.
+
+Every kernel releases the interpreter's lock and runs on one thread; each picture is drawn by one thread, so its bytes
+do not depend on the number of threads. Both triangles at an edge compute the same end of their spans and include it,
+so that no sample falls between them. Picture space: x right, y down, in samples.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.compilation import kernel
+
+Array = NDArray[Any]
+
+X, Y, NEAR, U, V, RED, GREEN, BLUE = range(8)  # columns of a table of projected vertices
+N_COLUMNS = 8
+TRIANGLE_BITS = 20
+MAX_TRIANGLES = (1 << TRIANGLE_BITS) - 2
+TRIANGLE_MASK = (1 << TRIANGLE_BITS) - 1  # of the triangle's number plus one in a sample
+DEPTH_SCALE = np.float32(2.0**41)  # of 1/z in 1/mm: 43 bits beside the triangle's, from 1 mm to 100 m
+BLOCK = 4  # samples at once, without a branch: spans are three long on average
+LEAST_AREA = np.float32(1e-3)  # twice that of a triangle that is drawn, in samples
+
+
+@kernel
+def project(points: Array, source: Array, view: Array, lens: Array, table: Array) -> None:
+    """Write columns X, Y and NEAR (1/mm; 0 nearer than the near plane) of the world points (P, 3), mm, of rows (V,).
+
+    `view` (3, 4) transforms world to camera space; `lens` is (focal length in samples, centre x, centre y, near plane).
+    Samples have whole coordinates at their centres.
+    """
+    half, one = np.float32(0.5), np.float32(1)
+    for v in range(len(source)):
+        p = source[v]
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        right = view[0, 0] * x + view[0, 1] * y + view[0, 2] * z + view[0, 3]
+        down = view[1, 0] * x + view[1, 1] * y + view[1, 2] * z + view[1, 3]
+        ahead = view[2, 0] * x + view[2, 1] * y + view[2, 2] * z + view[2, 3]
+        near = one / ahead if ahead >= lens[3] else np.float32(0)
+        table[v, X] = lens[1] + lens[0] * right * near - half
+        table[v, Y] = lens[2] + lens[0] * down * near - half
+        table[v, NEAR] = near
+
+
+@kernel
+def find_nearest(table: Array, triangles: Array, nearest: Array) -> None:
+    """Write the nearest triangle that faces the camera in each sample.
+
+    Parameters
+    ----------
+    table : (V, 8)
+        Projected vertices.
+    triangles : (F, 3)
+        Vertex indices, counter-clockwise as seen; those with a vertex nearer than the near plane are not drawn.
+    nearest : (H, W + BLOCK) int64
+        Out: 1/z in the high bits, the triangle's number plus one in the low ones; the largest wins. 0 where none is.
+    """
+    height, stride = nearest.shape
+    line = nearest.reshape(-1)
+    line[:] = 0
+    top_row, end_row = np.float32(0), np.float32(height - 1)
+    left_end, right_end = np.float32(0), np.float32(stride - BLOCK - 1)
+    for t in range(len(triangles)):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        ax, ay, bx, by, cx, cy = table[a, X], table[a, Y], table[b, X], table[b, Y], table[c, X], table[c, Y]
+        area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+        if area > -LEAST_AREA:
+            continue
+        low, high = np.ceil(max(min(ay, by, cy), top_row)), np.floor(min(max(ay, by, cy), end_row))
+        if low > high or np.ceil(max(min(ax, bx, cx), left_end)) > np.floor(min(max(ax, bx, cx), right_end)):
+            continue
+        az, bz, cz = table[a, NEAR], table[b, NEAR], table[c, NEAR]
+        if min(az, bz, cz) <= 0:
+            continue
+        inverse = np.float32(1) / area
+        across = ((bz - az) * (cy - ay) - (cz - az) * (by - ay)) * inverse
+        along = ((cz - az) * (bx - ax) - (bz - az) * (cx - ax)) * inverse
+        origin = az - across * ax - along * ay
+        if by < ay:
+            ax, ay, bx, by = bx, by, ax, ay
+        if cy < by:
+            bx, by, cx, cy = cx, cy, bx, by
+            if by < ay:
+                ax, ay, bx, by = bx, by, ax, ay
+        whole = (cx - ax) / (cy - ay)
+        upper = (bx - ax) / (by - ay) if by > ay else np.float32(0)
+        lower = (cx - bx) / (cy - by) if cy > by else np.float32(0)
+        step = np.int64(across * DEPTH_SCALE) << TRIANGLE_BITS
+        number = np.int64(t + 1)
+        y = low
+        for row in range(int(low), int(high) + 1):
+            one_side = ax + whole * (y - ay)
+            other = ax + upper * (y - ay) if y < by else bx + lower * (y - by)
+            left = np.ceil(max(min(one_side, other), left_end))
+            right = int(np.floor(min(max(one_side, other), right_end)))
+            begin = int(left)
+            count = right + 1 - begin
+            depth = np.int64((origin + across * left + along * y) * DEPTH_SCALE) << TRIANGLE_BITS | number
+            at = np.uint64(row * stride + begin)
+            for block in range(0, count, BLOCK):
+                for column in range(block, block + BLOCK):
+                    own, old = depth + column * step, line[at + np.uint64(column)]
+                    line[at + np.uint64(column)] = own if (own > old) & (column < count) else old
+            y += np.float32(1)
