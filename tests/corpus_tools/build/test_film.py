@@ -1,5 +1,6 @@
 """Film light: the path tracer's picture of a drawn character, where Blender's package bpy and MakeHuman's data are."""
 
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -9,11 +10,15 @@ import pytest
 from PIL import Image
 
 from corpus_tools.drawn.build_drawn import CAST, drawn_face, face_masks
+from corpus_tools.film.compare import View, differences, draw_view
+from corpus_tools.film.fit_light import fit_light
 from corpus_tools.film.look import LAMPS, Look
-from corpus_tools.film.poses import expression_pose, farthest
+from corpus_tools.film.pose_light import PoseLight
+from corpus_tools.film.poses import EXPRESSIONS, LitPose, expression_pose, farthest
 from tests.characters.makehuman import makehuman
+from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face
-from tts2face.render.camera_views import CameraView
+from tts2face.render.camera_views import CameraView, parse_camera
 from tts2face.render.film.view_transform import table_levels
 
 SIDE, SAMPLES = 96, 2
@@ -76,6 +81,33 @@ def test_light_is_baked_into_texels_and_vertices(scene: Any) -> None:
     assert (np.diff(greys) >= 0).all()
     assert (greys[0], greys[-1]) == (0, 1)
     assert table[16, 16, 16] == pytest.approx(displayed(np.full((1, 3), table_levels()[16], np.float32))[0], abs=1e-3)
+
+
+def test_a_character_is_drawn_in_its_baked_light(scene: Any, tmp_path: Path) -> None:
+    from corpus_tools.film.bake_poses import Effort, bake_poses
+
+    face, still = scene.face, np.zeros(6, np.float32)
+    shown = {"rest": {}, **{name: EXPRESSIONS[name] for name in ("a", "smile", "blink")}}
+    poses = [LitPose(name, expression_pose(face, weights), still) for name, weights in shown.items()]
+    turns = [np.radians([pitch, yaw, 0, 0, 0, 0]).astype(np.float32) for yaw, pitch in ((-20, 0), (20, 0), (0, 12))]
+    poses += [LitPose(f"head {number}", poses[0].weights, head) for number, head in enumerate(turns)]
+    effort = Effort(side=256, pose_side=192, rest=2, pose=1, turn=1, reference=2, mouth=2, small=1, wall=2)
+    steps: list[str] = []
+    baked = bake_poses(scene, poses, effort, steps.append)
+    assert steps[1] == "rest"
+    baked.save(tmp_path / "baked.npz")
+    lit = replace(face, light=(fit_light(face, PoseLight.load(tmp_path / "baked.npz"), Look()),))
+    write_face(tmp_path / "lit.face", lit)
+    lit = read_face(tmp_path / "lit.face")
+    for pose in (poses[0], poses[1]):
+        drawn, regions = draw_view(lit, View(pose, "front"), SIDE)
+        scene.look_from(parse_camera("front"), SIDE)
+        scene.pose(pose.weights, pose.head)
+        scene.render(tmp_path / "traced.png", 8, has_wall=False)
+        apart = differences(drawn, np.asarray(Image.open(tmp_path / "traced.png")), regions)
+        assert apart["face"] < 12
+        assert apart["hair"] < 20
+        assert apart["mouth"] < 25
 
 
 def test_poses_lie_far_apart() -> None:
