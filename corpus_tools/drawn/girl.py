@@ -11,8 +11,8 @@ TARGETS = {
     "macrodetails/universal-female-child-averagemuscle-averageweight": 1.0,
     "mouth/mouth-angles-up": 0.45, "mouth/mouth-cupidsbow-decr": 0.3, "mouth/mouth-laugh-lines-out": 0.5,
     "mouth/mouth-upperlip-middle-up": 0.3, "mouth/mouth-scale-horiz-incr": 0.35,
-    "mouth/mouth-lowerlip-height-decr": 0.4, "mouth/mouth-upperlip-height-decr": 0.4,
-    "mouth/mouth-upperlip-volume-decr": 0.6, "mouth/mouth-lowerlip-volume-decr": 0.5,
+    "mouth/mouth-lowerlip-height-decr": 0.3, "mouth/mouth-upperlip-height-decr": 0.3,
+    "mouth/mouth-upperlip-volume-decr": 0.4, "mouth/mouth-lowerlip-volume-decr": 0.2,
     "eyes/l-eye-height1-incr": 0.5, "eyes/r-eye-height1-incr": 0.5, "eyes/l-eye-height2-incr": 0.9,
     "eyes/r-eye-height2-incr": 0.9, "eyes/l-eye-height3-incr": 0.7, "eyes/r-eye-height3-incr": 0.7,
     "eyes/l-eye-bag-decr": 0.8, "eyes/r-eye-bag-decr": 0.8,
@@ -90,5 +90,5 @@ GIRL = Character(
     collar=Collar(
         across=50, ahead=46, behind=60, front=-134, back=-110, middle=-64, half_width=8.5, half_height=13, tilt=-12
     ),
-    rest={"mouthSmile": 0.36, "cheekSquint": 0.14, "eyeSquint": 0.14, "eyeBlink": 0.03},
+    rest={"mouthSmile": 0.27, "cheekSquint": 0.14, "eyeSquint": 0.14, "eyeBlink": 0.03},
 )  # fmt: skip

@@ -44,5 +44,5 @@ def test_lips_touch_at_rest_and_part_with_the_jaw(face: Face) -> None:
 
 def test_lids_shut(face: Face) -> None:
     rest, shut = places(face), places(face, eyeBlinkLeft=1.0)
-    assert rest[UPPER_LID][1] - rest[LOWER_LID][1] > 18.0
+    assert rest[UPPER_LID][1] - rest[LOWER_LID][1] > 15.0
     assert shut[UPPER_LID][1] - shut[LOWER_LID][1] < 0.5
