@@ -122,6 +122,11 @@ class BakedLight:
                 array.setflags(write=False)
 
     @property
+    def n_shapes(self) -> int:
+        """Number of the face's own shapes, the first ones; those that a palette adds do not change its light."""
+        return len(self.mode_weights) - len(PRODUCTS) - len(self.turns_deg)
+
+    @property
     def turn_side(self) -> int:
         """Side of a page of the texels of change."""
         return round(float(np.sqrt(self.camera_modes.shape[2])))

@@ -17,9 +17,11 @@ from tests.render.film.lit_face import (
 )
 from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face_file import read_face, write_face
+from tts2face.models.face_parts import keep_parts
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.film.scene import LitScene
 from tts2face.render.picture import Picture
+from tts2face.render.scene import Scene
 
 FACE = lit_tiny_face()
 REST = np.zeros(len(FACE.shape_names), np.float32)
@@ -61,6 +63,21 @@ def test_light_changes_with_expression_head_and_camera() -> None:
     dark = [picture[picture.max(axis=1) < 90] for picture in lashes]
     assert np.median(dark[0], axis=0) == pytest.approx([30, 30, 30], abs=2)
     assert np.median(dark[1], axis=0) == pytest.approx([30, 30, 30 + CAMERA_CHANGE], abs=2)
+
+
+def test_shapes_that_a_palette_adds_move_the_face_in_the_light_of_its_own() -> None:
+    pushed = np.zeros_like(FACE.vertices)
+    pushed[:, 0] = 30.0
+    more = replace(
+        FACE,
+        shape_names=(*FACE.shape_names, "added"),
+        shapes=np.concatenate([FACE.shapes, pushed[None]]),
+        limits=np.concatenate([FACE.limits, FACE.limits[:1]]),
+    )
+    moved = drawn(more, np.append(pose(jawOpen=0.5), np.float32(1.0)))
+    still = drawn(weights=pose(jawOpen=0.5))
+    assert forehead(moved) == pytest.approx(forehead(still), abs=1)
+    assert np.abs(moved - still).mean() > 5
 
 
 @pytest.mark.parametrize(
@@ -125,6 +142,12 @@ def test_light_that_does_not_fit_its_face_is_refused(tmp_path, changes, what: st
     with pytest.raises(DataError, match=what) as refused:
         read_face(path)
     assert "bad.face" in str(refused.value)
+
+
+def test_a_face_without_some_of_its_parts_is_drawn_with_lamps() -> None:
+    bare = keep_parts(FACE, lambda part: part.name != "lashes")
+    assert bare.light == ()
+    assert isinstance(mesh_renderer(bare, Picture(size=SIZE)).scene, Scene)
 
 
 def test_a_face_with_light_needs_the_landmarks_of_its_mouth(tmp_path) -> None:

@@ -172,7 +172,7 @@ class LitScene:
         """Write the light of a pose into the table and the texels of change."""
         light, table = self.surface.light, buffers.table
         turn = self.turns.at(yaw_and_pitch_deg(head))
-        features = np.concatenate([self.features.of(weights), turn])
+        features = np.concatenate([self.features.of(weights[: light.n_shapes]), turn])
         opened = opening_weights(light.openings, self.opening.measures(points, head))
         for base, modes, weight, out in (
             (light.base, light.modes, features @ light.mode_weights, buffers.light),
@@ -233,7 +233,7 @@ def build_lit_scene(face: Face, light: BakedLight, picture: Picture, background:
         texture_size=size,
         from_camera=_from_camera(light, picture.view.yaw_deg),
         view=light.view.astype(np.float32),
-        features=Features.of_shapes(face.shape_names),
+        features=Features.of_shapes(face.shape_names[: light.n_shapes]),
         opening=Opening.of_face(face),
         turns=turn_weights(light.turns_deg),
     )
