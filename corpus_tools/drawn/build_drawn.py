@@ -40,6 +40,7 @@ from corpus_tools.head.skin import Skin, build_shoulders, build_skin
 from corpus_tools.head.source import SourceMesh, fetch_data, read_source
 from corpus_tools.head.tongue import tongue_piece
 from corpus_tools.training.score_files import calibrate_face_file
+from tts2face.face.hair_swing import LIMIT_RAD, SWING_SHAPES
 from tts2face.models.face import Face, Texture
 from tts2face.models.face_file import write_face
 from tts2face.render.occlusion import bake_occlusion
@@ -67,7 +68,10 @@ def drawn_face(source: SourceMesh, character: Character) -> Face:
     )
     about = {"name": character.name, "summary": character.summary, **METADATA}
     about["made_by"] = "python -m corpus_tools.drawn.build_drawn"
-    return add_landmarks(assemble_face(built, shape_names(cage), textures, about), skin.base)
+    face = assemble_face(built, [*shape_names(cage), *SWING_SHAPES], textures, about)
+    limits = face.limits.copy()
+    limits[-len(SWING_SHAPES) :] = -LIMIT_RAD, LIMIT_RAD
+    return add_landmarks(replace(face, limits=limits), skin.base)
 
 
 def face_masks(source: SourceMesh, face: Face) -> dict[str, NDArray[np.float64]]:

@@ -121,6 +121,8 @@ class Lock:
         Least distance of its middle line from the skin.
     curls : mm
         Height of curls over its surface; 0 for straight hair.
+    loose
+        Share of a lag of the hair that its tip follows, or a whole ball.
     """
 
     path: tuple[tuple[float, float, float], ...]
@@ -134,6 +136,7 @@ class Lock:
     is_ball: bool = False
     clearance: float = 3.0
     curls: float = 0.0
+    loose: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

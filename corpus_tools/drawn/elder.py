@@ -39,7 +39,7 @@ PALETTE = replace(
 )  # fmt: skip
 BUN = Lock(
     path=((85, 62, 20), (100, 78, 26), (-100, 78, 26), (-85, 62, 20)),
-    half_width=36, thickness=33, hollow=0.8, clearance=8.0, ridges=6, is_ball=True,
+    half_width=36, thickness=33, hollow=0.8, clearance=8.0, ridges=6, is_ball=True, loose=0.12,
 )  # fmt: skip
 LOCKS = (
     BUN,
@@ -49,7 +49,7 @@ LOCKS = (
                 (side * turn, low, -14), (side * (turn * 0.97 + 4), low + 0.3 * (78 - low), 5),
                 (side * (turn * 0.9 + 12), low + 0.65 * (80 - low), 9), (side * 120, 82, 6),
             ),
-            half_width=width, thickness=7, root=0.6, tip=0.6, ridges=3, clearance=-5.0,
+            half_width=width, thickness=7, root=0.6, tip=0.6, ridges=3, clearance=-5.0, loose=0.0,
         )
         for side in (1, -1)
         for turn, low, width in (
@@ -59,7 +59,7 @@ LOCKS = (
     ),
     Lock(
         path=((180, -36, -14), (180, 0, 6), (180, 45, 10), (180, 80, 6)),
-        half_width=22, thickness=7, root=0.6, tip=0.6, ridges=3, clearance=-5.0,
+        half_width=22, thickness=7, root=0.6, tip=0.6, ridges=3, clearance=-5.0, loose=0.0,
     ),
 )  # fmt: skip
 SIDE = (

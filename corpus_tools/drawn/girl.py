@@ -40,7 +40,7 @@ PALETTE = replace(
 PUFFS = tuple(
     Lock(
         path=((side * 26, 44, 16), (side * 42, 56, 25), (side * 68, 59, 26), (side * 92, 50, 17)),
-        half_width=39, thickness=36, hollow=0.9, clearance=14.0, is_ball=True, curls=2.4,
+        half_width=39, thickness=36, hollow=0.9, clearance=14.0, is_ball=True, curls=2.4, loose=0.35,
     )
     for side in (1, -1)
 )  # fmt: skip
@@ -52,7 +52,7 @@ LOCKS = (
                 (side * turn, low, -4), (side * (0.8 * turn + 12), low + 0.35 * (52 - low), 4),
                 (side * (0.4 * turn + 34), low + 0.7 * (52 - low), 6), (side * 58, 52, 5),
             ),
-            half_width=width, thickness=5, root=0.3, tip=0.5, ridges=3, clearance=-4.0,
+            half_width=width, thickness=5, root=0.3, tip=0.5, ridges=3, clearance=-4.0, loose=0.0,
         )
         for side in (1, -1)
         for turn, low, width in (

@@ -13,6 +13,7 @@ from corpus_tools.drawn.fields import arc_length, profile, smooth_rows, wind_out
 from corpus_tools.head.piece import MaterialSpan, Piece
 from corpus_tools.head.skin import Skin, vertex_normals
 from corpus_tools.head.subdivide import grid_triangles, triangulate
+from tts2face.face.hair_swing import SWING_SHAPES
 from tts2face.numeric import smoothstep, unit_vectors
 
 Floats = NDArray[np.float64]
@@ -26,6 +27,7 @@ DEPTH = (AHEAD + BEHIND) / 2
 N_ALONG, N_TOP, N_UNDER = 36, 11, 4
 CURLED = 64, 33, 23  # the same of locks with curls
 CURL_MM = 9.0  # width of a curl
+LOOSE_FROM = 1.7  # exponent by which tips are looser than roots
 TIP_DENSITY = 1.35  # exponent by which rings are closer at the tip
 SHADE_ALONG = ((0, 0.72), (0.15, 0.92), (0.45, 1.06), (0.8, 1.0), (1, 0.92))
 RIM_SHADE, UNDER_SHADE, END_SHADE, SHELL_SHADE = 0.74, 0.80, 0.6, 0.95
@@ -39,6 +41,9 @@ def hair_piece(skin: Skin, style: Hairstyle, palette: Palette) -> Piece:
     scalp = Scalp(skin, style)
     tubes = [scalp.shell(), *(lock_tube(lock, scalp) for lock in style.locks)]
     points, faces, colours, uv, count = [], [], [], [], 0
+    shares = [np.zeros(len(tubes[0].points))]  # the shell is still
+    for lock, tube in zip(style.locks, tubes[1:], strict=True):
+        shares.append(lock.loose * (np.ones_like(tube.along) if lock.is_ball else tube.along**LOOSE_FROM))
     for number, (tube, tile) in enumerate(zip(tubes, hair_tiles(len(tubes)), strict=True)):
         colour = _colours(tube, palette)
         if style.fade and number == 0:
@@ -54,9 +59,17 @@ def hair_piece(skin: Skin, style: Hairstyle, palette: Palette) -> Piece:
         np.concatenate(points),
         (span,),
         np.concatenate(colours),
+        shapes=_swings(np.concatenate(points), np.concatenate(shares)),
         uv=np.concatenate(uv),
         tangents=np.concatenate([tube.tangents for tube in tubes]),
     )
+
+
+def _swings(points: Floats, share: Floats) -> dict[str, Floats]:
+    """Motion (N, 3) of the hair for a lag of 1 rad about the head's axes; `share` (N,) of it is followed."""
+    off = points - MIDDLE
+    axes = dict(zip(SWING_SHAPES, np.eye(3), strict=True))
+    return {name: share[:, None] * np.cross(axis, off) for name, axis in axes.items()}
 
 
 def hair_cover(skin: Skin, style: Hairstyle) -> Floats:

@@ -44,39 +44,39 @@ LOCKS = (
                 (turn, 50, 0), (turn * 1.05, 62, 9), (turn * 1.3, 76, 12), (180 - turn * 0.95, 78, 10),
                 (180 - turn * 0.8, 58, 7), (180 - turn * 0.75, 40, 2),
             ),
-            half_width=24, thickness=8, root=0.8, tip=1.1,
+            half_width=24, thickness=8, root=0.8, tip=1.1, loose=0.0,
         )
         for turn in (-58, 58, -28, 30, 2)
     ),
     # sides of the top
     Lock(
         path=((36, 38, -3), (48, 41, 5), (72, 44, 8), (100, 42, 7), (130, 34, 2)),
-        half_width=16, thickness=7, root=0.8,
+        half_width=16, thickness=7, root=0.8, loose=0.0,
     ),
     Lock(
         path=((-40, 38, -3), (-52, 41, 5), (-74, 44, 8), (-102, 42, 7), (-130, 34, 2)),
-        half_width=16, thickness=7, root=0.8,
+        half_width=16, thickness=7, root=0.8, loose=0.0,
     ),
     # the quiff: broad locks rise from the front hairline and roll over to his left, those behind first
     Lock(
         path=((-46, 38, -4), (-43, 44, 6), (-30, 58, 14), (0, 71, 16), (52, 74, 12), (84, 62, 5)),
-        half_width=22, thickness=9, root=0.34, clearance=0.5, ridges=1,
+        half_width=22, thickness=9, root=0.34, clearance=0.5, ridges=1, loose=0.2,
     ),
     Lock(
         path=((-30, 39, -4), (-25, 45, 9), (-10, 58, 20), (20, 67, 20), (54, 64, 14), (74, 52, 5)),
-        half_width=24, thickness=11, root=0.34, clearance=0.5, ridges=1,
+        half_width=24, thickness=11, root=0.34, clearance=0.5, ridges=1, loose=0.2,
     ),
     Lock(
         path=((-8, 40, -4), (-2, 45, 11), (14, 55, 23), (36, 60, 22), (56, 54, 14), (66, 43, 5)),
-        half_width=24, thickness=12, root=0.34, clearance=0.5, ridges=1,
+        half_width=24, thickness=12, root=0.34, clearance=0.5, ridges=1, loose=0.2,
     ),
     Lock(
         path=((15, 40, -4), (20, 44, 8), (31, 50, 16), (44, 50, 15), (55, 43, 9), (61, 35, 4)),
-        half_width=18, thickness=10, root=0.34, clearance=0.5, ridges=1,
+        half_width=18, thickness=10, root=0.34, clearance=0.5, ridges=1, loose=0.2,
     ),
     Lock(
         path=((30, 38, -3), (35, 40, 5), (43, 42, 8), (51, 38, 6), (56, 31, 3)),
-        half_width=10, thickness=6, root=0.34, clearance=0.5, ridges=1,
+        half_width=10, thickness=6, root=0.34, clearance=0.5, ridges=1, loose=0.2,
     ),
 )  # fmt: skip
 SIDE = (

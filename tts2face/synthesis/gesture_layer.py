@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.face.gesture_transfer import SPEECH_GAINS
+from tts2face.face.hair_swing import HairSwing, Swing
 from tts2face.gesture.easing import interpolate_keys
 from tts2face.gesture.gesture_stream import GestureFields, GestureStream, GestureValues
 from tts2face.gesture.perlin_noise import NoiseStream
@@ -63,6 +64,8 @@ class GestureLayer:
             palette.require(style)
         face.check_gains(self._requested.gains.factors)
         self._edits = ChannelEdits(self._requested.edits, face)
+        self._hair = HairSwing.of_channels(face.channels)
+        self._swing: Swing | None = None  # after the last piece
         kind: type[NoiseStream] | type[GestureStream] = NoiseStream if request.gestures == "noise" else GestureStream
         executor = ThreadPoolExecutor(1)  # building the fields takes 0.5 s, in parallel with loading the voice
         self._first: Future[GestureStream | NoiseStream] = executor.submit(
@@ -108,7 +111,10 @@ class GestureLayer:
         )
         moved = self._edits.apply(moved, round(self._seconds * lips.fps))
         self._stream, self._marked, self._seconds = stream, marked, self._seconds + len(lips) / lips.fps
-        return Clip(moved.face, moved.head, speech)
+        if self._hair is None or not len(lips):
+            return Clip(moved.face, moved.head, speech)
+        swung, self._swing = self._hair.apply(moved.face, moved.head, self._swing)
+        return Clip(swung, moved.head, speech)
 
     def _next(
         self, sound: Waveform, n_frames: int, timeline: Timeline
