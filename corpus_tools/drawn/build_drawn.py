@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.drawn.brows import brow_piece
 from corpus_tools.drawn.character import Character
-from corpus_tools.drawn.clothes import stud_pieces, sweater_piece
+from corpus_tools.drawn.clothes import breath, stud_pieces, sweater_piece
 from corpus_tools.drawn.elder import ELDER
 from corpus_tools.drawn.expressions import rest_in, soften
 from corpus_tools.drawn.girl import GIRL
@@ -40,6 +40,7 @@ from corpus_tools.head.skin import Skin, build_shoulders, build_skin
 from corpus_tools.head.source import SourceMesh, fetch_data, read_source
 from corpus_tools.head.tongue import tongue_piece
 from corpus_tools.training.score_files import calibrate_face_file
+from tts2face.face.breathing import BREATH_SHAPE
 from tts2face.face.hair_swing import LIMIT_RAD, SWING_SHAPES
 from tts2face.models.face import Face, Texture
 from tts2face.models.face_file import write_face
@@ -57,7 +58,8 @@ def drawn_face(source: SourceMesh, character: Character) -> Face:
     cage = drawn_cage(source, character.targets, character.proportions)
     balls = fit_eyeballs(cage, character.eyes)
     skin = _skin(build_skin(cage), reference, balls, character)
-    built = HeadPieces(_pieces(cage, skin, reference, balls, character), (1, 2), balls, PIVOT)
+    pieces = [_breathing(piece) for piece in _pieces(cage, skin, reference, balls, character)]
+    built = HeadPieces(tuple(pieces), (1, 2), balls, PIVOT)
     lips = skin.vertices[reference.lips]
     mouth_y = float(lips[np.abs(lips[:, 0]) < 6, 1].mean())
     hair = hair_cover(skin, character.hair)
@@ -68,10 +70,15 @@ def drawn_face(source: SourceMesh, character: Character) -> Face:
     )
     about = {"name": character.name, "summary": character.summary, **METADATA}
     about["made_by"] = "python -m corpus_tools.drawn.build_drawn"
-    face = assemble_face(built, [*shape_names(cage), *SWING_SHAPES], textures, about)
+    face = assemble_face(built, [*shape_names(cage), BREATH_SHAPE, *SWING_SHAPES], textures, about)
     limits = face.limits.copy()
     limits[-len(SWING_SHAPES) :] = -LIMIT_RAD, LIMIT_RAD
     return add_landmarks(replace(face, limits=limits), skin.base)
+
+
+def _breathing(piece: Piece) -> Piece:
+    moved = breath(piece.vertices)
+    return replace(piece, shapes={**piece.shapes, BREATH_SHAPE: moved}) if moved.any() else piece
 
 
 def face_masks(source: SourceMesh, face: Face) -> dict[str, NDArray[np.float64]]:

@@ -10,7 +10,7 @@ from corpus_tools.drawn.fields import wind_outward
 from corpus_tools.head.piece import MaterialSpan, Piece
 from corpus_tools.head.skin import Skin
 from corpus_tools.head.subdivide import grid_triangles
-from tts2face.numeric import unit_vectors
+from tts2face.numeric import smoothstep, unit_vectors
 
 Floats = NDArray[np.float64]
 
@@ -20,6 +20,8 @@ N_KNOTS, N_AROUND, N_SECTION = 12, 96, 16
 STUD_MM, STUD_COLOUR, STUD_OFF = 3.6, (0.98, 0.80, 0.36), np.array([1.6, 0.0, 1.0])
 STUD_MATERIAL = {"specular": 0.6, "shininess": 60.0, "wrap": 0.3}
 STUD_GRID = (9, 16)
+BREATH_FROM_MM = (105.0, 150.0)  # below the eyes: from the neck to the shoulders
+BREATH_MM, BREATH_GAIN = np.array([0.0, 3.0, 1.2]), np.array([0.008, 0.0, 0.0])
 
 
 def sweater_piece(shirt: Piece, collar: Collar, colour: Colour) -> Piece:
@@ -63,6 +65,12 @@ def _roll(collar: Collar) -> tuple[Floats, NDArray[np.int64], Floats]:
     grid = np.meshgrid(np.linspace(0, 1, N_AROUND + 1), np.linspace(0, 1, N_SECTION + 1), indexing="ij")
     places = np.stack(grid, axis=-1).reshape(-1, 2)
     return points, wind_outward(points, triangles, path.mean(axis=0)), places
+
+
+def breath(vertices: Floats) -> Floats:
+    """Motion (N, 3) of a full breath: shoulders and chest rise, the neck hardly moves."""
+    share = smoothstep(-vertices[:, 1], *BREATH_FROM_MM)[:, None]
+    return np.asarray(share * (BREATH_MM + vertices * BREATH_GAIN))
 
 
 def stud_pieces(skin: Skin) -> tuple[Piece, Piece]:

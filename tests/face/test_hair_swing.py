@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tts2face.face.breathing import BREATH_SHAPE
 from tts2face.face.hair_swing import LIMIT_RAD, SWING_SHAPES, HairSwing
 from tts2face.models.face_loading import load_face
 from tts2face.session import Session
@@ -52,13 +53,14 @@ def test_a_face_without_these_shapes_has_no_swing() -> None:
     assert HairSwing.of_channels(("jawOpen", *SWING_SHAPES[:2])) is None
 
 
-def test_hair_swings_in_clips_of_a_face_that_has_it() -> None:
+def test_hair_swings_and_shoulders_breathe_in_clips_of_a_face_that_has_them() -> None:
     face = load_face("head", hair="bald")
-    still = np.zeros((len(SWING_SHAPES), *face.vertices.shape), np.float32)
-    limits = np.tile(np.array([-LIMIT_RAD, LIMIT_RAD], np.float32), (len(SWING_SHAPES), 1))
+    names = (*SWING_SHAPES, BREATH_SHAPE)
+    still = np.zeros((len(names), *face.vertices.shape), np.float32)
+    limits = np.tile(np.array([-LIMIT_RAD, 1.0], np.float32), (len(names), 1))
     swinging = replace(
         face,
-        shape_names=(*face.shape_names, *SWING_SHAPES),
+        shape_names=(*face.shape_names, *names),
         shapes=np.concatenate([face.shapes, still]),
         limits=np.concatenate([face.limits, limits]),
     )
@@ -70,3 +72,6 @@ def test_hair_swings_in_clips_of_a_face_that_has_it() -> None:
     alone = Trajectory(clip.motion.channels, np.zeros_like(clip.motion.values), clip.motion.fps)
     expected, _ = HairSwing.of_channels(alone.channels).apply(alone, clip.head, None)
     assert lags == pytest.approx(expected.values[:, columns], abs=1e-5)
+    breath = clip.motion.values[:, clip.motion.channels.index(BREATH_SHAPE)]
+    assert breath.max() > 0.9
+    assert breath.min() < 0.8

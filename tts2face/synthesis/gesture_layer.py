@@ -7,6 +7,7 @@ from hashlib import blake2b
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.face.breathing import Breath, Breathing
 from tts2face.face.gesture_transfer import SPEECH_GAINS
 from tts2face.face.hair_swing import HairSwing, Swing
 from tts2face.gesture.easing import interpolate_keys
@@ -14,7 +15,7 @@ from tts2face.gesture.gesture_stream import GestureFields, GestureStream, Gestur
 from tts2face.gesture.perlin_noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import Palette
-from tts2face.synthesis.animated_face import AnimatedFace
+from tts2face.synthesis.animated_face import AnimatedFace, FaceMotion
 from tts2face.synthesis.channel_edits import ChannelEdits
 from tts2face.synthesis.mark_styles import marked_styles
 from tts2face.synthesis.prepared_request import PreparedRequest
@@ -65,7 +66,10 @@ class GestureLayer:
         face.check_gains(self._requested.gains.factors)
         self._edits = ChannelEdits(self._requested.edits, face)
         self._hair = HairSwing.of_channels(face.channels)
+        self._breathing = Breathing.of_channels(face.channels)
         self._swing: Swing | None = None  # after the last piece
+        self._breath: Breath | None = None
+        self._seed = request.seed
         kind: type[NoiseStream] | type[GestureStream] = NoiseStream if request.gestures == "noise" else GestureStream
         executor = ThreadPoolExecutor(1)  # building the fields takes 0.5 s, in parallel with loading the voice
         self._first: Future[GestureStream | NoiseStream] = executor.submit(
@@ -111,10 +115,16 @@ class GestureLayer:
         )
         moved = self._edits.apply(moved, round(self._seconds * lips.fps))
         self._stream, self._marked, self._seconds = stream, marked, self._seconds + len(lips) / lips.fps
-        if self._hair is None or not len(lips):
-            return Clip(moved.face, moved.head, speech)
-        swung, self._swing = self._hair.apply(moved.face, moved.head, self._swing)
-        return Clip(swung, moved.head, speech)
+        return Clip(self._with_body(moved, speech), moved.head, speech)
+
+    def _with_body(self, moved: FaceMotion, speech: Speech) -> Trajectory:
+        """Motion of a piece of a face whose hair and shoulders move, too."""
+        face = moved.face
+        if self._hair is not None and len(face):
+            face, self._swing = self._hair.apply(face, moved.head, self._swing)
+        if self._breathing is not None:
+            face, self._breath = self._breathing.apply(face, speech.phones, self._seed, self._breath)
+        return face
 
     def _next(
         self, sound: Waveform, n_frames: int, timeline: Timeline

@@ -5,6 +5,7 @@ import pytest
 
 from corpus_tools.drawn.build_drawn import CAST, drawn_face
 from tests.characters.makehuman import makehuman
+from tts2face.face.breathing import BREATH_SHAPE
 from tts2face.face.hair_swing import SWING_SHAPES
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions
 from tts2face.models.face import Face
@@ -32,7 +33,7 @@ def test_the_skin_has_the_layout_of_the_shipped_head(face: Face) -> None:
     assert np.array_equal(*skins)
     used = np.unique(skins[0])
     np.testing.assert_allclose(face.uv[used], head.uv[used], atol=1e-4)  # files round it
-    assert face.shape_names == (*head.shape_names, *SWING_SHAPES)
+    assert face.shape_names == (*head.shape_names, BREATH_SHAPE, *SWING_SHAPES)
     assert face.landmarks.tolist() == head.landmarks.tolist()
     assert np.isfinite(face.shapes).all()
 
@@ -48,3 +49,10 @@ def test_lids_shut(face: Face) -> None:
     rest, shut = places(face), places(face, eyeBlinkLeft=1.0)
     assert rest[UPPER_LID][1] - rest[LOWER_LID][1] > 15.0
     assert shut[UPPER_LID][1] - shut[LOWER_LID][1] < 0.5
+
+
+def test_shoulders_rise_three_millimetres_and_the_head_stays(face: Face) -> None:
+    moved = face.shapes[face.shape_names.index(BREATH_SHAPE)]
+    height = face.vertices[:, 1]
+    assert np.abs(moved[height > -100]).max() == 0
+    assert 2.0 <= moved[height < -160, 1].mean() <= 4.0
