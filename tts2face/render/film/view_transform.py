@@ -1,7 +1,5 @@
 """View transform: linear light to colours of a display, as a table over its logarithm."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,10 +13,3 @@ def table_levels() -> NDArray[np.float64]:
     """(33,) levels of linear light, evenly in the logarithm of light plus an offset."""
     levels: NDArray[np.float64] = OFFSET * 2 ** (np.linspace(0, 1, TABLE_SIDE) * SPAN) - OFFSET
     return levels
-
-
-def table_places(light: NDArray[Any]) -> NDArray[np.float32]:
-    """Places of linear light in the table, from 0 to 32; for tests and tools."""
-    places = np.log2(np.maximum(light, 0) / OFFSET + 1) * (TABLE_SIDE - 1) / SPAN
-    found: NDArray[np.float32] = np.clip(places, 0, TABLE_SIDE - 1).astype(np.float32)
-    return found
