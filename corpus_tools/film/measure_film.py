@@ -1,0 +1,77 @@
+"""``python -m corpus_tools.film.measure_film``: baked light beside the path tracer, in unseen poses. Needs bpy."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from corpus_tools.drawn.build_drawn import cast_parser, face_masks, step_reporter
+from corpus_tools.film.compare import View, differences, draw_view, over_grey
+from corpus_tools.film.look import look_of
+from corpus_tools.film.poses import LitPose, held_out_poses
+from corpus_tools.film.scene import FilmScene
+from corpus_tools.head.source import SourceMesh, fetch_data, read_source
+from tts2face.models.face import Face
+from tts2face.models.face_file import read_face
+from tts2face.render.camera_views import parse_camera
+
+Pixels = NDArray[np.uint8]
+
+SIDE_PX, SAMPLES = 512, 32
+CAMERAS = ("20,3", "35,3", "-35,3")  # about the pose at rest
+N_COLUMNS = 4  # of the sheet of sixteen views
+REGIONS = ("face", "mouth", "eyes", "hair", "clothes")
+
+
+def views(face: Face) -> dict[str, View]:
+    """What is compared, by name: rest, poses that were not fitted, and cameras round the pose at rest."""
+    rest = LitPose("rest", np.zeros(len(face.shape_names), np.float32), np.zeros(6, np.float32))
+    found = {"rest": View(rest, "front")}
+    found |= {pose.name: View(pose, "front") for pose in held_out_poses(face)}
+    return found | {f"camera {camera}": View(rest, camera) for camera in CAMERAS}
+
+
+def trace(source: SourceMesh, face: Face, name: str, folder: Path, report: Callable[[str], None]) -> dict[str, Pixels]:
+    """Pictures (S, S, 4) of the path tracer by the name of their view; those in `folder` are not made again."""
+    wanted = views(face)
+    paths = {key: folder / f"{name} {key}.png" for key in wanted}
+    if not all(path.is_file() for path in paths.values()):
+        scene = FilmScene(face, look_of(name), face_masks(source, face))
+        for key, view in wanted.items():
+            report(key)
+            scene.look_from(parse_camera(view.camera), SIDE_PX)
+            scene.pose(view.pose.weights, view.pose.head)
+            scene.render(paths[key], SAMPLES, has_wall=False)
+    return {key: np.asarray(Image.open(path)) for key, path in paths.items()}
+
+
+def main() -> None:
+    """Print mean differences of 255 by region; write a sheet of path tracer, picture and three times the difference."""
+    parser, report = cast_parser(__doc__), step_reporter()
+    parser.add_argument("--traced", type=Path, required=True, help="folder in which the traced pictures are kept")
+    parser.add_argument("--out", type=Path, required=True, help="folder of the sheets")
+    arguments = parser.parse_args()
+    source = read_source(arguments.data or fetch_data(Path.home() / ".cache/tts2face"))
+    for folder in (arguments.traced, arguments.out):
+        folder.mkdir(parents=True, exist_ok=True)
+    for name in arguments.names:
+        face = read_face(arguments.faces / f"{name}.face")
+        cells = []
+        for key, traced in trace(source, face, name, arguments.traced, report).items():
+            view = views(face)[key]
+            drawn, regions = draw_view(face, view, SIDE_PX)
+            apart = differences(drawn, traced, regions)
+            yaw, pitch = np.degrees(view.pose.head[[1, 0]])
+            found = "  ".join(f"{region} {apart[region]:4.1f}" for region in REGIONS if region in apart)
+            print(f"{name}  {key:14}  head {yaw:3.0f} {pitch:3.0f}  {found}")  # noqa: T201
+            pair = [over_grey(traced), over_grey(drawn)]
+            off = np.abs(pair[0].astype(np.int64) - pair[1]) * 3
+            cells.append(np.vstack([*pair, np.clip(off, 0, 255).astype(np.uint8)]))
+        rows = [np.hstack(cells[at : at + N_COLUMNS]) for at in range(0, len(cells), N_COLUMNS)]
+        Image.fromarray(np.vstack(rows)).save(arguments.out / f"{name}.png")
+
+
+if __name__ == "__main__":
+    main()
