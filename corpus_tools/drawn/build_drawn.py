@@ -16,6 +16,7 @@ from corpus_tools.drawn.clothes import breath, stud_pieces, sweater_piece
 from corpus_tools.drawn.elder import ELDER
 from corpus_tools.drawn.expressions import rest_in, soften
 from corpus_tools.drawn.girl import GIRL
+from corpus_tools.drawn.glasses import glasses_piece
 from corpus_tools.drawn.hair import hair_cover, hair_piece
 from corpus_tools.drawn.lashes import lash_piece
 from corpus_tools.drawn.lids import find_lining, shut_lids, still_lining, tuck_lining
@@ -123,6 +124,7 @@ def _pieces(
         sweater_piece(shirt, character.collar, palette.cloth),
         hair_piece(skin, character.hair, palette),
         *(stud_pieces(skin) if character.has_studs else ()),
+        *(() if character.glasses is None else (glasses_piece(balls, character.glasses),)),
     )
 
 

@@ -197,3 +197,4 @@ class Character:
         default_factory=lambda: {"specular": 0.13, "shininess": 9.0, "wrap": 0.7, "texture": 0, "kind": "skin"}
     )
     has_studs: bool = False
+    glasses: Colour | None = None

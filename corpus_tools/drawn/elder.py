@@ -93,4 +93,5 @@ ELDER = Character(
     ),
     rest={"mouthSmile": 0.36, "cheekSquint": 0.20, "eyeSquint": 0.26, "eyeBlink": 0.06},
     has_studs=True,
+    glasses=(0.62, 0.42, 0.20),
 )  # fmt: skip

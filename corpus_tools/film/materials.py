@@ -28,6 +28,7 @@ def part_materials(look: Look, skin: Texture, eye: Texture) -> dict[str, Any]:
         "wet": lambda: _plain("wet", Roughness=0.06, Specular_IOR_Level=0.9),
         "brows": lambda: _plain("brows", Roughness=0.55, Specular_IOR_Level=0.25, Sheen_Weight=0.1),
         "lashes": lambda: _plain("lashes", Roughness=0.45, Specular_IOR_Level=0.3),
+        "glasses": lambda: _plain("glasses", Roughness=0.25, Metallic=0.8),
         "stud": lambda: _plain("stud", Roughness=0.18, Metallic=1.0),
     }
     return {name: make() for name, make in made.items()}
