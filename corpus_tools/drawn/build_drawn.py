@@ -14,7 +14,7 @@ from corpus_tools.drawn.brows import brow_piece
 from corpus_tools.drawn.character import Character
 from corpus_tools.drawn.clothes import breath, stud_pieces, sweater_piece
 from corpus_tools.drawn.elder import ELDER
-from corpus_tools.drawn.expressions import rest_in, soften
+from corpus_tools.drawn.expressions import part_lips, rest_in, soften
 from corpus_tools.drawn.girl import GIRL
 from corpus_tools.drawn.glasses import glasses_piece
 from corpus_tools.drawn.hair import hair_cover, hair_piece
@@ -100,7 +100,8 @@ def _reference(source: SourceMesh) -> ReferenceHead:
 
 def _skin(own: Skin, reference: ReferenceHead, balls: tuple[Eyeball, Eyeball], character: Character) -> Skin:
     """The skin of a character, with its expressions, and its slight smile at rest."""
-    skin = soften(shut_lids(correct_shapes(close_lips(own, reference.lips)), balls, reference.lids), reference.lids)
+    shut = shut_lids(correct_shapes(close_lips(own, reference.lips)), balls, reference.lids)
+    skin = part_lips(soften(shut, reference.lids), reference.lips)
     lining = find_lining(skin, balls, -0.1)
     others = [name for name in LID_SHAPES if name != "eyeBlink"]  # that one lies on the eyeball already
     skin = tuck_lining(clear_eyeballs(skin, balls, others, CLEAR_MM, lining), balls, lining)

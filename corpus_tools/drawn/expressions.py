@@ -5,11 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
 from corpus_tools.drawn.fields import bump
 from corpus_tools.drawn.lids import keep_outside
 from corpus_tools.head.lids import LidEdge
+from corpus_tools.head.lips import find_lip_line, ring_arcs
 from corpus_tools.head.piece import Eyeball
 from corpus_tools.head.shapes import neighbour_means, smoothed
 from corpus_tools.head.skin import Skin
@@ -21,6 +23,9 @@ SIDES = (("Left", 1.0), ("Right", -1.0))
 SMILES, N_SMILE_MEANS = ("mouthSmile", "mouthDimple", "mouthStretch", "noseSneer", "mouthUpperUp"), 120
 SQUINTS, N_SQUINT_MEANS = ("eyeSquint", "cheekSquint"), 30
 LID_MM, MOUTH_MM = (1.5, 7.0), (13.0, 20.0)  # distances over which the smoothing begins
+SHUT_SIDES, SHUT_SHAPES = ("mouthSmile", "mouthDimple", "mouthPress"), ("mouthPucker", "mouthFunnel")
+LIP_TOUCH_MM, LIP_REACH_MM, LIP_MIDDLE_MM = 0.3, 9.0, 8.0  # overlap that is left, reach of its removal, between sides
+COLUMNS_MM = np.linspace(-30.0, 30.0, 61)  # across the mouth
 CORNER_MM, CHEEK_MM = np.array([1.5, 3.0, 1.5]), np.array([1.0, 1.6, 2.6])  # a smile lifts these more than MakeHuman's
 
 
@@ -40,6 +45,38 @@ def soften(skin: Skin, lids: Sequence[LidEdge]) -> Skin:
         lift = corner[:, None] * outward * CORNER_MM + cheek[:, None] * outward * CHEEK_MM
         shapes[f"mouthSmile{side}"] = shapes[f"mouthSmile{side}"] + lift
     return replace(skin, shapes=shapes)
+
+
+def part_lips(skin: Skin, ring: NDArray[np.int64]) -> Skin:
+    """Smiles and rounding whose lips touch and do not run into each other; `ring` is where they meet."""
+    line, shapes = find_lip_line(skin, ring), dict(skin.shapes)
+    upper, lower = ring_arcs(skin, ring)
+    apart = _overlap(skin.vertices, upper, lower)
+    near = np.exp(-((np.asarray(cKDTree(skin.vertices[ring]).query(skin.vertices)[0]) / LIP_REACH_MM) ** 2))
+    places = skin.vertices[:, 0]
+    for names in (SHUT_SHAPES, [stem + side for stem in SHUT_SIDES for side, _ in SIDES]):
+        for name in names:
+            both = shapes[name]
+            if name not in SHUT_SHAPES:  # the other side moves as well
+                both = both + shapes[name.replace("Left", "#").replace("Right", "Left").replace("#", "Right")]
+            more = np.clip(_overlap(skin.vertices + both, upper, lower) - apart - LIP_TOUCH_MM, 0, None)
+            lift = np.interp(places, COLUMNS_MM, more) * near * -line.lower / 2
+            share = 1.0
+            if name not in SHUT_SHAPES:
+                sign = 1.0 if name.endswith("Left") else -1.0
+                share = smoothstep(sign * places, -LIP_MIDDLE_MM, LIP_MIDDLE_MM)
+            shapes[name] = shapes[name] + (share * lift)[:, None] * [0, 1, 0]
+    return replace(skin, shapes=shapes)
+
+
+def _overlap(vertices: Floats, upper: NDArray[np.int64], lower: NDArray[np.int64]) -> Floats:
+    """Height in mm by which the lower lip's edge lies above the upper one's, at `COLUMNS_MM`."""
+    heights = []
+    for arc in (upper, lower):
+        order = np.argsort(vertices[arc, 0])
+        heights.append(np.interp(COLUMNS_MM, vertices[arc][order, 0], vertices[arc][order, 1]))
+    smooth: Floats = gaussian_filter1d(heights[1] - heights[0], 2.0)
+    return smooth
 
 
 def rest_in(skin: Skin, weights: Mapping[str, float], balls: Sequence[Eyeball]) -> Skin:

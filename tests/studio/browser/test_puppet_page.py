@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.running import RunningService
+from tests.running import RunningService, eventually
 from tests.studio.chromium import Browser
 from tts2face.models.palette import read_palette
 
@@ -41,7 +41,7 @@ def test_a_camera_drives_the_head_and_its_take_becomes_a_style(page: Browser, da
     page.click("Use camera and microphone")
     page.wait("return window.__studio.camera_state === 'live'", seconds=120)
     page.wait(POSE, seconds=60)
-    assert np.abs(head(page) - rest).mean() > 1
+    eventually(lambda: np.abs(head(page) - rest).mean() > 1, 60, "the head to follow the person")
     page.click("Record a take")
     page.wait(
         "return parseFloat(document.querySelector('.puppet-on')?.innerText.match(/[0-9.]+/)) > arguments[0]", TAKE_S
