@@ -61,7 +61,7 @@ def part_lips(skin: Skin, ring: NDArray[np.int64]) -> Skin:
                 both = both + shapes[name.replace("Left", "#").replace("Right", "Left").replace("#", "Right")]
             more = np.clip(_overlap(skin.vertices + both, upper, lower) - apart - LIP_TOUCH_MM, 0, None)
             lift = np.interp(places, COLUMNS_MM, more) * near * -line.lower / 2
-            share = 1.0
+            share = np.ones_like(places)
             if name not in SHUT_SHAPES:
                 sign = 1.0 if name.endswith("Left") else -1.0
                 share = smoothstep(sign * places, -LIP_MIDDLE_MM, LIP_MIDDLE_MM)
