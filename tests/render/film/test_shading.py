@@ -26,11 +26,11 @@ def draw_list(points, triangles, part_of, side):
     table = np.zeros((len(points), N_COLUMNS), np.float32)
     table[:, [X, Y, NEAR]] = points
     nearest = np.zeros((side * SIZE, side * SIZE + BLOCK), np.int64)
-    find_nearest(table, np.array(triangles, np.int32), nearest)
+    columns = find_nearest(table, np.array(triangles, np.int32), nearest)
     n = (side * SIZE) ** 2
     found = (np.zeros(n, np.int32), np.zeros(n, np.float32), np.zeros(n, np.float32), np.zeros(n, np.int32))
     pixels = np.zeros(SIZE * SIZE + 1, np.int32)
-    count = list_fragments(nearest, (side, 0), np.array(part_of, np.int32), found, pixels)
+    count = list_fragments(nearest, (side, 0, *columns), np.array(part_of, np.int32), found, pixels)
     return table, nearest, [one[:count] for one in found], pixels
 
 

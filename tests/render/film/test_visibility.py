@@ -16,7 +16,10 @@ def table_of(points):
 
 def nearest_of(points, triangles, size=(SIDE, SIDE)):
     nearest = np.full((size[0], size[1] + BLOCK), -1, np.int64)
-    find_nearest(table_of(points), np.array(triangles, np.int32), nearest)
+    first, end = find_nearest(table_of(points), np.array(triangles, np.int32), nearest)
+    assert 0 <= first <= end <= size[1]
+    assert not nearest[:, :first].any()
+    assert not nearest[:, end:].any()
     return (nearest[:, : size[1]] & TRIANGLE_MASK) - 1
 
 

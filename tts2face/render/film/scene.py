@@ -125,14 +125,14 @@ class LitScene:
         self.light_pose(weights, head, points, buffers)
         optics = (self.optics.view.astype(np.float32), self.optics.lens.astype(np.float32))
         project(points, surface.source, *optics, buffers.table)
-        find_nearest(buffers.table, surface.triangles, buffers.nearest)
+        columns = find_nearest(buffers.table, surface.triangles, buffers.nearest)
         buffers.frame += 1
         eyes = (self._eye_rows(weights, head), surface.eye_texture, self.camera)
         light = (self._lamps(head), surface.light.sky, self.view)
         rows = buffers.band_rows
         for first in range(0, len(pixels), rows):
             band = pixels[first : first + rows]
-            place = (side, first * side)
+            place = (side, first * side, *columns)
             found = (buffers.triangle, *buffers.place)
             nearest = buffers.nearest[first * side : (first + rows) * side]
             starts = buffers.pixels[: band.shape[0] * band.shape[1] + 1]

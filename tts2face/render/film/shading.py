@@ -20,7 +20,11 @@ CHANGE_CODING = (LIGHT_BITS, LIGHT_ZERO, LIGHT_STEP)
 
 @kernel
 def list_fragments(
-    nearest: Array, place: tuple[int, int], piece_of: Array, found: tuple[Array, Array, Array, Array], pixels: Array
+    nearest: Array,
+    place: tuple[int, int, int, int],
+    piece_of: Array,
+    found: tuple[Array, Array, Array, Array],
+    pixels: Array,
 ) -> int:
     """Write what is seen in each pixel of a band of rows; returns the number of fragments.
 
@@ -29,7 +33,7 @@ def list_fragments(
     nearest : (side H, side W + BLOCK)
         Of `tts2face.render.film.visibility.find_nearest`.
     place
-        Samples along a pixel's side, and the band's first row of samples.
+        Samples along a pixel's side, the band's first row of samples, and the columns [first, end) with any.
     piece_of : (F,)
     found
         Out, for each fragment: its triangle, its place (x, y) in samples, and the number of its samples.
@@ -37,32 +41,44 @@ def list_fragments(
         Out: the first fragment of each pixel.
     """
     triangle, across, down, samples = found
-    side, first_row = place
+    side, first_row, first_column, end_column = place
     height, stride = nearest.shape[0] // side, nearest.shape[1]
     width = (len(pixels) - 1) // height
     line = nearest.reshape(-1)
     middle, n_samples = np.float32(side - 1) / np.float32(2), side * side
-    count, pixel = 0, 0
+    count = 0
+    a = b = c = d = np.int64(0)
     keys, offset = np.zeros(n_samples, np.int64), np.zeros(n_samples, np.int64)
     right_of, below = np.zeros(n_samples, np.float32), np.zeros(n_samples, np.float32)
     for s in range(n_samples):
         offset[s], right_of[s], below[s] = s // side * stride + s % side, s % side, s // side
+    first_pixel, end_pixel = first_column // side, (end_column + side - 1) // side
     for row in range(height):
-        for column in range(width):
-            pixels[pixel] = count
-            pixel += 1
+        for column in range(first_pixel):
+            pixels[row * width + column] = count
+        for column in range(first_pixel, end_pixel):
+            pixels[row * width + column] = count
             at = side * (row * stride + column)
-            least, most = line[at], line[at]
-            for s in range(1, n_samples):
-                key = line[at + offset[s]]
-                least, most = min(least, key), max(most, key)
+            if side == 2:  # as the loop, written out
+                a, b, c, d = line[at], line[at + 1], line[at + stride], line[at + stride + 1]
+                least, most = min(a, b, c, d), max(a, b, c, d)
+            else:
+                least, most = line[at], line[at]
+                for s in range(1, n_samples):
+                    key = line[at + offset[s]]
+                    least, most = min(least, key), max(most, key)
             if most == 0:
                 continue
             x, y = np.float32(side * column), np.float32(side * row + first_row)
             if least > 0 and (most - least) >> TRIANGLE_BITS <= (least >> TRIANGLE_BITS) >> SAME_DEPTH_BITS:
                 piece, is_one = piece_of[(most & TRIANGLE_MASK) - 1], True
-                for s in range(n_samples):
-                    is_one &= piece_of[(line[at + offset[s]] & TRIANGLE_MASK) - 1] == piece
+                if side == 2:
+                    is_one = piece_of[(a & TRIANGLE_MASK) - 1] == piece and piece_of[(b & TRIANGLE_MASK) - 1] == piece
+                    is_one = is_one and piece_of[(c & TRIANGLE_MASK) - 1] == piece
+                    is_one = is_one and piece_of[(d & TRIANGLE_MASK) - 1] == piece
+                else:
+                    for s in range(n_samples):
+                        is_one &= piece_of[(line[at + offset[s]] & TRIANGLE_MASK) - 1] == piece
                 if is_one:
                     triangle[count] = (line[at + offset[n_samples // 2]] & TRIANGLE_MASK) - 1
                     across[count], down[count], samples[count] = x + middle, y + middle, n_samples
@@ -85,7 +101,9 @@ def list_fragments(
                 triangle[count], samples[count] = own, n
                 across[count], down[count] = x + total_right * share, y + total_below * share
                 count += 1
-    pixels[pixel] = count
+        for column in range(end_pixel, width):
+            pixels[row * width + column] = count
+    pixels[height * width] = count
     return count
 
 

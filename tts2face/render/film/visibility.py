@@ -45,8 +45,8 @@ def project(points: Array, source: Array, view: Array, lens: Array, table: Array
 
 
 @kernel
-def find_nearest(table: Array, triangles: Array, nearest: Array) -> None:
-    """Write the nearest triangle that faces the camera in each sample.
+def find_nearest(table: Array, triangles: Array, nearest: Array) -> tuple[int, int]:
+    """Write the nearest triangle that faces the camera in each sample; returns the columns [first, end) that hold any.
 
     Parameters
     ----------
@@ -62,6 +62,7 @@ def find_nearest(table: Array, triangles: Array, nearest: Array) -> None:
     line[:] = 0
     top_row, end_row = np.float32(0), np.float32(height - 1)
     left_end, right_end = np.float32(0), np.float32(stride - BLOCK - 1)
+    first_column, last_column = stride, -1
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay, bx, by, cx, cy = table[a, X], table[a, Y], table[b, X], table[b, Y], table[c, X], table[c, Y]
@@ -69,11 +70,13 @@ def find_nearest(table: Array, triangles: Array, nearest: Array) -> None:
         if area > -LEAST_AREA:
             continue
         low, high = np.ceil(max(min(ay, by, cy), top_row)), np.floor(min(max(ay, by, cy), end_row))
-        if low > high or np.ceil(max(min(ax, bx, cx), left_end)) > np.floor(min(max(ax, bx, cx), right_end)):
+        from_column, to_column = np.ceil(max(min(ax, bx, cx), left_end)), np.floor(min(max(ax, bx, cx), right_end))
+        if low > high or from_column > to_column:
             continue
         az, bz, cz = table[a, NEAR], table[b, NEAR], table[c, NEAR]
         if min(az, bz, cz) <= 0:
             continue
+        first_column, last_column = min(first_column, int(from_column)), max(last_column, int(to_column))
         inverse = np.float32(1) / area
         across = ((bz - az) * (cy - ay) - (cz - az) * (by - ay)) * inverse
         along = ((cz - az) * (bx - ax) - (bz - az) * (cx - ax)) * inverse
@@ -104,3 +107,4 @@ def find_nearest(table: Array, triangles: Array, nearest: Array) -> None:
                     own, old = depth + column * step, line[at + np.uint64(column)]
                     line[at + np.uint64(column)] = own if (own > old) & (column < count) else old
             y += np.float32(1)
+    return min(first_column, last_column + 1), last_column + 1
