@@ -54,17 +54,14 @@ def part_lips(skin: Skin, ring: NDArray[np.int64]) -> Skin:
     apart = _overlap(skin.vertices, upper, lower)
     near = np.exp(-((np.asarray(cKDTree(skin.vertices[ring]).query(skin.vertices)[0]) / LIP_REACH_MM) ** 2))
     places = skin.vertices[:, 0]
-    for names in (SHUT_SHAPES, [stem + side for stem in SHUT_SIDES for side, _ in SIDES]):
-        for name in names:
-            both = shapes[name]
-            if name not in SHUT_SHAPES:  # the other side moves as well
-                both = both + shapes[name.replace("Left", "#").replace("Right", "Left").replace("#", "Right")]
-            more = np.clip(_overlap(skin.vertices + both, upper, lower) - apart - LIP_TOUCH_MM, 0, None)
-            lift = np.interp(places, COLUMNS_MM, more) * near * -line.lower / 2
-            share = np.ones_like(places)
-            if name not in SHUT_SHAPES:
-                sign = 1.0 if name.endswith("Left") else -1.0
-                share = smoothstep(sign * places, -LIP_MIDDLE_MM, LIP_MIDDLE_MM)
+    left = smoothstep(places, -LIP_MIDDLE_MM, LIP_MIDDLE_MM)
+    groups = [{name: np.ones_like(places)} for name in SHUT_SHAPES]
+    groups += [{f"{stem}Left": left, f"{stem}Right": 1 - left} for stem in SHUT_SIDES]  # both sides move together
+    for shares in groups:
+        moved = np.sum([shapes[name] for name in shares], axis=0)
+        more = np.clip(_overlap(skin.vertices + moved, upper, lower) - apart - LIP_TOUCH_MM, 0, None)
+        lift = np.interp(places, COLUMNS_MM, more) * near * -line.lower / 2
+        for name, share in shares.items():
             shapes[name] = shapes[name] + (share * lift)[:, None] * [0, 1, 0]
     return replace(skin, shapes=shapes)
 
