@@ -4,10 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from corpus_tools.drawn.character import Colour
-from corpus_tools.drawn.fields import arc_length, wind_outward
+from corpus_tools.drawn.fields import smooth_line, wind_outward
 from corpus_tools.head.piece import Eyeball, MaterialSpan, Piece
 from corpus_tools.head.subdivide import grid_triangles
 from tts2face.numeric import unit_vectors
@@ -38,20 +37,14 @@ def glasses_piece(balls: Sequence[Eyeball], colour: Colour) -> Piece:
         ear = EAR_MM * [sign, 1, 1]
         bend = 0.5 * (outer + ear) + [sign * 7.0, 2.0, 6.0]
         knots = np.stack([outer, bend, ear, ear - np.array([3.0 * sign, 9.0, 9.0])])
-        tubes.append(_tube(_smooth(knots, N_TEMPLE)))
+        tubes.append(_tube(smooth_line(knots, N_TEMPLE)))
         inner.append(rim[np.argmax(-sign * rim[:, 0] + 0.3 * rim[:, 1])])
     middle = 0.5 * (inner[0] + inner[1]) + [0.0, 3.5, 2.0]
-    tubes.append(_tube(_smooth(np.stack([inner[0], middle, inner[1]]), N_BRIDGE)))
+    tubes.append(_tube(smooth_line((inner[0], middle, inner[1]), N_BRIDGE)))
     counts = np.cumsum([0, *(len(points) for points, _ in tubes)])
     points = np.concatenate([points for points, _ in tubes])
     faces = np.concatenate([faces + count for (_, faces), count in zip(tubes, counts, strict=False)])
     return Piece(points, (MaterialSpan("glasses", faces, MATERIAL),), np.tile(colour, (len(points), 1)))
-
-
-def _smooth(knots: Floats, number: int) -> Floats:
-    """(`number`, 3) points of a curve through knots."""
-    length = arc_length(knots)
-    return np.asarray(CubicSpline(length / length[-1], knots)(np.linspace(0, 1, number)))
 
 
 def _tube(path: Floats, *, is_closed: bool = False) -> tuple[Floats, NDArray[np.int64]]:

@@ -54,8 +54,7 @@ def _regions(scene: LitScene, pose: LitPose) -> dict[str, Mask]:
     find_nearest(table, surface.triangles, nearest)
     seen = (nearest[n // 2 :: n, n // 2 : side * n : n] & TRIANGLE_MASK) - 1
     part_names = np.repeat([part.name for part in face.parts], [part.count for part in face.parts])
-    drawn = surface.light.triangles[np.maximum(seen, 0)]
-    names = part_names[np.where(drawn < 0, ~drawn, drawn)]
+    names = part_names[surface.light.triangle_numbers[np.maximum(seen, 0)]]
     covered = seen >= 0
     found = {region: covered & np.isin(names, parts) for region, parts in REGIONS.items()}
     rows = {int(number): row for row, number in enumerate(face.landmarks)}

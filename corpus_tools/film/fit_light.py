@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from corpus_tools.film.look import WHITE, Look
 from corpus_tools.film.pose_light import CAMERA_YAWS_DEG, FAR, MOUTH, SKIN, PoseLight
 from corpus_tools.film.poses import EXPRESSIONS
-from corpus_tools.film.seen import seen_triangles
+from corpus_tools.film.seen import mouth_middle, seen_triangles
 from corpus_tools.film.weld import weld_vertices
 from tts2face.face.deformation import build_rig
 from tts2face.models.baked_light import BLACK_SHARE, PRODUCTS, BakedLight
@@ -54,7 +54,8 @@ def fit_light(face: Face, poses: PoseLight, look: Look) -> BakedLight:
     of_mouth = np.array([name.startswith(MOUTH) for name in small_parts])
     of_ball = np.isin(small_parts, ("sclera", "iris"))
     others = ~of_mouth & ~of_ball
-    skin_rows, skin, hidden = _skin_changes(face, poses, turned)
+    shown = _base_map(face, poses)
+    skin_rows, skin, hidden = _skin_changes(face, poses, turned, shown[0])
     small = _smoothed_small(face, poses, small_rows, small_parts)
     still = small[:, others] * 255
     base = np.concatenate([np.zeros((len(skin_rows), 3)), still[0]])
@@ -73,7 +74,7 @@ def fit_light(face: Face, poses: PoseLight, look: Look) -> BakedLight:
     cameras, sizes = _quantised(_far_changes(poses)[turned.sum() + 1 :])
     return BakedLight(
         page_of={name: page for page, names in enumerate((SKIN, FAR)) for name in names},
-        pages=np.stack([_skin_page(face, poses), _filled(poses.far_rest, FAR_LIT)]),
+        pages=np.stack([_skin_page(poses, *shown[1:]), _filled(poses.far_rest, FAR_LIT)]),
         triangles=triangles,
         is_inside=is_inside,
         rows=rows.astype(np.int32),
@@ -177,14 +178,16 @@ def _vertex_parts(face: Face) -> NDArray[np.str_]:
     return found
 
 
-def _skin_changes(face: Face, poses: PoseLight, turned: NDArray[np.bool_]) -> tuple[Ints, Floats, NDArray[np.bool_]]:
-    """Vertices (N,) of skin whose light changes with expressions, and the changes (P, N, 3), 0 where the head turns.
+def _skin_changes(
+    face: Face, poses: PoseLight, turned: NDArray[np.bool_], base: Floats
+) -> tuple[Ints, Floats, NDArray[np.bool_]]:
+    """Vertices (N,) of skin whose light changes with expressions, and the changes (P, N, 3) from a base map (s, s, 3).
 
-    Also whether a pose (P, N) hides them at eyes or mouth.
+    The changes are 0 where the head turns. Also whether a pose (P, N) hides them at eyes or mouth.
     """
     corners = _corners(face, SKIN)
     used = np.unique(corners)
-    light = read_maps(np.concatenate([_base_map(face, poses)[0][None], poses.skin]), _uv(face)[used]) * 255
+    light = read_maps(np.concatenate([base[None], poses.skin]), _uv(face)[used]) * 255
     changes = light[1:] - light[:1]
     changes[turned] = 0.0
     changes[0] = 0.0  # at rest the base is what is seen
@@ -273,8 +276,7 @@ def _filled(page: NDArray[np.floating], least: float, keeps: NDArray[np.bool_] |
 
 def _near_features(face: Face, places: NDArray[np.floating]) -> Floats:
     """(N,) 1 at eyes and mouth, 0 away from them, of places (N, 3)."""
-    corners = face.landmark_vertices[np.isin(face.landmarks, (13, 14))]
-    zones = [(face.vertices[corners].mean(axis=(0, 1)), MOUTH_MM), *((eye.centre, EYE_MM) for eye in face.eyes)]
+    zones = [(mouth_middle(face), MOUTH_MM), *((eye.centre, EYE_MM) for eye in face.eyes)]
     off = np.min([np.linalg.norm((places - centre) / np.array(size), axis=1) for centre, size in zones], axis=0)
     near: Floats = 1 - smoothstep(off.astype(np.float64), 0.75, 1.0)
     return near
@@ -298,9 +300,8 @@ def _base_map(face: Face, poses: PoseLight) -> tuple[Floats, Floats, Floats]:
     return rest + share[..., None] * (brightest - rest), share, brightest.astype(np.float64)
 
 
-def _skin_page(face: Face, poses: PoseLight) -> NDArray[np.uint8]:
-    """Colours of the skin at rest, with what is hidden at eyes and mouth as other poses show it."""
-    _, share, light = _base_map(face, poses)
+def _skin_page(poses: PoseLight, share: Floats, light: Floats) -> NDArray[np.uint8]:
+    """Colours of the skin at rest, with a share (s, s) of light (s, s, 3) of other poses."""
     side = poses.skin_rest.shape[0]
     share, larger = _enlarged(share, side), np.stack([_enlarged(one, side) for one in np.moveaxis(light, 2, 0)], 2)
     page = np.maximum(poses.skin_rest, np.array(SKIN_FLOOR) / 255)

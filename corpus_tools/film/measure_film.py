@@ -1,6 +1,7 @@
 """``python -m corpus_tools.film.measure_film``: baked light beside the path tracer, in unseen poses. Needs bpy."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -33,17 +34,23 @@ def views(face: Face) -> dict[str, View]:
     return found | {f"camera {camera}": View(rest, camera) for camera in CAMERAS}
 
 
-def trace(source: SourceMesh, face: Face, name: str, folder: Path, report: Callable[[str], None]) -> dict[str, Pixels]:
-    """Pictures (S, S, 4) of the path tracer by the name of their view; those in `folder` are not made again."""
-    wanted = views(face)
-    paths = {key: folder / f"{name} {key}.png" for key in wanted}
+def build_scene(source: SourceMesh, face: Face, name: str) -> FilmScene:
+    """A character before the path tracer."""
+    return FilmScene(face, look_of(name), face_masks(source, face))
+
+
+def trace(
+    scene: Callable[[], FilmScene], wanted: Mapping[str, View], prefix: Path, report: Callable[[str], None]
+) -> dict[str, Pixels]:
+    """Pictures (S, S, 4) of the path tracer by the name of their view; files that are there are not made again."""
+    paths = {key: prefix.with_name(f"{prefix.name} {key}.png") for key in wanted}
     if not all(path.is_file() for path in paths.values()):
-        scene = FilmScene(face, look_of(name), face_masks(source, face))
+        traced = scene()
         for key, view in wanted.items():
             report(key)
-            scene.look_from(parse_camera(view.camera), SIDE_PX)
-            scene.pose(view.pose.weights, view.pose.head)
-            scene.render(paths[key], SAMPLES, has_wall=False)
+            traced.look_from(parse_camera(view.camera), SIDE_PX)
+            traced.pose(view.pose.weights, view.pose.head)
+            traced.render(paths[key], SAMPLES, has_wall=False)
     return {key: np.asarray(Image.open(path)) for key, path in paths.items()}
 
 
@@ -59,8 +66,10 @@ def main() -> None:
     for name in arguments.names:
         face = read_face(arguments.faces / f"{name}.face")
         cells = []
-        for key, traced in trace(source, face, name, arguments.traced, report).items():
-            view = views(face)[key]
+        wanted = views(face)
+        pictures = trace(partial(build_scene, source, face, name), wanted, arguments.traced / name, report)
+        for key, traced in pictures.items():
+            view = wanted[key]
             drawn, regions = draw_view(face, view, SIDE_PX)
             apart = differences(drawn, traced, regions)
             yaw, pitch = np.degrees(view.pose.head[[1, 0]])

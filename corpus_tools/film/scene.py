@@ -20,6 +20,7 @@ from tts2face.models.face import Face
 from tts2face.numeric import smoothstep
 from tts2face.render.camera import camera_matrices
 from tts2face.render.camera_views import CameraView
+from tts2face.render.film.scene import BLINK_SHRINK
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -27,7 +28,6 @@ Ints = NDArray[np.int64]
 SENSOR_MM = 36.0
 FAR = 200.0
 CORNEA_RADII = 1.35  # of the iris, angle from the gaze at which the cornea's bulge ends
-BLINK_SHRINK = 0.075  # of the ball behind a shut lid, times its weight to the fourth power
 EYES = ("sclera", "iris")
 NO_SHADOW_TERMINATOR = ("hair", "skin")  # parts of large triangles
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.film.pose_light import PoseLight
 from tts2face.face.deformation import build_rig
+from tts2face.models.baked_light import OPENING_LANDMARKS
 from tts2face.models.face import Face
 from tts2face.render.camera import camera_matrices
 from tts2face.render.camera_views import CameraView
@@ -27,21 +28,28 @@ def seen_triangles(face: Face, poses: PoseLight) -> tuple[NDArray[np.int32], NDA
     table = np.zeros((len(face.vertices), N_COLUMNS), np.float32)
     nearest = np.zeros((SIDE_PX, SIDE_PX + BLOCK), np.int64)
     every, seen = np.arange(len(face.vertices), dtype=np.int32), np.zeros(2 * n, bool)
-    for number, view in _views(poses):
+    for number in _looked_at(poses):
         points = rig.pose(poses.weights[number], poses.heads[number])
-        optics = camera_matrices(view, face, (SIDE_PX, SIDE_PX))
-        project(points, every, optics.view.astype(np.float32), optics.lens.astype(np.float32), table)
-        find_nearest(table, both, nearest)
-        seen[np.unique(nearest & TRIANGLE_MASK)[1:] - 1] = True
+        for view in _cameras(is_at_rest=number == 0):
+            optics = camera_matrices(view, face, (SIDE_PX, SIDE_PX))
+            project(points, every, optics.view.astype(np.float32), optics.lens.astype(np.float32), table)
+            find_nearest(table, both, nearest)
+            seen[np.unique(nearest & TRIANGLE_MASK)[1:] - 1] = True
     found = np.flatnonzero(seen | _beside(face, seen[:n]))
     centres = face.vertices[both[found]].mean(axis=1)
     middle = np.array([0.0, 20.0, -60.0])
     out = -(np.linalg.norm(centres - middle, axis=1) // TILE_MM)
     order = np.lexsort((centres[:, 0] // TILE_MM, centres[:, 1] // TILE_MM, out))
     found, centres = found[order], centres[order]
-    lips = face.vertices[face.landmark_vertices[np.isin(face.landmarks, (13, 14))]].mean(axis=(0, 1))
-    is_inside = (found >= n) & (centres[:, 2] < lips[2] - INSIDE_MM)
+    is_inside = (found >= n) & (centres[:, 2] < mouth_middle(face)[2] - INSIDE_MM)
     return np.where(found < n, found, ~(found - n)).astype(np.int32), is_inside
+
+
+def mouth_middle(face: Face) -> NDArray[np.float32]:
+    """(3,) place between the lips at rest."""
+    lips = np.isin(face.landmarks, OPENING_LANDMARKS[:2])
+    middle: NDArray[np.float32] = face.vertices[face.landmark_vertices[lips]].mean(axis=(0, 1))
+    return middle
 
 
 def _beside(face: Face, seen: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -52,13 +60,18 @@ def _beside(face: Face, seen: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return np.concatenate([beside, np.zeros_like(beside)])
 
 
-def _views(poses: PoseLight) -> Iterable[tuple[int, CameraView]]:
-    """Numbers of poses, and cameras that look at them."""
+def _looked_at(poses: PoseLight) -> Iterable[int]:
+    """Numbers of the poses that are looked at: all but some of speech."""
     spoken = 0
     for number, name in enumerate(poses.names):
-        spoken += str(name).startswith("speech")
-        if str(name).startswith("speech") and spoken % EVERY:
-            continue
-        for yaw in YAWS_DEG:
-            if number == 0 or abs(yaw) <= MOST_YAW_DEG:
-                yield from ((number, CameraView(float(yaw), pitch)) for pitch in PITCHES_DEG)
+        is_speech = str(name).startswith("speech")
+        spoken += is_speech
+        if not is_speech or spoken % EVERY == 0:
+            yield number
+
+
+def _cameras(*, is_at_rest: bool) -> Iterable[CameraView]:
+    """Cameras that look at a pose."""
+    for yaw in YAWS_DEG:
+        if is_at_rest or abs(yaw) <= MOST_YAW_DEG:
+            yield from (CameraView(float(yaw), pitch) for pitch in PITCHES_DEG)

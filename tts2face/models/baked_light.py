@@ -122,6 +122,11 @@ class BakedLight:
                 array.setflags(write=False)
 
     @property
+    def triangle_numbers(self) -> NDArray[np.int32]:
+        """(D,) triangle of the face of which each drawn one shows the front or the back."""
+        return np.where(self.triangles < 0, ~self.triangles, self.triangles)
+
+    @property
     def n_shapes(self) -> int:
         """Number of the face's own shapes, the first ones; those that a palette adds do not change its light."""
         return len(self.mode_weights) - len(PRODUCTS) - len(self.turns_deg)

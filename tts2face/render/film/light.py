@@ -37,10 +37,3 @@ def pack_change(change: Array, texels: Array) -> None:
         green = min(max(change[1, i] * per_step + LIGHT_ZERO + half, np.float32(0)), top)
         blue = min(max(change[2, i] * per_step + LIGHT_ZERO + half, np.float32(0)), top)
         texels[i] = np.int32(red) | np.int32(green) << LIGHT_BITS | np.int32(blue) << (2 * LIGHT_BITS)
-
-
-@vectorized_kernel
-def write_colours(light: Array, table: Array, column: int) -> None:
-    """Write light (N, 3) into three columns of the first rows of a table."""
-    for i in range(len(light)):
-        table[i, column], table[i, column + 1], table[i, column + 2] = light[i, 0], light[i, 1], light[i, 2]

@@ -12,7 +12,7 @@ from tts2face.models.baked_light import LEAST_SIDE, BakedLight
 from tts2face.models.face import Face
 from tts2face.render.camera import CameraMatrices, camera_matrices
 from tts2face.render.film.eyes import CENTRE, N_EYE_COLUMNS, TURN, colour_eyes
-from tts2face.render.film.light import add_modes, pack_change, write_colours
+from tts2face.render.film.light import add_modes, pack_change
 from tts2face.render.film.pose_features import (
     Cardinal,
     Features,
@@ -184,7 +184,7 @@ class LitScene:
         pack_change(buffers.change, buffers.changed)
         at = 0
         for lit in (buffers.light, buffers.mouth, buffers.balls):
-            write_colours(lit, table[at : at + len(lit)], RED)
+            table[at : at + len(lit), RED:] = lit
             at += len(lit)
 
     def _eye_rows(self, weights: Float32Array, head: Float32Array) -> Float32Array:

@@ -60,7 +60,7 @@ def build_surface(face: Face, light: BakedLight) -> LitSurface:
     if len(light.triangles) > MAX_TRIANGLES:
         raise DataError(f"a face with light may have {MAX_TRIANGLES} triangles, not {len(light.triangles)}")
     backs = light.triangles < 0
-    numbers = np.where(backs, ~light.triangles, light.triangles)
+    numbers = light.triangle_numbers
     corners = face.triangles[numbers]
     corners[backs] = corners[backs][:, ::-1]
     part_of = np.repeat(np.arange(len(face.parts), dtype=np.int32), [part.count for part in face.parts])[numbers]
