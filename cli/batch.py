@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from cli.flags import Hair, HairColor, add_option_flags, options_from_flags, switch, whole_number
+from cli.flags import Face, Hair, HairColor, add_option_flags, options_from_flags, switch, whole_number
 from cli.process import write_message
 from cli.progress import progress_bar
 from lexicon.errors import DataError, InputError
@@ -33,7 +33,7 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         Path | None, Parameter(help="TOML file that gives speakers their talker, voice, face, style, ...")
     ] = None,
     talker: Annotated[str, Parameter(help="Talker whose articulation is used.")] = "grid_s1",
-    face: Annotated[str, Parameter(help="Face to show: head, cartoon, a .face file, or self.")] = "head",
+    face: Face = None,
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
     hair: Hair = None,
     hair_color: HairColor = None,
@@ -88,7 +88,7 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         options_from_flags(BatchOptions, options, audio=audio, exports=tuple(export or ())),
         request=options_from_flags(Request, options),
         picture=options_from_flags(Picture, options),
-        models=Models(talker, face, identity, palette, hair, hair_color),
+        models=Models(talker, face or "", identity, palette, hair, hair_color),
         cast=read_cast(cast) if cast is not None else Cast(),
     )
     if not quiet:

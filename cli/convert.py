@@ -6,7 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from cli.flags import Hair, HairColor, switch
+from cli.flags import Face, Hair, HairColor, switch
 from cli.process import write_message
 
 
@@ -17,7 +17,7 @@ def convert(  # noqa: PLR0913 - one parameter a flag
     ],
     /,
     *,
-    face: Annotated[str, Parameter(help="Face of the track: a shipped face or a .face file.")] = "head",
+    face: Face = None,
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
     hair: Hair = None,
     hair_color: HairColor = None,

@@ -112,7 +112,7 @@ def relink(
 
 @face.command
 def show(
-    name: Annotated[str, Parameter(help="Face: head, cartoon, or a .face file.")],
+    name: Annotated[str, Parameter(help="Face: head, ada, or a .face file.")],
     /,
     *,
     out: Annotated[Path, Parameter(help="Output picture (.png).", alias="-o")],

@@ -23,6 +23,13 @@ Out = Annotated[
         alias="-o",
     ),
 ]
+Face = Annotated[
+    str | None,
+    Parameter(
+        help="Face: one of `tts2face faces`, a .face file, or self for the talker's own face; by default ada, or head "
+        "where an identity or hair is chosen."
+    ),
+]
 Hair = Annotated[str | None, Parameter(help="Haircut: bald, one of `tts2face haircuts`, or a .hair file.")]
 HairColor = Annotated[str | None, Parameter(help="Hair colour: one of `tts2face hair-colors`, or #rrggbb.")]
 Exports = Annotated[

@@ -12,7 +12,7 @@ from cli.batch import batch
 from cli.convert import convert
 from cli.corpus import corpus
 from cli.face import face as face_commands
-from cli.flags import Exports, Hair, HairColor, Out, add_option_flags, check_options, options_from_flags, switch
+from cli.flags import Exports, Face, Hair, HairColor, Out, add_option_flags, check_options, options_from_flags, switch
 from cli.jobs import jobs, worker
 from cli.lists import LISTS
 from cli.mimic import mimic
@@ -116,9 +116,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     talker: Annotated[
         str, Parameter(help="Talker whose articulation is used: a shipped talker or a .talker file.")
     ] = "grid_s1",
-    face: Annotated[
-        str, Parameter(help="Face to show: head, cartoon, a .face file, or self (the talker's own face).")
-    ] = "head",
+    face: Face = None,
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
     hair: Hair = None,
     hair_color: HairColor = None,
@@ -146,7 +144,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     )
     speak_options = SpeakOptions(
         out,
-        Models(talker, face, identity, palette, hair, hair_color),
+        Models(talker, face or "", identity, palette, hair, hair_color),
         explain,
         view,
         quiet,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from cli.flags import Exports, Hair, HairColor, Out, switch
+from cli.flags import Exports, Face, Hair, HairColor, Out, switch
 from cli.process import write_message
 from cli.progress import stage_bar
 from lexicon.errors import InputError
@@ -29,9 +29,7 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
         str | None,
         Parameter(help="Camera number (0 is the first) or address, shown live in a window, instead of a take."),
     ] = None,
-    face: Annotated[
-        str, Parameter(help="Face to show: head, cartoon, a .face file, or self (with --talker).")
-    ] = "head",
+    face: Face = None,
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
     hair: Hair = None,
     hair_color: HairColor = None,
@@ -56,7 +54,7 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     from tts2face.render.picture import Picture
     from tts2face.session_cache import Models
 
-    models = Models(str(talker or "grid_s1"), face, identity, None, hair, hair_color)
+    models = Models(str(talker or "grid_s1"), face or "", identity, None, hair, hair_color)
     if camera is not None:
         if take is not None or out is not None or export or face == OWN_FACE:
             raise InputError("--camera cannot be combined with a take, --out, --export or --face self; remove them")

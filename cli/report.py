@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from cli.flags import Cache, Jobs, Model, whole_number
+from cli.flags import Cache, Face, Jobs, Model, whole_number
 from cli.process import write_message
 from cli.progress import progress_bar, stage_bar
 from lexicon.errors import InputError
@@ -77,7 +77,7 @@ def moods(
     /,
     *,
     out: Annotated[Path, Parameter(help="Output: .csv, .json or .png (contact sheet).", alias="-o")],
-    face: Annotated[str, Parameter(help="Shipped face or .face file that shows the moods.")] = "head",
+    face: Face = None,
     seeds: Annotated[int, whole_number("Number of clips of each mood; the first half trains the classifier.")] = 8,
     seed: Annotated[int, whole_number("Seed of the first clip.")] = 0,
     size: Annotated[int, whole_number("Width and height of the rendered pictures in pixels.")] = 256,
@@ -103,7 +103,7 @@ def retarget(  # noqa: PLR0913 - one parameter a flag
     /,
     *,
     out: Annotated[Path, Parameter(help="Output: .html, .csv, .json or .png.", alias="-o")],
-    face: Annotated[str, Parameter(help="Face that mimics the recordings: head, cartoon or a .face file.")] = "head",
+    face: Face = None,
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
     jobs: Jobs = None,
     cache: Cache = None,
@@ -113,12 +113,13 @@ def retarget(  # noqa: PLR0913 - one parameter a flag
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--face": face, "--model": model})
     from corpus_tools.retargeting_study.write import write_retargeting
     from corpus_tools.run_options import RunOptions, ignore_stage
+    from tts2face.request import default_face
 
     with stage_bar() as stages:
         study = write_retargeting(
             recordings,
             out,
-            face=face,
+            face=face or default_face(identity, None, None),
             identity=identity,
             run_options=RunOptions(cache, jobs, model),
             stages=stages or ignore_stage,

@@ -210,8 +210,10 @@ def _open_session(options: SpeakOptions, voices: "VoicePool") -> "Session":
     if options.out is not None:
         check_output(options.out)
     session = options.models.open_session(voices)
-    if not kernels_are_compiled(draws=options.out is not None or options.view):
-        compile_kernels()
+    draws = (options.out is not None or options.view) and options.models.face != OWN_FACE
+    drawn = session.face.mesh if draws else None
+    if not kernels_are_compiled(drawn):
+        compile_kernels(drawn)
     return session
 
 

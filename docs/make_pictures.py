@@ -38,6 +38,10 @@ MOUTH_PIXELS = 800  # side of the pictures from which the mouths are cut
 MOUTHS = {"0,0,600": (240, 408), "38,0,600": (20, 408)}  # left upper corner of the mouth in each view
 MOOD_TEXT = "I have a lot to tell you, so please sit down and listen while I explain what happened yesterday."
 N_MOOD_FRAMES = 6
+DRAWN = ("ada",)
+CAST_VIEWS, CAST_COLUMNS = ("front", "three-quarter", "profile", "close"), 6
+CAST_TEXT, CAST_PHONES = "My father, thin as he was, saw you leave the room.", ("m", "f", "ɑ", "θ", "u", "i")
+SMILE = {"mouthSmile": 0.9, "cheekSquint": 0.5, "eyeSquint": 0.2}
 SIDE = 320
 WORD_PIXELS = 18
 JPEG_QUALITY = 88
@@ -111,9 +115,30 @@ def still(face: Face, label: str, camera: str = "front") -> Image.Image:
 
 def faces_sheet() -> Image.Image:
     """The shipped faces and the identities of the head, at rest."""
-    chosen: list[tuple[str, str | None]] = [("head", None), ("cartoon", None)]
+    chosen: list[tuple[str, str | None]] = [*((name, None) for name in DRAWN), ("head", None)]
     chosen += [("head", name) for name in (entry.name for entry in identities())]
     return sheet([still(load_face(name, identity), identity or name) for name, identity in chosen], 4)
+
+
+def cast_sheet() -> Image.Image:
+    """Each drawn character at rest in four views, in six phones, smiling, and in each mood."""
+    pictures = []
+    for name in DRAWN:
+        session = Session(face=name)
+        face, shown = session.face.mesh, Picture(size=f"{SIDE}x{SIDE}")
+        pictures += [still(face, camera, camera) for camera in CAST_VIEWS]
+        pictures += [
+            labelled(pixels, ipa_to_arpabet(phone))
+            for pixels, phone, _ in frames_of_phones(session, CAST_TEXT, CAST_PHONES, shown)
+        ]
+        smiling = np.array([SMILE.get(one.removesuffix("Left").removesuffix("Right"), 0.0) for one in face.shape_names])
+        pictures.append(labelled(draw(face, smiling, picture=shown), "smile"))
+        renderer = session.renderer(shown)
+        for style in load_palette("starter").derivations:
+            clip = session.clip(MOOD_TEXT, style=style)
+            pictures.append(labelled(renderer.frame(clip, len(clip.motion) // 2), style))
+    whole = sheet(pictures, CAST_COLUMNS)
+    return whole.resize((whole.width // 2, whole.height // 2), Image.Resampling.LANCZOS)
 
 
 def hair_sheet() -> Image.Image:
@@ -163,6 +188,7 @@ def main() -> None:
     write_similarity("grid_s1", HERE / "similarity.png", Options())
     write_gestures("starter", HERE / "gestures.png", GestureOptions())
     sheets = {
+        "cast": cast_sheet,
         "clip": clip_sheet,
         "faces": faces_sheet,
         "hair": hair_sheet,

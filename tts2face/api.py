@@ -13,6 +13,7 @@ from tts2face.models.face_loading import load_face
 from tts2face.models.palette import load_palette
 from tts2face.render.encode import write_clips
 from tts2face.render.picture import Picture
+from tts2face.request import default_face
 from tts2face.storage.overwrite import refuse_overwriting
 from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.speech_stream import Piece
@@ -115,7 +116,7 @@ def convert(  # noqa: PLR0913 - one parameter a model
     track: str | Path,
     path: str | Path | Iterable[str | Path],
     *,
-    face: str = "head",
+    face: str | None = None,
     identity: str | None = None,
     hair: str | None = None,
     hair_color: str | None = None,
@@ -132,7 +133,7 @@ def convert(  # noqa: PLR0913 - one parameter a model
         As for `export`.
     face, identity, hair, hair_color, palette
         Names or paths of the face, its identity preset and hair, and the palette that made the clip; loaded if a format
-        uses the face's shapes.
+        uses the face's shapes. Without a face, as for `Session`.
 
     Returns
     -------
@@ -154,6 +155,7 @@ def convert(  # noqa: PLR0913 - one parameter a model
     first = next(pieces)
     channels = first.clip.motion.channels
     mesh = None
+    face = face or default_face(identity, hair, hair_color)
     if any(file.format.uses_face for file in files):
         mesh = _mesh_with_channels(
             channels, load_face(face, identity, hair=hair, hair_color=hair_color), (face, palette)

@@ -40,11 +40,12 @@ class LanguageEntry:
 
 @dataclass(frozen=True, slots=True)
 class FaceEntry:
-    """A face and the names of its identity presets."""
+    """A face, the names of its identity presets, and whether haircuts fit it."""
 
     name: str
     identities: tuple[str, ...]
     summary: str
+    takes_haircuts: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +172,8 @@ def describe_face(path: Path) -> FaceEntry:
     """Entry of a ``.face`` file; raises as `load_face`."""
     _, header = _read(path, "face")
     names = tuple(name for name, _, _ in header["identities"])
-    return FaceEntry(path.stem, names, f"mesh with {len(header['shape_names'])} shapes")
+    summary = header.get("metadata", {}).get("summary") or f"mesh with {len(header['shape_names'])} shapes"
+    return FaceEntry(path.stem, names, str(summary), bool(header.get("hairdos")))
 
 
 def identities(face: str = "head") -> tuple[IdentityEntry, ...]:

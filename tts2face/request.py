@@ -16,12 +16,20 @@ VOLUME_LIMITS = (0.0, 2.0)
 FPS_LIMITS = (1.0, 120.0)
 AUDIO_MAP_NAMES = ("linear", "network")
 SYNTHESIS_METHODS = ("exemplar", "theobald2007")
-GESTURES = ("fields", "ju2008", "noise", "none")
+FIELDS = "fields"
+GESTURES = (FIELDS, "ju2008", "noise", "none")
 IDLE_LIMITS_S = (0.1, 3600.0)
 NATURAL, CLEAR = 1.0, 1.5  # factors of articulation
 ARTICULATIONS = {"natural": NATURAL, "clear": CLEAR}
 ARTICULATION_LIMITS = (0.5, 2.0)
 OWN_FACE = "self"  # name of the talker's own face
+DRAWN_FACE, REALISTIC_FACE = "ada", "head"  # the shipped face that is shown by default, and the one with identities
+
+
+def default_face(identity: str | None, hair: str | None, hair_color: str | None) -> str:
+    """Face that is shown where none is named: the one that the other options belong to."""
+    belongs_to_head = not (identity is None and hair is None and hair_color is None)
+    return REALISTIC_FACE if belongs_to_head else DRAWN_FACE
 
 
 def option(default: Any, help_text: str) -> Any:

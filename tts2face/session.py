@@ -41,7 +41,8 @@ class Session:
     talker
         Name of a shipped talker, path of a .talker file, or a `Talker`.
     face
-        Name of a shipped face, path of a .face file, a `Face`, or ``"self"`` for the talker's own face.
+        Name of a shipped face, path of a .face file, a `Face`, or ``"self"`` for the talker's own face; None for the
+        drawn woman, or for the realistic head where an identity or hair is chosen.
     identity
         Name of a preset of the face's age, sex and ancestry.
     hair, hair_color
@@ -70,7 +71,7 @@ class Session:
     def __init__(  # noqa: PLR0913 - one parameter a model
         self,
         talker: str | Path | Talker = "grid_s1",
-        face: str | Path | Face = "head",
+        face: str | Path | Face | None = None,
         *,
         identity: str | None = None,
         palette: str | Path | Palette | None = "starter",

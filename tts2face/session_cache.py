@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lexicon.json_values import check_fields
+from tts2face.request import default_face
 
 if TYPE_CHECKING:
     from tts2face.session import Session
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Models:
-    """Models that show and move a speaker, by name or path.
+    """Models that show and move a speaker, by name or path; without a face, `tts2face.request.default_face`.
 
     Raises
     ------
@@ -26,15 +27,17 @@ class Models:
     """
 
     talker: str = "grid_s1"
-    face: str = "head"
+    face: str = ""
     identity: str | None = None
     palette: str | None = "starter"
     hair: str | None = None
     hair_color: str | None = None
 
     def __post_init__(self) -> None:
-        """Reject values of other types."""
+        """Reject values of other types, and choose a face where none is named."""
         check_fields(self)
+        if not self.face:
+            object.__setattr__(self, "face", default_face(self.identity, self.hair, self.hair_color))
 
     def open_session(self, voices: "VoicePool | None" = None, *, memory_mb: float = 0.0) -> "Session":
         """Session of these models; raises as `Session`."""

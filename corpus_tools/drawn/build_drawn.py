@@ -14,7 +14,7 @@ from corpus_tools.drawn.brows import brow_piece
 from corpus_tools.drawn.character import Character
 from corpus_tools.drawn.clothes import breath, stud_pieces, sweater_piece
 from corpus_tools.drawn.elder import ELDER
-from corpus_tools.drawn.expressions import part_lips, rest_in, soften
+from corpus_tools.drawn.expressions import close_jaw, part_lips, rest_in, soften, thin_lips
 from corpus_tools.drawn.girl import GIRL
 from corpus_tools.drawn.glasses import glasses_piece
 from corpus_tools.drawn.hair import hair_cover, hair_piece
@@ -43,6 +43,7 @@ from corpus_tools.head.tongue import tongue_piece
 from corpus_tools.training.score_files import calibrate_face_file
 from tts2face.face.breathing import BREATH_SHAPE
 from tts2face.face.hair_swing import LIMIT_RAD, SWING_SHAPES
+from tts2face.face.pupils import PUPIL_SHAPE
 from tts2face.models.face import Face, Texture
 from tts2face.models.face_file import write_face
 from tts2face.render.occlusion import bake_occlusion
@@ -50,6 +51,8 @@ from tts2face.render.scene import available_cores
 
 CAST: Mapping[str, Character] = {one.name: one for one in (WOMAN, MAN, ELDER, GIRL)}
 CLEAR_MM = 0.6  # between lid and eyeball: the edges of stretched lids are 6 mm long and sink between vertices
+BODY_SHAPES = (BREATH_SHAPE, *SWING_SHAPES, PUPIL_SHAPE)
+BODY_LIMITS = ((0.0, 1.0), *[(-LIMIT_RAD, LIMIT_RAD)] * len(SWING_SHAPES), (-1.0, 1.0))
 NO_TEXTURE = Texture(np.zeros((4, 4, 3), np.uint8))  # in place of the cards of brows and lashes
 
 
@@ -71,10 +74,17 @@ def drawn_face(source: SourceMesh, character: Character) -> Face:
     )
     about = {"name": character.name, "summary": character.summary, **METADATA}
     about["made_by"] = "python -m corpus_tools.drawn.build_drawn"
-    face = assemble_face(built, [*shape_names(cage), BREATH_SHAPE, *SWING_SHAPES], textures, about)
+    face = assemble_face(built, [*shape_names(cage), *BODY_SHAPES], textures, about)
     limits = face.limits.copy()
-    limits[-len(SWING_SHAPES) :] = -LIMIT_RAD, LIMIT_RAD
-    return add_landmarks(replace(face, limits=limits), skin.base)
+    limits[-len(BODY_SHAPES) :] = BODY_LIMITS
+    return add_landmarks(_centred(replace(face, limits=limits)), skin.base)
+
+
+def _centred(face: Face) -> Face:
+    """The face with its origin midway between its eyes."""
+    middle = np.mean([eye.centre for eye in face.eyes], axis=0)
+    eyes = tuple(replace(eye, centre=eye.centre - middle) for eye in face.eyes)
+    return replace(face, vertices=face.vertices - middle, eyes=eyes, pivot=face.pivot - middle)
 
 
 def _breathing(piece: Piece) -> Piece:
@@ -101,7 +111,8 @@ def _reference(source: SourceMesh) -> ReferenceHead:
 def _skin(own: Skin, reference: ReferenceHead, balls: tuple[Eyeball, Eyeball], character: Character) -> Skin:
     """The skin of a character, with its expressions, and its slight smile at rest."""
     shut = shut_lids(correct_shapes(close_lips(own, reference.lips)), balls, reference.lids)
-    skin = part_lips(soften(shut, reference.lids), reference.lips)
+    skin = thin_lips(soften(shut, reference.lids), reference.lips)
+    skin = part_lips(close_jaw(skin, reference.lips), reference.lips)
     lining = find_lining(skin, balls, -0.1)
     others = [name for name in LID_SHAPES if name != "eyeBlink"]  # that one lies on the eyeball already
     skin = tuck_lining(clear_eyeballs(skin, balls, others, CLEAR_MM, lining), balls, lining)

@@ -25,8 +25,11 @@ SQUINTS, N_SQUINT_MEANS = ("eyeSquint", "cheekSquint"), 30
 LID_MM, MOUTH_MM = (1.5, 7.0), (13.0, 20.0)  # distances over which the smoothing begins
 SHUT_SIDES, SHUT_SHAPES = ("mouthSmile", "mouthDimple", "mouthPress"), ("mouthPucker", "mouthFunnel")
 LIP_TOUCH_MM, LIP_REACH_MM, LIP_MIDDLE_MM = 0.3, 9.0, 8.0  # overlap that is left, reach of its removal, between sides
+LIFTS = ("mouthUpperUp", "mouthSmile", "mouthShrugUpper")
+LIP_TOP_SHARE, LIP_TOP_MM, LIP_TOP_SIZE = 0.6, np.array([0.0, 10.0, 4.0]), (32.0, 11.5, 24.0)
 COLUMNS_MM = np.linspace(-30.0, 30.0, 61)  # across the mouth
-CORNER_MM, CHEEK_MM = np.array([1.5, 3.0, 1.5]), np.array([1.0, 1.6, 2.6])  # a smile lifts these more than MakeHuman's
+# A smile lifts corners and cheeks more than MakeHuman's, and the middle of both lips, which else hangs like a beak.
+CORNER_MM, CHEEK_MM, MIDDLE_MM = np.array([1.5, 3.0, 1.5]), np.array([1.0, 1.6, 2.6]), np.array([0.0, 1.2, -0.6])
 
 
 def soften(skin: Skin, lids: Sequence[LidEdge]) -> Skin:
@@ -42,7 +45,9 @@ def soften(skin: Skin, lids: Sequence[LidEdge]) -> Skin:
         outward = np.array([sign, 1.0, 1.0])
         corner = bump(places, (sign * 22, -58, 20), (11, 9, 20))
         cheek = bump(places, (sign * 37, -32, 18), (17, 14, 24)) * off_lids
+        middle = bump(places, (0, -60, 28), (13, 6, 24))
         lift = corner[:, None] * outward * CORNER_MM + cheek[:, None] * outward * CHEEK_MM
+        lift += middle[:, None] * MIDDLE_MM / len(SIDES)
         shapes[f"mouthSmile{side}"] = shapes[f"mouthSmile{side}"] + lift
     return replace(skin, shapes=shapes)
 
@@ -64,6 +69,28 @@ def part_lips(skin: Skin, ring: NDArray[np.int64]) -> Skin:
         for name, share in shares.items():
             shapes[name] = shapes[name] + (share * lift)[:, None] * [0, 1, 0]
     return replace(skin, shapes=shapes)
+
+
+def thin_lips(skin: Skin, ring: NDArray[np.int64]) -> Skin:
+    """Lifted upper lips that become thinner: the skin between them and the nose, which is short, would fold."""
+    middle = skin.vertices[ring][np.abs(skin.vertices[ring, 0]) < LIP_MIDDLE_MM].mean(axis=0)
+    share = 1 - LIP_TOP_SHARE * bump(skin.vertices, middle + LIP_TOP_MM, LIP_TOP_SIZE)
+    lifted = {
+        name: moved * np.stack([np.ones_like(share), share, np.ones_like(share)], axis=1)
+        for name, moved in skin.shapes.items()
+        if name.startswith(LIFTS)
+    }
+    return replace(skin, shapes={**skin.shapes, **lifted})
+
+
+def close_jaw(skin: Skin, ring: NDArray[np.int64]) -> Skin:
+    """A `mouthClose` that undoes the gap of an open jaw: proportions change how far the jaw parts the lips."""
+    upper, lower = ring_arcs(skin, ring)
+    places, jaw, close = skin.vertices, skin.shapes["jawOpen"], skin.shapes["mouthClose"]
+    open_, closed = (-_overlap(places + moved, upper, lower) for moved in (jaw, jaw + close))
+    inside = np.abs(COLUMNS_MM) < LIP_MIDDLE_MM
+    gain = float(np.median(open_[inside] / (open_ - closed)[inside]))
+    return replace(skin, shapes={**skin.shapes, "mouthClose": gain * close})
 
 
 def _overlap(vertices: Floats, upper: NDArray[np.int64], lower: NDArray[np.int64]) -> Floats:

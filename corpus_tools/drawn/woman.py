@@ -11,15 +11,16 @@ TARGETS = {
     "macrodetails/caucasian-female-child": 0.44,
     "macrodetails/universal-female-young-averagemuscle-averageweight": 0.56,
     "macrodetails/universal-female-child-averagemuscle-averageweight": 0.44,
-    "mouth/mouth-angles-up": 0.45, "mouth/mouth-cupidsbow-decr": 0.25, "mouth/mouth-cupidsbow-width-incr": 0.3,
+    "mouth/mouth-angles-up": 0.45, "mouth/mouth-cupidsbow-decr": 0.55, "mouth/mouth-cupidsbow-width-incr": 0.3,
     "mouth/mouth-laugh-lines-out": 0.4, "mouth/mouth-upperlip-volume-incr": 0.1,
-    "mouth/mouth-upperlip-height-decr": 0.25, "mouth/mouth-upperlip-middle-up": 0.35,
+    "mouth/mouth-upperlip-height-decr": 0.25, "mouth/mouth-upperlip-middle-up": 0.6,
     "mouth/mouth-lowerlip-height-decr": 0.25, "mouth/mouth-scale-horiz-incr": 0.40,
     "eyes/l-eye-height1-incr": 0.60, "eyes/r-eye-height1-incr": 0.60, "eyes/l-eye-height2-incr": 0.95,
     "eyes/r-eye-height2-incr": 0.95, "eyes/l-eye-height3-incr": 0.75, "eyes/r-eye-height3-incr": 0.75,
     "eyes/l-eye-bag-decr": 0.8, "eyes/r-eye-bag-decr": 0.8,
     "nose/nose-hump-decr": 0.6, "nose/nose-point-up": 0.55, "nose/nose-width1-decr": 0.4,
-    "nose/nose-nostrils-width-decr": 0.5, "nose/nose-flaring-decr": 0.7, "nose/nose-scale-horiz-decr": 0.3,
+    "nose/nose-nostrils-width-decr": 0.5, "nose/nose-flaring-decr": 0.7, "nose/nose-scale-horiz-decr": 0.1,
+    "nose/nose-point-width-incr": 0.5,
     "cheek/l-cheek-volume-incr": 0.25, "cheek/r-cheek-volume-incr": 0.25, "chin/chin-cleft-decr": 0.4,
 }  # fmt: skip
 # Rosy rather than yellow skin, as the warm key light adds the yellow. The hair is two values darker than the skin, as
@@ -35,8 +36,8 @@ PALETTE = Palette(
     ),
     lips=(0.85, 0.47, 0.45), lip_strength=0.82, n_freckles=46, cavity=(0.52, 0.17, 0.19),
     lid_line=(0.26, 0.18, 0.16), crease=(0.88, 0.74, 0.70), waterline=(0.72, 0.52, 0.50),
-    hair=(0.27, 0.12, 0.08), hair_tip=(0.42, 0.19, 0.10),
-    brows=(0.21, 0.105, 0.07), lashes=(0.13, 0.07, 0.055),
+    hair=(0.26, 0.125, 0.085), hair_tip=(0.38, 0.19, 0.115),
+    brows=(0.33, 0.18, 0.12), lashes=(0.13, 0.07, 0.055),
     iris_dark=(0.05, 0.12, 0.10), iris=(0.15, 0.31, 0.25), iris_light=(0.49, 0.68, 0.48), iris_rim=(0.03, 0.07, 0.06),
     cloth=(0.93, 0.66, 0.25),
 )  # fmt: skip
@@ -80,6 +81,11 @@ LOCKS = (
     Lock(
         path=((36, 46, 0), (50, 26, 4), (60, 10, 4), (67, -4, 4), (70, -17, 4), (66, -29, 4)),
         half_width=5.5, thickness=4, clearance=1.5,
+    ),
+    # along the hairline of the bare temple
+    Lock(
+        path=((60, 33, 0), (75, 23, 2), (87, 13, 3), (97, 4, 3), (105, -5, 2), (112, -16, 0)),
+        half_width=8.5, thickness=4, bluntness=0.1, clearance=1.5, loose=0.3,
     ),
     # under the part and the crown
     Lock(
@@ -138,7 +144,7 @@ WOMAN = Character(
     targets=TARGETS,
     proportions=Proportions(
         eye_gain=0.92, nose_gain=-0.46, lips_thinner=0.36, lips_back=2.6, jaw_taper=0.24, chin_up=15.5,
-        chin_forward=2.0, upper_cheek=3.2, lower_cheek=2.8, corners_up=4.2, middle_down=0.5, skull_gain=0.10,
+        chin_forward=2.0, upper_cheek=3.2, lower_cheek=2.8, corners_up=4.2, middle_down=0.0, skull_gain=0.10,
         neck_thinner=0.30,
     ),
     palette=PALETTE,

@@ -31,7 +31,7 @@ class Effort:
     pose_side: int = 384
     rest: int = 16
     pose: int = 5
-    turn: int = 10
+    turn: int = 16
     reference: int = 40  # from which changes are counted, in all of which its noise is
     mouth: int = 28
     small: int = 8

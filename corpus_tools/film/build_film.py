@@ -12,6 +12,7 @@ from corpus_tools.film.pose_light import PoseLight
 from corpus_tools.film.poses import lit_poses
 from corpus_tools.film.scene import FilmScene
 from corpus_tools.head.source import SourceMesh, fetch_data, read_source
+from corpus_tools.training.score_files import calibrate_face_file
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 
@@ -39,7 +40,9 @@ def main() -> None:
             if kept is not None:
                 poses.save(kept)
         report(f"{name}: fit")
-        write_face(path, replace(face, light=(fit_light(face, poses, look),)))
+        write_face(path, replace(face, light=(fit_light(face, poses, look, CAST[name].eyes),)))
+        report(f"{name}: calibration")  # again: the tracker sees other pictures of it now
+        calibrate_face_file(str(path), path)
     report("done")
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.ndimage import binary_erosion, distance_transform_edt, map_coordinates
+from scipy.ndimage import binary_erosion, distance_transform_edt, gaussian_filter, map_coordinates
 from scipy.spatial import cKDTree
 
 from corpus_tools.film.look import WHITE, Look
@@ -14,6 +14,7 @@ from corpus_tools.film.pose_light import CAMERA_YAWS_DEG, FAR, MOUTH, SKIN, Pose
 from corpus_tools.film.poses import EXPRESSIONS
 from corpus_tools.film.seen import mouth_middle, seen_triangles
 from corpus_tools.film.weld import weld_vertices
+from corpus_tools.head.eyes import EyeStyle
 from tts2face.face.deformation import build_rig
 from tts2face.models.baked_light import BLACK_SHARE, PRODUCTS, BakedLight
 from tts2face.models.face import Face
@@ -36,12 +37,14 @@ EYE_MM, MOUTH_MM = (32.0, 26.0, 60.0), (34.0, 24.0, 48.0)  # around them what is
 HIDDEN, SEEN = 0.05, 0.12  # displayed light of texels that are hidden at rest there, and of those that are seen
 N_GUESSES = 4  # rounds in which the light of what a pose hides is guessed by the others
 FINE_ROUNDS, CLEAN_ROUNDS = 1, 7  # of neighbours over which noise is smoothed at eyes and mouth, and elsewhere
-SMALL_ROUNDS = 3  # on teeth, tongue, lashes and eyeballs
+SMALL_ROUNDS, MOUTH_ROUNDS = 3, 8  # on lashes and eyeballs; on teeth and tongue, which else are striped
+MOUTH_LIT, REVEAL_SPREAD = 0.12, 1.2  # displayed light of what an opening shows, and distance of openings
+METAL, METAL_LIT = ("stud", "glasses"), 0.5  # and the share of its median below which its light is that of its back
 BALL_LIT = 0.45  # of the light in front below which a vertex of an eyeball lies under the lid
-TURN_SIDE = 192
+TURN_SIDE, TURN_BLUR = 192, 0.8  # texels; the shadows of hair are soft, what is left of noise is not
 
 
-def fit_light(face: Face, poses: PoseLight, look: Look) -> BakedLight:
+def fit_light(face: Face, poses: PoseLight, look: Look, eyes: EyeStyle) -> BakedLight:
     """Light of a face from that of its poses."""
     triangles, is_inside = seen_triangles(face, poses)
     part_of = _vertex_parts(face)
@@ -71,6 +74,7 @@ def fit_light(face: Face, poses: PoseLight, look: Look) -> BakedLight:
     balls = np.stack([_lit_balls(face, ball_rows, light) for light in small[:, of_ball] / WHITE])
     ball_modes, ball_weights = principal_modes(features, balls - balls[:1], N_BALL_MODES, BALL_RIDGE)
     turns, turn_modes, from_turns = _turn_changes(poses, turned)
+    mouth = _revealed(small[~turned][:, of_mouth], measures[~turned])
     cameras, sizes = _quantised(_far_changes(poses)[turned.sum() + 1 :])
     return BakedLight(
         page_of={name: page for page, names in enumerate((SKIN, FAR)) for name in names},
@@ -83,7 +87,7 @@ def fit_light(face: Face, poses: PoseLight, look: Look) -> BakedLight:
         mode_weights=weights,
         mouth_rows=small_rows[of_mouth].astype(np.int32),
         openings=measures[~turned].astype(np.float32),
-        mouth=np.rint(np.clip(small[~turned][:, of_mouth] * 255, 0, 255)).astype(np.uint8),
+        mouth=np.rint(np.clip(mouth * 255, 0, 255)).astype(np.uint8),
         turns_deg=turns.astype(np.float32),
         turn_weights=from_turns,
         turn_modes=turn_modes,
@@ -95,9 +99,10 @@ def fit_light(face: Face, poses: PoseLight, look: Look) -> BakedLight:
         ball_modes=ball_modes.astype(np.float32),
         ball_weights=ball_weights,
         lamps=poses.lamps,
-        head_lamps=0,
+        head_lamps=sum(lamp.follows_head for lamp in look.lamps.values()),
         sky=(np.array(look.sky) * look.sky_strength).astype(np.float32),
         eye_gain=look.eye.gain,
+        eye_edges=np.array([eyes.pupil, eyes.iris], np.float32),
         view=np.rint(poses.view * 255).astype(np.uint8),
         backdrop=poses.backdrop,
     )
@@ -251,7 +256,8 @@ def _far_changes(poses: PoseLight) -> Floats:
 def _turn_changes(poses: PoseLight, turned: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.int8], NDArray[np.float32]]:
     """Turns (T, 2) of the head, modes (A, 3, n) of the change of both pages, and their weights (T, A)."""
     n = int(turned.sum())
-    skin = (_halved(poses.skin[turned] - poses.skin[:1]) * 255).transpose(0, 3, 1, 2).reshape(n, 3, -1)
+    skin = gaussian_filter(_halved(poses.skin[turned] - poses.skin[:1]) * 255, (0, TURN_BLUR, TURN_BLUR, 0))
+    skin = skin.transpose(0, 3, 1, 2).reshape(n, 3, -1)
     below = np.zeros((n, 3, TURN_SIDE * (TURN_SIDE // BLACK_SHARE)))
     changes = np.concatenate([skin, _far_changes(poses)[1 : n + 1], below], axis=2)
     modes, weights = principal_modes(np.eye(n), changes, N_TURN_MODES, 0.0)
@@ -319,7 +325,8 @@ def _enlarged(values: Floats, side: int) -> Floats:
 def _smoothed_small(face: Face, poses: PoseLight, rows: Ints, parts: NDArray[np.str_]) -> Floats:
     """(P, N, 3) light of the vertices (N,) of the small parts (N,), without the noise of single ones.
 
-    Lit ones are averaged with each other: a tooth does not take the dark of what the lip hides of it.
+    Lit ones are averaged with each other: a tooth does not take the dark of what the lip hides of it. Metal, whose
+    light is that of the camera in front, takes its median where it turns away.
     """
     first, group = weld_vertices(face)
     at = np.full(len(face.vertices), -1)
@@ -331,9 +338,27 @@ def _smoothed_small(face: Face, poses: PoseLight, rows: Ints, parts: NDArray[np.
         for pose in light:
             lit = (pose[own].max(axis=1) > SKIN_LIT).astype(np.float64)[:, None]
             among = np.maximum(near @ lit, 1e-9)
-            for _ in range(SMALL_ROUNDS):
+            for _ in range(MOUTH_ROUNDS if name.startswith(MOUTH) else SMALL_ROUNDS):
                 pose[own] = np.where(lit > 0, near @ (pose[own] * lit) / among, pose[own])
+            if name in METAL and lit.any():
+                usual = np.median(pose[own][lit[:, 0] > 0], axis=0)
+                dull = pose[own].max(axis=1) < METAL_LIT * usual.max()
+                pose[own[dull]] = usual
     return light
+
+
+def _revealed(light: Floats, openings: Floats) -> Floats:
+    """(J, M, 3) light of the mouth in openings (J, 5): what one of them hides has the light of those that show it.
+
+    Between baked openings it is seen, and else black: side teeth would be missing.
+    """
+    shown = light.max(axis=2) > MOUTH_LIT
+    squared = ((openings[:, None] - openings[None]) ** 2).sum(axis=2)
+    near = np.exp(-squared / (2 * REVEAL_SPREAD**2))
+    weights = near @ shown
+    found = np.einsum("jk,km,kmc->jmc", near, shown.astype(np.float64), light) / np.maximum(weights, 1e-12)[..., None]
+    revealed: Floats = np.where((shown | ~shown.any(axis=0))[..., None], light, found)
+    return revealed
 
 
 def _corners(face: Face, names: Sequence[str]) -> Ints:

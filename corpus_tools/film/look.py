@@ -79,7 +79,11 @@ class EyeLook:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lamp:
-    """A rectangle that shines towards a target; ``parts`` names the only parts that it lights, empty for all."""
+    """A rectangle that shines towards a target.
+
+    ``parts`` names the only parts that it lights, empty for all. One that ``follows_head`` turns twice as far as the
+    head: its mirror image in an eye keeps its place there.
+    """
 
     place: Vector
     target: Vector
@@ -88,6 +92,7 @@ class Lamp:
     watts: float
     colour: Vector
     parts: tuple[str, ...] = ()
+    follows_head: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,7 +126,7 @@ LAMPS = {
     ),
     "fill": Lamp(place=(4.8, 0, 4.6), target=(0, -0.3, 0), width=4.5, height=4.5, watts=34, colour=(0.74, 0.86, 1)),
     "left rim": Lamp(
-        place=(-4.2, 2.4, -3), target=(0, 0.1, -0.6), width=1, height=3, watts=170, colour=(0.70, 0.84, 1)
+        place=(-4.2, 2.4, -3), target=(0, 0.1, -0.6), width=1, height=3, watts=120, colour=(0.70, 0.84, 1)
     ),
     "right rim": Lamp(
         place=(4.6, 2, -2), target=(0, 0, -0.5), width=1, height=3, watts=560, colour=(0.78, 0.89, 1)
@@ -133,6 +138,11 @@ LAMPS = {
     "mouth": Lamp(
         place=(0, -1.6, 6.5), target=(0, -0.6, 0), width=0.6, height=0.6, watts=80, colour=(1, 0.92, 0.85),
         parts=("teeth", "gums", "tongue"),
+    ),
+    # Without it, the key light leaves the eyes when the head turns or bows, and they look dull.
+    "catch": Lamp(
+        place=(-3.4, 3.4, 4.9), target=(0, -0.2, 0), width=2.0, height=2.4, watts=600, colour=(1, 0.88, 0.74),
+        parts=("cornea",), follows_head=True,
     ),
 }  # fmt: skip
 WALL = Wall(

@@ -49,10 +49,10 @@ class FilmScene:
         self.materials = part_materials(look, face.textures[0], face.textures[2])
         self.objects: dict[str, tuple[Any, Ints]] = {}  # by part, with the face's vertex of each of the mesh's
         self._add_parts()
-        self.pose(np.zeros(len(face.shape_names)), np.zeros(6))
         self.lamps = {name: _lamp(name, lamp) for name, lamp in look.lamps.items()}
         for name, lamp in look.lamps.items():
             self._link(name, lamp)
+        self.pose(np.zeros(len(face.shape_names)), np.zeros(6))
         self._wall = _build_wall(look)
         self._camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         self._camera.data.clip_end, self._camera.data.sensor_width = FAR, SENSOR_MM
@@ -126,6 +126,10 @@ class FilmScene:
                 turned = self._tangents(rows) @ moved[:, :3].T
                 made.data.attributes["tangent"].data.foreach_set("vector", turned.astype(np.float32).ravel())
             made.data.update()
+        turn = np.vstack([np.column_stack([moved[:, :3], moved[:, 3] / UNIT_MM]), [0, 0, 0, 1]])
+        for name, lamp in self.look.lamps.items():
+            if lamp.follows_head:
+                self.lamps[name].matrix_basis = Matrix((turn @ turn).tolist()) @ _placed(lamp)
 
     def _eyeball(
         self,
@@ -159,17 +163,17 @@ class FilmScene:
             receivers = bpy.data.collections.new(name)
             bpy.context.scene.collection.children.link(receivers)
             for part, (made, _) in self.objects.items():
-                if part.split("_")[0] in lamp.parts:
+                if part.split("_")[0].rstrip("01") in lamp.parts:
                     receivers.objects.link(made)
             self.lamps[name].light_linking.receiver_collection = receivers
 
     def mirrored_lamps(self) -> NDArray[np.float32]:
-        """(L, 17) lamps that light all parts, as `tts2face.models.baked_light` describes them."""
+        """(L, 17) lamps that light the eyes, as `tts2face.models.baked_light` describes them; heads' own are last."""
         rows = []
-        for name, lamp in self.look.lamps.items():
-            if lamp.parts:
+        for lamp in sorted(self.look.lamps.values(), key=lambda one: one.follows_head):
+            if lamp.parts and "cornea" not in lamp.parts:
                 continue
-            place = np.array(self.lamps[name].matrix_basis)  # the one in the world is not computed yet
+            place = np.array(_placed(lamp))
             radiance = np.array(lamp.colour) * lamp.watts / (np.pi * lamp.width * lamp.height)
             size = (lamp.width * UNIT_MM / 2, lamp.height * UNIT_MM / 2)
             rows.append(np.concatenate([place[:3, 3] * UNIT_MM, *place[:3, :2].T, -place[:3, 2], size, radiance]))
@@ -222,9 +226,14 @@ def _lamp(name: str, lamp: Lamp) -> Any:
     data.energy, data.color = lamp.watts, lamp.colour
     made = bpy.data.objects.new(name, data)
     bpy.context.collection.objects.link(made)
-    made.location = lamp.place
-    made.rotation_euler = (Vector(lamp.target) - Vector(lamp.place)).to_track_quat("-Z", "Y").to_euler()
+    made.matrix_basis = _placed(lamp)
     return made
+
+
+def _placed(lamp: Lamp) -> Matrix:
+    """(4, 4) place of a lamp and its direction, before the head turns."""
+    place = Vector(lamp.place)
+    return Matrix.LocRotScale(place, (Vector(lamp.target) - place).to_track_quat("-Z", "Y"), None)
 
 
 def _build_wall(look: Look) -> list[Any]:

@@ -53,10 +53,10 @@ def mouth_middle(face: Face) -> NDArray[np.float32]:
 
 
 def _beside(face: Face, seen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(2 F,) triangles that share a vertex with a seen one (F,): some are seen between the poses and cameras."""
+    """(2 F,) triangles that share an edge with seen ones (F,): some are seen between the poses and cameras."""
     reached = np.zeros(len(face.vertices), bool)
     reached[face.triangles[seen]] = True
-    beside = reached[face.triangles].any(axis=1)
+    beside = reached[face.triangles].sum(axis=1) >= 2
     return np.concatenate([beside, np.zeros_like(beside)])
 
 

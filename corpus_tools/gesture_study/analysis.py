@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.gesture_study.blinks import find_blinks
+from corpus_tools.gesture_study.body import BodyMeasure, measure_body
 from corpus_tools.gesture_study.clips import field_clip, hold_out, noise_clip, published_clip, replace_style
 from corpus_tools.gesture_study.longrun import LongRun, long_run
 from corpus_tools.gesture_study.measures import (
@@ -137,11 +138,12 @@ class StyleStudy:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GestureStudy:
-    """Results for all styles of a palette."""
+    """Results for all styles of a palette, and of what the body does whatever the style."""
 
     name: str
     options: Options
     styles: tuple[StyleStudy, ...]
+    body: tuple[BodyMeasure, ...]
 
     @property
     def targets(self) -> tuple[int, int]:
@@ -165,7 +167,7 @@ def study_gestures(name: str, palette: Palette, options: Options, on_progress: P
         studies.append(_study_style(palette, style, prepared[source], options))
     if on_progress:
         on_progress(len(names), len(names))
-    return GestureStudy(name, options, tuple(studies))
+    return GestureStudy(name, options, tuple(studies), measure_body(options.seed))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

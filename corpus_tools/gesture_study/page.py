@@ -33,7 +33,18 @@ def gestures_page(study: GestureStudy) -> str:
     parts = [LAYOUT, _method(study)]
     for style in study.styles:
         parts += _style(style)
+    parts += ["<h2>Breath and eyes</h2>", _body(study)]
     return page(f"Gestures: {study.name}", parts)
+
+
+def _body(study: GestureStudy) -> str:
+    rows = [
+        (one.name, format_number(one.value), one.unit, f"{one.published[0]:g} to {one.published[1]:g}", one.source)
+        for one in study.body
+    ]
+    return table(("what", "made", "unit", "published", "source"), rows, numbers=(1,)) + note_paragraph(
+        "Of any style and face that has them; the seed is that of the study."
+    )
 
 
 def format_number(value: float, digits: int = 2) -> str:

@@ -43,6 +43,10 @@ def gestures_json(study: GestureStudy) -> str:
         "seed": options.seed,
         "quantiles": list(QUANTILES),
         "styles": [_style(style) for style in study.styles],
+        "body": [
+            {"name": one.name, "value": _round_number(one.value), "unit": one.unit, "published": list(one.published)}
+            for one in study.body
+        ],
     }
     return json.dumps(content, ensure_ascii=False, indent=1) + "\n"
 

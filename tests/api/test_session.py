@@ -119,7 +119,7 @@ def test_a_performance_does_not_replace_its_inputs(
 def test_a_session_without_a_palette_moves_lips_alone() -> None:
     bare = tts2face.Session(palette=None)
     clip = bare.clip("Bob may move.")
-    assert clip.motion.channels == tts2face.load_face("head").shape_names
+    assert clip.motion.channels == tts2face.load_face("ada").shape_names
     assert not clip.head.values.any()
 
 

@@ -22,7 +22,7 @@ identity = "kofi"
 
 [[role]]
 speaker = "ann*"
-face = "cartoon"
+face = "ada"
 voice = "espeak-female"
 style = "delighted"
 rate = 1.1
@@ -42,7 +42,7 @@ def test_speakers_of_one_cue_have_their_own_clips_and_divide_its_time(plan_of: P
     text = "1\n00:00:01,000 --> 00:00:04,000\n- JOHN: Good.\n- ANN: Hello there.\n"
     plan = plan_of(text, cast=read_cast(tmp_path / "cast.toml"))
     assert [(one.name, one.begin_s) for one in plan.outputs] == [("one-0001.mp4", 1.0), ("one-0001-2.mp4", 1.9)]
-    assert [one.segments[0].models.face for one in plan.outputs] == ["head", "cartoon"]
+    assert [one.segments[0].models.face for one in plan.outputs] == ["head", "ada"]
     assert [cue.speaker for one in plan.outputs for cue in one.cues] == ["JOHN", "ANN"]
     assert [(one.line, one.message) for one in plan.warnings] == [
         (2, "JOHN and ANN speak in cue 1; its time is divided by their letters")
@@ -123,7 +123,7 @@ def test_segments_survive_json(plan_of: Planner) -> None:
 def test_roles_choose_models_and_options(plan_of: Planner, tmp_path: Path) -> None:
     (tmp_path / "cast.toml").write_text(CAST)
     first, second, _ = (one.segments[0] for one in plan_of(cast=read_cast(tmp_path / "cast.toml")).outputs)
-    assert (first.models.face, first.models.identity) == ("cartoon", None)  # presets belong to a face
+    assert (first.models.face, first.models.identity) == ("ada", None)  # presets belong to a face
     assert {name: first.request[name] for name in ("voice", "style", "rate")} == {
         "voice": "espeak-female",
         "style": "delighted",
@@ -183,7 +183,7 @@ def test_names_of_a_cast_are_checked_before_anything_is_rendered(
 
 
 def test_a_role_that_applies_to_no_cue_is_a_warning(plan_of: Planner, tmp_path: Path) -> None:
-    (tmp_path / "cast.toml").write_text('[[role]]\nspeaker = "ANN"\n[[role]]\nspeaker = "JOHNN"\nface = "cartoon"\n')
+    (tmp_path / "cast.toml").write_text('[[role]]\nspeaker = "ANN"\n[[role]]\nspeaker = "JOHNN"\nface = "ada"\n')
     plan = plan_of(cast=read_cast(tmp_path / "cast.toml"))
     assert [(one.file, one.line, one.message) for one in plan.warnings] == [
         ("the cast", 0, "role 2 (speaker 'JOHNN') applies to no cue; check its patterns")

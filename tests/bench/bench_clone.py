@@ -58,7 +58,7 @@ def targets(recordings: Path, cache: Path | None, talker: Talker) -> Iterator[tu
     kept = observe(recordings, run_options=RunOptions(cache, 1)).kept
     yield "even half, 12 + 6 modes", learn_shapes(kept[::2], 12, 6)
     yield "odd half, 30 + 15 modes", learn_shapes(kept[1::2], 30, 15)
-    for name in ("head", "cartoon"):
+    for name in ("head", "ada"):
         yield f"{name}, 20 + 10 modes", learn_shapes(observe_face(talker, name), 20, 10)
 
 

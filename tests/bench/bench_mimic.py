@@ -59,7 +59,7 @@ def main() -> None:
     read_s, film_s = time.perf_counter() - began, sum(len(take.landmarks) / take.fps for take in takes)
     print(f"watching {film_s:.0f} s of film: {film_s / read_s:.1f} x real time")
     print("| face | r opening | r width | r lids | range | pitch, yaw, roll off (degrees) | whole, x real time |")
-    for name in ("head", "cartoon"):
+    for name in ("head", "ada"):
         session = Session(face=name, palette=None)
         rows, drawn_s = [], 0.0
         for video, take in zip(videos, takes, strict=True):

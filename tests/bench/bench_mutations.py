@@ -32,7 +32,7 @@ def main(count: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
         own = Path(folder) / "own.talker"
         write_made_talker(own, has_face=True)
-        files = [SHIPPED_FOLDER / name for name in ("head.face", "cartoon.face", "starter.palette", "grid_s1.talker")]
+        files = [SHIPPED_FOLDER / name for name in ("head.face", "ada.face", "starter.palette", "grid_s1.talker")]
         for file in (*files, own):
             rows = []
             for first in range(0, count, BATCH):

@@ -84,7 +84,7 @@ def test_a_talker_s_own_face_has_no_mesh_to_export(here: Path) -> None:
     class OwnFace:
         @property
         def mesh(self) -> Face:
-            raise InputError("a talker's own face has no mesh; choose --face head, cartoon or a .face file")
+            raise InputError("a talker's own face has no mesh; choose --face ada, head or a .face file")
 
     clip = Session(palette=None).clip("", idle=0.2, fps=5)
     with pytest.raises(InputError, match="own face has no mesh"):
@@ -160,8 +160,6 @@ def test_a_track_of_another_face_is_refused(session: Session, here: Path) -> Non
     names = ("a", *clip.motion.channels[1:])
     other = tts2face.Clip(tts2face.Trajectory(names, clip.motion.values, 5.0), clip.head, clip.speech)
     tts2face.export(other, "a.json")
-    with pytest.raises(
-        DataError, match=r"66 channels .* which are not those of the face head with the palette starter"
-    ):
+    with pytest.raises(DataError, match=r"66 channels .* which are not those of the face ada with the palette starter"):
         tts2face.convert("a.json", "a.glb")
     tts2face.convert("a.json", "a.bvh")

@@ -37,7 +37,7 @@ TEXTS = (
 
 @pytest.fixture(scope="module")
 def ready() -> Session:
-    return Session(load_talker("grid_s1"), load_face("cartoon"))
+    return Session(load_talker("grid_s1"), load_face("ada"))
 
 
 def pieces_of(ready: Session, text: str, **options: object) -> list[Piece]:

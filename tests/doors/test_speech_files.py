@@ -60,7 +60,7 @@ def test_no_model_is_loaded_unless_it_is_needed(tmp_path: Path, monkeypatch: pyt
     unlike = [
         [*plain, str(tmp_path / "a.csv")],
         [*plain, str(tmp_path / "b.wav"), "--style", "delighted"],  # the palette has to have it
-        [*plain, str(tmp_path / "b.wav"), "--face", "cartoon"],
+        [*plain, str(tmp_path / "b.wav"), "--face", "head"],
         [*plain, str(tmp_path / "b.wav"), "--explain", str(tmp_path / "b.txt")],
         [*plain, str(tmp_path / "b.wav"), "--talker", "nobody.talker"],
         ["[style:annoyed]Hello.[/style]", *plain[1:], str(tmp_path / "b.wav")],

@@ -30,7 +30,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_core_reports_the_words(recording: Path, tmp_path: Path) -> None:
-    ready = Session(load_talker("grid_s1"), load_face("cartoon"))
+    ready = Session(load_talker("grid_s1"), load_face("ada"))
     request = Request(audio=recording, text=WRONG, fps=10.0, gestures="none")
     pieces = list(ready.stream(request))
     (mismatch,) = (one for piece in pieces for one in piece.mismatches)

@@ -2,12 +2,15 @@
 
 import json
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from tests.render.film.lit_face import SKIN_LIGHT, lit_tiny_face
 from tests.render.tiny_face import tiny_face
 from tts2face.exports import stage_surfaces
+from tts2face.exports.rest_light import in_rest_light
 from tts2face.exports.stage_glb import LEAST_MOVE_MM, quantised_moves, stage_glb
 from tts2face.exports.surfaces import divide_surface
 
@@ -98,3 +101,24 @@ def test_other_viewers_can_read_it(made):
     assert set(stage["views"]) == {"front", "three-quarter", "profile", "close"}
     assert len(stage["lamps"]) == 4
     assert len(stage["eyes"]) == len(FACE.eyes)
+
+
+def test_a_face_with_baked_light_is_shown_in_it_at_rest() -> None:
+    face = lit_tiny_face()
+    (light,) = face.light
+    lashes = face.triangles[face.parts[-1].first :]
+    brown = replace(light, page_of={"skin": 0}, rows=np.unique(lashes).astype(np.int32))
+    brown = replace(brown, base=np.full((len(brown.rows), 3), (90, 60, 30), np.uint8))
+    shown, unlit = in_rest_light(replace(face, light=(brown,)))
+    assert unlit == {"skin", "lashes"}
+    assert [one.pixels[0, 0].tolist() for one in shown.textures] == [list(SKIN_LIGHT), [30, 30, 30]]
+    assert (shown.colours[brown.rows] == (90, 60, 30)).all()
+    others = np.setdiff1d(np.arange(len(face.vertices)), brown.rows)
+    np.testing.assert_array_equal(shown.colours[others], face.colours[others])
+
+    made = Read(stage_glb(face, face.shape_names))
+    by_name = {one["name"]: one for one in made.json["materials"]}
+    assert {name for name, one in by_name.items() if one["extras"]["unlit"]} == {"skin", "lashes"}
+    assert by_name["skin"]["pbrMetallicRoughness"]["baseColorTexture"] == {"index": 0}
+    assert by_name["lashes"]["pbrMetallicRoughness"]["baseColorTexture"] == {"index": 1}
+    assert in_rest_light(FACE) == (FACE, frozenset())

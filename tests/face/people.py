@@ -6,6 +6,6 @@ from tts2face.catalogue import identities
 
 PEOPLE = [  # face and identity
     pytest.param("head", None, marks=pytest.mark.smoke, id="head"),
-    pytest.param("cartoon", None, id="cartoon"),
+    pytest.param("ada", None, id="ada"),
     *(pytest.param("head", entry.name, id=entry.name) for entry in identities("head")),
 ]

@@ -11,7 +11,7 @@ from tts2face.models.face_loading import load_face
 
 
 def test_displacements_are_the_same_with_any_cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    face = load_face("cartoon")
+    face = load_face("ada")
     landmarks = face.landmarks[:20]
     motion = np.random.default_rng(0).normal(size=(1, len(landmarks), 3))
     folder = tmp_path / "tts2face" / "displacements"

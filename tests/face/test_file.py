@@ -15,6 +15,7 @@ from tts2face.models import face_file
 from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Part, Texture
 from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_loading import load_face
+from tts2face.storage import files
 from tts2face.storage.files import find_file
 from tts2face.storage.tensors import write_tensors
 
@@ -188,3 +189,12 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
         replace(face, colours=face.colours[1:])
     with pytest.raises(DataError, match="beyond its 40"):
         replace(face, triangles=np.full((20, 3), N, np.int32))
+
+
+def test_a_former_face_is_said_once_and_shown_by_another_without_its_hair(caplog):
+    files._say_new_name.cache_clear()
+    assert {find_file("cartoon", "face").name for _ in range(2)} == {"ada.face"}
+    (note,) = [record.message for record in caplog.records if "cartoon" in record.message]
+    assert note == "the face cartoon is no longer part of this program; ada is used"
+    face = load_face("cartoon", hair="bob02", hair_color="red")
+    assert np.array_equal(face.vertices, load_face("ada").vertices)

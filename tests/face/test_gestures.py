@@ -23,7 +23,7 @@ from tts2face.request import Request
 from tts2face.session import Session
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
-FACES = ("head", "cartoon")
+FACES = ("head", "ada")
 BILABIALS = "Bob may bump my pump; Pam probably maps a big bamboo bomb to Mum. You choose two blue shoes."
 CONTACT_MM = 0.3  # gaps up to this are closed lips: half a pixel of a face that fills 512 of them
 KEPT_MM = 0.08  # tolerance of lip contact: a sixth of a pixel

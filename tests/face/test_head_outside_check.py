@@ -29,7 +29,7 @@ def networks():
         pytest.skip(f"the outside check cannot run: {missing}")
 
 
-@pytest.fixture(scope="module", params=["head", "cartoon"])
+@pytest.fixture(scope="module", params=["head", "ada"])
 def scores(request, networks):
     """Function from shape weights to the network's scores by name."""
     tracker, reader = networks

@@ -53,7 +53,7 @@ CLIPS: dict[str, Golden] = {
     "recording_with_words": Golden({"text": "Bob may move five big maps."}, is_recorded=True),
     "idle": Golden({"idle": 2.0, "style": "depressed"}),
     "ssml": Golden({"text": SSML, "style": "exaggerated"}),
-    "cartoon": Golden({"text": "Five ships shall measure joy.", "fps": 25.0}, Models(face="cartoon")),
+    "realistic": Golden({"text": "Five ships shall measure joy.", "fps": 25.0}, Models(face="head")),
     "identity_transparent": Golden(
         {"text": "Hello.", "rate": 1.2, "gestures": "noise"},
         Models(identity="kofi"),

@@ -28,7 +28,7 @@ def test_a_segment_finds_its_files_on_another_machine(stores: tuple[BlobStore, B
     here, there = tmp_path / "here", tmp_path / "there"
     sound = place_file(stores, stores[0].put(b"sound"), "audio.wav", here)
     wall = place_file(stores, stores[0].put(b"picture"), "background.png", here)
-    face = stores[1].fetch(stores[1].put(find_file("cartoon", "face")))
+    face = stores[1].fetch(stores[1].put(find_file("ada", "face")))
     models = Models(face=str(face))
     request, picture = {"audio": str(sound), "text": f"/a/{'ab' * 32}"}, {"background": str(wall)}
     segment = Segment(request, picture, models, 5, file_hashes=input_hashes(models, request, picture))

@@ -31,7 +31,7 @@ def whole(tmp_path: Path) -> Project:
     return Project(
         name="Scène 1",
         request=Request(text="Tea for two.", audio=tmp_path / "speech.wav", seed=3, style="delighted"),
-        models=Models(face="cartoon", hair="bob02"),
+        models=Models(identity="kofi", hair="bob02"),
         picture=Picture(size="320x320"),
         timeline=WHOLE,
         pronunciations={"two": "T UW1", "tea": "/tiː/"},
@@ -63,10 +63,18 @@ def test_paths_are_relative_to_the_folder_of_the_project(whole: Project, tmp_pat
 def test_defaults_are_not_written(tmp_path: Path) -> None:
     assert project_json(Project(request=Request(text="Hi.")), tmp_path) == {
         "format": "tts2face project",
-        "version": 1,
+        "version": 2,
         "name": "untitled",
         "request": {"text": "Hi."},
     }
+
+
+def test_projects_of_version_1_show_the_face_that_was_the_default_then(tmp_path: Path) -> None:
+    for version, models, face in ((1, {}, "head"), (1, {"face": "cartoon"}, "cartoon"), (2, {}, "ada")):
+        path = tmp_path / "old.json"
+        content = {"format": "tts2face project", "version": version, "models": models}
+        path.write_text(json.dumps(content), encoding="utf-8")
+        assert load_project(path).models.face == face
 
 
 def test_silent_features_are_the_muted_and_those_that_are_not_solo(whole: Project) -> None:
@@ -78,7 +86,7 @@ def test_silent_features_are_the_muted_and_those_that_are_not_solo(whole: Projec
     ("change", "reason"),
     [
         ({"format": "x"}, "is not a project"),
-        ({"version": 2}, "has version 2; this program reads version 1"),
+        ({"version": 3}, "has version 3; this program reads version 2"),
         ({"colour": 1}, "there is no 'colour' in a project; choose format, version"),
         ({"name": ""}, "name: a project needs a name of 1 to 200 characters"),
         ({"request": {"speed": 2}}, "request: there is no option 'speed'; choose"),
@@ -101,7 +109,7 @@ def test_silent_features_are_the_muted_and_those_that_are_not_solo(whole: Projec
 )
 def test_projects_that_are_wrong_are_refused(change: dict, reason: str, tmp_path: Path) -> None:
     path = tmp_path / "wrong.json"
-    path.write_text(json.dumps({"format": "tts2face project", "version": 1} | change), encoding="utf-8")
+    path.write_text(json.dumps({"format": "tts2face project", "version": 2} | change), encoding="utf-8")
     with pytest.raises(DataError, match=reason):
         load_project(path)
 
@@ -117,7 +125,7 @@ def test_an_option_of_a_wrong_type_is_refused_by_its_name(tmp_path: Path) -> Non
     for part, options in (("request", Request), ("models", Models), ("picture", Picture)):
         for option, value in product(fields(options), VALUES):
             kinds = (*(get_args(option.type) or (option.type,)), *((float,) if option.name == "articulation" else ()))
-            content = {"format": "tts2face project", "version": 1, part: {option.name: value}}
+            content = {"format": "tts2face project", "version": 2, part: {option.name: value}}
             (tmp_path / "p.json").write_text(json.dumps(content), encoding="utf-8")
             reason = ""
             try:

@@ -90,7 +90,7 @@ def test_an_edit_is_added_to_its_channel_only(session: Session, pieces: list[Pie
     at = before.motion.channels.index("browInnerUp")
     assert difference[15, at] == pytest.approx(0.4, abs=1e-5)
     assert not difference[30:, at].any()
-    assert not np.delete(difference, at, axis=1).any()
+    assert np.abs(np.delete(difference, at, axis=1)).max() < 1e-6  # hair follows the head
     np.testing.assert_allclose(changed.head.values[:, 1] - before.head.values[:, 1], 0.1, atol=1e-6)
     with pytest.raises(InputError, match="this face has no channel 'ear' to edit"):
         moved(session, replace(PROJECT, timeline=Timeline(edits=(ChannelEdit("ear", ((0.0, 1.0),)),))))

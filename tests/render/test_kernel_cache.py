@@ -4,6 +4,7 @@ import logging
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,10 +14,12 @@ import pytest
 from numba.core.dispatcher import Dispatcher
 
 from cli.progress import COMPILATION, compilation_messages, progress_bar
+from tests.render.film.lit_face import lit_tiny_face
 from tts2face import compilation
 from tts2face.compilation import CACHE_VARIABLE, cache_folder
 from tts2face.exemplar import recorded_motion
 from tts2face.render import raster, shade, strand_light, strands
+from tts2face.render.film import visibility
 from tts2face.service.logs import LineFormatter
 from tts2face.speech.bs1770 import filter_biquad
 from tts2face.synthesis.warm_up import kernels_are_compiled
@@ -65,21 +68,28 @@ def test_a_folder_that_the_user_sets_is_kept(monkeypatch):
 
 @pytest.fixture
 def indexes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> dict[str, Path]:
-    """Index files of a kernel of motion and of one of drawing, which do not exist."""
+    """Index files of a kernel of motion and of one of each kind of drawing, which do not exist."""
     stats = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path)))
     monkeypatch.setattr(raster, "draw_band", stats)
+    monkeypatch.setattr(visibility, "find_nearest", stats)
     monkeypatch.setattr(recorded_motion, "sample_tokens", stats)
-    names = {"motion": "recorded_motion.sample_tokens", "drawing": "raster.draw_band"}
+    names = {
+        "motion": "recorded_motion.sample_tokens",
+        "lamps": "raster.draw_band",
+        "baked": "visibility.find_nearest",
+    }
     return {what: tmp_path / f"{name}-1.py311.nbi" for what, name in names.items()}
 
 
 def test_kernels_count_as_compiled_once_they_lie_on_disk(indexes):
-    assert not kernels_are_compiled(draws=False)
+    lit = lit_tiny_face()
+    assert not kernels_are_compiled(None)
     indexes["motion"].write_bytes(b"")
-    assert kernels_are_compiled(draws=False)
-    assert not kernels_are_compiled(draws=True)
-    indexes["drawing"].write_bytes(b"")
-    assert kernels_are_compiled(draws=True)
+    assert kernels_are_compiled(None)
+    for kind, face in (("lamps", replace(lit, light=())), ("baked", lit)):
+        assert not kernels_are_compiled(face)
+        indexes[kind].write_bytes(b"")
+        assert kernels_are_compiled(face)
 
 
 CALLER = """

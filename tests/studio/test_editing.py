@@ -153,7 +153,7 @@ def test_options_change_alone() -> None:
         {"kind": "picture", "options": {"size": "640x480"}}, {"kind": "name", "name": " New "},
     )  # fmt: skip
     assert (project.request, project.models) == (
-        Request(text="Bob may move.", rate=1.2, voice="espeak"), Models(hair="bald"),
+        Request(text="Bob may move.", rate=1.2, voice="espeak"), Models(face="ada", hair="bald"),
     )  # fmt: skip
     assert (project.picture.size, project.name) == ("640x480", "New")
 

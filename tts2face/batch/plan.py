@@ -20,7 +20,7 @@ from tts2face.clock import exact_rate, first_sample
 from tts2face.exports.formats import batch_format
 from tts2face.render.movie import SOUND_RATE
 from tts2face.render.picture import Picture
-from tts2face.request import IDLE_LIMITS_S, Request
+from tts2face.request import DRAWN_FACE, IDLE_LIMITS_S, Request
 from tts2face.session_cache import Models
 from tts2face.subtitles.cue import Cue, Subtitles, SubtitleWarning
 from tts2face.subtitles.reader import read_subtitles
@@ -268,13 +268,15 @@ class _FilePlan:
             return None
 
     def _models(self, window: Window) -> Models:
-        chosen = {name: getattr(self.base.models, name) for name in MODEL_NAMES}
-        role = self.base.cast.role_of(window.cue, self.path.name)
+        models, role = self.base.models, self.base.cast.role_of(window.cue, self.path.name)
         for settings in (self.base.cast.default, role.settings if role else {}):
-            if settings.get("face", chosen["face"]) != chosen["face"]:
-                chosen |= dict.fromkeys(("identity", "hair", "hair_color"))  # they belong to a face
-            chosen |= {name: settings[name] for name in MODEL_NAMES if name in settings}
-        return Models(**chosen)
+            chosen = {name: settings[name] for name in MODEL_NAMES if name in settings}
+            if chosen.get("face", models.face) != models.face:
+                chosen = dict.fromkeys(("identity", "hair", "hair_color")) | chosen  # they belong to a face
+            elif models.face == DRAWN_FACE:
+                chosen = {"face": ""} | chosen  # the one that the other settings belong to
+            models = replace(models, **chosen)
+        return models
 
     def _file_hashes(self, segment: Segment) -> Mapping[str, str]:
         if segment.audio_begin is not None:

@@ -92,7 +92,7 @@ def arkit_projection(channels: tuple[str, ...], face: Face | None, name: str) ->
     if (columns < 0).all():
         raise InputError(
             f"{name} holds ARKit shapes, and the clip has none of them (its channels are "
-            f"{', '.join(channels[:3])}, ...); choose a face with ARKit shapes, such as head or cartoon"
+            f"{', '.join(channels[:3])}, ...); choose a face with ARKit shapes, such as head or ada"
         )
     none = np.zeros((0, 0))
     if not len(others):

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.exports.gltf import INDICES, VERTICES, GltfBuffer
+from tts2face.exports.rest_light import in_rest_light
 from tts2face.exports.skeleton import HEAD, Skeleton, build_skeleton
 from tts2face.exports.stage_surfaces import stage_surfaces
 from tts2face.exports.surfaces import MM_PER_M, ExportSurface, linear_colours
@@ -56,6 +57,7 @@ def stage_glb(face: Face, channels: tuple[str, ...]) -> bytes:
 
     Target k has weight 1 where its channel has the value ``scales[k]`` of the mesh's extras.
     """
+    face, unlit = in_rest_light(face)
     surface = build_surface(face, scatters=False)
     skeleton, buffer = build_skeleton(face, len(channels)), GltfBuffer()
     moves, scales = quantised_moves(face.shapes[: len(channels)])
@@ -71,7 +73,7 @@ def stage_glb(face: Face, channels: tuple[str, ...]) -> bytes:
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"name": "face", "mesh": 0}],
-        "materials": [_material(one, surface, face) for one in surfaces],
+        "materials": [_material(one, surface, face, unlit=one.part.name in unlit) for one in surfaces],
         "meshes": [
             {
                 "name": "face",
@@ -138,7 +140,7 @@ def quantised_moves(shapes: NDArray[np.floating]) -> tuple[NDArray[np.int16], ND
     return moves, scales
 
 
-def _material(surface: ExportSurface, built: Surface, face: Face) -> dict[str, Any]:
+def _material(surface: ExportSurface, built: Surface, face: Face, *, unlit: bool) -> dict[str, Any]:
     """Material with the values of the renderer's table in its extras."""
     part = surface.part
     row = built.materials[face.parts.index(part)]
@@ -154,6 +156,7 @@ def _material(surface: ExportSurface, built: Surface, face: Face) -> dict[str, A
         "open": bool(row[OPEN_SURFACE]),
         "opacity": part.opacity,
         "cutout": part.cutout,
+        "unlit": unlit,
         **more,
     }
     material = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": shading, "extras": extras}
@@ -224,8 +227,19 @@ def _stage(face: Face, surface: Surface, skeleton: Skeleton, channels: tuple[str
         "sky": list(studio_light.SKY_COLOUR),
         "floor": list(studio_light.FLOOR_COLOUR),
         "brightness": studio_light.BRIGHTNESS,
-        "wall": [list(STUDIO_BRIGHT), list(STUDIO_DARK), list(STUDIO_CENTRE)],
+        "wall": _wall(face),
     }
+
+
+def _wall(face: Face) -> list[list[float]]:
+    """Colours, 0 to 255, of the wall in the middle and at the sides, and the place of its middle."""
+    if not face.light:
+        return [list(STUDIO_BRIGHT), list(STUDIO_DARK), list(STUDIO_CENTRE)]
+    backdrop = face.light[0].backdrop.astype(np.float64)
+    middle, side = backdrop.shape[1] // 3, backdrop.shape[1] // 6
+    outer = np.concatenate([backdrop[:, :side], backdrop[:, -side:]], axis=1)
+    bright, dark = backdrop[:, middle:-middle].mean(axis=(0, 1)), outer.mean(axis=(0, 1))
+    return [bright.round(1).tolist(), dark.round(1).tolist(), list(STUDIO_CENTRE)]
 
 
 def _lids(surface: Surface, eye: int) -> list[list[list[float]]]:

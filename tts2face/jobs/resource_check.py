@@ -172,7 +172,7 @@ def _draw_talker(content: Path) -> "Image":
     from tts2face.request import OWN_FACE
     from tts2face.session import Session
 
-    face = OWN_FACE if describe_talker(content).has_own_face else "head"
+    face = OWN_FACE if describe_talker(content).has_own_face else None
     return _rest_picture(Session(str(content), face, palette=None))
 
 

@@ -76,11 +76,13 @@ class BakedLight:
     lamps : (L, 17)
         Rectangles that eyes mirror, mm: centre, two axes, normal, half width, half height, radiance.
     head_lamps
-        How many of the lamps, the last ones, move with the head.
+        How many of the lamps, the last ones, turn twice as far as the head: their mirror images keep their places.
     sky : (3,)
         Radiance that eyes mirror elsewhere.
     eye_gain
         Factor of the texture of the eyes.
+    eye_edges : (2,)
+        Angles from the gaze, rad, at which pupil and iris end in that texture.
     view : (33, 33, 33, 3)
         Colours of linear light at `tts2face.render.film.view_transform.table_levels`.
     backdrop : (H, W, 3)
@@ -112,6 +114,7 @@ class BakedLight:
     head_lamps: int
     sky: NDArray[np.float32]
     eye_gain: float
+    eye_edges: NDArray[np.float32]
     view: NDArray[np.uint8]
     backdrop: NDArray[np.uint8]
 

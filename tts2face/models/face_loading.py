@@ -5,7 +5,7 @@ from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import KIND, read_face
 from tts2face.models.hair import BALD, attach_hair, parse_hair_colour
 from tts2face.models.hair_file import load_hair
-from tts2face.storage.files import SHIPPED_FOLDER, find_file
+from tts2face.storage.files import FORMER, SHIPPED_FOLDER, find_file
 
 
 def load_face(
@@ -16,7 +16,7 @@ def load_face(
     Parameters
     ----------
     name
-        Shipped face (head, cartoon), or the path of a ``.face`` file.
+        Shipped face (head, ada), or the path of a ``.face`` file.
     identity
         Preset of the face's age, sex and ancestry.
     hair
@@ -33,6 +33,8 @@ def load_face(
     """
     path = find_file(name, KIND)
     face = read_face(path, identity, checks_pictures=path.parent != SHIPPED_FOLDER)
+    if f"{name}.{KIND}" in FORMER:
+        return face  # options of its hair are those of the former face
     if face.hairdo is None:
         if hair not in (None, BALD) or hair_color is not None:
             raise InputError(f"no haircut fits the face {name}; remove --hair and --hair-color, or choose another face")

@@ -65,6 +65,7 @@ TENSORS: Mapping[str, Tensor] = {
     "ball_weights": _factors("features", "modes of eyes"),
     "lamps": Tensor("float32", ("lamps", N_LAMP_NUMBERS), -MAX_MM, MAX_MM, may_be_empty=True),
     "sky": _factors(3, low=0.0),
+    "eye_edges": Tensor("float32", (2,), 0.01, 1.5),
     "view": Tensor("uint8", (TABLE_SIDE, TABLE_SIDE, TABLE_SIDE, 3)),
     **{name: Tensor("uint8", (f"bytes of {name}",)) for name in PICTURES},
 }

@@ -19,7 +19,8 @@ from tts2face.session_cache import Models
 from tts2face.storage.files import write_atomically
 from tts2face.synthesis.phone_edges import SentenceEdges
 
-FORMAT, VERSION = "tts2face project", 1
+FORMAT, VERSION = "tts2face project", 2
+FIRST_FACE = "head"  # that files of version 1 mean where they name none
 PROJECT_SUFFIX = ".json"
 # Options that name files; their paths are relative to the folder of the project.
 REQUEST_FILES, MODEL_FILES, PICTURE_FILES = (
@@ -58,13 +59,15 @@ def parse_project(content: Any, name: str, folder: Path) -> Project:
     """A project from its object of JSON; errors as `load_project`."""
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise DataError(f'{name} is not a project: "format" is not {FORMAT!r}; choose a file written by the studio')
-    if content.get("version") != VERSION:
+    if content.get("version") not in (1, VERSION):
         raise DataError(
             f"{name} has version {content.get('version')!r}; this program reads version {VERSION}; update it"
         )
     for key in content:
         if key not in KEYS:
             raise DataError(f"{name}: there is no {key!r} in a project; choose {', '.join(KEYS)}")
+
+    first = {"face": FIRST_FACE} if content["version"] == 1 else {}
 
     def part(key: str, make: Callable[[Any], Made], empty: Any) -> Made:
         try:
@@ -74,7 +77,7 @@ def parse_project(content: Any, name: str, folder: Path) -> Project:
 
     parts = (
         part("request", lambda given: _options(Request, given, folder, REQUEST_FILES), {}),
-        part("models", lambda given: _options(Models, given, folder, MODEL_FILES), {}),
+        part("models", lambda given: _options(Models, first | check_mapping(given), folder, MODEL_FILES), {}),
         part("picture", lambda given: _options(Picture, given, folder, PICTURE_FILES), {}),
         part("timeline", lambda given: parse_timeline_object(check_mapping(given)), {}),
         part("pronunciations", _pronunciations, {}),

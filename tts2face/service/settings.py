@@ -49,7 +49,7 @@ class ServiceSettings:
     hosts: tuple[str, ...] = setting((), "Further host names under which clients may reach the service.")
     origins: tuple[str, ...] = setting((), "Web pages of other origins that may use the service: https://example.org.")
     talker: str = setting("grid_s1", "Talker of requests that name none.")
-    face: str = setting("head", "Face of requests that name none.")
+    face: str = setting("", "Face of requests that name none; empty: ada, or head for those with an identity or hair.")
     palette: str = setting("starter", "Palette of requests that name none.")
     data: Path | None = setting(None, "Folder of jobs, results and uploads; by default one of the user's.")
     database: str = setting("", "SQLite file or postgresql://...; empty: service.sqlite in the data folder.")

@@ -1,14 +1,18 @@
 """Atomic writing of files, and lookup of shipped files."""
 
 import contextlib
+import logging
 import os
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
 from tts2face.storage.temporary import Temporary
 
 SHIPPED_FOLDER = Path(__file__).parents[1] / "data"
+FORMER = {"cartoon.face": "ada"}  # shipped files of earlier versions, and the names of what is used in their place
+LOG = logging.getLogger(__name__)
 
 
 def write_atomically(path: Path, content: bytes) -> None:
@@ -30,7 +34,7 @@ def write_atomically(path: Path, content: bytes) -> None:
 
 
 def find_file(name: str, kind: str) -> Path:
-    """Path of a talker, face or palette: a shipped one by name, or the given path.
+    """Path of a talker, face or palette: a shipped one by name or former name, or the given path.
 
     Raises
     ------
@@ -42,8 +46,17 @@ def find_file(name: str, kind: str) -> Path:
         return shipped
     if Path(name).suffix or Path(name).exists():
         return Path(name)
+    if f"{name}.{kind}" in FORMER:
+        _say_new_name(name, kind)
+        return SHIPPED_FOLDER / f"{FORMER[f'{name}.{kind}']}.{kind}"
     known = ", ".join(sorted(file.stem for file in SHIPPED_FOLDER.glob(f"*.{kind}")))
     raise InputError(f"there is no {kind} {name!r}; give {known}, or the path of a .{kind} file")
+
+
+@cache
+def _say_new_name(name: str, kind: str) -> None:
+    """Warn once in a process."""
+    LOG.warning("the %s %s is no longer part of this program; %s is used", kind, name, FORMER[f"{name}.{kind}"])
 
 
 @contextlib.contextmanager

@@ -7,15 +7,16 @@ from hashlib import blake2b
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.face.breathing import Breath, Breathing
+from tts2face.face.body import Body
 from tts2face.face.gesture_transfer import SPEECH_GAINS
-from tts2face.face.hair_swing import HairSwing, Swing
 from tts2face.gesture.easing import interpolate_keys
 from tts2face.gesture.gesture_stream import GestureFields, GestureStream, GestureValues
+from tts2face.gesture.microsaccades import microsaccades
 from tts2face.gesture.perlin_noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import Palette
-from tts2face.synthesis.animated_face import AnimatedFace, FaceMotion
+from tts2face.request import FIELDS
+from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.channel_edits import ChannelEdits
 from tts2face.synthesis.mark_styles import marked_styles
 from tts2face.synthesis.prepared_request import PreparedRequest
@@ -65,11 +66,9 @@ class GestureLayer:
             palette.require(style)
         face.check_gains(self._requested.gains.factors)
         self._edits = ChannelEdits(self._requested.edits, face)
-        self._hair = HairSwing.of_channels(face.channels)
-        self._breathing = Breathing.of_channels(face.channels)
-        self._swing: Swing | None = None  # after the last piece
-        self._breath: Breath | None = None
+        self._body = Body(face.channels, request.seed)
         self._seed = request.seed
+        self._has_microsaccades = request.gestures == FIELDS  # other methods are as they were published
         kind: type[NoiseStream] | type[GestureStream] = NoiseStream if request.gestures == "noise" else GestureStream
         executor = ThreadPoolExecutor(1)  # building the fields takes 0.5 s, in parallel with loading the voice
         self._first: Future[GestureStream | NoiseStream] = executor.submit(
@@ -105,7 +104,7 @@ class GestureLayer:
             self._history = _digest(self._history, times, speech.waveform, timeline)
         gestures, stream = self._memory.recall(
             lambda: self._history,
-            lambda: self._next(speech.waveform, len(lips), timeline),
+            lambda: self._next(speech.waveform, times, timeline),
             lambda made: STATE_BYTES + sum(values.nbytes for values in made[0].values()),
         )
         moved = self._memory.recall(
@@ -115,23 +114,18 @@ class GestureLayer:
         )
         moved = self._edits.apply(moved, round(self._seconds * lips.fps))
         self._stream, self._marked, self._seconds = stream, marked, self._seconds + len(lips) / lips.fps
-        return Clip(self._with_body(moved, speech), moved.head, speech)
-
-    def _with_body(self, moved: FaceMotion, speech: Speech) -> Trajectory:
-        """Motion of a piece of a face whose hair and shoulders move, too."""
-        face = moved.face
-        if self._hair is not None and len(face):
-            face, self._swing = self._hair.apply(face, moved.head, self._swing)
-        if self._breathing is not None:
-            face, self._breath = self._breathing.apply(face, speech.phones, self._seed, self._breath)
-        return face
+        return Clip(self._body.move(moved.face, moved.head, speech.phones), moved.head, speech)
 
     def _next(
-        self, sound: Waveform, n_frames: int, timeline: Timeline
+        self, sound: Waveform, times: NDArray[np.float64], timeline: Timeline
     ) -> tuple[GestureValues, GestureStream | NoiseStream]:
         """Gestures of the next piece, and the stream for the piece after it."""
         stream = (self._stream or self._first.result()).copy()
-        return _gaze_relative_to_head(stream.next(sound, n_frames, timeline, self._give_way)), stream
+        gestures = _gaze_relative_to_head(stream.next(sound, len(times), timeline, self._give_way))
+        if "gaze" in gestures and self._has_microsaccades:
+            seed = self._requested.seeds.get("gaze", self._seed)
+            gestures = {**gestures, "gaze": gestures["gaze"] + microsaccades(times, seed).astype(np.float32)}
+        return gestures, stream
 
     def finish(self) -> None:
         """Reject requested gestures beyond the end of the clip.

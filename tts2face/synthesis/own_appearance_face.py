@@ -61,7 +61,7 @@ class OwnAppearanceFace:
     @property
     def mesh(self) -> Face:
         """Raise InputError: a talker's own face is drawn from pictures and has no mesh."""
-        raise InputError("a talker's own face has no mesh; choose --face head, cartoon or a .face file")
+        raise InputError("a talker's own face has no mesh; choose --face head, ada or a .face file")
 
     def motion_of_tokens(
         self, selection: TokenSelection, *, fps: float, n_frames: int, give_way: GiveWay = keep_on
@@ -88,7 +88,7 @@ class OwnAppearanceFace:
         """Raise InputError: a capture has no landmarks to clone."""
         del capture, gain
         raise InputError(
-            "a Live Link Face capture has no landmarks, which a talker's own face needs; choose --face head, cartoon "
+            "a Live Link Face capture has no landmarks, which a talker's own face needs; choose --face head, ada "
             "or a .face file"
         )
 

@@ -10,6 +10,7 @@ from lexicon.errors import InputError
 from lexicon.inputs import check_limits
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.clock import exact_rate, first_sample
+from tts2face.face.body import Body
 from tts2face.synthesis.animated_face import AnimatedFace, FaceMotion
 from tts2face.types import Clip, Speech, Trajectory, Waveform
 from tts2face.video.blendshapes import BlendshapeReader
@@ -171,7 +172,7 @@ def resample_take(motion: FaceMotion, fps: float) -> FaceMotion:
 
 def take_clips(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
     """Divide motion and sound into clips of at most `MAX_CLIP_FRAMES` frames; short sound is padded with silence."""
-    fps = exact_rate(motion.face.fps)
+    fps, body = exact_rate(motion.face.fps), Body(motion.face.channels, 0)
     for first in range(0, len(motion.face), MAX_CLIP_FRAMES):
         last = min(first + MAX_CLIP_FRAMES, len(motion.face))
         begin, end = (first_sample(frame, sound.rate, fps) for frame in (first, last))
@@ -179,8 +180,8 @@ def take_clips(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
         available = sound.samples[begin:end]
         samples[: len(available)] = available
         speech = Speech(Waveform(samples, sound.rate), PhoneSequence([SILENCE], [0.0, len(samples) / sound.rate]), ())
-        frames = slice(first, last)
-        yield Clip(_cut_trajectory(motion.face, frames), _cut_trajectory(motion.head, frames), speech)
+        face, head = (_cut_trajectory(one, slice(first, last)) for one in (motion.face, motion.head))
+        yield Clip(body.move(face, head, speech.phones), head, speech)
 
 
 def _cut_trajectory(trajectory: Trajectory, frames: slice) -> Trajectory:

@@ -21,7 +21,7 @@ from tts2face.models.palette_editing import add_derivation
 from tts2face.models.talker import Talker, load_talker
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
-from tts2face.request import OWN_FACE, Request
+from tts2face.request import FIELDS, OWN_FACE, Request, default_face
 from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.clip_stream import SynthesisModels, pieces
 from tts2face.synthesis.gesture_layer import GestureLayer
@@ -33,13 +33,14 @@ from tts2face.synthesis.voice_preload import preload_voice
 from tts2face.voice.engine import Voice
 from tts2face.voice.pool import VoicePool
 
-DEFAULT_FIELDS = "fields"
 MAX_RENDERERS = 2  # renderers in memory, one for each picture; about 30 MB each
 
 Value = TypeVar("Value")
 
 
-def shown_face(face: str | Path | Face, identity: str | None, hair: str | None, hair_color: str | None) -> Face | None:
+def shown_face(
+    face: str | Path | Face | None, identity: str | None, hair: str | None, hair_color: str | None
+) -> Face | None:
     """Face that a session shows; None for the talker's own face.
 
     Raises
@@ -55,7 +56,8 @@ def shown_face(face: str | Path | Face, identity: str | None, hair: str | None, 
             raise InputError("identity and hair belong to a face given by name; remove them, or load it with them")
         return face
     if face != OWN_FACE:
-        return load_face(str(face), identity, hair=hair, hair_color=hair_color)
+        name = str(face) if face else default_face(identity, hair, hair_color)
+        return load_face(name, identity, hair=hair, hair_color=hair_color)
     if identity is not None:
         raise InputError("a talker's own face has no identity presets; remove the identity, or choose another face")
     if has_hair:
@@ -205,7 +207,7 @@ class SessionModels:
             return self._without[1]
 
     def _fields(self, palette: Palette, request: Request) -> GestureFields:
-        method = request.gestures if request.gestures in FIELD_OPTIONS else DEFAULT_FIELDS  # noise has no options
+        method = request.gestures if request.gestures in FIELD_OPTIONS else FIELDS  # noise has no options
         key = ("fields", method, request.pitch)
         is_published = method == "ju2008"
         return self._once(

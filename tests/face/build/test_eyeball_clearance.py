@@ -66,7 +66,7 @@ def test_no_sum_of_shapes_moves_skin_into_an_eyeball(name: str, person: str | No
 
 @pytest.mark.smoke
 def test_lashes_follow_the_lids() -> None:
-    face = load_face("cartoon", hair="bald")
+    face = load_face("head", hair="bald")
     rig = build_rig(face)
     weights = pose(face, {"eyeWide": 0.3}, {"eyeLookUp": 1.0}, 0.5)
     moved = np.linalg.norm(rig.pose(weights) - posed_vertices(face, weights), axis=1)

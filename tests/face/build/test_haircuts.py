@@ -12,7 +12,7 @@ from tts2face.models.hair import Hair, fit_hair
 from tts2face.models.hair_file import haircut_names, load_hair
 from tts2face.storage.files import find_file
 
-PEOPLE = ("", "amara", "kofi", "mei", "walter", "nia", "cartoon")
+PEOPLE = ("", "amara", "kofi", "mei", "walter", "nia")
 SOLID = 80  # coverage, of 255, from which a card hides what is behind it
 EYE_MM = 13.0  # half the width of an eye's opening
 N_SAMPLES = 20_000
@@ -22,8 +22,7 @@ ALL_HAIR = tuple(haircut_names())
 @pytest.fixture(scope="module")
 def people() -> dict[str, Face]:
     head = find_file("head", "face")
-    found = {name: read_face(head, name or None) for name in PEOPLE if name != "cartoon"}
-    return found | {"cartoon": read_face(find_file("cartoon", "face"))}
+    return {name: read_face(head, name or None) for name in PEOPLE}
 
 
 def solid_points(hair: Hair, vertices: np.ndarray) -> np.ndarray:

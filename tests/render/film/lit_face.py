@@ -59,6 +59,7 @@ def lit_tiny_face():
         head_lamps=0,
         sky=np.zeros(3, np.float32),
         eye_gain=1.0,
+        eye_edges=np.array([0.2, 0.5], np.float32),
         view=np.rint(np.stack(np.meshgrid(*[np.linspace(0, 255, 33)] * 3, indexing="ij"), -1)).astype(np.uint8),
         backdrop=np.full((32, 32, 3), WALL, np.uint8),
     )

@@ -16,9 +16,12 @@ from tests.render.film.lit_face import (
     lit_tiny_face,
 )
 from tts2face.face.deformation import REST_HEAD
+from tts2face.face.pupils import DILATION, PUPIL_SHAPE
+from tts2face.models.face import Texture
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_parts import keep_parts
 from tts2face.render.draw import mesh_renderer
+from tts2face.render.film.eyes import EDGE_RAD
 from tts2face.render.film.scene import LitScene
 from tts2face.render.picture import Picture
 from tts2face.render.scene import Scene
@@ -29,7 +32,7 @@ SIZE = "96x96"
 
 
 def drawn(face=FACE, weights=REST, head=REST_HEAD, **options):
-    renderer = mesh_renderer(face, Picture(size=SIZE, **options))
+    renderer = mesh_renderer(face, Picture(**{"size": SIZE} | options))
     assert isinstance(renderer.scene, LitScene)
     return renderer.draw(weights, head).astype(int)
 
@@ -96,6 +99,30 @@ def test_eyes_are_looked_up_in_the_view_transform() -> None:
     eyes = drawn()[40:50, 62:74]
     expected = 255 * np.log(0.5 / 0.004 + 1) / np.log(4001)
     assert (np.abs(eyes - expected).max(axis=2) < 3).any()
+
+
+def test_a_pupil_widens_within_its_iris() -> None:
+    side, (pupil, iris) = 256, FACE.light[0].eye_edges
+    across = (np.arange(side) + 0.5) / side * 2 - 1
+    off = EDGE_RAD * np.hypot(across[:, None], across)
+    painted = np.where(off[..., None] < pupil, (255, 0, 0), np.where(off[..., None] < iris, (0, 255, 0), (0, 0, 255)))
+    face = replace(
+        FACE,
+        parts=tuple(replace(part, name="iris", texture=1) if "eye" in part.name else part for part in FACE.parts),
+        textures=(*FACE.textures, Texture(painted.astype(np.uint8))),
+        shape_names=tuple(PUPIL_SHAPE if name == "mouthSmileLeft" else name for name in FACE.shape_names),
+        shapes=FACE.shapes * (np.array(FACE.shape_names) != "mouthSmileLeft")[:, None, None],
+    )
+    areas = []
+    for weight in (-1.0, 0.0, 1.0):
+        weights = pose(mouthSmileLeft=weight)
+        shown = np.sort(picture := drawn(face, weights, size="400x400"), axis=2)
+        pure = (shown[..., 2] > 100) & (shown[..., 1] < 30)
+        areas.append([(pure & (picture.argmax(axis=2) == colour)).sum() for colour in range(3)])
+    small, usual, wide = np.array(areas, float)
+    assert wide[0] / usual[0] == pytest.approx((1 + DILATION) ** 2, rel=0.1)
+    assert small[0] / usual[0] == pytest.approx((1 - DILATION) ** 2, rel=0.1)
+    assert wide[:2].sum() == pytest.approx(usual[:2].sum(), rel=0.02)  # the iris stays
 
 
 def test_light_is_the_same_after_it_was_written(tmp_path) -> None:

@@ -22,7 +22,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     tts2face.export(tts2face.Session().clip("We were away a year ago."), tmp_path / "speech.wav")
     Image.new("RGB", (64, 64), (20, 40, 60)).save(tmp_path / "wall.png")
     (tmp_path / "talk.srt").write_text("1\n00:00:00,500 --> 00:00:02,000\nANN: Hello.\n")
-    shutil.copy(find_file("cartoon", "face"), tmp_path / "anna.face")
+    shutil.copy(find_file("ada", "face"), tmp_path / "anna.face")
     (tmp_path / "names.txt").write_text("Siobhan  SH IH0 V AO1 N\n")
     (tmp_path / "anna.txt").write_text("We may.")
     tts2face.Session().write("We may.", tmp_path / "anna.mp4", size="64x64")

@@ -103,7 +103,7 @@ def test_models_and_voices_list_them(client: httpx.Client, uploaded: dict[str, P
 def test_a_deleted_name_is_gone_and_a_new_content_is_used(service: RunningService, client: httpx.Client) -> None:
     """A session that is still in memory never answers for another content of its name."""
     names = {"face": "other", "gestures": "none"}
-    upload(service.url, "face", "other", find_file("cartoon", "face"))
+    upload(service.url, "face", "other", find_file("ada", "face"))
     first = curves(client, **names)
     assert client.delete("/v1/faces/other").status_code == 204
     gone = client.post("/v1/clips", json={"text": TEXT, "format": "curves", **names})

@@ -17,8 +17,10 @@ Array = NDArray[Any]
 EDGE_RAD = 1.1  # angle from the gaze at the edge of the texture (`corpus_tools.head.eyes`)
 REFRACTION = 1.45  # index of the cornea
 SOFT_EDGE = 0.035  # of a mirrored lamp, a share of its distance
-CENTRE, TURN = 0, 3  # columns of a row for an eye: its centre, and the rotation from its own axes, by rows
-N_EYE_COLUMNS = 12
+# Columns of a row for an eye: its centre, the rotation from its own axes, by rows, the edges of pupil and iris, and the
+# scale of the texture in the pupil and beside it.
+CENTRE, TURN, PUPIL, IRIS, INNER, OUTER = 0, 3, 12, 13, 14, 15
+N_EYE_COLUMNS = 16
 POSITION, AXES, FOCAL, MIDDLE_X, MIDDLE_Y = 0, 3, 12, 13, 14  # of a camera: place, right, down, ahead, lens
 LAMP_CENTRE, LAMP_ACROSS, LAMP_UP, LAMP_NORMAL, LAMP_WIDE, LAMP_HIGH, LAMP_LIGHT = 0, 3, 6, 9, 12, 13, 14
 _LEVEL_SCALE = np.float32(32 / SPAN / np.log(2.0))
@@ -146,7 +148,12 @@ def colour_eyes(
         dy = normal[0] * eye[TURN + 1] + normal[1] * eye[TURN + 4] + normal[2] * eye[TURN + 7]
         dz = normal[0] * eye[TURN + 2] + normal[1] * eye[TURN + 5] + normal[2] * eye[TURN + 8]
         aside = np.sqrt(max(dx * dx + dy * dy, np.float32(1e-12)))
-        scale = np.arctan2(aside, dz) * _HALF_ANGLE / aside
+        off = np.arctan2(aside, dz)
+        if off < eye[PUPIL]:
+            off *= eye[INNER]
+        elif off < eye[IRIS]:
+            off = eye[IRIS] - (eye[IRIS] - off) * eye[OUTER]
+        scale = off * _HALF_ANGLE / aside
         px = min(max((half + scale * dx) * side - half, zero), side - np.float32(1.01))
         py = min(max((half - scale * dy) * side - half, zero), side - np.float32(1.01))
         left, top = int(px), int(py)

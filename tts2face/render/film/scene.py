@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.face.deformation import eye_rotations, head_transform
+from tts2face.face.pupils import DILATION, PUPIL_SHAPE
 from tts2face.models.baked_light import LEAST_SIDE, BakedLight
 from tts2face.models.face import Face
 from tts2face.render.camera import CameraMatrices, camera_matrices
-from tts2face.render.film.eyes import CENTRE, N_EYE_COLUMNS, TURN, colour_eyes
+from tts2face.render.film.eyes import CENTRE, N_EYE_COLUMNS, PUPIL, TURN, colour_eyes
 from tts2face.render.film.light import add_modes, pack_change
 from tts2face.render.film.pose_features import (
     Cardinal,
@@ -195,6 +196,9 @@ class LitScene:
         ):
             row[CENTRE : CENTRE + 3] = moved[:, :3] @ eye.centre + moved[:, 3]
             row[TURN : TURN + 9] = (moved[:, :3] @ turn).ravel()
+        painted, iris = self.surface.light.eye_edges
+        pupil = min(painted * (1 + DILATION * _weight(self.face, weights, PUPIL_SHAPE)), 0.95 * iris)
+        rows[:, PUPIL:] = pupil, iris, painted / pupil, (iris - painted) / (iris - pupil)
         return rows
 
     def _lamps(self, head: Float32Array) -> Float32Array:
@@ -203,9 +207,10 @@ class LitScene:
             return light.lamps
         lamps, moved = light.lamps.copy(), head_transform(head, self.face.pivot)
         own = lamps[-light.head_lamps :]
-        own[:, :3] = own[:, :3] @ moved[:, :3].T + moved[:, 3]
-        for first in (3, 6, 9):
-            own[:, first : first + 3] = own[:, first : first + 3] @ moved[:, :3].T
+        for _ in range(2):
+            own[:, :3] = own[:, :3] @ moved[:, :3].T + moved[:, 3]
+            for first in (3, 6, 9):
+                own[:, first : first + 3] = own[:, first : first + 3] @ moved[:, :3].T
         return lamps
 
 

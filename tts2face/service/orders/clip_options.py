@@ -48,7 +48,7 @@ class ClipOptions(BaseModel):
     style: Annotated[str | None, Field(description="Style of the palette.", examples=["delighted"])] = None
     gain: Annotated[str | None, Field(description="Gains of features.", examples=["head=1.5"])] = None
     talker: Annotated[str | None, Field(description="A talker of GET /v1/talkers.", examples=["grid_s1"])] = None
-    face: Annotated[str | None, Field(description="A face of GET /v1/faces, or self.", examples=["head"])] = None
+    face: Annotated[str | None, Field(description="A face of GET /v1/faces, or self.", examples=["ada"])] = None
     identity: Annotated[str | None, Field(description="Identity preset of the face.", examples=["kofi"])] = None
     hair: Annotated[str | None, Field(description="Haircut of the face, or bald.", examples=["long01"])] = None
     hair_color: Annotated[

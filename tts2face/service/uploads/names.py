@@ -15,6 +15,7 @@ from tts2face.request import OWN_FACE
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
 from tts2face.service.uploads.library import Library, shipped_names
+from tts2face.storage.files import FORMER
 
 COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
 MODEL_KINDS = ("talker", "face", "palette")
@@ -90,4 +91,5 @@ def check_background(background: str) -> None:
 
 
 def _served_names(kind: str) -> tuple[str, ...]:
-    return (*shipped_names(kind), OWN_FACE) if kind == FACE else shipped_names(kind)
+    former = (name.removesuffix(f".{kind}") for name in FORMER if name.endswith(f".{kind}"))
+    return (*shipped_names(kind), *former, *((OWN_FACE,) if kind == FACE else ()))

@@ -36,6 +36,7 @@ export function partMaterial(part, shared, samples) {
   if (extras.cutout) defines.CUTOUT = 1;
   if (extras.kind === "strands") defines.STRANDS = 1;
   if (extras.kind === "eye") defines.EYE = 1;
+  if (extras.unlit) defines.UNLIT = 1;
   const layered = extras.cutout && part.material.name.startsWith("hair"); // cards over cards hide each other
   if (layered) defines.SOLID = 1;
   const numbers = { second: extras.second, dark: extras.dark, openSheet: Number(extras.open), opacity: extras.opacity, shine: Math.min(extras.gloss / 0.25, 1.5) };

@@ -21,9 +21,10 @@ const TONE = `
     return clamp(.662002687 * a + .68412206 * b - .323583601 * c - .022541147 * mixed, 0., 1.);
   }`;
 
-// Without highlights of its own, a fragment takes its colour from two colours that its vertices have at two texels.
+// Without highlights of its own, a fragment takes its colour from two colours that its vertices have at two texels;
+// where light is baked, these are the texels themselves.
 const COARSE_COLOUR = `
-  #if defined(COARSE) && !defined(EYE)
+  #if defined(UNLIT) || (defined(COARSE) && !defined(EYE))
   #define FLAT 1
   varying vec3 vBase, vSlope;
   #endif`;
@@ -149,7 +150,13 @@ export const VERTEX = `
     narrow = lampColours[0] * arrives * .085 * pow(max(1. - first * first, 1e-4), 32.);
     wide = lampColours[0] * arrives * .8 * pow(max(1. - other * other, 1e-4), 8.);
     #endif
-    #ifdef TEXTURED
+    #ifdef UNLIT
+    vSlope = vec3(1.);
+    vBase = vec3(0.);
+    #ifndef TEXTURED
+    vBase = mix(12.92 * color.rgb, 1.055 * pow(color.rgb, vec3(1. / 2.4)) - .055, step(.0031308, color.rgb));
+    #endif
+    #elif defined(TEXTURED)
     vec3 low = shade(linear(darkTexel), wide, narrow), high = shade(linear(brightTexel), wide, narrow);
     vSlope = (high - low) / (brightTexel - darkTexel);
     vBase = low - darkTexel * vSlope;

@@ -202,7 +202,7 @@ class AnimatePage:
         found = await styles(self.studio.state.library, self.workspace.key, models.palette)
         self.timeline.set_styles(found)
         self.inspector.set_styles(found)
-        await self.speech.show_identities()
+        await self.speech.show_looks()
 
     def _show_preview(self) -> None:
         preview = self.workspace.preview.current

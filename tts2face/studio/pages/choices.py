@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+from contextlib import suppress
 from functools import lru_cache
 
 from lexicon.errors import Tts2faceError
@@ -35,15 +36,13 @@ def languages() -> dict[str, str]:
 
 
 @lru_cache(maxsize=1)
-def haircuts() -> dict[str, str]:
-    """Haircuts by name; the empty one is the face's own."""
-    return {"": "as the face", **{one.name: f"{one.name} - {one.summary}" for one in catalogue.haircuts()}}
+def _haircuts() -> dict[str, str]:
+    return {one.name: f"{one.name} - {one.summary}" for one in catalogue.haircuts()}
 
 
 @lru_cache(maxsize=1)
-def hair_colours() -> dict[str, str]:
-    """Hair colours by name; the empty one is the face's own."""
-    return {"": "as the face", **{one.name: one.name for one in catalogue.hair_colors()}}
+def _hair_colours() -> dict[str, str]:
+    return {one.name: one.name for one in catalogue.hair_colors()}
 
 
 async def models(library: Library, key: ApiKey, kind: str) -> list[str]:
@@ -53,17 +52,23 @@ async def models(library: Library, key: ApiKey, kind: str) -> list[str]:
     return [*shipped_names(kind), *more, *(one.name for one in own)]
 
 
-async def identities(library: Library, key: ApiKey, face: str) -> dict[str, str]:
-    """Presets of a face by name; the empty one is the face as it is."""
-    names: list[str] = []
-    if face in shipped_names(FACE):
-        names = [one.name for one in await asyncio.to_thread(catalogue.identities, face)]
-    elif face != OWN_FACE:
-        try:
-            names = list((await asyncio.to_thread(library.resolve, key, FACE, face))[1]["identities"])
-        except RefusedError:
-            names = []  # the face has been deleted; the preview says so
-    return {"": "as the face", **{name: name for name in names}}
+async def looks(library: Library, key: ApiKey, face: str) -> dict[str, dict[str, str]]:
+    """Identities, haircuts and hair colours of a face by the names of the options; the empty one is its own."""
+    known = {one.name: one for one in await asyncio.to_thread(catalogue.faces)}
+    names: tuple[str, ...] = ()
+    takes_haircuts = False
+    if face in known:
+        names, takes_haircuts = known[face].identities, known[face].takes_haircuts
+    else:
+        with suppress(RefusedError):  # the face has been deleted; the preview says so
+            about = (await asyncio.to_thread(library.resolve, key, FACE, face))[1]
+            names, takes_haircuts = tuple(about["identities"]), about.get("takes_haircuts", True)
+    own = {"": "as the face"}
+    return {
+        "identity": own | {name: name for name in names},
+        "hair": own | (_haircuts() if takes_haircuts else {}),
+        "hair_color": own | (_hair_colours() if takes_haircuts else {}),
+    }
 
 
 async def styles(library: Library, key: ApiKey, palette: str | None) -> list[dict[str, str]]:

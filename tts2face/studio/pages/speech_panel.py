@@ -7,10 +7,11 @@ from nicegui import ui
 
 from tts2face.jobs.resource_check import FACE, PALETTE, TALKER
 from tts2face.request import GESTURES, OWN_FACE
-from tts2face.studio.pages.choices import hair_colours, haircuts, identities, languages, models, voices
+from tts2face.studio.pages.choices import languages, looks, models, voices
 from tts2face.studio.pages.frame import heading
 from tts2face.studio.pages.open_page import OpenPage
 
+LOOKS = {"identity": "Identity", "hair": "Hair", "hair_color": "Hair colour"}  # of a face, with their labels
 TYPING_MS = 350  # of rest after which a text is spoken
 
 
@@ -42,9 +43,9 @@ class SpeechPanel:
         found = await self._models()
         for kind in (TALKER, FACE):
             self._select("models", kind, kind.capitalize(), found[kind])
-        self._select("models", "identity", "Identity", await identities(library, key, project.models.face))
-        self._select("models", "hair", "Hair", haircuts())
-        self._select("models", "hair_color", "Hair colour", hair_colours())
+        offered = await looks(library, key, project.models.face)
+        for name, label in LOOKS.items():
+            self._select("models", name, label, offered[name])
         heading(2, "Gestures")
         self._select("models", PALETTE, PALETTE.capitalize(), found[PALETTE])
         self._select("request", "gestures", "Method", {name: name for name in GESTURES})
@@ -60,12 +61,13 @@ class SpeechPanel:
             value = self._value(kind)
             self._controls[kind].set_options({value: value, **options}, value=value)
 
-    async def show_identities(self) -> None:
-        """Offer the identities of the present face."""
+    async def show_looks(self) -> None:
+        """Offer the identities and the hair of the present face."""
         page = self._page
-        face = page.workspace.project.models.face
-        found = await identities(page.studio.state.library, page.workspace.key, face)
-        self._controls["identity"].set_options(found, value=page.workspace.project.models.identity or "")
+        offered = await looks(page.studio.state.library, page.workspace.key, page.workspace.project.models.face)
+        for name, options in offered.items():
+            value = self._value(name)
+            self._controls[name].set_options({value: value, **options}, value=value)
 
     async def _models(self) -> dict[str, dict[str, str]]:
         """Shown names of talkers, faces and palettes, by kind and value."""
@@ -122,9 +124,7 @@ class SpeechPanel:
             return
         options = {name: None if value == "" and name != "text" else value}
         if name == "face":  # presets and hair belong to a face
-            options |= {"identity": None}
-            if value == OWN_FACE:
-                options |= {"hair": None, "hair_color": None}
+            options |= dict.fromkeys(LOOKS)
         await self._page.edit({"kind": part, "options": options})
 
 

@@ -1,0 +1,102 @@
+"""Speech in any mood on drawn faces: no folds, and neither teeth nor eyeballs in front of the skin around them."""
+
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw, ImageFilter
+
+from tts2face.face.deformation import REST_HEAD
+from tts2face.models.face import Face
+from tts2face.models.face_loading import load_face
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LID_RINGS
+from tts2face.models.palette import load_palette
+from tts2face.render.camera import camera_matrices
+from tts2face.render.camera_views import CameraView
+from tts2face.render.draw import mesh_renderer
+from tts2face.render.film.scene import LitScene
+from tts2face.render.film.visibility import BLOCK, N_COLUMNS, TRIANGLE_MASK, find_nearest, project
+from tts2face.render.picture import Picture
+from tts2face.session import Session
+
+DRAWN = ("ada",)
+N_POSES = 200
+SIDE_PX, SHARE = 700, 0.8
+OUTLINE_PX = 5  # width of what may lie over an outline: landmarks lie between vertices, and lips are round
+FOLDED_MM2 = 12.0  # skin of the lower face that is seen at rest and turned over; lids turn over their edges
+LOWER_FACE_MM = -20.0
+TEXTS = (
+    "People who move to Boston often choose a house by the sea.",
+    "Who knew that you would join us? Five big maps!",
+    "I am sorry, but we have not found your mother's blue shoes.",
+)
+
+
+@pytest.fixture(scope="module", params=DRAWN)
+def posed(request: pytest.FixtureRequest) -> tuple[Face, np.ndarray]:
+    """A face, and weights of random frames of speech in all moods."""
+    face = load_face(request.param)
+    session = Session(face=face)
+    found = []
+    for number, style in enumerate(load_palette("starter").names):
+        clip = session.clip(TEXTS[number % len(TEXTS)], style=style, seed=number, voice="espeak")
+        found.append(clip.motion.values)
+    frames = np.concatenate(found)
+    chosen = frames[np.random.default_rng(3).choice(len(frames), N_POSES, replace=False)]
+    return session.face.mesh, chosen
+
+
+def seen(face: Face, points: np.ndarray) -> np.ndarray:
+    """(SIDE_PX, SIDE_PX) number of the triangle that is seen in each pixel; -1 for none."""
+    table = np.zeros((len(points), N_COLUMNS), np.float32)
+    nearest = np.zeros((SIDE_PX, SIDE_PX + BLOCK), np.int64)
+    optics = camera_matrices(CameraView(0, 0, share=SHARE), face, (SIDE_PX, SIDE_PX))
+    every = np.arange(len(points), dtype=np.int32)
+    project(points, every, optics.view.astype(np.float32), optics.lens.astype(np.float32), table)
+    find_nearest(table, face.triangles.astype(np.int32), nearest)
+    return (nearest[:, :SIDE_PX] & TRIANGLE_MASK).astype(np.int64) - 1
+
+
+def outline(face: Face, points: np.ndarray, rows: list[int]) -> np.ndarray:
+    """Pixels within a polygon of landmarks, and a little around it."""
+    corners = np.einsum("lc,lcx->lx", face.landmark_weights[rows], points[face.landmark_vertices[rows]])
+    table = np.zeros((len(corners), N_COLUMNS), np.float32)
+    optics = camera_matrices(CameraView(0, 0, share=SHARE), face, (SIDE_PX, SIDE_PX))
+    every = np.arange(len(corners), dtype=np.int32)
+    view, lens = optics.view.astype(np.float32), optics.lens.astype(np.float32)
+    project(corners.astype(np.float32), every, view, lens, table)
+    picture = Image.new("L", (SIDE_PX, SIDE_PX))
+    ImageDraw.Draw(picture).polygon([tuple(place) for place in table[:, :2].tolist()], fill=255)
+    return np.asarray(picture.filter(ImageFilter.MaxFilter(2 * OUTLINE_PX + 1))) > 0
+
+
+def triangle_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(F, 3) normals of triangles, twice as long as they are large."""
+    a, b, c = (points[triangles[:, k]].astype(np.float64) for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def test_neither_teeth_nor_balls_nor_folds_are_seen(posed: tuple[Face, np.ndarray]) -> None:
+    face, poses = posed
+    scene = mesh_renderer(face, Picture(size="64x64")).scene
+    assert isinstance(scene, LitScene)
+    part_of = np.repeat([part.name for part in face.parts], [part.count for part in face.parts])
+    inside = np.array([name.startswith(("teeth", "gums", "tongue")) for name in part_of])
+    balls, skin = np.isin(part_of, ("sclera", "iris")), part_of == "skin"
+    rest = triangle_normals(face.vertices, face.triangles)
+    ahead = np.zeros(len(part_of), bool)
+    ahead[np.unique(seen(face, face.vertices))[1:]] = True
+    ahead &= face.vertices[face.triangles, 1].max(axis=1) < LOWER_FACE_MM
+    lips = [*INNER_LIP_UPPER, *INNER_LIP_LOWER[::-1][1:-1]]
+    wrong = []
+    for number, weights in enumerate(poses):
+        points = scene.pose(weights, REST_HEAD)
+        shown = seen(face, points)
+        teeth, eyes = ((shown >= 0) & kind[shown] for kind in (inside, balls))
+        beyond_lips = int((teeth & ~outline(face, points, lips)).sum())
+        lids = np.any([outline(face, points, list(ring)) for ring in LID_RINGS], axis=0)
+        beyond_lids = int((eyes & ~lids).sum())
+        normals = triangle_normals(points, face.triangles)
+        turned = skin & ahead & ((rest * normals).sum(axis=1) < 0)
+        folded = float(np.linalg.norm(normals[turned], axis=1).sum() / 2)
+        if beyond_lips or beyond_lids or folded > FOLDED_MM2:
+            wrong.append((number, beyond_lips, beyond_lids, round(folded, 1)))
+    assert not wrong

@@ -1,0 +1,34 @@
+"""What moves on a face by itself, whatever it says or mimics: hair, shoulders and pupils, if it has shapes for them."""
+
+from collections.abc import Sequence
+
+from lexicon.sequence import PhoneSequence
+from tts2face.face.breathing import Breath, Breathing
+from tts2face.face.hair_swing import HairSwing, Swing
+from tts2face.face.pupils import Dilation, Pupils
+from tts2face.types import Trajectory
+
+
+class Body:
+    """Hair, shoulders and pupils of a face with some channels, piece by piece of a clip."""
+
+    def __init__(self, channels: Sequence[str], seed: int) -> None:
+        self._hair = HairSwing.of_channels(channels)
+        self._breathing = Breathing.of_channels(channels)
+        self._pupils = Pupils.of_channels(channels)
+        self._seed = seed
+        self._swing: Swing | None = None  # after the last piece
+        self._breath: Breath | None = None
+        self._dilation: Dilation | None = None
+
+    def move(self, face: Trajectory, head: Trajectory, phones: PhoneSequence) -> Trajectory:
+        """Motion (T, K) of the next piece with these, from that of the face and the head (T, 6)."""
+        if not len(face):
+            return face
+        if self._hair is not None:
+            face, self._swing = self._hair.apply(face, head, self._swing)
+        if self._breathing is not None:
+            face, self._breath = self._breathing.apply(face, phones, self._seed, self._breath)
+        if self._pupils is not None:
+            face, self._dilation = self._pupils.apply(face, phones, self._seed, self._dilation)
+        return face
