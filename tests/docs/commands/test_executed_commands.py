@@ -80,7 +80,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "timeline.json").write_text('{"style": "delighted", "nods": [{"time": 0.2}]}', encoding="utf-8")
     (folder / "one.srt").write_text("1\n00:00:00,000 --> 00:00:01,000\nANN: Hello.\n", encoding="utf-8")
     (folder / "cast.toml").write_text('[[role]]\nspeaker = "ANN"\nvoice = "espeak"\n', encoding="utf-8")
-    spoken = session.Session("grid_s1", "head", identity=None, palette="starter")
+    spoken = session.Session("grid_s1", "ada", identity=None, palette="starter")
     clip = spoken.clip("Hello there.", fps=5)
     export(clip, folder / "hello.track.json")
     sound = clip.speech.waveform
