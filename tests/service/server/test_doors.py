@@ -32,7 +32,7 @@ REQUESTS: dict[str, dict[str, Any]] = {
     "articulation": {"text": TEXT, "articulation": "natural"},
     "espeak": {"text": "Guten Morgen, liebe Welt.", "language": "de", "rate": 1.2, "volume": 0.8},
     "long first sentence": {"text": LONG},
-    "talker and face": {"text": TEXT, "talker": "grid_s1", "face": "ada"},
+    "talker and face": {"text": TEXT, "talker": "grid_s1", "face": "head"},
     "identity": {"text": TEXT, "identity": "kofi"},
     "idle": {"idle": 2.0, "seed": 3},
 }

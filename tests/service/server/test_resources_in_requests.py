@@ -111,7 +111,7 @@ def test_a_deleted_name_is_gone_and_a_new_content_is_used(service: RunningServic
     upload(service.url, "face", "other", find_file("head", "face"))
     second = curves(client, **names)
     assert second != first
-    assert second == curves(client, gestures="none")
+    assert second == curves(client, face="head", gestures="none")
     client.delete("/v1/faces/other")
 
 

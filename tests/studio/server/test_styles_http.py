@@ -106,7 +106,7 @@ def test_a_new_name_and_a_removal_reach_projects(owned: httpx.Client, data: Path
 def test_a_face_comes_though_its_palette_is_removed_while_it_is_made(owned: httpx.Client) -> None:
     mix(owned, "short-lived")
     number = create(owned, TEXT)
-    looks = {"palette": "my-styles", "hair_color": "#123457"}  # a face that is not kept yet
+    looks = {"palette": "my-styles", "face": "head", "hair_color": "#123457"}  # a face that is not kept yet
     assert edit(owned, number, {"kind": "models", "options": looks}).status_code == 200
     with ThreadPoolExecutor(1) as pool:
         asked = pool.submit(owned.get, f"/api/projects/{number}/face.glb")
