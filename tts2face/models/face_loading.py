@@ -33,7 +33,7 @@ def load_face(
     """
     path = find_file(name, KIND)
     face = read_face(path, identity, checks_pictures=path.parent != SHIPPED_FOLDER)
-    if f"{name}.{KIND}" in FORMER:
+    if name in FORMER[KIND]:
         return face  # options of its hair are those of the former face
     if face.hairdo is None:
         if hair not in (None, BALD) or hair_color is not None:

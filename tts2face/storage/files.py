@@ -11,7 +11,7 @@ from lexicon.errors import BackendError, InputError
 from tts2face.storage.temporary import Temporary
 
 SHIPPED_FOLDER = Path(__file__).parents[1] / "data"
-FORMER = {"cartoon.face": "ada"}  # shipped files of earlier versions, and the names of what is used in their place
+FORMER = {"face": {"cartoon": "ada"}}  # by kind, shipped files of earlier versions and what is used in their place
 LOG = logging.getLogger(__name__)
 
 
@@ -46,9 +46,9 @@ def find_file(name: str, kind: str) -> Path:
         return shipped
     if Path(name).suffix or Path(name).exists():
         return Path(name)
-    if f"{name}.{kind}" in FORMER:
+    if name in FORMER.get(kind, {}):
         _say_new_name(name, kind)
-        return SHIPPED_FOLDER / f"{FORMER[f'{name}.{kind}']}.{kind}"
+        return SHIPPED_FOLDER / f"{FORMER[kind][name]}.{kind}"
     known = ", ".join(sorted(file.stem for file in SHIPPED_FOLDER.glob(f"*.{kind}")))
     raise InputError(f"there is no {kind} {name!r}; give {known}, or the path of a .{kind} file")
 
@@ -56,7 +56,7 @@ def find_file(name: str, kind: str) -> Path:
 @cache
 def _say_new_name(name: str, kind: str) -> None:
     """Warn once in a process."""
-    LOG.warning("the %s %s is no longer part of this program; %s is used", kind, name, FORMER[f"{name}.{kind}"])
+    LOG.warning("the %s %s is no longer part of this program; %s is used", kind, name, FORMER[kind][name])
 
 
 @contextlib.contextmanager

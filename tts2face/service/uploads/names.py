@@ -91,5 +91,4 @@ def check_background(background: str) -> None:
 
 
 def _served_names(kind: str) -> tuple[str, ...]:
-    former = (name.removesuffix(f".{kind}") for name in FORMER if name.endswith(f".{kind}"))
-    return (*shipped_names(kind), *former, *((OWN_FACE,) if kind == FACE else ()))
+    return (*shipped_names(kind), *FORMER.get(kind, {}), *((OWN_FACE,) if kind == FACE else ()))
