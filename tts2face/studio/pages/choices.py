@@ -12,6 +12,7 @@ from tts2face.request import OWN_FACE
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
 from tts2face.service.uploads.library import Library, shipped_names
+from tts2face.storage.files import find_file
 
 # Of styles in their order: far apart in hue and lightness also for colour-blind people (Okabe and Ito 2008, extended).
 COLOURS = (
@@ -54,12 +55,12 @@ async def models(library: Library, key: ApiKey, kind: str) -> list[str]:
 
 async def looks(library: Library, key: ApiKey, face: str) -> dict[str, dict[str, str]]:
     """Identities, haircuts and hair colours of a face by the names of the options; the empty one is its own."""
-    known = {one.name: one for one in await asyncio.to_thread(catalogue.faces)}
     names: tuple[str, ...] = ()
     takes_haircuts = False
-    if face in known:
-        names, takes_haircuts = known[face].identities, known[face].takes_haircuts
-    else:
+    if face in shipped_names(FACE):
+        entry = await asyncio.to_thread(catalogue.describe_face, find_file(face, FACE))
+        names, takes_haircuts = entry.identities, entry.takes_haircuts
+    elif face != OWN_FACE:
         with suppress(RefusedError):  # the face has been deleted; the preview says so
             about = (await asyncio.to_thread(library.resolve, key, FACE, face))[1]
             names, takes_haircuts = tuple(about["identities"]), about.get("takes_haircuts", True)
