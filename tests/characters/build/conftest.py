@@ -11,7 +11,7 @@ from tts2face.render.occlusion import bake_occlusion
 N_DIRECTIONS = 8
 
 
-@pytest.fixture(scope="package", autouse=True)
+@pytest.fixture(scope="module", autouse=True)  # of a package it would last as long as the session
 def few_directions() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(importing, "bake_occlusion", partial(bake_occlusion, n_directions=N_DIRECTIONS))
