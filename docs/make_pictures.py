@@ -38,8 +38,8 @@ MOUTH_PIXELS = 800  # side of the pictures from which the mouths are cut
 MOUTHS = {"0,0,600": (240, 408), "38,0,600": (20, 408)}  # left upper corner of the mouth in each view
 MOOD_TEXT = "I have a lot to tell you, so please sit down and listen while I explain what happened yesterday."
 N_MOOD_FRAMES = 6
-DRAWN = ("ada",)
-CAST_VIEWS, CAST_COLUMNS = ("front", "three-quarter", "profile", "close"), 6
+DRAWN = ("ada", "ben", "noor", "zuri")
+CAST_VIEWS, CAST_COLUMNS = ("front", "three-quarter", "profile", "close"), 9
 CAST_TEXT, CAST_PHONES = "My father, thin as he was, saw you leave the room.", ("m", "f", "ɑ", "θ", "u", "i")
 SMILE = {"mouthSmile": 0.9, "cheekSquint": 0.5, "eyeSquint": 0.2}
 SIDE = 320
@@ -137,6 +137,7 @@ def cast_sheet() -> Image.Image:
         for style in load_palette("starter").derivations:
             clip = session.clip(MOOD_TEXT, style=style)
             pictures.append(labelled(renderer.frame(clip, len(clip.motion) // 2), style))
+        pictures += [Image.new("RGB", (SIDE, SIDE))] * (-len(pictures) % CAST_COLUMNS)
     whole = sheet(pictures, CAST_COLUMNS)
     return whole.resize((whole.width // 2, whole.height // 2), Image.Resampling.LANCZOS)
 

@@ -14,7 +14,7 @@ from corpus_tools.drawn.brows import brow_piece
 from corpus_tools.drawn.character import Character
 from corpus_tools.drawn.clothes import breath, stud_pieces, sweater_piece
 from corpus_tools.drawn.elder import ELDER
-from corpus_tools.drawn.expressions import close_jaw, part_lips, rest_in, soften, thin_lips
+from corpus_tools.drawn.expressions import close_jaw, part_lips, rest_in, round_lips, soften, thin_lips
 from corpus_tools.drawn.girl import GIRL
 from corpus_tools.drawn.glasses import glasses_piece
 from corpus_tools.drawn.hair import hair_cover, hair_piece
@@ -111,7 +111,8 @@ def _reference(source: SourceMesh) -> ReferenceHead:
 def _skin(own: Skin, reference: ReferenceHead, balls: tuple[Eyeball, Eyeball], character: Character) -> Skin:
     """The skin of a character, with its expressions, and its slight smile at rest."""
     shut = shut_lids(correct_shapes(close_lips(own, reference.lips)), balls, reference.lids)
-    skin = thin_lips(soften(shut, reference.lids), reference.lips)
+    skin = round_lips(soften(shut, reference.lids, reference.lips), character.pucker)
+    skin = thin_lips(skin, reference.lips, character.still_lip)
     skin = part_lips(close_jaw(skin, reference.lips), reference.lips)
     lining = find_lining(skin, balls, -0.1)
     others = [name for name in LID_SHAPES if name != "eyeBlink"]  # that one lies on the eyeball already
@@ -124,11 +125,14 @@ def _pieces(
 ) -> tuple[Piece, ...]:
     palette, jaw = character.palette, fit_jaw(cage)
     wet = wet_piece(skin, balls, reference.lids)
+    upper, lower = teeth_pieces(cage, skin, reference, jaw)
+    lower = replace(lower, vertices=lower.vertices - [0.0, 0.0, character.teeth_back])
     shirt = shirt_piece(reference.shoulders, build_shoulders(cage), np.array(palette.cloth))
     return (
         skin_piece(skin, palette.skin, character.skin_material),
         *(eyeball_piece(ball, side, character.eyes) for ball, side in zip(balls, ("Left", "Right"), strict=True)),
-        *teeth_pieces(cage, skin, reference, jaw),
+        upper,
+        lower,
         tongue_piece(cage, jaw),
         replace(wet, colours=wet.colours * palette.tear_line),
         brow_piece(skin, character.brow, palette.brows),

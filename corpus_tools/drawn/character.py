@@ -178,7 +178,10 @@ class Character:
     """A drawn character.
 
     ``targets`` are weights of MakeHuman's targets; ``rest`` are weights of the face's shapes that it has at rest.
-    ``lashes`` is the length of the upper lashes in mm along the lid, from the inner corner to the outer.
+    ``lashes`` is the length of the upper lashes in mm along the lid, from the inner corner to the outer. The top of the
+    upper lip does not follow the share ``still_lip`` of a lift; more where the lip is close to the nose. ``pucker`` is
+    the gain of `mouthPucker`: a wide mouth needs more of it to look round. The lower teeth lie ``teeth_back`` mm
+    further behind the lips: those of a short chin would else come through it when the jaw moves ahead.
     """
 
     name: str
@@ -192,6 +195,9 @@ class Character:
     hair: Hairstyle
     collar: Collar
     rest: Mapping[str, float]
+    still_lip: float = 0.6
+    pucker: float = 1.0
+    teeth_back: float = 0.0
     skin_material: Mapping[str, Any] = field(
         # a soft sheen: .07 looks like wax, .16 like plastic
         default_factory=lambda: {"specular": 0.13, "shininess": 9.0, "wrap": 0.7, "texture": 0, "kind": "skin"}

@@ -13,7 +13,7 @@ TARGETS = {
     "macrodetails/universal-female-young-averagemuscle-averageweight": 0.16,
     "macrodetails/universal-female-child-averagemuscle-averageweight": 0.24,
     "mouth/mouth-angles-up": 0.5, "mouth/mouth-cupidsbow-decr": 0.3, "mouth/mouth-scale-horiz-incr": 0.45,
-    "mouth/mouth-upperlip-middle-up": 0.3, "mouth/mouth-laugh-lines-out": 0.2,
+    "mouth/mouth-upperlip-middle-up": 0.3, "mouth/mouth-laugh-lines-out": 0.2, "mouth/mouth-trans-down": 0.55,
     "eyes/l-eye-height1-incr": 0.5, "eyes/r-eye-height1-incr": 0.5, "eyes/l-eye-height2-incr": 0.7,
     "eyes/r-eye-height2-incr": 0.7, "eyes/l-eye-height3-incr": 0.5, "eyes/r-eye-height3-incr": 0.5,
     "eyes/l-eye-bag-decr": 0.4, "eyes/r-eye-bag-decr": 0.4,
@@ -71,7 +71,7 @@ ELDER = Character(
     summary="an old woman with silver hair in a bun, drawn as for an animated film",
     targets=TARGETS,
     proportions=Proportions(
-        eye_gain=0.72, eye_reach=34.0, nose_gain=-0.16, lips_thinner=0.46, lips_back=2.8, jaw_taper=0.10, chin_up=10.0,
+        eye_gain=0.72, eye_reach=34.0, nose_gain=-0.30, lips_thinner=0.26, lips_back=2.8, jaw_taper=0.10, chin_up=10.0,
         chin_forward=3.0, upper_cheek=4.0, lower_cheek=4.4, corners_up=4.4, middle_down=0.4, skull_gain=0.08,
         neck_thinner=0.14,
     ),
@@ -92,6 +92,9 @@ ELDER = Character(
         across=56, ahead=46, behind=64, front=-146, back=-115, middle=-68, half_width=8.0, half_height=14, tilt=-14
     ),
     rest={"mouthSmile": 0.36, "cheekSquint": 0.20, "eyeSquint": 0.26, "eyeBlink": 0.06},
+    still_lip=0.75,
+    pucker=1.45,
+    teeth_back=2.0,
     has_studs=True,
     glasses=(0.62, 0.42, 0.20),
 )  # fmt: skip

@@ -26,26 +26,31 @@ LID_MM, MOUTH_MM = (1.5, 7.0), (13.0, 20.0)  # distances over which the smoothin
 SHUT_SIDES, SHUT_SHAPES = ("mouthSmile", "mouthDimple", "mouthPress"), ("mouthPucker", "mouthFunnel")
 LIP_TOUCH_MM, LIP_REACH_MM, LIP_MIDDLE_MM = 0.3, 9.0, 8.0  # overlap that is left, reach of its removal, between sides
 LIFTS = ("mouthUpperUp", "mouthSmile", "mouthShrugUpper")
-LIP_TOP_SHARE, LIP_TOP_MM, LIP_TOP_SIZE = 0.6, np.array([0.0, 10.0, 4.0]), (32.0, 11.5, 24.0)
+LIP_TOP_MM, LIP_TOP_SIZE = np.array([0.0, 10.0, 4.0]), (32.0, 11.5, 24.0)
 COLUMNS_MM = np.linspace(-30.0, 30.0, 61)  # across the mouth
 # A smile lifts corners and cheeks more than MakeHuman's, and the middle of both lips, which else hangs like a beak.
 CORNER_MM, CHEEK_MM, MIDDLE_MM = np.array([1.5, 3.0, 1.5]), np.array([1.0, 1.6, 2.6]), np.array([0.0, 1.2, -0.6])
 
 
-def soften(skin: Skin, lids: Sequence[LidEdge]) -> Skin:
-    """Smiles and squints whose motion of the cheeks is one smooth field; a smile lifts round cheeks."""
+def soften(skin: Skin, lids: Sequence[LidEdge], ring: NDArray[np.int64]) -> Skin:
+    """Smiles and squints whose motion of the cheeks is one smooth field; a smile lifts round cheeks.
+
+    `ring` is where the lips meet.
+    """
     means, shapes, places = neighbour_means(skin), dict(skin.shapes), skin.vertices
+    x, y, z = _lip_middle(skin, ring)
+    width = float(np.ptp(places[ring, 0])) / 2
     rims = np.concatenate([places[np.concatenate([edge.upper, edge.lower])] for edge in lids])
     off_lids = smoothstep(np.asarray(cKDTree(rims).query(places)[0]), *LID_MM)
-    off_mouth = smoothstep(np.linalg.norm((places - [0, -59, 24]) * [0.80, 1.25, 0.5], axis=1), *MOUTH_MM)
+    off_mouth = smoothstep(np.linalg.norm((places - [x, y, z - 2]) * [0.80, 1.25, 0.5], axis=1), *MOUTH_MM)
     for names, share, n_means in ((SMILES, off_mouth * off_lids, N_SMILE_MEANS), (SQUINTS, off_lids, N_SQUINT_MEANS)):
         for name in (stem + side for stem in names for side, _ in SIDES):
             shapes[name] = smoothed(shapes[name], share, means, n_means)
     for side, sign in SIDES:
         outward = np.array([sign, 1.0, 1.0])
-        corner = bump(places, (sign * 22, -58, 20), (11, 9, 20))
+        corner = bump(places, (sign * (width + 2.5), y + 1.6, z - 6), (11, 9, 20))
         cheek = bump(places, (sign * 37, -32, 18), (17, 14, 24)) * off_lids
-        middle = bump(places, (0, -60, 28), (13, 6, 24))
+        middle = bump(places, (x, y, z + 2), (13, 6, 24))
         lift = corner[:, None] * outward * CORNER_MM + cheek[:, None] * outward * CHEEK_MM
         lift += middle[:, None] * MIDDLE_MM / len(SIDES)
         shapes[f"mouthSmile{side}"] = shapes[f"mouthSmile{side}"] + lift
@@ -71,10 +76,17 @@ def part_lips(skin: Skin, ring: NDArray[np.int64]) -> Skin:
     return replace(skin, shapes=shapes)
 
 
-def thin_lips(skin: Skin, ring: NDArray[np.int64]) -> Skin:
-    """Lifted upper lips that become thinner: the skin between them and the nose, which is short, would fold."""
-    middle = skin.vertices[ring][np.abs(skin.vertices[ring, 0]) < LIP_MIDDLE_MM].mean(axis=0)
-    share = 1 - LIP_TOP_SHARE * bump(skin.vertices, middle + LIP_TOP_MM, LIP_TOP_SIZE)
+def round_lips(skin: Skin, gain: float) -> Skin:
+    """The skin with `mouthPucker` times a gain."""
+    return replace(skin, shapes={**skin.shapes, "mouthPucker": gain * skin.shapes["mouthPucker"]})
+
+
+def thin_lips(skin: Skin, ring: NDArray[np.int64], still: float) -> Skin:
+    """Lifted upper lips that become thinner: the skin between them and the nose, which is short, would fold.
+
+    The top of the lip does not follow the share `still` of a lift.
+    """
+    share = 1 - still * bump(skin.vertices, _lip_middle(skin, ring) + LIP_TOP_MM, LIP_TOP_SIZE)
     lifted = {
         name: moved * np.stack([np.ones_like(share), share, np.ones_like(share)], axis=1)
         for name, moved in skin.shapes.items()
@@ -91,6 +103,12 @@ def close_jaw(skin: Skin, ring: NDArray[np.int64]) -> Skin:
     inside = np.abs(COLUMNS_MM) < LIP_MIDDLE_MM
     gain = float(np.median(open_[inside] / (open_ - closed)[inside]))
     return replace(skin, shapes={**skin.shapes, "mouthClose": gain * close})
+
+
+def _lip_middle(skin: Skin, ring: NDArray[np.int64]) -> Floats:
+    """(3,) middle of the line where lips meet, mm."""
+    places = skin.vertices[ring]
+    return np.asarray(places[np.abs(places[:, 0]) < LIP_MIDDLE_MM].mean(axis=0))
 
 
 def _overlap(vertices: Floats, upper: NDArray[np.int64], lower: NDArray[np.int64]) -> Floats:

@@ -25,7 +25,7 @@ ACROSS, UP, AHEAD, BEHIND, DOWN = 80.0, 92.0, 100.0, 96.0, 118.0
 LOWEST_DEG = 60.0  # elevation of the lowest tips, below the middle
 DEPTH = (AHEAD + BEHIND) / 2
 N_ALONG, N_TOP, N_UNDER = 36, 11, 4
-CURLED = 64, 33, 23  # the same of locks with curls
+CURLED = 56, 29, 19  # the same of locks with curls
 CURL_MM = 9.0  # width of a curl
 LOOSE_FROM = 1.7  # exponent by which tips are looser than roots
 TIP_DENSITY = 1.35  # exponent by which rings are closer at the tip
@@ -158,12 +158,13 @@ class Scalp:
         height, lift = self._height[self._used], self._style.shell_lift
         up = np.where(height > 0, lift * (1 - np.exp(-np.maximum(height, 0) / 5.0)), 0.8 * np.maximum(height, -3.0))
         points = self._skin.vertices[self._used] + up[:, None] * self._normals[self._used]
-        flat = points[:, [0, 2]] - points[:, [0, 2]].min(axis=0)  # from above: the locks hide most of it
         off = points - MIDDLE
+        from_top = np.arccos(unit_vectors(off)[:, 1]) / np.pi  # places as on a map about the crown
+        flat = 0.5 + 0.5 * (from_top / from_top.max())[:, None] * unit_vectors(off[:, [0, 2]] + 1e-9)
         down = np.cross(np.cross(off, [0.0, -1.0, 0.0]), off)
         n = len(points)
         shade, tangents = np.full(n, SHELL_SHADE), unit_vectors(down + 1e-9)
-        return Tube(points, self._triangles, shade, np.zeros(n), flat / flat.max(axis=0), tangents)
+        return Tube(points, self._triangles, shade, np.zeros(n), flat, tangents)
 
     def fade(self) -> Floats:
         """(N,) share of its own colour that cropped hair has at the points of the shell."""

@@ -24,7 +24,7 @@ LID_MM = (1.0, 2.4)  # least and greatest distance of a shut lid from the eyebal
 N_RELAXATIONS = 4
 ARC, LOWER_LID_MM = 0.62, 8.0  # sag of a shut eye, a share of the lower lid's, and reach of the motion below it
 UNDER_MM, UNDER_REACH_MM = 0.3, 3.5  # distance from the eyeball of the lower lid's edge when shut, and how far below
-LINING_REACH_MM, LINING_Z = 9.0, -5.0  # from the eyeball, and the least depth before its centre
+LINING_REACH_MM, LINING_Z = 5.0, -5.0  # from the eyeball, and the least depth before its centre
 REST_GAP_MM = 0.5  # between the skin at rest and the eyeballs
 LINING_MM, LINING_DEEP_MM = 0.2, 14.0  # distance of the tucked lining from the eyeball, and how far off it is tucked
 BROWS = ("browInnerUp", "browOuterUpLeft", "browOuterUpRight", "browDownLeft", "browDownRight")
@@ -104,7 +104,7 @@ def _lay_on_ball(skin: Skin, moved: Floats, ball: Eyeball, edge: LidEdge, means:
     _, distance, cosine = facing(skin, ball)
     off = skin.vertices + moved - ball.centre
     is_own = np.sign(skin.vertices[:, 0]) == np.sign(ball.centre[0])
-    is_outer = cosine > -0.1
+    is_outer = (cosine > -0.1) | (distance > ball.radius + LINING_REACH_MM)  # a heavy lid faces down
     share = smoothstep(np.linalg.norm(moved, axis=1), 1.0, 7.0) * is_outer * (moved[:, 1] < 0) * is_own
     wanted = ball.radius + np.clip(distance - ball.radius, *LID_MM)
     moved = moved + (share * (wanted / np.linalg.norm(off, axis=1) - 1))[:, None] * off

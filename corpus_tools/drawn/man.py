@@ -50,46 +50,56 @@ LOCKS = (
     ),
     # sides of the top
     Lock(
-        path=((36, 38, -3), (48, 41, 5), (72, 44, 8), (100, 42, 7), (130, 34, 2)),
+        path=((36, 34, -3), (48, 39, 5), (72, 44, 8), (100, 42, 7), (130, 34, 2)),
         half_width=16, thickness=7, root=0.8, loose=0.0,
     ),
     Lock(
-        path=((-40, 38, -3), (-52, 41, 5), (-74, 44, 8), (-102, 42, 7), (-130, 34, 2)),
+        path=((-40, 34, -3), (-52, 39, 5), (-74, 44, 8), (-102, 42, 7), (-130, 34, 2)),
         half_width=16, thickness=7, root=0.8, loose=0.0,
+    ),
+    # between the sides and what is combed back
+    *(
+        Lock(
+            path=(
+                (side * 42, 42, -3), (side * 56, 48, 4), (side * 80, 56, 8), (side * 110, 56, 7), (side * 140, 42, 2),
+            ),
+            half_width=20, thickness=7, root=0.8, loose=0.0,
+        )
+        for side in (1, -1)
     ),
     # the quiff: broad locks rise from the front hairline and roll over to his left, those behind first
     Lock(
-        path=((-46, 38, -4), (-43, 44, 6), (-30, 58, 14), (0, 71, 16), (52, 74, 12), (84, 62, 5)),
+        path=((-46, 33, -4), (-43, 41, 6), (-30, 58, 14), (0, 71, 16), (52, 74, 12), (84, 62, 5)),
         half_width=22, thickness=9, root=0.34, clearance=0.5, ridges=1, loose=0.2,
     ),
     Lock(
-        path=((-30, 39, -4), (-25, 45, 9), (-10, 58, 20), (20, 67, 20), (54, 64, 14), (74, 52, 5)),
+        path=((-30, 34, -4), (-25, 42, 9), (-10, 58, 20), (20, 67, 20), (54, 64, 14), (74, 52, 5)),
         half_width=24, thickness=11, root=0.34, clearance=0.5, ridges=1, loose=0.2,
     ),
     Lock(
-        path=((-8, 40, -4), (-2, 45, 11), (14, 55, 23), (36, 60, 22), (56, 54, 14), (66, 43, 5)),
+        path=((-8, 34, -4), (-2, 42, 11), (14, 55, 23), (36, 60, 22), (56, 54, 14), (66, 43, 5)),
         half_width=24, thickness=12, root=0.34, clearance=0.5, ridges=1, loose=0.2,
     ),
     Lock(
-        path=((15, 40, -4), (20, 44, 8), (31, 50, 16), (44, 50, 15), (55, 43, 9), (61, 35, 4)),
+        path=((15, 34, -4), (20, 41, 8), (31, 48, 16), (44, 50, 15), (55, 43, 9), (61, 35, 4)),
         half_width=18, thickness=10, root=0.34, clearance=0.5, ridges=1, loose=0.2,
     ),
     Lock(
-        path=((30, 38, -3), (35, 40, 5), (43, 42, 8), (51, 38, 6), (56, 31, 3)),
+        path=((30, 33, -3), (35, 38, 5), (43, 42, 8), (51, 38, 6), (56, 31, 3)),
         half_width=10, thickness=6, root=0.34, clearance=0.5, ridges=1, loose=0.2,
     ),
 )  # fmt: skip
 SIDE = (
-    (0, 38), (15, 38), (30, 38), (42, 35), (50, 26), (57, 15), (64, 6), (72, -12), (79, -16), (86, -6), (96, 2),
-    (105, -10), (120, -22), (150, -32), (180, -34),
+    (0, 37), (15, 37), (30, 37), (42, 33), (50, 25), (56, 14), (61, 2), (66, -11), (72, -17), (80, -18), (90, -16),
+    (105, -18), (120, -24), (150, -32), (180, -34),
 )  # fmt: skip
 MAN = Character(
     name="ben",
     summary="a young man with a dark quiff, drawn as for an animated film",
     targets=TARGETS,
     proportions=Proportions(
-        eye_gain=0.82, eye_reach=34.0, nose_gain=-0.26, lips_thinner=0.34, lips_back=2.4, jaw_taper=0.15, chin_up=9.0,
-        chin_forward=4.0, upper_cheek=2.0, lower_cheek=0.8, corners_up=4.2, middle_down=0.4, skull_gain=0.08,
+        eye_gain=0.90, eye_reach=34.0, nose_gain=-0.28, lips_thinner=0.26, lips_back=2.4, jaw_taper=0.15, chin_up=11.0,
+        chin_forward=4.0, upper_cheek=2.0, lower_cheek=0.8, corners_up=4.2, middle_down=0.4, skull_gain=0.05,
         neck_thinner=0.06, jaw=4.0,
     ),
     palette=PALETTE,
@@ -110,4 +120,5 @@ MAN = Character(
         across=60, ahead=44, behind=62, front=-152, back=-117, middle=-73, half_width=8.5, half_height=19, tilt=-16
     ),
     rest=WOMAN.rest,
+    pucker=1.45,
 )  # fmt: skip

@@ -46,7 +46,7 @@ def bake_poses(scene: FilmScene, poses: Sequence[LitPose], effort: Effort, repor
     rest = [_displayed(TexelBake(scene, parts, effort.side).light(effort.rest)) for parts in (SKIN, FAR)]
     bakes = [TexelBake(scene, parts, effort.pose_side) for parts in (SKIN, FAR)]
     small = _small_parts(scene)
-    light: tuple[list[Float32Array], ...] = ([], [], [])
+    light: tuple[list[Float32Array], ...] = ([], [], [], [])
     for pose in poses:
         report(pose.name)
         _pose(scene, pose)
@@ -61,6 +61,7 @@ def bake_poses(scene: FilmScene, poses: Sequence[LitPose], effort: Effort, repor
         report(f"camera {yaw}")
         scene.look_from(replace(FRONT, yaw_deg=yaw), effort.side)
         light[1].append(_displayed(bakes[1].light(effort.turn)))
+        light[3].append(_displayed(bakes[0].light(effort.turn)))
     scene.look_from(FRONT, effort.side)
     return PoseLight(
         names=np.array([pose.name for pose in poses]),
@@ -70,6 +71,7 @@ def bake_poses(scene: FilmScene, poses: Sequence[LitPose], effort: Effort, repor
         far_rest=rest[1],
         skin=np.stack(light[0]),
         far=np.stack(light[1]),
+        skin_from=np.stack(light[3]),
         rows=np.concatenate([scene.objects[part][1] for part in small]),
         small=np.stack(light[2]),
         view=view_table(),

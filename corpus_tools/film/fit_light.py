@@ -75,7 +75,7 @@ def fit_light(face: Face, poses: PoseLight, look: Look, eyes: EyeStyle) -> Baked
     ball_modes, ball_weights = principal_modes(features, balls - balls[:1], N_BALL_MODES, BALL_RIDGE)
     turns, turn_modes, from_turns = _turn_changes(poses, turned)
     mouth = _revealed(small[~turned][:, of_mouth], measures[~turned])
-    cameras, sizes = _quantised(_far_changes(poses)[turned.sum() + 1 :])
+    cameras, sizes = _quantised(_camera_changes(poses))
     return BakedLight(
         page_of={name: page for page, names in enumerate((SKIN, FAR)) for name in names},
         pages=np.stack([_skin_page(poses, *shown[1:]), _filled(poses.far_rest, FAR_LIT)]),
@@ -253,11 +253,22 @@ def _far_changes(poses: PoseLight) -> Floats:
     return halved.transpose(0, 3, 1, 2).reshape(len(halved), 3, -1)
 
 
+def _skin_turns(poses: PoseLight, light: NDArray[np.floating]) -> Floats:
+    """(N, 3, s s) changes of the skin's light (N, S, S, 3) from rest, without noise."""
+    changes = gaussian_filter(_halved(light - poses.skin[:1]) * 255, (0, TURN_BLUR, TURN_BLUR, 0))
+    return np.asarray(changes.transpose(0, 3, 1, 2).reshape(len(light), 3, -1))
+
+
+def _camera_changes(poses: PoseLight) -> Floats:
+    """(C, 3, 2 s s) changes of both pages from the cameras."""
+    skin = _skin_turns(poses, poses.skin_from)
+    return np.concatenate([skin, _far_changes(poses)[-len(skin) :]], axis=2)
+
+
 def _turn_changes(poses: PoseLight, turned: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.int8], NDArray[np.float32]]:
     """Turns (T, 2) of the head, modes (A, 3, n) of the change of both pages, and their weights (T, A)."""
     n = int(turned.sum())
-    skin = gaussian_filter(_halved(poses.skin[turned] - poses.skin[:1]) * 255, (0, TURN_BLUR, TURN_BLUR, 0))
-    skin = skin.transpose(0, 3, 1, 2).reshape(n, 3, -1)
+    skin = _skin_turns(poses, poses.skin[turned])
     below = np.zeros((n, 3, TURN_SIDE * (TURN_SIDE // BLACK_SHARE)))
     changes = np.concatenate([skin, _far_changes(poses)[1 : n + 1], below], axis=2)
     modes, weights = principal_modes(np.eye(n), changes, N_TURN_MODES, 0.0)

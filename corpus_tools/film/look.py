@@ -4,7 +4,7 @@ Lengths of lamps and the wall are in decimetres, about the middle between the ey
 towards the viewer. Colours are linear light, or sRGB where a field says so.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 Vector = tuple[float, float, float]
 
@@ -180,7 +180,35 @@ class Look:
     wall: Wall = field(default_factory=lambda: WALL)
 
 
-LOOKS: dict[str, Look] = {}  # of characters that are not lit as the drawn woman is
+def _dimmed(name: str, watts: float) -> dict[str, Lamp]:
+    return LAMPS | {name: replace(LAMPS[name], watts=watts)}
+
+
+# Of characters that are not lit as the drawn woman is. Gloss of the first skin is white plastic on brown skin, and lips
+# of her pink are paint.
+LOOKS = {
+    "ben": Look(
+        skin=SkinLook(
+            specular=0.34, roughness=0.48, sheen=0.06, scatter_mm=2.2, lip_colour=(0.55, 0.25, 0.22), lip_share=0.25
+        ),
+        hair=HairLook(specular=0.16, anisotropy=0.7, roughness=0.56, sheen=0.1),
+        lamps=_dimmed("right rim", 330),
+    ),
+    "noor": Look(
+        skin=SkinLook(lip_colour=(0.70, 0.30, 0.30), lip_share=0.3),
+        hair=HairLook(specular=0.2, streaks=0.25, variation=0.1, gain=(1.0, 0.98, 0.97)),
+        lamps=_dimmed("right rim", 400),
+    ),
+    "zuri": Look(
+        skin=SkinLook(
+            specular=0.30, roughness=0.50, sheen=0.05, scatter_mm=2.0, lip_colour=(0.50, 0.20, 0.19), lip_share=0.3,
+            inner_colour=(0.50, 0.16, 0.16),
+        ),
+        hair=HairLook(specular=0.2, anisotropy=0.4, roughness=0.56, sheen=0.15, gain=(1.35, 1.25, 1.25)),
+        lamps=_dimmed("right rim", 300),
+        exposure=0.73,
+    ),
+}  # fmt: skip
 
 
 def look_of(name: str) -> Look:

@@ -29,6 +29,8 @@ class PoseLight:
     skin : (P, s, s, 3)
     far : (T + C + 1, s, s, 3)
         Of hair and clothes at rest, in the turns of the head, then from the cameras.
+    skin_from : (C, s, s, 3)
+        Of the skin from the cameras.
     rows : (N,)
         Vertices of the face whose light ``small`` (P, N, 3) holds: of all other parts.
     view : (33, 33, 33, 3)
@@ -46,6 +48,7 @@ class PoseLight:
     far_rest: Float32Array
     skin: Float32Array
     far: Float32Array
+    skin_from: Float32Array
     rows: NDArray[np.int64]
     small: Float32Array
     view: Float32Array

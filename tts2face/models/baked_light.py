@@ -64,8 +64,8 @@ class BakedLight:
         Change of the colours of both pages, of sides s, one above the other and 1/64 of a page below them.
     camera_yaws_deg : (Y,)
         Cameras at rest.
-    camera_modes : (Y, 3, s s)
-        Change of the second page from them, over ``camera_sizes`` (Y,).
+    camera_modes : (Y, 3, p s s)
+        Change of both pages, or of the second alone, from them, over ``camera_sizes`` (Y,).
     ball_rows : (B,)
         Vertices of the eyeballs that are ever seen.
     ball_base : (B, 3)
@@ -137,7 +137,7 @@ class BakedLight:
     @property
     def turn_side(self) -> int:
         """Side of a page of the texels of change."""
-        return round(float(np.sqrt(self.camera_modes.shape[2])))
+        return round(float(np.sqrt(self.n_texels / (N_PAGES + 1 / BLACK_SHARE))))
 
     @property
     def n_texels(self) -> int:
@@ -152,6 +152,6 @@ class BakedLight:
         return (
             side >= LEAST_SIDE
             and side % BLACK_SHARE == 0
-            and self.camera_modes.shape[2] == side**2
+            and self.camera_modes.shape[2] in (side**2, N_PAGES * side**2)
             and self.n_texels == whole
         )

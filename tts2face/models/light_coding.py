@@ -57,7 +57,7 @@ TENSORS: Mapping[str, Tensor] = {
     "turn_weights": _factors("turns", "turn modes"),
     "turn_modes": Tensor("int8", ("turn modes", 3, "texels of change"), may_be_empty=True),
     "camera_yaws_deg": Tensor("float32", ("cameras",), -180.0, 180.0, may_be_empty=True),
-    "camera_modes": Tensor("int8", ("cameras", 3, "texels of a page"), may_be_empty=True),
+    "camera_modes": Tensor("int8", ("cameras", 3, "texels from cameras"), may_be_empty=True),
     "camera_sizes": _factors("cameras"),
     "ball_rows": Tensor("int32", ("lit vertices of eyes",), may_be_empty=True),
     "ball_base": _factors("lit vertices of eyes", 3),

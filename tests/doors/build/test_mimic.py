@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from cli.main import run
+from tests.face.people import DRAWN
 from tests.rendered_takes import ONLY_RENDERED
 from tts2face.retargeting.performer import eye_aperture
 from tts2face.video.media import read_frames, read_media_info
@@ -42,7 +43,7 @@ def gap(landmarks: np.ndarray) -> np.ndarray:
     return np.linalg.norm(landmarks[:, 13] - landmarks[:, 14], axis=1)
 
 
-@pytest.mark.parametrize("face", ["head", "ada"])
+@pytest.mark.parametrize("face", ["head", *DRAWN])
 def test_lips_lids_and_head_of_the_clip_are_the_performer_s(
     face: str, film: Path, face_model: Path, here: Path
 ) -> None:
@@ -55,7 +56,7 @@ def test_lips_lids_and_head_of_the_clip_are_the_performer_s(
     assert len(shown) == len(source)
     least = 0.94 if face == "head" else 0.9  # the tracker reads drawn lips less well
     assert np.corrcoef(gap(source), gap(shown))[0, 1] >= least
-    assert (np.abs(source_head - shown_head).mean(axis=0) <= 1.0).all()
+    assert (np.abs(source_head - shown_head).mean(axis=0) <= (1.0 if face == "head" else 1.2)).all()
     if face == "head":
         for side in ("Left", "Right"):
             assert np.corrcoef(eye_aperture(source, side), eye_aperture(shown, side))[0, 1] > 0.8

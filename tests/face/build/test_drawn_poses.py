@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw, ImageFilter
 
+from tests.face.people import DRAWN
 from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
@@ -17,11 +18,11 @@ from tts2face.render.film.visibility import BLOCK, N_COLUMNS, TRIANGLE_MASK, fin
 from tts2face.render.picture import Picture
 from tts2face.session import Session
 
-DRAWN = ("ada",)
 N_POSES = 200
 SIDE_PX, SHARE = 700, 0.8
 OUTLINE_PX = 5  # width of what may lie over an outline: landmarks lie between vertices, and lips are round
 FOLDED_MM2 = 12.0  # skin of the lower face that is seen at rest and turned over; lids turn over their edges
+ROLLED_MM2 = {"noor": 70.0}  # the rim of her upper lip rolls in when she rounds her lips and smiles
 LOWER_FACE_MM = -20.0
 TEXTS = (
     "People who move to Boston often choose a house by the sea.",
@@ -97,6 +98,6 @@ def test_neither_teeth_nor_balls_nor_folds_are_seen(posed: tuple[Face, np.ndarra
         normals = triangle_normals(points, face.triangles)
         turned = skin & ahead & ((rest * normals).sum(axis=1) < 0)
         folded = float(np.linalg.norm(normals[turned], axis=1).sum() / 2)
-        if beyond_lips or beyond_lids or folded > FOLDED_MM2:
+        if beyond_lips or beyond_lids or folded > ROLLED_MM2.get(face.metadata["name"], FOLDED_MM2):
             wrong.append((number, beyond_lips, beyond_lids, round(folded, 1)))
     assert not wrong

@@ -66,6 +66,11 @@ def test_light_changes_with_expression_head_and_camera() -> None:
     dark = [picture[picture.max(axis=1) < 90] for picture in lashes]
     assert np.median(dark[0], axis=0) == pytest.approx([30, 30, 30], abs=2)
     assert np.median(dark[1], axis=0) == pytest.approx([30, 30, 30 + CAMERA_CHANGE], abs=2)
+    light = FACE.light[0]
+    both = replace(light, camera_modes=np.concatenate([light.camera_modes, 0 * light.camera_modes], axis=2))
+    seen = drawn(replace(FACE, light=(both,)), camera="30,0").reshape(-1, 3)
+    off = np.abs(seen - SKIN_LIGHT - [0, 0, CAMERA_CHANGE]).max(axis=1)
+    assert (off <= 1).sum() > 1000  # the skin, when the first page has the change
 
 
 def test_shapes_that_a_palette_adds_move_the_face_in_the_light_of_its_own() -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tts2face.face.deformation import eye_rotations, head_transform
 from tts2face.face.pupils import DILATION, PUPIL_SHAPE
-from tts2face.models.baked_light import LEAST_SIDE, BakedLight
+from tts2face.models.baked_light import LEAST_SIDE, N_PAGES, BakedLight
 from tts2face.models.face import Face
 from tts2face.render.camera import CameraMatrices, camera_matrices
 from tts2face.render.film.eyes import CENTRE, N_EYE_COLUMNS, PUPIL, TURN, colour_eyes
@@ -264,6 +264,8 @@ def _from_camera(light: BakedLight, yaw_deg: float) -> Float32Array:
     """(3, N) change of light in texels from a camera, at rest; before the head's turns."""
     change = np.zeros((3, light.n_texels), np.float32)
     weights = camera_weights(light.camera_yaws_deg).at(np.array([yaw_deg]))
-    second = slice(light.turn_side**2, 2 * light.turn_side**2)
-    change[:, second] = np.einsum("y,ycn->cn", weights * light.camera_sizes, light.camera_modes.astype(np.float32))
+    end = N_PAGES * light.turn_side**2
+    change[:, end - light.camera_modes.shape[2] : end] = np.einsum(
+        "y,ycn->cn", weights * light.camera_sizes, light.camera_modes.astype(np.float32)
+    )
     return change
