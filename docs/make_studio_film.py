@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 from scipy.spatial import cKDTree
-from tests.service.conftest import RunningService, running_service
 
 from corpus_tools.prompts.coverage import count_units, sentence_units
 from corpus_tools.recording_process import prompts_answer
+from tests.running import ServeProcess, serve_process
 from tests.studio.chromium import Browser, open_browser
 from tests.studio.fake_camera import write_fake_media
 from tests.studio.served import Page
@@ -195,7 +195,7 @@ def revision_of(browser: Browser) -> int:
     return int(browser.run(PREVIEW + "preview.revision"))
 
 
-def write_text(film: Film, service: RunningService) -> Page:
+def write_text(film: Film, service: ServeProcess) -> Page:
     """Type a text on the first page and open its project."""
     browser = film.browser
     browser.open(f"{service.url}/studio/")
@@ -314,7 +314,7 @@ def add_curves(studio: httpx.Client, number: str, tab: str = "") -> None:
         assert answer.status_code == 200, answer.text
 
 
-def record_picture(browser: Browser, service: RunningService, pictures: Path) -> None:
+def record_picture(browser: Browser, service: ServeProcess, pictures: Path) -> None:
     """The recording page, on which the camera shows a rendered head and the states of takes are examples."""
     store = RecordingStore(Path(service.data.name) / "studio")
     units = [sentence_units(prompt, "en-us") for prompt in PROMPTS]
@@ -358,9 +358,9 @@ def camera_files(folder: Path) -> list[str]:
     return write_fake_media(clip, folder)
 
 
-def windows(folder: Path) -> Iterator[tuple[RunningService, Browser]]:
+def windows(folder: Path) -> Iterator[tuple[ServeProcess, Browser]]:
     """A service, and a window of the film's size."""
-    with running_service() as service, open_browser(SIZE, camera_files(folder)) as browser:
+    with serve_process() as service, open_browser(SIZE, camera_files(folder)) as browser:
         width, height = SIZE
         browser.devtools(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False
