@@ -113,7 +113,7 @@ def main() -> None:
     palette = replace(load_palette("starter"), derivations={})
     (found,) = study_gestures("starter", palette, Options()).styles
     page = PAGE.read_text(encoding="utf-8")
-    session = Session()
+    session = Session(face="head")  # the tracker reads its brows
     tables = {
         "distances": distances(found),
         "blinks": blinks(found),
