@@ -10,14 +10,11 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from corpus_tools.film.bake import TexelBake, bake_vertices, displayed, view_table
-from corpus_tools.film.pose_light import CAMERA_YAWS_DEG, FAR, MOUTH, SKIN, PoseLight
+from corpus_tools.film.pose_light import CAMERA_YAWS_DEG, FAR, FRONT, MOUTH, SKIN, PoseLight
 from corpus_tools.film.poses import LitPose
 from corpus_tools.film.scene import FilmScene
-from tts2face.render.camera_views import CameraView
 
 Float32Array = NDArray[np.float32]
-
-FRONT = CameraView(0, 3, share=0.86)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,11 +6,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.render.camera_views import CameraView
+
 Float32Array = NDArray[np.float32]
 
 CAMERA_YAWS_DEG = (-35, -20, 20, 35)  # about the face at rest
 SKIN, FAR = ("skin",), ("hair", "shirt")  # parts with a texture of light: those that speak, and those that do not
 MOUTH = ("teeth", "gums", "tongue")
+FRONT = CameraView(0, 3, share=0.86)  # that sees the poses
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,7 +20,7 @@ from tts2face.render.film import scene as film
 from tts2face.render.picture import PYVISTA, Picture
 
 STAGES = {  # of a frame, and the functions of `tts2face.render.film.scene` that it calls
-    "pose": ("LitScene.pose",),
+    "pose": ("LitScene.deform", "LitScene.move"),
     "light of the pose": ("LitScene.light_pose",),
     "projection": ("project",),
     "visibility, 2 x 2": ("find_nearest",),

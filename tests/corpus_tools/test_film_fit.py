@@ -1,41 +1,97 @@
-"""Fit of baked light: modes of what changes, and what a pose hides."""
+"""Fit of baked light: how vertices answer to the terms of a pose, who lies across the lips, and modes of turns."""
 
 import numpy as np
 import pytest
 
-from corpus_tools.film.fit_light import fit_modes, predicted, principal_modes
+from corpus_tools.film.fit_light import HIDDEN_WEIGHT, RIDGE, principal_modes
+from corpus_tools.film.fit_responses import find_partners, fit_responses, limits_of, quantised
+from tts2face.models.baked_light import LIMIT_STEP
+from tts2face.models.face import Face
+from tts2face.models.face_loading import load_face
 
-N_POSES, N_FEATURES, N_VERTICES = 30, 8, 50
+N_POSES, N_TERMS, N_VERTICES = 30, 5, 50
 
 
 @pytest.fixture(scope="module")
-def truth() -> tuple[np.ndarray, np.ndarray]:
-    """Features, the first of which is 0 in the first pose, and changes that follow from them."""
+def truth() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Terms (P, T, N), responses (T, 3, N), and the changes (P, N, 3) that follow from them."""
     rng = np.random.default_rng(4)
-    features = rng.uniform(0, 1, (N_POSES, N_FEATURES))
-    features[0] = 0
-    return features, np.einsum("pf,fnc->pnc", features, rng.normal(0, 20, (N_FEATURES, N_VERTICES, 3)))
+    terms = rng.uniform(-1, 1, (N_POSES, N_TERMS, N_VERTICES))
+    responses = rng.normal(0, 20, (N_TERMS, 3, N_VERTICES))
+    return terms, responses, np.einsum("ptn,tcn->pnc", terms, responses)
 
 
-def test_modes_predict_changes_from_features(truth: tuple[np.ndarray, np.ndarray]) -> None:
-    features, changes = truth
-    hidden = np.zeros(changes.shape[:2], bool)
-    modes, weights = fit_modes(features, changes, hidden, N_FEATURES)
-    assert modes.dtype == np.int8
-    found = predicted(features, modes, weights)
-    assert np.abs(found - changes).mean() < 0.02 * np.abs(changes).mean()
-    assert np.abs(found[0]).max() == 0
-    few, of_few = principal_modes(features, changes, 2, 0.01)
-    assert len(few) == 2
-    assert few.reshape(2, -1) @ few.reshape(2, -1).T == pytest.approx(np.eye(2), abs=1e-9)
-    assert np.abs(predicted(features, few, of_few) - changes).mean() < np.abs(changes).mean()
+def test_responses_are_found_from_the_poses(truth: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+    terms, responses, changes = truth
+    found = fit_responses(terms, changes, np.ones(changes.shape[:2]), RIDGE)
+    assert found == pytest.approx(responses, abs=0.1)
+    steps, sizes = quantised(found)
+    assert steps.dtype == np.int8
+    assert steps * sizes[:, None, None] == pytest.approx(found, abs=float(sizes.max()))
+    cut, smaller = quantised(found, 90.0)
+    assert (smaller < sizes).all()
+    assert np.abs(cut).max() == 127
 
 
-def test_what_a_pose_hides_is_guessed_by_the_others(truth: tuple[np.ndarray, np.ndarray]) -> None:
-    features, changes = truth
+def test_a_pose_that_hides_a_vertex_counts_little(truth: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+    terms, responses, changes = truth
     hidden = np.random.default_rng(5).uniform(size=changes.shape[:2]) < 0.15
-    seen = np.where(hidden[..., None], -200.0, changes)
-    blind = predicted(features, *fit_modes(features, seen, np.zeros_like(hidden), N_FEATURES))
-    found = predicted(features, *fit_modes(features, seen, hidden, N_FEATURES))
-    errors = [np.abs(one - changes)[hidden].mean() for one in (blind, found)]
-    assert errors[1] < 0.3 * errors[0]
+    dark = np.where(hidden[..., None], -200.0, changes)
+    errors = [
+        np.abs(fit_responses(terms, dark, weights, RIDGE) - responses).mean()
+        for weights in (np.ones(hidden.shape), ~hidden + HIDDEN_WEIGHT)
+    ]
+    assert errors[1] < 0.15 * errors[0]
+    limits = limits_of(dark, ~hidden) * LIMIT_STEP
+    shown = np.where(hidden[..., None], 0.0, changes)
+    ends = np.clip([shown.min(axis=0).T, shown.max(axis=0).T], -254, 254)
+    assert limits == pytest.approx(ends, abs=LIMIT_STEP / 2)
+
+
+def test_a_vertex_that_few_poses_show_answers_as_its_group(truth: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+    terms, responses, _ = truth
+    alike = responses[:, :, :1] + 0.1 * (responses - responses[:, :, :1])
+    changes = np.einsum("ptn,tcn->pnc", terms, alike)
+    shown = np.ones(changes.shape[:2])
+    shown[2:, 0] = 0.0  # two poses cannot tell five responses
+    groups = np.full(N_VERTICES, "teeth")
+    alone, among = (fit_responses(terms, changes, shown, 0.1, groups=one) for one in (None, groups))
+    errors = [np.abs(one[:, :, 0] - alike[:, :, 0]).mean() for one in (alone, among)]
+    assert errors[1] < 0.5 * errors[0]
+
+
+@pytest.fixture(scope="module")
+def face() -> Face:
+    """The drawn woman."""
+    return load_face("ada")
+
+
+def test_partners_lie_across_the_lips_and_lids(face: Face) -> None:
+    part = next(one for one in face.parts if one.name == "skin")
+    skin = np.unique(face.triangles[part.first : part.first + part.count])
+    ball = np.arange(face.eyes[0].first, face.eyes[0].first + face.eyes[0].count)
+    rows = np.concatenate([skin, ball]).astype(np.int32)
+    partners = find_partners(face, rows, skin, ball)
+    jaw = np.abs(face.shapes[face.shape_names.index("jawOpen")][:, 1])
+    numbers = {int(number): row for row, number in enumerate(face.landmarks)}
+    for number in (13, 14):
+        lip = int(face.landmark_vertices[numbers[number]][face.landmark_weights[numbers[number]].argmax()])
+        across = int(partners[np.searchsorted(skin, lip)])
+        assert across != lip
+        assert (jaw[across] > 0.5 * jaw.max()) == (number == 13)
+        assert np.linalg.norm(face.vertices[across] - face.vertices[lip]) < 6
+    alone = rows[: len(skin)] == partners[: len(skin)]
+    brow = face.vertices[skin, 1] > face.eyes[0].centre[1] + 40
+    assert alone[brow].all()
+    lids = partners[len(skin) :]
+    assert np.isin(lids, skin).all()
+    assert (face.vertices[lids, 1].mean()) > face.eyes[0].centre[1]
+
+
+def test_modes_of_turns_are_orthonormal() -> None:
+    changes = np.random.default_rng(6).normal(0, 5, (8, 3, 40))
+    modes, weights = principal_modes(changes, 8)
+    assert modes.reshape(8, -1) @ modes.reshape(8, -1).T == pytest.approx(np.eye(8), abs=1e-9)
+    assert np.einsum("pc,cxn->pxn", weights, modes) == pytest.approx(changes, abs=1e-9)
+    few, of_few = principal_modes(changes, 2)
+    assert len(few) == of_few.shape[1] == 2

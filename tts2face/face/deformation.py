@@ -51,16 +51,24 @@ class FaceRig:
 
     def pose(self, weights: NDArray[np.floating], head: NDArray[np.floating] = REST_HEAD) -> NDArray[np.float32]:
         """Vertices (V, 3), mm, for shape weights (K,) and a head pose (6,) of `HEAD_CHANNELS`."""
+        vertices = self.deform(weights)
+        self.move_head(head, vertices)
+        return vertices
+
+    def deform(self, weights: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Vertices (V, 3), mm, for shape weights (K,), of a head that has not moved."""
         vertices = np.zeros_like(self.rest)
-        transform = head_transform(head, self.pivot)
         eyes = eye_rotations(self.eye_turns, np.asarray(weights))
         _apply_shapes(self.rest, self.starts, self.indices, self.deltas, np.asarray(weights, np.float32), vertices)
         _turn_eyes(self.eye_spans, self.eye_centres, eyes, vertices)
         centres = self.clearance.centres(self.eye_centres, np.asarray(weights, np.float32))
         self.clearance.enforce(centres, eyes, vertices)
-        if np.asarray(head).any():
-            _move_head(transform, self.follow, vertices)
         return vertices
+
+    def move_head(self, head: NDArray[np.floating], vertices: NDArray[np.float32]) -> None:
+        """Move vertices (V, 3) of `deform` in place by a head pose (6,)."""
+        if np.asarray(head).any():
+            _move_head(head_transform(head, self.pivot), self.follow, vertices)
 
 
 def build_rig(face: Face) -> FaceRig:

@@ -1,7 +1,8 @@
 """Light of a face that a path tracer has baked: its colours at rest, and how they change with its poses and the camera.
 
 Colours are those of a display, 0 to 255, and are added to each other; those of eyeballs are linear light. Source:
-Theobald et al. 2007, equation 2 (an appearance is a mean and a sum of modes), with the modes predicted from the pose.
+Theobald et al. 2007, equation 2 (an appearance is a mean and a sum of changes), with changes that each vertex finds in
+the shape of its pose.
 """
 
 from collections.abc import Mapping
@@ -13,17 +14,10 @@ from numpy.typing import NDArray
 N_PAGES = 2
 TABLE_SIDE = 33  # entries of the view transform along each colour
 N_LAMP_NUMBERS = 17
-OPENING_LANDMARKS = (13, 14, 61, 291)  # inner lips, upper and lower, and corners of the mouth
-PRODUCTS = (
-    ("jawOpen", "jawOpen"),
-    ("jawOpen", "mouthFunnel"),
-    ("jawOpen", "mouthLowerDown"),
-    ("mouthSmile", "jawOpen"),
-    ("eyeBlinkLeft", "eyeBlinkLeft"),
-    ("eyeBlinkRight", "eyeBlinkRight"),
-    ("eyeBlinkLeft", "browDownLeft"),
-    ("eyeBlinkRight", "browDownRight"),
-)  # of weights, the mean of both sides where a name has none: light falls off faster than shapes move
+UPPER_LIP, LOWER_LIP = (78, 191, 80, 81, 82, 13, 312, 311, 310, 415, 308), (324, 318, 402, 317, 14, 87, 178, 88, 95)
+LIP_RING = (*UPPER_LIP, *LOWER_LIP)  # landmarks round the opening, against the clock as the face sees it
+N_TERMS, N_MOUTH_TERMS, N_BALL_TERMS = 10, 6, 3  # of `tts2face.render.film.response`
+LIMIT_STEP = 2.0  # of 255
 BLACK_SHARE = 64  # of a page's height lies below both, black: the texels of parts without a page
 LEAST_SIDE = 2 * BLACK_SHARE  # of a page: two rows of black, of which one is read
 
@@ -46,16 +40,18 @@ class BakedLight:
         Vertices whose light changes with the expression.
     base : (N, 3)
         Their light at rest; 0 on pages.
-    modes : (C, N, 3)
-        Change of the light of the rows; weights hold the size of a step.
-    mode_weights : (F, C)
-        Weights of the modes by `tts2face.render.film.pose_features.features`.
+    responses : (10, 3, N)
+        Change of their light by terms of the pose (`tts2face.render.film.response`), over ``response_sizes`` (10,).
+    limits : (2, 3, N)
+        Least and most change that the baked poses showed, in steps of `LIMIT_STEP`.
+    partners : (N + B,)
+        Vertex across the lips or lids from each of ``rows`` and ``ball_rows``; itself where there is none.
     mouth_rows : (M,)
         Vertices of teeth, gums and tongue.
-    openings : (J, 5)
-        Shapes of the mouth's opening (`tts2face.render.film.pose_features.Opening`).
-    mouth : (J, M, 3)
-        Light of the mouth's vertices in these openings.
+    mouth_base : (M, 3)
+    mouth_responses : (6, 3, M)
+        Of their light, over ``mouth_sizes`` (6,).
+    mouth_limits : (2, 3, M)
     turns_deg : (T, 2)
         Turns of the head, yaw and pitch.
     turn_weights : (T, A)
@@ -70,9 +66,8 @@ class BakedLight:
         Vertices of the eyeballs that are ever seen.
     ball_base : (B, 3)
         Light on white eyeballs at rest.
-    ball_modes : (E, B, 3)
-    ball_weights : (F, E)
-        As ``mode_weights``.
+    ball_responses : (3, 3, B)
+        Its change by the last three terms, over ``ball_sizes`` (3,).
     lamps : (L, 17)
         Rectangles that eyes mirror, mm: centre, two axes, normal, half width, half height, radiance.
     head_lamps
@@ -95,11 +90,15 @@ class BakedLight:
     is_inside: NDArray[np.bool_]
     rows: NDArray[np.int32]
     base: NDArray[np.uint8]
-    modes: NDArray[np.int8]
-    mode_weights: NDArray[np.float32]
+    responses: NDArray[np.int8]
+    response_sizes: NDArray[np.float32]
+    limits: NDArray[np.int8]
+    partners: NDArray[np.int32]
     mouth_rows: NDArray[np.int32]
-    openings: NDArray[np.float32]
-    mouth: NDArray[np.uint8]
+    mouth_base: NDArray[np.uint8]
+    mouth_responses: NDArray[np.int8]
+    mouth_sizes: NDArray[np.float32]
+    mouth_limits: NDArray[np.int8]
     turns_deg: NDArray[np.float32]
     turn_weights: NDArray[np.float32]
     turn_modes: NDArray[np.int8]
@@ -108,8 +107,8 @@ class BakedLight:
     camera_sizes: NDArray[np.float32]
     ball_rows: NDArray[np.int32]
     ball_base: NDArray[np.float32]
-    ball_modes: NDArray[np.float32]
-    ball_weights: NDArray[np.float32]
+    ball_responses: NDArray[np.int8]
+    ball_sizes: NDArray[np.float32]
     lamps: NDArray[np.float32]
     head_lamps: int
     sky: NDArray[np.float32]
@@ -128,11 +127,6 @@ class BakedLight:
     def triangle_numbers(self) -> NDArray[np.int32]:
         """(D,) triangle of the face of which each drawn one shows the front or the back."""
         return np.where(self.triangles < 0, ~self.triangles, self.triangles)
-
-    @property
-    def n_shapes(self) -> int:
-        """Number of the face's own shapes, the first ones; those that a palette adds do not change its light."""
-        return len(self.mode_weights) - len(PRODUCTS) - len(self.turns_deg)
 
     @property
     def turn_side(self) -> int:

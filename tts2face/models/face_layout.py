@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.models.baked_light import OPENING_LANDMARKS
+from tts2face.models.baked_light import LIP_RING
 from tts2face.models.face import PART_KINDS
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.occlusion_coding import MAX_OCCLUSION_BYTES
@@ -148,7 +148,7 @@ def _check_light(contents: Contents) -> None:
     """Light itself is checked when it is inflated."""
     arrays, header = contents.arrays, contents.header
     contents.require((LIGHT in arrays) == (LIGHT in header), "has only one of light and what describes it")
-    lacks = set(OPENING_LANDMARKS) - set(arrays["landmarks"].tolist())
+    lacks = set(LIP_RING) - set(arrays["landmarks"].tolist())
     contents.require(LIGHT not in arrays or not lacks, f"has light, but not the landmark {min(lacks, default=0)}")
 
 

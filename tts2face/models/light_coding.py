@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.models.baked_light import LEAST_SIDE, N_LAMP_NUMBERS, N_PAGES, PRODUCTS, TABLE_SIDE, BakedLight
+from tts2face.models.baked_light import (
+    LEAST_SIDE,
+    N_BALL_TERMS,
+    N_LAMP_NUMBERS,
+    N_MOUTH_TERMS,
+    N_PAGES,
+    N_TERMS,
+    TABLE_SIDE,
+    BakedLight,
+)
 from tts2face.models.picture_coding import decode_colours, encode_colours
 from tts2face.storage.deflated import deflate, inflate
 from tts2face.storage.schema import (
@@ -48,11 +57,15 @@ TENSORS: Mapping[str, Tensor] = {
     "is_inside": Tensor("bool", ("drawn triangles",)),
     "rows": Tensor("int32", ("lit vertices",), may_be_empty=True),
     "base": Tensor("uint8", ("lit vertices", 3), may_be_empty=True),
-    "modes": Tensor("int8", ("modes", "lit vertices", 3), may_be_empty=True),
-    "mode_weights": _factors("features", "modes"),
+    "responses": Tensor("int8", (N_TERMS, 3, "lit vertices"), may_be_empty=True),
+    "response_sizes": _factors(N_TERMS),
+    "limits": Tensor("int8", (2, 3, "lit vertices"), may_be_empty=True),
+    "partners": Tensor("int32", ("partners",), may_be_empty=True),
     "mouth_rows": Tensor("int32", ("vertices of the mouth",), may_be_empty=True),
-    "openings": _factors("openings", 5),
-    "mouth": Tensor("uint8", ("openings", "vertices of the mouth", 3), may_be_empty=True),
+    "mouth_base": Tensor("uint8", ("vertices of the mouth", 3), may_be_empty=True),
+    "mouth_responses": Tensor("int8", (N_MOUTH_TERMS, 3, "vertices of the mouth"), may_be_empty=True),
+    "mouth_sizes": _factors(N_MOUTH_TERMS),
+    "mouth_limits": Tensor("int8", (2, 3, "vertices of the mouth"), may_be_empty=True),
     "turns_deg": Tensor("float32", ("turns", 2), -90.0, 90.0, may_be_empty=True),
     "turn_weights": _factors("turns", "turn modes"),
     "turn_modes": Tensor("int8", ("turn modes", 3, "texels of change"), may_be_empty=True),
@@ -61,8 +74,8 @@ TENSORS: Mapping[str, Tensor] = {
     "camera_sizes": _factors("cameras"),
     "ball_rows": Tensor("int32", ("lit vertices of eyes",), may_be_empty=True),
     "ball_base": _factors("lit vertices of eyes", 3),
-    "ball_modes": _factors("modes of eyes", "lit vertices of eyes", 3),
-    "ball_weights": _factors("features", "modes of eyes"),
+    "ball_responses": Tensor("int8", (N_BALL_TERMS, 3, "lit vertices of eyes"), may_be_empty=True),
+    "ball_sizes": _factors(N_BALL_TERMS),
     "lamps": Tensor("float32", ("lamps", N_LAMP_NUMBERS), -MAX_MM, MAX_MM, may_be_empty=True),
     "sky": _factors(3, low=0.0),
     "eye_edges": Tensor("float32", (2,), 0.01, 1.5),
@@ -88,7 +101,7 @@ def encode_light(light: BakedLight) -> tuple[NDArray[np.uint8], dict[str, Any]]:
 def decode_light(
     content: NDArray[np.uint8], stored: Mapping[str, Any], sizes: Mapping[str, int], path: Path
 ) -> BakedLight:
-    """Light of what `encode_light` returned, for a face with these numbers of vertices, triangles and shapes.
+    """Light of what `encode_light` returned, for a face with these numbers of vertices and triangles.
 
     Raises
     ------
@@ -96,11 +109,11 @@ def decode_light(
         It is damaged, or does not fit the face.
     """
     arrays = _arrays(content, stored, path)
-    n_features = sizes["shapes"] + len(PRODUCTS) + len(arrays.get("turns_deg", ()))
-    contents = Contents(path, "face", arrays, {}, {"features": n_features})
+    n_partners = len(arrays.get("rows", ())) + len(arrays.get("ball_rows", ()))
+    contents = Contents(path, "face", arrays, {}, {"partners": n_partners})
     contents.tensors(TENSORS)
     contents.only_known()
-    for name in ("rows", "mouth_rows", "ball_rows"):
+    for name in ("rows", "partners", "mouth_rows", "ball_rows"):
         contents.indices(name, sizes["vertices"], "vertices")
     drawn = arrays["triangles"]
     numbers = np.where(drawn < 0, ~drawn, drawn)

@@ -57,7 +57,7 @@ def build_surface(face: Face, *, scatters: bool = True) -> Surface:
     is_strand = np.repeat([part.kind == STRANDS for part in parts], counts).astype(bool)
     every = np.array(face.triangles, np.int32)
     rig = build_rig(face)
-    starts, members = _triangles_by_vertex(face, every, part_of, rig)
+    starts, members = triangles_by_vertex(face, every, part_of, rig)
     textures = tuple(face.textures)
     texels, levels = pack_textures(textures, TONE_TABLES)
     materials = material_table(face, every, part_of)
@@ -104,7 +104,7 @@ def _phases(face: Face, part_of: NDArray[np.int32]) -> NDArray[np.int8]:
     return np.stack([phases, backs], axis=1)[part_of]
 
 
-def _triangles_by_vertex(
+def triangles_by_vertex(
     face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32], rig: FaceRig
 ) -> tuple[Any, Any]:
     """Starts and indices of the triangles around each vertex; coincident vertices that move alike are welded."""

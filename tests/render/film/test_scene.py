@@ -8,7 +8,8 @@ import pytest
 from lexicon.errors import DataError
 from tests.render.film.lit_face import (
     CAMERA_CHANGE,
-    JAW_CHANGE,
+    MOST_CHANGE,
+    RISE_CHANGE,
     SKIN_LIGHT,
     TONGUE_LIGHT,
     TURN_CHANGE,
@@ -58,8 +59,10 @@ def test_a_face_at_rest_has_its_baked_colours_before_its_wall() -> None:
 
 
 def test_light_changes_with_expression_head_and_camera() -> None:
-    jaw = pose(jawOpen=0.5)
-    assert forehead(drawn(weights=jaw)) - SKIN_LIGHT == pytest.approx([JAW_CHANGE / 2, 0, 0], abs=1)
+    raised = (drawn(weights=pose(mouthSmileLeft=0.8)).reshape(-1, 3) - SKIN_LIGHT)[:, 0]
+    assert (np.abs(raised - RISE_CHANGE) <= 1).sum() > 100  # by 8 mm
+    opened = (drawn(weights=pose(jawOpen=1.0)).reshape(-1, 3) - SKIN_LIGHT)[:, 0]  # by more than was baked
+    assert (np.abs(opened + MOST_CHANGE) <= 1).sum() > 100
     turned = np.radians([0, 20, 0, 0, 0, 0]).astype(np.float32)
     assert forehead(drawn(head=turned)) - SKIN_LIGHT == pytest.approx([0, TURN_CHANGE, 0], abs=1)
     lashes = [drawn(camera=camera, supersampling=3).reshape(-1, 3) for camera in ("front", "30,0")]
@@ -138,9 +141,11 @@ def test_light_is_the_same_after_it_was_written(tmp_path) -> None:
     for name in (
         "triangles",
         "rows",
-        "modes",
-        "mode_weights",
-        "mouth",
+        "responses",
+        "limits",
+        "partners",
+        "mouth_base",
+        "mouth_responses",
         "turn_modes",
         "camera_sizes",
         "ball_base",
@@ -160,7 +165,8 @@ def test_light_is_the_same_after_it_was_written(tmp_path) -> None:
         ({"rows": FACE.light[0].rows + 10_000}, "rows holds"),
         ({"triangles": FACE.light[0].triangles + 10_000}, "draws a triangle"),
         ({"base": FACE.light[0].base[1:]}, "base has the shape"),
-        ({"mode_weights": FACE.light[0].mode_weights[1:]}, "mode_weights has the shape"),
+        ({"response_sizes": FACE.light[0].response_sizes[1:]}, "response_sizes has the shape"),
+        ({"partners": FACE.light[0].partners[1:]}, "partners has the shape"),
         ({"sky": np.full(3, np.nan, np.float32)}, "sky holds nan"),
         ({"pages": np.zeros((2, 48, 48, 3), np.uint8)}, "squares of a power of two"),
         ({"turn_modes": np.zeros((1, 3, 50), np.int8)}, "do not fill"),
@@ -191,5 +197,5 @@ def test_a_face_with_light_needs_the_landmarks_of_its_mouth(tmp_path) -> None:
         landmark_weights=FACE.landmark_weights[1:],
     )
     write_face(path, lacking)
-    with pytest.raises(DataError, match="not the landmark 13"):
+    with pytest.raises(DataError, match="not the landmark 78"):
         read_face(path)

@@ -9,20 +9,12 @@ from numpy.typing import NDArray
 
 from tts2face.face.deformation import eye_rotations, head_transform
 from tts2face.face.pupils import DILATION, PUPIL_SHAPE
-from tts2face.models.baked_light import LEAST_SIDE, N_PAGES, BakedLight
+from tts2face.models.baked_light import LEAST_SIDE, N_BALL_TERMS, N_PAGES, N_TERMS, BakedLight
 from tts2face.models.face import Face
 from tts2face.render.camera import CameraMatrices, camera_matrices
 from tts2face.render.film.eyes import CENTRE, N_EYE_COLUMNS, PUPIL, TURN, colour_eyes
 from tts2face.render.film.light import add_modes, pack_change
-from tts2face.render.film.pose_features import (
-    Cardinal,
-    Features,
-    Opening,
-    camera_weights,
-    opening_weights,
-    turn_weights,
-    yaw_and_pitch_deg,
-)
+from tts2face.render.film.response import LightTerms, TermBuffers, add_responses, light_terms, still_eyes
 from tts2face.render.film.shading import (
     AT_RED,
     CHANGE_CODING,
@@ -37,6 +29,7 @@ from tts2face.render.film.shading import (
     list_fragments,
 )
 from tts2face.render.film.surface import TEXELS_A_PIXEL, LitSurface, build_surface, stack_pages, still_change
+from tts2face.render.film.turns import Cardinal, camera_weights, turn_weights, yaw_and_pitch_deg
 from tts2face.render.film.visibility import BLOCK, RED, X, find_nearest, project
 from tts2face.render.picture import Picture
 
@@ -65,6 +58,7 @@ class LitBuffers:
     texel: NDArray[np.int32]
     share: Float32Array
     corners: NDArray[np.int32]
+    terms: TermBuffers
     light: Float32Array
     mouth: Float32Array
     balls: Float32Array
@@ -86,8 +80,9 @@ class LitScene:
     texture_size: tuple[int, int]
     from_camera: Float32Array
     view: Float32Array
-    features: Features
-    opening: Opening
+    terms: LightTerms
+    bases: tuple[Float32Array, ...]
+    answers: tuple[Any, ...]
     turns: Cardinal
 
     def allocate_buffers(self) -> LitBuffers:
@@ -112,9 +107,10 @@ class LitScene:
             texel=np.zeros(n_fragments, np.int32),
             share=np.zeros((2, n_fragments), np.float32),
             corners=np.zeros((4, n_fragments), np.int32),
-            light=np.zeros((len(light.rows), 3), np.float32),
-            mouth=np.zeros((len(light.mouth_rows), 3), np.float32),
-            balls=np.zeros((len(light.ball_rows), 3), np.float32),
+            terms=self.terms.allocate_buffers(),
+            light=np.zeros((3, len(light.rows)), np.float32),
+            mouth=np.zeros((3, len(light.mouth_rows)), np.float32),
+            balls=np.zeros((3, len(light.ball_rows)), np.float32),
             change=np.zeros((3, light.n_texels), np.float32),
             changed=changed,
         )
@@ -122,8 +118,9 @@ class LitScene:
     def draw(self, weights: Float32Array, head: Float32Array, buffers: LitBuffers, pixels: NDArray[np.uint8]) -> None:
         """Draw the face with shape weights (K,) and a head pose (6,) over the background in `pixels`, in place."""
         surface, side = self.surface, self.picture.samples_per_side
-        points = self.pose(weights, head)
-        self.light_pose(weights, head, points, buffers)
+        points = self.deform(weights)
+        self.light_pose(points, head, buffers)
+        self.move(weights, head, points)
         optics = (self.optics.view.astype(np.float32), self.optics.lens.astype(np.float32))
         project(points, surface.source, *optics, buffers.table)
         columns = find_nearest(buffers.table, surface.triangles, buffers.nearest)
@@ -159,34 +156,41 @@ class LitScene:
 
     def pose(self, weights: Float32Array, head: Float32Array) -> Float32Array:
         """(V, 3) vertices, mm; eyeballs look ahead, and are smaller behind shut lids."""
-        face = self.face
-        points = self.surface.rig.pose(weights, head)
-        moved = head_transform(head, face.pivot)
-        for number, eye in enumerate(face.eyes):
-            span = slice(eye.first, eye.first + eye.count)
-            share = 1 - BLINK_SHRINK * _weight(face, weights, BLINKS[number]) ** 4
-            ball = eye.centre + share * (face.vertices[span] - eye.centre)
-            points[span] = ball @ moved[:, :3].T + moved[:, 3]
+        points = self.deform(weights)
+        self.move(weights, head, points)
         return points
 
-    def light_pose(self, weights: Float32Array, head: Float32Array, points: Float32Array, buffers: LitBuffers) -> None:
-        """Write the light of a pose into the table and the texels of change."""
-        light, table = self.surface.light, buffers.table
-        turn = self.turns.at(yaw_and_pitch_deg(head))
-        features = np.concatenate([self.features.of(weights[: light.n_shapes]), turn])
-        opened = opening_weights(light.openings, self.opening.measures(points, head))
-        for base, modes, weight, out in (
-            (light.base, light.modes, features @ light.mode_weights, buffers.light),
-            (np.zeros_like(buffers.mouth), light.mouth, opened, buffers.mouth),
-            (light.ball_base, light.ball_modes, features @ light.ball_weights, buffers.balls),
-            (self.from_camera, light.turn_modes, turn @ light.turn_weights, buffers.change),
-        ):
-            add_modes(base.reshape(-1), modes.reshape(len(modes), base.size), weight, out.reshape(-1))
-        pack_change(buffers.change, buffers.changed)
+    def deform(self, weights: Float32Array) -> Float32Array:
+        """(V, 3) vertices, mm, of a head that has not moved, whose eyeballs look ahead."""
+        points = self.surface.rig.deform(weights)
+        still_eyes(self.face, points)
+        return points
+
+    def move(self, weights: Float32Array, head: Float32Array, points: Float32Array) -> None:
+        """Move the head of vertices of `deform` in place; eyeballs shrink behind shut lids."""
+        for number, eye in enumerate(self.face.eyes):
+            share = 1 - BLINK_SHRINK * _weight(self.face, weights, BLINKS[number]) ** 4
+            span = slice(eye.first, eye.first + eye.count)
+            points[span] = eye.centre + share * (points[span] - eye.centre)
+        self.surface.rig.move_head(head, points)
+
+    def light_pose(self, points: Float32Array, head: Float32Array, buffers: LitBuffers) -> None:
+        """Write the light of vertices of `deform` and a head pose into the table and the texels of change."""
+        light, found = self.surface.light, buffers.terms
+        self.terms.update(points, found)
+        of_balls = (N_TERMS - N_BALL_TERMS, len(light.rows))
+        places = ((found.terms, (0, 0)), (found.mouth, (0, 0)), (found.terms, of_balls))
         at = 0
-        for lit in (buffers.light, buffers.mouth, buffers.balls):
-            table[at : at + len(lit), RED:] = lit
-            at += len(lit)
+        for base, answer, (terms, first), out in zip(
+            self.bases, self.answers, places, (buffers.light, buffers.mouth, buffers.balls), strict=True
+        ):
+            add_responses(base, answer, terms, first, out)
+            buffers.table[at : at + out.shape[1], RED:] = out.T
+            at += out.shape[1]
+        turn = self.turns.at(yaw_and_pitch_deg(head))
+        modes = light.turn_modes.reshape(len(light.turn_modes), -1)
+        add_modes(self.from_camera.reshape(-1), modes, turn @ light.turn_weights, buffers.change.reshape(-1))
+        pack_change(buffers.change, buffers.changed)
 
     def _eye_rows(self, weights: Float32Array, head: Float32Array) -> Float32Array:
         moved = head_transform(head, self.face.pivot)
@@ -238,10 +242,25 @@ def build_lit_scene(face: Face, light: BakedLight, picture: Picture, background:
         texture_size=size,
         from_camera=_from_camera(light, picture.view.yaw_deg),
         view=light.view.astype(np.float32),
-        features=Features.of_shapes(face.shape_names[: light.n_shapes]),
-        opening=Opening.of_face(face),
+        terms=light_terms(face, surface.rig, light),
+        bases=tuple(_planes(base) for base in (light.base, light.mouth_base, light.ball_base)),
+        answers=(
+            (light.responses, light.response_sizes, light.limits),
+            (light.mouth_responses, light.mouth_sizes, light.mouth_limits),
+            (light.ball_responses, light.ball_sizes, _no_limits(len(light.ball_rows))),
+        ),
         turns=turn_weights(light.turns_deg),
     )
+
+
+def _no_limits(n: int) -> NDArray[np.int8]:
+    """(2, 3, n) limits that are never reached."""
+    return np.tile(np.array([-127, 127], np.int8)[:, None, None], (1, 3, n))
+
+
+def _planes(base: NDArray[np.generic]) -> Float32Array:
+    """(3, N) red, green and blue of a base (N, 3)."""
+    return np.ascontiguousarray(base.T, np.float32)
 
 
 def _level(surface: LitSurface, optics: CameraMatrices, side: int) -> int:
