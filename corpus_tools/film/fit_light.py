@@ -21,12 +21,13 @@ from corpus_tools.film.fit_responses import (
 from corpus_tools.film.look import WHITE, Look
 from corpus_tools.film.pose_light import CAMERA_YAWS_DEG, FAR, MOUTH, SKIN, PoseLight
 from corpus_tools.film.seen import seen_triangles, shown_skin
-from corpus_tools.film.weld import weld_vertices
 from corpus_tools.head.eyes import EyeStyle
+from tts2face.face.deformation import build_rig
 from tts2face.models.baked_light import BLACK_SHARE, N_BALL_TERMS, BakedLight
 from tts2face.models.face import Face
 from tts2face.numeric import smoothstep
 from tts2face.render.film.turns import yaw_and_pitch_deg
+from tts2face.render.surface import weld_groups
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -281,7 +282,8 @@ def _smoothed_small(
     dark of what the lip hides of it. Metal, whose light is that of the camera in front, takes its median where it turns
     away.
     """
-    first, group = weld_vertices(face)
+    group = weld_groups(face, build_rig(face))
+    first = np.unique(group, return_index=True)[1]
     at = np.full(len(face.vertices), -1)
     at[poses.rows] = np.arange(len(poses.rows))
     light = poses.small[numbers][:, at[first[group[rows]]]].astype(np.float64)

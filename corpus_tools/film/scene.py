@@ -13,7 +13,6 @@ from corpus_tools.drawn.atlas import COLLAR, strand_places
 from corpus_tools.film.look import Lamp, Look
 from corpus_tools.film.materials import UNIT_MM, part_materials
 from corpus_tools.film.nodes import Shader, rgba
-from corpus_tools.film.weld import weld_vertices
 from tts2face.colour import decode_srgb
 from tts2face.face.deformation import build_rig, eye_rotations, head_transform
 from tts2face.models.face import Face
@@ -21,6 +20,7 @@ from tts2face.numeric import smoothstep
 from tts2face.render.camera import camera_matrices
 from tts2face.render.camera_views import CameraView
 from tts2face.render.film.scene import BLINK_SHRINK
+from tts2face.render.surface import weld_groups
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -45,7 +45,8 @@ class FilmScene:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         self.face, self.look = face, look
         self._rig, self._masks = build_rig(face), masks
-        self._first, self._weld = weld_vertices(face)
+        self._weld = weld_groups(face, self._rig)
+        self._first = np.unique(self._weld, return_index=True)[1]
         self.materials = part_materials(look, face.textures[0], face.textures[2])
         self.objects: dict[str, tuple[Any, Ints]] = {}  # by part, with the face's vertex of each of the mesh's
         self._add_parts()

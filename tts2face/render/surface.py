@@ -108,15 +108,9 @@ def triangles_by_vertex(
     face: Face, triangles: NDArray[np.int32], part_of: NDArray[np.int32], rig: FaceRig
 ) -> tuple[Any, Any]:
     """Starts and indices of the triangles around each vertex; coincident vertices that move alike are welded."""
-    n_vertices = len(face.vertices)
-    vertex_part = np.full(n_vertices, -1)
+    vertex_part = np.full(len(face.vertices), -1)
     vertex_part[triangles.ravel()] = np.repeat(part_of, 3)
-    mixed = np.zeros((n_vertices, 3))
-    for number, (first, end) in enumerate(pairwise(rig.starts.tolist()), start=1):
-        weight = np.cos(number)  # arbitrary fixed weights that separate vertices with different motion
-        mixed[rig.indices[first:end]] += weight * rig.deltas[first:end]
-    key = np.column_stack([face.vertices, mixed, vertex_part])
-    weld = _group_rows(np.rint(key * 1000).astype(np.int64))
+    weld = weld_groups(face, rig, vertex_part)
     corner = weld[triangles.ravel()]
     order = np.argsort(corner, kind="stable")
     counts = np.bincount(corner, minlength=int(weld.max(initial=-1)) + 1)
@@ -126,6 +120,17 @@ def triangles_by_vertex(
     starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     picks = np.repeat(begins[weld] - starts[:-1], sizes) + np.arange(starts[-1])
     return starts, around[picks]
+
+
+def weld_groups(face: Face, rig: FaceRig, kind: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
+    """(V,) group of each vertex with those at its place that move alike, and are of the same kind (V,)."""
+    mixed = np.zeros((len(face.vertices), 3))
+    for number, (first, end) in enumerate(pairwise(rig.starts.tolist()), start=1):
+        weight = np.cos(number)  # arbitrary fixed weights that separate vertices with different motion
+        mixed[rig.indices[first:end]] += weight * rig.deltas[first:end]
+    alike = np.zeros(len(mixed)) if kind is None else kind
+    key = np.column_stack([face.vertices, mixed, alike])
+    return _group_rows(np.rint(key * 1000).astype(np.int64))
 
 
 def _group_rows(rows: NDArray[np.int64]) -> NDArray[np.int64]:
