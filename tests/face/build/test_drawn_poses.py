@@ -65,7 +65,10 @@ def outline(face: Face, points: np.ndarray, rows: list[int]) -> np.ndarray:
     view, lens = optics.view.astype(np.float32), optics.lens.astype(np.float32)
     project(corners.astype(np.float32), every, view, lens, table)
     picture = Image.new("L", (SIDE_PX, SIDE_PX))
-    ImageDraw.Draw(picture).polygon([tuple(place) for place in table[:, :2].tolist()], fill=255)
+    places = [tuple(place) for place in table[:, :2].tolist()]
+    pen = ImageDraw.Draw(picture)
+    pen.polygon(places, fill=255)
+    pen.line([*places, places[0]], fill=255)  # a polygon without a height has no filling
     return np.asarray(picture.filter(ImageFilter.MaxFilter(2 * OUTLINE_PX + 1))) > 0
 
 
