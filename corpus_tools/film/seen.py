@@ -26,9 +26,10 @@ def seen_triangles(face: Face, poses: PoseLight) -> tuple[NDArray[np.int32], NDA
     """Triangles in the order of drawing, ``~t`` for the back of one, and whether it is the inside of the head."""
     n = len(face.triangles)
     both = np.concatenate([face.triangles, face.triangles[:, ::-1]]).astype(np.int32)
-    seen = np.zeros(2 * n, bool)
+    rig, seen = build_rig(face), np.zeros(2 * n, bool)
     for number in _looked_at(poses):
-        for nearest, _ in _looks(face, poses, number, _cameras(is_at_rest=number == 0)):
+        points = rig.pose(poses.weights[number], poses.heads[number])
+        for nearest, _ in _looks(face, points, _cameras(is_at_rest=number == 0)):
             shown = np.unique(nearest)
             seen[shown[shown >= 0]] = True
     found = np.flatnonzero(seen | _beside(face, seen[:n]))
@@ -52,10 +53,11 @@ def shown_skin(
     is_skin = np.isin(face.triangles, skin).sum(axis=1) == 3
     uv = np.zeros((len(face.vertices), 2), np.float32) if face.uv is None else face.uv
     texel = np.clip(uv[skin] * side, 0, side - 1).astype(int)
+    rig, n = build_rig(face), len(face.triangles)
     vertices, texels = [], []
     for number in numbers:
-        ((nearest, table),) = _looks(face, poses, number, [FRONT])
-        n = len(face.triangles)
+        points = rig.pose(poses.weights[number], poses.heads[number])
+        ((nearest, table),) = _looks(face, points, [FRONT])
         shown = np.zeros(len(face.vertices), bool)
         at = np.clip(np.rint(table[:, [Y, X]]), 1, SIDE_PX - 2).astype(int)
         for down, right in np.ndindex(3, 3):
@@ -82,9 +84,9 @@ def shown_skin(
 
 
 def _looks(
-    face: Face, poses: PoseLight, number: int, views: Iterable[CameraView]
+    face: Face, points: NDArray[np.float32], views: Iterable[CameraView]
 ) -> Iterable[tuple[NDArray[np.int64], NDArray[np.float32]]]:
-    """Triangle (S, S) that each camera sees of a pose, -1 of none, and the projected vertices.
+    """Triangle (S, S) that each camera sees of posed vertices (V, 3), -1 of none, and the projected vertices.
 
     From the number of triangles on, these are backs.
     """
@@ -92,7 +94,6 @@ def _looks(
     table = np.zeros((len(face.vertices), N_COLUMNS), np.float32)
     nearest = np.zeros((SIDE_PX, SIDE_PX + BLOCK), np.int64)
     every = np.arange(len(face.vertices), dtype=np.int32)
-    points = build_rig(face).pose(poses.weights[number], poses.heads[number])
     for view in views:
         optics = camera_matrices(view, face, (SIDE_PX, SIDE_PX))
         project(points, every, optics.view.astype(np.float32), optics.lens.astype(np.float32), table)

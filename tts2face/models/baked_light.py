@@ -11,11 +11,15 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
+
 N_PAGES = 2
 TABLE_SIDE = 33  # entries of the view transform along each colour
 N_LAMP_NUMBERS = 17
-UPPER_LIP, LOWER_LIP = (78, 191, 80, 81, 82, 13, 312, 311, 310, 415, 308), (324, 318, 402, 317, 14, 87, 178, 88, 95)
-LIP_RING = (*UPPER_LIP, *LOWER_LIP)  # landmarks round the opening, against the clock as the face sees it
+LIP_RING = (
+    *INNER_LIP_UPPER,
+    *INNER_LIP_LOWER[::-1][1:-1],
+)  # landmarks round the opening, against the clock as the face sees it
 N_TERMS, N_MOUTH_TERMS, N_BALL_TERMS = 10, 6, 3  # of `tts2face.render.film.response`
 LIMIT_STEP = 2.0  # of 255
 BLACK_SHARE = 64  # of a page's height lies below both, black: the texels of parts without a page

@@ -26,6 +26,7 @@ Float32Array = NDArray[np.float32]
 
 MOVE_MM = np.float32(8.0)  # movement that counts as much as a turn of 1 rad
 GAP_MM = np.float32(2.0)  # of an opening that is half as good as a wide one
+PLACE_KEY = np.array([1, 1 << 21, 1 << 42])  # of a place in um, each coordinate below 1 m
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,9 +123,6 @@ class TermBuffers:
     table: Float32Array
     terms: Float32Array
     mouth: Float32Array
-
-
-PLACE_KEY = np.array([1, 1 << 21, 1 << 42])  # of a place in um, each coordinate below 1 m
 
 
 def light_terms(face: Face, rig: FaceRig, light: BakedLight) -> LightTerms:
