@@ -30,7 +30,7 @@ Face = Annotated[
         "where an identity or hair is chosen."
     ),
 ]
-Hair = Annotated[str | None, Parameter(help="Haircut: bald, one of `tts2face haircuts`, or a .hair file.")]
+Hair = Annotated[str | None, Parameter(help="Haircut: one of `tts2face haircuts` for the face, or a .hair file.")]
 HairColor = Annotated[str | None, Parameter(help="Hair colour: one of `tts2face hair-colors`, or #rrggbb.")]
 Exports = Annotated[
     list[str] | None,

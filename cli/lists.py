@@ -67,7 +67,7 @@ def haircuts(*, as_json: AsJson = False) -> None:
     from tts2face.catalogue import haircuts
 
     entries = haircuts()
-    _print(entries, ("haircut", "summary"), ((one.name, one.summary) for one in entries), as_json)
+    _print(entries, ("haircut", "face", "summary"), ((one.name, one.face, one.summary) for one in entries), as_json)
 
 
 def hair_colors(*, as_json: AsJson = False) -> None:

@@ -113,13 +113,13 @@ def retarget(  # noqa: PLR0913 - one parameter a flag
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--face": face, "--model": model})
     from corpus_tools.retargeting_study.write import write_retargeting
     from corpus_tools.run_options import RunOptions, ignore_stage
-    from tts2face.request import default_face
+    from tts2face.models.face_loading import default_face
 
     with stage_bar() as stages:
         study = write_retargeting(
             recordings,
             out,
-            face=face or default_face(identity, None, None),
+            face=face or default_face(identity, None),
             identity=identity,
             run_options=RunOptions(cache, jobs, model),
             stages=stages or ignore_stage,

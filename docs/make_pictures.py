@@ -39,6 +39,13 @@ MOUTHS = {"0,0,600": (240, 408), "38,0,600": (20, 408)}  # left upper corner of 
 MOOD_TEXT = "I have a lot to tell you, so please sit down and listen while I explain what happened yesterday."
 N_MOOD_FRAMES = 6
 DRAWN = ("ada", "ben", "noor", "zuri")
+DYED = {
+    "ada": ("blond", "black", "auburn"),
+    "ben": ("blond", "red", "grey"),
+    "noor": ("dark-brown", "auburn", "blond"),
+    "zuri": ("auburn", "light-brown", "red"),
+}  # colours of their haircuts
+HAIR_VIEWS = ("front", "three-quarter")
 CAST_VIEWS, CAST_COLUMNS = ("front", "three-quarter", "profile", "close"), 9
 CAST_TEXT, CAST_PHONES = "My father, thin as he was, saw you leave the room.", ("m", "f", "ɑ", "θ", "u", "i")
 SMILE = {"mouthSmile": 0.9, "cheekSquint": 0.5, "eyeSquint": 0.2}
@@ -147,9 +154,22 @@ def hair_sheet() -> Image.Image:
     pictures = [
         still(load_face("head", hair=entry.name), entry.name, camera)
         for entry in haircuts()
+        if entry.face == "head"
         for camera in ("front", "three-quarter")
     ]
     return sheet(pictures, 6)
+
+
+def drawn_hair_sheet() -> Image.Image:
+    """The haircuts of each drawn character, and then each in another colour."""
+    pictures = []
+    for name in DRAWN:
+        own = [entry.name for entry in haircuts() if entry.face == name]
+        dyed = list(zip(own, DYED[name], strict=True))
+        pictures += [still(load_face(name, hair=cut), cut, camera) for cut in own for camera in HAIR_VIEWS]
+        pictures += [still(load_face(name, hair=cut, hair_color=colour), colour) for cut, colour in dyed]
+    whole = sheet(pictures, 3 * len(HAIR_VIEWS) + 3)
+    return whole.resize((whole.width // 2, whole.height // 2), Image.Resampling.LANCZOS)
 
 
 def moods_sheet() -> Image.Image:
@@ -190,6 +210,7 @@ def main() -> None:
     write_gestures("starter", HERE / "gestures.png", GestureOptions())
     sheets = {
         "cast": cast_sheet,
+        "drawn-hair": drawn_hair_sheet,
         "clip": clip_sheet,
         "faces": faces_sheet,
         "hair": hair_sheet,

@@ -9,11 +9,10 @@ from tts2face.exports.track_json import read_track
 from tts2face.exports.writer import ExportWriter, mesh_of, plan_exports
 from tts2face.face.gesture_transfer import gesture_face
 from tts2face.models.face import Face
-from tts2face.models.face_loading import load_face
+from tts2face.models.face_loading import default_face, load_face
 from tts2face.models.palette import load_palette
 from tts2face.render.encode import write_clips
 from tts2face.render.picture import Picture
-from tts2face.request import default_face
 from tts2face.storage.overwrite import refuse_overwriting
 from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.speech_stream import Piece
@@ -155,7 +154,7 @@ def convert(  # noqa: PLR0913 - one parameter a model
     first = next(pieces)
     channels = first.clip.motion.channels
     mesh = None
-    face = face or default_face(identity, hair, hair_color)
+    face = face or default_face(identity, hair)
     if any(file.format.uses_face for file in files):
         mesh = _mesh_with_channels(
             channels, load_face(face, identity, hair=hair, hair_color=hair_color), (face, palette)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError
-from tts2face.request import OWN_FACE
+from tts2face.request import OWN_FACE, REALISTIC_FACE
 from tts2face.storage.files import SHIPPED_FOLDER, find_file
 
 SHORT_S = 120.0  # recordings that are shorter are listed in seconds
@@ -59,9 +59,10 @@ class IdentityEntry:
 
 @dataclass(frozen=True, slots=True)
 class HaircutEntry:
-    """A haircut of the shipped heads."""
+    """A haircut of a shipped face."""
 
     name: str
+    face: str
     summary: str
 
 
@@ -195,15 +196,21 @@ def identities(face: str = "head") -> tuple[IdentityEntry, ...]:
 
 
 def haircuts() -> tuple[HaircutEntry, ...]:
-    """The shipped haircuts, and ``bald``."""
+    """The shipped haircuts by their faces: of the head, with ``bald``, and of each drawn character, its own first."""
     from tts2face.models.hair import BALD
-    from tts2face.models.hair_file import KIND
+    from tts2face.models.hair_file import KIND, OF_FACE
 
-    found = [
-        HaircutEntry(path.stem, str(_read(path, KIND)[1]["metadata"].get("summary", "")))
-        for path in _shipped_files(KIND)
-    ]
-    return (HaircutEntry(BALD, "no hair"), *found)
+    found = [HaircutEntry(BALD, REALISTIC_FACE, "no hair")]
+    for path in _shipped_files("face"):
+        if path.stem != REALISTIC_FACE:
+            hairdos = _read(path, "face")[1].get("hairdos", {})
+            found += [HaircutEntry(name, path.stem, "the face's own") for name, _ in hairdos.values()]
+    for path in _shipped_files(KIND):
+        face, _, name = path.stem.rpartition(OF_FACE)
+        summary = str(_read(path, KIND)[1]["metadata"].get("summary", ""))
+        found.append(HaircutEntry(name, face or REALISTIC_FACE, summary))
+    order = [REALISTIC_FACE, *(path.stem for path in _shipped_files("face"))]
+    return tuple(sorted(found, key=lambda one: order.index(one.face)))
 
 
 def hair_colors() -> tuple[HairColorEntry, ...]:

@@ -26,12 +26,6 @@ OWN_FACE = "self"  # name of the talker's own face
 DRAWN_FACE, REALISTIC_FACE = "ada", "head"  # the shipped face that is shown by default, and the one with identities
 
 
-def default_face(identity: str | None, hair: str | None, hair_color: str | None) -> str:
-    """Face that is shown where none is named: the one that the other options belong to."""
-    belongs_to_head = not (identity is None and hair is None and hair_color is None)
-    return REALISTIC_FACE if belongs_to_head else DRAWN_FACE
-
-
 def option(default: Any, help_text: str) -> Any:
     """Dataclass field with a default value and a help text in its metadata."""
     return field(default=default, metadata={"help": help_text})

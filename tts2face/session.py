@@ -20,7 +20,7 @@ from tts2face.synthesis.prepared_request import PreparedRequest, input_paths, pr
 from tts2face.synthesis.sentence_memory import SentenceMemory
 from tts2face.synthesis.session_models import SessionModels, shown_face
 from tts2face.synthesis.speech_stream import Piece, SpeechSpan, TimedSpeech, measure_speech, timed_speech
-from tts2face.synthesis.written_clip import RequestSteps, WrittenClip, write_pieces
+from tts2face.synthesis.written_clip import RequestSteps, WrittenClip, ahead, write_pieces
 from tts2face.types import Chunk, Clip, Progress, concatenate_clips
 from tts2face.voice.pool import VoicePool
 
@@ -337,7 +337,9 @@ class Session:
     ) -> WrittenClip:
         has_gestures = prepared.request.has_gestures
         self._models.preload_voice(prepared)
-        renderer = None if outputs.out is None else self.renderer(picture, has_gestures=has_gestures)
         progress = RequestSteps(prepared.n_steps, on_progress)
-        with outputs.open(self._models.face(has_gestures=has_gestures), renderer, progress.report_frames) as files:
-            return write_pieces(self._models.pieces(prepared), files, outputs, progress, on_piece)
+        face = self._models.face(has_gestures=has_gestures)
+        with ahead(self._models.pieces(prepared)) as pieces:  # spoken while the renderer is built
+            renderer = None if outputs.out is None else self.renderer(picture, has_gestures=has_gestures)
+            with outputs.open(face, renderer, progress.report_frames) as files:
+                return write_pieces(pieces, files, outputs, progress, on_piece)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lexicon.json_values import check_fields
-from tts2face.request import default_face
 
 if TYPE_CHECKING:
     from tts2face.session import Session
@@ -18,7 +17,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Models:
-    """Models that show and move a speaker, by name or path; without a face, `tts2face.request.default_face`.
+    """Models that show and move a speaker, by name or path.
+
+    Without a face, `tts2face.models.face_loading.default_face`.
 
     Raises
     ------
@@ -37,7 +38,9 @@ class Models:
         """Reject values of other types, and choose a face where none is named."""
         check_fields(self)
         if not self.face:
-            object.__setattr__(self, "face", default_face(self.identity, self.hair, self.hair_color))
+            from tts2face.models.face_loading import default_face
+
+            object.__setattr__(self, "face", default_face(self.identity, self.hair))
 
     def open_session(self, voices: "VoicePool | None" = None, *, memory_mb: float = 0.0) -> "Session":
         """Session of these models; raises as `Session`."""

@@ -26,8 +26,9 @@ def hair_tiles(number: int) -> list[Tile]:
     """
     if number > N_COLUMNS * N_ROWS:
         raise DataError(f"a texture has tiles for {N_COLUMNS * N_ROWS} locks, not {number}; join some of them")
-    wide, high = 1.0 / N_COLUMNS, HAIR_BOTTOM / N_ROWS
-    places = [divmod(at, N_COLUMNS) for at in range(number)]
+    columns, rows = (2, 1) if number <= 2 else (N_COLUMNS, N_ROWS)  # curls all over are one large surface
+    wide, high = 1.0 / columns, HAIR_BOTTOM / rows
+    places = [divmod(at, columns) for at in range(number)]
     return [(column * wide, (column + 1) * wide, row * high, (row + 1) * high) for row, column in places]
 
 

@@ -17,7 +17,7 @@ from corpus_tools.drawn.elder import ELDER
 from corpus_tools.drawn.expressions import close_jaw, part_lips, rest_in, round_lips, soften, thin_lips
 from corpus_tools.drawn.girl import GIRL
 from corpus_tools.drawn.glasses import glasses_piece
-from corpus_tools.drawn.hair import hair_cover, hair_piece
+from corpus_tools.drawn.hair import OtherHair, hair_cover, hair_piece, other_palettes
 from corpus_tools.drawn.lashes import lash_piece
 from corpus_tools.drawn.lids import find_lining, shut_lids, still_lining, tuck_lining
 from corpus_tools.drawn.man import MAN
@@ -42,10 +42,11 @@ from corpus_tools.head.source import SourceMesh, fetch_data, read_source
 from corpus_tools.head.tongue import tongue_piece
 from corpus_tools.training.score_files import calibrate_face_file
 from tts2face.face.breathing import BREATH_SHAPE
-from tts2face.face.hair_swing import LIMIT_RAD, SWING_SHAPES
+from tts2face.face.hair_swing import LIMIT_RAD
 from tts2face.face.pupils import PUPIL_SHAPE
-from tts2face.models.face import Face, Texture
+from tts2face.models.face import Face, Hairdo, Texture
 from tts2face.models.face_file import write_face
+from tts2face.models.lit_hair import SWING_SHAPES
 from tts2face.render.occlusion import bake_occlusion
 from tts2face.render.scene import available_cores
 
@@ -74,10 +75,22 @@ def drawn_face(source: SourceMesh, character: Character) -> Face:
     )
     about = {"name": character.name, "summary": character.summary, **METADATA}
     about["made_by"] = "python -m corpus_tools.drawn.build_drawn"
+    colour = "#" + "".join(f"{round(255 * share):02x}" for share in character.palette.hair)
     face = assemble_face(built, [*shape_names(cage), *BODY_SHAPES], textures, about)
     limits = face.limits.copy()
     limits[-len(BODY_SHAPES) :] = BODY_LIMITS
-    return add_landmarks(_centred(replace(face, limits=limits)), skin.base)
+    hairdo = Hairdo(character.hair.name, colour)
+    return add_landmarks(_centred(replace(face, limits=limits, hairdo=hairdo)), skin.base)
+
+
+def other_hair(source: SourceMesh, character: Character) -> OtherHair:
+    """The hair of a character in other colours."""
+    reference, cage = _reference(source), drawn_cage(source, character.targets, character.proportions)
+    skin = _skin(build_skin(cage), reference, fit_eyeballs(cage, character.eyes), character)
+    others = other_palettes(character.palette)
+    painted = [hair_piece(skin, character.hair, palette).colours for palette in others]
+    known = [palette.hair for palette in (character.palette, *others)]
+    return OtherHair(np.rint(255 * np.clip(painted, 0, 1)).astype(np.uint8), np.array(known, np.float32))
 
 
 def _centred(face: Face) -> Face:
@@ -138,9 +151,9 @@ def _pieces(
         brow_piece(skin, character.brow, palette.brows),
         lash_piece(skin, reference.lids, balls, character.lashes, palette.lashes),
         sweater_piece(shirt, character.collar, palette.cloth),
-        hair_piece(skin, character.hair, palette),
         *(stud_pieces(skin) if character.has_studs else ()),
         *(() if character.glasses is None else (glasses_piece(balls, character.glasses),)),
+        hair_piece(skin, character.hair, palette),  # last: another haircut takes its place
     )
 
 

@@ -140,18 +140,42 @@ class Lock:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Hairstyle:
-    """Locks over a shell that fills their gaps.
+class Curls:
+    """Round curls all over the head, as one surface.
 
-    ``hairline`` gives the elevation in degrees of the edge of the hair by azimuth, from behind the person's right over
-    the front to behind the left. ``shell_lift`` is the height of the shell in mm; ``fade`` is the height in degrees
-    over the hairline in which cropped hair turns from the colour of the skin to its own, 0 for none.
+    Parameters
+    ----------
+    lift : mm
+        Height over the skin at the crown.
+    width, height : mm
+        Of a curl.
+    sides
+        Share of the lift above the ears.
     """
 
+    lift: float
+    width: float
+    height: float
+    sides: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hairstyle:
+    """Locks over a shell that fills their gaps, or curls over it.
+
+    ``name`` and ``summary`` are as in lists of haircuts. ``hairline`` gives the elevation in degrees of the edge of the
+    hair by azimuth, from behind the person's right over the front to behind the left. ``shell_lift`` is the height of
+    the shell in mm; ``fade`` is the height in degrees over the hairline in which cropped hair turns from the colour of
+    the skin to its own, 0 for none.
+    """
+
+    name: str
+    summary: str = ""
     locks: tuple[Lock, ...]
     hairline: Profile
     shell_lift: float
     fade: float = 0.0
+    curls: Curls | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -84,6 +84,7 @@ ELDER = Character(
     ),
     lashes=((0, 0.1), (0.2, 0.7), (0.5, 1.5), (0.8, 2.1), (1, 2.4)),
     hair=Hairstyle(
+        name="bun",
         locks=LOCKS,
         hairline=(*((-turn, height) for turn, height in reversed(SIDE[1:])), *SIDE),
         shell_lift=6.0,

@@ -84,6 +84,7 @@ GIRL = Character(
     ),
     lashes=((0, 0.2), (0.12, 0.8), (0.4, 1.9), (0.7, 2.6), (0.88, 3.4), (1, 4.6)),
     hair=Hairstyle(
+        name="puffs",
         locks=LOCKS,
         hairline=(*((-turn, height) for turn, height in reversed(SIDE[1:])), *SIDE),
         shell_lift=3.5,

@@ -1,19 +1,20 @@
 """Hair of large sculpted locks over a shell, as one opaque part."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
 from corpus_tools.drawn.atlas import hair_tiles, in_tile
-from corpus_tools.drawn.character import Hairstyle, Lock, Palette
+from corpus_tools.drawn.character import Curls, Hairstyle, Lock, Palette
 from corpus_tools.drawn.fields import arc_length, profile, smooth_rows, wind_outward
 from corpus_tools.head.piece import MaterialSpan, Piece
 from corpus_tools.head.skin import Skin, vertex_normals
 from corpus_tools.head.subdivide import grid_triangles, triangulate
-from tts2face.face.hair_swing import SWING_SHAPES
+from tts2face.models.lit_hair import swing_shapes
 from tts2face.numeric import smoothstep, unit_vectors
 
 Floats = NDArray[np.float64]
@@ -27,11 +28,21 @@ DEPTH = (AHEAD + BEHIND) / 2
 N_ALONG, N_TOP, N_UNDER = 36, 11, 4
 CURLED = 56, 29, 19  # the same of locks with curls
 CURL_MM = 9.0  # width of a curl
+CURLS_A_COLUMN = 0.6  # at most; more would not be resolved
+N_ROUND, N_DOWN = 180, 60  # rings and points of curls all over the head, from the crown
+EDGE_FROM, EDGE_SINKS = 0.5, 5.0  # of the way down, from where curls come closer to the skin; mm below it at the edge
+ABOVE_EAR = ((0, -90), (54, -90), (62, 10), (84, 6), (100, 2), (116, -16), (180, -24))  # edge of curls
+EVEN_COLUMNS = 6.0  # rings over which it, and the skull below, are evened
+SIDES_FROM_TOP_DEG = (25.0, 70.0)
+CURL_SHADE = 0.55  # between curls
 LOOSE_FROM = 1.7  # exponent by which tips are looser than roots
 TIP_DENSITY = 1.35  # exponent by which rings are closer at the tip
 SHADE_ALONG = ((0, 0.72), (0.15, 0.92), (0.45, 1.06), (0.8, 1.0), (1, 0.92))
 RIM_SHADE, UNDER_SHADE, END_SHADE, SHELL_SHADE = 0.74, 0.80, 0.6, 0.95
 TIP_SHARE, PAINTED_SHADE = 0.9, 0.25  # of the colours of the tips, and of the shade: the light brings the rest
+BLACK, LIGHT = (0.078, 0.063, 0.055), (0.69, 0.647, 0.565)
+BLACK_TO, LIGHT_FROM = 0.13, 0.5  # mean of hair that is black already, or light
+MOST_TO_TIP = 1.25  # factor of the colour from the root to the tip
 # Matt: a gloss of .20 made it lilac plastic in the cool rim lights.
 MATERIAL = {"specular": 0.05, "shininess": 10.0, "wrap": 0.5}
 
@@ -42,7 +53,10 @@ def hair_piece(skin: Skin, style: Hairstyle, palette: Palette) -> Piece:
     tubes = [scalp.shell(), *(lock_tube(lock, scalp) for lock in style.locks)]
     points, faces, colours, uv, count = [], [], [], [], 0
     shares = [np.zeros(len(tubes[0].points))]  # the shell is still
-    for lock, tube in zip(style.locks, tubes[1:], strict=True):
+    if style.curls is not None:
+        tubes.append(curled_tube(style.curls, scalp))
+        shares.append(np.zeros(len(tubes[-1].points)))
+    for lock, tube in zip(style.locks, tubes[1:], strict=False):
         shares.append(lock.loose * (np.ones_like(tube.along) if lock.is_ball else tube.along**LOOSE_FROM))
     for number, (tube, tile) in enumerate(zip(tubes, hair_tiles(len(tubes)), strict=True)):
         colour = _colours(tube, palette)
@@ -59,17 +73,29 @@ def hair_piece(skin: Skin, style: Hairstyle, palette: Palette) -> Piece:
         np.concatenate(points),
         (span,),
         np.concatenate(colours),
-        shapes=_swings(np.concatenate(points), np.concatenate(shares)),
+        shapes=swing_shapes(np.concatenate(points), np.concatenate(shares), MIDDLE),
         uv=np.concatenate(uv),
         tangents=np.concatenate([tube.tangents for tube in tubes]),
     )
 
 
-def _swings(points: Floats, share: Floats) -> dict[str, Floats]:
-    """Motion (N, 3) of the hair for a lag of 1 rad about the head's axes; `share` (N,) of it is followed."""
-    off = points - MIDDLE
-    axes = dict(zip(SWING_SHAPES, np.eye(3), strict=True))
-    return {name: share[:, None] * np.cross(axis, off) for name, axis in axes.items()}
+@dataclass(frozen=True, slots=True, eq=False)
+class OtherHair:
+    """Hair in C other colours: those (C, N, 3) of its vertices, and its own colour and the others (1 + C, 3), sRGB."""
+
+    vertices: NDArray[np.uint8]
+    colours: NDArray[np.float32]
+
+
+def other_palettes(palette: Palette) -> tuple[Palette, ...]:
+    """Colours with black and with light hair, as far as a character's own is neither.
+
+    Between its pictures in these, hair is drawn in any colour.
+    """
+    own = float(np.mean(palette.hair))
+    others = [one for one, is_far in ((BLACK, own > BLACK_TO), (LIGHT, own < LIGHT_FROM)) if is_far]
+    to_tip = np.clip(np.divide(palette.hair_tip, palette.hair), 1.0, MOST_TO_TIP)
+    return tuple(replace(palette, hair=one, hair_tip=tuple((np.array(one) * to_tip).tolist())) for one in others)
 
 
 def hair_cover(skin: Skin, style: Hairstyle) -> Floats:
@@ -153,6 +179,13 @@ class Scalp:
         moved: Floats = points + lack[:, None] * normals[row, lowest]
         return moved
 
+    def hairline(self, azimuth: Floats) -> Floats:
+        """(N,) elevation of the edge of curls at azimuths (N,) all around, in degrees; it runs above the ears."""
+        low = np.interp(azimuth, *np.array(self._style.hairline).T)
+        low = np.maximum(low, np.interp(np.abs(azimuth), *np.array(ABOVE_EAR).T))
+        even = gaussian_filter1d(low[:-1], EVEN_COLUMNS, mode="wrap")
+        return np.append(even, even[0])
+
     def shell(self) -> Tube:
         """The cap under the locks; it sinks through the skin along a level line, so that its edge is smooth."""
         height, lift = self._height[self._used], self._style.shell_lift
@@ -212,15 +245,58 @@ def lock_tube(lock: Lock, scalp: Scalp) -> Tube:
     )
 
 
+def curled_tube(curls: Curls, scalp: "Scalp") -> Tube:
+    """Curls all over the head: a dome from the crown to the edge of the hair, with a round bump for each curl."""
+    turn = np.linspace(-180, 180, N_ROUND + 1)
+    down = np.linspace(0, 1, N_DOWN)
+    elevation = 89.0 + (scalp.hairline(turn) - 89.0) * down[:, None]
+    volume = np.array([[on_volume(a, e, 0.0) for a, e in zip(turn, row, strict=True)] for row in elevation])
+    out = unit_vectors(volume - MIDDLE)
+    raised = ((scalp.keep_outside(volume.reshape(-1, 3), 0.0).reshape(out.shape) - volume) * out).sum(axis=2)
+    raised = gaussian_filter1d(raised[:, :-1], EVEN_COLUMNS, axis=1, mode="wrap")  # not by each ear
+    edge = np.sqrt(1 - (np.maximum(down - EDGE_FROM, 0) / (1 - EDGE_FROM)) ** 2)[:, None]
+    sides = 1 - (1 - curls.sides) * smoothstep(90.0 - elevation, *SIDES_FROM_TOP_DEG)
+    lift = curls.lift * edge * sides - EDGE_SINKS * (1 - edge)
+    dome = volume + (raised[:, [*range(N_ROUND), 0]] + lift)[..., None] * out
+    points, triangles = dome.reshape(-1, 3), grid_triangles(N_DOWN, N_ROUND + 1)
+    triangles = wind_outward(points, triangles)
+    near, _ = cKDTree(_spread(points, 0.8 * curls.width)).query(points)
+    bump = np.sqrt(np.clip(1 - 0.9 * (np.asarray(near) / (0.55 * curls.width)) ** 2, 0, 1))
+    rise = (curls.height * (bump - 0.5)).reshape(lift.shape) * np.minimum(1.5 * edge, 1)
+    dome = dome + rise[..., None] * out
+    around = np.tile((turn + 180) / 360, N_DOWN)
+    return Tube(
+        dome.reshape(-1, 3),
+        triangles,
+        CURL_SHADE + (1 - CURL_SHADE) * bump,
+        np.full(len(points), 0.5),
+        np.column_stack([around, np.repeat(down, N_ROUND + 1)]),
+        unit_vectors(np.gradient(dome, axis=0) + 1e-9).reshape(-1, 3),
+    )
+
+
+def _spread(points: Floats, apart: float) -> Floats:
+    """Some of points (N, 3) that are at least so far from each other, in random order (seeded)."""
+    order = np.random.default_rng(0).permutation(len(points))
+    tree, is_free, kept = cKDTree(points), np.ones(len(points), bool), []
+    for at in order:
+        if is_free[at]:
+            kept.append(at)
+            is_free[tree.query_ball_point(points[at], apart)] = False
+    return points[kept]
+
+
 def _curled(rings: Floats, middle: Floats, height: float) -> Floats:
     """Rings (n, k, 3) around a middle line (n, 3) with round curls, each in the gap between those of the row before."""
     off = rings - middle[:, None]
     far = np.linalg.norm(off, axis=2, keepdims=True)
     sides = np.linalg.norm(np.diff(rings, axis=1, append=rings[:, :1]), axis=2)
-    n_around = 2 * max(2, round(float(sides.sum(axis=1).max()) / CURL_MM / 2))
+    longest = float(sides.sum(axis=1).max())
+    curl = max(CURL_MM, longest / (CURLS_A_COLUMN * rings.shape[1]))
+    n_around = 2 * max(2, round(longest / curl / 2))
     across = np.cumsum(sides, axis=1) / np.maximum(sides.sum(axis=1, keepdims=True), 1e-9)
     outline = arc_length(np.column_stack([arc_length(middle), far.mean(axis=1)[:, 0], np.zeros(len(middle))]))
-    rows = np.pi * outline / CURL_MM
+    rows = np.pi * outline / curl
     bumps = np.cos(np.pi * n_around * across) * np.cos(rows)[:, None]
     return np.asarray(rings + height * bumps[..., None] * off / np.maximum(far, 1e-6) * np.minimum(far / 12, 1))
 

@@ -111,6 +111,7 @@ MAN = Character(
     ),
     lashes=((0, 0.1), (0.2, 0.7), (0.5, 1.3), (0.8, 1.7), (1, 1.2)),
     hair=Hairstyle(
+        name="quiff",
         locks=LOCKS,
         hairline=(*((-turn, height) for turn, height in reversed(SIDE[1:])), *SIDE),
         shell_lift=3.2,

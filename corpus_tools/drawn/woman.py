@@ -156,7 +156,7 @@ WOMAN = Character(
         thickness=((0, 0.4), (0.12, 1.1), (0.4, 1.4), (0.8, 0.8), (1, 0.2)),
     ),
     lashes=((0, 0.2), (0.12, 1.0), (0.4, 2.5), (0.7, 3.3), (0.88, 4.9), (1, 7.4)),  # ends in a wing
-    hair=Hairstyle(locks=LOCKS, hairline=HAIRLINE, shell_lift=8.0),
+    hair=Hairstyle(name="bob", locks=LOCKS, hairline=HAIRLINE, shell_lift=8.0),
     collar=Collar(
         across=54, ahead=50, behind=66, front=-141, back=-113, middle=-64, half_width=9, half_height=17, tilt=-14
     ),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.film.materials import white
 from corpus_tools.film.scene import FilmScene
-from tts2face.render.film.view_transform import table_levels
+from tts2face.models.view_transform import table_levels
 
 Float32Array = NDArray[np.float32]
 

@@ -1,5 +1,6 @@
 """Baking of a character's poses. Needs bpy."""
 
+import math
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -9,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from corpus_tools.drawn.atlas import HAIR_BOTTOM
+from corpus_tools.drawn.hair import OtherHair
 from corpus_tools.film.bake import TexelBake, bake_vertices, displayed, view_table
 from corpus_tools.film.pose_light import CAMERA_YAWS_DEG, FAR, FRONT, MOUTH, SKIN, PoseLight
 from corpus_tools.film.poses import LitPose
@@ -35,12 +38,25 @@ class Effort:
     wall: int = 64
 
 
-def bake_poses(scene: FilmScene, poses: Sequence[LitPose], effort: Effort, report: Callable[[str], None]) -> PoseLight:
-    """Bake the poses, the first of which is at rest; `report` gets the name of each step."""
+HAIRCUT = Effort(pose_side=192, rest=12, turn=24, reference=64)  # of the light of another haircut at rest and in turns
+
+
+def bake_poses(
+    scene: FilmScene,
+    poses: Sequence[LitPose],
+    other_hair: OtherHair,
+    effort: Effort,
+    report: Callable[[str], None],
+) -> PoseLight:
+    """Bake the poses, the first of which is at rest, and the hair in other colours.
+
+    `report` gets the name of each step.
+    """
     scene.look_from(FRONT, effort.side)
     _pose(scene, poses[0])
     report("texels at rest")
     rest = [_displayed(TexelBake(scene, parts, effort.side).light(effort.rest)) for parts in (SKIN, FAR)]
+    far_other = _bake_other_hair(scene, other_hair.vertices, effort)
     bakes = [TexelBake(scene, parts, effort.pose_side) for parts in (SKIN, FAR)]
     small = _small_parts(scene)
     light: tuple[list[Float32Array], ...] = ([], [], [], [])
@@ -52,7 +68,7 @@ def bake_poses(scene: FilmScene, poses: Sequence[LitPose], effort: Effort, repor
         light[0].append(_displayed(bakes[0].light(samples)))
         if turned:
             light[1].append(_displayed(bakes[1].light(samples)))
-        light[2].append(_small_light(scene, small, effort))
+        light[2].append(light[2][0] if turned and not at_rest else _small_light(scene, small, effort))
     _pose(scene, poses[0])
     for yaw in CAMERA_YAWS_DEG:
         report(f"camera {yaw}")
@@ -69,12 +85,26 @@ def bake_poses(scene: FilmScene, poses: Sequence[LitPose], effort: Effort, repor
         skin=np.stack(light[0]),
         far=np.stack(light[1]),
         skin_from=np.stack(light[3]),
+        far_other=far_other,
+        other_colours=other_hair.colours,
+        other_vertices=other_hair.vertices,
         rows=np.concatenate([scene.objects[part][1] for part in small]),
         small=np.stack(light[2]),
         view=view_table(),
         lamps=scene.mirrored_lamps(),
         backdrop=bake_backdrop(scene, effort),
     )
+
+
+def _bake_other_hair(scene: FilmScene, colours: NDArray[np.uint8], effort: Effort) -> Float32Array:
+    """(C, h, s, 3) light of the hair in colours (C, N, 3) of its vertices."""
+    side, own = effort.side // 2, scene.face.colours[-colours.shape[1] :]
+    found = []
+    for other in colours:
+        scene.paint_hair(other)
+        found.append(_displayed(TexelBake(scene, FAR, side).light(effort.rest))[: math.ceil(HAIR_BOTTOM * side)])
+    scene.paint_hair(own)
+    return np.stack(found)
 
 
 def bake_backdrop(scene: FilmScene, effort: Effort) -> NDArray[np.uint8]:

@@ -4,10 +4,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from corpus_tools.drawn.build_drawn import CAST, cast_parser, face_masks, step_reporter
-from corpus_tools.film.bake_poses import Effort, bake_poses
-from corpus_tools.film.fit_light import fit_light
-from corpus_tools.film.look import Look, look_of
+from corpus_tools.drawn.build_drawn import CAST, cast_parser, drawn_face, face_masks, other_hair, step_reporter
+from corpus_tools.drawn.character import Character
+from corpus_tools.drawn.haircuts import HAIRCUTS, lit_haircut
+from corpus_tools.film.bake_poses import HAIRCUT, Effort, bake_poses
+from corpus_tools.film.fit_light import fit_haircut, fit_light
+from corpus_tools.film.look import look_of
 from corpus_tools.film.pose_light import PoseLight
 from corpus_tools.film.poses import lit_poses
 from corpus_tools.film.scene import FilmScene
@@ -15,34 +17,49 @@ from corpus_tools.head.source import SourceMesh, fetch_data, read_source
 from corpus_tools.training.score_files import calibrate_face_file
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
+from tts2face.models.hair_file import OF_FACE, write_lit_hair
 
 
-def bake_face(source: SourceMesh, face: Face, look: Look, report: Callable[[str], None]) -> PoseLight:
-    """Light of the poses of a face that `corpus_tools.drawn.build_drawn` has built."""
-    scene = FilmScene(face, look, face_masks(source, face))
-    return bake_poses(scene, lit_poses(face), Effort(), report)
+def bake_face(
+    source: SourceMesh, face: Face, character: Character, effort: Effort, report: Callable[[str], None]
+) -> PoseLight:
+    """Light of a character that `corpus_tools.drawn.build_drawn` has built: with `HAIRCUT`, at rest and in turns."""
+    scene = FilmScene(face, look_of(character.name), face_masks(source, face))
+    poses = [pose for pose in lit_poses(face) if effort is not HAIRCUT or pose.is_still]
+    return bake_poses(scene, poses, other_hair(source, character), effort, report)
 
 
 def main() -> None:
-    """Bake, fit and write the light of characters; steps go to standard error."""
+    """Bake, fit and write the light of characters and of their haircuts; steps go to standard error."""
     parser, report = cast_parser(__doc__), step_reporter()
     parser.add_argument("--keep", type=Path, help="folder in which the bakes are kept: with them light is fitted only")
     arguments = parser.parse_args()
     source = read_source(arguments.data or fetch_data(Path.home() / ".cache/tts2face"))
-    for name in arguments.names or CAST:
-        path, look = arguments.faces / f"{name}.face", look_of(name)
-        face = read_face(path)
-        kept = None if arguments.keep is None else arguments.keep / f"{name}.npz"
+
+    def baked(face: Face, character: Character, effort: Effort) -> PoseLight:
+        kept = None if arguments.keep is None else arguments.keep / f"{character.name}-{character.hair.name}.npz"
         if kept is not None and kept.is_file():
-            poses = PoseLight.load(kept)
-        else:
-            poses = bake_face(source, face, look, report)
-            if kept is not None:
-                poses.save(kept)
+            return PoseLight.load(kept)
+        poses = bake_face(source, face, character, effort, report)
+        if kept is not None:
+            poses.save(kept)
+        return poses
+
+    for name in arguments.names or CAST:
+        path, character = arguments.faces / f"{name}.face", CAST[name]
+        face = read_face(path)
+        own = baked(face, character, Effort())
         report(f"{name}: fit")
-        write_face(path, replace(face, light=(fit_light(face, poses, look, CAST[name].eyes),)))
+        light = fit_light(face, own, look_of(name), character.eyes)
+        write_face(path, replace(face, light=(light,)))
         report(f"{name}: calibration")  # again: the tracker sees other pictures of it now
         calibrate_face_file(str(path), path)
+        for style in HAIRCUTS[name]:
+            report(f"{name}: {style.name}")
+            dressed = replace(character, hair=style)
+            wearing = drawn_face(source, dressed)
+            worn = fit_haircut((face, wearing), own, baked(wearing, dressed, HAIRCUT), light)
+            write_lit_hair(arguments.faces / f"{name}{OF_FACE}{style.name}.hair", lit_haircut(wearing, style, worn))
     report("done")
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.ndimage import binary_erosion, distance_transform_edt, gaussian_filter, map_coordinates
+from scipy.ndimage import distance_transform_edt, gaussian_filter, map_coordinates
 from scipy.spatial import cKDTree
 
 from corpus_tools.film.fit_responses import (
@@ -18,42 +18,47 @@ from corpus_tools.film.fit_responses import (
     pose_terms,
     quantised,
 )
+from corpus_tools.film.fit_texels import (
+    SKIN_LIT,
+    STEP,
+    TURN_SIDE,
+    camera_changes,
+    drawn_texels,
+    relit_skin,
+    rest_pages,
+    tint_of,
+    turn_changes,
+)
 from corpus_tools.film.look import WHITE, Look
 from corpus_tools.film.pose_light import CAMERA_YAWS_DEG, FAR, MOUTH, SKIN, PoseLight
 from corpus_tools.film.seen import seen_triangles, shown_skin
 from corpus_tools.head.eyes import EyeStyle
 from tts2face.face.deformation import build_rig
-from tts2face.models.baked_light import BLACK_SHARE, N_BALL_TERMS, BakedLight
+from tts2face.models.baked_light import N_BALL_TERMS, BakedLight, HairLight
 from tts2face.models.face import Face
 from tts2face.numeric import smoothstep
-from tts2face.render.film.turns import yaw_and_pitch_deg
 from tts2face.render.surface import weld_groups
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-N_TURN_MODES = 6
+N_TURN_MODES, HAIRCUT_TURN_MODES = 6, 4
 RIDGE, MOUTH_RIDGE = 0.003, 0.1  # of responses
 HIDDEN_WEIGHT, MOUTH_HIDDEN_WEIGHT = 0.02, 0.002  # of a pose that hides a vertex
 MOST_SHARE = 99.9  # per cent of the responses that are not cut off
 LEAST_CHANGE, CLEAR_CHANGE = 2.0, 5.0  # of 255: skin that changes less in every pose keeps its light
 CHANGE_ROUNDS = 4  # of neighbours over which that fades
 COLOUR_ROUNDS, TONE_SHARE = 4, 0.5  # of neighbours by which coloured noise, and that of the tone, is smoothed
-SKIN_FLOOR = (34.0, 12.0, 11.0)  # of the texels: nothing of a face is black
-SKIN_LIT, FAR_LIT = 0.05, 0.06  # displayed light below which a texel was hidden from the bake
 UNCOVERED_BLUR, BEYOND_TEXELS = 1.0, 1  # over which the light of what other poses uncover fades, and goes on
 SMALL_ROUNDS = 3  # of neighbours over which the light of small parts is averaged: teeth else are striped
 METAL, METAL_LIT = ("stud", "glasses"), 0.5  # and the share of its median below which its light is that of its back
 BALL_LIT = 0.45  # of the light in front below which a vertex of an eyeball lies under the lid
-TURN_SIDE, TURN_BLUR = 192, 0.8  # texels; the shadows of hair are soft, what is left of noise is not
 
 
 def fit_light(face: Face, poses: PoseLight, look: Look, eyes: EyeStyle) -> BakedLight:
     """Light of a face from that of its poses."""
-    triangles, is_inside = seen_triangles(face, poses)
     part_of = _vertex_parts(face)
-    turned = np.asarray(poses.heads.any(axis=1))
-    still = np.flatnonzero(~turned)
+    still = np.flatnonzero(~poses.heads.any(axis=1))
     shown, texels = shown_skin(face, poses, still, _corners(face, SKIN), poses.skin.shape[1])
     small_rows = np.flatnonzero(np.isin(part_of, np.unique(part_of[poses.rows])))
     of_mouth = np.array([name.startswith(MOUTH) for name in part_of[small_rows]])
@@ -81,13 +86,9 @@ def fit_light(face: Face, poses: PoseLight, look: Look, eyes: EyeStyle) -> Baked
     mouth_responses, mouth_sizes = quantised(in_mouth, MOST_SHARE)
     of_lids = fit_responses(terms[:, -N_BALL_TERMS:, n:], balls - balls[:1], np.ones(balls.shape[:2]), RIDGE)
     ball_responses, ball_sizes = quantised(of_lids, MOST_SHARE)
-    turns, turn_modes, from_turns = _turn_changes(poses, turned)
-    cameras, camera_sizes = quantised(_camera_changes(poses))
     return BakedLight(
+        **_light_in_texels(face, poses, poses, base_map[1:], N_TURN_MODES),
         page_of={name: page for page, names in enumerate((SKIN, FAR)) for name in names},
-        pages=np.stack([_skin_page(poses, *base_map[1:]), _filled(poses.far_rest, FAR_LIT)]),
-        triangles=triangles,
-        is_inside=is_inside,
         rows=rows,
         base=np.rint(np.clip(np.concatenate([np.zeros((len(skin_rows), 3)), plain[0]]), 0, 255)).astype(np.uint8),
         responses=responses,
@@ -99,12 +100,6 @@ def fit_light(face: Face, poses: PoseLight, look: Look, eyes: EyeStyle) -> Baked
         mouth_responses=mouth_responses,
         mouth_sizes=mouth_sizes,
         mouth_limits=limits_of(mouth - mouth_base, shown[:, mouth_rows]),
-        turns_deg=turns.astype(np.float32),
-        turn_weights=from_turns,
-        turn_modes=turn_modes,
-        camera_yaws_deg=np.array(CAMERA_YAWS_DEG, np.float32),
-        camera_modes=cameras,
-        camera_sizes=camera_sizes,
         ball_rows=ball_rows.astype(np.int32),
         ball_base=balls[0].astype(np.float32),
         ball_responses=ball_responses,
@@ -119,11 +114,56 @@ def fit_light(face: Face, poses: PoseLight, look: Look, eyes: EyeStyle) -> Baked
     )
 
 
-def principal_modes(changes: Floats, number: int) -> tuple[Floats, Floats]:
-    """Principal modes (C, ...) of changes (P, ...), and their weights (P, C)."""
-    u, s, v = np.linalg.svd(changes.reshape(len(changes), -1), full_matrices=False)
-    n = min(number, len(s))
-    return v[:n].reshape(n, *changes.shape[1:]), u[:, :n] * s[:n]
+def fit_haircut(faces: tuple[Face, Face], own: PoseLight, worn: PoseLight, light: BakedLight) -> HairLight:
+    """Light of a face with another haircut, baked at rest and in turns of the head.
+
+    `faces` are with its own hair and the other; `own` and `light` are of the first, of whose skin, in expressions, the
+    other has the light.
+    """
+    plain, face = faces
+    part_of = _vertex_parts(face)
+    still = np.flatnonzero(~own.heads.any(axis=1))
+    side = own.skin.shape[1]
+    shown, texels = shown_skin(plain, own, still, _corners(plain, SKIN), side)
+    texels[0] |= shown_skin(face, own, still[:1], _corners(face, SKIN), side)[1][0]  # what neither hair covers
+    is_small = ~np.isin(part_of[light.rows], SKIN)
+    rows = light.rows[is_small].astype(np.int64)
+    small = _smoothed_small(face, worn, np.array([0]), rows, part_of[rows], shown[:1])
+    base = light.base.copy()
+    base[is_small] = np.rint(np.clip(small[0] * 255, 0, 255))
+    found = _light_in_texels(face, own, worn, _base_map(own, still, texels)[1:], HAIRCUT_TURN_MODES)
+    changes = camera_changes(worn, drawn_texels(face, found["triangles"]))
+    n = TURN_SIDE**2
+    changes[:, :, :n] -= light.camera_sizes[:, None, None] * light.camera_modes[:, :, :n]
+    changes[:, :, :n] *= relit_skin(own, worn)
+    cameras, sizes = quantised(changes, least=STEP)
+    return HairLight(**found | {"base": base, "camera_modes": cameras, "camera_sizes": sizes})
+
+
+def _light_in_texels(
+    face: Face, own: PoseLight, worn: PoseLight, uncovered: tuple[Floats, Floats], number: int
+) -> dict[str, Any]:
+    """What depends on the haircut, but for the light of vertices, by the names of `HairLight`.
+
+    `own` has the poses in which triangles are seen, `worn` the light; `uncovered` is the share (s, s) and light
+    (s, s, 3) of what other poses uncover, `number` that of the modes of turns.
+    """
+    triangles, is_inside = seen_triangles(face, own)
+    drawn = drawn_texels(face, triangles)
+    turns, turn_modes, from_turns = turn_changes(worn, drawn, number)
+    cameras, camera_sizes = quantised(camera_changes(worn, drawn), least=STEP)
+    return {
+        "pages": rest_pages(worn, *uncovered),
+        "triangles": triangles,
+        "is_inside": is_inside,
+        "turns_deg": turns.astype(np.float32),
+        "turn_weights": from_turns,
+        "turn_modes": turn_modes,
+        "camera_yaws_deg": np.array(CAMERA_YAWS_DEG, np.float32),
+        "camera_modes": cameras,
+        "camera_sizes": camera_sizes,
+        "tint": tint_of(worn),
+    }
 
 
 def _vertex_parts(face: Face) -> NDArray[np.str_]:
@@ -191,57 +231,6 @@ def read_maps(maps: NDArray[np.floating], uv: NDArray[np.floating]) -> Floats:
     ).astype(np.float64)
 
 
-def _halved(maps: NDArray[np.floating]) -> Floats:
-    """(P, 192, 192, 3) means of squares of maps (P, S, S, 3)."""
-    n = maps.shape[1] // TURN_SIDE
-    means: Floats = maps.reshape(len(maps), TURN_SIDE, n, TURN_SIDE, n, 3).mean(axis=(2, 4)).astype(np.float64)
-    return means
-
-
-def _far_changes(poses: PoseLight) -> Floats:
-    """(T + C + 1, 3, s s) changes of the second page from rest."""
-    halved = _halved(poses.far - poses.far[:1]) * 255
-    return halved.transpose(0, 3, 1, 2).reshape(len(halved), 3, -1)
-
-
-def _skin_turns(poses: PoseLight, light: NDArray[np.floating]) -> Floats:
-    """(N, 3, s s) changes of the skin's light (N, S, S, 3) from rest, without noise."""
-    changes = gaussian_filter(_halved(light - poses.skin[:1]) * 255, (0, TURN_BLUR, TURN_BLUR, 0))
-    return np.asarray(changes.transpose(0, 3, 1, 2).reshape(len(light), 3, -1))
-
-
-def _camera_changes(poses: PoseLight) -> Floats:
-    """(C, 3, 2 s s) changes of both pages from the cameras."""
-    skin = _skin_turns(poses, poses.skin_from)
-    return np.concatenate([skin, _far_changes(poses)[-len(skin) :]], axis=2)
-
-
-def _turn_changes(poses: PoseLight, turned: NDArray[np.bool_]) -> tuple[Floats, NDArray[np.int8], NDArray[np.float32]]:
-    """Turns (T, 2) of the head, modes (A, 3, n) of the change of both pages, and their weights (T, A)."""
-    n = int(turned.sum())
-    skin = _skin_turns(poses, poses.skin[turned])
-    below = np.zeros((n, 3, TURN_SIDE * (TURN_SIDE // BLACK_SHARE)))
-    changes = np.concatenate([skin, _far_changes(poses)[1 : n + 1], below], axis=2)
-    modes, weights = principal_modes(changes, N_TURN_MODES)
-    steps, sizes = quantised(modes)
-    return (
-        np.array([yaw_and_pitch_deg(head) for head in poses.heads[turned]]),
-        steps,
-        (weights * sizes).astype(np.float32),
-    )
-
-
-def _filled(page: NDArray[np.floating], least: float, keeps: NDArray[np.bool_] | None = None) -> NDArray[np.uint8]:
-    """Page (S, S, 3) of displayed light, 0 to 255, whose hidden texels take the light of the nearest lit ones."""
-    lit = binary_erosion(page.max(axis=2) > least)
-    nearest = distance_transform_edt(~lit, return_distances=False, return_indices=True)
-    filled = page[tuple(nearest)]
-    if keeps is not None:
-        filled[keeps] = page[keeps]
-    pixels: NDArray[np.uint8] = np.rint(np.clip(filled, 0, 1) * 255).astype(np.uint8)
-    return pixels
-
-
 def _base_map(poses: PoseLight, numbers: Ints, shown: NDArray[np.bool_]) -> tuple[Floats, Floats, Floats]:
     """Map (s, s, 3) of the skin at rest, in which what other poses uncover has the mean light of those that show it.
 
@@ -255,22 +244,6 @@ def _base_map(poses: PoseLight, numbers: Ints, shown: NDArray[np.bool_]) -> tupl
     light = light[tuple(nearest)]
     share: Floats = gaussian_filter((~shown[0] & (away <= BEYOND_TEXELS)).astype(np.float64), UNCOVERED_BLUR)
     return rest + share[..., None] * (light - rest), share, light
-
-
-def _skin_page(poses: PoseLight, share: Floats, light: Floats) -> NDArray[np.uint8]:
-    """Colours of the skin at rest, with a share (s, s) of light (s, s, 3) of other poses."""
-    side = poses.skin_rest.shape[0]
-    share, larger = _enlarged(share, side), np.stack([_enlarged(one, side) for one in np.moveaxis(light, 2, 0)], 2)
-    page = np.maximum(poses.skin_rest, np.array(SKIN_FLOOR) / 255)
-    page = page + share[..., None] * (larger - page)
-    return _filled(page, SKIN_LIT, share > 0.5)
-
-
-def _enlarged(values: Floats, side: int) -> Floats:
-    """(S, S) values (s, s) between their places."""
-    places = (np.arange(side) + 0.5) * values.shape[0] / side - 0.5
-    found: Floats = map_coordinates(values, np.meshgrid(places, places, indexing="ij"), order=1, mode="nearest")
-    return found
 
 
 def _smoothed_small(

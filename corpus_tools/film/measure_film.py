@@ -15,7 +15,7 @@ from corpus_tools.film.poses import LitPose, held_out_poses
 from corpus_tools.film.scene import FilmScene
 from corpus_tools.head.source import SourceMesh, fetch_data, read_source
 from tts2face.models.face import Face
-from tts2face.models.face_file import read_face
+from tts2face.models.face_loading import load_face
 from tts2face.render.camera_views import parse_camera
 
 Pixels = NDArray[np.uint8]
@@ -59,27 +59,31 @@ def main() -> None:
     parser, report = cast_parser(__doc__), step_reporter()
     parser.add_argument("--traced", type=Path, required=True, help="folder in which the traced pictures are kept")
     parser.add_argument("--out", type=Path, required=True, help="folder of the sheets")
+    parser.add_argument("--hair", help="haircut; the face's own if omitted")
+    parser.add_argument("--hair-color", help="its colour; the face's own if omitted")
     arguments = parser.parse_args()
     source = read_source(arguments.data or fetch_data(Path.home() / ".cache/tts2face"))
     for folder in (arguments.traced, arguments.out):
         folder.mkdir(parents=True, exist_ok=True)
     for name in arguments.names:
-        face = read_face(arguments.faces / f"{name}.face")
+        path = str(arguments.faces / f"{name}.face")
+        face = load_face(path, hair=arguments.hair, hair_color=arguments.hair_color)
+        label = " ".join(filter(None, (name, arguments.hair, arguments.hair_color)))
         cells = []
         wanted = views(face)
-        pictures = trace(partial(build_scene, source, face, name), wanted, arguments.traced / name, report)
+        pictures = trace(partial(build_scene, source, face, name), wanted, arguments.traced / label, report)
         for key, traced in pictures.items():
             view = wanted[key]
             drawn, regions = draw_view(face, view, SIDE_PX)
             apart = differences(drawn, traced, regions)
             yaw, pitch = np.degrees(view.pose.head[[1, 0]])
             found = "  ".join(f"{region} {apart[region]:4.1f}" for region in REGIONS if region in apart)
-            print(f"{name}  {key:14}  head {yaw:3.0f} {pitch:3.0f}  {found}")  # noqa: T201
+            print(f"{label}  {key:14}  head {yaw:3.0f} {pitch:3.0f}  {found}")  # noqa: T201
             pair = [over_grey(traced), over_grey(drawn)]
             off = np.abs(pair[0].astype(np.int64) - pair[1]) * 3
             cells.append(np.vstack([*pair, np.clip(off, 0, 255).astype(np.uint8)]))
         rows = [np.hstack(cells[at : at + N_COLUMNS]) for at in range(0, len(cells), N_COLUMNS)]
-        Image.fromarray(np.vstack(rows)).save(arguments.out / f"{name}.png")
+        Image.fromarray(np.vstack(rows)).save(arguments.out / f"{label}.png")
 
 
 if __name__ == "__main__":

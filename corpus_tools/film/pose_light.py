@@ -34,10 +34,17 @@ class PoseLight:
         Of hair and clothes at rest, in the turns of the head, then from the cameras.
     skin_from : (C, s, s, 3)
         Of the skin from the cameras.
+    far_other : (C, h, S / 2, 3)
+        Of hair at rest in other colours, to the bottom of its tiles.
+    other_colours : (1 + C, 3)
+        The hair's own colour and the others, sRGB.
+    other_vertices : (C, N, 3)
+        Colours of the face's last vertices, those of the hair, in the others.
     rows : (N,)
-        Vertices of the face whose light ``small`` (P, N, 3) holds: of all other parts.
+        Vertices of the face whose light ``small`` (P, N, 3) holds: of all other parts; in turns of the head, as at
+        rest.
     view : (33, 33, 33, 3)
-        View transform at `tts2face.render.film.view_transform.table_levels`.
+        View transform at `tts2face.models.view_transform.table_levels`.
     lamps : (L, 17)
         As eyes mirror them (`tts2face.models.baked_light`).
     backdrop : (S, S, 3)
@@ -52,6 +59,9 @@ class PoseLight:
     skin: Float32Array
     far: Float32Array
     skin_from: Float32Array
+    far_other: Float32Array
+    other_colours: Float32Array
+    other_vertices: NDArray[np.uint8]
     rows: NDArray[np.int64]
     small: Float32Array
     view: Float32Array

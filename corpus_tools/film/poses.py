@@ -61,6 +61,11 @@ class LitPose:
     weights: Float32Array
     head: Float32Array
 
+    @property
+    def is_still(self) -> bool:
+        """Whether the face rests, whatever the head does."""
+        return not self.weights.any()
+
 
 def lit_poses(face: Face) -> list[LitPose]:
     """The pose at rest, then expressions, frames of speech and turns of the head."""

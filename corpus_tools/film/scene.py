@@ -88,8 +88,7 @@ class FilmScene:
         uv = np.zeros((len(face.vertices), 2)) if face.uv is None else face.uv.astype(np.float64)
         flat = uv[corners.ravel()] * [1, -1] + [0, 1]
         mesh.uv_layers.new(name="uv").data.foreach_set("uv", flat.astype(np.float32).ravel())
-        colours = np.column_stack([decode_srgb(face.colours[rows] / 255.0), np.ones(len(rows))])
-        _set(mesh, "colour", "FLOAT_COLOR", colours)
+        _set(mesh, "colour", "FLOAT_COLOR", _linear(face.colours[rows]))
         if name == "skin":
             for mask, values in self._masks.items():
                 most = np.zeros(len(self._first))
@@ -158,6 +157,15 @@ class FilmScene:
         placed[span] = ball @ (gaze if turns_eyes else moved[:, :3]).T + centre
         return placed
 
+    def paint_hair(self, colours: NDArray[np.uint8]) -> None:
+        """Give the hair colours (N, 3), sRGB, of its vertices, which are the face's last N."""
+        made, rows = self.objects["hair"]
+        every = self.face.colours.copy()
+        every[self._first[self._weld[-len(colours) :]]] = colours
+        values = _linear(every[rows])
+        made.data.attributes["colour"].data.foreach_set("color", values.astype(np.float32).ravel())
+        made.data.update()
+
     def _link(self, name: str, lamp: Lamp) -> None:
         """Let a lamp light some parts only."""
         if lamp.parts:
@@ -213,6 +221,11 @@ class FilmScene:
         for made, _ in self.objects.values():
             made.hide_render = False
         focus.use_dof = False
+
+
+def _linear(colours: NDArray[np.uint8]) -> Floats:
+    """(N, 4) linear light of colours (N, 3), sRGB."""
+    return np.column_stack([decode_srgb(colours / 255.0), np.ones(len(colours))])
 
 
 def _set(mesh: Any, name: str, kind: str, values: Floats) -> None:

@@ -1,5 +1,6 @@
 """Sessions: their clips can be drawn, they are thread-safe, and options are checked."""
 
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -40,6 +41,27 @@ def test_what_a_session_returns_can_be_drawn(
     again, at_once = (sorted((tmp_path / name).glob("*.png")) for name in ("again", "at_once"))
     assert len(again) == len(clip.motion)
     assert [path.read_bytes() for path in again] == [path.read_bytes() for path in at_once]
+
+
+def test_speech_is_synthesised_while_the_renderer_is_built(
+    session: tts2face.Session, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    begun, models, build = threading.Event(), session._models, session.renderer
+    synthesise, waited = type(models).pieces, []
+
+    def pieces(self, prepared):  # type: ignore[no-untyped-def]
+        begun.set()
+        yield from synthesise(self, prepared)
+
+    def renderer(*given, **named):  # type: ignore[no-untyped-def]
+        waited.append(begun.wait(20))
+        return build(*given, **named)
+
+    monkeypatch.setattr(type(models), "pieces", pieces)
+    monkeypatch.setattr(session, "renderer", renderer)
+    written = session.write("Bob may.", tmp_path / "frames", picture=SMALL)
+    assert waited == [True]
+    assert written.n_frames == len(list((tmp_path / "frames").glob("*.png")))
 
 
 def test_a_talker_s_own_face_is_drawn_by_the_same_calls(tmp_path: Path) -> None:

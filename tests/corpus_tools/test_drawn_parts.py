@@ -7,10 +7,22 @@ import pytest
 
 from corpus_tools.drawn.atlas import COLLAR, MARGIN, SHIRT, cut_seam, hair_tiles, in_tile
 from corpus_tools.drawn.build_drawn import CAST
-from corpus_tools.drawn.character import Character, Palette
+from corpus_tools.drawn.character import Character, Hairstyle, Palette
 from corpus_tools.drawn.clothes import _roll
 from corpus_tools.drawn.fields import Front, smooth_line, wind_outward
-from corpus_tools.drawn.hair import LOWEST_DEG, MIDDLE, Scalp, height_over_hairline, lock_tube, on_volume
+from corpus_tools.drawn.hair import (
+    LOWEST_DEG,
+    MIDDLE,
+    N_DOWN,
+    N_ROUND,
+    Scalp,
+    curled_tube,
+    height_over_hairline,
+    lock_tube,
+    on_volume,
+    other_palettes,
+)
+from corpus_tools.drawn.haircuts import HAIRCUTS, comb, cut, grow
 from corpus_tools.drawn.paint import paint_eye
 from corpus_tools.drawn.sculpt import apply_proportions
 from corpus_tools.head.skin import Skin
@@ -18,8 +30,11 @@ from corpus_tools.head.subdivide import grid_triangles
 from lexicon.errors import DataError
 from tts2face.models.face_loading import load_face
 
+ROUND = np.linspace(-180, 180, N_ROUND + 1)
 EYES = [np.array([31.0, 0.0, 0.0]), np.array([-31.0, 0.0, 0.0])]
 EVERYBODY = pytest.mark.parametrize("character", CAST.values(), ids=list(CAST))
+STYLES = {f"{name} {style.name}": style for name, styles in HAIRCUTS.items() for style in (CAST[name].hair, *styles)}
+EVERY_STYLE = pytest.mark.parametrize("style", STYLES.values(), ids=list(STYLES))
 
 
 def ball(radius: float = 70.0) -> Skin:
@@ -52,9 +67,6 @@ def test_tables_are_within_their_ranges(character: Character) -> None:
         shares = [share for share, _ in profile]
         assert (shares[0], shares[-1], shares) == (0, 1, sorted(set(shares)))
         assert min(value for _, value in profile) >= 0
-    turns = [turn for turn, _ in character.hair.hairline]
-    assert (turns[0], turns[-1], turns) == (-180, 180, sorted(set(turns)))
-    assert all(-LOWEST_DEG <= height <= 90 for lock in character.hair.locks for _, height, _ in lock.path)
     names = set(load_face("head").shape_names)
     assert {f"{name}{side}" for name in character.rest for side in ("Left", "Right")} <= names
 
@@ -75,10 +87,25 @@ def test_the_map_of_space_turns_nothing_inside_out(character: Character) -> None
     assert np.linalg.det(jacobian)[~on_midline].min() > 0.05
 
 
-@EVERYBODY
-def test_locks_are_closed_and_face_outwards(character: Character) -> None:
-    scalp = Scalp(ball(), character.hair)
-    for lock in character.hair.locks:
+def test_every_character_has_three_haircuts_with_names_of_their_own() -> None:
+    for name, character in CAST.items():
+        names = [character.hair.name, *(style.name for style in HAIRCUTS[name])]
+        assert len(set(names)) == len(names) >= 3
+        assert all(style.summary for style in HAIRCUTS[name])
+
+
+@EVERY_STYLE
+def test_hair_grows_from_the_hairline_to_the_crown(style: Hairstyle) -> None:
+    turns = [turn for turn, _ in style.hairline]
+    assert (turns[0], turns[-1], turns) == (-180, 180, sorted(set(turns)))
+    assert all(2 * -LOWEST_DEG <= height <= 90 for lock in style.locks for _, height, _ in lock.path)
+    assert len(hair_tiles(1 + len(style.locks) + (style.curls is not None))) > 1
+
+
+@EVERY_STYLE
+def test_locks_are_closed_and_face_outwards(style: Hairstyle) -> None:
+    scalp = Scalp(ball(), style)
+    for lock in style.locks:
         tube = lock_tube(lock, scalp)
         assert (closed_sides(tube.points, tube.triangles) == 2).all()
         a, b, c = tube.points[tube.triangles].transpose(1, 0, 2)
@@ -89,6 +116,51 @@ def test_locks_are_closed_and_face_outwards(character: Character) -> None:
         assert np.ptp(tube.along) == 1
 
 
+@pytest.mark.parametrize("style", [one for one in STYLES.values() if one.curls], ids=["curls", "afro"])
+def test_curls_stand_off_the_head_and_sink_into_it_at_their_edge(style: Hairstyle) -> None:
+    tube, curls = curled_tube(style.curls, Scalp(ball(), style)), style.curls
+    height = np.linalg.norm(tube.points - MIDDLE, axis=1) - 70
+    on_volume_mm = np.linalg.norm([on_volume(turn, 89, 0.0) - MIDDLE for turn in (0, 90)], axis=1).mean() - 70
+    rows = height.reshape(N_DOWN, N_ROUND + 1)
+    assert rows[:10].mean() == pytest.approx(on_volume_mm + curls.lift, abs=curls.height)
+    assert np.ptp(rows[5:25]) > 0.7 * curls.height
+    edge = np.linalg.norm(tube.points.reshape(N_DOWN, -1, 3)[-1] - MIDDLE, axis=1)
+    skin = np.linalg.norm(
+        [
+            on_volume(turn, low, 0.0) - MIDDLE
+            for turn, low in zip(ROUND, Scalp(ball(), style).hairline(ROUND), strict=True)
+        ],
+        axis=1,
+    )
+    assert (edge < skin).all()
+    a, b, c = (tube.points[tube.triangles] - MIDDLE).transpose(1, 0, 2)
+    assert np.einsum("fc,fc->f", a, np.cross(b, c)).sum() > 0
+
+
+def test_locks_are_cut_grown_and_combed() -> None:
+    hanging = next(lock for lock in CAST["ada"].hair.locks if lock.path[-1][1] < -50)
+    short = cut(hanging, -14.0)
+    assert short.path[-1][1] == -14
+    assert all(height > -14 for _, height, _ in short.path[:-1])
+    assert cut(short, -30.0) is short
+    long = grow(hanging, (0, -70, 20), (5, -100, 40))
+    assert long.path[-1] == (hanging.path[-2][0] + 5, -100, 40)
+    assert long.path[: len(hanging.path) - 1] == hanging.path[:-1]
+    assert grow(short, (0, -70, 20)) is short
+    flat = comb(hanging, 0.5)
+    assert [lift for _, _, lift in flat.path if lift > 0] == [lift / 2 for _, _, lift in hanging.path if lift > 0]
+
+
+def test_other_colours_lie_on_both_sides_of_the_own_one() -> None:
+    for character in CAST.values():
+        own = np.mean(character.palette.hair)
+        others = [np.mean(one.hair) for one in other_palettes(character.palette)]
+        assert min(own, *others) < 0.13
+        assert max(own, *others) > 0.5
+        assert np.abs(np.array(others) - own).min() > 0.05
+        assert all(0 <= part <= 1 for one in other_palettes(character.palette) for part in one.hair_tip)
+
+
 def test_the_volume_of_hair_is_continuous_and_lift_is_its_distance() -> None:
     for turn in range(-180, 180, 15):
         above, below = (on_volume(turn, height, 0.0) for height in (1e-6, -1e-6))
@@ -97,10 +169,10 @@ def test_the_volume_of_hair_is_continuous_and_lift_is_its_distance() -> None:
             assert np.linalg.norm(on_volume(turn, height, 7.0) - on_volume(turn, height, 0.0)) == pytest.approx(7.0)
 
 
-@EVERYBODY
-def test_hair_grows_over_the_crown_and_not_in_the_face_or_on_the_ears(character: Character) -> None:
+@EVERY_STYLE
+def test_hair_grows_over_the_crown_and_not_in_the_face_or_on_the_ears(style: Hairstyle) -> None:
     crown, chin, forehead, ear = np.array([[0.0, 120, -58], [0, -80, 20], [0, 40, 40], [78, -8, -66]])
-    heights = height_over_hairline(np.stack([crown, chin, forehead, ear]), character.hair)
+    heights = height_over_hairline(np.stack([crown, chin, forehead, ear]), style)
     assert heights[0] > 20
     assert (heights[1:] < 0).all()
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from corpus_tools.film.fit_light import HIDDEN_WEIGHT, RIDGE, principal_modes
+from corpus_tools.film.fit_light import HIDDEN_WEIGHT, RIDGE
 from corpus_tools.film.fit_responses import find_partners, fit_responses, limits_of, quantised
+from corpus_tools.film.fit_texels import principal_modes
 from tts2face.models.baked_light import LIMIT_STEP
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face

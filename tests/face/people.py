@@ -3,6 +3,8 @@
 import pytest
 
 from tts2face.catalogue import identities
+from tts2face.models.face import Face
+from tts2face.models.face_loading import load_face
 
 DRAWN = ("ada", "ben", "noor", "zuri")
 PEOPLE = [  # face and identity
@@ -10,3 +12,8 @@ PEOPLE = [  # face and identity
     *(pytest.param(name, None, id=name) for name in DRAWN),
     *(pytest.param("head", entry.name, id=entry.name) for entry in identities("head")),
 ]
+
+
+def load_plain(name: str, person: str | None = None) -> Face:
+    """A shipped face without hair cards; drawn characters keep their hair, which is a part of them."""
+    return load_face(name, person, hair="bald" if name == "head" else None)

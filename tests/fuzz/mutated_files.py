@@ -17,6 +17,7 @@ import tts2face
 from lexicon.errors import BackendError, DataError, InputError
 from tests.exports.made import made_clip, made_stream
 from tests.face.test_hair import cap
+from tests.face.test_lit_hair import haired_face, wig_of
 from tests.fuzz.mutations import change_bytes, change_value, json_bytes, mutate_model, toml_bytes
 from tests.gesture.test_key_curves import WHOLE
 from tests.model_files.made import write_made_face, write_made_palette, write_made_talker
@@ -27,7 +28,8 @@ from tts2face.gesture.timeline_file import read_timeline, timeline_json
 from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_layout import WIDE_OPEN
 from tts2face.models.hair import attach_hair
-from tts2face.models.hair_file import read_hair, write_hair
+from tts2face.models.hair_file import read_hair, write_hair, write_lit_hair
+from tts2face.models.lit_hair import wear_hair
 from tts2face.models.palette import read_palette
 from tts2face.models.talker import read_talker
 from tts2face.project.project_file import load_project
@@ -170,6 +172,8 @@ def kinds(folder: Path) -> dict[str, tuple[Kind, ...]]:
     write_made_palette(made["palette"])
     bare = tiny_face(textured=True)
     write_hair(made["hair"], cap(bare))
+    lit = haired_face()
+    write_lit_hair(folder / "lit.hair", wig_of(lit))
     stream = written_track(folder, [tts2face.Piece(clip, 0.0, 1, text="Tea.") for clip in made_stream(2, 3)])
     return {
         "model": (
@@ -177,6 +181,7 @@ def kinds(folder: Path) -> dict[str, tuple[Kind, ...]]:
             model(made["face"], lambda path: read_face(path, "older")),
             model(made["palette"], read_palette),
             model(made["hair"], lambda path: attach_hair(bare, read_hair(path), "#ff0000")),
+            model(folder / "lit.hair", lambda path: tuple(wear_hair(lit, read_hair(path)).light)),
         ),
         "project": (document(".json", project, json_bytes, use_request),),
         "timeline": (document(".json", timeline_json(WHOLE), json_bytes, use_timeline),),

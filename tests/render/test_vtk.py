@@ -9,9 +9,9 @@ import pytest
 
 from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence
+from tests.face.people import load_plain
 from tests.render.test_cutouts import face_with_sheet, without_sheet
 from tests.render.tiny_face import tiny_face
-from tts2face.models.face_loading import load_face
 from tts2face.render import vtk_renderer as vtk
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import NUMBA, PYVISTA, Picture
@@ -44,7 +44,7 @@ def both(face, weights, head=TURNED * 0, **options):
 @pytest.mark.parametrize("name", ["head", "ada"])
 @pytest.mark.parametrize(("jaw", "camera"), [(0.0, "front"), (0.6, "front"), (0.6, "three-quarter")])
 def test_both_renderers_agree_on_the_shipped_heads(name, jaw, camera):
-    face = replace(load_face(name, hair="bald"), light=())  # VTK draws no strands (decision 026), nor baked light
+    face = replace(load_plain(name), light=())  # VTK draws no strands (decision 026), nor baked light
     weights = np.zeros(len(face.shape_names))
     weights[face.shape_names.index("jawOpen")] = jaw
     ours, theirs = both(face, weights, TURNED, size="256x256", camera=camera)

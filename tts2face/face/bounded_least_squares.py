@@ -44,8 +44,11 @@ def bounded_least_squares(curvature: FloatArray, linear: FloatArray, limits: Flo
     matrices = np.ascontiguousarray(np.reshape(curvature, (-1, *curvature.shape[-2:])))
     slack = SLOPE_TOLERANCE * float(np.trace(matrices.mean(axis=0))) / curvature.shape[-1]
     bounds = (low, high, slack)
+    k = linear.shape[1]
+    states = np.zeros(k, np.int8), np.zeros(k, np.int8)
+    work = (*states, np.zeros((k + 1, k)), np.zeros(k, np.int64))
     try:
-        rounds = _solve_all(matrices, np.ascontiguousarray(linear), bounds, solved)
+        rounds = _solve_all(matrices, np.ascontiguousarray(linear), bounds, solved, work)
     except ZeroDivisionError:  # a pivot of the factor is 0
         rounds = MAX_ROUNDS
     if rounds >= MAX_ROUNDS or not np.isfinite(solved).all():
@@ -56,13 +59,15 @@ def bounded_least_squares(curvature: FloatArray, linear: FloatArray, limits: Flo
 
 
 @kernel
-def _solve_all(matrices, linear, bounds, weights):  # type: ignore[no-untyped-def]
-    """Write the minimisers; returns the largest number of rounds of a frame. Plain loops compile in a second."""
+def _solve_all(matrices, linear, bounds, weights, work):  # type: ignore[no-untyped-def]
+    """Write the minimisers; returns the largest number of rounds of a frame. Plain loops compile in a second.
+
+    `work` are states (k,) now and wanted, -1 at the lower limit, 0 free, 1 at the upper limit; a Cholesky factor
+    (k + 1, k), whose last row is the right-hand side; and numbers (k,) of free weights.
+    """
     low, high, _ = bounds
     n_frames, k = linear.shape
-    state, target = np.zeros(k, np.int8), np.zeros(k, np.int8)  # -1 at the lower limit, 0 free, 1 at the upper limit
-    factor = np.zeros((k + 1, k))  # Cholesky factor; the last row is the right-hand side
-    free = np.zeros(k, np.int64)
+    state, target, factor, free = work
     longest = 0
     for t in range(n_frames):
         curvature = matrices[min(t, len(matrices) - 1)]

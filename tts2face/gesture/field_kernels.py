@@ -2,11 +2,18 @@
 
 import numpy as np
 
-from tts2face.compilation import kernel
+from tts2face.compilation import inlined_kernel, kernel
 
 # Default factor by which distances of moments found may exceed the best ones (Ju and Lee 2008 use ANN).
 SEARCH_SLACK = 1.1
 MIN_MOMENT_GAP = 10  # default least number of frames between two candidates of one recording
+
+
+@inlined_kernel
+def _clear(best, distance):  # type: ignore[no-untyped-def]
+    """Forget the best candidates; assignments of slices take the compiler three seconds."""
+    for c in range(len(best)):
+        best[c], distance[c] = -1, np.inf
 
 
 @kernel
@@ -18,7 +25,7 @@ def nearest_distances(corpus, tree, axes, history, queries):  # type: ignore[no-
     stack, bounds = np.zeros(128, np.int64), np.zeros(128)
     query = np.zeros(len(axes), np.float32)
     for n in range(len(moments)):
-        best[:], distance[:] = -1, np.inf
+        _clear(best, distance)
         window = (values[moments[n] - history : moments[n]], recorded[moments[n] - history : moments[n]], 0, history)
         _project_window(window, axes, query)
         _search_tree(
@@ -46,7 +53,7 @@ def generate_frames(corpus, tree, axes, options, track):  # type: ignore[no-unty
         can_continue = moment >= 0 and following < len(values) and starts[following] == starts[moment]
         chosen = following
         if not can_continue or (n_before + i) % stride == 0:
-            best[:], distance[:] = -1, np.inf
+            _clear(best, distance)
             if can_continue:
                 cost = continuity * _window_distance(corpus, (shown, prosody, i, history), following, np.inf)
                 _insert_moment(following, cost, (starts, none, rule[0]), (best, distance))
@@ -65,8 +72,9 @@ def generate_frames(corpus, tree, axes, options, track):  # type: ignore[no-unty
             offset[1, d] = (offset[1, d] - pull * stiffness) * fade
             shown[i + history, d] = values[chosen, d] + offset[0, d]
         if len(recent) and (not can_continue or chosen != following):
-            recent[:-1] = recent[1:].copy()
-            recent[-1] = chosen
+            for r in range(1, len(recent)):
+                recent[r - 1] = recent[r]
+            recent[len(recent) - 1] = chosen
         moment = moments[i] = chosen
 
 

@@ -6,7 +6,8 @@ the shape of its pose.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,23 +28,98 @@ LEAST_SIDE = 2 * BLACK_SHARE  # of a page: two rows of black, of which one is re
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BakedLight:
-    """Light of a face.
+class HairTint:
+    """Hair in other colours, between which and its own it is drawn in any.
 
     Attributes
     ----------
-    page_of
-        Page of each part that has its colours in texels, by the part's name: 0 for skin, 1 for what does not speak.
+    colours : (1 + C, 3)
+        Its own and the others, sRGB.
+    pages : (C, h, s, 3)
+        The first rows of the second page at rest with the others; their side s may be smaller.
+    vertices : (C, N, 3)
+        Colours of the face's last N vertices, those of the hair, with the others.
+    """
+
+    colours: NDArray[np.float32]
+    pages: NDArray[np.uint8]
+    vertices: NDArray[np.uint8]
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        _make_read_only(self)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class HairLight:
+    """What of a face's light depends on its haircut.
+
+    Attributes
+    ----------
     pages : (2, S, S, 3)
         Colours at rest.
     triangles : (D,)
         Triangles of the face that are drawn, outermost first; ``~t`` for the back of one.
     is_inside : (D,)
         Whether the back of one lies in the dark of the mouth.
+    base : (N, 3)
+        Light of ``rows`` at rest; 0 on pages.
+    turns_deg : (T, 2)
+        Turns of the head, yaw and pitch.
+    turn_weights : (T, A)
+        Share of the modes of change in texels in each turn.
+    turn_modes : (A, 3, n)
+        Change of the colours of both pages, of sides s, one above the other and 1/64 of a page below them.
+    camera_yaws_deg : (Y,)
+        Cameras at rest.
+    camera_modes : (Y, 3, p s s)
+        Change of both pages, or of the second alone, from them, over ``camera_sizes`` (Y,).
+    tint
+        The hair in another colour; None for a face whose hair has one.
+    """
+
+    pages: NDArray[np.uint8]
+    triangles: NDArray[np.int32]
+    is_inside: NDArray[np.bool_]
+    base: NDArray[np.uint8]
+    turns_deg: NDArray[np.float32]
+    turn_weights: NDArray[np.float32]
+    turn_modes: NDArray[np.int8]
+    camera_yaws_deg: NDArray[np.float32]
+    camera_modes: NDArray[np.int8]
+    camera_sizes: NDArray[np.float32]
+    tint: HairTint | None = None
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        _make_read_only(self)
+
+    @property
+    def triangle_numbers(self) -> NDArray[np.int32]:
+        """(D,) triangle of the face of which each drawn one shows the front or the back."""
+        return np.where(self.triangles < 0, ~self.triangles, self.triangles)
+
+    @property
+    def turn_side(self) -> int:
+        """Side of a page of the texels of change."""
+        return side_of(self.n_texels)
+
+    @property
+    def n_texels(self) -> int:
+        """Number of the texels of change."""
+        return int(self.turn_modes.shape[2])
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class BakedLight(HairLight):
+    """Light of a face.
+
+    Attributes
+    ----------
+    page_of
+        Page of each part that has its colours in texels, by the part's name: 0 for skin, 1 for what does not speak.
     rows : (N,)
         Vertices whose light changes with the expression.
-    base : (N, 3)
-        Their light at rest; 0 on pages.
     responses : (10, 3, N)
         Change of their light by terms of the pose (`tts2face.render.film.response`), over ``response_sizes`` (10,).
     limits : (2, 3, N)
@@ -56,16 +132,6 @@ class BakedLight:
     mouth_responses : (6, 3, M)
         Of their light, over ``mouth_sizes`` (6,).
     mouth_limits : (2, 3, M)
-    turns_deg : (T, 2)
-        Turns of the head, yaw and pitch.
-    turn_weights : (T, A)
-        Share of the modes of change in texels in each turn.
-    turn_modes : (A, 3, n)
-        Change of the colours of both pages, of sides s, one above the other and 1/64 of a page below them.
-    camera_yaws_deg : (Y,)
-        Cameras at rest.
-    camera_modes : (Y, 3, p s s)
-        Change of both pages, or of the second alone, from them, over ``camera_sizes`` (Y,).
     ball_rows : (B,)
         Vertices of the eyeballs that are ever seen.
     ball_base : (B, 3)
@@ -83,17 +149,13 @@ class BakedLight:
     eye_edges : (2,)
         Angles from the gaze, rad, at which pupil and iris end in that texture.
     view : (33, 33, 33, 3)
-        Colours of linear light at `tts2face.render.film.view_transform.table_levels`.
+        Colours of linear light at `tts2face.models.view_transform.table_levels`.
     backdrop : (H, W, 3)
         The wall behind, from in front.
     """
 
     page_of: Mapping[str, int]
-    pages: NDArray[np.uint8]
-    triangles: NDArray[np.int32]
-    is_inside: NDArray[np.bool_]
     rows: NDArray[np.int32]
-    base: NDArray[np.uint8]
     responses: NDArray[np.int8]
     response_sizes: NDArray[np.float32]
     limits: NDArray[np.int8]
@@ -103,12 +165,6 @@ class BakedLight:
     mouth_responses: NDArray[np.int8]
     mouth_sizes: NDArray[np.float32]
     mouth_limits: NDArray[np.int8]
-    turns_deg: NDArray[np.float32]
-    turn_weights: NDArray[np.float32]
-    turn_modes: NDArray[np.int8]
-    camera_yaws_deg: NDArray[np.float32]
-    camera_modes: NDArray[np.int8]
-    camera_sizes: NDArray[np.float32]
     ball_rows: NDArray[np.int32]
     ball_base: NDArray[np.float32]
     ball_responses: NDArray[np.int8]
@@ -121,35 +177,56 @@ class BakedLight:
     view: NDArray[np.uint8]
     backdrop: NDArray[np.uint8]
 
-    def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        for one in fields(self):
-            if isinstance(array := getattr(self, one.name), np.ndarray):
-                array.setflags(write=False)
-
-    @property
-    def triangle_numbers(self) -> NDArray[np.int32]:
-        """(D,) triangle of the face of which each drawn one shows the front or the back."""
-        return np.where(self.triangles < 0, ~self.triangles, self.triangles)
-
-    @property
-    def turn_side(self) -> int:
-        """Side of a page of the texels of change."""
-        return round(float(np.sqrt(self.n_texels / (N_PAGES + 1 / BLACK_SHARE))))
-
-    @property
-    def n_texels(self) -> int:
-        """Number of the texels of change."""
-        return int(self.turn_modes.shape[2])
-
-    @property
-    def has_whole_pages(self) -> bool:
-        """Whether the texels of change are those of square pages and of the black below them."""
-        side = self.turn_side
-        whole = N_PAGES * side**2 + side * (side // BLACK_SHARE)
-        return (
-            side >= LEAST_SIDE
-            and side % BLACK_SHARE == 0
-            and self.camera_modes.shape[2] in (side**2, N_PAGES * side**2)
-            and self.n_texels == whole
+    def of_drawn(self, triangles: NDArray[np.int32]) -> "BakedLight":
+        """Light of those vertices alone that the drawn ones of a face's triangles (F, 3) have."""
+        drawn = np.unique(triangles[self.triangle_numbers])
+        rows, mouth, balls = (np.isin(rows, drawn) for rows in (self.rows, self.mouth_rows, self.ball_rows))
+        return replace(
+            self,
+            rows=self.rows[rows],
+            base=self.base[rows],
+            responses=self.responses[:, :, rows],
+            limits=self.limits[:, :, rows],
+            partners=self.partners[np.concatenate([rows, balls])],
+            mouth_rows=self.mouth_rows[mouth],
+            mouth_base=self.mouth_base[mouth],
+            mouth_responses=self.mouth_responses[:, :, mouth],
+            mouth_limits=self.mouth_limits[:, :, mouth],
+            ball_rows=self.ball_rows[balls],
+            ball_base=self.ball_base[balls],
+            ball_responses=self.ball_responses[:, :, balls],
         )
+
+    def with_hair(self, worn: HairLight) -> "BakedLight":
+        """Light of the face with another haircut, of which the skin's change from cameras is beside this one's."""
+        new = {one.name: getattr(worn, one.name) for one in fields(HairLight)}
+        n = worn.turn_side**2
+        if n < min(self.camera_modes.shape[2], worn.camera_modes.shape[2]):
+            own = (self.camera_sizes / worn.camera_sizes)[:, None, None] * self.camera_modes[:, :, :n]
+            cameras = worn.camera_modes.copy()
+            cameras[:, :, :n] = np.clip(np.rint(cameras[:, :, :n] + own), -127, 127)
+            new["camera_modes"] = cameras
+        return replace(self, **new)
+
+
+def side_of(n_texels: int) -> int:
+    """Side of a page of so many texels of change."""
+    return round(float(np.sqrt(n_texels / (N_PAGES + 1 / BLACK_SHARE))))
+
+
+def fills_pages(n_texels: int, n_from_cameras: int) -> bool:
+    """Whether so many texels of change are those of square pages and of the black below them."""
+    side = side_of(n_texels)
+    whole = N_PAGES * side**2 + side * (side // BLACK_SHARE)
+    return (
+        side >= LEAST_SIDE
+        and side % BLACK_SHARE == 0
+        and n_from_cameras in (side**2, N_PAGES * side**2)
+        and n_texels == whole
+    )
+
+
+def _make_read_only(record: Any) -> None:
+    for one in fields(record):
+        if isinstance(array := getattr(record, one.name), np.ndarray):
+            array.setflags(write=False)

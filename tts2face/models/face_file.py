@@ -25,11 +25,12 @@ from tts2face.models.picture_coding import (
     texture_tensors,
 )
 from tts2face.models.score_map import score_map_arrays, score_map_from_arrays
+from tts2face.models.shape_coding import pack_shapes, quantise, unpack_shapes
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 KIND = "face"
 FORMAT_VERSION = 1
-STEPS_PER_SHAPE = 32000.0  # 16-bit steps of a shape's largest displacement: below 0.002 mm for 60 mm
+LEAST_STEP = 1.2e-5  # of shapes, of a face's extent: 0.004 mm of a head; finer ones are noise, which cannot be packed
 MAX_BRIGHTENED_LEVEL = 150  # upper limit of texels brightened by a tint: keeps skin colours at the edge of dark hair
 
 
@@ -67,7 +68,8 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
         "landmark_weights": face.landmark_weights.astype(np.float32),
         "pivot": face.pivot.astype(np.float32),
     }
-    arrays |= _pack_shapes(face.shapes)
+    least_mm = LEAST_STEP * float(np.ptp(face.vertices, axis=0).max())
+    arrays |= pack_shapes(face.shapes, least_mm)
     if face.uv is not None and face.textures:
         arrays["uv"] = encode_uv(face.uv)
     for number, texture in enumerate(face.textures):
@@ -80,7 +82,7 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
     if face.occlusion is not None:
         arrays["occlusion"] = encode_occlusion(face.occlusion)
     presets = dict(identities or {})
-    arrays |= _pack_identities(presets)
+    arrays |= _pack_identities(presets, least_mm)
     header = {
         "parts": [_part_fields(part) for part in face.parts],
         "shape_names": list(face.shape_names),
@@ -131,43 +133,12 @@ def read_face(path: Path, identity: str | None = None, *, checks_pictures: bool 
     return face if identity is None else _apply_identity(face, arrays, header, names.index(identity))
 
 
-def _pack_identities(presets: Mapping[str, Identity]) -> dict[str, NDArray[Any]]:
+def _pack_identities(presets: Mapping[str, Identity], least_mm: float) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {}
     for number, preset in enumerate(presets.values()):
-        steps, step = _quantise(preset.displacement)
+        steps, step = quantise(preset.displacement, least_mm)
         arrays |= {f"identity{number}": steps, f"identity{number}_step": np.array([step], np.float32)}
     return arrays
-
-
-def _quantise(values: NDArray[np.floating]) -> tuple[NDArray[np.int16], float]:
-    step = max(float(np.abs(values).max(initial=0.0)) / STEPS_PER_SHAPE, 1e-9)
-    return np.rint(values / step).astype(np.int16), step
-
-
-def _pack_shapes(shapes: NDArray[np.floating]) -> dict[str, NDArray[Any]]:
-    steps, sizes, moved = [], [], []
-    for shape in shapes:
-        quantised, step = _quantise(shape)
-        rows = np.flatnonzero(quantised.any(axis=1))
-        steps.append(quantised[rows])
-        sizes.append(step)
-        moved.append(rows.astype(np.int32))
-    return {
-        "shape_deltas": np.concatenate([np.zeros((0, 3), np.int16), *steps]),
-        "shape_vertices": np.concatenate([np.zeros(0, np.int32), *moved]),
-        "shape_counts": np.array([len(rows) for rows in moved], np.int32),
-        "shape_steps": np.array(sizes, np.float32),
-    }
-
-
-def _unpack_shapes(arrays: Mapping[str, NDArray[Any]], n_vertices: int) -> NDArray[np.float32]:
-    counts, steps = arrays["shape_counts"], arrays["shape_steps"]
-    shapes = np.zeros((len(counts), n_vertices, 3), np.float32)
-    bounds = np.concatenate([[0], np.cumsum(counts)])
-    for number, step in enumerate(steps):
-        span = slice(bounds[number], bounds[number + 1])
-        shapes[number, arrays["shape_vertices"][span]] = arrays["shape_deltas"][span] * step
-    return shapes
 
 
 def _part_fields(part: Part) -> dict[str, Any]:
@@ -240,7 +211,7 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
         triangles=arrays["triangles"],
         parts=tuple(_read_part(part, len(textures)) for part in header["parts"]),
         shape_names=tuple(header["shape_names"]),
-        shapes=_unpack_shapes(arrays, len(arrays["vertices"])),
+        shapes=unpack_shapes(arrays, len(arrays["vertices"])),
         limits=arrays["limits"],
         eyes=tuple(eyes),
         colours=arrays["colours"],

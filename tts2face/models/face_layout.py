@@ -14,6 +14,7 @@ from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.occlusion_coding import MAX_OCCLUSION_BYTES
 from tts2face.models.picture_coding import texture_tensors
 from tts2face.models.score_map import check_score_map
+from tts2face.models.shape_coding import MAX_STEP_MM, SHAPE_TENSORS, check_shapes
 from tts2face.storage.schema import (
     MAX_MM,
     Check,
@@ -36,8 +37,6 @@ SCORE_INPUTS = "score_inputs"  # key of the metadata: names of the shapes that t
 LIGHT = "light"  # array of baked light, and the key of the metadata that describes it
 MAX_TEXTURES = 16
 MAX_WEIGHT = 100.0  # of a shape; common shapes have 0 to 1, gesture modes up to about 30
-MAX_STEP_MM = 0.1  # 16 bits of it are 3 m
-MAX_CELLS = 100_000_000  # shapes x vertices: 1.2 GB when read; a head has 1.4 million
 MIN_EXTENT_MM = 1.0  # least width and height of a face
 SUM_WITHIN = 1e-3  # tolerance of the sum of barycentric weights; 32-bit rounding is 1e-7
 N_CORNERS = 3
@@ -74,10 +73,7 @@ METADATA: Mapping[str, Check] = {
 TENSORS: Mapping[str, Tensor] = {
     "vertices": millimetres("vertices", 3),
     "triangles": Tensor("int32", ("triangles", N_CORNERS)),
-    "shape_steps": Tensor("float32", ("shapes",), 0.0, MAX_STEP_MM, may_be_empty=True),
-    "shape_counts": Tensor("int32", ("shapes",), 0, may_be_empty=True),
-    "shape_vertices": Tensor("int32", ("moved vertices",), may_be_empty=True),
-    "shape_deltas": Tensor("int16", ("moved vertices", 3), may_be_empty=True),
+    **SHAPE_TENSORS,
     "limits": Tensor("float32", ("shapes", 2), -MAX_WEIGHT, MAX_WEIGHT, may_be_empty=True),
     "colours": Tensor("uint8", ("vertices", 3)),
     "uv": Tensor("uint16", ("vertices", 2), is_optional=True),
@@ -117,14 +113,14 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
     _check_scores(contents)
     contents.only_known()
     n_vertices = contents.sizes["vertices"]
-    for name in ("triangles", "shape_vertices", "landmark_vertices"):
+    for name in ("triangles", "landmark_vertices"):
         contents.indices(name, n_vertices, "vertices")
     contents.indices("landmarks", N_LANDMARKS, "landmarks of the face mesh")
     contents.distinct("landmarks")
     _check_light(contents)
     _check_textures(contents)
     _check_places(contents)
-    _check_shapes(contents, n_vertices)
+    _check_shapes(contents)
     _check_parts(contents, n_vertices)
     _check_area(contents)
 
@@ -174,15 +170,10 @@ def _check_places(contents: Contents) -> None:
     contents.require(float(off) <= SUM_WITHIN, f"landmark_weights of a landmark add up to 1 with an error of {off:g}")
 
 
-def _check_shapes(contents: Contents, n_vertices: int) -> None:
+def _check_shapes(contents: Contents) -> None:
     arrays, header = contents.arrays, contents.header
     names = header["shape_names"]
-    n_shapes = contents.sizes["shapes"]
-    contents.require(len(names) == n_shapes, f"has {len(names)} shape_names, but {n_shapes} shape_steps")
-    contents.require(len(set(names)) == len(names), "has two shapes of the same name")
-    contents.require(n_shapes * n_vertices <= MAX_CELLS, f"has {n_shapes} shapes of {n_vertices} vertices: too many")
-    moved, total = contents.sizes["moved vertices"], int(arrays["shape_counts"].sum(dtype=np.int64))
-    contents.require(total == moved, f"shape_counts adds up to {total}, but there are {moved} moved vertices")
+    check_shapes(contents, names)
     reversed_ = np.flatnonzero(arrays["limits"][:, 0] > arrays["limits"][:, 1])
     contents.require(
         not len(reversed_), f"limits of the shape {names[reversed_[0]] if len(reversed_) else ''} are reversed"

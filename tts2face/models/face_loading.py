@@ -1,10 +1,14 @@
 """Loading of a face by name, with its hair."""
 
-from lexicon.errors import InputError
+from pathlib import Path
+
+from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import KIND, read_face
 from tts2face.models.hair import BALD, attach_hair, parse_hair_colour
-from tts2face.models.hair_file import load_hair
+from tts2face.models.hair_file import haircut_names, load_hair
+from tts2face.models.lit_hair import LitHair, tint_hair, wear_hair
+from tts2face.request import DRAWN_FACE, REALISTIC_FACE
 from tts2face.storage.files import FORMER, SHIPPED_FOLDER, find_file
 
 
@@ -20,7 +24,8 @@ def load_face(
     identity
         Preset of the face's age, sex and ancestry.
     hair
-        Haircut: ``bald``, one that `tts2face.haircuts` lists, or the path of a ``.hair`` file; None for the face's own.
+        Haircut: one that `tts2face.haircuts` lists for the face, ``bald`` for a head, or the path of a ``.hair`` file;
+        None for the face's own.
     hair_color
         Name that `tts2face.hair_colors` lists, or #rrggbb; None for the face's own.
 
@@ -40,7 +45,33 @@ def load_face(
             raise InputError(f"no haircut fits the face {name}; remove --hair and --hair-color, or choose another face")
         return face
     chosen = Hairdo(hair or face.hairdo.haircut, hair_color or face.hairdo.colour)
+    if len(face.light):
+        return _lit_face(face, chosen)
     if chosen.haircut == BALD:
         parse_hair_colour(chosen.colour)
         return face
-    return attach_hair(face, load_hair(chosen.haircut), chosen.colour)
+    cards = load_hair(chosen.haircut)
+    if isinstance(cards, LitHair):
+        raise DataError(f"the haircut {chosen.haircut} is one of the face {cards.face}; choose that face")
+    return attach_hair(face, cards, chosen.colour)
+
+
+def _lit_face(face: Face, chosen: Hairdo) -> Face:
+    """A face with baked light, which has a haircut and a colour in its file, with chosen ones."""
+    own, name = face.hairdo or chosen, str(face.metadata.get("name", ""))
+    if chosen.haircut != own.haircut:
+        known = haircut_names(name)
+        if not (chosen.haircut in known or Path(chosen.haircut).suffix):
+            offered = ", ".join(sorted((own.haircut, *known)))
+            raise InputError(f"the face {name} has no haircut {chosen.haircut!r}; give {offered}, or a .hair file")
+        hair = load_hair(chosen.haircut, name)
+        if not isinstance(hair, LitHair):
+            raise DataError(f"the haircut {chosen.haircut} is for heads; choose another face or one of its haircuts")
+        face = wear_hair(face, hair)
+    return face if chosen.colour == own.colour else tint_hair(face, chosen.colour)
+
+
+def default_face(identity: str | None, hair: str | None) -> str:
+    """Face that is shown where none is named: the one that the other options belong to."""
+    is_for_heads = hair is not None and (hair in (BALD, *haircut_names()) or bool(Path(hair).suffix))
+    return DRAWN_FACE if identity is None and not is_for_heads else REALISTIC_FACE

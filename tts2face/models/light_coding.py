@@ -18,8 +18,11 @@ from tts2face.models.baked_light import (
     N_TERMS,
     TABLE_SIDE,
     BakedLight,
+    HairLight,
+    HairTint,
+    fills_pages,
 )
-from tts2face.models.picture_coding import decode_colours, encode_colours
+from tts2face.models.picture_coding import JPEG_QUALITY, decode_colours, encode_colours
 from tts2face.storage.deflated import deflate, inflate
 from tts2face.storage.schema import (
     MAX_MM,
@@ -37,15 +40,18 @@ from tts2face.storage.schema import (
 MAX_BYTES = 64_000_000  # of all arrays; the light of a shipped face has 6,000,000
 MAX_SIDE = 4096
 MAX_FACTOR = 1e3  # of any weight or light
-PICTURES = ("page0", "page1", "backdrop")
+HAIR_QUALITY = 85  # of the JPEG pictures of haircuts; 92 takes 100 kB more of each
+PICTURES = ("page0", "page1", "backdrop", "tint")
+ARRAYS = {"arrays": list_of(row(text, text, list_of(whole(0, MAX_BYTES))))}
 FIELDS = record(
     {
-        "arrays": list_of(row(text, text, list_of(whole(0, MAX_BYTES)))),
+        **ARRAYS,
         "page_of": table(whole(0, N_PAGES - 1)),
         "head_lamps": whole(0, 64),
         "eye_gain": number(0.0, MAX_FACTOR),
     }
 )
+HAIR_FIELDS = record(ARRAYS)
 
 
 def _factors(*shape: int | str, low: float = -MAX_FACTOR) -> Tensor:
@@ -53,7 +59,7 @@ def _factors(*shape: int | str, low: float = -MAX_FACTOR) -> Tensor:
 
 
 TENSORS: Mapping[str, Tensor] = {
-    "triangles": Tensor("int32", ("drawn triangles",)),
+    "triangle_steps": Tensor("int32", ("drawn triangles",)),  # from one to the next
     "is_inside": Tensor("bool", ("drawn triangles",)),
     "rows": Tensor("int32", ("lit vertices",), may_be_empty=True),
     "base": Tensor("uint8", ("lit vertices", 3), may_be_empty=True),
@@ -80,22 +86,44 @@ TENSORS: Mapping[str, Tensor] = {
     "sky": _factors(3, low=0.0),
     "eye_edges": Tensor("float32", (2,), 0.01, 1.5),
     "view": Tensor("uint8", (TABLE_SIDE, TABLE_SIDE, TABLE_SIDE, 3)),
-    **{name: Tensor("uint8", (f"bytes of {name}",)) for name in PICTURES},
+    **{name: Tensor("uint8", (f"bytes of {name}",), is_optional=name == "tint") for name in PICTURES},
+    "tint_colours": Tensor("float32", ("colours of the hair", 3), 0.0, 1.0, is_optional=True),
+    "tint_vertices": Tensor("uint8", ("other colours", "vertices of the hair", 3), is_optional=True),
+}
+OF_HAIR = {
+    name: TENSORS[name]
+    for name in (
+        *("page0", "page1", "triangle_steps", "is_inside", "base", "turns_deg", "turn_weights", "turn_modes"),
+        *("camera_yaws_deg", "camera_modes", "camera_sizes", "tint", "tint_colours", "tint_vertices"),
+    )
 }
 
 
 def encode_light(light: BakedLight) -> tuple[NDArray[np.uint8], dict[str, Any]]:
     """Bytes (N,) of light, and the fields that `decode_light` takes with them."""
-    arrays = {one.name: getattr(light, one.name) for one in fields(light) if one.name in TENSORS}
-    arrays["backdrop"] = encode_colours(light.backdrop)
-    arrays |= {f"page{number}": encode_colours(page) for number, page in enumerate(light.pages)}
+    content, stored = _encoded(light, {"backdrop": encode_colours(light.backdrop)})
+    more = {"page_of": dict(light.page_of), "head_lamps": light.head_lamps, "eye_gain": light.eye_gain}
+    return content, stored | more
+
+
+def encode_hair_light(light: HairLight) -> tuple[NDArray[np.uint8], dict[str, Any]]:
+    """Bytes (N,) of light with another haircut, and the fields that `decode_hair_light` takes with them."""
+    return _encoded(light, {})
+
+
+def _encoded(light: BakedLight | HairLight, pictures: Mapping[str, Any]) -> tuple[NDArray[np.uint8], dict[str, Any]]:
+    arrays = {one.name: getattr(light, one.name) for one in fields(light) if one.name in TENSORS} | dict(pictures)
+    if light.tint is None:
+        arrays.pop("tint", None)
+    else:
+        pages = np.concatenate(list(light.tint.pages))
+        tint = {"tint": encode_colours(pages, HAIR_QUALITY), "tint_colours": light.tint.colours}
+        arrays |= tint | {"tint_vertices": light.tint.vertices}
+    arrays["triangle_steps"] = np.diff(light.triangles, prepend=np.int32(0))
+    quality = JPEG_QUALITY if isinstance(light, BakedLight) else HAIR_QUALITY
+    arrays |= {f"page{number}": encode_colours(page, quality) for number, page in enumerate(light.pages)}
     content = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays.values())
-    return deflate(content), {
-        "arrays": [[name, array.dtype.name, list(array.shape)] for name, array in arrays.items()],
-        "page_of": dict(light.page_of),
-        "head_lamps": light.head_lamps,
-        "eye_gain": light.eye_gain,
-    }
+    return deflate(content), {"arrays": [[name, array.dtype.name, list(array.shape)] for name, array in arrays.items()]}
 
 
 def decode_light(
@@ -108,18 +136,49 @@ def decode_light(
     DataError
         It is damaged, or does not fit the face.
     """
-    arrays = _arrays(content, stored, path)
+    FIELDS(stored, f"{path}: metadata: light")
+    arrays = _arrays(content, stored, TENSORS, path)
     n_partners = len(arrays.get("rows", ())) + len(arrays.get("ball_rows", ()))
     contents = Contents(path, "face", arrays, {}, {"partners": n_partners})
     contents.tensors(TENSORS)
-    contents.only_known()
     for name in ("rows", "partners", "mouth_rows", "ball_rows"):
         contents.indices(name, sizes["vertices"], "vertices")
-    drawn = arrays["triangles"]
+    kept = _checked(contents, sizes)
+    lamps = stored["head_lamps"]
+    contents.require(lamps <= len(arrays["lamps"]), f"light has {lamps} head_lamps, but {len(arrays['lamps'])} lamps")
+    return BakedLight(
+        **kept,
+        backdrop=decode_colours(arrays["backdrop"], path),
+        page_of=stored["page_of"],
+        head_lamps=lamps,
+        eye_gain=stored["eye_gain"],
+    )
+
+
+def decode_hair_light(
+    content: NDArray[np.uint8], stored: Mapping[str, Any], sizes: Mapping[str, int], path: Path
+) -> HairLight:
+    """Light of what `encode_hair_light` returned, for a face with so many vertices and triangles with the haircut.
+
+    Raises
+    ------
+    DataError
+        It is damaged.
+    """
+    HAIR_FIELDS(stored, f"{path}: metadata: light")
+    contents = Contents(path, "haircut", _arrays(content, stored, OF_HAIR, path), {})
+    contents.tensors(OF_HAIR)
+    return HairLight(**_checked(contents, sizes))
+
+
+def _checked(contents: Contents, sizes: Mapping[str, int]) -> dict[str, Any]:
+    """Attributes that are both of light and of light with another haircut, checked, with the others that are arrays."""
+    arrays, path = contents.arrays, contents.path
+    contents.only_known()
+    drawn = np.cumsum(arrays["triangle_steps"], dtype=np.int64)
     numbers = np.where(drawn < 0, ~drawn, drawn)
     contents.require(int(numbers.max()) < sizes["triangles"], f"light draws a triangle beyond its {sizes['triangles']}")
     pages = [decode_colours(arrays[f"page{number}"], path) for number in range(N_PAGES)]
-    backdrop = decode_colours(arrays["backdrop"], path)
     side = len(pages[0])
     is_square = (
         all(page.shape == (side, side, 3) for page in pages)
@@ -127,25 +186,37 @@ def decode_light(
         and side.bit_count() == 1
     )
     contents.require(is_square, f"pages of light are not squares of a power of two from {LEAST_SIDE}")
-    lamps = stored["head_lamps"]
-    contents.require(lamps <= len(arrays["lamps"]), f"light has {lamps} head_lamps, but {len(arrays['lamps'])} lamps")
-    kept = {name: array for name, array in arrays.items() if name not in PICTURES}
-    light = BakedLight(
-        **kept,
-        pages=np.stack(pages),
-        backdrop=backdrop,
-        page_of=stored["page_of"],
-        head_lamps=lamps,
-        eye_gain=stored["eye_gain"],
+    whole = fills_pages(arrays["turn_modes"].shape[2], arrays["camera_modes"].shape[2])
+    contents.require(whole, "texels of change of light do not fill their pages")
+    coded = (*PICTURES, "triangle_steps", "tint_colours", "tint_vertices")
+    kept = {name: array for name, array in arrays.items() if name not in coded}
+    tint = _tint(contents, sizes["vertices"], side)
+    return kept | {"triangles": drawn.astype(np.int32), "pages": np.stack(pages), "tint": tint}
+
+
+def _tint(contents: Contents, n_vertices: int, side: int) -> HairTint | None:
+    arrays = contents.arrays
+    present = [name in arrays for name in ("tint", "tint_colours", "tint_vertices")]
+    contents.require(len(set(present)) == 1, "light with another colour of the hair lacks a part of it")
+    if not present[0]:
+        return None
+    colours, vertices = arrays["tint_colours"], arrays["tint_vertices"]
+    stacked = decode_colours(arrays["tint"], contents.path)
+    n, wide = len(vertices), stacked.shape[1]
+    contents.require(len(colours) == n + 1, f"light has {len(colours)} colours of hair, but vertices of {n}")
+    fits = len(stacked) % n == 0 and len(stacked) // n <= wide <= side and side % wide == 0
+    contents.require(fits, f"hair in {n} other colours, {wide} by {len(stacked)} texels, does not fit its page")
+    contents.require(
+        vertices.shape[1] <= n_vertices, f"light colours {vertices.shape[1]} vertices of hair, of {n_vertices}"
     )
-    contents.require(light.has_whole_pages, "texels of change of light do not fill their pages")
-    return light
+    return HairTint(colours, np.stack(np.split(stacked, n)), vertices)
 
 
-def _arrays(content: NDArray[np.uint8], stored: Mapping[str, Any], path: Path) -> dict[str, NDArray[Any]]:
+def _arrays(
+    content: NDArray[np.uint8], stored: Mapping[str, Any], known: Mapping[str, Tensor], path: Path
+) -> dict[str, NDArray[Any]]:
     """Arrays by name."""
-    FIELDS(stored, f"{path}: metadata: light")
-    kinds = {name: (np.dtype(TENSORS[name].dtype), shape) for name, kind, shape in stored["arrays"] if name in TENSORS}
+    kinds = {name: (np.dtype(known[name].dtype), shape) for name, kind, shape in stored["arrays"] if name in known}
     sizes = {name: math.prod(shape) * kind.itemsize for name, (kind, shape) in kinds.items()}
     raw = inflate(content, min(sum(sizes.values()), MAX_BYTES), "light", path)
     found, at = {}, 0

@@ -6,7 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 UV_STEPS = 65535
+PLACE_STEP = 6e-6  # of the extent of a mesh, 0.002 mm of a head
 TANGENT_STEPS = 127
+
+
+def round_places(vertices: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Vertices (V, 3) in steps of a power of two, whose last bits can be packed; those at one place stay there."""
+    step = 2.0 ** np.floor(np.log2(max(float(np.ptp(vertices, axis=0).max()), 1e-6) * PLACE_STEP))
+    rounded: NDArray[np.float32] = (np.rint(vertices / step) * step).astype(np.float32)
+    return rounded
 
 
 def encode_uv(uv: NDArray[np.float32]) -> NDArray[np.uint16]:

@@ -57,42 +57,38 @@ class PhoneNetwork:
         output = np.zeros((len(times), self.weights[-1].shape[2]), np.float32)
         for member in range(len(self.weights[0]))[members]:
             weights, biases = (tuple(layer[member] for layer in layers) for layers in (self.weights, self.biases))
-            hidden = _first_layer(rows, position, weights[0], biases[0])
+            used, values = _first_inputs(rows, position, len(weights[0]))
+            counts = np.full(len(rows), used.shape[1])
+            hidden = _layer(used, values, counts, weights[0], biases[0])
             for inner, bias in zip(weights[1:], biases[1:], strict=True):
-                hidden = _hidden_layer(hidden, inner, bias)
+                used = np.argsort(hidden <= 0, axis=1, kind="stable")  # rectified ones are left out
+                values = np.take_along_axis(hidden, used, axis=1)
+                hidden = _layer(used, values, (values > 0).sum(axis=1), inner, bias)
             output += hidden
         return output / np.float32(len(range(len(self.weights[0]))[members]))
 
 
-@kernel
-def _first_layer(rows: Any, position: Any, weights: Any, biases: Any) -> Any:
-    """First layer (T, H) for one-hot inputs at `rows` (T, C) of the weights and values (T, 4) for the last rows."""
-    first = len(weights) - position.shape[1]
-    output = np.zeros((len(rows), weights.shape[1]), np.float32)
-    values = np.ones(rows.shape[1] + position.shape[1], np.float32)
-    used = np.zeros(len(values), np.int64)
-    for t in range(len(rows)):
-        for c in range(rows.shape[1]):
-            used[c] = rows[t, c]
-        for k in range(position.shape[1]):
-            used[rows.shape[1] + k], values[rows.shape[1] + k] = first + k, position[t, k]
-        _add_rows(weights, used, values, biases, output[t])
+def _first_inputs(
+    rows: NDArray[np.int64], position: NDArray[np.floating], n_rows: int
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Rows (T, N) of the weights, of `n_rows`, and their factors: one-hot inputs (T, C), then the last rows' (T, 4)."""
+    last = np.broadcast_to(np.arange(n_rows - position.shape[1], n_rows), position.shape)
+    values = np.concatenate([np.ones(rows.shape, np.float32), position.astype(np.float32)], axis=1)
+    return np.concatenate([rows, last], axis=1).astype(np.int64), values
+
+
+def _layer(used: Any, values: Any, counts: Any, weights: Any, biases: Any) -> Any:
+    """Layer (T, H) of the first `counts` (T,) of inputs `values` (T, N), of the rows `used` (T, N) of its weights."""
+    output = np.zeros((len(used), weights.shape[1]), np.float32)
+    _add_all_rows(weights, used, values, counts, biases, output)
     return output
 
 
 @kernel
-def _hidden_layer(inputs: Any, weights: Any, biases: Any) -> Any:
-    """Layer (T, H') of rectified inputs (T, H)."""
-    output = np.zeros((len(inputs), weights.shape[1]), np.float32)
-    values, used = np.zeros(len(weights), np.float32), np.zeros(len(weights), np.int64)
-    for t in range(len(inputs)):
-        n_used = 0
-        for k in range(len(weights)):
-            if inputs[t, k] > np.float32(0):
-                used[n_used], values[n_used] = k, inputs[t, k]
-                n_used += 1
-        _add_rows(weights, used[:n_used], values[:n_used], biases, output[t])
-    return output
+def _add_all_rows(weights: Any, used: Any, values: Any, counts: Any, biases: Any, output: Any) -> None:
+    """Write the rows of a layer."""
+    for t in range(len(used)):
+        _add_rows(weights, used[t, : counts[t]], values[t, : counts[t]], biases, output[t])
 
 
 @kernel

@@ -17,9 +17,9 @@ def texture_tensors(number: int) -> tuple[str, str]:
     return f"texture{number or ''}", f"alpha{number or ''}"
 
 
-def encode_colours(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def encode_colours(pixels: NDArray[np.uint8], quality: int = JPEG_QUALITY) -> NDArray[np.uint8]:
     """JPEG, as bytes (N,), of pixels (H, W, 3) or (H, W)."""
-    return _encode(pixels, "JPEG", quality=JPEG_QUALITY, **({"subsampling": 0} if pixels.ndim == 3 else {}))
+    return _encode(pixels, "JPEG", quality=quality, **({"subsampling": 0} if pixels.ndim == 3 else {}))
 
 
 def encode_coverage(alpha: NDArray[np.uint8]) -> NDArray[np.uint8]:

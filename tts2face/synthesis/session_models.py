@@ -15,13 +15,13 @@ from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model
 from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.gesture.ju2008 import FIELD_OPTIONS
 from tts2face.models.face import Face
-from tts2face.models.face_loading import load_face
+from tts2face.models.face_loading import default_face, load_face
 from tts2face.models.palette import Derivation, Palette, load_palette
 from tts2face.models.palette_editing import add_derivation
 from tts2face.models.talker import Talker, load_talker
 from tts2face.render.picture import Picture
 from tts2face.render.renderer import FrameRenderer
-from tts2face.request import FIELDS, OWN_FACE, Request, default_face
+from tts2face.request import FIELDS, OWN_FACE, Request
 from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.clip_stream import SynthesisModels, pieces
 from tts2face.synthesis.gesture_layer import GestureLayer
@@ -56,7 +56,7 @@ def shown_face(
             raise InputError("identity and hair belong to a face given by name; remove them, or load it with them")
         return face
     if face != OWN_FACE:
-        name = str(face) if face else default_face(identity, hair, hair_color)
+        name = str(face) if face else default_face(identity, hair)
         return load_face(name, identity, hair=hair, hair_color=hair_color)
     if identity is not None:
         raise InputError("a talker's own face has no identity presets; remove the identity, or choose another face")

@@ -6,7 +6,7 @@ from tts2face.synthesis.mark_styles import marked_styles
 from tts2face.synthesis.output_files import OutputFiles
 from tts2face.synthesis.prepared_request import PreparedRequest
 from tts2face.synthesis.speech_stream import SpeechModels, speech_pieces
-from tts2face.synthesis.written_clip import RequestSteps, WrittenClip, write_pieces
+from tts2face.synthesis.written_clip import RequestSteps, WrittenClip, ahead, write_pieces
 from tts2face.types import Progress
 from tts2face.voice.pool import VoicePool
 
@@ -32,5 +32,5 @@ def write_speech(
     has_phones = any(not file.format.is_sound for file in outputs.exports)
     has_names = any(isinstance(mark, NameMark) for mark in prepared.text.marks)
     pieces = speech_pieces(prepared, models, has_phones=has_phones or has_names)
-    with outputs.open(None, None, None) as files:
-        return write_pieces(pieces, files, outputs, RequestSteps(prepared.n_steps, on_progress), None)
+    with outputs.open(None, None, None) as files, ahead(pieces) as spoken:
+        return write_pieces(spoken, files, outputs, RequestSteps(prepared.n_steps, on_progress), None)

@@ -1,6 +1,6 @@
 """Writing of the pieces of a clip to its outputs, with progress in the steps of the request."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,14 +77,19 @@ class RequestSteps:
             self._on_progress(self._n_steps, self._n_steps)
 
 
+def ahead(pieces: Iterable[Piece]) -> Prefetch[Piece]:
+    """Pieces that are synthesised in a thread, ahead of their use, as long as the ``with`` block lasts."""
+    return Prefetch(pieces, N_PIECES_AHEAD)
+
+
 def write_pieces(
-    pieces: Iterator[Piece],
+    pieces: Iterable[Piece],
     files: OpenOutputs,
     outputs: OutputFiles,
     progress: RequestSteps,
     on_piece: Callable[[Piece], None] | None,
 ) -> WrittenClip:
-    """Write all pieces to the open files of `outputs` while the next ones are synthesised.
+    """Write all pieces to the open files of `outputs`, while the next ones are synthesised if they are of `ahead`.
 
     Parameters
     ----------
@@ -94,18 +99,17 @@ def write_pieces(
     marks: list[MarkTime] = []
     mismatches: list[TextMismatch] = []
     seconds, n_frames = 0.0, 0
-    with Prefetch(pieces, N_PIECES_AHEAD) as synthesised:
-        for piece in synthesised:
-            if on_piece:
-                on_piece(piece)
-            progress.begin(piece)
-            files.add(piece.clip, piece.text)
-            if files.film is None:
-                progress.report_piece()
-            marks += piece.marks
-            mismatches += piece.mismatches
-            seconds += piece.clip.speech.waveform.duration
-            n_frames += len(piece.clip.motion)
+    for piece in pieces:
+        if on_piece:
+            on_piece(piece)
+        progress.begin(piece)
+        files.add(piece.clip, piece.text)
+        if files.film is None:
+            progress.report_piece()
+        marks += piece.marks
+        mismatches += piece.mismatches
+        seconds += piece.clip.speech.waveform.duration
+        n_frames += len(piece.clip.motion)
     progress.finish()
     return WrittenClip(
         outputs.path, seconds, n_frames, tuple(marks), mismatches=tuple(mismatches), exports=outputs.export_paths

@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from corpus_tools.drawn.build_drawn import CAST, drawn_face, face_masks
+from corpus_tools.drawn.hair import OtherHair
 from corpus_tools.film.compare import View, differences, draw_view
 from corpus_tools.film.fit_light import fit_light
 from corpus_tools.film.look import LAMPS, Look
@@ -18,8 +19,9 @@ from corpus_tools.film.poses import EXPRESSIONS, LitPose, expression_pose, farth
 from tests.characters.makehuman import makehuman
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face
+from tts2face.models.lit_hair import tint_hair
+from tts2face.models.view_transform import table_levels
 from tts2face.render.camera_views import CameraView, parse_camera
-from tts2face.render.film.view_transform import table_levels
 
 SIDE, SAMPLES = 96, 2
 
@@ -93,7 +95,11 @@ def test_a_character_is_drawn_in_its_baked_light(scene: Any, tmp_path: Path) -> 
     poses += [LitPose(f"head {number}", poses[0].weights, head) for number, head in enumerate(turns)]
     effort = Effort(side=256, pose_side=192, rest=2, pose=1, turn=1, reference=2, mouth=2, small=1, wall=2)
     steps: list[str] = []
-    baked = bake_poses(scene, poses, effort, steps.append)
+    n_hair = len(face.vertices) - int(face.triangles[face.parts[-1].first :].min())
+    other = OtherHair(
+        np.full((1, n_hair, 3), 170, np.uint8), np.array([CAST["ada"].palette.hair, (0.67,) * 3], np.float32)
+    )
+    baked = bake_poses(scene, poses, other, effort, steps.append)
     assert steps[1] == "rest"
     baked.save(tmp_path / "baked.npz")
     lit = replace(face, light=(fit_light(face, PoseLight.load(tmp_path / "baked.npz"), Look(), CAST["ada"].eyes),))
@@ -108,6 +114,14 @@ def test_a_character_is_drawn_in_its_baked_light(scene: Any, tmp_path: Path) -> 
         assert apart["face"] < 12
         assert apart["hair"] < 20
         assert apart["mouth"] < 25
+    blond = tint_hair(lit, "#ababab")
+    assert np.abs(blond.light[0].pages[1].mean() - lit.light[0].pages[1].mean()) > 20
+    scene.paint_hair(other.vertices[0])
+    scene.pose(poses[0].weights, poses[0].head)
+    scene.render(tmp_path / "blond.png", 8, has_wall=False)
+    drawn, regions = draw_view(blond, View(poses[0], "front"), SIDE)
+    apart = differences(drawn, np.asarray(Image.open(tmp_path / "blond.png")), regions)
+    assert apart["hair"] < 20
 
 
 def test_poses_lie_far_apart() -> None:

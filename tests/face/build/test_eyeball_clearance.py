@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.face.people import PEOPLE
+from tests.face.people import PEOPLE, load_plain
 from tests.face.posing import posed_vertices
 from tts2face.face.deformation import build_rig, eye_rotations
 from tts2face.models.face import Face
@@ -44,7 +44,7 @@ def depths(face: Face, vertices: np.ndarray, weights: np.ndarray, eye_turns: np.
 
 @pytest.mark.parametrize(("name", "person"), PEOPLE)
 def test_no_sum_of_shapes_moves_skin_into_an_eyeball(name: str, person: str | None) -> None:
-    face = load_face(name, person, hair="bald")
+    face = load_plain(name, person)
     skin = np.unique(face.triangles[: face.parts[0].count])
     assert face.parts[0].kind == "skin"
     rig, still = build_rig(face), np.zeros(len(face.shape_names), np.float32)

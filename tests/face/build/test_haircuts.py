@@ -4,19 +4,25 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from tests.face.people import DRAWN
 from tests.face.test_mouth import part_vertices
-from tts2face.catalogue import identities
+from tts2face.catalogue import haircuts, identities
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
+from tts2face.models.face_loading import load_face
 from tts2face.models.hair import Hair, fit_hair
 from tts2face.models.hair_file import haircut_names, load_hair
-from tts2face.storage.files import find_file
+from tts2face.models.lit_hair import SWING_SHAPES
+from tts2face.storage.files import SHIPPED_FOLDER, find_file
 
 PEOPLE = ("", "amara", "kofi", "mei", "walter", "nia")
 SOLID = 80  # coverage, of 255, from which a card hides what is behind it
 EYE_MM = 13.0  # half the width of an eye's opening
 N_SAMPLES = 20_000
 ALL_HAIR = tuple(haircut_names())
+DRAWN_HAIR = [(face, name) for face in DRAWN for name in haircut_names(face)]
+STILL = ("curls", "afro")  # of which nothing is loose
+MOST_BYTES = 1_600_000  # of a drawn character's haircut
 
 
 @pytest.fixture(scope="module")
@@ -85,3 +91,31 @@ def test_every_person_has_hair_of_the_shipped() -> None:
     assert cuts <= {*ALL_HAIR, "bald"}
     assert len(cuts) >= 7
     assert read_face(path).hairdo.haircut == "long01"
+
+
+@pytest.mark.smoke
+def test_every_drawn_character_has_three_haircuts() -> None:
+    assert {face: 1 + len(haircut_names(face)) for face in DRAWN} == dict.fromkeys(DRAWN, 3)
+    listed = [(one.face, one.name) for one in haircuts()]
+    assert all(pair in listed for pair in [*DRAWN_HAIR, ("ada", "bob"), ("zuri", "puffs"), ("head", "bald")])
+    assert len(set(listed)) == len(listed)
+
+
+@pytest.mark.parametrize(("name", "haircut"), [pytest.param(*DRAWN_HAIR[0], marks=pytest.mark.smoke), *DRAWN_HAIR[1:]])
+def test_haircuts_of_drawn_characters(name: str, haircut: str) -> None:
+    assert (SHIPPED_FOLDER / f"{name}-{haircut}.hair").stat().st_size < MOST_BYTES
+    own, face = load_face(name), load_face(name, hair=haircut, hair_color="auburn")
+    n = int(face.triangles[face.parts[-1].first :].min())
+    assert np.array_equal(face.vertices[:n], own.vertices[:n])
+    hair = face.vertices[face.triangles[face.parts[-1].first :]].mean(axis=1)
+    for eye in face.eyes:
+        off = hair - eye.centre
+        hides = (np.abs(off[:, 0]) < EYE_MM) & (np.abs(off[:, 1]) < EYE_MM / 2) & (off[:, 2] > 0)
+        assert not hides.any()
+    assert all(face.shapes[face.shape_names.index(shape), n:].any() for shape in SWING_SHAPES) == (haircut not in STILL)
+    light = face.light[0]
+    assert light.triangle_numbers.max() < len(face.triangles)
+    assert np.isin(np.arange(face.parts[-1].first, len(face.triangles)), light.triangle_numbers).mean() > 0.3
+    assert np.abs(light.pages[1].astype(int) - own.light[0].pages[1]).mean() > 3  # another haircut, in red
+    red, green, blue = light.pages[1][: len(light.pages[1]) // 2].mean(axis=(0, 1))
+    assert red > 1.3 * green > 1.3 * blue

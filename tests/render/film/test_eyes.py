@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
-from tts2face.render.film.eyes import LAMP_LIGHT, REFRACTION, look_up, mirror_lamps
-from tts2face.render.film.view_transform import table_levels
+from tts2face.models.view_transform import table_levels
+from tts2face.render.film.eyes import LAMP_LIGHT, N_ROWS, REFRACTION, look_up, mirror_lamps
 
 CAMERA = np.zeros(15, np.float32)
 SKY = np.array([0.1, 0.2, 0.3], np.float32)
@@ -19,10 +19,11 @@ def lamp_at(z: float, facing: float) -> np.ndarray:
 
 
 def mirrored(lamps, normal=(0.0, 0.0, 1.0), point=(0.0, 0.0, -500.0)):
-    light = np.zeros(3, np.float32)
-    rows = np.array(lamps, np.float32).reshape(-1, 17)
-    mirror_lamps(*(np.array(one, np.float32) for one in (point, normal)), CAMERA, rows, SKY, light)
-    return light
+    rows = np.zeros((N_ROWS, 3), np.float32)
+    rows[:6] = np.array([*point, *normal], np.float32)[:, None]
+    mirror_lamps(CAMERA, np.array(lamps, np.float32).reshape(-1, 17), SKY, rows)
+    assert (rows[6:] == rows[6:, :1]).all()
+    return rows[6:, 0]
 
 
 def test_an_eye_mirrors_the_lamp_behind_the_camera_by_fresnels_share() -> None:
@@ -49,9 +50,10 @@ def test_the_view_transform_is_read_between_its_entries() -> None:
     view = rng.uniform(0, 255, (33, 33, 33, 3)).astype(np.float32)
     places = np.log(levels + 0.004)
     exact = RegularGridInterpolator((places,) * 3, view)
-    for light in rng.uniform(0, 12, (50, 3)).astype(np.float32):
-        colour = np.zeros(3, np.float32)
-        look_up(view, light, colour)
-        assert colour == pytest.approx(exact(np.log(light + 0.004))[0], abs=0.2)
-    look_up(view, np.array([-1, 99, 0], np.float32), colour)
-    assert colour == pytest.approx(view[0, 32, 0], abs=0.5)
+    light = rng.uniform(0, 12, (3, 50)).astype(np.float32)
+    light[:, 0] = -1, 99, 0
+    colour = np.zeros((3, 70), np.float32)
+    look_up(view, light, np.arange(20, 70, dtype=np.int32), colour)
+    assert pytest.approx(exact(np.log(light[:, 1:].T + 0.004)), abs=0.2) == colour[:, 21:].T
+    assert colour[:, 20] == pytest.approx(view[0, 32, 0], abs=0.5)
+    assert not colour[:, :20].any()

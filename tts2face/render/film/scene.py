@@ -224,7 +224,7 @@ def _weight(face: Face, weights: Float32Array, name: str) -> float:
 
 def build_lit_scene(face: Face, light: BakedLight, picture: Picture, background: NDArray[np.uint8]) -> LitScene:
     """Scene of a face with baked light before a background (H, W, 3)."""
-    side = picture.samples_per_side
+    side, light = picture.samples_per_side, light.of_drawn(face.triangles)
     surface = build_surface(face, light)
     optics = camera_matrices(picture.view, face, (picture.width * side, picture.height * side))
     texels, size = stack_pages(light.pages, _level(surface, optics, side))

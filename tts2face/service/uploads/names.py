@@ -8,10 +8,10 @@ from typing import Any
 from lexicon.errors import InputError
 from tts2face import catalogue
 from tts2face.jobs.resource_check import DICTIONARY, FACE
-from tts2face.models.hair import BALD, parse_hair_colour
-from tts2face.models.hair_file import haircut_names
+from tts2face.models.face_loading import default_face
+from tts2face.models.hair import parse_hair_colour
 from tts2face.render.picture import COLOURS, STUDIO, TRANSPARENT
-from tts2face.request import OWN_FACE
+from tts2face.request import OWN_FACE, REALISTIC_FACE
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
 from tts2face.service.uploads.library import Library, shipped_names
@@ -36,7 +36,7 @@ async def resolve_models(library: Library, key: ApiKey, models: Mapping[str, Any
         There is no such talker, face, palette or haircut for this key, or an uploaded face has no such identity.
     """
     resolved = dict(models)
-    _check_hair(models.get("hair"), models.get("hair_color"))
+    _check_hair(models)
     for kind in MODEL_KINDS:
         name = models.get(kind)
         if name is None or name in _served_names(kind):
@@ -51,12 +51,16 @@ async def resolve_models(library: Library, key: ApiKey, models: Mapping[str, Any
     return resolved
 
 
-def _check_hair(haircut: str | None, colour: str | None) -> None:
-    known = (BALD, *haircut_names())
-    if haircut is not None and haircut not in known:
-        raise RefusedError(
-            400, "invalid_request", f"there is no haircut {haircut[:60]!r}; the haircuts are {', '.join(known)}"
-        )
+def _check_hair(models: Mapping[str, Any]) -> None:
+    haircut, colour = models.get("hair"), models.get("hair_color")
+    if haircut is not None:
+        face = str(models.get("face") or default_face(models.get("identity"), haircut))
+        known = [one.name for one in catalogue.haircuts() if one.face == face]
+        known = known or [one.name for one in catalogue.haircuts() if one.face == REALISTIC_FACE]  # of an upload
+        if haircut not in known:
+            raise RefusedError(
+                400, "invalid_request", f"there is no haircut {haircut[:60]!r}; the haircuts are {', '.join(known)}"
+            )
     if colour is not None:
         try:
             parse_hair_colour(colour[:60])

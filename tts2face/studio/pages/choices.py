@@ -8,7 +8,7 @@ from functools import lru_cache
 from lexicon.errors import Tts2faceError
 from tts2face import catalogue
 from tts2face.jobs.resource_check import FACE, PALETTE
-from tts2face.request import OWN_FACE
+from tts2face.request import OWN_FACE, REALISTIC_FACE
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
 from tts2face.service.uploads.library import Library, shipped_names
@@ -36,9 +36,10 @@ def languages() -> dict[str, str]:
     return {one.code: f"{one.name} ({one.code})" for one in catalogue.languages()}
 
 
-@lru_cache(maxsize=1)
-def _haircuts() -> dict[str, str]:
-    return {one.name: f"{one.name} - {one.summary}" for one in catalogue.haircuts()}
+@lru_cache(maxsize=16)
+def _haircuts(face: str) -> dict[str, str]:
+    found = {one.name: f"{one.name} - {one.summary}" for one in catalogue.haircuts() if one.face == face}
+    return found or _haircuts(REALISTIC_FACE)  # of an uploaded head
 
 
 @lru_cache(maxsize=1)
@@ -67,7 +68,7 @@ async def looks(library: Library, key: ApiKey, face: str) -> dict[str, dict[str,
     own = {"": "as the face"}
     return {
         "identity": own | {name: name for name in names},
-        "hair": own | (_haircuts() if takes_haircuts else {}),
+        "hair": own | (_haircuts(face) if takes_haircuts else {}),
         "hair_color": own | (_hair_colours() if takes_haircuts else {}),
     }
 
