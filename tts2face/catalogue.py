@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -195,6 +196,7 @@ def identities(face: str = "head") -> tuple[IdentityEntry, ...]:
         raise DataError(f"{path} lacks its list of identities; build or copy it again") from broken
 
 
+@cache
 def haircuts() -> tuple[HaircutEntry, ...]:
     """The shipped haircuts by their faces: of the head, with ``bald``, and of each drawn character, its own first."""
     from tts2face.models.hair import BALD
@@ -211,6 +213,12 @@ def haircuts() -> tuple[HaircutEntry, ...]:
         found.append(HaircutEntry(name, face or REALISTIC_FACE, summary))
     order = [REALISTIC_FACE, *(path.stem for path in _shipped_files("face"))]
     return tuple(sorted(found, key=lambda one: order.index(one.face)))
+
+
+def haircuts_of(face: str) -> tuple[HaircutEntry, ...]:
+    """The haircuts of a face; of one that is not shipped, those of the head."""
+    own = tuple(one for one in haircuts() if one.face == face)
+    return own or haircuts_of(REALISTIC_FACE)
 
 
 def hair_colors() -> tuple[HairColorEntry, ...]:

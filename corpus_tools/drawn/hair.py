@@ -50,13 +50,12 @@ MATERIAL = {"specular": 0.05, "shininess": 10.0, "wrap": 0.5}
 def hair_piece(skin: Skin, style: Hairstyle, palette: Palette) -> Piece:
     """The hair of a character, with a tile of the texture for the shell and for each lock."""
     scalp = Scalp(skin, style)
-    tubes = [scalp.shell(), *(lock_tube(lock, scalp) for lock in style.locks)]
+    still = [scalp.shell(), *(() if style.curls is None else (curled_tube(style.curls, scalp),))]
+    locks = [lock_tube(lock, scalp) for lock in style.locks]
+    tubes = [*still, *locks]
     points, faces, colours, uv, count = [], [], [], [], 0
-    shares = [np.zeros(len(tubes[0].points))]  # the shell is still
-    if style.curls is not None:
-        tubes.append(curled_tube(style.curls, scalp))
-        shares.append(np.zeros(len(tubes[-1].points)))
-    for lock, tube in zip(style.locks, tubes[1:], strict=False):
+    shares = [np.zeros(len(tube.points)) for tube in still]
+    for lock, tube in zip(style.locks, locks, strict=True):
         shares.append(lock.loose * (np.ones_like(tube.along) if lock.is_ball else tube.along**LOOSE_FROM))
     for number, (tube, tile) in enumerate(zip(tubes, hair_tiles(len(tubes)), strict=True)):
         colour = _colours(tube, palette)

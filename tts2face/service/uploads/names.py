@@ -11,7 +11,7 @@ from tts2face.jobs.resource_check import DICTIONARY, FACE
 from tts2face.models.face_loading import default_face
 from tts2face.models.hair import parse_hair_colour
 from tts2face.render.picture import COLOURS, STUDIO, TRANSPARENT
-from tts2face.request import OWN_FACE, REALISTIC_FACE
+from tts2face.request import OWN_FACE
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
 from tts2face.service.uploads.library import Library, shipped_names
@@ -55,8 +55,7 @@ def _check_hair(models: Mapping[str, Any]) -> None:
     haircut, colour = models.get("hair"), models.get("hair_color")
     if haircut is not None:
         face = str(models.get("face") or default_face(models.get("identity"), haircut))
-        known = [one.name for one in catalogue.haircuts() if one.face == face]
-        known = known or [one.name for one in catalogue.haircuts() if one.face == REALISTIC_FACE]  # of an upload
+        known = [one.name for one in catalogue.haircuts_of(face)]
         if haircut not in known:
             raise RefusedError(
                 400, "invalid_request", f"there is no haircut {haircut[:60]!r}; the haircuts are {', '.join(known)}"

@@ -8,7 +8,7 @@ from functools import lru_cache
 from lexicon.errors import Tts2faceError
 from tts2face import catalogue
 from tts2face.jobs.resource_check import FACE, PALETTE
-from tts2face.request import OWN_FACE, REALISTIC_FACE
+from tts2face.request import OWN_FACE
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
 from tts2face.service.uploads.library import Library, shipped_names
@@ -36,10 +36,8 @@ def languages() -> dict[str, str]:
     return {one.code: f"{one.name} ({one.code})" for one in catalogue.languages()}
 
 
-@lru_cache(maxsize=16)
 def _haircuts(face: str) -> dict[str, str]:
-    found = {one.name: f"{one.name} - {one.summary}" for one in catalogue.haircuts() if one.face == face}
-    return found or _haircuts(REALISTIC_FACE)  # of an uploaded head
+    return {one.name: f"{one.name} - {one.summary}" for one in catalogue.haircuts_of(face)}
 
 
 @lru_cache(maxsize=1)
