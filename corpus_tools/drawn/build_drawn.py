@@ -59,10 +59,7 @@ NO_TEXTURE = Texture(np.zeros((4, 4, 3), np.uint8))  # in place of the cards of 
 
 def drawn_face(source: SourceMesh, character: Character) -> Face:
     """The face of a character, without score map and occlusion."""
-    reference = _reference(source)
-    cage = drawn_cage(source, character.targets, character.proportions)
-    balls = fit_eyeballs(cage, character.eyes)
-    skin = _skin(build_skin(cage), reference, balls, character)
+    reference, cage, balls, skin = _sculpted(source, character)
     pieces = [_breathing(piece) for piece in _pieces(cage, skin, reference, balls, character)]
     built = HeadPieces(tuple(pieces), (1, 2), balls, PIVOT)
     lips = skin.vertices[reference.lips]
@@ -85,12 +82,19 @@ def drawn_face(source: SourceMesh, character: Character) -> Face:
 
 def other_hair(source: SourceMesh, character: Character) -> OtherHair:
     """The hair of a character in other colours."""
-    reference, cage = _reference(source), drawn_cage(source, character.targets, character.proportions)
-    skin = _skin(build_skin(cage), reference, fit_eyeballs(cage, character.eyes), character)
+    skin = _sculpted(source, character)[-1]
     others = other_palettes(character.palette)
     painted = [hair_piece(skin, character.hair, palette).colours for palette in others]
     known = [palette.hair for palette in (character.palette, *others)]
     return OtherHair(np.rint(255 * np.clip(painted, 0, 1)).astype(np.uint8), np.array(known, np.float32))
+
+
+def _sculpted(source: SourceMesh, character: Character) -> tuple[ReferenceHead, Cage, tuple[Eyeball, Eyeball], Skin]:
+    """A person's head for reference, and a character's cage, eyeballs and skin."""
+    reference = _reference(source)
+    cage = drawn_cage(source, character.targets, character.proportions)
+    balls = fit_eyeballs(cage, character.eyes)
+    return reference, cage, balls, _skin(build_skin(cage), reference, balls, character)
 
 
 def _centred(face: Face) -> Face:

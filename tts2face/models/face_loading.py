@@ -60,11 +60,7 @@ def _lit_face(face: Face, chosen: Hairdo) -> Face:
     """A face with baked light, which has a haircut and a colour in its file, with chosen ones."""
     own, name = face.hairdo or chosen, str(face.metadata.get("name", ""))
     if chosen.haircut != own.haircut:
-        known = haircut_names(name)
-        if not (chosen.haircut in known or Path(chosen.haircut).suffix):
-            offered = ", ".join(sorted((own.haircut, *known)))
-            raise InputError(f"the face {name} has no haircut {chosen.haircut!r}; give {offered}, or a .hair file")
-        hair = load_hair(chosen.haircut, name)
+        hair = load_hair(chosen.haircut, name, own.haircut)
         if not isinstance(hair, LitHair):
             raise DataError(f"the haircut {chosen.haircut} is for heads; choose another face or one of its haircuts")
         face = wear_hair(face, hair)

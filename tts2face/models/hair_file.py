@@ -204,7 +204,7 @@ def _read_occlusion(name: str, n_vertices: int, file: tuple[Any, Any, Path]) -> 
     return bits
 
 
-def load_hair(name: str, face: str = "") -> Hair | LitHair:
+def load_hair(name: str, face: str = "", own: str = BALD) -> Hair | LitHair:
     """Load a shipped haircut by name, or one from a file.
 
     Parameters
@@ -213,6 +213,8 @@ def load_hair(name: str, face: str = "") -> Hair | LitHair:
         Haircut.
     face
         Shipped face with baked light whose haircut it is; empty for one of cards, for heads.
+    own
+        Haircut that such a face has without a file.
 
     Raises
     ------
@@ -223,7 +225,8 @@ def load_hair(name: str, face: str = "") -> Hair | LitHair:
     """
     known = haircut_names(face)
     if not (name in known or Path(name).suffix):
-        raise InputError(f"there is no haircut {name!r}; give {', '.join((BALD, *known))}, or a .hair file")
+        lacks = f"the face {face} has no haircut {name!r}" if face else f"there is no haircut {name!r}"
+        raise InputError(f"{lacks}; give {', '.join((own, *known))}, or a .hair file")
     path = find_file(f"{face}{OF_FACE}{name}" if face and name in known else name, KIND)
     return read_hair(path, checks_pictures=path.parent != SHIPPED_FOLDER)
 
