@@ -87,7 +87,7 @@ def fit_light(face: Face, poses: PoseLight, look: Look, eyes: EyeStyle) -> Baked
     of_lids = fit_responses(terms[:, -N_BALL_TERMS:, n:], balls - balls[:1], np.ones(balls.shape[:2]), RIDGE)
     ball_responses, ball_sizes = quantised(of_lids, MOST_SHARE)
     return BakedLight(
-        **_light_in_texels(face, poses, poses, base_map[1:], N_TURN_MODES),
+        **_light_in_texels(face, (poses, poses), base_map[1:], N_TURN_MODES),
         page_of={name: page for page, names in enumerate((SKIN, FAR)) for name in names},
         rows=rows,
         base=np.rint(np.clip(np.concatenate([np.zeros((len(skin_rows), 3)), plain[0]]), 0, 255)).astype(np.uint8),
@@ -131,27 +131,33 @@ def fit_haircut(faces: tuple[Face, Face], own: PoseLight, worn: PoseLight, light
     small = _smoothed_small(face, worn, np.array([0]), rows, part_of[rows], shown[:1])
     base = light.base.copy()
     base[is_small] = np.rint(np.clip(small[0] * 255, 0, 255))
-    found = _light_in_texels(face, own, worn, _base_map(own, still, texels)[1:], HAIRCUT_TURN_MODES)
-    changes = camera_changes(worn, drawn_texels(face, found["triangles"]))
-    n = TURN_SIDE**2
-    changes[:, :, :n] -= light.camera_sizes[:, None, None] * light.camera_modes[:, :, :n]
-    changes[:, :, :n] *= relit_skin(own, worn)
-    cameras, sizes = quantised(changes, least=STEP)
-    return HairLight(**found | {"base": base, "camera_modes": cameras, "camera_sizes": sizes})
+    found = _light_in_texels(face, (own, worn), _base_map(own, still, texels)[1:], HAIRCUT_TURN_MODES, light)
+    return HairLight(base=base, **found)
 
 
 def _light_in_texels(
-    face: Face, own: PoseLight, worn: PoseLight, uncovered: tuple[Floats, Floats], number: int
+    face: Face,
+    poses: tuple[PoseLight, PoseLight],
+    uncovered: tuple[Floats, Floats],
+    number: int,
+    light: BakedLight | None = None,
 ) -> dict[str, Any]:
     """What depends on the haircut, but for the light of vertices, by the names of `HairLight`.
 
-    `own` has the poses in which triangles are seen, `worn` the light; `uncovered` is the share (s, s) and light
-    (s, s, 3) of what other poses uncover, `number` that of the modes of turns.
+    The first of `poses` has those in which triangles are seen, the second the light; `uncovered` is the share (s, s)
+    and light (s, s, 3) of what other poses uncover, `number` that of the modes of turns. With `light`, that of the face
+    with its own hair, the skin's changes from cameras are those beside its changes.
     """
+    own, worn = poses
     triangles, is_inside = seen_triangles(face, own)
     drawn = drawn_texels(face, triangles)
     turns, turn_modes, from_turns = turn_changes(worn, drawn, number)
-    cameras, camera_sizes = quantised(camera_changes(worn, drawn), least=STEP)
+    changes = camera_changes(worn, drawn)
+    if light is not None:
+        skin = changes[:, :, : TURN_SIDE**2]
+        skin -= light.camera_sizes[:, None, None] * light.camera_modes[:, :, : TURN_SIDE**2]
+        skin *= relit_skin(own, worn)
+    cameras, camera_sizes = quantised(changes, least=STEP)
     return {
         "pages": rest_pages(worn, *uncovered),
         "triangles": triangles,
