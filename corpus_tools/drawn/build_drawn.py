@@ -22,6 +22,7 @@ from corpus_tools.drawn.lashes import lash_piece
 from corpus_tools.drawn.lids import find_lining, shut_lids, still_lining, tuck_lining
 from corpus_tools.drawn.man import MAN
 from corpus_tools.drawn.paint import paint_eye, paint_skin, vertex_masks
+from corpus_tools.drawn.people import REALISTIC_MAN, REALISTIC_WOMAN
 from corpus_tools.drawn.sculpt import drawn_cage
 from corpus_tools.drawn.teeth import teeth_pieces
 from corpus_tools.drawn.woman import WOMAN
@@ -50,7 +51,7 @@ from tts2face.models.lit_hair import SWING_SHAPES
 from tts2face.render.occlusion import bake_occlusion
 from tts2face.render.scene import available_cores
 
-CAST: Mapping[str, Character] = {one.name: one for one in (WOMAN, MAN, ELDER, GIRL)}
+CAST: Mapping[str, Character] = {one.name: one for one in (WOMAN, MAN, ELDER, GIRL, REALISTIC_WOMAN, REALISTIC_MAN)}
 CLEAR_MM = 0.6  # between lid and eyeball: the edges of stretched lids are 6 mm long and sink between vertices
 BODY_SHAPES = (BREATH_SHAPE, *SWING_SHAPES, PUPIL_SHAPE)
 BODY_LIMITS = ((0.0, 1.0), *[(-LIMIT_RAD, LIMIT_RAD)] * len(SWING_SHAPES), (-1.0, 1.0))
@@ -66,7 +67,7 @@ def drawn_face(source: SourceMesh, character: Character) -> Face:
     mouth_y = float(lips[np.abs(lips[:, 0]) < 6, 1].mean())
     hair = hair_cover(skin, character.hair)
     textures = (
-        Texture(paint_skin(source, skin, reference.lids, character.palette, mouth_y, hair)),
+        Texture(paint_skin(source, skin, reference.lids, character, mouth_y, hair)),
         NO_TEXTURE,
         Texture(paint_eye(character.eyes, character.palette)),
     )
@@ -142,8 +143,7 @@ def _pieces(
 ) -> tuple[Piece, ...]:
     palette, jaw = character.palette, fit_jaw(cage)
     wet = wet_piece(skin, balls, reference.lids)
-    upper, lower = teeth_pieces(cage, skin, reference, jaw)
-    lower = replace(lower, vertices=lower.vertices - [0.0, 0.0, character.teeth_back])
+    upper, lower = teeth_pieces(cage, skin, reference, jaw, character)
     shirt = shirt_piece(reference.shoulders, build_shoulders(cage), np.array(palette.cloth))
     return (
         skin_piece(skin, palette.skin, character.skin_material),
@@ -152,7 +152,7 @@ def _pieces(
         lower,
         tongue_piece(cage, jaw),
         replace(wet, colours=wet.colours * palette.tear_line),
-        brow_piece(skin, character.brow, palette.brows),
+        *(() if character.brow.hairs else (brow_piece(skin, character.brow, palette.brows),)),
         lash_piece(skin, reference.lids, balls, character.lashes, palette.lashes),
         sweater_piece(shirt, character.collar, palette.cloth),
         *(stud_pieces(skin) if character.has_studs else ()),

@@ -35,6 +35,8 @@ class Proportions:
         Gain of lengths at the top of the skull, and share by which the neck becomes thinner.
     jaw : mm
         Breadth of the jaw below the ears.
+    drawn
+        Share of the smoothing and of the changes that all drawn faces have; 0 for the proportions of a person.
     """
 
     eye_gain: float = 0.0
@@ -52,6 +54,7 @@ class Proportions:
     skull_gain: float = 0.0
     neck_thinner: float = 0.0
     jaw: float = 0.0
+    drawn: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,16 +87,21 @@ class Palette:
     pupil: Colour = (0.02, 0.015, 0.015)
     sclera: Colour = (0.95, 0.935, 0.92)
     cloth: Colour
+    teeth: Colour = (0.97, 0.955, 0.925)
     tear_line: float = 1.0  # of its brightness: it takes the light of the skin
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Brow:
-    """A brow: its middle line (|x|, y) in front view in mm, and half width and thickness in mm along it."""
+    """A brow: its middle line (|x|, y) in front view in mm, and half width and thickness in mm along it.
+
+    One with a number of ``hairs`` is painted on the skin, hair by hair, and has no thickness.
+    """
 
     line: tuple[tuple[float, float], ...]
     half_width: Profile
-    thickness: Profile
+    thickness: Profile = ()
+    hairs: int = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -205,7 +213,8 @@ class Character:
     ``lashes`` is the length of the upper lashes in mm along the lid, from the inner corner to the outer. The top of the
     upper lip does not follow the share ``still_lip`` of a lift; more where the lip is close to the nose. ``pucker`` is
     the gain of `mouthPucker`: a wide mouth needs more of it to look round. The lower teeth lie ``teeth_back`` mm
-    further behind the lips: those of a short chin would else come through it when the jaw moves ahead.
+    further behind the lips: those of a short chin would else come through it when the jaw moves ahead. ``seams`` is the
+    depth and darkness of the seams between teeth, 1 for the faint ones of a drawn face.
     """
 
     name: str
@@ -217,11 +226,12 @@ class Character:
     brow: Brow
     lashes: Profile
     hair: Hairstyle
-    collar: Collar
+    collar: Collar | None
     rest: Mapping[str, float]
     still_lip: float = 0.6
     pucker: float = 1.0
     teeth_back: float = 0.0
+    seams: float = 1.0
     skin_material: Mapping[str, Any] = field(
         # a soft sheen: .07 looks like wax, .16 like plastic
         default_factory=lambda: {"specular": 0.13, "shininess": 9.0, "wrap": 0.7, "texture": 0, "kind": "skin"}

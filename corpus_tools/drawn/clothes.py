@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 MATERIAL = {"specular": 0.02, "shininess": 6.0, "wrap": 0.6}
 ROLL_SHADE = 0.97  # of the shirt's colour
 N_KNOTS, N_AROUND, N_SECTION = 12, 96, 16
+NECK_Z = -66.0  # mm, the depth of the neck's axis
 STUD_MM, STUD_COLOUR, STUD_OFF = 3.6, (0.98, 0.80, 0.36), np.array([1.6, 0.0, 1.0])
 STUD_MATERIAL = {"specular": 0.6, "shininess": 60.0, "wrap": 0.3}
 STUD_GRID = (9, 16)
@@ -24,17 +25,22 @@ BREATH_FROM_MM = (105.0, 150.0)  # below the eyes: from the neck to the shoulder
 BREATH_MM, BREATH_GAIN = np.array([0.0, 3.0, 1.2]), np.array([0.008, 0.0, 0.0])
 
 
-def sweater_piece(shirt: Piece, collar: Collar, colour: Colour) -> Piece:
-    """A shirt of one colour with a rolled collar; both are cut open at the back, for the texture."""
-    off = shirt.vertices - [0.0, 0.0, collar.middle]
+def sweater_piece(shirt: Piece, collar: Collar | None, colour: Colour) -> Piece:
+    """A shirt of one colour, with a rolled collar if given; both are cut open at the back, for the texture."""
+    off = shirt.vertices - [0.0, 0.0, NECK_Z if collar is None else collar.middle]
     turn = np.arctan2(off[:, 0], off[:, 2]) / (2 * np.pi) + 0.5
     rows, body, turn = cut_seam(shirt.spans[0].triangles, turn)
     radius, height = np.hypot(off[rows, 0], off[rows, 2]), shirt.vertices[rows, 1]
     down = np.hypot(radius - radius.min(), height.max() - height)  # from the collar outwards: around the neck as well
+    uv = in_tile(SHIRT, turn / turn.max(), down / down.max())
+    if collar is None:
+        return Piece(
+            shirt.vertices[rows], (MaterialSpan("shirt", body, MATERIAL),), np.tile(colour, (len(rows), 1)), uv=uv
+        )
     points, triangles, places = _roll(collar)
     faces = np.concatenate([body, triangles + len(rows)])
     colours = np.concatenate([np.ones(len(rows)), np.full(len(points), ROLL_SHADE)])[:, None] * colour
-    uv = np.concatenate([in_tile(SHIRT, turn / turn.max(), down / down.max()), in_tile(COLLAR, *places.T)])
+    uv = np.concatenate([uv, in_tile(COLLAR, *places.T)])
     vertices = np.concatenate([shirt.vertices[rows], points])
     return Piece(vertices, (MaterialSpan("shirt", faces, MATERIAL),), colours, uv=uv)
 

@@ -18,6 +18,7 @@ from tts2face.models.face import Face
 from tts2face.models.lit_hair import LitHair, swing_shapes
 
 Place = tuple[float, float, float]
+HANGS_BELOW_DEG = -50.0  # ends that hang free of the head
 ENDS_BELOW_DEG = -30.0  # locks that hang
 
 
@@ -47,6 +48,14 @@ def grow(lock: Lock, *ends: Place) -> Lock:
 def comb(lock: Lock, share: float) -> Lock:
     """A lock that stands off the head by a share of its height."""
     return replace(lock, path=tuple((turn, up, min(lift, share * lift)) for turn, up, lift in lock.path))
+
+
+def lay_closer(lock: Lock, by_mm: float, *, root_mm: float = 0.0, root_deg: float = 0.0) -> Lock:
+    """A lock that lies lower on the head; its root lies `root_mm` lower still, and `root_deg` nearer to the face."""
+    path = [(turn, up, lift - by_mm * (up > HANGS_BELOW_DEG)) for turn, up, lift in lock.path]
+    turn, up, lift = path[0]
+    path[0] = (turn, up - root_deg, lift - root_mm)
+    return replace(lock, path=tuple(path), clearance=1.0 if root_mm else lock.clearance)
 
 
 def raise_to(lock: Lock, top_deg: float) -> Lock:

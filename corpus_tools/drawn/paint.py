@@ -5,9 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
+from scipy.spatial import cKDTree
 
 from corpus_tools.dense.texels import Texels, find_texels
-from corpus_tools.drawn.character import Colour, Palette
+from corpus_tools.drawn.character import Brow, Character, Colour, Palette
+from corpus_tools.drawn.fields import profile, smooth_line
 from corpus_tools.head.eyes import EDGE_RAD, TEXTURE_SIDE, EyeStyle
 from corpus_tools.head.layout import layout_coordinates
 from corpus_tools.head.lids import LidEdge
@@ -28,16 +30,25 @@ CREASE_OFF_MM, CREASE_MM, CREASE = 5.0, 2.6, 0.28
 WATERLINE_MM, WATERLINE = 1.0, 0.45
 FRECKLE_SEED, FRECKLE = 3, (0.80, 0.68, 0.60)
 HAIR_SHADE = 0.9  # of the colour of hair, on the skin under it
+BROW_SEED, N_LINE = 5, 200
+HAIR_WIDTH_MM, HAIR_MM = 0.30, ((0, 5.5), (0.3, 6.5), (0.7, 5.0), (1, 3.0))  # of a brow's hairs, along the brow
+HAIR_LEAN_DEG = ((0, 80), (0.15, 55), (0.4, 30), (0.7, 12), (1, 2))  # of a brow's hairs over its line
 SPOKES = ((23, 0.5, 0.3), (37, 0.35, 1.9), (52, 0.25, 4.0))  # of the iris: number, strength, phase
 
 
 def paint_skin(
-    source: SourceMesh, skin: Skin, lids: Sequence[LidEdge], palette: Palette, mouth_y: float, hair: Floats
+    source: SourceMesh,
+    skin: Skin,
+    lids: Sequence[LidEdge],
+    character: Character,
+    mouth_y: float,
+    hair: Floats,
 ) -> NDArray[np.uint8]:
     """(SIDE, SIDE, 3) texture of the skin.
 
     `mouth_y` is the height of the middle of the line between the lips, `hair` (N,) the share of the skin under hair.
     """
+    palette = character.palette
     texels = find_texels(layout_coordinates(skin.source_uv), triangulate(skin.quads), SIDE)
     place, where = texels.interpolate(skin.vertices), texels.interpolate(skin.source_uv)
     colour = _Paint(np.tile(np.array(palette.skin), (len(place), 1)))
@@ -51,6 +62,7 @@ def paint_skin(
     colour.blend(*_mouth(source, place, where, palette))
     _paint_lids(colour, texels, skin, lids, palette)
     _sprinkle(colour, place, palette.n_freckles)
+    colour.blend(_brow_hairs(place, character.brow), np.array(palette.brows))
     colour.blend(texels.interpolate(hair[:, None])[:, 0], HAIR_SHADE * np.array(palette.hair))
     return fill_gaps(texels, colour.values, SIDE)
 
@@ -141,6 +153,39 @@ def _sprinkle(colour: _Paint, place: Floats, number: int) -> None:
         is_near = (squared < 9) & (place[:, 2] > 0)
         strength = generator.uniform(0.25, 0.6)
         colour.tint(np.where(is_near, strength * np.exp(-squared / size**2), 0.0), FRECKLE)
+
+
+def _brow_hairs(place: Floats, brow: Brow) -> Floats:
+    """(P,) share of skin that the hairs of both brows cover; they rise at the nose and lie along the line outside."""
+    uncovered = np.ones(len(place))
+    generator = np.random.default_rng(BROW_SEED)
+    line = smooth_line(brow.line, N_LINE)
+    ahead = np.gradient(line, axis=0)
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    tree = cKDTree(place[:, :2])
+    is_front = place[:, 2] > 0
+    for sign in (1.0, -1.0):
+        at = generator.beta(1.1, 1.25, brow.hairs)
+        row = np.minimum((at * N_LINE).astype(int), N_LINE - 1)
+        off = np.clip(generator.normal(0, 0.5, brow.hairs), -1, 1) * profile(brow.half_width, at)
+        lean = np.radians(np.interp(at, *np.array(HAIR_LEAN_DEG).T) - 22 * off / brow.half_width[2][1])
+        lean += generator.normal(0, 0.12, brow.hairs)
+        out = ahead[row]
+        up = np.column_stack([-out[:, 1], out[:, 0]])
+        root = line[row] + off[:, None] * up
+        way = np.cos(lean)[:, None] * out + np.sin(lean)[:, None] * up
+        long = generator.uniform(0.75, 1.15, brow.hairs) * np.interp(at, *np.array(HAIR_MM).T)
+        strength = generator.uniform(0.35, 0.75, brow.hairs)
+        for start, direction, length, dark in zip(root, way, long, strength, strict=True):
+            middle = (start + direction * length / 2) * [sign, 1]
+            near = np.array(tree.query_ball_point(middle, length / 2 + 1.0), np.int64)
+            near = near[is_front[near]]
+            from_root = place[near, :2] * [sign, 1] - start
+            along = np.clip(from_root @ direction, 0, length)
+            apart = np.linalg.norm(from_root - along[:, None] * direction, axis=1)
+            thin = HAIR_WIDTH_MM * (1 - 0.5 * along / length)
+            uncovered[near] *= 1 - dark * np.exp(-((apart / thin) ** 2))
+    return np.asarray(1 - uncovered)
 
 
 def _as_bytes(colours: Floats) -> NDArray[np.uint8]:

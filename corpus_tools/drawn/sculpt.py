@@ -28,7 +28,7 @@ NECK_Z = -62.0
 
 def drawn_cage(source: SourceMesh, targets: Mapping[str, float], proportions: Proportions) -> Cage:
     """The cage of a drawn character: `warp(v + u) - warp(v)` for shapes u, so that eyes and lips still meet."""
-    cage = smooth_cage(build_cage(source, targets))
+    cage = smooth_cage(build_cage(source, targets), proportions.drawn)
     eyes = [_eye(cage.vertices, cage, side) for side in SIDES]
     rest = apply_proportions(cage.vertices, eyes, proportions)
     units = {
@@ -43,12 +43,12 @@ def _eye(vertices: Floats, cage: Cage, side: str) -> Floats:
     return centre
 
 
-def smooth_cage(cage: Cage) -> Cage:
+def smooth_cage(cage: Cage, strength: float = 1.0) -> Cage:
     """Planes become one surface; eyes, lips, tip of the nose and ears stay. Source: Taubin 1995."""
     means, used = _neighbour_means(cage)
     vertices = cage.vertices.copy()
     share = np.zeros(len(vertices))
-    share[used] = SHRINK
+    share[used] = SHRINK * strength
     for side in SIDES:
         share *= smoothstep(np.linalg.norm(vertices - _eye(vertices, cage, side), axis=1), 17.0, 27.0)
     share *= smoothstep(np.linalg.norm((vertices - [0, -68, 30]) * [0.75, 1, 0.6], axis=1), 17.0, 26.0)  # mouth
@@ -59,7 +59,7 @@ def smooth_cage(cage: Cage) -> Cage:
             vertices = vertices + factor * share[:, None] * (means @ vertices - vertices)
     is_used = np.zeros(len(vertices))
     is_used[used] = 1.0
-    nostrils = (is_used * gaussian_bump(cage.vertices, (7.5, -45, 26), (7, 6, 9)))[:, None]
+    nostrils = strength * (is_used * gaussian_bump(cage.vertices, (7.5, -45, 26), (7, 6, 9)))[:, None]
     for _ in range(N_NOSTRIL_MEANS):
         vertices = vertices + 0.8 * nostrils * (means @ vertices - vertices)
     return replace(cage, vertices=vertices)
@@ -84,8 +84,8 @@ def apply_proportions(points: Floats, eyes: list[Floats], own: Proportions) -> F
         inward = np.array([-0.5 * np.sign(centre[0]), 0.0, -4.0])
         moved = _scale_about(moved, centre + inward, own.eye_gain, own.eye_reach)
     moved = _scale_about(moved, NOSE, own.nose_gain * np.array([1, 1, 1.05]), NOSE_REACH_MM)
-    moved[:, 1] += NOSE_UP_MM * bump(moved, (0, -34, 38), (11, 11, 16))
-    moved = _scale_about(moved, MOUTH, MOUTH_GAIN, MOUTH_REACH_MM)
+    moved[:, 1] += own.drawn * NOSE_UP_MM * bump(moved, (0, -34, 38), (11, 11, 16))
+    moved = _scale_about(moved, MOUTH, own.drawn * MOUTH_GAIN, MOUTH_REACH_MM)
     near = bump(moved, (0, LIP_Y, 30), (34, 15, 30))
     moved[:, 1] = LIP_Y + (moved[:, 1] - LIP_Y) * (1 - own.lips_thinner * near)
     moved[:, 2] -= own.lips_back * bump(moved, (0, LIP_Y, 36), (26, 12, 20))
@@ -99,7 +99,7 @@ def apply_proportions(points: Floats, eyes: list[Floats], own: Proportions) -> F
     moved[:, 0] *= 1 + 0.03 * own.jaw * bump(moved, (0, -92, 20), (24, 14, 26))
     top = smoothstep(moved[:, 1], -5.0, 80.0)[:, None]
     moved = moved * (1 + top * own.skull_gain * np.array([1, 1, 0.9]))
-    moved[:, 2] += 3.0 * bump(moved, (0, 52, 28), (42, 26, 30))  # forehead
+    moved[:, 2] += own.drawn * 3.0 * bump(moved, (0, 52, 28), (42, 26, 30))  # forehead
     neck = smoothstep(-moved[:, 1], 92.0, 125.0) * (1 - smoothstep(-moved[:, 1], 150.0, 200.0))
     moved[:, 0] *= 1 - own.neck_thinner * neck
     moved[:, 2] = NECK_Z + (moved[:, 2] - NECK_Z) * (1 - 0.73 * own.neck_thinner * neck)
@@ -118,7 +118,7 @@ def _shape_jaw(points: Floats, own: Proportions) -> None:
 def _shape_cheeks(points: Floats, own: Proportions) -> None:
     """Round and high cheeks, and fat above the jaw, in place."""
     high = gaussian_bump(points, (36, -36, 14), (19, 17, 26))
-    points += high[:, None] * np.array([0.0, 1.0, 3.4])
+    points += own.drawn * high[:, None] * np.array([0.0, 1.0, 3.4])
     points[:, 0] += np.sign(points[:, 0]) * own.upper_cheek * high
     low = own.lower_cheek * gaussian_bump(points, (46, -58, -6), (22, 20, 30))
     points[:, 0] += np.sign(points[:, 0]) * low

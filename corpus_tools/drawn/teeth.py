@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
+from corpus_tools.drawn.character import Character
 from corpus_tools.head.cage import Cage
 from corpus_tools.head.head import COVERED_POSES, ReferenceHead, cover_in_pose
 from corpus_tools.head.jaw import Jaw
@@ -45,18 +46,20 @@ SEAM_MM, SEAM_SHARE, SEAM_DEPTH_MM = 0.45, 0.40, 0.10
 CORNER_MM, CORNER_REACH_MM = 0.18, 0.9  # rounding of the crowns' corners
 BACK_LOWER = 0.12  # share by which the rearmost crowns are lower
 SHADE = (1.0, 1.0, 0.96, 0.88, 0.76, 0.62)  # brightness of the crowns from the middle
-TOOTH, SEAM, GUM = np.array([0.97, 0.955, 0.925]), np.array([0.90, 0.87, 0.83]), np.array([0.80, 0.46, 0.46])
+SEAM_TINT, GUM = np.array([0.928, 0.911, 0.897]), np.array([0.80, 0.46, 0.46])
 TEETH_MATERIAL = {"specular": 0.30, "shininess": 40.0, "wrap": 0.5}
 GUM_MATERIAL = {"specular": 0.25, "shininess": 30.0, "wrap": 0.4}
 
 
-def teeth_pieces(cage: Cage, skin: Skin, reference: ReferenceHead, jaw: Jaw) -> tuple[Piece, Piece]:
+def teeth_pieces(
+    cage: Cage, skin: Skin, reference: ReferenceHead, jaw: Jaw, character: Character
+) -> tuple[Piece, Piece]:
     """Upper and lower arch of a character's cage, behind its skin; `reference` is that of a person."""
     pieces = []
     ahead = lip_front(skin.vertices, reference.lips) - lip_front(reference.skin.vertices, reference.lips)
     for arch, name in ((replace(UPPER, heights=UPPER_GAIN * UPPER.heights), "upper"), (LOWER, "lower")):
         strip = cage.group(f"helper-{name}-teeth")
-        piece = _arch_piece(arch, name)
+        piece = _arch_piece(arch, name, character)
         points = fit_teeth(piece.vertices, reference.cage.vertices[strip], cage.vertices[strip])
         points = _follow_line(follow_lips(points, piece.vertices, ahead), name, skin, reference.lips)
         points = _smooth_cover(points, keep_behind(points, skin.vertices, COVER_MM[name]))
@@ -64,7 +67,8 @@ def teeth_pieces(cage: Cage, skin: Skin, reference: ReferenceHead, jaw: Jaw) -> 
         points = _smooth_cover(points, cover_in_pose(points, skin, jaw, pose, cover))
         moved = add_retreat(points, jaw.shapes(points), skin, reference.lips) if name == "lower" else {}
         pieces.append(Piece(points, piece.spans, piece.colours, moved))
-    return pieces[0], pieces[1]
+    upper, lower = pieces
+    return upper, replace(lower, vertices=lower.vertices - [0.0, 0.0, character.teeth_back])
 
 
 def _follow_line(points: Floats, name: str, skin: Skin, ring: NDArray[np.int64]) -> Floats:
@@ -92,8 +96,9 @@ def _smooth_cover(points: Floats, covered: Floats) -> Floats:
     return moved
 
 
-def _arch_piece(arch: Arch, name: str) -> Piece:
+def _arch_piece(arch: Arch, name: str, character: Character) -> Piece:
     """Teeth and gum of an arch; its two spans are ``teeth_<name>`` and ``gums_<name>``."""
+    tooth_colour, seams = np.array(character.palette.teeth), character.seams
     path, total = arch_path(arch.curve), arch.widths.sum()
     along = np.linspace(-total, total, N_ALONG)
     bounds = np.concatenate([[0], np.cumsum(arch.widths)])
@@ -102,17 +107,17 @@ def _arch_piece(arch: Arch, name: str) -> Piece:
     off_seam = np.minimum(within, 1 - within) * arch.widths[tooth]  # mm
     seam = np.exp(-((off_seam / SEAM_MM) ** 2))
     seam[np.abs(along) < 0.3] = 1
-    corner = CORNER_MM * np.exp(-((off_seam / CORNER_REACH_MM) ** 2))
+    corner = CORNER_MM * seams * np.exp(-((off_seam / CORNER_REACH_MM) ** 2))
     height = arch.heights[0] * (1 - BACK_LOWER * np.abs(along) / total) / CROWN_MM
     light = np.interp(np.abs(along), bounds[:-1] + arch.widths / 2, SHADE)[:, None]
     place, normal = path.at(along)
     normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     rows, colours = [], []
     for up, out, share in SECTION:
-        flat = place + (out - SEAM_DEPTH_MM * seam * share)[:, None] * normal
+        flat = place + (out - SEAM_DEPTH_MM * seams * seam * share)[:, None] * normal
         over_edge = (corner if up < 0.1 else 0.0) + up * height
         rows.append(np.column_stack([flat[:, 0], arch.edge_y + arch.up * over_edge, flat[:, 1]]))
-        enamel = TOOTH + (SEAM - TOOTH) * (SEAM_SHARE * seam * share)[:, None]
+        enamel = tooth_colour * (1 - (1 - SEAM_TINT) * (SEAM_SHARE * seams * seam * share)[:, None])
         colours.append(enamel * light * (1 - 0.06 * smoothstep(np.array([up]), 3, 10)))
     points = np.stack(rows, axis=1).reshape(-1, 3)
     gum = gum_piece(path, arch, GUM)

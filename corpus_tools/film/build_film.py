@@ -54,7 +54,7 @@ def main() -> None:
         write_face(path, replace(face, light=(light,)))
         report(f"{name}: calibration")  # again: the tracker sees other pictures of it now
         calibrate_face_file(str(path), path)
-        for style in HAIRCUTS[name]:
+        for style in HAIRCUTS.get(name, ()):
             report(f"{name}: {style.name}")
             dressed = replace(character, hair=style)
             wearing = drawn_face(source, dressed)

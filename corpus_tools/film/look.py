@@ -27,6 +27,8 @@ class SkinLook:
     roughness: float = 0.40
     sheen: float = 0.12
     bump: float = 0.09
+    pores: float = 60.0
+    mottle: float = 0.0
     lip_colour: Vector = (0.80, 0.30, 0.31)
     lip_share: float = 0.35
     lip_roughness: float = 0.26
@@ -50,6 +52,7 @@ class HairLook:
     streaks: float = 0.38
     variation: float = 0.5
     bump: float = 0.22
+    strands: float = 34.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -207,6 +210,24 @@ LOOKS = {
         hair=HairLook(specular=0.2, anisotropy=0.4, roughness=0.56, sheen=0.15, gain=(1.35, 1.25, 1.25)),
         lamps=_dimmed("right rim", 300),
         exposure=0.73,
+    ),
+    "mara": Look(
+        skin=SkinLook(
+            specular=0.45, roughness=0.42, sheen=0.06, scatter_mm=2.4, bump=0.25, pores=110.0, mottle=0.7,
+            lip_colour=(0.72, 0.33, 0.32), lip_share=0.25,
+        ),
+        hair=HairLook(strands=70.0, streaks=0.85, variation=0.8, bump=0.8, roughness=0.34, specular=0.35),
+    ),
+    "tomas": Look(
+        skin=SkinLook(
+            specular=0.38, roughness=0.45, sheen=0.05, scatter_mm=2.2, bump=0.35, pores=110.0, mottle=0.6,
+            lip_colour=(0.58, 0.29, 0.26), lip_share=0.2,
+        ),
+        hair=HairLook(
+            strands=70.0, streaks=0.7, variation=0.5, bump=0.8, roughness=0.42, specular=0.12, anisotropy=0.75,
+            sheen=0.03,
+        ),
+        lamps=_dimmed("right rim", 380),
     ),
 }  # fmt: skip
 

@@ -12,6 +12,8 @@ from tts2face.models.face import Texture
 
 UNIT_MM = 100.0  # of the scene: a decimetre
 TAU = 6.2832
+# Patches of skin with more blood, and with more pigment: scale of the noise, factor of the colour.
+MOTTLE = ((7.0, (0.97, 0.84, 0.82)), (40.0, (0.95, 0.90, 0.86)))
 
 
 def part_materials(look: Look, skin: Texture, eye: Texture) -> dict[str, Any]:
@@ -59,10 +61,15 @@ def _skin(look: SkinLook, image: Any) -> Any:
     painted = shader.node("TexImage", image=image, interpolation="Cubic").outputs["Color"]
     colour = shader.mix(painted, (*look.gain, 1.0), 1.0, "MULTIPLY")
     colour = shader.node("HueSaturation", Color=colour, Saturation=look.saturation).outputs[0]
+    places = shader.node("TexCoord").outputs["Object"]
+    for scale, factors in MOTTLE:
+        tint = tuple(1 + look.mottle * (factor - 1) for factor in factors)
+        spots = shader.scaled(shader.noise(places, (scale,) * 3, 3.0), 0.45, 0.75, 0, 1)
+        colour = shader.mix(colour, (*tint, 1.0), spots, "MULTIPLY")
     lips, inner = shader.attribute("lips"), shader.attribute("inner")
     colour = shader.mix(colour, rgba(look.lip_colour), shader.scaled(lips, 0, 1, 0, look.lip_share))
     colour = shader.mix(colour, rgba(look.inner_colour), inner)
-    grain = shader.noise(shader.node("TexCoord").outputs["Object"], (60.0,) * 3, 3.0)
+    grain = shader.noise(shader.node("TexCoord").outputs["Object"], (look.pores,) * 3, 3.0)
     is_front = shader.math("SUBTRACT", 1.0, shader.node("NewGeometry").outputs["Backfacing"])
     surface = shader.principled(
         Base_Color=colour,
@@ -82,8 +89,8 @@ def _skin(look: SkinLook, image: Any) -> Any:
 def _hair(look: HairLook) -> Any:
     shader = Shader("hair")
     place = shader.attribute("strand", "Vector")  # along and across the lock, and its number
-    streak = shader.noise(place, (1.1, 34.0, 7.3), 3.0, 0.55)
-    tone = shader.noise(place, (0.7, 9.0, 3.1), 2.0)
+    streak = shader.noise(place, (1.1, look.strands, 7.3), 3.0, 0.55)
+    tone = shader.noise(place, (0.7, 0.27 * look.strands, 3.1), 2.0)
     colour = shader.mix(shader.attribute("colour", "Color"), (*look.gain, 1.0), 1.0, "MULTIPLY")
     more, less, vary = look.streaks, 1 - look.streaks, look.variation
     light = shader.scaled(streak, 0.42, 0.72, 0, 1)
