@@ -73,12 +73,16 @@ def drawn_face(source: SourceMesh, character: Character) -> Face:
     )
     about = {"name": character.name, "summary": character.summary, **METADATA}
     about["made_by"] = "python -m corpus_tools.drawn.build_drawn"
-    colour = "#" + "".join(f"{round(255 * share):02x}" for share in character.palette.hair)
     face = assemble_face(built, [*shape_names(cage), *BODY_SHAPES], textures, about)
     limits = face.limits.copy()
     limits[-len(BODY_SHAPES) :] = BODY_LIMITS
-    hairdo = Hairdo(character.hair.name, colour)
-    return add_landmarks(_centred(replace(face, limits=limits, hairdo=hairdo)), skin.base)
+    return add_landmarks(_centred(replace(face, limits=limits)), skin.base)
+
+
+def own_hairdo(character: Character) -> Hairdo:
+    """Haircut and hair colour of a character; its face has them once it has the light of its hair, and others fit."""
+    colour = "#" + "".join(f"{round(255 * share):02x}" for share in character.palette.hair)
+    return Hairdo(character.hair.name, colour)
 
 
 def other_hair(source: SourceMesh, character: Character) -> OtherHair:

@@ -4,7 +4,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from corpus_tools.drawn.build_drawn import CAST, cast_parser, drawn_face, face_masks, other_hair, step_reporter
+from corpus_tools.drawn.build_drawn import (
+    CAST,
+    cast_parser,
+    drawn_face,
+    face_masks,
+    other_hair,
+    own_hairdo,
+    step_reporter,
+)
 from corpus_tools.drawn.character import Character
 from corpus_tools.drawn.haircuts import HAIRCUTS, lit_haircut
 from corpus_tools.film.bake_poses import HAIRCUT, Effort, bake_poses
@@ -51,7 +59,7 @@ def main() -> None:
         own = baked(face, character, Effort())
         report(f"{name}: fit")
         light = fit_light(face, own, look_of(name), character.eyes)
-        write_face(path, replace(face, light=(light,)))
+        write_face(path, replace(face, light=(light,), hairdo=own_hairdo(character)))
         report(f"{name}: calibration")  # again: the tracker sees other pictures of it now
         calibrate_face_file(str(path), path)
         for style in HAIRCUTS.get(name, ()):
