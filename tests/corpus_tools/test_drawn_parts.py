@@ -4,6 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from corpus_tools.drawn.atlas import COLLAR, MARGIN, SHIRT, cut_seam, hair_tiles, in_tile
 from corpus_tools.drawn.build_drawn import CAST
@@ -22,18 +23,20 @@ from corpus_tools.drawn.hair import (
     on_volume,
     other_palettes,
 )
-from corpus_tools.drawn.haircuts import HAIRCUTS, comb, cut, grow
-from corpus_tools.drawn.paint import paint_eye
+from corpus_tools.drawn.haircuts import HAIRCUTS, comb, cut, grow, lay_closer
+from corpus_tools.drawn.paint import _brow_hairs, paint_eye
 from corpus_tools.drawn.sculpt import apply_proportions
 from corpus_tools.head.skin import Skin
 from corpus_tools.head.subdivide import grid_triangles
 from lexicon.errors import DataError
+from tests.face.people import DRAWN
 from tts2face.models.face_loading import load_face
 
 ROUND = np.linspace(-180, 180, N_ROUND + 1)
 EYES = [np.array([31.0, 0.0, 0.0]), np.array([-31.0, 0.0, 0.0])]
+WITH_COLLAR = [name for name, one in CAST.items() if one.collar]
 EVERYBODY = pytest.mark.parametrize("character", CAST.values(), ids=list(CAST))
-STYLES = {f"{name} {style.name}": style for name, styles in HAIRCUTS.items() for style in (CAST[name].hair, *styles)}
+STYLES = {f"{name} {style.name}": style for name, one in CAST.items() for style in (one.hair, *HAIRCUTS.get(name, ()))}
 EVERY_STYLE = pytest.mark.parametrize("style", STYLES.values(), ids=list(STYLES))
 
 
@@ -63,7 +66,9 @@ def test_tables_are_within_their_ranges(character: Character) -> None:
         value = getattr(character.palette, one.name)
         if isinstance(value, tuple) and one.name not in ("tints", "ears", "lids"):
             assert all(0 <= part <= 1 for part in value), one.name
-    for profile in (character.brow.half_width, character.brow.thickness, character.lashes):
+    brow = character.brow
+    assert bool(brow.hairs) != bool(brow.thickness)  # painted or solid
+    for profile in filter(None, (brow.half_width, brow.thickness, character.lashes)):
         shares = [share for share, _ in profile]
         assert (shares[0], shares[-1], shares) == (0, 1, sorted(set(shares)))
         assert min(value for _, value in profile) >= 0
@@ -87,9 +92,9 @@ def test_the_map_of_space_turns_nothing_inside_out(character: Character) -> None
     assert np.linalg.det(jacobian)[~on_midline].min() > 0.05
 
 
-def test_every_character_has_three_haircuts_with_names_of_their_own() -> None:
-    for name, character in CAST.items():
-        names = [character.hair.name, *(style.name for style in HAIRCUTS[name])]
+def test_every_drawn_character_has_three_haircuts_with_names_of_their_own() -> None:
+    for name in DRAWN:
+        names = [CAST[name].hair.name, *(style.name for style in HAIRCUTS[name])]
         assert len(set(names)) == len(names) >= 3
         assert all(style.summary for style in HAIRCUTS[name])
 
@@ -186,7 +191,18 @@ def test_hair_stays_outside_of_the_skin() -> None:
     assert np.abs(np.linalg.norm(scalp.keep_outside(near, 3.0) - MIDDLE, axis=1) - 73.0).max() < 1.0
 
 
-@EVERYBODY
+def test_a_lock_is_laid_closer_to_the_head() -> None:
+    lock = next(lock for lock in CAST["ada"].hair.locks if lock.path[-1][1] < -50)
+    lower = lay_closer(lock, 4.0)
+    assert [a[2] - b[2] for a, b in zip(lock.path, lower.path, strict=True)] == [
+        4.0 if up > -50 else 0.0 for _, up, _ in lock.path
+    ]
+    rooted = lay_closer(lock, 4.0, root_mm=9.0, root_deg=2.0)
+    assert (lower.path[0][1] - rooted.path[0][1], lower.path[0][2] - rooted.path[0][2]) == (2.0, 9.0)
+    assert rooted.path[1:] == lower.path[1:]
+
+
+@pytest.mark.parametrize("character", [one for one in CAST.values() if one.collar], ids=[*WITH_COLLAR])
 def test_a_roll_goes_around_the_neck(character: Character) -> None:
     points, triangles, places = _roll(character.collar)
     assert (closed_sides(points, triangles) == 2).all()
@@ -204,6 +220,21 @@ def test_an_iris_has_a_dark_ring_and_a_black_pupil(character: Character) -> None
     assert light[0] < light[1] < light[2]
     limbus = row[half + int(0.96 * character.eyes.iris / 2.2 * len(row))]
     assert limbus < light[1]
+
+
+def test_brows_are_painted_hair_by_hair_along_their_line() -> None:
+    brow = CAST["mara"].brow
+    across, up = np.meshgrid(np.arange(-70, 70.1, 0.5), np.arange(0, 45.1, 0.5))
+    place = np.stack([across, up, np.full_like(up, 20.0)], axis=-1).reshape(-1, 3)
+    cover = _brow_hairs(place, brow)
+    on_line = [np.linalg.norm(place[:, :2] - [x, y], axis=1).argmin() for x, y in smooth_line(brow.line, 30)[5:25]]
+    near = cKDTree(place[:, :2]).query_ball_point(place[on_line, :2], 2.0)
+    assert min(cover[rows].mean() for rows in near) > 0.3
+    far = cKDTree(np.abs(smooth_line(brow.line, 100))).query(np.abs(place[:, :2]))[0] > 12
+    assert cover[far].max() < 0.01
+    left, right = (cover[sign * place[:, 0] > 0].sum() for sign in (1, -1))
+    assert left == pytest.approx(right, rel=0.1)
+    assert _brow_hairs(place - [0, 0, 40], brow).max() == 0  # behind the face
 
 
 def test_surfaces_in_rows() -> None:

@@ -7,9 +7,11 @@ from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 
 DRAWN = ("ada", "ben", "noor", "zuri")
+REALISTIC = ("mara", "tomas")
+LIT = (*DRAWN, *REALISTIC)
 PEOPLE = [  # face and identity
     pytest.param("head", None, marks=pytest.mark.smoke, id="head"),
-    *(pytest.param(name, None, id=name) for name in DRAWN),
+    *(pytest.param(name, None, id=name) for name in LIT),
     *(pytest.param("head", entry.name, id=entry.name) for entry in identities("head")),
 ]
 

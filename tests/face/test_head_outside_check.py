@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import Tts2faceError
-from tests.face.people import DRAWN
+from tests.face.people import LIT
 from tts2face.models.face_loading import load_face
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import Picture
@@ -30,7 +30,7 @@ def networks():
         pytest.skip(f"the outside check cannot run: {missing}")
 
 
-@pytest.fixture(scope="module", params=["head", *DRAWN])
+@pytest.fixture(scope="module", params=["head", *LIT])
 def scores(request, networks):
     """Function from shape weights to the network's scores by name."""
     tracker, reader = networks

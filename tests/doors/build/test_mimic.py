@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from tests.face.people import DRAWN
+from tests.face.people import LIT
 from tests.rendered_takes import ONLY_RENDERED
 from tts2face.retargeting.performer import eye_aperture
 from tts2face.video.media import read_frames, read_media_info
@@ -43,7 +43,7 @@ def gap(landmarks: np.ndarray) -> np.ndarray:
     return np.linalg.norm(landmarks[:, 13] - landmarks[:, 14], axis=1)
 
 
-@pytest.mark.parametrize("face", ["head", *DRAWN])
+@pytest.mark.parametrize("face", ["head", *LIT])
 def test_lips_lids_and_head_of_the_clip_are_the_performer_s(
     face: str, film: Path, face_model: Path, here: Path
 ) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw, ImageFilter
 
-from tests.face.people import DRAWN
+from tests.face.people import LIT
 from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
@@ -31,7 +31,7 @@ TEXTS = (
 )
 
 
-@pytest.fixture(scope="module", params=DRAWN)
+@pytest.fixture(scope="module", params=LIT)
 def posed(request: pytest.FixtureRequest) -> tuple[Face, np.ndarray]:
     """A face, and weights of random frames of speech in all moods."""
     face = load_face(request.param)

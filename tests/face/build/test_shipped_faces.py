@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.face.people import DRAWN
+from tests.face.people import LIT
 from tests.face.posing import posed_vertices
 from tts2face.face.breathing import BREATH_SHAPE
 from tts2face.face.hair_swing import SWING_SHAPES
@@ -15,7 +15,7 @@ from tts2face.storage.files import find_file
 UPPER_LID, LOWER_LID = (159, 386), (145, 374)  # right and left eye, in the middle
 
 
-@pytest.fixture(scope="module", params=[pytest.param("head", marks=pytest.mark.smoke), *DRAWN])
+@pytest.fixture(scope="module", params=[pytest.param("head", marks=pytest.mark.smoke), *LIT])
 def face(request):
     return load_face(request.param)
 
