@@ -17,11 +17,11 @@ ACROSS_MM = np.arange(-165.0, 165.1, CELL_MM)  # of the picture, from between th
 UP_MM = np.arange(190.0, -200.1, -CELL_MM)
 DEPTH_PERCENTILE = 20  # of the face's outline: the depth of the plane, near that of the hair's outline
 FOREHEAD = 10  # landmark; skin on most people, hair on some
-CROWN_MM, CROWN_HALF_MM = (9.0, 36.0), 36.0  # above it, and beside it: inside the skull of everyone, never background
+CROWN_MM, CROWN_HALF_MM = (24.0, 38.0), 36.0  # above it, and beside it: inside the skull of everyone, never background
 # Difference from skin, as a distance: 1 for these logarithms of luminance (darker) and of R/G and B/G.
 DARKER, OTHER_HUE, IS_HAIR = 0.45, 0.28, 0.9
 SHADED = 1.2  # the first of them outside the crown, where skin is in the shadow of jaw and hair
-MIN_HAIRY_SHARE = 0.38  # of the crown: bald people .11 to .18, others from .57
+MIN_HAIRY_SHARE = 0.6  # of the crown: bald people .23 to .29, white stubble .43, others from .92
 LUMINANCE_SCALE, CHROMA_SCALE, WEAK_LIGHT = 1.0, 0.3, 0.01  # distances between colours of hair; dark ones have no hue
 VIVID = 0.4  # of the hair's difference in hue from skin: chroma scale of vivid hair, whose shine varies in hue
 NEAR_HAIR, OFF_BACKGROUND = 0.35, 0.6

@@ -16,15 +16,17 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB, IEC 61966-2-1
 DARKEST = 0.004  # linear light, added before logarithms: noise of dark pixels has no colour
 # log R/G and B/G in neutral light. Skin: between light and dark skin of a colour chart (.57 -.31; .71 -.37), and
 # rendered people of all tones (.53 to .89, -.32 to -.66): tones differ in luminance far more than in these. White of
-# the eye: median of rendered people.
-SKIN_CHROMA, SKIN_SPREAD = np.array([0.67, -0.45]), np.array([0.12, 0.08])
-SCLERA_CHROMA = np.array([0.18, -0.11])
+# the eye: median of rendered people. What is within the spread of either is no cast.
+SKIN_CHROMA, SKIN_SPREAD = np.array([0.67, -0.45]), np.array([0.18, 0.10])
+SCLERA_CHROMA, SCLERA_SPREAD = np.array([0.18, -0.11]), np.array([0.10, 0.05])
 SKIN_ALONE = 0.5  # share of the skin's cast that is corrected where no white of the eye is seen
 SKIN_LANDMARKS = (50, 280, 205, 425, 151, 9, 108, 337)  # cheeks and forehead
 IRISES = ((468, (469, 470, 471, 472)), (473, (474, 475, 476, 477)))  # centre and rim, as in LID_RINGS
 MIN_IRIS_PX = 3.5  # radius; below it iris, lashes and white are mixed
 IRIS_RING, IRIS_TOP = (0.4, 0.8), 0.35  # of the radius: between pupil and limbus, below the lashes' shadow
 OFF_IRIS, OFF_LIDS = 1.35, 0.18  # of the radius: what is white of the eye, and how far lids reach into it
+IRIS_MIX_PX = 0.5  # over the radius: share of the surroundings' light; rendered eyes have .05 to .1 at 5 px
+MIN_OWN_LIGHT = 0.5  # of what is seen
 BRIGHT_WHITE, PLAIN_IRIS = 0.6, (0.2, 0.8)  # quantiles of luminance: white without shadow, iris without catchlights
 MIN_PIXELS = 6
 EYE_GRID = (41, 25)  # samples across and down an eye
@@ -48,11 +50,16 @@ def log_colour(srgb: NDArray[np.floating]) -> Floats:
     return found
 
 
+def linear_light(colour: Floats) -> Floats:
+    """Linear light (..., 3) of `log_colour` values."""
+    ratio = np.exp(np.stack([colour[..., 1], np.zeros(colour.shape[:-1]), colour[..., 2]], axis=-1))
+    light: Floats = ratio * (np.exp(colour[..., 0]) / (ratio @ LUMINANCE))[..., None] - DARKEST
+    return light
+
+
 def srgb_colour(colour: Floats) -> NDArray[np.uint8]:
     """8-bit sRGB (..., 3) of `log_colour` values."""
-    ratio = np.exp(np.stack([colour[..., 1], np.zeros(colour.shape[:-1]), colour[..., 2]], axis=-1))
-    green = np.exp(colour[..., 0]) / (ratio @ LUMINANCE)
-    return encode_srgb(ratio * green[..., None] - DARKEST)
+    return encode_srgb(linear_light(colour))
 
 
 def sample_eyes(picture: NDArray[np.uint8], points: NDArray[np.floating]) -> EyeColours:
@@ -95,6 +102,17 @@ def median_eyes(seen: list[EyeColours]) -> EyeColours:
     return EyeColours(skin, sclera, iris, float(np.median([one.radius_px for one in seen])))
 
 
+def clear_iris(eyes: EyeColours) -> Floats:
+    """Colour (3,), `log_colour`, of the iris without the light of skin and white that a small picture mixes into it."""
+    share = IRIS_MIX_PX / eyes.radius_px
+    around = linear_light(eyes.skin)
+    if np.isfinite(eyes.sclera).all():
+        around = (around + linear_light(eyes.sclera)) / 2
+    seen = linear_light(eyes.iris)
+    own = np.maximum((seen - share * around) / (1.0 - share), MIN_OWN_LIGHT * seen)
+    return log_colour(255.0 * _encode(own))
+
+
 def _median_known(colours: list[Floats]) -> Floats:
     known = [colour for colour in colours if np.isfinite(colour).all()]
     return np.asarray(np.median(known, axis=0) if known else np.full(3, np.nan), np.float64)
@@ -103,16 +121,21 @@ def _median_known(colours: list[Floats]) -> Floats:
 def estimate_cast(eyes: EyeColours) -> Floats:
     """(2,) cast of the light: the logarithms by which it raises R/G and B/G.
 
-    Skin and white of the eye each tell it, and each may err: a skin is ruddy or olive, a white is reddened and mixed
-    with lids. The smaller of the two casts is taken where they agree in direction, and none where they do not.
+    Skin and white of the eye each tell it, and each may err: a skin is ruddy or olive, a white is mixed with lids and
+    reddened. Where they do not agree in direction, there is none; where they do, it is their mean in B/G and the
+    smaller one in R/G.
     """
-    off = eyes.skin[1:] - SKIN_CHROMA
-    of_skin = np.sign(off) * np.maximum(np.abs(off) - SKIN_SPREAD, 0.0)
+    of_skin = _beyond(eyes.skin[1:] - SKIN_CHROMA, SKIN_SPREAD)
     if not np.isfinite(eyes.sclera).all():
-        return np.asarray(SKIN_ALONE * of_skin, np.float64)
-    of_white = eyes.sclera[1:] - SCLERA_CHROMA
-    agree = of_skin * of_white > 0
-    return np.where(agree, np.sign(of_skin) * np.minimum(np.abs(of_skin), np.abs(of_white)), 0.0)
+        return SKIN_ALONE * of_skin
+    of_white = _beyond(eyes.sclera[1:] - SCLERA_CHROMA, SCLERA_SPREAD)
+    smaller = np.sign(of_skin) * np.minimum(np.abs(of_skin), np.abs(of_white))
+    agreed = np.array([smaller[0], (of_skin[1] + of_white[1]) / 2])
+    return np.where(of_skin * of_white > 0, agreed, 0.0)
+
+
+def _beyond(off: Floats, spread: Floats) -> Floats:
+    return np.sign(off) * np.maximum(np.abs(off) - spread, 0.0)
 
 
 def remove_cast(srgb: Floats, cast: Floats, skin: Floats) -> Floats:
@@ -120,6 +143,10 @@ def remove_cast(srgb: Floats, cast: Floats, skin: Floats) -> Floats:
     gains = np.exp([-cast[0], 0.0, -cast[1]])
     before = np.exp([skin[1], 0.0, skin[2]])
     gains *= (before @ LUMINANCE) / ((before * gains) @ LUMINANCE)
-    light = decode_srgb(np.clip(srgb, 0.0, 255.0) / 255.0) * gains
-    lit: Floats = 255.0 * np.where(light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 0) ** (1 / 2.4) - 0.055)
-    return np.clip(lit, 0.0, 255.0)
+    return 255.0 * _encode(decode_srgb(np.clip(srgb, 0.0, 255.0) / 255.0) * gains)
+
+
+def _encode(light: Floats) -> Floats:
+    """SRGB values in [0, 1] of linear light, without the steps of 8 bits."""
+    within = np.clip(light, 0.0, 1.0)
+    return np.where(within <= 0.0031308, 12.92 * within, 1.055 * within ** (1 / 2.4) - 0.055)

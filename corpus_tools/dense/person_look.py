@@ -19,12 +19,14 @@ from corpus_tools.dense.light_cast import (
     MIN_IRIS_PX,
     SCLERA_CHROMA,
     EyeColours,
+    clear_iris,
     estimate_cast,
     log_colour,
     median_eyes,
     sample_eyes,
     srgb_colour,
 )
+from corpus_tools.dense.mesh_fit import part_vertices
 from corpus_tools.dense.skin_colour import PictureFitter, sample_picture
 from corpus_tools.dense.texels import find_texels
 from tts2face.models.face import Face, Hairdo
@@ -39,7 +41,7 @@ HAIRCUTS: Mapping[str, str] = {  # by length class
 }  # fmt: skip
 UNSEEN, UNSEEN_HAIR = "flat", "dark-brown"  # class and colour where the top of the head is outside of the picture
 HAIR_LIGHT = (0.005, 0.36)  # luminance of the darkest and lightest hair
-CROPPED_LIGHT = -0.6  # most luminance of cropped hair, of the skin's, logarithm: what is seen is hair and skin mixed
+CROPPED_LIGHT = -1.2  # most luminance of cropped hair, of the skin's, logarithm: what is seen is hair and skin mixed
 SHINE = 0.5  # logarithm by which hair in a picture is lighter than its colour; median of rendered haircuts
 # Natural hair lies on a line of log R/G and B/G, from black and grey to brown and blond: browner by so much bluer less.
 # Casts of cameras and walls lead off it; what is further off than these is dyed or red.
@@ -48,11 +50,19 @@ EYE_COLOURS: Mapping[str, str] = {
     "dark brown": "3a281f", "brown": "58402f", "hazel": "6a5a3e", "green": "67705a", "grey": "6d7274", "blue": "60788c",
 }  # fmt: skip  # sRGB
 NEUTRAL_IRIS = "58402f"
+IRIS_LIGHT, DARK_IRIS, DARK_IRIS_HUE = 0.012, 0.02, (0.55, -0.55)  # least luminance; up to which irises are brown
 BROWN_FROM, BROWN_SLOPE, BROWN_LIGHT = -0.45, -0.6, 0.05  # log B/G of brown irises, their least R/G, most luminance
-BROW_LIGHT = -1.2  # most luminance of brows, of the skin's, logarithm
+BROW_LIGHT = -1.9  # most luminance of brows, of the skin's, logarithm
+ROOT_MM, LASH_MM = 0.7, 10.0  # off the skin: roots of lashes, and lashes that are shown
+LASH_LENGTH = 0.55  # of the default head's, which are a made-up woman's
 NEUTRAL_SHIRT = "6a6b6d"
 SHIRT_MM, SHIRT_SPREAD, MIN_SHIRT_CELLS = 30.0, 0.5, 60  # below the chin; deviation of its luminance, logarithm
-SHIRT_HUE, SHIRT_LIGHT = 0.35, (0.03, 0.2)  # share of its colour that is kept, bounds of its luminance
+SHIRT_HUE, SHIRT_LIGHT, VIVID_SHADE = (
+    0.35,
+    (0.03, 0.2),
+    0.25,
+)  # share of its colour that is kept, bounds of its luminance
+NAMING_LIGHT = 0.5  # weight of luminance beside hue where a colour is named
 PLAIN_CAST = 0.03  # logarithm up to which light is called neutral
 MIN_SHARE = 0.3  # of the frames that show a cell of the portrait
 TINT_LIMITS = (0.25, 4.0)
@@ -146,12 +156,16 @@ def hair_colour(seen: Floats, most: float = 0.0) -> Floats:
 
 def iris_colour(eyes: EyeColours, cast: Floats) -> Floats:
     """Colour of the iris (3,), `log_colour`, in neutral light: the mean by the cast and by the white of the eye."""
-    by_cast = neutral(eyes.iris, cast)
-    by_white = eyes.iris[1:] - eyes.sclera[1:] + SCLERA_CHROMA
+    clear = clear_iris(eyes)
+    by_cast = neutral(clear, cast)
+    by_white = clear[1:] - eyes.sclera[1:] + SCLERA_CHROMA
     red, blue = (by_cast[1:] + by_white) / 2 if np.isfinite(by_white).all() else by_cast[1:]
+    light = max(by_cast[0], np.log(IRIS_LIGHT))
+    if light < np.log(DARK_IRIS):
+        return np.array([light, *DARK_IRIS_HUE])
     if blue < BROWN_FROM:
-        return np.array([min(by_cast[0], np.log(BROWN_LIGHT)), max(red, BROWN_SLOPE * blue), blue])
-    return np.array([by_cast[0], red, blue])
+        return np.array([min(light, np.log(BROWN_LIGHT)), max(red, BROWN_SLOPE * blue), blue])
+    return np.array([light, red, blue])
 
 
 def shirt_colour(portrait: Portrait, hair: SeenHair, cast: Floats) -> NDArray[np.uint8]:
@@ -167,19 +181,35 @@ def shirt_colour(portrait: Portrait, hair: SeenHair, cast: Floats) -> NDArray[np
     cloth = colours[low][beyond.query(colours[low])[0] > OFF_BACKGROUND]
     if len(cloth) < MIN_SHIRT_CELLS or np.median(np.abs(cloth[:, 0] - np.median(cloth[:, 0]))) > SHIRT_SPREAD:
         return parse_hex(NEUTRAL_SHIRT)
-    light, *hue = neutral(np.median(cloth, axis=0), cast)
-    bounded = np.clip(light, *np.log(SHIRT_LIGHT))
-    return srgb_colour(np.array([bounded, *(SHIRT_HUE * np.array(hue))]))
+    light, *hue = np.median(cloth, axis=0)
+    vivid = float(np.linalg.norm(hue))
+    clean = np.array(hue) - cast * np.exp(-vivid)  # a clipped channel has no cast
+    most = np.log(SHIRT_LIGHT[1]) - VIVID_SHADE * vivid
+    return srgb_colour(np.array([np.clip(light, np.log(SHIRT_LIGHT[0]), most), *(SHIRT_HUE * clean)]))
 
 
 def dress_head(face: Face, look: PersonLook) -> Face:
-    """The head with iris, brows, shirt and hairdo of a look."""
+    """The head with iris, brows, shirt and hairdo of a look, and lashes of a length that suits everyone."""
     tints = {}
     for name, wanted in (("iris", look.iris), ("brows", look.brows), ("shirt", look.shirt)):
         n_times = sum(part.name == name and part.is_textured for part in face.parts)  # eyes share their texels
         factors = np.clip(wanted / np.maximum(part_colour(face, name), 1.0), *TINT_LIMITS) ** (1 / max(n_times, 1))
         tints[name] = (float(factors[0]), float(factors[1]), float(factors[2]))
-    return replace(tint_parts(face, tints), hairdo=look.hairdo)
+    return replace(tint_parts(shorten_lashes(face, LASH_LENGTH), tints), hairdo=look.hairdo)
+
+
+def shorten_lashes(face: Face, length: float) -> Face:
+    """The face with lashes of a share of their length, at rest and in all shapes; sets that are not shown stay."""
+    from scipy.spatial import cKDTree
+
+    lashes, skin = part_vertices(face, ("lashes",)), part_vertices(face, ("skin",))
+    off = cKDTree(face.vertices[skin]).query(face.vertices[lashes])[0]
+    roots, rest = lashes[off < ROOT_MM], lashes[(off >= ROOT_MM) & (off < LASH_MM)]
+    nearest = roots[cKDTree(face.vertices[roots]).query(face.vertices[rest])[1]]
+    vertices, shapes = face.vertices.copy(), face.shapes.copy()
+    vertices[rest] = vertices[nearest] + length * (vertices[rest] - vertices[nearest])
+    shapes[:, rest] = shapes[:, nearest] + length * (shapes[:, rest] - shapes[:, nearest])
+    return replace(face, vertices=vertices, shapes=shapes)
 
 
 def part_colour(face: Face, name: str) -> Floats:
@@ -207,6 +237,9 @@ def _hair_word(colour: str) -> str:
 
 def _nearest(colour: Floats, names: Mapping[str, str]) -> str:
     """The name whose colour, rrggbb, is nearest."""
-    return min(
-        names, key=lambda name: float(np.linalg.norm(colour - log_colour(parse_hex(names[name]).astype(np.float64))))
-    )
+
+    def distance(name: str) -> float:
+        off = colour - log_colour(parse_hex(names[name]).astype(np.float64))
+        return float(np.linalg.norm(off * (NAMING_LIGHT, 1.0, 1.0)))
+
+    return min(names, key=distance)

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.dense.hair_region import OTHER_HUE
+from corpus_tools.dense.light_cast import log_colour
 from corpus_tools.dense.mesh_fit import face_landmarks
 from corpus_tools.dense.skin_colour import SkinColours, vertex_normals
 from corpus_tools.dense.texels import Texels
@@ -27,6 +29,7 @@ NOSE_BASE = 2  # landmark; beside the face, strands are searched for above it, s
 # second.
 FRINGE_MM = (2.0, 7.0)
 STRAND_TEXELS = 25  # about 4 mm of the forehead, for the shadow around a strand
+FRINGE_HUE = (1.0, 1.6)  # of `OTHER_HUE` from the median skin: up to the first skin, from the second hair
 FRINGE_LUMA = (0.78, 0.95)  # of the median skin: up to the first hair, from the second skin
 N_SAMPLES = 1500  # sample of the seen texels
 SHARP_TEXELS, SHARP_GAIN = 4.0, 0.7  # unsharp masking, Gaussian of this deviation
@@ -71,7 +74,7 @@ def _shading_terms(normals: Floats) -> Floats:
 
 
 def _remove_fringe(face: Face, canvas: SkinCanvas, own: Floats, share: Floats) -> Floats:
-    """Shares (P,) without the dark strands of hair over the forehead and beside the eyes."""
+    """Shares (P,) without the strands of hair over the forehead and beside the eyes."""
     from scipy.ndimage import gaussian_filter, minimum_filter
 
     marks = face_landmarks(face, face.vertices)
@@ -81,7 +84,9 @@ def _remove_fringe(face: Face, canvas: SkinCanvas, own: Floats, share: Floats) -
     beside[places[:, 1] < marks[NOSE_BASE, 1]] = 0.0
     luma = own @ LUMA
     usual = float(np.median(luma[share > 0.5]))
-    clear = smoothstep(luma / usual, *FRINGE_LUMA)
+    hue = log_colour(own)[:, 1:]
+    off = np.linalg.norm(hue - np.median(hue[share > 0.5], axis=0), axis=1) / OTHER_HUE
+    clear = smoothstep(luma / usual, *FRINGE_LUMA) * (1.0 - smoothstep(off, *FRINGE_HUE))
     near = 1.0 - np.maximum(smoothstep(above, *FRINGE_MM), smoothstep(beside, *FRINGE_MM))
     picture = np.ones(canvas.texture.shape[:2])
     picture[canvas.texels.rows, canvas.texels.columns] = np.maximum(clear, near)
