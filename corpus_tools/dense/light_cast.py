@@ -110,7 +110,7 @@ def clear_iris(eyes: EyeColours) -> Floats:
         around = (around + linear_light(eyes.sclera)) / 2
     seen = linear_light(eyes.iris)
     own = np.maximum((seen - share * around) / (1.0 - share), MIN_OWN_LIGHT * seen)
-    return log_colour(255.0 * _encode(own))
+    return log_colour(255.0 * encode_light(own))
 
 
 def _median_known(colours: list[Floats]) -> Floats:
@@ -143,10 +143,10 @@ def remove_cast(srgb: Floats, cast: Floats, skin: Floats) -> Floats:
     gains = np.exp([-cast[0], 0.0, -cast[1]])
     before = np.exp([skin[1], 0.0, skin[2]])
     gains *= (before @ LUMINANCE) / ((before * gains) @ LUMINANCE)
-    return 255.0 * _encode(decode_srgb(np.clip(srgb, 0.0, 255.0) / 255.0) * gains)
+    return 255.0 * encode_light(decode_srgb(np.clip(srgb, 0.0, 255.0) / 255.0) * gains)
 
 
-def _encode(light: Floats) -> Floats:
+def encode_light(light: Floats) -> Floats:
     """SRGB values in [0, 1] of linear light, without the steps of 8 bits."""
     within = np.clip(light, 0.0, 1.0)
     return np.where(within <= 0.0031308, 12.92 * within, 1.055 * within ** (1 / 2.4) - 0.055)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.hair_region import OTHER_HUE
-from corpus_tools.dense.light_cast import log_colour
+from corpus_tools.dense.light_cast import encode_light, linear_light, log_colour
 from corpus_tools.dense.mesh_fit import face_landmarks
 from corpus_tools.dense.skin_colour import SkinColours, vertex_normals
 from corpus_tools.dense.texels import Texels
@@ -31,6 +31,7 @@ FRINGE_MM = (2.0, 7.0)
 STRAND_TEXELS = 25  # about 4 mm of the forehead, for the shadow around a strand
 FRINGE_HUE = (1.0, 1.6)  # of `OTHER_HUE` from the median skin: up to the first skin, from the second hair
 FRINGE_LUMA = (0.78, 0.95)  # of the median skin: up to the first hair, from the second skin
+EVEN_TEXELS, EVEN_SHARE = 50.0, 0.7  # about 8 mm, Gaussian; share of slow variations of log B/G that is removed
 N_SAMPLES = 1500  # sample of the seen texels
 SHARP_TEXELS, SHARP_GAIN = 4.0, 0.7  # unsharp masking, Gaussian of this deviation
 MIN_TEXEL_WEIGHT = 0.02  # of the largest weight: texels below it are blended
@@ -42,6 +43,7 @@ def paint_skin(face: Face, canvas: SkinCanvas, skin: SkinColours) -> Face:
     base = canvas.texture[texels.rows, texels.columns].astype(np.float64)
     share = canvas.share * smoothstep(skin.weight / skin.weight.max(), 0.0, MIN_TEXEL_WEIGHT)
     own = _remove_shading(canvas.texels.interpolate(vertex_normals(face)), skin.colour, share)
+    own = _even_yellow(canvas, own, share)
     share = soften_edges(_remove_fringe(face, canvas, own, share), texels, len(canvas.texture))
     dark = 1.0 - smoothstep(base @ LUMA, *LASH_LUMA)
     tint = _skin_tint(face, canvas, own / np.maximum(base, 1.0), (share, base @ LUMA))
@@ -66,6 +68,24 @@ def _remove_shading(normals: Floats, colour: Floats, share: Floats) -> Floats:
     shade = np.exp((terms - terms[lit].mean(axis=0)) @ slopes)
     flat: Floats = colour / np.clip(shade, *SHADE_BOUNDS)
     return flat
+
+
+def _even_yellow(canvas: SkinCanvas, own: Floats, share: Floats) -> Floats:
+    """Colours (P, 3) with less of the yellow and blue that vary slowly over skin: light of lamps and walls.
+
+    Redness, which varies over a face by nature, and luminance stay.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    colours = log_colour(own)
+    luma = own @ LUMA
+    weight = share * (luma > SKIN_LUMA * np.median(luma[share > 0.5]))
+    usual = np.median(colours[weight > 0.5, 2])
+    texels, planes = canvas.texels, np.zeros((2, *canvas.texture.shape[:2]))
+    planes[:, texels.rows, texels.columns] = weight, weight * (colours[:, 2] - usual)
+    near, off = (gaussian_filter(plane, EVEN_TEXELS)[texels.rows, texels.columns] for plane in planes)
+    colours[:, 2] -= EVEN_SHARE * off / np.maximum(near, 0.1)
+    return 255.0 * encode_light(linear_light(colours))
 
 
 def _shading_terms(normals: Floats) -> Floats:
