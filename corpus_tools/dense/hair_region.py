@@ -25,7 +25,9 @@ MIN_HAIRY_SHARE = 0.6  # of the crown: bald people .23 to .29, white stubble .43
 LUMINANCE_SCALE, CHROMA_SCALE, WEAK_LIGHT = 1.0, 0.3, 0.01  # distances between colours of hair; dark ones have no hue
 VIVID = 0.4  # of the hair's difference in hue from skin: chroma scale of vivid hair, whose shine varies in hue
 NEAR_HAIR, OFF_BACKGROUND = 0.35, 0.6
+WALL_MM = 150.0  # of height, over which a wall may change by a distance of 1
 N_GROWTHS = 6
+MIN_GROWTH = 1.5  # of the crown's cells: hair that grows less is not told from the wall
 EDGE_CELLS, MIN_ROW_CELLS = 4, 20
 INSIDE_MM = 4.0  # of the face's oval: no hair
 TEMPLE_MM, MIN_LOCK_MM = 36.0, 9.0  # hair beside the face, from the middle of it; thinner locks do not count
@@ -97,7 +99,9 @@ def find_hair(portrait: Portrait, skin: Floats) -> SeenHair:
     region = _grow(space, seed, background, (allowed, up < portrait.marks[CHIN, 1]))
     colour: Floats = np.median(colours[region], axis=0)
     other = background | (known & (unlike < IS_HAIR))
-    return SeenHair(_length(region, portrait.marks, colour - skin), region, other, colour)
+    length = _length(region, portrait.marks, colour - skin)
+    is_told = region.sum() > MIN_GROWTH * seed.sum()
+    return SeenHair(length if is_told or length != "cropped" else "flat", region, other, colour)
 
 
 def difference_from_skin(off: Floats, darker: float | Floats) -> Floats:
@@ -139,7 +143,7 @@ def _grow(space: Floats, seed: Mask, background: Mask, limits: tuple[Mask, Mask]
 
     allowed, is_low = limits
     cells = space.reshape(-1, 3)
-    to_background = np.asarray(cKDTree(cells[background.ravel()]).query(cells)[0]).reshape(seed.shape)
+    to_background = _distance_to_edges(space, background)
     most = np.where(is_low, 0.5 * NEAR_HAIR, np.minimum(NEAR_HAIR, to_background))
     region = seed
     for _ in range(N_GROWTHS):
@@ -148,6 +152,20 @@ def _grow(space: Floats, seed: Mask, background: Mask, limits: tuple[Mask, Mask]
         numbers, _ = label(candidates, np.ones((3, 3)))
         region = np.isin(numbers, np.unique(numbers[seed]))
     return region
+
+
+def _distance_to_edges(space: Floats, background: Mask) -> Floats:
+    """(R, C) distance of colours from those at the picture's edge on the same side, at about the same height."""
+    from scipy.spatial import cKDTree
+
+    height = np.broadcast_to(UP_MM[:, None, None] / WALL_MM, (*background.shape, 1))
+    placed = np.concatenate([space, height], axis=-1)
+    apart = np.full(background.shape, np.inf)
+    for side in (ACROSS_MM < 0, ACROSS_MM >= 0):
+        edge = placed[background & side]
+        if len(edge):
+            apart[:, side] = cKDTree(edge).query(placed[:, side])[0]
+    return apart
 
 
 def _length(region: Mask, marks: Floats, off: Floats) -> str:

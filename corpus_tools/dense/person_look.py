@@ -46,6 +46,7 @@ SHINE = 0.5  # logarithm by which hair in a picture is lighter than its colour; 
 # Natural hair lies on a line of log R/G and B/G, from black and grey to brown and blond: browner by so much bluer less.
 # Casts of cameras and walls lead off it; what is further off than these is dyed or red.
 HAIR_LINE, NATURAL = np.array([1.0, -0.9]), (0.4, 0.7)
+GREY = 0.3  # log R/G below which hair is rather grey in yellowish light than blond
 EYE_COLOURS: Mapping[str, str] = {
     "dark brown": "3a281f", "brown": "58402f", "hazel": "6a5a3e", "green": "67705a", "grey": "6d7274", "blue": "60788c",
 }  # fmt: skip  # sRGB
@@ -147,8 +148,9 @@ def hair_colour(seen: Floats, most: float = 0.0) -> Floats:
 
     `most` limits the logarithm of its luminance.
     """
-    along = max(float(seen[1:] @ HAIR_LINE / (HAIR_LINE @ HAIR_LINE)), 0.0) * HAIR_LINE
-    away = seen[1:] - along
+    brown = max(float(seen[1:] @ HAIR_LINE / (HAIR_LINE @ HAIR_LINE)), 0.0)
+    away = seen[1:] - brown * HAIR_LINE
+    along = brown * min(brown / GREY, 1.0) * HAIR_LINE
     kept = np.clip((np.linalg.norm(away) - NATURAL[0]) / (NATURAL[1] - NATURAL[0]), 0.0, 1.0)
     light = np.clip(min(seen[0] - SHINE, most), *np.log(HAIR_LIGHT))
     return np.array([light, *(along + kept * away)])
