@@ -138,7 +138,7 @@ def face(  # noqa: PLR0913 - one parameter a flag
     cache: Cache = None,
     model: Model = None,
 ) -> None:
-    """Build a head with the shape and skin of the person in videos, for `--face`."""
+    """Build a head with the shape, skin, hair and eyes of the person in videos, for `--face`."""
     check_suffix(out, "face")
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--model": model})
     from corpus_tools.dense.build_face import build_face
@@ -158,6 +158,7 @@ def face(  # noqa: PLR0913 - one parameter a flag
             f"95 % in {dense_basis.dense.n_modes(0.95)}, 99 % in {dense_basis.dense.n_modes(0.99)} "
             f"(landmarks alone: {dense_basis.sparse.n_modes(0.95)}, {dense_basis.sparse.n_modes(0.99)})"
         )
+    write_message(result.look.summary())
     write_message(f"wrote {out}: {result.n_videos} of {result.n_found} videos, landmark error {result.error_mm:.2f} mm")
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from corpus_tools.build_talker import NOT_STATED, PROVENANCE, read_provenance
 from corpus_tools.dense.adapt_head import adapt_head
+from corpus_tools.dense.light_cast import remove_cast
 from corpus_tools.dense.mesh_fit import (
     align_to_head,
     correct_lips_and_lids,
@@ -17,6 +18,7 @@ from corpus_tools.dense.mesh_fit import (
     select_consistent_landmarks,
 )
 from corpus_tools.dense.modes import MOST_MODES, DenseModel, add_modes, dense_model, mode_fitter
+from corpus_tools.dense.person_look import LookSampler, PersonLook, dress_head
 from corpus_tools.dense.skin_colour import average_skin_colours, build_picture_fitter
 from corpus_tools.dense.texture_painting import paint_skin
 from corpus_tools.dense.video_landmarks import find_videos, resting_landmarks, track_videos
@@ -38,11 +40,12 @@ CONTENT = "a head with the shape and, with the stated consent, the skin of a rea
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BuiltFace:
-    """Result of a build: videos used and found, mean distance of the landmarks from the talker's, dense model."""
+    """Result of a build: videos used and found, mean distance of the landmarks from the talker's, look, dense model."""
 
     n_videos: int
     n_found: int
     error_mm: float
+    look: PersonLook
     model: DenseModel | None = None
 
 
@@ -97,14 +100,18 @@ def build_face(
     canvas = build_canvas(shaped)
     fit = build_picture_fitter(shaped, canvas.opened, used)
     model = dense_model(shaped, mode_fitter(shaped, used), landmarks, talker, n_modes) if n_modes else None
-    painting = average_skin_colours(
+    sampler = LookSampler(fit)
+    skin = average_skin_colours(
         shaped,
         canvas,
         fit,
         landmarks,
-        lambda done, of: report(len(videos) + done * len(videos) // of, 2 * len(videos)),
+        on_frame=sampler.add,
+        on_progress=lambda done, of: report(len(videos) + done * len(videos) // of, 2 * len(videos)),
     )
-    face = paint_skin(shaped, canvas, painting)
+    look = sampler.look()
+    skin = replace(skin, colour=remove_cast(skin.colour, look.cast, look.skin))
+    face = dress_head(paint_skin(shaped, canvas, skin), look)
     words = ["tts2face", "corpus", "face", recordings.name, "--out", out.name]
     metadata = {
         **head.metadata,
@@ -112,6 +119,7 @@ def build_face(
         "licence": f"mesh: {head.metadata['licence']}; likeness of the person: {stated.get('licence', NOT_STATED)}",
         "attribution": "; ".join(filter(None, [head.metadata["attribution"], stated.get("attribution")])),
         "content": CONTENT,
+        "look": look.summary(),
         "consent": dict(consent),
         "command": shlex.join([*words, *(["--basis", str(n_modes)] if n_modes else [])]),
         "created": datetime.now(UTC).date().isoformat(),
@@ -121,4 +129,5 @@ def build_face(
     write_face(out, bake_occlusion(replace(face, metadata=metadata), available_cores()))
     reached = face_landmarks(shaped, shaped.vertices)[:N_MESH_LANDMARKS]
     again = align_to_head(talker, reached)
-    return BuiltFace(len(landmarks), len(videos), float(np.linalg.norm(again - reached, axis=1)[used].mean()), model)
+    error = float(np.linalg.norm(again - reached, axis=1)[used].mean())
+    return BuiltFace(len(landmarks), len(videos), error, look, model)

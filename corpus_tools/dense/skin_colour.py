@@ -1,6 +1,6 @@
 """The talker's skin colour, averaged over many frames: the dense mesh is fitted to each (eqs 3 and 4)."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,24 +19,20 @@ from tts2face.video.media import read_frames
 from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
+OnFrame = Callable[[NDArray[np.uint8], NDArray[np.float32]], None]
 
 N_FRAMES = 160  # averaged; a few dozen remove the noise of the pictures
 FACING_COSINES = (0.15, 0.75)  # cosine between normal and camera at which the weight of a texel starts and is full
 MIN_EYE_OPENING = 0.8  # of the median eye opening; frames with less are skipped
 REMAP_COLUMNS = 1024  # OpenCV maps pictures, not lists
-FOREHEAD_TOP, HAIR_REGION_MM = (
-    10,
-    (10.0, 28.0, 32.0),
-)  # landmark at the top of the forehead; hair above it: from, to, half width
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkinColours:
-    """Colour (P, 3) and weight (P,) of each texel, sRGB 0..255, and the hair's colour (3,), NaN where none is seen."""
+    """Colour (P, 3) and weight (P,) of each texel, sRGB 0..255."""
 
     colour: Floats
     weight: Floats
-    hair: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,14 +46,20 @@ class PictureFitter:
 
     def fit(self, points: NDArray[np.floating]) -> tuple[Floats, Floats]:
         """(V, 3) vertices, x right, y up, z towards the camera in pixels, and the (3, 3) rotation, for (478, 3)."""
-        wanted = points[self.used].astype(np.float64) * (1.0, -1.0, -1.0)
-        own = self.marks[self.used]
+        linear, shift, turn = self.pose(points)
+        left = self._wanted(points) - (self.marks[self.used] @ linear.T + shift)
+        placed: Floats = self.vertices @ linear.T + shift + self.spread @ left
+        return placed, turn
+
+    def pose(self, points: NDArray[np.floating]) -> tuple[Floats, Floats, Floats]:
+        """Scaled rotation (3, 3) and shift (3,) from the head to such pixels, and the rotation, for (478, 3)."""
+        wanted, own = self._wanted(points), self.marks[self.used]
         turns, scales = similarity_transforms(own[None], wanted, np.full(len(own), 1.0 / len(own)))
         linear = scales[0] * turns[0]
-        shift = wanted.mean(axis=0) - linear @ own.mean(axis=0)
-        left = wanted - (own @ linear.T + shift)
-        placed: Floats = self.vertices @ linear.T + shift + self.spread @ left
-        return placed, turns[0]
+        return linear, wanted.mean(axis=0) - linear @ own.mean(axis=0), turns[0]
+
+    def _wanted(self, points: NDArray[np.floating]) -> Floats:
+        return np.asarray(points[self.used], np.float64) * (1.0, -1.0, -1.0)
 
 
 def build_picture_fitter(face: Face, opened: Floats, used: NDArray[np.int64]) -> PictureFitter:
@@ -73,9 +75,15 @@ def build_picture_fitter(face: Face, opened: Floats, used: NDArray[np.int64]) ->
 
 
 def average_skin_colours(
-    face: Face, canvas: SkinCanvas, fit: PictureFitter, seen: Sequence[VideoLandmarks], on_progress: Progress
+    face: Face,
+    canvas: SkinCanvas,
+    fit: PictureFitter,
+    seen: Sequence[VideoLandmarks],
+    *,
+    on_frame: OnFrame,
+    on_progress: Progress,
 ) -> SkinColours:
-    """Colours from the frames of all videos that show open eyes.
+    """Colours from the frames of all videos that show open eyes; `on_frame` gets each picture and its landmarks.
 
     Raises
     ------
@@ -87,8 +95,6 @@ def average_skin_colours(
     normals = vertex_normals(face)
     own_normals = unit_vectors(np.einsum("pk,pkd->pd", weights, normals[corners]))
     total, weight = np.zeros((len(rows), 3)), np.zeros(len(rows))
-    hair: list[Floats] = []
-    crown = hair_vertices(face, fit, normals)
     for picture, points in select_frames(seen, on_progress):
         placed, turn = fit.fit(points)
         flat = placed[:, :2] * (1.0, -1.0)
@@ -96,15 +102,13 @@ def average_skin_colours(
         facing = smoothstep(own_normals @ turn[2], *FACING_COSINES) * inside
         total += facing[:, None] * colour
         weight += facing
-        found, is_inside = sample_picture(picture, flat[crown])
-        hair.append(found[is_inside])
+        on_frame(picture, points)
     if not weight.any():
         raise DataError("no frame shows the face with open eyes; give a video of the person looking at the camera")
     all_colours, all_weights = np.zeros((len(canvas.share), 3)), np.zeros(len(canvas.share))
     all_colours[rows] = total / np.maximum(weight, 1e-9)[:, None]
     all_weights[rows] = weight
-    strands = np.concatenate(hair)
-    return SkinColours(all_colours, all_weights, np.median(strands, axis=0) if len(strands) else np.full(3, np.nan))
+    return SkinColours(all_colours, all_weights)
 
 
 def select_frames(
@@ -134,19 +138,6 @@ def sample_picture(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, 
     found = cv2.remap(picture, grid[..., 0], grid[..., 1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
     inside = np.all((places >= 0) & (places <= (width - 1, height - 1)), axis=1)
     return found.reshape(-1, 3)[:n].astype(np.float64), inside
-
-
-def hair_vertices(face: Face, fit: PictureFitter, normals: Floats) -> NDArray[np.int64]:
-    """Vertices in the hair above the forehead that are visible from the front."""
-    offset = face.vertices - fit.marks[FOREHEAD_TOP]
-    low, high, half = HAIR_REGION_MM
-    is_hair = (
-        (offset[:, 1] > low)
-        & (offset[:, 1] < high)
-        & (np.abs(offset[:, 0]) < half)
-        & (normals[:, 2] > FACING_COSINES[0])
-    )
-    return np.flatnonzero(is_hair)
 
 
 def vertex_normals(face: Face) -> Floats:

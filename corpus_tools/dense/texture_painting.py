@@ -5,55 +5,53 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.dense.hair_region import OTHER_HUE
+from corpus_tools.dense.light_cast import encode_light, linear_light, log_colour
 from corpus_tools.dense.mesh_fit import face_landmarks
 from corpus_tools.dense.skin_colour import SkinColours, vertex_normals
 from corpus_tools.dense.texels import Texels
 from corpus_tools.dense.visible_texels import SkinCanvas, soften_edges
 from tts2face.models.face import Face, Texture
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
 from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
 
 LUMA = np.array([0.299, 0.587, 0.114])  # ITU-R BT.601
 SKIN_LUMA = 0.72  # of the head's median skin; darker texels are brows, lashes, nostrils or hair
-HAIR_LUMA = (55.0, 115.0)  # of the head's texture: hair alone, and skin alone
+LASH_LUMA = (55.0, 115.0)  # of the head's texture: roots of lashes alone, and skin alone
 TINT_REACH_MM = 14.0  # reach over which unseen skin takes the tint of the seen skin beside it
 TINT_BOUNDS = (0.35, 1.6)
 SHADE_BOUNDS = (0.75, 1.35)  # limits of the shading correction; more would amplify noise at the rim
 BROW_LANDMARKS = (105, 66, 334, 296)  # upper edges
-FRINGE_MM = (2.0, 7.0)  # above the brows: dark texels count as hair from the first, fully from the second
+NOSE_BASE = 2  # landmark; beside the face, strands are searched for above it, since a beard is below
+# Above the brows, and beside the outer corners of the eyes: dark texels count as hair from the first, fully from the
+# second.
+FRINGE_MM = (2.0, 7.0)
 STRAND_TEXELS = 25  # about 4 mm of the forehead, for the shadow around a strand
+FRINGE_HUE = (1.0, 1.6)  # of `OTHER_HUE` from the median skin: up to the first skin, from the second hair
 FRINGE_LUMA = (0.78, 0.95)  # of the median skin: up to the first hair, from the second skin
+EVEN_TEXELS, EVEN_SHARE = 50.0, 0.7  # about 8 mm, Gaussian; share of slow variations of log B/G that is removed
 N_SAMPLES = 1500  # sample of the seen texels
 SHARP_TEXELS, SHARP_GAIN = 4.0, 0.7  # unsharp masking, Gaussian of this deviation
 MIN_TEXEL_WEIGHT = 0.02  # of the largest weight: texels below it are blended
 
 
 def paint_skin(face: Face, canvas: SkinCanvas, skin: SkinColours) -> Face:
-    """The face with the talker's texture and hair colour."""
+    """The face with the talker's texture."""
     texels = canvas.texels
     base = canvas.texture[texels.rows, texels.columns].astype(np.float64)
     share = canvas.share * smoothstep(skin.weight / skin.weight.max(), 0.0, MIN_TEXEL_WEIGHT)
     own = _remove_shading(canvas.texels.interpolate(vertex_normals(face)), skin.colour, share)
+    own = _even_yellow(canvas, own, share)
     share = soften_edges(_remove_fringe(face, canvas, own, share), texels, len(canvas.texture))
-    hair = 1.0 - smoothstep(base @ LUMA, *HAIR_LUMA)
+    dark = 1.0 - smoothstep(base @ LUMA, *LASH_LUMA)
     tint = _skin_tint(face, canvas, own / np.maximum(base, 1.0), (share, base @ LUMA))
-    usual = np.median(base[hair > 0.9], axis=0) if (hair > 0.9).any() else np.ones(3)
-    strands = np.clip(skin.hair / np.maximum(usual, 1.0), *TINT_BOUNDS) if np.isfinite(skin.hair).all() else np.ones(3)
-    tint = tint * (1 - hair)[:, None] + strands * hair[:, None]
+    tint = tint * (1 - dark)[:, None] + dark[:, None]
     tint[canvas.in_mouth] = 1.0
     own = sharpen(own, share, texels, len(canvas.texture))
     colour = share[:, None] * own + (1 - share)[:, None] * base * tint
-    colours = face.colours.astype(np.float64)
-    for part in face.parts:
-        if part.name.startswith("hair"):
-            rows = np.unique(face.triangles[part.first : part.first + part.count])
-            colours[rows] *= strands
-    return replace(
-        face,
-        textures=(Texture(_fill_texture(canvas.texture, texels, colour)), *face.textures[1:]),
-        colours=np.rint(np.clip(colours, 0, 255)).astype(np.uint8),
-    )
+    return replace(face, textures=(Texture(_fill_texture(canvas.texture, texels, colour)), *face.textures[1:]))
 
 
 def _remove_shading(normals: Floats, colour: Floats, share: Floats) -> Floats:
@@ -72,23 +70,44 @@ def _remove_shading(normals: Floats, colour: Floats, share: Floats) -> Floats:
     return flat
 
 
+def _even_yellow(canvas: SkinCanvas, own: Floats, share: Floats) -> Floats:
+    """Colours (P, 3) with less of the yellow and blue that vary slowly over skin: light of lamps and walls.
+
+    Redness, which varies over a face by nature, and luminance stay.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    colours = log_colour(own)
+    luma = own @ LUMA
+    weight = share * (luma > SKIN_LUMA * np.median(luma[share > 0.5]))
+    usual = np.median(colours[weight > 0.5, 2])
+    texels, planes = canvas.texels, np.zeros((2, *canvas.texture.shape[:2]))
+    planes[:, texels.rows, texels.columns] = weight, weight * (colours[:, 2] - usual)
+    near, off = (gaussian_filter(plane, EVEN_TEXELS)[texels.rows, texels.columns] for plane in planes)
+    colours[:, 2] -= EVEN_SHARE * off / np.maximum(near, 0.1)
+    return 255.0 * encode_light(linear_light(colours))
+
+
 def _shading_terms(normals: Floats) -> Floats:
     x, y, z = normals.T
     return np.column_stack([x, y, z, x * y, x * z, y * z, x * x - y * y])
 
 
 def _remove_fringe(face: Face, canvas: SkinCanvas, own: Floats, share: Floats) -> Floats:
-    """Shares (P,) without the dark strands of hair over the forehead."""
+    """Shares (P,) without the strands of hair over the forehead and beside the eyes."""
     from scipy.ndimage import gaussian_filter, minimum_filter
 
     marks = face_landmarks(face, face.vertices)
-    above = canvas.texels.interpolate(face.vertices.astype(np.float64))[:, 1] - float(
-        marks[list(BROW_LANDMARKS), 1].max()
-    )
+    places = canvas.texels.interpolate(face.vertices.astype(np.float64))
+    above = places[:, 1] - float(marks[list(BROW_LANDMARKS), 1].max())
+    beside = np.abs(places[:, 0]) - float(np.abs(marks[[EYE_OUTER_RIGHT, EYE_OUTER_LEFT], 0]).mean())
+    beside[places[:, 1] < marks[NOSE_BASE, 1]] = 0.0
     luma = own @ LUMA
     usual = float(np.median(luma[share > 0.5]))
-    clear = smoothstep(luma / usual, *FRINGE_LUMA)
-    near = 1.0 - smoothstep(above, *FRINGE_MM)
+    hue = log_colour(own)[:, 1:]
+    off = np.linalg.norm(hue - np.median(hue[share > 0.5], axis=0), axis=1) / OTHER_HUE
+    clear = smoothstep(luma / usual, *FRINGE_LUMA) * (1.0 - smoothstep(off, *FRINGE_HUE))
+    near = 1.0 - np.maximum(smoothstep(above, *FRINGE_MM), smoothstep(beside, *FRINGE_MM))
     picture = np.ones(canvas.texture.shape[:2])
     picture[canvas.texels.rows, canvas.texels.columns] = np.maximum(clear, near)
     grown = gaussian_filter(minimum_filter(picture, STRAND_TEXELS), STRAND_TEXELS / 3)

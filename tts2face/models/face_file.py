@@ -248,10 +248,6 @@ def _apply_identity(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapp
     displacement = arrays[f"identity{number}"] * arrays[f"identity{number}_step"][0]
     name, tints, _ = header["identities"][number]
     hairdo = header.get("hairdos", {}).get(name)
-    colours = face.colours.copy()
-    for part in face.parts:
-        used = np.unique(face.triangles[part.first : part.first + part.count])
-        colours[used] = np.clip(face.colours[used] * _tint(tints, part), 0, 255).astype(np.uint8)
     eyes = [
         replace(
             eye, centre=eye.centre + displacement[eye.first : eye.first + eye.count].mean(axis=0).astype(np.float32)
@@ -259,14 +255,21 @@ def _apply_identity(face: Face, arrays: Mapping[str, NDArray[Any]], header: Mapp
         for eye in face.eyes
     ]
     return replace(
-        face,
+        tint_parts(face, tints),
         vertices=(face.vertices + displacement).astype(np.float32),
         eyes=tuple(eyes),
-        colours=colours,
-        textures=Late(len(face.textures), lambda: _tinted(face, tints)),
         hairdo=face.hairdo if hairdo is None else Hairdo(*hairdo),
         metadata={**face.metadata, "identity": name},
     )
+
+
+def tint_parts(face: Face, tints: Mapping[str, Any]) -> Face:
+    """A face whose parts, by name, have their sRGB colours multiplied by three factors, of vertices and textures."""
+    colours = face.colours.copy()
+    for part in face.parts:
+        used = np.unique(face.triangles[part.first : part.first + part.count])
+        colours[used] = np.clip(face.colours[used] * _tint(tints, part), 0, 255).astype(np.uint8)
+    return replace(face, colours=colours, textures=Late(len(face.textures), lambda: _tinted(face, tints)))
 
 
 def _tint(tints: Mapping[str, Any], part: Part) -> NDArray[np.float32]:

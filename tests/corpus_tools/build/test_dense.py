@@ -172,6 +172,9 @@ def test_a_talkers_head(
     assert face.shape_names == head.shape_names
     assert face.textures
     assert head.textures
+    assert built.look.length in ("short", "long")  # of the recorded man, of the rendered woman
+    assert face.hairdo == built.look.hairdo
+    assert face.metadata["look"] == built.look.summary()
     canvas = build_canvas(face)
     rows, columns = canvas.texels.rows[canvas.in_mouth], canvas.texels.columns[canvas.in_mouth]
     difference = face.textures[0].pixels[rows, columns].astype(int) - head.textures[0].pixels[rows, columns]

@@ -1,0 +1,247 @@
+"""What a person's head gets from videos besides shape and skin: light, hair, eyes, brows and shirt."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.dense.hair_region import (
+    ACROSS_MM,
+    OFF_BACKGROUND,
+    UP_MM,
+    Portrait,
+    SeenHair,
+    find_hair,
+    portrait_grid,
+)
+from corpus_tools.dense.light_cast import (
+    MIN_IRIS_PX,
+    SCLERA_CHROMA,
+    EyeColours,
+    clear_iris,
+    estimate_cast,
+    log_colour,
+    median_eyes,
+    sample_eyes,
+    srgb_colour,
+)
+from corpus_tools.dense.mesh_fit import part_vertices
+from corpus_tools.dense.skin_colour import PictureFitter, sample_picture
+from corpus_tools.dense.texels import find_texels
+from tts2face.models.face import Face, Hairdo
+from tts2face.models.face_file import tint_parts
+from tts2face.models.hair import HAIR_COLOURS, parse_hair_colour
+from tts2face.models.landmarks import CHIN
+
+Floats = NDArray[np.float64]
+
+HAIRCUTS: Mapping[str, str] = {  # by length class
+    "bald": "bald", "cropped": "cropped", "flat": "short01", "short": "short02", "bob": "bob02", "long": "long01",
+}  # fmt: skip
+UNSEEN, UNSEEN_HAIR = "flat", "dark-brown"  # class and colour where the top of the head is outside of the picture
+HAIR_LIGHT = (0.005, 0.36)  # luminance of the darkest and lightest hair
+CROPPED_LIGHT = -1.2  # most luminance of cropped hair, of the skin's, logarithm: what is seen is hair and skin mixed
+SHINE = 0.5  # logarithm by which hair in a picture is lighter than its colour; median of rendered haircuts
+# Natural hair lies on a line of log R/G and B/G, from black and grey to brown and blond: browner by so much bluer less.
+# Casts of cameras and walls lead off it; what is further off than these is dyed or red.
+HAIR_LINE, NATURAL = np.array([1.0, -0.9]), (0.4, 0.7)
+GREY = 0.3  # log R/G below which hair is rather grey in yellowish light than blond
+EYE_COLOURS: Mapping[str, str] = {
+    "dark brown": "3a281f", "brown": "58402f", "hazel": "6a5a3e", "green": "67705a", "grey": "6d7274", "blue": "60788c",
+}  # fmt: skip  # sRGB
+NEUTRAL_IRIS = "58402f"
+IRIS_LIGHT, DARK_IRIS, DARK_IRIS_HUE = 0.012, 0.02, (0.55, -0.55)  # least luminance; up to which irises are brown
+BROWN_FROM, BROWN_SLOPE, BROWN_LIGHT = -0.45, -0.6, 0.05  # log B/G of brown irises, their least R/G, most luminance
+BROW_LIGHT = -1.9  # most luminance of brows, of the skin's, logarithm
+ROOT_MM, LASH_MM = 0.7, 10.0  # off the skin: roots of lashes, and lashes that are shown
+LASH_LENGTH = 0.55  # of the default head's, which are a made-up woman's
+NEUTRAL_SHIRT = "6a6b6d"
+SHIRT_MM, SHIRT_SPREAD, MIN_SHIRT_CELLS = 30.0, 0.5, 60  # below the chin; deviation of its luminance, logarithm
+SHIRT_HUE, SHIRT_LIGHT, VIVID_SHADE = (
+    0.35,
+    (0.03, 0.2),
+    0.25,
+)  # share of its colour that is kept, bounds of its luminance
+NAMING_LIGHT = 0.5  # weight of luminance beside hue where a colour is named
+PLAIN_CAST = 0.03  # logarithm up to which light is called neutral
+MIN_SHARE = 0.3  # of the frames that show a cell of the portrait
+TINT_LIMITS = (0.25, 4.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PersonLook:
+    """Cast of the light (2,), colour of the skin in it (3,), and colours, sRGB (3,), of iris, brows and shirt."""
+
+    cast: Floats
+    skin: Floats
+    hairdo: Hairdo
+    length: str
+    iris: NDArray[np.uint8]
+    brows: NDArray[np.uint8]
+    shirt: NDArray[np.uint8]
+    notes: tuple[str, ...] = ()
+
+    def summary(self) -> str:
+        """One line for people; warm light lacks that share of blue, beside red, cold light of red, beside blue."""
+        hair = self.length if self.length == "bald" else f"{self.length}, {_hair_word(self.hairdo.colour)}"
+        warmth = float(self.cast[0] - self.cast[1])
+        light = "neutral"
+        if abs(warmth) > PLAIN_CAST:
+            light = f"{-np.expm1(-abs(warmth)):.0%} {'warm' if warmth > 0 else 'cold'}, corrected".replace("%", " %")
+        eyes = _nearest(log_colour(self.iris.astype(np.float64)), EYE_COLOURS)
+        return "; ".join([f"hair: {hair}", f"eyes: {eyes}", f"light: {light}", *self.notes])
+
+
+@dataclass(slots=True, eq=False)
+class LookSampler:
+    """Collects what frames show of a person, whose head a fitter places in them."""
+
+    fit: PictureFitter
+    portraits: list[NDArray[np.float32]] = field(default_factory=list)
+    eyes: list[EyeColours] = field(default_factory=list)
+
+    def add(self, picture: NDArray[np.uint8], points: NDArray[np.floating]) -> None:
+        """Sample one frame (H, W, 3) with its landmarks (478, 3) in pixels."""
+        linear, shift, _ = self.fit.pose(points)
+        places = portrait_grid(self.fit.marks) @ linear.T + shift
+        colours, inside = sample_picture(picture, places[:, :2] * (1.0, -1.0))
+        colours[~inside] = np.nan
+        self.portraits.append(colours.astype(np.float32))
+        self.eyes.append(sample_eyes(picture, points))
+
+    def look(self) -> PersonLook:
+        """The look of the person in all frames."""
+        grid = np.array(self.portraits)
+        known = np.isfinite(grid[:, :, 0]).mean(axis=0) > MIN_SHARE
+        middle = np.full(grid.shape[1:], np.nan)
+        middle[known] = np.nanmedian(grid[:, known], axis=0)
+        portrait = Portrait(middle.reshape(len(UP_MM), len(ACROSS_MM), 3), self.fit.marks)
+        eyes = median_eyes(self.eyes)
+        cast = estimate_cast(eyes)
+        hair = find_hair(portrait, eyes.skin)
+        colour, code = log_colour(255.0 * parse_hair_colour(UNSEEN_HAIR)), UNSEEN_HAIR
+        if np.isfinite(hair.colour).all():
+            most = eyes.skin[0] + CROPPED_LIGHT if hair.length == "cropped" else 0.0
+            colour = hair_colour(neutral(hair.colour, cast), most)
+            code = "#{:02x}{:02x}{:02x}".format(*srgb_colour(colour).tolist())
+        length, notes = hair.length or UNSEEN, [] if hair.length else ["top of the head not seen"]
+        iris = srgb_colour(iris_colour(eyes, cast))
+        if eyes.radius_px < MIN_IRIS_PX or not np.isfinite(eyes.iris).all():
+            iris = parse_hex(NEUTRAL_IRIS)
+            notes.append("eyes too small to tell their colour")
+        brows = np.array([min(colour[0], eyes.skin[0] + BROW_LIGHT), *colour[1:]])
+        return PersonLook(
+            cast, eyes.skin, Hairdo(HAIRCUTS[length], code), length, iris, srgb_colour(brows),
+            shirt_colour(portrait, hair, cast), tuple(notes),
+        )  # fmt: skip
+
+
+def neutral(colour: Floats, cast: Floats) -> Floats:
+    """A colour (..., 3), `log_colour`, without a cast of the light."""
+    clean: Floats = colour - np.concatenate([[0.0], cast])
+    return clean
+
+
+def hair_colour(seen: Floats, most: float = 0.0) -> Floats:
+    """Colour of hair (3,), `log_colour`, that looks as `seen` in neutral light: natural colours are kept natural.
+
+    `most` limits the logarithm of its luminance.
+    """
+    brown = max(float(seen[1:] @ HAIR_LINE / (HAIR_LINE @ HAIR_LINE)), 0.0)
+    away = seen[1:] - brown * HAIR_LINE
+    along = brown * min(brown / GREY, 1.0) * HAIR_LINE
+    kept = np.clip((np.linalg.norm(away) - NATURAL[0]) / (NATURAL[1] - NATURAL[0]), 0.0, 1.0)
+    light = np.clip(min(seen[0] - SHINE, most), *np.log(HAIR_LIGHT))
+    return np.array([light, *(along + kept * away)])
+
+
+def iris_colour(eyes: EyeColours, cast: Floats) -> Floats:
+    """Colour of the iris (3,), `log_colour`, in neutral light: the mean by the cast and by the white of the eye."""
+    clear = clear_iris(eyes)
+    by_cast = neutral(clear, cast)
+    by_white = clear[1:] - eyes.sclera[1:] + SCLERA_CHROMA
+    red, blue = (by_cast[1:] + by_white) / 2 if np.isfinite(by_white).all() else by_cast[1:]
+    light = max(by_cast[0], np.log(IRIS_LIGHT))
+    if light < np.log(DARK_IRIS):
+        return np.array([light, *DARK_IRIS_HUE])
+    if blue < BROWN_FROM:
+        return np.array([min(light, np.log(BROWN_LIGHT)), max(red, BROWN_SLOPE * blue), blue])
+    return np.array([light, red, blue])
+
+
+def shirt_colour(portrait: Portrait, hair: SeenHair, cast: Floats) -> NDArray[np.uint8]:
+    """Muted colour of the clothes below the neck, sRGB; a neutral grey where they are not clearly seen."""
+    from scipy.spatial import cKDTree
+
+    known = np.isfinite(portrait.srgb[..., 0])
+    low = known & (UP_MM[:, None] < portrait.marks[CHIN, 1] - SHIRT_MM) & ~hair.region & ~hair.other
+    colours = log_colour(np.nan_to_num(portrait.srgb))
+    if low.sum() < MIN_SHIRT_CELLS:
+        return parse_hex(NEUTRAL_SHIRT)
+    beyond = cKDTree(colours[hair.other & (UP_MM[:, None] > portrait.marks[CHIN, 1])])
+    cloth = colours[low][beyond.query(colours[low])[0] > OFF_BACKGROUND]
+    if len(cloth) < MIN_SHIRT_CELLS or np.median(np.abs(cloth[:, 0] - np.median(cloth[:, 0]))) > SHIRT_SPREAD:
+        return parse_hex(NEUTRAL_SHIRT)
+    light, *hue = np.median(cloth, axis=0)
+    vivid = float(np.linalg.norm(hue))
+    clean = np.array(hue) - cast * np.exp(-vivid)  # a clipped channel has no cast
+    most = np.log(SHIRT_LIGHT[1]) - VIVID_SHADE * vivid
+    return srgb_colour(np.array([np.clip(light, np.log(SHIRT_LIGHT[0]), most), *(SHIRT_HUE * clean)]))
+
+
+def dress_head(face: Face, look: PersonLook) -> Face:
+    """The head with iris, brows, shirt and hairdo of a look, and lashes of a length that suits everyone."""
+    tints = {}
+    for name, wanted in (("iris", look.iris), ("brows", look.brows), ("shirt", look.shirt)):
+        n_times = sum(part.name == name and part.is_textured for part in face.parts)  # eyes share their texels
+        factors = np.clip(wanted / np.maximum(part_colour(face, name), 1.0), *TINT_LIMITS) ** (1 / max(n_times, 1))
+        tints[name] = (float(factors[0]), float(factors[1]), float(factors[2]))
+    return replace(tint_parts(shorten_lashes(face, LASH_LENGTH), tints), hairdo=look.hairdo)
+
+
+def shorten_lashes(face: Face, length: float) -> Face:
+    """The face with lashes of a share of their length, at rest and in all shapes; sets that are not shown stay."""
+    from scipy.spatial import cKDTree
+
+    lashes, skin = part_vertices(face, ("lashes",)), part_vertices(face, ("skin",))
+    off = cKDTree(face.vertices[skin]).query(face.vertices[lashes])[0]
+    roots, rest = lashes[off < ROOT_MM], lashes[(off >= ROOT_MM) & (off < LASH_MM)]
+    nearest = roots[cKDTree(face.vertices[roots]).query(face.vertices[rest])[1]]
+    vertices, shapes = face.vertices.copy(), face.shapes.copy()
+    vertices[rest] = vertices[nearest] + length * (vertices[rest] - vertices[nearest])
+    shapes[:, rest] = shapes[:, nearest] + length * (shapes[:, rest] - shapes[:, nearest])
+    return replace(face, vertices=vertices, shapes=shapes)
+
+
+def part_colour(face: Face, name: str) -> Floats:
+    """Mean colour (3,) of a part, sRGB 0..255: of the brighter half of its texels, or of its vertices."""
+    part = next(part for part in face.parts if part.name == name)
+    triangles = face.triangles[part.first : part.first + part.count].astype(np.int64)
+    if not part.is_textured or part.cutout or face.uv is None:
+        return np.asarray(face.colours[np.unique(triangles)].astype(np.float64).mean(axis=0))
+    pixels = face.textures[part.texture].pixels
+    texels = find_texels(face.uv.astype(np.float64), triangles, len(pixels))
+    colours = pixels[texels.rows, texels.columns].astype(np.float64)
+    light = colours.sum(axis=1)
+    return np.asarray(colours[light > np.median(light)].mean(axis=0))
+
+
+def parse_hex(digits: str) -> NDArray[np.uint8]:
+    """8-bit sRGB (3,) of rrggbb."""
+    return np.array([int(digits[at : at + 2], 16) for at in (0, 2, 4)], np.uint8)
+
+
+def _hair_word(colour: str) -> str:
+    found = log_colour(255.0 * parse_hair_colour(colour))
+    return _nearest(found, HAIR_COLOURS).replace("-", " ")
+
+
+def _nearest(colour: Floats, names: Mapping[str, str]) -> str:
+    """The name whose colour, rrggbb, is nearest."""
+
+    def distance(name: str) -> float:
+        off = colour - log_colour(parse_hex(names[name]).astype(np.float64))
+        return float(np.linalg.norm(off * (NAMING_LIGHT, 1.0, 1.0)))
+
+    return min(names, key=distance)

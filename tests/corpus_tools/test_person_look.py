@@ -1,0 +1,234 @@
+"""What heads of people get from pictures: drawn people whose light, hair, eyes and clothes are known."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from corpus_tools.dense.hair_region import ACROSS_MM, UP_MM, Portrait, find_hair
+from corpus_tools.dense.light_cast import EyeColours, estimate_cast, log_colour, remove_cast, srgb_colour
+from corpus_tools.dense.mesh_fit import face_landmarks, part_vertices
+from corpus_tools.dense.person_look import (
+    LASH_LENGTH,
+    LookSampler,
+    PersonLook,
+    dress_head,
+    hair_colour,
+    parse_hex,
+    part_colour,
+    shorten_lashes,
+)
+from corpus_tools.dense.skin_colour import PictureFitter
+from tests.face.posing import posed_vertices
+from tts2face.colour import decode_srgb, encode_srgb
+from tts2face.models.face import Face, Hairdo
+from tts2face.models.face_file import read_face
+from tts2face.models.face_loading import load_face
+from tts2face.models.hair import HAIR_COLOURS, parse_hair_colour
+from tts2face.models.landmarks import N_LANDMARKS, N_MESH_LANDMARKS
+from tts2face.render.camera import camera_matrices
+from tts2face.render.camera_views import parse_camera
+from tts2face.render.draw import draw
+from tts2face.render.picture import Picture
+from tts2face.storage.files import find_file
+
+CAMERA, SIDE_PX = "0,0,900", 448
+FOREHEAD_MM = 8.0  # by which the tracker sees the top of the forehead above the drawn people's own landmark
+SKINS = ((232, 190, 172), (198, 134, 102), (141, 85, 60), (84, 52, 39))  # light to dark, in neutral light
+WHITE = (188, 182, 176)
+NO_COLOUR = np.full(3, np.nan)
+SHORT, LONG = ("bald", "cropped", "flat", "short"), ("bob", "long")
+
+
+@pytest.fixture(scope="module")
+def head() -> Face:
+    return read_face(find_file("head", "face"))
+
+
+@cache
+def seen_look(
+    identity: str | None, hair: str | None, colour: str | None, gains: tuple[float, ...] = (1, 1, 1)
+) -> PersonLook:
+    """Look of a drawn person in one picture, in light that multiplies red, green and blue."""
+    person, bare = (
+        load_face("head", identity, hair=hair, hair_color=colour),
+        read_face(find_file("head", "face"), identity),
+    )
+    picture = draw(
+        person, np.zeros(len(person.shape_names)), picture=Picture(size=f"{SIDE_PX}x{SIDE_PX}", camera=CAMERA)
+    )
+    lit = encode_srgb(decode_srgb(picture / 255.0) * gains)
+    lens = camera_matrices(parse_camera(CAMERA), person, (SIDE_PX, SIDE_PX))
+    marks = face_landmarks(bare, bare.vertices.astype(np.float64))[:N_LANDMARKS]
+    marks[10, 1] += FOREHEAD_MM
+    across, down, ahead = (marks @ lens.view[:, :3].T + lens.view[:, 3]).T
+    scale = lens.lens[0] / ahead
+    points = np.column_stack([across * scale + lens.lens[1], down * scale + lens.lens[2], ahead * scale.mean()])
+    used = np.arange(N_MESH_LANDMARKS)
+    sampler = LookSampler(PictureFitter(bare.vertices.astype(np.float64), marks[used], used, np.zeros((1, 1))))
+    sampler.add(lit, points)
+    return sampler.look()
+
+
+def test_colours_return_from_their_logarithms() -> None:
+    colours = np.array([*SKINS, WHITE, (20, 16, 14), (250, 40, 70)], np.float64)
+    np.testing.assert_allclose(srgb_colour(log_colour(colours)), colours, atol=1)
+
+
+@pytest.mark.parametrize("skin", SKINS)
+def test_a_cast_is_found_on_every_tone_of_skin(skin: tuple[int, ...]) -> None:
+    gains = np.array([1.15, 1.0, 0.55])
+    lit = [255.0 * _encoded(decode_srgb(np.array(colour) / 255.0) * gains) for colour in (skin, WHITE)]
+    eyes = EyeColours(log_colour(lit[0]), log_colour(lit[1]), NO_COLOUR, 8.0)
+    cast = estimate_cast(eyes)
+    np.testing.assert_allclose(cast, np.log(gains[[0, 2]]), atol=0.25)
+    before, after = log_colour(lit[0]), log_colour(remove_cast(lit[0], cast, eyes.skin))
+    assert after[0] == pytest.approx(before[0], abs=0.01)  # as light or dark as it was
+    np.testing.assert_allclose(after[1:], log_colour(np.array(skin, np.float64))[1:], atol=0.25)
+
+
+@pytest.mark.parametrize("skin", SKINS)
+def test_neutral_light_is_left_as_it_is(skin: tuple[int, ...]) -> None:
+    colours = [log_colour(np.array(colour, np.float64)) for colour in (skin, WHITE)]
+    np.testing.assert_allclose(estimate_cast(EyeColours(*colours, NO_COLOUR, 8.0)), 0.0, atol=0.08)
+
+
+def test_red_eyes_alone_are_no_red_light() -> None:
+    skin, white = (log_colour(np.array(colour, np.float64)) for colour in (SKINS[1], WHITE))
+    red = EyeColours(skin, white + np.array([0.0, 0.6, -0.2]), NO_COLOUR, 8.0)
+    assert np.abs(estimate_cast(red)).max() < 0.08
+
+
+def test_without_white_of_the_eye_half_of_the_skins_cast_is_corrected() -> None:
+    skin = log_colour(np.array(SKINS[1], np.float64)) + np.array([0.0, 0.0, -0.8])
+    alone = estimate_cast(EyeColours(skin, NO_COLOUR, NO_COLOUR, 2.0))
+    assert -0.45 < alone[1] < -0.3
+
+
+def _encoded(light: np.ndarray) -> np.ndarray:
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def painted_portrait(
+    head: Face, wall: tuple[int, ...], hair: tuple[int, ...], lowest_mm: float, top_mm: float
+) -> Portrait:
+    """A face of plain skin before a wall, with hair to a height beside it and above the forehead."""
+    marks = face_landmarks(head, head.vertices.astype(np.float64))[:N_MESH_LANDMARKS]
+    across, up = np.meshgrid(ACROSS_MM, UP_MM)
+    picture = np.tile(np.array(wall, np.float64), (*across.shape, 1))
+    forehead, chin = marks[10, 1], marks[152, 1]
+    skull = (across / 78) ** 2 + ((up - forehead + 60) / (60 + top_mm)) ** 2 < 1
+    beside = (np.abs(across) < 95) & (up > chin - lowest_mm) & (up < forehead)
+    if top_mm:
+        picture[skull & (up > chin - lowest_mm) | beside] = hair
+    face = (across / 66) ** 2 + ((up + 20) / 92) ** 2 < 1
+    picture[face & (up < forehead + 6) | (np.abs(across) < 40) & (up < chin + 20)] = SKINS[1]
+    if not top_mm:
+        picture[(across / 66) ** 2 + ((up + 20) / 132) ** 2 < 1] = SKINS[1]
+    return Portrait(picture + np.random.default_rng(0).normal(0, 2, picture.shape), marks)
+
+
+@pytest.mark.parametrize(
+    ("lowest_mm", "top_mm", "lengths"),
+    [(-95.0, 0.0, ("bald",)), (-95.0, 75.0, ("short",)), (-20.0, 75.0, ("bob",)), (45.0, 75.0, ("long",))],
+)
+def test_hair_is_measured_to_where_it_ends(
+    head: Face, lowest_mm: float, top_mm: float, lengths: tuple[str, ...]
+) -> None:
+    found = find_hair(
+        painted_portrait(head, (70, 120, 170), (60, 42, 30), lowest_mm, top_mm), log_colour(np.array(SKINS[1], float))
+    )
+    assert found.length in lengths
+    if top_mm:
+        np.testing.assert_allclose(srgb_colour(found.colour), (60, 42, 30), atol=3)
+
+
+def test_a_wall_in_the_colour_of_the_hair_is_no_long_hair(head: Face) -> None:
+    portrait = painted_portrait(head, (58, 43, 33), (60, 42, 30), -95.0, 75.0)
+    assert find_hair(portrait, log_colour(np.array(SKINS[1], float))).length in SHORT
+
+
+def test_a_head_cut_by_the_pictures_edge_has_no_length(head: Face) -> None:
+    portrait = painted_portrait(head, (70, 120, 170), (60, 42, 30), -95.0, 75.0)
+    cut = portrait.srgb.copy()
+    cut[portrait.marks[10, 1] + 8 < UP_MM] = np.nan
+    assert find_hair(replace(portrait, srgb=cut), log_colour(np.array(SKINS[1], float))).length == ""
+
+
+@pytest.mark.parametrize("name", HAIR_COLOURS)
+def test_natural_hair_keeps_its_hue(name: str) -> None:
+    colour = log_colour(255.0 * parse_hair_colour(name))
+    np.testing.assert_allclose(hair_colour(colour)[1:], colour[1:], atol=0.3)
+
+
+def test_olive_hair_becomes_grey_and_blue_hair_stays_blue() -> None:
+    olive, blue = (log_colour(np.array(colour, float)) for colour in ((120, 124, 96), (40, 60, 160)))
+    assert 0.0 < hair_colour(olive)[1] < 0.35
+    np.testing.assert_allclose(hair_colour(blue)[1:], blue[1:], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("identity", "hair", "colour", "lengths", "names"),
+    [
+        (None, "long01", "brown", ("long",), ("brown", "dark-brown")),
+        ("erik", "short02", "dark-blond", ("short",), ("dark-blond", "light-brown")),
+        ("mei", "bob02", "blond", ("bob",), ("blond",)),
+        ("kofi", "bald", None, ("bald",), ()),
+        ("walter", "bald", None, ("bald",), ()),
+        ("kofi", "cropped", "black", ("cropped", "flat"), ("black", "dark-brown")),
+        ("kenji", "short01", "black", ("flat", "short"), ("black",)),
+        ("ingrid", "bob02", "white", ("bob",), ("white", "grey")),
+    ],
+)
+def test_drawn_peoples_hair_is_found(
+    identity: str | None, hair: str, colour: str | None, lengths: tuple[str, ...], names: tuple[str, ...]
+) -> None:
+    look = seen_look(identity, hair, colour)
+    assert look.length in lengths
+    if names:
+        found = log_colour(255.0 * parse_hair_colour(look.hairdo.colour))
+        off = {name: np.linalg.norm(found - log_colour(255.0 * parse_hair_colour(name))) for name in HAIR_COLOURS}
+        assert min(off, key=off.__getitem__) in names
+
+
+@pytest.mark.parametrize("gains", [(1.25, 1.0, 0.6), (0.9, 1.0, 1.35)])
+@pytest.mark.parametrize("identity", ["erik", "kofi", "mei"])
+def test_a_coloured_light_is_told_from_drawn_people(identity: str, gains: tuple[float, float, float]) -> None:
+    plain, lit = seen_look(identity, None, None), seen_look(identity, None, None, gains)
+    assert lit.cast[1] - plain.cast[1] == pytest.approx(np.log(gains[2]), abs=0.2)
+    assert np.sign(lit.cast[1]) == np.sign(np.log(gains[2]))
+    assert lit.length == plain.length
+
+
+def test_blue_eyes_are_blue_and_dark_eyes_brown() -> None:
+    blue, dark = seen_look("erik", None, None).iris.astype(int), seen_look("amara", None, None).iris.astype(int)
+    assert blue[2] > blue[0] + 8
+    assert dark[0] > dark[2]
+    assert blue.sum() > 2 * dark.sum()
+
+
+def test_a_head_is_drawn_as_the_person_looks(head: Face) -> None:
+    look = replace(seen_look("ravi", None, None), iris=parse_hex("58402f"), shirt=parse_hex("6a6b6d"))
+    dressed = dress_head(head, look)
+    assert dressed.hairdo == look.hairdo == Hairdo("short02", look.hairdo.colour)
+    np.testing.assert_allclose(part_colour(dressed, "iris"), look.iris, atol=3)
+    np.testing.assert_allclose(part_colour(dressed, "shirt"), look.shirt, atol=2)
+    np.testing.assert_array_equal(dressed.textures[0].pixels, head.textures[0].pixels)
+    assert "hair: short, black; eyes: brown; light: " in look.summary()
+
+
+def test_lashes_become_shorter_and_still_follow_the_lids(head: Face) -> None:
+    short, lashes = shorten_lashes(head, LASH_LENGTH), part_vertices(head, ("lashes",))
+    moved = np.linalg.norm(short.vertices - head.vertices, axis=1)
+    assert moved[lashes].max() > 2.0
+    assert moved[np.setdiff1d(np.arange(len(moved)), lashes)].max() == 0
+    shut = np.array([float(name.startswith("eyeBlink")) for name in head.shape_names], np.float32)
+    lids = posed_vertices(head, shut)[part_vertices(head, ("skin",))]
+    shown = lashes[head.vertices[lashes, 2] > -20]
+    off = [_distances(posed_vertices(face, shut)[shown], lids) for face in (head, short)]
+    assert np.percentile(off[1], 95) < LASH_LENGTH * np.percentile(off[0], 95) + 0.5
+
+
+def _distances(places: np.ndarray, others: np.ndarray) -> np.ndarray:
+    return np.array([np.linalg.norm(others - place, axis=1).min() for place in places])
