@@ -51,7 +51,7 @@ def main() -> None:
         own = baked(face, character, Effort())
         report(f"{name}: fit")
         light = fit_light(face, own, look_of(name), character.eyes)
-        write_face(path, replace(face, light=(light,)))
+        write_face(path, replace(face, light=(light,), occlusion=None))  # drawn without lamps
         report(f"{name}: calibration")  # again: the tracker sees other pictures of it now
         calibrate_face_file(str(path), path)
         for style in HAIRCUTS[name]:
