@@ -172,7 +172,7 @@ def faces() -> tuple[FaceEntry, ...]:
 
 def describe_face(path: Path) -> FaceEntry:
     """Entry of a ``.face`` file; raises as `load_face`."""
-    _, header = _read(path, "face")
+    header = _read(path, "face")
     names = tuple(name for name, _, _ in header["identities"])
     summary = header.get("metadata", {}).get("summary") or f"mesh with {len(header['shape_names'])} shapes"
     return FaceEntry(path.stem, names, str(summary), bool(header.get("hairdos")))
@@ -189,7 +189,7 @@ def identities(face: str = "head") -> tuple[IdentityEntry, ...]:
         The file is damaged or is not a ``.face`` file.
     """
     path = find_file(face, "face")
-    _, header = _read(path, "face")
+    header = _read(path, "face")
     try:
         return tuple(IdentityEntry(name, face, summary) for name, _, summary in header["identities"])
     except (KeyError, TypeError, ValueError) as broken:
@@ -205,11 +205,11 @@ def haircuts() -> tuple[HaircutEntry, ...]:
     found = [HaircutEntry(BALD, REALISTIC_FACE, "no hair")]
     for path in _shipped_files("face"):
         if path.stem != REALISTIC_FACE:
-            hairdos = _read(path, "face")[1].get("hairdos", {})
+            hairdos = _read(path, "face").get("hairdos", {})
             found += [HaircutEntry(name, path.stem, "the face's own") for name, _ in hairdos.values()]
     for path in _shipped_files(KIND):
         face, _, name = path.stem.rpartition(OF_FACE)
-        summary = str(_read(path, KIND)[1]["metadata"].get("summary", ""))
+        summary = str(_read(path, KIND)["metadata"].get("summary", ""))
         found.append(HaircutEntry(name, face or REALISTIC_FACE, summary))
     order = [REALISTIC_FACE, *(path.stem for path in _shipped_files("face"))]
     return tuple(sorted(found, key=lambda one: order.index(one.face)))
@@ -284,11 +284,11 @@ def _shipped_files(kind: str) -> list[Path]:
     return sorted(SHIPPED_FOLDER.glob(f"*.{kind}"))
 
 
-def _read(path: Path, kind: str) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+def _read(path: Path, kind: str) -> Mapping[str, Any]:
     from tts2face.models.face_file import FORMAT_VERSION
-    from tts2face.storage.tensors import read_tensors
+    from tts2face.storage.tensors import read_metadata
 
-    return read_tensors(path, kind, FORMAT_VERSION)
+    return read_metadata(path, kind, FORMAT_VERSION)
 
 
 def _is_installed(module: str) -> bool:

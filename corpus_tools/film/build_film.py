@@ -59,7 +59,8 @@ def main() -> None:
         own = baked(face, character, Effort())
         report(f"{name}: fit")
         light = fit_light(face, own, look_of(name), character.eyes)
-        write_face(path, replace(face, light=(light,), hairdo=own_hairdo(character)))
+        lit = replace(face, light=(light,), hairdo=own_hairdo(character), occlusion=None)  # drawn without lamps
+        write_face(path, lit)
         report(f"{name}: calibration")  # again: the tracker sees other pictures of it now
         calibrate_face_file(str(path), path)
         for style in HAIRCUTS.get(name, ()):

@@ -44,4 +44,5 @@ def _replace_score_map(path: Path, out: Path, scores: ScoreMap) -> None:
     arrays, header = read_tensors(path, face_file.KIND, face_file.FORMAT_VERSION)
     kept = {name: array for name, array in arrays.items() if not name.startswith(SCORE_MAP_PREFIX)}
     header = header | {SCORE_INPUTS: list(scores.inputs)}
-    write_tensors(out, face_file.KIND, face_file.FORMAT_VERSION, kept | score_map_arrays(scores), header)
+    written = kept | score_map_arrays(scores)
+    write_tensors(out, face_file.KIND, face_file.FORMAT_VERSION, written, header, is_packed=True)

@@ -7,6 +7,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from safetensors.numpy import load_file
 
 from lexicon.errors import DataError, InputError
 from tests.face.posing import posed_vertices
@@ -17,7 +18,7 @@ from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_loading import load_face
 from tts2face.storage import files
 from tts2face.storage.files import find_file
-from tts2face.storage.tensors import write_tensors
+from tts2face.storage.tensors import read_tensors, write_tensors
 
 N = 40
 TINT = (0.5, 0.75, 1.0)
@@ -81,6 +82,18 @@ def test_a_face_round_trips(written: tuple[Face, Path]) -> None:
     assert np.array_equal(read.eyes[0].turns["eyeLookUpLeft"], face.eyes[0].turns["eyeLookUpLeft"])
     weights = np.array([0.7, 1.0])
     assert posed_vertices(read, weights) == pytest.approx(posed_vertices(face, weights), abs=0.005)
+
+
+def test_an_earlier_face_whose_arrays_are_not_packed_is_the_same(written: tuple[Face, Path], tmp_path: Path) -> None:
+    arrays, header = read_tensors(written[1], "face", 1)
+    write_tensors(tmp_path / "earlier.face", "face", 1, arrays, header)
+    assert set(arrays) <= set(load_file(tmp_path / "earlier.face"))
+    for identity in (None, "older"):
+        packed, earlier = (read_face(path, identity) for path in (written[1], tmp_path / "earlier.face"))
+        for name in ("vertices", "triangles", "shapes", "colours", "uv", "landmark_weights"):
+            assert np.array_equal(getattr(packed, name), getattr(earlier, name)), name
+        assert packed.metadata == earlier.metadata
+    assert identities(str(tmp_path / "earlier.face"))[0].name == "older"
 
 
 def test_textures_of_a_shipped_face_are_decoded_when_one_is_read(monkeypatch: pytest.MonkeyPatch) -> None:

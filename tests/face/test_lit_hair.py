@@ -1,6 +1,6 @@
 """Haircuts of faces with baked light: files, wearing, and any colour."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ from tts2face.models.hair_file import read_hair, write_hair, write_lit_hair
 from tts2face.models.late import Late
 from tts2face.models.lit_hair import LitHair, swing_shapes, tint_hair, wear_hair
 from tts2face.models.view_transform import table_levels
+from tts2face.storage.deflated import deflate, unpack_arrays
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 OWN, BLACK, LIGHT = (0.3, 0.2, 0.1), (0.1, 0.08, 0.06), (0.7, 0.65, 0.6)
@@ -236,6 +237,27 @@ def test_faces_and_haircuts_round_trip(face: Face, wig: LitHair, tmp_path: Path)
     assert loaded.hairdo == Hairdo("wig", "blond")
     assert len(loaded.vertices) == wig.n_face_vertices + 4
     assert isinstance(read_face(tmp_path / "tiny.face", checks_pictures=False).light, Late)
+
+
+def test_earlier_light_whose_arrays_have_no_steps_is_the_same(face: Face, wig: LitHair, tmp_path: Path) -> None:
+    write_face(tmp_path / "tiny.face", face)
+    write_lit_hair(tmp_path / "wig.hair", wig)
+    lights = []
+    for path, read in ((tmp_path / "tiny.face", read_face), (tmp_path / "wig.hair", read_hair)):
+        kind = path.suffix[1:]
+        arrays, header = read_tensors(path, kind, 1)
+        parts = unpack_arrays(arrays["light"], header["light"]["arrays"], "light", path)
+        assert any(len(entry) > 3 for entry in header["light"]["arrays"])
+        arrays["light"] = deflate(b"".join(array.tobytes() for array in parts.values()))
+        header["light"]["arrays"] = [[name, array.dtype.name, [*array.shape]] for name, array in parts.items()]
+        write_tensors(tmp_path / f"before.{kind}", kind, 1, arrays, header)
+        for one in (path, tmp_path / f"before.{kind}"):
+            found = read(one)
+            lights.append((found.light if isinstance(found, Face) else found.lights)[0])
+    for packed, before in (lights[:2], lights[2:]):
+        for field in fields(packed):
+            if isinstance(array := getattr(packed, field.name), np.ndarray):
+                assert np.array_equal(array, getattr(before, field.name)), field.name
 
 
 def test_haircuts_of_the_other_kind_are_refused(face: Face, wig: LitHair, tmp_path: Path) -> None:

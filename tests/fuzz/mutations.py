@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from safetensors.numpy import save
+from safetensors.numpy import load_file, save
 
-from tts2face.storage.tensors import read_tensors
+from tts2face.storage.tensors import read_metadata, read_tensors
 
 # Values that the writers of JSON and TOML cannot write: names in a document, and what stands in the file instead.
 DEEP, DIGITS = "@DEEP@", "@DIGITS@"
@@ -95,9 +95,14 @@ def change_bytes(content: bytes, rng: np.random.Generator, reach: int | None = N
 
 
 def mutate_model(source: Path, kind: str, out: Path, seed: int) -> str:
-    """Write a copy of a model file with one or two changes of arrays or metadata; returns their description."""
+    """Write a copy of a model file with one or two changes of arrays or metadata; returns their description.
+
+    Arrays that are packed stay so in one of three copies, so that their bytes and their list are changed.
+    """
     rng = np.random.default_rng(seed)
     arrays, header = read_tensors(source, kind, 1)
+    if seed % 3 == 0:
+        arrays, header = load_file(source), read_metadata(source, kind, 1)
     arrays = {name: np.array(array) for name, array in arrays.items()}
     done = []
     for _ in range(1 if rng.random() < 0.8 else 2):

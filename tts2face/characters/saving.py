@@ -48,7 +48,7 @@ def relink_face(path: str | Path, character: str | Path) -> Path:
     place = character_file(read_binding(read_face(path)), character).resolve()
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
     header["metadata"][KEY]["file"] = str(place)
-    write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
+    write_tensors(path, KIND, FORMAT_VERSION, arrays, header, is_packed=True)
     return place
 
 

@@ -164,7 +164,7 @@ def _rewrite(source: Path, out: Path, kind: str, version: int) -> None:
     if kind == FACE:
         check_face(source, arrays, metadata)
         metadata = metadata | {"metadata": {k: v for k, v in metadata["metadata"].items() if k != KEY}}
-    write_tensors(out, kind, version, arrays, metadata)
+    write_tensors(out, kind, version, arrays, metadata, is_packed=kind == FACE)
 
 
 def _draw_talker(content: Path) -> "Image":

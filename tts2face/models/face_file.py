@@ -105,7 +105,7 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
         header[SCORE_INPUTS] = list(face.scores.inputs)
     for light in face.light:
         arrays[LIGHT], header[LIGHT] = encode_light(light)
-    write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
+    write_tensors(path, KIND, FORMAT_VERSION, arrays, header, is_packed=True)
 
 
 def read_face(path: Path, identity: str | None = None, *, checks_pictures: bool = True) -> Face:

@@ -82,7 +82,7 @@ def write_hair(path: Path, hair: Hair) -> None:
         if bits is not None:
             arrays[name], n_bytes = encode_occlusion(bits[None]), bits.shape[1]
     header = {"n_face_vertices": hair.n_face_vertices, "occlusion_bytes": n_bytes, "metadata": dict(hair.metadata)}
-    write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
+    write_tensors(path, KIND, FORMAT_VERSION, arrays, header, is_packed=True)
 
 
 def write_lit_hair(path: Path, hair: LitHair) -> None:
@@ -108,7 +108,7 @@ def write_lit_hair(path: Path, hair: LitHair) -> None:
         LIGHT: stored,
         "metadata": dict(hair.metadata),
     }
-    write_tensors(path, KIND, FORMAT_VERSION, arrays, header)
+    write_tensors(path, KIND, FORMAT_VERSION, arrays, header, is_packed=True)
 
 
 def read_hair(path: Path, *, checks_pictures: bool = True) -> Hair | LitHair:

@@ -1,6 +1,5 @@
 """Coding of baked light in ``.face`` files: all its arrays deflated as one, pictures as JPEG among them."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -23,26 +22,23 @@ from tts2face.models.baked_light import (
     fills_pages,
 )
 from tts2face.models.picture_coding import JPEG_QUALITY, decode_colours, encode_colours
-from tts2face.storage.deflated import deflate, inflate
+from tts2face.storage.deflated import pack_arrays, unpack_arrays
 from tts2face.storage.schema import (
     MAX_MM,
     Contents,
     Tensor,
-    list_of,
+    anything,
     number,
     record,
-    row,
     table,
-    text,
     whole,
 )
 
-MAX_BYTES = 64_000_000  # of all arrays; the light of a shipped face has 6,000,000
 MAX_SIDE = 4096
 MAX_FACTOR = 1e3  # of any weight or light
 HAIR_QUALITY = 85  # of the JPEG pictures of haircuts; 92 takes 100 kB more of each
 PICTURES = ("page0", "page1", "backdrop", "tint")
-ARRAYS = {"arrays": list_of(row(text, text, list_of(whole(0, MAX_BYTES))))}
+ARRAYS = {"arrays": anything}  # checked when they are inflated
 FIELDS = record(
     {
         **ARRAYS,
@@ -122,8 +118,8 @@ def _encoded(light: BakedLight | HairLight, pictures: Mapping[str, Any]) -> tupl
     arrays["triangle_steps"] = np.diff(light.triangles, prepend=np.int32(0))
     quality = JPEG_QUALITY if isinstance(light, BakedLight) else HAIR_QUALITY
     arrays |= {f"page{number}": encode_colours(page, quality) for number, page in enumerate(light.pages)}
-    content = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays.values())
-    return deflate(content), {"arrays": [[name, array.dtype.name, list(array.shape)] for name, array in arrays.items()]}
+    content, listed = pack_arrays(arrays)
+    return content, {"arrays": listed}
 
 
 def decode_light(
@@ -137,7 +133,7 @@ def decode_light(
         It is damaged, or does not fit the face.
     """
     FIELDS(stored, f"{path}: metadata: light")
-    arrays = _arrays(content, stored, TENSORS, path)
+    arrays = unpack_arrays(content, stored["arrays"], "light", path)
     n_partners = len(arrays.get("rows", ())) + len(arrays.get("ball_rows", ()))
     contents = Contents(path, "face", arrays, {}, {"partners": n_partners})
     contents.tensors(TENSORS)
@@ -166,7 +162,7 @@ def decode_hair_light(
         It is damaged.
     """
     HAIR_FIELDS(stored, f"{path}: metadata: light")
-    contents = Contents(path, "haircut", _arrays(content, stored, OF_HAIR, path), {})
+    contents = Contents(path, "haircut", unpack_arrays(content, stored["arrays"], "light", path), {})
     contents.tensors(OF_HAIR)
     return HairLight(**_checked(contents, sizes))
 
@@ -210,17 +206,3 @@ def _tint(contents: Contents, n_vertices: int, side: int) -> HairTint | None:
         vertices.shape[1] <= n_vertices, f"light colours {vertices.shape[1]} vertices of hair, of {n_vertices}"
     )
     return HairTint(colours, np.stack(np.split(stacked, n)), vertices)
-
-
-def _arrays(
-    content: NDArray[np.uint8], stored: Mapping[str, Any], known: Mapping[str, Tensor], path: Path
-) -> dict[str, NDArray[Any]]:
-    """Arrays by name."""
-    kinds = {name: (np.dtype(known[name].dtype), shape) for name, kind, shape in stored["arrays"] if name in known}
-    sizes = {name: math.prod(shape) * kind.itemsize for name, (kind, shape) in kinds.items()}
-    raw = inflate(content, min(sum(sizes.values()), MAX_BYTES), "light", path)
-    found, at = {}, 0
-    for name, (kind, shape) in kinds.items():
-        found[name] = np.frombuffer(raw, kind, sizes[name] // kind.itemsize, at).reshape(shape)
-        at += sizes[name]
-    return found

@@ -1,7 +1,8 @@
 """Arrays and JSON metadata in one safetensors file, the container of all model files."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +11,23 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import parse_json
+from tts2face.storage.deflated import MAX_BYTES, pack_arrays, unpack_arrays
 from tts2face.storage.files import write_atomically
 
 MAX_METADATA_CHARACTERS = 32_000_000  # characters; 800 utterances with their words have 150,000
+PACKED = "packed"  # array that holds others, and the key of the metadata that lists them
 Arrays = Mapping[str, NDArray[Any]]
 
 
-def write_tensors(path: Path, kind: str, version: int, arrays: Arrays, metadata: Mapping[str, Any]) -> None:
+def write_tensors(
+    path: Path, kind: str, version: int, arrays: Arrays, metadata: Mapping[str, Any], *, is_packed: bool = False
+) -> None:
     """Write arrays and metadata to a file atomically; equal contents give equal bytes.
+
+    Parameters
+    ----------
+    is_packed
+        Deflate arrays as one, without loss, except bytes, which are coded already, and what is too large for it.
 
     Raises
     ------
@@ -26,9 +36,14 @@ def write_tensors(path: Path, kind: str, version: int, arrays: Arrays, metadata:
     """
     from safetensors.numpy import save
 
+    written = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
+    several = {name: array for name, array in written.items() if array.ndim > 1 or array.dtype != np.uint8}
+    if is_packed and 0 < sum(array.nbytes for array in several.values()) <= MAX_BYTES:
+        content, listed = pack_arrays(several)
+        written = {name: array for name, array in written.items() if name not in several} | {PACKED: content}
+        metadata = {**metadata, PACKED: listed}
     header = {"kind": kind, "version": str(version), "metadata": json.dumps(metadata, ensure_ascii=False)}
-    content = _sort_header(save({name: np.ascontiguousarray(array) for name, array in arrays.items()}, header))
-    write_atomically(path, content)
+    write_atomically(path, _sort_header(save(written, header)))
 
 
 def _sort_header(content: bytes) -> bytes:
@@ -41,7 +56,7 @@ def _sort_header(content: bytes) -> bytes:
 
 
 def read_tensors(path: Path, kind: str, version: int) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Memory-mapped arrays and the metadata of a file that `write_tensors` wrote.
+    """Arrays and the metadata of a file that `write_tensors` wrote.
 
     Raises
     ------
@@ -50,6 +65,27 @@ def read_tensors(path: Path, kind: str, version: int) -> tuple[dict[str, NDArray
     DataError
         The file is truncated, of another kind, or of another version.
     """
+    with _opened(path, kind, version) as (file, metadata):
+        arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
+    if PACKED in metadata:
+        if PACKED not in arrays:
+            raise DataError(f"{path} lacks the array {PACKED}; build or copy it again")
+        several = unpack_arrays(arrays.pop(PACKED), metadata.pop(PACKED), PACKED, path)
+        if twice := sorted(several.keys() & arrays.keys()):
+            raise DataError(f"{path} holds the array {twice[0]} twice; build or copy it again")
+        arrays |= several
+    return arrays, metadata
+
+
+def read_metadata(path: Path, kind: str, version: int) -> dict[str, Any]:
+    """The metadata alone; raises as `read_tensors`."""
+    with _opened(path, kind, version) as (_, metadata):
+        return metadata
+
+
+@contextmanager
+def _opened(path: Path, kind: str, version: int) -> Iterator[tuple[Any, dict[str, Any]]]:
+    """Memory-mapped file and its metadata."""
     from safetensors import SafetensorError, safe_open
 
     if not path.is_file():
@@ -63,8 +99,7 @@ def read_tensors(path: Path, kind: str, version: int) -> tuple[dict[str, NDArray
                 raise DataError(
                     f"{path} is a {kind} file of version {header.get('version')}, not {version}; build it again"
                 )
-            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
-            return arrays, _metadata(header["metadata"], path)
+            yield file, _metadata(header["metadata"], path)
     except (SafetensorError, KeyError, OSError, ValueError, TypeError, AttributeError) as error:
         if isinstance(error, DataError):
             raise
