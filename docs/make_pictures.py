@@ -39,6 +39,7 @@ MOUTHS = {"0,0,600": (240, 408), "38,0,600": (20, 408)}  # left upper corner of 
 MOOD_TEXT = "I have a lot to tell you, so please sit down and listen while I explain what happened yesterday."
 N_MOOD_FRAMES = 6
 DRAWN = ("ada", "ben", "noor", "zuri")
+LIT = (*DRAWN, "mara", "tomas")
 DYED = {
     "ada": ("blond", "black", "auburn"),
     "ben": ("blond", "red", "grey"),
@@ -122,15 +123,15 @@ def still(face: Face, label: str, camera: str = "front") -> Image.Image:
 
 def faces_sheet() -> Image.Image:
     """The shipped faces and the identities of the head, at rest."""
-    chosen: list[tuple[str, str | None]] = [*((name, None) for name in DRAWN), ("head", None)]
+    chosen: list[tuple[str, str | None]] = [*((name, None) for name in LIT), ("head", None)]
     chosen += [("head", name) for name in (entry.name for entry in identities())]
     return sheet([still(load_face(name, identity), identity or name) for name, identity in chosen], 4)
 
 
 def cast_sheet() -> Image.Image:
-    """Each drawn character at rest in four views, in six phones, smiling, and in each mood."""
+    """Each face in film light at rest in four views, in six phones, smiling, and in each mood."""
     pictures = []
-    for name in DRAWN:
+    for name in LIT:
         session = Session(face=name)
         face, shown = session.face.mesh, Picture(size=f"{SIDE}x{SIDE}")
         pictures += [still(face, camera, camera) for camera in CAST_VIEWS]

@@ -35,7 +35,6 @@ from corpus_tools.head.head import DEFAULT_PERSON, PIVOT, ReferenceHead, skin_pi
 from corpus_tools.head.jaw import fit_jaw
 from corpus_tools.head.lids import find_lid_edges, wet_piece
 from corpus_tools.head.lips import close_lips, lip_ring
-from corpus_tools.head.mouth_light import scatter_in_mouth
 from corpus_tools.head.piece import Eyeball, HeadPieces, Piece, assemble_face
 from corpus_tools.head.shapes import LID_SHAPES, clear_eyeballs, correct_shapes
 from corpus_tools.head.skin import Skin, build_shoulders, build_skin
@@ -48,8 +47,6 @@ from tts2face.face.pupils import PUPIL_SHAPE
 from tts2face.models.face import Face, Hairdo, Texture
 from tts2face.models.face_file import write_face
 from tts2face.models.lit_hair import SWING_SHAPES
-from tts2face.render.occlusion import bake_occlusion
-from tts2face.render.scene import available_cores
 
 CAST: Mapping[str, Character] = {one.name: one for one in (WOMAN, MAN, ELDER, GIRL, REALISTIC_WOMAN, REALISTIC_MAN)}
 CLEAR_MM = 0.6  # between lid and eyeball: the edges of stretched lids are 6 mm long and sink between vertices
@@ -59,7 +56,7 @@ NO_TEXTURE = Texture(np.zeros((4, 4, 3), np.uint8))  # in place of the cards of 
 
 
 def drawn_face(source: SourceMesh, character: Character) -> Face:
-    """The face of a character, without score map and occlusion."""
+    """The face of a character, without score map."""
     reference, cage, balls, skin = _sculpted(source, character)
     pieces = [_breathing(piece) for piece in _pieces(cage, skin, reference, balls, character)]
     built = HeadPieces(tuple(pieces), (1, 2), balls, PIVOT)
@@ -169,9 +166,7 @@ def build_character(source: SourceMesh, character: Character, out: Path, report:
     """Write a character, calibrated, into a file; `report` gets the name of each step."""
     report(f"{character.name}: shape")
     face = drawn_face(source, character)
-    report(f"{character.name}: occlusion")
-    skin = build_skin(build_cage(source, DEFAULT_PERSON))
-    write_face(out, scatter_in_mouth(bake_occlusion(face, available_cores()), skin))
+    write_face(out, face)
     report(f"{character.name}: calibration")
     calibrate_face_file(str(out), out)
 

@@ -59,7 +59,7 @@ def main() -> None:
         own = baked(face, character, Effort())
         report(f"{name}: fit")
         light = fit_light(face, own, look_of(name), character.eyes)
-        lit = replace(face, light=(light,), hairdo=own_hairdo(character), occlusion=None)  # drawn without lamps
+        lit = replace(face, light=(light,), hairdo=own_hairdo(character))
         write_face(path, lit)
         report(f"{name}: calibration")  # again: the tracker sees other pictures of it now
         calibrate_face_file(str(path), path)

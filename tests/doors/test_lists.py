@@ -71,7 +71,7 @@ def test_voices_list_their_languages_and_whether_they_are_installed() -> None:
 
 def test_identities_and_styles_of_missing_files_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     for words, reason in (
-        (["identities", "--face", "nobody"], "no face 'nobody'; give ada, ben, head, noor, zuri"),
+        (["identities", "--face", "nobody"], "no face 'nobody'; give ada, ben, head, mara, noor, tomas, zuri"),
         (["styles", "--palette", "nobody"], "no palette 'nobody'; give starter"),
     ):
         assert run(words) == 2

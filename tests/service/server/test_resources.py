@@ -77,7 +77,7 @@ def names(answer: httpx.Response) -> list[tuple[str, str | None]]:
 
 def test_the_services_own_are_listed_and_shown(ask: Ask) -> None:
     assert names(ask("reader", "GET", "/v1/talkers")) == [("grid_s1", None)]
-    shipped = ["ada", "ben", "head", "noor", "zuri"]
+    shipped = ["ada", "ben", "head", "mara", "noor", "tomas", "zuri"]
     assert names(ask("reader", "GET", "/v1/faces")) == [(name, None) for name in shipped]
     assert names(ask("reader", "GET", "/v1/dictionaries")) == []
     palette = ask("reader", "GET", "/v1/palettes/starter").json()
