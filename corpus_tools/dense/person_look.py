@@ -55,14 +55,11 @@ IRIS_LIGHT, DARK_IRIS, DARK_IRIS_HUE = 0.012, 0.02, (0.55, -0.55)  # least lumin
 BROWN_FROM, BROWN_SLOPE, BROWN_LIGHT = -0.45, -0.6, 0.05  # log B/G of brown irises, their least R/G, most luminance
 BROW_LIGHT = -1.9  # most luminance of brows, of the skin's, logarithm
 ROOT_MM, LASH_MM = 0.7, 10.0  # off the skin: roots of lashes, and lashes that are shown
-LASH_LENGTH = 0.55  # of the default head's, which are a made-up woman's
+LASH_LENGTH = 0.55  # of the default head's, which are those of made-up eyes
 NEUTRAL_SHIRT = "6a6b6d"
 SHIRT_MM, SHIRT_SPREAD, MIN_SHIRT_CELLS = 30.0, 0.5, 60  # below the chin; deviation of its luminance, logarithm
-SHIRT_HUE, SHIRT_LIGHT, VIVID_SHADE = (
-    0.35,
-    (0.03, 0.2),
-    0.25,
-)  # share of its colour that is kept, bounds of its luminance
+SHIRT_HUE, SHIRT_LIGHT = 0.35, (0.03, 0.2)  # share of its colour that is kept, bounds of its luminance
+VIVID_SHADE = 0.25  # by which the upper bound falls with the colour, logarithms
 NAMING_LIGHT = 0.5  # weight of luminance beside hue where a colour is named
 PLAIN_CAST = 0.03  # logarithm up to which light is called neutral
 MIN_SHARE = 0.3  # of the frames that show a cell of the portrait
@@ -126,10 +123,9 @@ class LookSampler:
             colour = hair_colour(neutral(hair.colour, cast), most)
             code = "#{:02x}{:02x}{:02x}".format(*srgb_colour(colour).tolist())
         length, notes = hair.length or UNSEEN, [] if hair.length else ["top of the head not seen"]
-        iris = srgb_colour(iris_colour(eyes, cast))
-        if eyes.radius_px < MIN_IRIS_PX or not np.isfinite(eyes.iris).all():
-            iris = parse_hex(NEUTRAL_IRIS)
-            notes.append("eyes too small to tell their colour")
+        is_told = eyes.radius_px >= MIN_IRIS_PX and np.isfinite(eyes.iris).all()
+        iris = srgb_colour(iris_colour(eyes, cast)) if is_told else parse_hex(NEUTRAL_IRIS)
+        notes += [] if is_told else ["eyes too small to tell their colour"]
         brows = np.array([min(colour[0], eyes.skin[0] + BROW_LIGHT), *colour[1:]])
         return PersonLook(
             cast, eyes.skin, Hairdo(HAIRCUTS[length], code), length, iris, srgb_colour(brows),
