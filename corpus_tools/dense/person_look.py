@@ -41,12 +41,12 @@ HAIRCUTS: Mapping[str, str] = {  # by length class
 }  # fmt: skip
 UNSEEN, UNSEEN_HAIR = "flat", "dark-brown"  # class and colour where the top of the head is outside of the picture
 HAIR_LIGHT = (0.005, 0.36)  # luminance of the darkest and lightest hair
-CROPPED_LIGHT = -1.2  # most luminance of cropped hair, of the skin's, logarithm: what is seen is hair and skin mixed
+CROPPED_LIGHT = -1.8  # most luminance of cropped hair, of the skin's, logarithm: what is seen is hair and skin mixed
 SHINE = 0.5  # logarithm by which hair in a picture is lighter than its colour; median of rendered haircuts
 # Natural hair lies on a line of log R/G and B/G, from black and grey to brown and blond: browner by so much bluer less.
 # Casts of cameras and walls lead off it; what is further off than these is dyed or red.
 HAIR_LINE, NATURAL = np.array([1.0, -0.9]), (0.4, 0.7)
-GREY = 0.3  # log R/G below which hair is rather grey in yellowish light than blond
+GREY = 0.4  # log R/G below which hair is rather grey in yellowish light than blond
 EYE_COLOURS: Mapping[str, str] = {
     "dark brown": "3a281f", "brown": "58402f", "hazel": "6a5a3e", "green": "67705a", "grey": "6d7274", "blue": "60788c",
 }  # fmt: skip  # sRGB
