@@ -41,12 +41,12 @@ HAIRCUTS: Mapping[str, str] = {  # by length class
 }  # fmt: skip
 UNSEEN, UNSEEN_HAIR = "flat", "dark-brown"  # class and colour where the top of the head is outside of the picture
 HAIR_LIGHT = (0.005, 0.36)  # luminance of the darkest and lightest hair
-CROPPED_LIGHT = -1.2  # most luminance of cropped hair, of the skin's, logarithm: what is seen is hair and skin mixed
+CROPPED_LIGHT = -1.8  # most luminance of cropped hair, of the skin's, logarithm: what is seen is hair and skin mixed
 SHINE = 0.5  # logarithm by which hair in a picture is lighter than its colour; median of rendered haircuts
 # Natural hair lies on a line of log R/G and B/G, from black and grey to brown and blond: browner by so much bluer less.
 # Casts of cameras and walls lead off it; what is further off than these is dyed or red.
 HAIR_LINE, NATURAL = np.array([1.0, -0.9]), (0.4, 0.7)
-GREY = 0.3  # log R/G below which hair is rather grey in yellowish light than blond
+GREY = 0.4  # log R/G below which hair is rather grey in yellowish light than blond
 EYE_COLOURS: Mapping[str, str] = {
     "dark brown": "3a281f", "brown": "58402f", "hazel": "6a5a3e", "green": "67705a", "grey": "6d7274", "blue": "60788c",
 }  # fmt: skip  # sRGB
@@ -55,14 +55,11 @@ IRIS_LIGHT, DARK_IRIS, DARK_IRIS_HUE = 0.012, 0.02, (0.55, -0.55)  # least lumin
 BROWN_FROM, BROWN_SLOPE, BROWN_LIGHT = -0.45, -0.6, 0.05  # log B/G of brown irises, their least R/G, most luminance
 BROW_LIGHT = -1.9  # most luminance of brows, of the skin's, logarithm
 ROOT_MM, LASH_MM = 0.7, 10.0  # off the skin: roots of lashes, and lashes that are shown
-LASH_LENGTH = 0.55  # of the default head's, which are a made-up woman's
+LASH_LENGTH = 0.55  # of the default head's, which are those of made-up eyes
 NEUTRAL_SHIRT = "6a6b6d"
 SHIRT_MM, SHIRT_SPREAD, MIN_SHIRT_CELLS = 30.0, 0.5, 60  # below the chin; deviation of its luminance, logarithm
-SHIRT_HUE, SHIRT_LIGHT, VIVID_SHADE = (
-    0.35,
-    (0.03, 0.2),
-    0.25,
-)  # share of its colour that is kept, bounds of its luminance
+SHIRT_HUE, SHIRT_LIGHT = 0.35, (0.03, 0.2)  # share of its colour that is kept, bounds of its luminance
+VIVID_SHADE = 0.25  # by which the upper bound falls with the colour, logarithms
 NAMING_LIGHT = 0.5  # weight of luminance beside hue where a colour is named
 PLAIN_CAST = 0.03  # logarithm up to which light is called neutral
 MIN_SHARE = 0.3  # of the frames that show a cell of the portrait
@@ -126,10 +123,9 @@ class LookSampler:
             colour = hair_colour(neutral(hair.colour, cast), most)
             code = "#{:02x}{:02x}{:02x}".format(*srgb_colour(colour).tolist())
         length, notes = hair.length or UNSEEN, [] if hair.length else ["top of the head not seen"]
-        iris = srgb_colour(iris_colour(eyes, cast))
-        if eyes.radius_px < MIN_IRIS_PX or not np.isfinite(eyes.iris).all():
-            iris = parse_hex(NEUTRAL_IRIS)
-            notes.append("eyes too small to tell their colour")
+        is_told = eyes.radius_px >= MIN_IRIS_PX and np.isfinite(eyes.iris).all()
+        iris = srgb_colour(iris_colour(eyes, cast)) if is_told else parse_hex(NEUTRAL_IRIS)
+        notes += [] if is_told else ["eyes too small to tell their colour"]
         brows = np.array([min(colour[0], eyes.skin[0] + BROW_LIGHT), *colour[1:]])
         return PersonLook(
             cast, eyes.skin, Hairdo(HAIRCUTS[length], code), length, iris, srgb_colour(brows),

@@ -11,6 +11,7 @@ from corpus_tools.dense.light_cast import EyeColours, estimate_cast, log_colour,
 from corpus_tools.dense.mesh_fit import face_landmarks, part_vertices
 from corpus_tools.dense.person_look import (
     LASH_LENGTH,
+    NEUTRAL_IRIS,
     LookSampler,
     PersonLook,
     dress_head,
@@ -47,17 +48,19 @@ def head() -> Face:
 
 
 @cache
+def drawn_person(identity: str | None, hair: str | None, colour: str | None) -> tuple[Face, np.ndarray]:
+    """A person with hair, and a picture of it in neutral light."""
+    person = load_face("head", identity, hair=hair, hair_color=colour)
+    picture = Picture(size=f"{SIDE_PX}x{SIDE_PX}", camera=CAMERA)
+    return person, draw(person, np.zeros(len(person.shape_names)), picture=picture)
+
+
 def seen_look(
-    identity: str | None, hair: str | None, colour: str | None, gains: tuple[float, ...] = (1, 1, 1)
+    identity: str | None, hair: str | None, colour: str | None, gains: tuple[float, ...] = (1, 1, 1), size: int = 1
 ) -> PersonLook:
-    """Look of a drawn person in one picture, in light that multiplies red, green and blue."""
-    person, bare = (
-        load_face("head", identity, hair=hair, hair_color=colour),
-        read_face(find_file("head", "face"), identity),
-    )
-    picture = draw(
-        person, np.zeros(len(person.shape_names)), picture=Picture(size=f"{SIDE_PX}x{SIDE_PX}", camera=CAMERA)
-    )
+    """Look of a drawn person in one picture, in light that multiplies its channels, at a `size`-th of its size."""
+    person, picture = drawn_person(identity, hair, colour)
+    bare = read_face(find_file("head", "face"), identity)
     lit = encode_srgb(decode_srgb(picture / 255.0) * gains)
     lens = camera_matrices(parse_camera(CAMERA), person, (SIDE_PX, SIDE_PX))
     marks = face_landmarks(bare, bare.vertices.astype(np.float64))[:N_LANDMARKS]
@@ -67,7 +70,7 @@ def seen_look(
     points = np.column_stack([across * scale + lens.lens[1], down * scale + lens.lens[2], ahead * scale.mean()])
     used = np.arange(N_MESH_LANDMARKS)
     sampler = LookSampler(PictureFitter(bare.vertices.astype(np.float64), marks[used], used, np.zeros((1, 1))))
-    sampler.add(lit, points)
+    sampler.add(lit[::size, ::size].copy(), (points / size).astype(np.float32))
     return sampler.look()
 
 
@@ -206,6 +209,13 @@ def test_blue_eyes_are_blue_and_dark_eyes_brown() -> None:
     assert blue[2] > blue[0] + 8
     assert dark[0] > dark[2]
     assert blue.sum() > 2 * dark.sum()
+
+
+def test_small_eyes_are_brown_and_said_to_be_unseen() -> None:
+    look = seen_look("erik", None, None, size=3)
+    np.testing.assert_array_equal(look.iris, parse_hex(NEUTRAL_IRIS))
+    assert look.summary().endswith("eyes too small to tell their colour")
+    assert look.length == "short"
 
 
 def test_a_head_is_drawn_as_the_person_looks(head: Face) -> None:
