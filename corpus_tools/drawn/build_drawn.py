@@ -30,7 +30,7 @@ from corpus_tools.head.cage import Cage, build_cage
 from corpus_tools.head.cloth import shirt_piece
 from corpus_tools.head.correspondence import add_landmarks
 from corpus_tools.head.eyes import eyeball_piece, fit_eyeballs
-from corpus_tools.head.head import DEFAULT_PERSON, PIVOT, ReferenceHead, skin_piece
+from corpus_tools.head.head import PIVOT, REFERENCE_PERSON, ReferenceHead, skin_piece
 from corpus_tools.head.jaw import fit_jaw
 from corpus_tools.head.lids import find_lid_edges, wet_piece
 from corpus_tools.head.lips import close_lips, lip_ring
@@ -119,7 +119,7 @@ def face_masks(source: SourceMesh, face: Face) -> dict[str, NDArray[np.float64]]
 
 def _reference(source: SourceMesh) -> ReferenceHead:
     """A person's head, on which lips, lids and shirt are found; it has no cards."""
-    cage = build_cage(source, DEFAULT_PERSON)
+    cage = build_cage(source, REFERENCE_PERSON)
     skin = build_skin(cage)
     lids = find_lid_edges(skin, fit_eyeballs(cage))
     return ReferenceHead(cage, skin, build_shoulders(cage), lip_ring(skin), lids, {}, {})
@@ -166,7 +166,7 @@ def build_character(source: SourceMesh, character: Character, out: Path, report:
     report(f"{character.name}: shape")
     face = drawn_face(source, character)
     report(f"{character.name}: occlusion")
-    skin = build_skin(build_cage(source, DEFAULT_PERSON))
+    skin = build_skin(build_cage(source, REFERENCE_PERSON))
     write_face(out, scatter_in_mouth(bake_occlusion(face, available_cores()), skin))
     report(f"{character.name}: calibration")
     calibrate_face_file(str(out), out)
