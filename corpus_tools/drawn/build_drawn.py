@@ -31,7 +31,7 @@ from corpus_tools.head.cage import Cage, build_cage
 from corpus_tools.head.cloth import shirt_piece
 from corpus_tools.head.correspondence import add_landmarks
 from corpus_tools.head.eyes import eyeball_piece, fit_eyeballs
-from corpus_tools.head.head import DEFAULT_PERSON, PIVOT, ReferenceHead, skin_piece
+from corpus_tools.head.head import PIVOT, REFERENCE_PERSON, ReferenceHead, skin_piece
 from corpus_tools.head.jaw import fit_jaw
 from corpus_tools.head.lids import find_lid_edges, wet_piece
 from corpus_tools.head.lips import close_lips, lip_ring
@@ -121,7 +121,7 @@ def face_masks(source: SourceMesh, face: Face) -> dict[str, NDArray[np.float64]]
 
 def _reference(source: SourceMesh) -> ReferenceHead:
     """A person's head, on which lips, lids and shirt are found; it has no cards."""
-    cage = build_cage(source, DEFAULT_PERSON)
+    cage = build_cage(source, REFERENCE_PERSON)
     skin = build_skin(cage)
     lids = find_lid_edges(skin, fit_eyeballs(cage))
     return ReferenceHead(cage, skin, build_shoulders(cage), lip_ring(skin), lids, {}, {})

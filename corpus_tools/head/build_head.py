@@ -16,24 +16,24 @@ from corpus_tools.head.cards import cards_texture
 from corpus_tools.head.correspondence import TABLE, add_landmarks
 from corpus_tools.head.eyes import eye_texture
 from corpus_tools.head.haircut import build_haircuts
-from corpus_tools.head.head import DEFAULT_PERSON, HeadStyle, ReferenceHead, assemble_head, build_reference
+from corpus_tools.head.head import REFERENCE_PERSON, HeadStyle, ReferenceHead, assemble_head, build_reference
 from corpus_tools.head.identity import build_identities
 from corpus_tools.head.mouth_light import scatter_in_mouth
-from corpus_tools.head.piece import HeadPieces, assemble_face
-from corpus_tools.head.skin import build_skin
+from corpus_tools.head.piece import HeadPieces, assemble_face, stack_vertices
+from corpus_tools.head.proportions import add_targets, modelling_targets
 from corpus_tools.head.source import PACKAGE, SourceMesh, fetch_data, read_source
 from corpus_tools.head.texture import paint_texture
 from corpus_tools.head.tongue import TONGUE_UP
 from corpus_tools.training.score_files import calibrate_face_file
 from tts2face.models.face import Face, Hairdo, Texture
-from tts2face.models.face_file import Identity, write_face
+from tts2face.models.face_file import write_face
 from tts2face.models.hair_file import write_hair
 from tts2face.render.occlusion import bake_hair, bake_occlusion
 from tts2face.render.scene import available_cores
 
 Floats = NDArray[np.float64]
 
-DEFAULT_HAIRDO = Hairdo("long01", "brown")
+DEFAULT_HAIRDO = Hairdo("bob02", "brown")
 METADATA = {
     "licence": "CC0-1.0",
     "attribution": "MakeHuman team (hm08 mesh, targets, brows, lashes, eyes); Mika Suominen (face units)",
@@ -63,22 +63,26 @@ def fetch_all(data: Path | None = None, assets: Path | None = None) -> Data:
 
 def head_face(data: Data) -> Face:
     """The default head, without hair."""
-    return _build_default(data)[1]
+    return _build_default(data, reference_head(data))[0]
 
 
-def head_with_identities(data: Data) -> tuple[Face, dict[str, Identity]]:
-    """The default head without hair, and its presets."""
-    ground, face, built = _build_default(data)
-    return face, build_identities(data.source, ground, HeadStyle(), built)
+def reference_head(data: Data) -> ReferenceHead:
+    """The head of the reference person."""
+    return build_reference(build_cage(data.source, REFERENCE_PERSON), data.assets)
 
 
-def _build_default(data: Data) -> tuple[ReferenceHead, Face, HeadPieces]:
-    ground, look = build_reference(build_cage(data.source, DEFAULT_PERSON), data.assets), HeadStyle()
-    built = assemble_head(ground.cage, ground, look)
+def default_cage(source: SourceMesh) -> Cage:
+    """The cage of the default person, a woman of about 30."""
+    return build_cage(source, add_targets(REFERENCE_PERSON, modelling_targets("head")))
+
+
+def _build_default(data: Data, ground: ReferenceHead) -> tuple[Face, HeadPieces]:
+    look = HeadStyle()
+    built = assemble_head(default_cage(data.source), ground, look)
     names = shape_names(ground.cage)
     face = assemble_face(built, names, paint_textures(data, ground, look), {"name": "head", **METADATA})
     face = replace(face, hairdo=DEFAULT_HAIRDO)
-    return ground, add_landmarks(face, ground.skin.base) if TABLE.is_file() else face, built
+    return add_landmarks(face, ground.skin.base) if TABLE.is_file() else face, built
 
 
 def paint_textures(data: Data, ground: ReferenceHead, look: HeadStyle) -> tuple[Texture, ...]:
@@ -93,13 +97,14 @@ def build_all(data: Data, out: Path, report: Callable[[str], None]) -> None:
     out.mkdir(parents=True, exist_ok=True)
     threads = available_cores()
     report("head and identities")
-    bare, identities = head_with_identities(data)
+    ground = reference_head(data)
+    bare, built = _build_default(data, ground)
+    identities = build_identities(data.source, ground, HeadStyle(), built)
     report("occlusion of the head")
     head = bake_occlusion(bare, threads)  # haircuts need it without the light scattered in the mouth
-    cage = build_cage(data.source, DEFAULT_PERSON)
-    skin = build_skin(cage)
-    write_face(out / "head.face", scatter_in_mouth(head, skin), identities)
-    for name, hair in build_haircuts(data.assets, cage, skin, head.vertices.astype(np.float64)):
+    write_face(out / "head.face", scatter_in_mouth(head, ground.skin), identities)
+    reference = stack_vertices(assemble_head(ground.cage, ground, HeadStyle()))
+    for name, hair in build_haircuts(data.assets, ground.cage, ground.skin, reference):
         report(f"haircut {name}")
         write_hair(out / f"{name}.hair", bake_hair(head, hair, threads))
     report("calibration")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 from corpus_tools.head.assets import asset_files, read_picture
 from tts2face.models.face import Texture
@@ -18,7 +19,8 @@ LASHES = ("eyelashes02", "eyelashes01")
 BROW_ROWS = {"eyebrow001": (140, 400), "eyebrow010": (252, 512), "eyebrow008": (200, 460), "eyebrow012": (240, 500)}
 BROW_HEIGHT = 252
 LASH_LEFT = 512
-BROW_COLOUR, LASH_COLOUR = (0.185, 0.133, 0.102), (0.115, 0.080, 0.065)  # sRGB
+BROW_COLOUR, LASH_COLOUR = (0.195, 0.138, 0.105), (0.065, 0.047, 0.040)  # sRGB
+BROW_BLUR_PX, BROW_COVER = 0.7, 0.94  # of the hairs of brows: softer and lighter than ink
 HAZE = 40.0  # coverage between the hairs of the pictures, of 255
 CARDS_TEXTURE, EYE_TEXTURE = 1, 2  # numbers of the face's textures
 HIDDEN = np.array([0.0, 10.0, -85.0])  # inside the skull: cards that a person does not show
@@ -46,6 +48,7 @@ def cards_texture(folder: Path, brow_colour: tuple[float, float, float] = BROW_C
     pixels = np.zeros((SIDE, SIDE, 3))
     pixels[:], pixels[:, :LASH_LEFT] = LASH_COLOUR, brow_colour
     cover = np.clip((alpha - HAZE) * 255 / (225 - HAZE), 0, 255)
+    cover[:, :LASH_LEFT] = BROW_COVER * gaussian_filter(cover[:, :LASH_LEFT], BROW_BLUR_PX)
     return Texture(np.rint(255 * pixels).astype(np.uint8), np.rint(cover).astype(np.uint8))
 
 

@@ -27,7 +27,7 @@ TEXTURE_SIDE, EDGE_RAD = 512, 1.1  # pixels, and the angle from the gaze at the 
 # The eye in the package's picture, pixels: centre, and radii of pupil, iris and the painted part of the ball.
 SOURCE_CENTRE, SOURCE_PUPIL_PX, SOURCE_IRIS_PX, SOURCE_BALL_PX = (361.4, 151.1), 17.0, 60.0, 125.0
 SOURCE_SCLERA = np.array([0.66, 0.63, 0.60])
-LIMBUS, LID_SHADE, IRIS_GAIN = 0.62, 0.62, 1.75
+LIMBUS, LID_SHADE, IRIS_GAIN = 0.55, 0.42, 1.75
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,9 +38,9 @@ class EyeStyle:
     is light, so that a tint can produce any other.
     """
 
-    iris: float = 0.385
-    pupil: float = 0.15
-    colour: tuple[float, float, float] = (0.44, 0.50, 0.46)
+    iris: float = 0.40
+    pupil: float = 0.165
+    colour: tuple[float, float, float] = (0.50, 0.44, 0.345)
     bulge: float = 0.04  # of the radius
 
 

@@ -1,4 +1,4 @@
-"""Haircuts: MakeHuman's hair cards on the default head, as `Hair`."""
+"""Haircuts: MakeHuman's hair cards on the reference head, as `Hair`."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -203,12 +203,12 @@ N_ANCHORS = 180
 N_SAMPLES = 60_000  # points on the cards
 SOLID = 0.4  # coverage of a card from which it hides the scalp
 SCALP_SIDE, STUBBLE_SIDE = 1024, 1024
-FUZZ_MM, FUZZ, FUZZ_SIDE = 0.5, 0.10, 512  # height of the layer above a cropped scalp, coverage, pixels
+FUZZ_MM, FUZZ, FUZZ_SIDE = 0.5, 0.42, 512  # height of the layer above a cropped scalp, coverage, pixels
 SEED = 11
 
 
 def build_haircuts(folder: Path, cage: Cage, skin: Skin, head: Floats) -> Iterator[tuple[str, Hair]]:
-    """Each haircut by name, on the default head with vertices (V, 3), whose first ones are the skin's."""
+    """Each haircut by name, on the reference head with vertices (V, 3), whose first ones are the skin's."""
     for name in HAIRCUTS:
         asset = read_asset(folder, f"hair/{name}", cage.source.vertices)
         yield name, build_hair(name, asset, cage, skin, head)
@@ -270,7 +270,7 @@ def paint_fuzz(places: Floats, triangles: Ints, uv: Floats, generator: np.random
     """(FUZZ_SIDE, FUZZ_SIDE) coverage of a layer with vertices above `places` (N, 3): none at the hairline."""
     texels = find_texels(uv, triangles, FUZZ_SIDE)
     place = texels.interpolate(places)
-    cover = FUZZ * stubble_share(place) ** 2 * np.clip(1 + value_noise(place, 0.9, generator), 0, 3)
+    cover = FUZZ * stubble_share(place) ** 4 * np.clip(1 + value_noise(place, 0.9, generator), 0, 3)
     alpha = np.zeros((FUZZ_SIDE, FUZZ_SIDE))
     alpha[texels.rows, texels.columns] = np.clip(cover, 0, 1)
     return share_levels(alpha)

@@ -25,13 +25,13 @@ REACH_MM, STEP_MM, BESIDE_MM = 40.0, 4.0, 5.0  # hair up to so far above the ski
 SMOOTH_MM = 7.0  # gaps such as a parting are closed, and the edge of the cover is smoothed, over this distance
 # Cropped hair: coverage at the sides and what the top has more, contrast and size of the grain; width of its hairline,
 # spread and size of its irregularities.
-STUBBLE, STUBBLE_TOP, GRAIN, STUBBLE_MM = 0.46, 0.24, 0.20, 0.7
-STUBBLE_SOFT_MM, RAGGED_MM, RAGGED_SIZE_MM, TOP_Y = 34.0, 3.5, 8.0, (0.0, 75.0)
+STUBBLE, STUBBLE_TOP, GRAIN, STUBBLE_MM = 0.72, 0.16, 0.12, 0.7
+STUBBLE_SOFT_MM, RAGGED_MM, RAGGED_SIZE_MM, TOP_Y = 20.0, 2.5, 8.0, (0.0, 75.0)
 STRAND_MM = 0.55  # width of a painted strand
 
 
 def hair_share(places: Floats, soft_mm: float = SOFT_MM) -> Floats:
-    """(P,) 1 where hair grows, 0 where it does not, for positions (P, 3) on the default skin, mm."""
+    """(P,) 1 where hair grows, 0 where it does not, for positions (P, 3) on the reference skin, mm."""
     off = places - MIDDLE
     angle = np.degrees(np.arctan2(np.abs(off[:, 0]), off[:, 2]))
     line = np.interp(angle, LINE_DEG, LINE_Y)

@@ -38,9 +38,8 @@ ADULT = {
     "macrodetails/caucasian-female-young": 1.0,
     "macrodetails/universal-female-young-averagemuscle-averageweight": 1.0,
 }
-# The default person: a woman of about 30. Higher corners of the mouth are read as a smile by the tracker (.20 at 0.6,
-# .03 at 0.3): the friendliness of speech comes from its gestures.
-DEFAULT_PERSON = ADULT | {
+# Textures, cards, haircuts and landmarks are laid out on the reference person, of whom all people are displacements.
+REFERENCE_PERSON = ADULT | {
     "head/head-oval": 0.35, "chin/chin-width-decr": 0.35, "chin/chin-height-decr": 0.15,
     "chin/chin-prominent-decr": 0.1, "cheek/l-cheek-bones-incr": 0.25, "cheek/r-cheek-bones-incr": 0.25,
     "cheek/l-cheek-volume-decr": 0.1, "cheek/r-cheek-volume-decr": 0.1, "eyes/l-eye-scale-incr": 0.15,
@@ -66,7 +65,7 @@ class HeadStyle:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReferenceHead:
-    """The default identity, on whose skin texture, cards and shirt are defined."""
+    """The reference person, on whose skin texture, cards and shirt are defined."""
 
     cage: Cage
     skin: Skin
@@ -78,7 +77,7 @@ class ReferenceHead:
 
 
 def build_reference(cage: Cage, assets: Path) -> ReferenceHead:
-    """The reference head of a default identity's cage, with cards from the folder `assets`."""
+    """The reference head of a cage, with cards from the folder `assets`."""
     skin = build_skin(cage)
     lids = find_lid_edges(skin, fit_eyeballs(cage))
     lashes = bind_lashes(assets, cage, skin, lids)

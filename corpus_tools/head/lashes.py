@@ -20,11 +20,12 @@ from corpus_tools.head.strands import number_islands
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-COLOUR = np.array([0.11, 0.075, 0.06])
+COLOUR = np.array([0.07, 0.05, 0.04])
 MATERIAL = {"specular": 0.05, "shininess": 20.0, "cutout": True, "kind": "strands", "texture": CARDS_TEXTURE}
 N_ROOTS = 3  # vertices of the lid's edge that a lash follows
 SHUT_DOWN, SHUT_AHEAD = 0.55, 0.83  # offset of upper lashes from their roots when the lids are shut, in their lengths
 LOOK_DOWN_SHARE = 0.4  # of that turn when the eye looks down
+LENGTH = 0.7  # of MakeHuman's lashes, which reach the crease of the lid and look like wrinkles there
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,15 +72,15 @@ def lash_piece(cage: Cage, skin: Skin, bound: Mapping[str, LashCards], shown: st
     for name, own in bound.items():
         places = own.asset.fit(cage.vertices, cage.source.vertices)[own.order]
         root = np.einsum("nk,nkd->nd", own.weights, skin.vertices[own.roots])
-        off = places - root
+        off = LENGTH * (places - root)
         for shape, moved in skin.shapes.items():
             follow = np.einsum("nk,nkd->nd", own.weights, moved[own.roots])
             shapes[shape].append(follow + _turn(off, shape, own.is_upper & _is_beside(shape, root)))
-        points.append(places if name == shown else np.tile(HIDDEN, (len(places), 1)))
+        points.append(root + off if name == shown else np.tile(HIDDEN, (len(root), 1)))
         faces.append(own.triangles + count)
         coordinates.append(own.uv)
         tangents.append(off / np.maximum(np.linalg.norm(off, axis=1, keepdims=True), 1e-6))
-        count += len(places)
+        count += len(root)
     vertices = np.concatenate(points)
     joined = {name: np.concatenate(blocks) for name, blocks in shapes.items()}
     return Piece(

@@ -16,8 +16,8 @@ Ints = NDArray[np.int64]
 
 REACH_MM = 30.0
 WET_MM, WET_OFF_MM = 0.75, 0.06  # height of the wet line, and its distance from the eyeball
-WET_COLOUR = np.array([0.80, 0.62, 0.58])
-WET_MATERIAL = {"specular": 0.8, "shininess": 90.0, "kind": "eye"}
+WET_COLOUR = np.array([0.76, 0.60, 0.56])
+WET_MATERIAL = {"specular": 0.35, "shininess": 90.0, "kind": "eye"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

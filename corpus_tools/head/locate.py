@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from corpus_tools.head.build_head import fetch_all, head_face
-from corpus_tools.head.cage import Cage, build_cage
+from corpus_tools.head.build_head import default_cage, fetch_all, head_face
+from corpus_tools.head.cage import Cage
 from corpus_tools.head.correspondence import nearest_surface_points, write_places
 from corpus_tools.head.eyes import fit_eyeballs
-from corpus_tools.head.head import DEFAULT_PERSON
 from corpus_tools.head.rings import EdgeRings, find_narrowest_ring
 from corpus_tools.head.skin import Skin, build_skin
 from corpus_tools.head.subdivide import triangulate
@@ -192,7 +191,7 @@ def main() -> None:
     )
     arguments = parser.parse_args()
     data = fetch_all(arguments.data, arguments.assets)
-    cage = build_cage(data.source, DEFAULT_PERSON)
+    cage = default_cage(data.source)
     skin = build_skin(cage)
     write_places(locate_landmarks(head_face(data), skin, cage, FaceTracker()))
 

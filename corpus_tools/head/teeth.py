@@ -57,8 +57,9 @@ LOWER = Arch(
     np.array([7.8, 8.0, 9.0, 8.2, 7.8, 7.4]),
     np.array([4.6, 4.8, 6.0, 7.2, 8.0, 9.4]),
 )  # fmt: skip
-SHADE = np.array([1.0, 1.0, 0.95, 0.84, 0.70, 0.56])  # brightness of the crowns; cheeks shade the back ones
-TOOTH, TOOTH_DARK = np.array([0.92, 0.895, 0.84]), np.array([0.86, 0.80, 0.71])
+SHADE = np.array([1.0, 0.98, 0.88, 0.72, 0.54, 0.38])  # brightness of the crowns; cheeks shade the back ones
+TOOTH, TOOTH_DARK = np.array([0.86, 0.83, 0.77]), np.array([0.79, 0.72, 0.62])
+GAP_SHADE = np.array([0.50, 0.44, 0.38])  # share of the light that the sides of a crown lack: its neighbours shade it
 GUM = np.array([0.68, 0.36, 0.36])
 BACK_Z, FRONT_Z, MOST_SHIFT_MM = -16.0, 14.0, 5.0  # molars stay; front teeth follow the lips
 COVER_MM = {"upper": 2.2, "lower": 3.8}  # of skin in front of teeth and gums at rest; a smile draws the lower lip back
@@ -180,7 +181,9 @@ def _crown(width: float, height: float, depth: float) -> tuple[Floats, Floats]:
     cap = np.array([[0.0, -0.05, front[0]]])
     share = np.concatenate([np.repeat(LEVELS, N_AROUND), [0.0]])[:, None]
     colours = TOOTH + (TOOTH_DARK - TOOTH) * np.clip((share - 0.35) / 0.65, 0, 1) ** 1.5
-    return np.concatenate([rings.reshape(-1, 3), cap]), colours
+    beside = np.abs(corner[:, 0]) ** 6
+    sides = np.concatenate([np.tile(beside, len(LEVELS)), [0.0]])[:, None]
+    return np.concatenate([rings.reshape(-1, 3), cap]), colours * (1 - sides * GAP_SHADE)
 
 
 def _place_crown(points: Floats, path: ArchPath, along: float, arch: Arch) -> Floats:

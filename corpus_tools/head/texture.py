@@ -27,7 +27,7 @@ class HeadColours:
     """Colours, sRGB 0..1, and the strength of the skin's variation (1 natural, 0 flat)."""
 
     skin: tuple[float, float, float] = (0.81, 0.615, 0.52)
-    lips: tuple[float, float, float] = (0.695, 0.385, 0.36)
+    lips: tuple[float, float, float] = (0.735, 0.41, 0.39)
     cavity: tuple[float, float, float] = (0.66, 0.30, 0.29)
     brows: tuple[float, float, float] = BROW_COLOUR
     variation: float = 1.0
@@ -40,14 +40,14 @@ TINTS = (
     ((14, -43, 25), (7, 7, 12), (0.99, 0.89, 0.89)),  # wings of the nose
     ((0, -101, 20), (13, 9, 20), (1.00, 0.93, 0.93)),  # chin
     ((0, 55, 30), (40, 24, 40), (1.01, 1.005, 0.985)),  # forehead
-    ((17, 1, 15), (6, 9, 14), (0.93, 0.86, 0.86)),  # inner corner of the eye
-    ((30, -14, 15), (14, 5, 14), (0.965, 0.925, 0.935)),  # under the eye
-    ((33, 9, 15), (17, 6, 14), (0.965, 0.915, 0.915)),  # upper lid
+    ((17, 1, 15), (6, 9, 14), (0.955, 0.905, 0.905)),  # inner corner of the eye
+    ((30, -14, 15), (14, 5, 14), (0.985, 0.96, 0.965)),  # under the eye
+    ((33, 9, 15), (17, 6, 14), (0.985, 0.955, 0.955)),  # upper lid
     ((0, -80, 24), (14, 4, 12), (0.955, 0.93, 0.93)),  # under the lower lip
 )
 FOLD = np.array([(16, -43), (22, -52), (27, -61), (29, -69)])  # from the nose to beside the mouth: |x|, y in mm
 N_FRECKLES = 240
-UPPER_LINE, LOWER_LINE, LINE_MM = 0.72, 0.30, 1.15  # dark roots of the lashes at the lids: strengths, half width
+UPPER_LINE, LOWER_LINE, LINE_MM = 0.80, 0.24, 1.15  # dark roots of the lashes at the lids: strengths, half width
 INNER_LIP_Z, THROAT_Z, THROAT_DARKER = (20.0, 28.0), (-12.0, 25.0), 0.5  # z in mm of the default head
 LINE_TINT = np.array([0.90, 1.0, 1.0])
 
@@ -60,7 +60,7 @@ def paint_texture(
     place = texels.interpolate(skin.vertices)
     where = texels.interpolate(skin.source_uv)
     colour = _flesh(place, where, source, palette, generator)
-    lips = sample_mask(gaussian_filter(source.mask("lips"), 2.5), where)
+    lips = sample_mask(gaussian_filter(source.mask("lips"), 5.0), where)
     colour += _lip_share(lips)[:, None] * (_lip_colour(place, palette, generator) - colour)
     inside = np.maximum(sample_mask(gaussian_filter(source.mask("inside-mouth"), 2.0), where), in_mouth(where))
     colour += smoothstep(inside, 0.15, 0.95)[:, None] * (_cavity_colour(place, palette) - colour)
@@ -79,13 +79,13 @@ def _flesh(
         factors *= 1 + strength * gaussian_bump(place, centre, reach)[:, None] * (np.array(tint) - 1)
     factors *= 1 - strength * sample_mask(source.mask("ears"), where)[:, None] * np.array([0.0, 0.10, 0.09])
     factors *= 1 - strength * sample_mask(gaussian_filter(source.mask("eyelids"), 3), where)[:, None] * np.array(
-        [0.04, 0.10, 0.09]
+        [0.03, 0.065, 0.06]
     )
     factors *= 1 - strength * 0.07 * _fold(place)[:, None] * np.array([0.7, 1.0, 1.0])
     blotch = 0.6 * value_noise(place, 14.0, generator) + 0.4 * value_noise(place, 5.0, generator)
     factors *= 1 + strength * 0.016 * blotch[:, None] * np.array([0.4, 1.3, 1.2])
     factors *= 1 + strength * 0.018 * value_noise(place, 0.9, generator)[:, None]
-    factors *= 1 - strength * _freckles(place, generator)[:, None] * np.array([0.10, 0.17, 0.20])
+    factors *= 1 - strength * _freckles(place, generator)[:, None] * np.array([0.06, 0.10, 0.12])
     return np.array(palette.skin) * factors
 
 
@@ -112,7 +112,7 @@ def _freckles(place: Floats, generator: np.random.Generator) -> Floats:
 
 
 def _lip_share(mask: Floats) -> Floats:
-    return 0.92 * smoothstep(mask, 0.22, 0.80)
+    return 0.88 * smoothstep(mask, 0.12, 0.93)
 
 
 def _lip_colour(place: Floats, palette: HeadColours, generator: np.random.Generator) -> Floats:

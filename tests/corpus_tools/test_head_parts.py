@@ -9,7 +9,9 @@ from corpus_tools.dense.texels import find_texels
 from corpus_tools.head import source
 from corpus_tools.head.cage import fit_rotation, fit_sphere
 from corpus_tools.head.cloth import Sheet, clip_sheet
+from corpus_tools.head.identity import PRESETS
 from corpus_tools.head.layout import layout_coordinates
+from corpus_tools.head.proportions import TABLE, add_targets, modelling_targets
 from corpus_tools.head.teeth import LOWER, UPPER, arch_piece
 from lexicon.errors import DataError
 
@@ -115,3 +117,20 @@ def test_crowns_are_closed_outward_and_alike_on_both_sides(arch):
     points = piece.vertices[np.unique(crowns)]
     assert (arch.up * (points[:, 1] - edge)).min() >= 0
     assert points[:, 0].max() == pytest.approx(-points[:, 0].min(), abs=1e-6)
+
+
+def test_every_preset_has_proportions_in_both_halves_of_the_face():
+    assert TABLE.read_text().splitlines()[0].split(",") == ["target", "less", "more", "head", *PRESETS]
+    for person in ("head", *PRESETS):
+        found = modelling_targets(person)
+        assert all(0 < weight <= 1 for weight in found.values())
+        assert all(found[name.replace("/l-", "/r-")] == weight for name, weight in found.items() if "/l-" in name)
+    assert modelling_targets("erik")["head/head-scale-horiz-decr"] == 0.35  # the row head/head-scale-horiz has -0.35
+    assert add_targets({"a": 0.5, "b": 1.0}, {"a": 0.25, "c": 2.0}) == {"a": 0.75, "b": 1.0, "c": 2.0}
+
+
+def test_what_is_pale_takes_a_share_of_the_tint_of_the_skin():
+    tints = PRESETS["kofi"].tints()
+    assert tints["skin"] == pytest.approx(PRESETS["kofi"].skin)
+    assert tints["skin"][0] < tints["tongue"][0] < tints["teeth_upper"][0] < 1
+    assert tints["iris"] == PRESETS["kofi"].iris

@@ -211,3 +211,18 @@ def test_a_former_face_is_said_once_and_shown_by_another_without_its_hair(caplog
     assert note == "the face cartoon is no longer part of this program; ada is used"
     face = load_face("cartoon", hair="bob02", hair_color="red")
     assert np.array_equal(face.vertices, load_face("ada").vertices)
+
+
+def test_a_former_identity_is_said_once_and_shown_by_another_where_there_is_one(caplog, tmp_path: Path) -> None:
+    files._say_new_name.cache_clear()
+    head = find_file("head", "face")
+    former = [read_face(head, "walter") for _ in range(2)]
+    assert all(face.metadata["identity"] == "erik" for face in former)
+    (note,) = [record.message for record in caplog.records if "walter" in record.message]
+    assert note == "the identity walter is no longer part of this program; erik is used"
+    assert not {*files.FORMER["identity"]} & {entry.name for entry in identities()}
+    own = small_face()
+    write_face(tmp_path / "own.face", own, {"walter": Identity(np.ones((N, 3), np.float32))})
+    assert read_face(tmp_path / "own.face", "walter").metadata["identity"] == "walter"
+    with pytest.raises(InputError, match="no identity 'kenji'; it has: walter"):
+        read_face(tmp_path / "own.face", "kenji")

@@ -11,6 +11,7 @@ from tts2face.models.hair import BALD
 from tts2face.models.palette import Palette, load_palette
 from tts2face.request import NATURAL, OWN_FACE, parse_articulation
 from tts2face.session_cache import Models
+from tts2face.storage.files import present_name
 from tts2face.voice.engine import VOICE_NAMES
 
 
@@ -29,7 +30,7 @@ def check_names(models: Models, request: Mapping[str, Any]) -> None:
         raise InputError(f"there is no voice {voice!r}; give {', '.join(VOICE_NAMES)}, or a Piper voice (.onnx)")
     if models.identity is not None:
         known = _identities(models.face)
-        if models.identity not in known:
+        if present_name(models.identity, "identity", known) not in known:
             offered = ", ".join(known) or "none"
             raise InputError(f"the face {models.face} has no identity {models.identity!r}; it has {offered}")
     if models.hair not in (None, BALD) or models.hair_color is not None:

@@ -26,6 +26,7 @@ from tts2face.models.picture_coding import (
 )
 from tts2face.models.score_map import score_map_arrays, score_map_from_arrays
 from tts2face.models.shape_coding import pack_shapes, quantise, unpack_shapes
+from tts2face.storage.files import present_name
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 KIND = "face"
@@ -116,13 +117,14 @@ def read_face(path: Path, identity: str | None = None, *, checks_pictures: bool 
     Raises
     ------
     InputError
-        The file or the identity does not exist.
+        The file does not exist, or the identity neither now nor in earlier versions.
     DataError
         The file is damaged, of another kind or version, or invalid (`tts2face.models.face_layout`).
     """
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
     check_face(path, arrays, header)
     names = [name for name, _, _ in header["identities"]]
+    identity = None if identity is None else present_name(identity, "identity", names)
     if identity is not None and identity not in names:
         offered = ", ".join(names) or "none"
         raise InputError(f"the face {path.stem} has no identity {identity!r}; it has: {offered}")
@@ -239,7 +241,7 @@ def _part_texel_weights(face: Face, part: Part, shape: tuple[int, ...]) -> NDArr
     places = np.asarray(face.uv, np.float64) * [shape[1], shape[0]] - 0.5
     for corners in places[face.triangles[part.first : part.first + part.count]].tolist():
         pen.polygon([tuple(corner) for corner in corners], fill=255, outline=255)
-    soft = mask.filter(ImageFilter.MaxFilter(3)).filter(ImageFilter.GaussianBlur(1.5))
+    soft = mask.filter(ImageFilter.MaxFilter(9)).filter(ImageFilter.GaussianBlur(1.5))
     share: NDArray[np.float32] = np.asarray(soft, np.float32) / np.float32(255)
     return share
 

@@ -30,7 +30,7 @@ class Hair:
     Parameters
     ----------
     vertices, triangles : (V, 3), (F, 3)
-        Cards on the default head, mm.
+        Cards on the head that they were fitted to, mm.
     uv : (V, 2)
         Texture coordinates in [0, 1] from the top left corner.
     tangents : (V, 3)
@@ -40,8 +40,8 @@ class Hair:
         0-255; and where there is one, `scalp`: coverage of the skin's texture by hair, painted in the hair's colour
         under the cards, 0-255.
     anchors, anchor_places : (A,), (A, 3)
-        Vertices of the head that carry the hair, and their places on the default head, mm: another head moves the hair
-        as it moves these.
+        Vertices of the head that carry the hair, and their places on that head, mm: another head moves the hair as it
+        moves these.
     n_face_vertices
         Number of vertices of heads of the layout.
     metadata

@@ -25,7 +25,7 @@ CENTRE, GAZE, KEY, FILL, ACROSS, UP, SCALE, IRIS, HAS_LIDS, UPPER, LOWER = 0, 3,
 N_EYE_COLUMNS = 57
 SOFTBOX = (0.17, 0.22)  # half width and height of the key lamp's reflection, as components of the reflected ray
 LID_SHADOW, LID_SHADOW_MM = np.float32(0.55), np.float32(1.5)  # share of light at the upper lid's margin, its fade
-WET_LINE, WET_LINE_MM = np.float32(0.16), np.float32(0.22)  # brightness and half width of the tear line
+WET_LINE, WET_LINE_MM = np.float32(0.10), np.float32(0.22)  # brightness and half width of the tear line
 SCLERA = np.float32(0.6)  # of its colour: the white of the eye lies in the lids' shade
 CATCHLIGHT, FILL_LIGHT = np.float32(1.2), np.float32(0.16)  # brightness of the reflections of key and fill light
 

@@ -24,9 +24,9 @@ SKIN, EYE_KIND, STRANDS = "skin", "eye", "strands"  # kinds of parts
 THIN_MM = 0.4  # median height of the triangles of parts that are thinner than a pixel
 OPEN_SHARE = 0.05  # parts with a larger share of boundary edges are open sheets, lit from both sides
 SKIN_ROUGHNESS = 0.0448  # squared width of the wide lobe of skin: a roughness of 0.46
-SKIN_GLOSS = 0.6  # wide lobe of skin, as a share of the part's specular
-SKIN_SECOND_LOBE = 0.7  # narrow lobe of skin, relative to the wide one
-DARK_SKIN_GLOSS = 0.6  # share of the gloss that the darkest skin lacks
+SKIN_GLOSS = 0.5  # wide lobe of skin, as a share of the part's specular
+SKIN_SECOND_LOBE = 0.42  # narrow lobe of skin, relative to the wide one
+DARK_SKIN_GLOSS = 0.75  # share of the gloss that the darkest skin lacks
 SKIN_WRAP = 0.6  # of skin, as a share of the part's wrap: light scatters to the vertices around, too
 
 

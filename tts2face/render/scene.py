@@ -30,7 +30,7 @@ from tts2face.render.surface import Surface, build_surface
 from tts2face.storage.picture_files import open_picture
 
 BACKS_SIDE_PX = 192  # pictures in which visible back faces are looked for; one band of rows
-STUDIO_BRIGHT, STUDIO_DARK = (112.0, 110.0, 108.0), (36.0, 37.0, 40.0)  # sRGB at the centre of the wall and far from it
+STUDIO_BRIGHT, STUDIO_DARK = (150.0, 146.0, 141.0), (62.0, 62.0, 65.0)  # sRGB at the centre of the wall and far from it
 STUDIO_CENTRE = (0.5, 0.42)  # of the bright area, as shares of width and height
 
 

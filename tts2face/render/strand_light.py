@@ -23,7 +23,7 @@ N_FRAGMENT_ROWS, FRAGMENTS_AT_ONCE = 16, 2048 + 80  # the table stays in the cac
 SHINING_LAMPS = (0, 2)  # lamps with highlights on hair: key, first rim
 FIRST_SHIFT, SECOND_SHIFT = np.float32(-0.08), np.float32(0.14)  # of the highlights along the normal
 TEXTURE_SHIFT = np.float32(0.12)  # further shift by the brightness of the texture: highlights follow the strands
-FIRST_STRENGTH, SECOND_STRENGTH = np.float32(0.085), np.float32(0.80)  # colourless, and of the hair's own colour
+FIRST_STRENGTH, SECOND_STRENGTH = np.float32(0.05), np.float32(0.72)  # colourless, and of the hair's own colour
 CARD_NORMAL = np.float32(0.55)  # share of the card's normal; the rest points away from the middle of the skull
 
 

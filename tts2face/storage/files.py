@@ -3,7 +3,7 @@
 import contextlib
 import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -11,7 +11,8 @@ from lexicon.errors import BackendError, InputError
 from tts2face.storage.temporary import Temporary
 
 SHIPPED_FOLDER = Path(__file__).parents[1] / "data"
-FORMER = {"face": {"cartoon": "ada"}}  # by kind, shipped files of earlier versions and what is used in their place
+# By kind, names that earlier versions shipped and what is used in their place.
+FORMER = {"face": {"cartoon": "ada"}, "identity": {"kenji": "ravi", "walter": "erik"}}
 LOG = logging.getLogger(__name__)
 
 
@@ -51,6 +52,15 @@ def find_file(name: str, kind: str) -> Path:
         return SHIPPED_FOLDER / f"{FORMER[kind][name]}.{kind}"
     known = ", ".join(sorted(file.stem for file in SHIPPED_FOLDER.glob(f"*.{kind}")))
     raise InputError(f"there is no {kind} {name!r}; give {known}, or the path of a .{kind} file")
+
+
+def present_name(name: str, kind: str, offered: Collection[str]) -> str:
+    """A name that is offered: the given one, or what is used in place of a former one; else the given name."""
+    present = FORMER[kind].get(name, name)
+    if name in offered or present not in offered:
+        return name
+    _say_new_name(name, kind)
+    return present
 
 
 @cache

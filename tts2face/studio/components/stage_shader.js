@@ -147,8 +147,8 @@ export const VERTEX = `
     along = dot(vTangent, h), across = dot(m, h);
     float arrives = clamp(1.6 * dot(m, lamps[0]) + .35, 0., 1.) * visible[0] * shine;
     float first = along + (shift - .08) * across, other = along + (shift + .14) * across;
-    narrow = lampColours[0] * arrives * .085 * pow(max(1. - first * first, 1e-4), 32.);
-    wide = lampColours[0] * arrives * .8 * pow(max(1. - other * other, 1e-4), 8.);
+    narrow = lampColours[0] * arrives * .05 * pow(max(1. - first * first, 1e-4), 32.);
+    wide = lampColours[0] * arrives * .72 * pow(max(1. - other * other, 1e-4), 8.);
     #endif
     #ifdef UNLIT
     vSlope = vec3(1.);
@@ -203,7 +203,7 @@ const EYES = `
       float under = max(lidHeight(best * 18, across) - height, 0.), over = max(height - lidHeight(best * 18 + 9, across), 0.);
       shade -= .55 * exp(-under / 1.5) + .18 * exp(-over * 1.6);
       float line = (over - .3) / .22;
-      glow += .16 * exp(-line * line) * max(from.z - from.y * key.y + .3, 0.) * shade;
+      glow += .10 * exp(-line * line) * max(from.z - from.y * key.y + .3, 0.) * shade;
     }
     shade = max(shade, .1);
     albedo *= ring * focus * (inside ? 1. : .6) * (1. - inner * vec3(.05, .11, .17));
@@ -293,7 +293,7 @@ export const FRAGMENT = `
       float narrow = max(1. - first * first, 0.), wide = max(1. - other * other, 0.);
       narrow *= narrow; narrow *= narrow; narrow *= narrow; narrow *= narrow; narrow *= narrow;
       wide *= wide; wide *= wide; wide *= wide;
-      colour += lampColours[k] * arrives * (.085 * narrow + .8 * wide * albedo);
+      colour += lampColours[k] * arrives * (.05 * narrow + .72 * wide * albedo);
     }
     #else
     #ifndef COARSE
