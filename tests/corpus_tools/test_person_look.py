@@ -178,9 +178,9 @@ def test_olive_hair_becomes_grey_and_blue_hair_stays_blue() -> None:
         ("erik", "short02", "dark-blond", ("short",), ("dark-blond", "light-brown")),
         ("mei", "bob02", "blond", ("bob",), ("blond",)),
         ("kofi", "bald", None, ("bald",), ()),
-        ("walter", "bald", None, ("bald",), ()),
+        ("nia", "bald", None, ("bald",), ()),
         ("kofi", "cropped", "black", ("cropped", "flat"), ("black", "dark-brown")),
-        ("kenji", "short01", "black", ("flat", "short"), ("black",)),
+        ("ravi", "short01", "black", ("flat", "short"), ("black",)),
         ("ingrid", "bob02", "white", ("bob",), ("white", "grey")),
     ],
 )
@@ -195,12 +195,31 @@ def test_drawn_peoples_hair_is_found(
         assert min(off, key=off.__getitem__) in names
 
 
-@pytest.mark.parametrize("gains", [(1.25, 1.0, 0.6), (0.9, 1.0, 1.35)])
-@pytest.mark.parametrize("identity", ["erik", "kofi", "mei"])
-def test_a_coloured_light_is_told_from_drawn_people(identity: str, gains: tuple[float, float, float]) -> None:
+WARM, COLD = (1.25, 1.0, 0.6), (0.9, 1.0, 1.35)
+
+
+@pytest.mark.parametrize(
+    ("identity", "gains", "is_told"),
+    [
+        *((name, gains, True) for name in ("erik", "mei") for gains in (WARM, COLD)),
+        ("kofi", WARM, True),
+        (
+            "kofi",
+            COLD,
+            False,
+        ),  # the white of his eyes is brown beyond its spread: it does not agree, and nothing is done
+    ],
+)
+def test_a_coloured_light_is_told_from_drawn_people(
+    identity: str, gains: tuple[float, float, float], is_told: bool
+) -> None:
     plain, lit = seen_look(identity, None, None), seen_look(identity, None, None, gains)
-    assert lit.cast[1] - plain.cast[1] == pytest.approx(np.log(gains[2]), abs=0.2)
-    assert np.sign(lit.cast[1]) == np.sign(np.log(gains[2]))
+    wanted = np.log(gains[2])
+    if is_told:
+        assert lit.cast[1] - plain.cast[1] == pytest.approx(wanted, abs=0.2)
+        assert np.sign(lit.cast[1]) == np.sign(wanted)
+    else:
+        assert lit.cast[1] == 0.0
     assert lit.length == plain.length
 
 
@@ -215,7 +234,7 @@ def test_small_eyes_are_brown_and_said_to_be_unseen() -> None:
     look = seen_look("erik", None, None, size=3)
     np.testing.assert_array_equal(look.iris, parse_hex(NEUTRAL_IRIS))
     assert look.summary().endswith("eyes too small to tell their colour")
-    assert look.length == "short"
+    assert look.length == "flat"
 
 
 def test_a_head_is_drawn_as_the_person_looks(head: Face) -> None:
