@@ -32,9 +32,9 @@ EDGE_CELLS, MIN_ROW_CELLS = 4, 20
 INSIDE_MM = 4.0  # of the face's oval: no hair
 TEMPLE_MM, MIN_LOCK_MM = 36.0, 9.0  # hair beside the face, from the middle of it; thinner locks do not count
 NECK_MM = 45.0  # half width, in which nothing below the chin is hair
-# Lowest hair beside the face, from the chin, mean of both sides: haircuts with free ears -80 and higher up, bobs -30 to
-# 6, long hair from 12.
-BOB_MM, LONG_MM = -50.0, 9.0
+# Lowest hair beside the face, from the chin, mean of both sides: haircuts with free ears -95 and higher up, bobs -58 to
+# -7, long hair from 8. A side that shows none beside the temple does not count: its hair is like the wall.
+BOB_MM, LONG_MM, TEMPLE_HAIR_MM = -75.0, 0.0, 10.0
 FLAT_MM = (55.0, 30.0)  # hair above `FOREHEAD`, and both sides' at the temples: less of both lies on the skull
 SEE_THROUGH = 2.0  # difference from skin up to which flat hair is cropped: the skin shows through
 
@@ -173,7 +173,8 @@ def _length(region: Mask, marks: Floats, off: Floats) -> str:
     chin, forehead = marks[CHIN, 1], marks[FOREHEAD, 1]
     beside = [(region & (side * ACROSS_MM > TEMPLE_MM)).sum(axis=1) * CELL_MM for side in (-1, 1)]
     ends = [UP_MM[np.flatnonzero(width >= MIN_LOCK_MM)].min(initial=forehead) for width in beside]
-    reach = chin - float(np.mean(ends))
+    told = [end for end in ends if end < forehead - TEMPLE_HAIR_MM] or [forehead]
+    reach = chin - float(np.mean(told))
     if reach > BOB_MM:
         return "long" if reach > LONG_MM else "bob"
     middle = region[:, np.abs(ACROSS_MM) < TEMPLE_MM]

@@ -46,13 +46,13 @@ SHINE = 0.5  # logarithm by which hair in a picture is lighter than its colour; 
 # Natural hair lies on a line of log R/G and B/G, from black and grey to brown and blond: browner by so much bluer less.
 # Casts of cameras and walls lead off it; what is further off than these is dyed or red.
 HAIR_LINE, NATURAL = np.array([1.0, -0.9]), (0.4, 0.7)
-GREY = 0.4  # log R/G below which hair is rather grey in yellowish light than blond
+GREY = 0.35  # log R/G below which hair is rather grey in yellowish light than blond
 EYE_COLOURS: Mapping[str, str] = {
     "dark brown": "3a281f", "brown": "58402f", "hazel": "6a5a3e", "green": "67705a", "grey": "6d7274", "blue": "60788c",
 }  # fmt: skip  # sRGB
 NEUTRAL_IRIS = "58402f"
 IRIS_LIGHT, DARK_IRIS, DARK_IRIS_HUE = 0.012, 0.02, (0.55, -0.55)  # least luminance; up to which irises are brown
-BROWN_FROM, BROWN_SLOPE, BROWN_LIGHT = -0.45, -0.6, 0.05  # log B/G of brown irises, their least R/G, most luminance
+BROWN_FROM, BROWN_SLOPE, BROWN_LIGHT = -0.45, -0.8, 0.035  # log B/G of brown irises, their least R/G, most luminance
 BROW_LIGHT = -1.9  # most luminance of brows, of the skin's, logarithm
 ROOT_MM, LASH_MM = 0.7, 10.0  # off the skin: roots of lashes, and lashes that are shown
 LASH_LENGTH = 0.55  # of the default head's, which are those of made-up eyes

@@ -147,6 +147,16 @@ def test_hair_is_measured_to_where_it_ends(
         np.testing.assert_allclose(srgb_colour(found.colour), (60, 42, 30), atol=3)
 
 
+def test_hair_that_is_like_the_wall_on_one_side_is_measured_on_the_other(head: Face) -> None:
+    portrait, skin = (
+        painted_portrait(head, (70, 120, 170), (60, 42, 30), 45.0, 75.0),
+        log_colour(np.array(SKINS[1], float)),
+    )
+    one_sided = portrait.srgb.copy()
+    one_sided[:, ACROSS_MM < -34] = (70, 120, 170)
+    assert find_hair(replace(portrait, srgb=one_sided), skin).length == "long"
+
+
 def test_a_wall_in_the_colour_of_the_hair_is_no_long_hair(head: Face) -> None:
     portrait = painted_portrait(head, (58, 43, 33), (60, 42, 30), -95.0, 75.0)
     assert find_hair(portrait, log_colour(np.array(SKINS[1], float))).length in SHORT
