@@ -203,7 +203,7 @@ N_ANCHORS = 180
 N_SAMPLES = 60_000  # points on the cards
 SOLID = 0.4  # coverage of a card from which it hides the scalp
 SCALP_SIDE, STUBBLE_SIDE = 1024, 1024
-FUZZ_MM, FUZZ, FUZZ_SIDE = 0.5, 0.42, 512  # height of the layer above a cropped scalp, coverage, pixels
+FUZZ_MM, FUZZ, FUZZ_SIDE = 1.6, 0.42, 512  # height of the layer above a cropped scalp, coverage, pixels
 SEED = 11
 
 

@@ -102,7 +102,7 @@ def test_each_row_may_have_a_matrix_of_its_own() -> None:
 
 
 def test_scores_of_the_person_are_read_on_the_head(talker: Talker, head: Face, speech: Trajectory) -> None:
-    """Jaw instead of upper lip: the tracker's scores by the head's own map, with and without score rows."""
+    """The tracker's scores by the head's own map, with and without score rows."""
     assert talker.scores is not None
     assert head.scores is not None
     person = talker.scores.scores(speech.values.astype(np.float64))
@@ -110,11 +110,10 @@ def test_scores_of_the_person_are_read_on_the_head(talker: Talker, head: Face, s
     matched = moving_weights(build_retargeter(talker, head), speech)
     open_ = person[:, JAW] > 0.2
     before, after = ((head.scores.scores(weights) - person)[open_] for weights in (plain, matched))
-    assert before[:, JAW].mean() < -0.08  # today's head drops the jaw too little
     assert abs(after[:, JAW].mean()) < 0.08
-    assert before[:, UPPER].mean() > 0.03  # and lifts the upper lip
-    assert abs(after[:, UPPER].mean()) < 0.03
-    assert np.abs(after.mean(axis=0))[:-1].max() < 0.08  # the last is the smile: this head's rest reads as one
+    assert abs(after[:, UPPER].mean()) < min(0.03, before[:, UPPER].mean())
+    assert abs(after[:, -1].mean()) < 0.5 * before[:, -1].mean()  # the lips' own match reads as a smile
+    assert np.abs(after.mean(axis=0)).max() < 0.08
 
 
 def test_bilabials_stay_closed(talker: Talker, head: Face) -> None:
