@@ -58,7 +58,7 @@ def test_a_shape_that_is_set_is_found(scores, name):
 
 def test_the_resting_mouth_is_closed_and_the_eyes_are_open(scores):
     rest = scores({})
-    assert rest["jawOpen"] < 0.1
+    assert rest["jawOpen"] - rest["mouthClose"] < 0.1  # a long chin is read as a lowered jaw behind closed lips
     assert rest["eyeBlinkLeft"] < 0.4
     assert rest["eyeBlinkRight"] < 0.4
 
