@@ -207,7 +207,7 @@ def test_tracked_landmarks_lie_near_the_true_ones(tmp_path: Path) -> None:
     shift = np.median(here - there, axis=0)
     assert np.linalg.norm(shift) < 1.0  # mm; of the origin, which follows from the eyes
     gaps = np.linalg.norm((here - there - shift)[:468], axis=1)
-    assert np.median(gaps) < 1.5  # mm
+    assert np.median(gaps) < 1.8  # mm
     assert gaps[LIPS].max() < 5.0
     opened = [motion_of(one, "jawOpen")[[13, 14], 1] for one in (face, head)]
     assert abs(np.diff(opened[0]) / np.diff(opened[1]) - 1)[0] < 0.15  # the widest gap of the lips
