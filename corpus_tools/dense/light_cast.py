@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.dense.skin_colour import sample_picture
 from corpus_tools.dense.visible_texels import polygon_depth
-from tts2face.colour import decode_srgb, encode_srgb
+from tts2face.colour import decode_srgb, encode_light, encode_srgb
 from tts2face.models.landmarks import LID_RINGS
 
 Floats = NDArray[np.float64]
@@ -144,9 +144,3 @@ def remove_cast(srgb: Floats, cast: Floats, skin: Floats) -> Floats:
     before = np.exp([skin[1], 0.0, skin[2]])
     gains *= (before @ LUMINANCE) / ((before * gains) @ LUMINANCE)
     return 255.0 * encode_light(decode_srgb(np.clip(srgb, 0.0, 255.0) / 255.0) * gains)
-
-
-def encode_light(light: Floats) -> Floats:
-    """SRGB values in [0, 1] of linear light, without the steps of 8 bits."""
-    within = np.clip(light, 0.0, 1.0)
-    return np.where(within <= 0.0031308, 12.92 * within, 1.055 * within ** (1 / 2.4) - 0.055)

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.hair_region import OTHER_HUE
-from corpus_tools.dense.light_cast import encode_light, linear_light, log_colour
+from corpus_tools.dense.light_cast import linear_light, log_colour
 from corpus_tools.dense.mesh_fit import face_landmarks
 from corpus_tools.dense.skin_colour import SkinColours, vertex_normals
 from corpus_tools.dense.texels import Texels
 from corpus_tools.dense.visible_texels import SkinCanvas, soften_edges
+from tts2face.colour import encode_light
 from tts2face.models.face import Face, Texture
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
 from tts2face.numeric import smoothstep
