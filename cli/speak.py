@@ -209,8 +209,10 @@ def _open_session(options: SpeakOptions, voices: "VoicePool") -> "Session":
 
     if options.out is not None:
         check_output(options.out)
-    session = options.models.open_session(voices)
     draws = (options.out is not None or options.view) and options.models.face != OWN_FACE
+    if not kernels_are_compiled(None):  # the first run: before models are read, which needs some of the kernels
+        compile_kernels(options.models.shown_face() if draws else None)
+    session = options.models.open_session(voices)
     drawn = session.face.mesh if draws else None
     if not kernels_are_compiled(drawn):
         compile_kernels(drawn)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from lexicon.json_values import check_fields
 
 if TYPE_CHECKING:
+    from tts2face.models.face import Face
     from tts2face.session import Session
     from tts2face.voice.pool import VoicePool
 
@@ -41,6 +42,12 @@ class Models:
             from tts2face.models.face_loading import default_face
 
             object.__setattr__(self, "face", default_face(self.identity, self.hair))
+
+    def shown_face(self) -> "Face | None":
+        """Face of these models, None for the talker's own; raises as `Session`."""
+        from tts2face.synthesis.session_models import shown_face
+
+        return shown_face(self.face, self.identity, self.hair, self.hair_color)
 
     def open_session(self, voices: "VoicePool | None" = None, *, memory_mb: float = 0.0) -> "Session":
         """Session of these models; raises as `Session`."""

@@ -11,7 +11,7 @@ from tts2face.models.face import Face
 from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.film.scene import LitScene
-from tts2face.render.film.visibility import BLOCK, TRIANGLE_MASK, X, Y, find_nearest, project
+from tts2face.render.film.visibility import TRIANGLE_MASK, X, Y, nearest_triangles, project
 from tts2face.render.picture import Picture
 
 Pixels = NDArray[np.uint8]
@@ -50,8 +50,7 @@ def _regions(scene: LitScene, pose: LitPose) -> dict[str, Mask]:
     points = scene.pose(pose.weights, pose.head)
     optics = (scene.optics.view.astype(np.float32), scene.optics.lens.astype(np.float32))
     project(points, surface.source, *optics, table)
-    nearest = np.zeros((side * n, side * n + BLOCK), np.int64)
-    find_nearest(table, surface.triangles, nearest)
+    nearest, _, _ = nearest_triangles(table, surface.triangles, (side * n, side * n))
     seen = (nearest[n // 2 :: n, n // 2 : side * n : n] & TRIANGLE_MASK) - 1
     part_names = np.repeat([part.name for part in face.parts], [part.count for part in face.parts])
     names = part_names[surface.light.triangle_numbers[np.maximum(seen, 0)]]

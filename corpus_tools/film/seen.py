@@ -11,7 +11,7 @@ from tts2face.face.deformation import build_rig
 from tts2face.models.face import Face
 from tts2face.render.camera import camera_matrices
 from tts2face.render.camera_views import CameraView
-from tts2face.render.film.visibility import BLOCK, N_COLUMNS, TRIANGLE_MASK, X, Y, find_nearest, project
+from tts2face.render.film.visibility import N_COLUMNS, TRIANGLE_MASK, X, Y, nearest_triangles, project
 
 SIDE_PX = 900
 MIDDLE_LIPS = (13, 14)  # landmarks
@@ -92,12 +92,11 @@ def _looks(
     """
     both = np.concatenate([face.triangles, face.triangles[:, ::-1]]).astype(np.int32)
     table = np.zeros((len(face.vertices), N_COLUMNS), np.float32)
-    nearest = np.zeros((SIDE_PX, SIDE_PX + BLOCK), np.int64)
     every = np.arange(len(face.vertices), dtype=np.int32)
     for view in views:
         optics = camera_matrices(view, face, (SIDE_PX, SIDE_PX))
         project(points, every, optics.view.astype(np.float32), optics.lens.astype(np.float32), table)
-        find_nearest(table, both, nearest)
+        nearest, _, _ = nearest_triangles(table, both, (SIDE_PX, SIDE_PX))
         yield (nearest[:, :SIDE_PX] & TRIANGLE_MASK) - 1, table
 
 

@@ -23,7 +23,7 @@ STAGES = {  # of a frame, and the functions of `tts2face.render.film.scene` that
     "pose": ("LitScene.deform", "LitScene.move"),
     "light of the pose": ("LitScene.light_pose",),
     "projection": ("project",),
-    "visibility, 2 x 2": ("find_nearest",),
+    "visibility, 2 x 2": ("LitScene._sort", "find_nearest"),
     "fragments": ("list_fragments",),
     "shading": ("lay_planes", "evaluate", "find_texels", "fetch", "add_texels"),
     "eyes": ("colour_eyes",),

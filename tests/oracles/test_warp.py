@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.exemplar.time_warping import frame_distances, path_cost, warp_path, warp_to_reference
+from tts2face.exemplar.time_warping import frame_distances, path_cost, warp_path, warp_space, warp_to_reference
 
 
 def every_path(n, m):
@@ -62,7 +62,7 @@ def test_a_late_event_is_laid_over_the_reference_s():
     reference = np.exp(-((knots - 5) ** 2) / 2)[:, None].astype(np.float32)
     late = np.exp(-((knots - 6) ** 2) / 2)[:, None].astype(np.float32)
     out = np.zeros_like(late)
-    warp_to_reference(late, reference, np.ones(1, np.float32), 2, out)
+    warp_to_reference(late, reference, np.ones(1, np.float32), 2, out, warp_space(len(late)))
     assert int(out.argmax()) == 5
     assert np.mean([out[5, 0], reference[5, 0]]) > 0.95 > np.mean([late[5, 0], reference[5, 0]])
     assert out[0] == late[0]

@@ -9,7 +9,7 @@ from tts2face.compilation import kernel
 from tts2face.exemplar.options import SynthesisOptions
 from tts2face.exemplar.phone_substitution import Targets
 from tts2face.exemplar.recorded_motion import read_motion
-from tts2face.exemplar.time_warping import warp_to_reference
+from tts2face.exemplar.time_warping import warp_space, warp_to_reference
 from tts2face.exemplar.tokens import Tokens
 
 CLOCK_HZ = 100.0  # rate at which motion is computed; lip motion is below 15 Hz
@@ -62,23 +62,25 @@ def average_tokens(
     _accumulate_average(
         (tokens.frames, tokens.first_frame, tokens.utterance, tokens.spans, tokens.fps),
         (chosen, weights, knots, 1.0 / spread, ALIGN_BAND if options.align else 0),
-        mean,
-        square,
+        (mean, square),
+        (np.zeros((3, *shape[1:]), np.float32), warp_space(len(knots))),
     )
     return AveragedTokens(mean, np.maximum(square - np.square(mean), np.float32(0.0)))
 
 
 @kernel
-def _accumulate_average(corpus, plan, mean, square):  # type: ignore[no-untyped-def]
+def _accumulate_average(corpus, plan, sums, space):  # type: ignore[no-untyped-def]
     chosen, weights, knots, scale, band = plan
-    best, piece, laid = np.zeros_like(mean[0]), np.zeros_like(mean[0]), np.zeros_like(mean[0])
+    mean, square = sums
+    pieces, warp = space
+    best, piece, laid = pieces[0], pieces[1], pieces[2]
     for n in range(len(chosen)):
         for e in range(chosen.shape[1]):
             if chosen[n, e] < 0 or weights[n, e] == 0.0:
                 continue
             _sample_token(corpus, chosen[n, e], knots, scale, best if e == 0 else piece)
             if e > 0 and band > 0:
-                warp_to_reference(piece, best, scale, band, laid)
+                warp_to_reference(piece, best, scale, band, laid, warp)
             _add_weighted(best if e == 0 else (laid if band > 0 else piece), weights[n, e], mean[n], square[n])
 
 

@@ -126,8 +126,8 @@ def best_tokens(query: TokenQuery, index: ContextIndex, *, context: int, k: int,
         (index.order, index.group_first, index.phone_first, index.context, index.log_durations),
         index.far_likeness if context > N_GROUP_CONTEXT else NO_LIKENESS,
         (index.similarity, context_weights(context), duration),
-        tokens,
-        scores,
+        (tokens, scores),
+        np.zeros(int(np.diff(index.phone_first).max(initial=0))),
     )
     return TokenRanking(tokens, scores)
 
@@ -176,12 +176,14 @@ def _score_bound(target, token, group, rule):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _search_groups(query, index, far_likeness, rule, tokens, scores):  # type: ignore[no-untyped-def]
+def _search_groups(query, index, far_likeness, rule, found, space):  # type: ignore[no-untyped-def]
+    """Write the rankings; `space` has a place for each group of a phone."""
     phone, contexts, durations = query
     order, group_first, phone_first, token_contexts, token_durations = index
+    tokens, scores = found
     for n in range(len(phone)):
         first, last = phone_first[phone[n]], phone_first[phone[n] + 1]
-        bounds = np.zeros(last - first)
+        bounds = space[: last - first]
         for g in range(first, last):
             shared = token_contexts[order[group_first[g]]]
             bounds[g - first] = _score_bound(contexts[n], shared, (far_likeness, g), rule)

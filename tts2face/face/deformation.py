@@ -58,10 +58,11 @@ class FaceRig:
     def deform(self, weights: NDArray[np.floating]) -> NDArray[np.float32]:
         """Vertices (V, 3), mm, for shape weights (K,), of a head that has not moved."""
         vertices = np.zeros_like(self.rest)
-        eyes = eye_rotations(self.eye_turns, np.asarray(weights))
-        _apply_shapes(self.rest, self.starts, self.indices, self.deltas, np.asarray(weights, np.float32), vertices)
+        weights = np.array(weights, np.float32)  # a copy that can be written: kernels are compiled for one kind
+        eyes = eye_rotations(self.eye_turns, weights)
+        _apply_shapes(self.rest, self.starts, self.indices, self.deltas, weights, vertices)
         _turn_eyes(self.eye_spans, self.eye_centres, eyes, vertices)
-        centres = self.clearance.centres(self.eye_centres, np.asarray(weights, np.float32))
+        centres = self.clearance.centres(self.eye_centres, weights)
         self.clearance.enforce(centres, eyes, vertices)
         return vertices
 

@@ -45,8 +45,6 @@ class HairSwing:
 
         The spring is solved exactly between frames, at which the head's rate jumps.
         """
-        from scipy.signal import lfilter
-
         angles = head.values[:, :3].astype(np.float64)
         if before is None:
             before = Swing(angles[0], np.zeros(3), np.zeros((2, 3)))
@@ -56,8 +54,13 @@ class HairSwing:
         damped = angular * math.sqrt(1 - DAMPING**2)
         decay = math.exp(-DAMPING * angular * step)
         gain = decay * math.sin(damped * step) / damped
-        poles = [1.0, -2 * decay * math.cos(damped * step), decay**2]
-        lags, springs = lfilter([gain], poles, pushes, axis=0, zi=before.springs)
+        turn = 2 * decay * math.cos(damped * step)
+        lags = np.empty_like(pushes)
+        now, later = before.springs
+        for lag, push in zip(lags, pushes, strict=True):  # a recursion of two poles; scipy.signal takes long to import
+            lag[:] = gain * push + now
+            now, later = turn * lag + later, -(decay**2) * lag
+        springs = np.stack([now, later])
         weights = face.values.copy()
         weights[:, self.columns] += (LIMIT_RAD * np.tanh(lags / LIMIT_RAD)).astype(weights.dtype)
         return replace(face, values=weights), Swing(angles[-1], rates[-1], springs)

@@ -12,7 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.field_kernels import MIN_MOMENT_GAP, SEARCH_SLACK, generate_frames, nearest_distances
+from tts2face.gesture.field_kernels import (
+    MIN_MOMENT_GAP,
+    SEARCH_SLACK,
+    generate_frames,
+    nearest_distances,
+    search_space,
+)
 from tts2face.gesture.kd_tree import KdTree, build_tree, count_nodes
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.numeric import principal_axes
@@ -270,7 +276,7 @@ def _is_index(
 
 def _median_nearest_distance(field: Field, usable: NDArray[np.int64]) -> float:
     moments = usable[np.linspace(0, len(usable) - 1, min(N_DISTANCE_SAMPLES, len(usable))).astype(int)]
-    queries = moments, np.zeros(len(moments))
+    queries = moments, np.zeros(len(moments)), search_space(2, len(field.axes))
     nearest_distances(_field_arrays(field), _tree_arrays(field.tree), field.axes, field.options.history, queries)
     distances = queries[1][np.isfinite(queries[1])]
     return max(float(np.median(distances)) if len(distances) else 1.0, 1e-9)
@@ -360,7 +366,6 @@ def sample_field_moments(
         field.axes,
         (
             history,
-            options.candidates,
             options.sigma * field.median_distance,
             options.stride,
             options.continuity,
@@ -368,7 +373,17 @@ def sample_field_moments(
             fade,
             (options.apart, options.search_error),
         ),
-        (motion, sound, moments, offset, recent, state.moment, state.n_frames, chances),
+        (
+            motion,
+            sound,
+            moments,
+            offset,
+            recent,
+            state.moment,
+            state.n_frames,
+            chances,
+            search_space(options.candidates, len(field.axes)),
+        ),
     )
     behind = motion[-history:].copy(), sound[-history:].copy(), int(moments[-1]), offset, recent
     after = FieldState(*behind, state.n_frames + len(chances))

@@ -1,5 +1,7 @@
 """Compiled kernels of `tts2face.gesture.field`: search of similar moments and sampling."""
 
+from typing import Any
+
 import numpy as np
 
 from tts2face.compilation import inlined_kernel, kernel
@@ -7,6 +9,18 @@ from tts2face.compilation import inlined_kernel, kernel
 # Default factor by which distances of moments found may exceed the best ones (Ju and Lee 2008 use ANN).
 SEARCH_SLACK = 1.1
 MIN_MOMENT_GAP = 10  # default least number of frames between two candidates of one recording
+
+
+SEARCH_DEPTH = 128  # nodes of the tree that may wait
+
+
+def search_space(n_candidates: int, n_axes: int) -> tuple[Any, ...]:
+    """Arrays of one search: the best moments and their distances, waiting nodes and their bounds, and the query.
+
+    Kernels do not make arrays, which takes the compiler a quarter of a second for each kind.
+    """
+    best, distance = np.zeros(n_candidates, np.int64), np.zeros(n_candidates)
+    return best, distance, np.zeros(SEARCH_DEPTH, np.int64), np.zeros(SEARCH_DEPTH), np.zeros(n_axes, np.float32)
 
 
 @inlined_kernel
@@ -20,10 +34,7 @@ def _clear(best, distance):  # type: ignore[no-untyped-def]
 def nearest_distances(corpus, tree, axes, history, queries):  # type: ignore[no-untyped-def]
     """Write the distance of each moment from its nearest other moment."""
     values, recorded, _ = corpus
-    moments, cost = queries
-    best, distance = np.zeros(2, np.int64), np.zeros(2)
-    stack, bounds = np.zeros(128, np.int64), np.zeros(128)
-    query = np.zeros(len(axes), np.float32)
+    moments, cost, (best, distance, stack, bounds, query) = queries
     for n in range(len(moments)):
         _clear(best, distance)
         window = (values[moments[n] - history : moments[n]], recorded[moments[n] - history : moments[n]], 0, history)
@@ -42,12 +53,9 @@ def generate_frames(corpus, tree, axes, options, track):  # type: ignore[no-unty
     2018).
     """
     values, _, starts = corpus
-    history, n_candidates, sigma, stride, continuity, stiffness, fade, rule = options
-    shown, prosody, moments, offset, recent, moment, n_before, chances = track
+    history, sigma, stride, continuity, stiffness, fade, rule = options
+    shown, prosody, moments, offset, recent, moment, n_before, chances, (best, distance, stack, bounds, query) = track
     none = recent[:0]
-    best, distance = np.zeros(n_candidates, np.int64), np.zeros(n_candidates)
-    stack, bounds = np.zeros(128, np.int64), np.zeros(128)
-    query = np.zeros(len(axes), np.float32)
     for i in range(len(chances)):
         following = moment + 1
         can_continue = moment >= 0 and following < len(values) and starts[following] == starts[moment]

@@ -1,7 +1,7 @@
 """Compilation of all kernels at the first run on a machine; later runs load them from the disk cache.
 
-The kernels of motion, and those of strands, are compiled in child processes while this process compiles the other
-drawing kernels, because numba compiles one kernel at a time in each process.
+The kernels of motion, of gestures and of strands are compiled in child processes while this process compiles the
+other drawing kernels, because numba compiles one kernel at a time in each process.
 """
 
 import subprocess
@@ -48,15 +48,18 @@ def compile_kernels(drawn: Face | None) -> None:
 
     If a child process fails, its kernels are compiled at their first use.
     """
+    from tts2face.face.deformation import REST_HEAD
     from tts2face.render.draw import draw
     from tts2face.render.materials import STRANDS
 
     has_strands = drawn is not None and not drawn.light
-    children = [_start_child(work) for work in ("compile_motion", *(["compile_strands"] if has_strands else []))]
+    works = ["compile_motion", "compile_gestures", *(["compile_strands"] if has_strands else [])]
+    children = [_start_child(work) for work in works]
     try:
         if drawn is not None:
             face = keep_parts(drawn, lambda part: part.kind != STRANDS) if has_strands else drawn
-            draw(face, np.zeros(len(face.shape_names), np.float32), picture=Picture(size="64x64"))
+            head = np.full(len(REST_HEAD), 0.01, np.float32)
+            draw(face, np.zeros(len(face.shape_names), np.float32), head, picture=Picture(size="64x64"))
         for child in children:
             child.wait(COMPILE_TIMEOUT_S)
     except subprocess.TimeoutExpired:
@@ -103,18 +106,26 @@ def compile_strands() -> None:
 
 
 def compile_motion() -> None:
-    """Compile the kernels of lip synthesis, retargeting and gestures by synthesising one second of motion."""
+    """Compile the kernels of lip synthesis and retargeting by synthesising one second of motion."""
     from tts2face.exemplar.synthesis import build_exemplar_model, speech_trajectory
-    from tts2face.gesture.gesture_stream import GestureFields, GestureStream
-    from tts2face.gesture.timeline import Timeline
-    from tts2face.models.palette import load_palette
     from tts2face.models.talker import load_talker
     from tts2face.retargeting.to_face import build_retargeter
-    from tts2face.types import Waveform
 
     talker: Talker = load_talker("grid_s1")
     retargeter = build_retargeter(talker, load_face("head"))
     phones = PhoneSequence([SILENCE, "p", "f", "ɑ", SILENCE], [0.0, 0.3, 0.4, 0.5, 0.7, 1.0])
     retargeter.retarget(speech_trajectory(phones, build_exemplar_model(talker), fps=30.0, n_frames=30))
+
+
+def compile_gestures() -> None:
+    """Compile the kernels of gestures and of the level of sound by three frames of gestures."""
+    from tts2face.gesture.gesture_stream import GestureFields, GestureStream
+    from tts2face.gesture.timeline import Timeline
+    from tts2face.models.palette import load_palette
+    from tts2face.speech.bs1770 import block_powers
+    from tts2face.types import Waveform
+
     gestures = GestureStream(GestureFields(load_palette("starter")), style="grid_s1", seed=0, fps=30.0)
-    gestures.next(Waveform(np.zeros(1600), 16_000), 3, Timeline())
+    sound = Waveform(np.zeros(1600), 16_000)
+    gestures.next(sound, 3, Timeline())
+    block_powers(sound)

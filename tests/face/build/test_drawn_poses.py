@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from PIL import Image, ImageDraw, ImageFilter
+from PIL import Image, ImageDraw
+from scipy.ndimage import maximum_filter
 
 from tests.face.people import LIT
 from tts2face.face.deformation import REST_HEAD
@@ -14,7 +15,7 @@ from tts2face.render.camera import camera_matrices
 from tts2face.render.camera_views import CameraView
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.film.scene import LitScene
-from tts2face.render.film.visibility import BLOCK, N_COLUMNS, TRIANGLE_MASK, find_nearest, project
+from tts2face.render.film.visibility import N_COLUMNS, TRIANGLE_MASK, nearest_triangles, project
 from tts2face.render.picture import Picture
 from tts2face.session import Session
 
@@ -48,11 +49,10 @@ def posed(request: pytest.FixtureRequest) -> tuple[Face, np.ndarray]:
 def seen(face: Face, points: np.ndarray) -> np.ndarray:
     """(SIDE_PX, SIDE_PX) number of the triangle that is seen in each pixel; -1 for none."""
     table = np.zeros((len(points), N_COLUMNS), np.float32)
-    nearest = np.zeros((SIDE_PX, SIDE_PX + BLOCK), np.int64)
     optics = camera_matrices(CameraView(0, 0, share=SHARE), face, (SIDE_PX, SIDE_PX))
     every = np.arange(len(points), dtype=np.int32)
     project(points, every, optics.view.astype(np.float32), optics.lens.astype(np.float32), table)
-    find_nearest(table, face.triangles.astype(np.int32), nearest)
+    nearest, _, _ = nearest_triangles(table, face.triangles.astype(np.int32), (SIDE_PX, SIDE_PX))
     return (nearest[:, :SIDE_PX] & TRIANGLE_MASK).astype(np.int64) - 1
 
 
@@ -69,7 +69,7 @@ def outline(face: Face, points: np.ndarray, rows: list[int]) -> np.ndarray:
     pen = ImageDraw.Draw(picture)
     pen.polygon(places, fill=255)
     pen.line([*places, places[0]], fill=255)  # a polygon without a height has no filling
-    return np.asarray(picture.filter(ImageFilter.MaxFilter(2 * OUTLINE_PX + 1))) > 0
+    return np.asarray(maximum_filter(np.asarray(picture), 2 * OUTLINE_PX + 1)) > 0
 
 
 def triangle_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -22,8 +22,8 @@ def mirrored(lamps, normal=(0.0, 0.0, 1.0), point=(0.0, 0.0, -500.0)):
     rows = np.zeros((N_ROWS, 3), np.float32)
     rows[:6] = np.array([*point, *normal], np.float32)[:, None]
     mirror_lamps(CAMERA, np.array(lamps, np.float32).reshape(-1, 17), SKY, rows)
-    assert (rows[6:] == rows[6:, :1]).all()
-    return rows[6:, 0]
+    assert (rows[6:9] == rows[6:9, :1]).all()
+    return rows[6:9, 0]
 
 
 def test_an_eye_mirrors_the_lamp_behind_the_camera_by_fresnels_share() -> None:

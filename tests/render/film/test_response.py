@@ -75,7 +75,7 @@ def test_the_light_through_an_opening_is_its_form_factor() -> None:
     tilt = np.radians(20)
     table[0, NORMAL:] = (0, np.sin(tilt), np.cos(tilt))
     terms = np.ones((N_MOUTH_TERMS, 1), np.float32)
-    write_mouth_terms(face_points, np.zeros(1, np.int32), table, face_points[1:], terms)
+    write_mouth_terms(face_points, np.zeros(1, np.int32), table, face_points[1:], terms, np.zeros((6, 1), np.float32))
     step = half / 400
     across, up = np.meshgrid(np.arange(-half, half, step) + step / 2, np.arange(-half, half, step) + step / 2)
     inside = polygon_holds(ring[:, :2], across, up)

@@ -17,7 +17,7 @@ from tts2face.render.film.shading import (
     lay_planes,
     list_fragments,
 )
-from tts2face.render.film.visibility import BLOCK, N_COLUMNS, NEAR, U, X, Y, find_nearest
+from tts2face.render.film.visibility import BLOCK, N_COLUMNS, NEAR, U, X, Y, nearest_triangles
 
 SIZE = 16  # pixels
 
@@ -25,12 +25,12 @@ SIZE = 16  # pixels
 def draw_list(points, triangles, part_of, side):
     table = np.zeros((len(points), N_COLUMNS), np.float32)
     table[:, [X, Y, NEAR]] = points
-    nearest = np.zeros((side * SIZE, side * SIZE + BLOCK), np.int64)
-    columns = find_nearest(table, np.array(triangles, np.int32), nearest)
+    nearest, *columns = nearest_triangles(table, np.array(triangles, np.int32), (side * SIZE, side * SIZE))
     n = (side * SIZE) ** 2
     found = (np.zeros(n, np.int32), np.zeros(n, np.float32), np.zeros(n, np.float32), np.zeros(n, np.int32))
+    keys = np.zeros(side * side, np.int64)
     pixels = np.zeros(SIZE * SIZE + 1, np.int32)
-    count = list_fragments(nearest, (side, 0, *columns), np.array(part_of, np.int32), found, pixels)
+    count = list_fragments(nearest, (side, 0, *columns), np.array(part_of, np.int32), (*found, keys), pixels)
     return table, nearest, [one[:count] for one in found], pixels
 
 

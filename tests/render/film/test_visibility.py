@@ -3,7 +3,19 @@
 import numpy as np
 import pytest
 
-from tts2face.render.film.visibility import BLOCK, N_COLUMNS, NEAR, TRIANGLE_MASK, X, Y, find_nearest, project
+from tts2face.render.film.visibility import (
+    BLOCK,
+    N_COLUMNS,
+    NEAR,
+    TRIANGLE_MASK,
+    X,
+    Y,
+    fill_bands,
+    find_bands,
+    find_nearest,
+    nearest_triangles,
+    project,
+)
 
 SIDE = 48
 
@@ -15,8 +27,7 @@ def table_of(points):
 
 
 def nearest_of(points, triangles, size=(SIDE, SIDE)):
-    nearest = np.full((size[0], size[1] + BLOCK), -1, np.int64)
-    first, end = find_nearest(table_of(points), np.array(triangles, np.int32), nearest)
+    nearest, first, end = nearest_triangles(table_of(points), np.array(triangles, np.int32), size)
     assert 0 <= first <= end <= size[1]
     assert not nearest[:, :first].any()
     assert not nearest[:, end:].any()
@@ -54,6 +65,30 @@ def test_each_sample_has_the_nearest_triangle_that_faces_the_camera(scale: float
     clear = off > 0.01
     assert clear.mean() > 0.3
     assert (nearest_of(points, triangles)[clear] == expected[clear]).all()
+
+
+@pytest.mark.parametrize("rows", [1, 7, SIDE])
+def test_bands_of_rows_show_what_the_whole_picture_shows(rows: int) -> None:
+    rng = np.random.default_rng(4)
+    places = (rng.uniform(-5, SIDE + 5, (200, 1, 2)) + rng.normal(0, 9, (200, 3, 2))).reshape(-1, 2)
+    table = table_of(np.column_stack([places, rng.uniform(0.5e-3, 2e-3, len(places))]))
+    triangles = np.arange(600, dtype=np.int32).reshape(-1, 3)
+    whole, first, end = nearest_triangles(table, triangles, (SIDE, SIDE))
+    bands, counts = np.zeros((200, 2), np.int16), np.zeros(-(-SIDE // rows), np.int64)
+    find_bands(table, triangles, (SIDE, rows), bands, counts)
+    ends = np.cumsum(counts)
+    order = np.zeros(ends[-1], np.int32)
+    fill_bands(bands, ends.copy(), order)
+    assert len(order) < len(counts) * 200
+    shown = np.zeros((2, rows + BLOCK), np.float32)
+    edges = []
+    for number, near in enumerate(np.split(order, ends[:-1])):
+        assert (np.diff(near) > 0).all()
+        band = np.full((min(rows, SIDE - number * rows), SIDE + BLOCK), -1, np.int64)
+        edges.append(find_nearest(table, triangles, near, number * rows, band, shown))
+        np.testing.assert_array_equal(band, whole[number * rows : (number + 1) * rows])
+    assert min(edge[0] for edge in edges) == first
+    assert max(edge[1] for edge in edges) == end
 
 
 def test_no_sample_falls_between_triangles_that_share_edges() -> None:

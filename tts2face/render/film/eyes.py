@@ -25,8 +25,8 @@ N_EYE_COLUMNS = 16
 POSITION, AXES, FOCAL, MIDDLE_X, MIDDLE_Y = 0, 3, 12, 13, 14  # of a camera: place, right, down, ahead, lens
 LAMP_CENTRE, LAMP_ACROSS, LAMP_UP, LAMP_NORMAL, LAMP_WIDE, LAMP_HIGH, LAMP_LIGHT = 0, 3, 6, 9, 12, 13, 14
 # Rows of the fragments of eyes: place, normal, and linear light.
-PLACE, FACES, LIGHT = 0, 3, 6
-N_ROWS = 9
+PLACE, FACES, LIGHT, MIRROR = 0, 3, 6, 9  # the last four: mirror direction and Fresnel's share
+N_ROWS = 13
 TAN_TERMS = (0.9999955, -0.3329886, 0.1955891, -0.1211095, 0.0573306, -0.0134222)  # of the angle over its tangent
 _LEVEL_SCALE = np.float32(32 / SPAN / np.log(2.0))
 _OFFSET = np.float32(OFFSET)
@@ -67,7 +67,7 @@ def look_at_eyes(
     colour: Array,
     rows: Array,
 ) -> None:
-    """Write places, normals and the light of the texture (9, M) of the fragments of eyeballs.
+    """Write places, normals and the light of the texture (13, M) of the fragments of eyeballs.
 
     Parameters
     ----------
@@ -128,11 +128,10 @@ def look_at_eyes(
 
 @vectorized_kernel
 def mirror_lamps(camera: Array, lamps: Array, sky: Array, rows: Array) -> None:
-    """Add the radiance of lamps (L, 17) and sky (3,) in the mirror direction, by Fresnel's share, to rows (9, M)."""
+    """Add the radiance of lamps (L, 17) and sky (3,) in the mirror direction, by Fresnel's share, to rows (13, M)."""
     n = rows.shape[1]
     one, zero, least = np.float32(1), np.float32(0), np.float32(-1e-4)
-    x, y, z = np.zeros(n, np.float32), np.zeros(n, np.float32), np.zeros(n, np.float32)
-    share = np.zeros(n, np.float32)
+    x, y, z, share = rows[MIRROR], rows[MIRROR + 1], rows[MIRROR + 2], rows[MIRROR + 3]
     for i in range(n):
         a, b, c = rows[0, i] - camera[0], rows[1, i] - camera[1], rows[2, i] - camera[2]
         scale = one / np.sqrt(a * a + b * b + c * c)

@@ -103,6 +103,7 @@ class LightTerms:
             table=np.zeros((n + m, NORMAL + 3), np.float32),
             terms=np.ones((N_TERMS, n), np.float32),
             mouth=np.ones((N_MOUTH_TERMS, m), np.float32),
+            ways=np.zeros((6, m), np.float32),
         )
 
     def update(self, points: Float32Array, buffers: "TermBuffers") -> None:
@@ -112,17 +113,18 @@ class LightTerms:
         n = len(self.source)
         write_terms(points, self.source, self.partners, buffers.table[:n], self.rest, buffers.terms)
         ring = np.einsum("lc,lcx->lx", self.ring_weights, points[self.ring])
-        write_mouth_terms(points, self.mouth, buffers.table[n:], ring, buffers.mouth)
+        write_mouth_terms(points, self.mouth, buffers.table[n:], ring, buffers.mouth, buffers.ways)
 
 
 @dataclass(slots=True, eq=False)
 class TermBuffers:
-    """Normals of triangles (F, 3), table of vertices, and terms (T, N) and of the mouth (6, M)."""
+    """Normals of triangles (F, 3), table of vertices, terms (T, N), and terms and ways (6, M) of the mouth."""
 
     flat: Float32Array
     table: Float32Array
     terms: Float32Array
     mouth: Float32Array
+    ways: Float32Array
 
 
 def light_terms(face: Face, rig: FaceRig, light: BakedLight) -> LightTerms:
@@ -158,19 +160,20 @@ def write_terms(points: Array, source: Array, partners: Array, table: Array, res
 
 
 @vectorized_kernel
-def write_mouth_terms(points: Array, mouth: Array, table: Array, ring: Array, terms: Array) -> None:
-    """Write terms 1 to 5 of vertices in the mouth: the form factor of the ring (L, 3), its root, and its vector."""
+def write_mouth_terms(points: Array, mouth: Array, table: Array, ring: Array, terms: Array, ways: Array) -> None:
+    """Write terms 1 to 5 of vertices in the mouth: the form factor of the ring (L, 3), its root, and its vector.
+
+    `ways` (6, M) is scratch space: places, and ways to the corner before, of length 1.
+    """
     zero, one, half, least = np.float32(0), np.float32(1), np.float32(0.5), np.float32(1e-7)
     n = len(mouth)
-    places = np.zeros((3, n), np.float32)
-    before = np.zeros((3, n), np.float32)  # way to the corner before, of length 1
-    for i in range(n):
-        for axis in range(3):
-            places[axis, i] = points[mouth[i], axis]
-    px, py, pz = places[0], places[1], places[2]
-    bx, by, bz = before[0], before[1], before[2]
+    px, py, pz, bx, by, bz = ways[0], ways[1], ways[2], ways[3], ways[4], ways[5]
     right, up, ahead = terms[3], terms[4], terms[5]
-    right[:], up[:], ahead[:] = zero, zero, zero
+    for i in range(n):
+        v = mouth[i]
+        px[i], py[i], pz[i] = points[v, 0], points[v, 1], points[v, 2]
+        bx[i], by[i], bz[i] = zero, zero, zero
+        right[i], up[i], ahead[i] = zero, zero, zero
     for k in range(len(ring) + 1):
         corner = ring[k % len(ring)]
         cx, cy, cz = corner[0], corner[1], corner[2]

@@ -30,7 +30,7 @@ from tts2face.render.film.shading import (
 )
 from tts2face.render.film.surface import TEXELS_A_PIXEL, LitSurface, build_surface, stack_pages, still_change
 from tts2face.render.film.turns import Cardinal, camera_weights, turn_weights, yaw_and_pitch_deg
-from tts2face.render.film.visibility import BLOCK, RED, X, find_nearest, project
+from tts2face.render.film.visibility import BLOCK, RED, X, fill_bands, find_bands, find_nearest, project
 from tts2face.render.picture import Picture
 
 Float32Array = NDArray[np.float32]
@@ -46,7 +46,10 @@ class LitBuffers:
 
     band_rows: int
     table: Float32Array
+    bands: NDArray[np.int16]
     nearest: NDArray[np.int64]
+    ends: Float32Array
+    keys: NDArray[np.int64]
     triangle: NDArray[np.int32]
     place: Float32Array
     samples: NDArray[np.int32]
@@ -95,7 +98,10 @@ class LitScene:
         return LitBuffers(
             band_rows=rows,
             table=surface.template.copy(),
-            nearest=np.zeros((picture.height * side, picture.width * side + BLOCK), np.int64),
+            bands=np.zeros((n_triangles, 2), np.int16),
+            ends=np.zeros((2, rows * side + BLOCK), np.float32),
+            keys=np.zeros(side * side, np.int64),
+            nearest=np.zeros((rows * side, picture.width * side + BLOCK), np.int64),
             triangle=np.zeros(n_fragments, np.int32),
             place=np.zeros((2, n_fragments), np.float32),
             samples=np.zeros(n_fragments, np.int32),
@@ -123,23 +129,35 @@ class LitScene:
         self.move(weights, head, points)
         optics = (self.optics.view.astype(np.float32), self.optics.lens.astype(np.float32))
         project(points, surface.source, *optics, buffers.table)
-        columns = find_nearest(buffers.table, surface.triangles, buffers.nearest)
+        rows = buffers.band_rows
+        order, ends = self._sort(len(pixels) * side, buffers)
         buffers.frame += 1
         eyes = (self._eye_rows(weights, head), surface.eye_texture, self.camera)
         light = (self._lamps(head), surface.light.sky, self.view)
-        rows = buffers.band_rows
-        for first in range(0, len(pixels), rows):
+        for number, first in enumerate(range(0, len(pixels), rows)):
             band = pixels[first : first + rows]
+            nearest = buffers.nearest[: len(band) * side]
+            near = order[ends[number - 1] if number else 0 : ends[number]]
+            columns = find_nearest(buffers.table, surface.triangles, near, first * side, nearest, buffers.ends)
             place = (side, first * side, *columns)
             found = (buffers.triangle, *buffers.place)
-            nearest = buffers.nearest[first * side : (first + rows) * side]
             starts = buffers.pixels[: band.shape[0] * band.shape[1] + 1]
-            count = list_fragments(nearest, place, surface.piece_of, (*found, buffers.samples), starts)
+            count = list_fragments(nearest, place, surface.piece_of, (*found, buffers.samples, buffers.keys), starts)
             if count:
                 self._colour(found, count, buffers)
                 shapes = (buffers.table, surface.triangles, surface.eye_of)
                 colour_eyes(found, count, shapes, eyes, light, buffers.values[AT_RED:])
                 compose(starts, buffers.samples, side * side, buffers.values[AT_RED:], band)
+
+    def _sort(self, height: int, buffers: LitBuffers) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+        """Numbers of the triangles that are drawn, by bands of rows of samples, and the end of each band."""
+        rows = (height, buffers.band_rows * self.picture.samples_per_side)
+        counts = np.zeros(-(-rows[0] // rows[1]), np.int64)
+        find_bands(buffers.table, self.surface.triangles, rows, buffers.bands, counts)
+        ends = np.cumsum(counts)
+        order = np.zeros(ends[-1], np.int32)
+        fill_bands(buffers.bands, ends.copy(), order)
+        return order, ends
 
     def _colour(self, found: Any, count: int, buffers: LitBuffers) -> None:
         """Write the colours of fragments; on eyeballs, the light."""

@@ -23,7 +23,7 @@ def list_fragments(
     nearest: Array,
     place: tuple[int, int, int, int],
     piece_of: Array,
-    found: tuple[Array, Array, Array, Array],
+    found: tuple[Array, Array, Array, Array, Array],
     pixels: Array,
 ) -> int:
     """Write what is seen in each pixel of a band of rows; returns the number of fragments.
@@ -36,22 +36,20 @@ def list_fragments(
         Samples along a pixel's side, the band's first row of samples, and the columns [first, end) with any.
     piece_of : (F,)
     found
-        Out, for each fragment: its triangle, its place (x, y) in samples, and the number of its samples.
+        Out, for each fragment: its triangle, its place (x, y) in samples, and the number of its samples. Last, scratch
+        space for the samples (side side,) of a pixel.
     pixels : (H W + 1,)
         Out: the first fragment of each pixel.
     """
-    triangle, across, down, samples = found
+    triangle, across, down, samples, keys = found
     side, first_row, first_column, end_column = place
     height, stride = nearest.shape[0] // side, nearest.shape[1]
     width = (len(pixels) - 1) // height
     line = nearest.reshape(-1)
     middle, n_samples = np.float32(side - 1) / np.float32(2), side * side
+    half = n_samples // 2 // side * stride + n_samples // 2 % side
     count = 0
     a = b = c = d = np.int64(0)
-    keys, offset = np.zeros(n_samples, np.int64), np.zeros(n_samples, np.int64)
-    right_of, below = np.zeros(n_samples, np.float32), np.zeros(n_samples, np.float32)
-    for s in range(n_samples):
-        offset[s], right_of[s], below[s] = s // side * stride + s % side, s % side, s // side
     first_pixel, end_pixel = first_column // side, (end_column + side - 1) // side
     for row in range(height):
         for column in range(first_pixel):
@@ -65,7 +63,7 @@ def list_fragments(
             else:
                 least, most = line[at], line[at]
                 for s in range(1, n_samples):
-                    key = line[at + offset[s]]
+                    key = line[at + s // side * stride + s % side]
                     least, most = min(least, key), max(most, key)
             if most == 0:
                 continue
@@ -78,28 +76,28 @@ def list_fragments(
                     is_one = is_one and piece_of[(d & TRIANGLE_MASK) - 1] == piece
                 else:
                     for s in range(n_samples):
-                        is_one &= piece_of[(line[at + offset[s]] & TRIANGLE_MASK) - 1] == piece
+                        is_one &= piece_of[(line[at + s // side * stride + s % side] & TRIANGLE_MASK) - 1] == piece
                 if is_one:
-                    triangle[count] = (line[at + offset[n_samples // 2]] & TRIANGLE_MASK) - 1
+                    triangle[count] = (line[at + half] & TRIANGLE_MASK) - 1
                     across[count], down[count], samples[count] = x + middle, y + middle, n_samples
                     count += 1
                     continue
             for s in range(n_samples):
-                keys[s] = line[at + offset[s]]
+                keys[s] = line[at + s // side * stride + s % side]
             for first in range(n_samples):
                 if keys[first] == 0:
                     continue
                 own, depth = (keys[first] & TRIANGLE_MASK) - 1, keys[first] >> TRIANGLE_BITS
-                n, total_right, total_below = 0, np.float32(0), np.float32(0)
+                n, total_right, total_below = 0, 0, 0
                 for s in range(first, n_samples):
                     if keys[s] == 0 or piece_of[(keys[s] & TRIANGLE_MASK) - 1] != piece_of[own]:
                         continue
                     if abs((keys[s] >> TRIANGLE_BITS) - depth) <= depth >> SAME_DEPTH_BITS:
-                        n, total_right, total_below = n + 1, total_right + right_of[s], total_below + below[s]
+                        n, total_right, total_below = n + 1, total_right + s % side, total_below + s // side
                         keys[s] = 0
                 share = np.float32(1) / np.float32(n)
                 triangle[count], samples[count] = own, n
-                across[count], down[count] = x + total_right * share, y + total_below * share
+                across[count], down[count] = x + np.float32(total_right) * share, y + np.float32(total_below) * share
                 count += 1
         for column in range(end_pixel, width):
             pixels[row * width + column] = count

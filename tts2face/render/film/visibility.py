@@ -20,7 +20,8 @@ TRIANGLE_BITS = 20
 MAX_TRIANGLES = (1 << TRIANGLE_BITS) - 2
 TRIANGLE_MASK = (1 << TRIANGLE_BITS) - 1  # of the triangle's number plus one in a sample
 DEPTH_SCALE = np.float32(2.0**41)  # of 1/z in 1/mm: 43 bits beside the triangle's, from 1 mm to 100 m
-BLOCK = 4  # samples at once, without a branch: spans are three long on average
+BLOCK = 4  # samples at once, without a branch: spans are three to five long on average
+FIRST_OF_BLOCK = np.where(np.arange(BLOCK) < np.arange(BLOCK + 1)[:, None], -1, 0)  # all bits of the first n samples
 LEAST_AREA = np.float32(1e-3)  # twice that of a triangle that is drawn, in samples
 
 
@@ -45,7 +46,52 @@ def project(points: Array, source: Array, view: Array, lens: Array, table: Array
 
 
 @kernel
-def find_nearest(table: Array, triangles: Array, nearest: Array) -> tuple[int, int]:
+def find_bands(table: Array, triangles: Array, rows: tuple[int, int], bands: Array, counts: Array) -> None:
+    """Write the bands of rows that triangles touch, and the number of triangles in each band.
+
+    A band's samples stay in the processor's cache while its triangles are drawn.
+
+    Parameters
+    ----------
+    table : (V, 8)
+        Projected vertices.
+    triangles : (F, 3)
+        Vertex indices, counter-clockwise as seen.
+    rows
+        Rows of samples of the picture and of a band.
+    bands : (F, 2)
+        Out: the first band and the end of the bands; none for a triangle that does not face the camera.
+    counts : (B,)
+        Out.
+    """
+    height, band_rows = rows
+    for band in range(len(counts)):
+        counts[band] = 0
+    for t in range(len(triangles)):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        ax, ay, bx, by, cx, cy = table[a, X], table[a, Y], table[b, X], table[b, Y], table[c, X], table[c, Y]
+        low, high = np.ceil(min(ay, by, cy)), np.floor(max(ay, by, cy))
+        bands[t, 1] = bands[t, 0] = 0
+        if (bx - ax) * (cy - ay) - (cx - ax) * (by - ay) > -LEAST_AREA or low > high or high < 0 or low >= height:
+            continue
+        bands[t, 0], bands[t, 1] = max(int(low), 0) // band_rows, min(int(high), height - 1) // band_rows + 1
+        for band in range(bands[t, 0], bands[t, 1]):
+            counts[band] += 1
+
+
+@kernel
+def fill_bands(bands: Array, ends: Array, order: Array) -> None:
+    """Write the numbers (n,) of the triangles of each band one after the other, from the ends (B,) of the bands."""
+    for t in range(len(bands) - 1, -1, -1):
+        for band in range(bands[t, 0], bands[t, 1]):
+            ends[band] -= 1
+            order[ends[band]] = t
+
+
+@kernel
+def find_nearest(
+    table: Array, triangles: Array, order: Array, first_row: int, nearest: Array, ends: Array
+) -> tuple[int, int]:
     """Write the nearest triangle that faces the camera in each sample; returns the columns [first, end) that hold any.
 
     Parameters
@@ -54,16 +100,23 @@ def find_nearest(table: Array, triangles: Array, nearest: Array) -> tuple[int, i
         Projected vertices.
     triangles : (F, 3)
         Vertex indices, counter-clockwise as seen; those with a vertex nearer than the near plane are not drawn.
+    order : (n,)
+        The triangles that are drawn.
+    first_row
+        The picture's row of samples that is the first of `nearest`.
     nearest : (H, W + BLOCK) int64
         Out: 1/z in the high bits, the triangle's number plus one in the low ones; the largest wins. 0 where none is.
+    ends : (2, H + BLOCK)
+        Scratch space: both ends of a triangle's spans.
     """
     height, stride = nearest.shape
     line = nearest.reshape(-1)
-    line[:] = 0
-    top_row, end_row = np.float32(0), np.float32(height - 1)
+    for sample in range(len(line)):
+        line[sample] = 0
+    top_row, end_row = np.float32(first_row), np.float32(first_row + height - 1)
     left_end, right_end = np.float32(0), np.float32(stride - BLOCK - 1)
     first_column, last_column = stride, -1
-    for t in range(len(triangles)):
+    for t in order:
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay, bx, by, cx, cy = table[a, X], table[a, Y], table[b, X], table[b, Y], table[c, X], table[c, Y]
         area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
@@ -92,19 +145,30 @@ def find_nearest(table: Array, triangles: Array, nearest: Array) -> tuple[int, i
         lower = (cx - bx) / (cy - by) if cy > by else np.float32(0)
         step = np.int64(across * DEPTH_SCALE) << TRIANGLE_BITS
         number = np.int64(t + 1)
-        y = low
-        for row in range(int(low), int(high) + 1):
-            one_side = ax + whole * (y - ay)
-            other = ax + upper * (y - ay) if y < by else bx + lower * (y - by)
-            left = np.ceil(max(min(one_side, other), left_end))
-            right = int(np.floor(min(max(one_side, other), right_end)))
-            begin = int(left)
-            count = right + 1 - begin
+        top, n_rows = int(low) - first_row, int(high) + 1 - int(low)
+        for block in range(0, n_rows, BLOCK):  # ends of the spans, of several rows at once
+            for row in range(block, block + BLOCK):
+                y = low + np.float32(row)
+                one_side, below = ax + whole * (y - ay), bx + lower * (y - by)
+                other = ax + upper * (y - ay) if y < by else below
+                ends[0, row] = np.ceil(max(min(one_side, other), left_end))
+                ends[1, row] = np.floor(min(max(one_side, other), right_end))
+        for row in range(n_rows):
+            left, y = ends[0, row], low + np.float32(row)
+            count = int(ends[1, row]) + 1 - int(left)
             depth = np.int64((origin + across * left + along * y) * DEPTH_SCALE) << TRIANGLE_BITS | number
-            at = np.uint64(row * stride + begin)
-            for block in range(0, count, BLOCK):
-                for column in range(block, block + BLOCK):
-                    own, old = depth + column * step, line[at + np.uint64(column)]
-                    line[at + np.uint64(column)] = own if (own > old) & (column < count) else old
-            y += np.float32(1)
+            at = np.uint64((top + row) * stride + int(left))
+            while count > 0:
+                n = min(count, BLOCK)
+                for i in range(BLOCK):
+                    own, old = (depth + i * step) & FIRST_OF_BLOCK[n, i], line[at + np.uint64(i)]
+                    line[at + np.uint64(i)] = own if own > old else old
+                depth, at, count = depth + BLOCK * step, at + np.uint64(BLOCK), count - BLOCK
     return min(first_column, last_column + 1), last_column + 1
+
+
+def nearest_triangles(table: Array, triangles: Array, shape: tuple[int, int]) -> tuple[NDArray[np.int64], int, int]:
+    """Samples (H, W + BLOCK) of a whole picture (H, W), and the columns with any, as `find_nearest` writes them."""
+    nearest = np.zeros((shape[0], shape[1] + BLOCK), np.int64)
+    ends = np.zeros((2, shape[0] + BLOCK), np.float32)
+    return nearest, *find_nearest(table, triangles, np.arange(len(triangles), dtype=np.int32), 0, nearest, ends)
