@@ -27,7 +27,7 @@ Face = Annotated[
     str | None,
     Parameter(
         help="Face: one of `tts2face faces`, a .face file, or self for the talker's own face; by default ada, or head "
-        "where an identity or hair is chosen."
+        "where an identity or one of head's haircuts is chosen."
     ),
 ]
 Hair = Annotated[str | None, Parameter(help="Haircut: one of `tts2face haircuts` for the face, or a .hair file.")]

@@ -14,6 +14,7 @@ import weakref
 from collections.abc import Mapping
 from io import TextIOWrapper
 from types import FrameType
+from typing import TextIO
 
 from cyclopts import CycloptsError
 
@@ -172,10 +173,13 @@ def repair_streams() -> None:
         sys.stdout.reconfigure(errors=ESCAPE_HANDLER)
 
 
-def discard_output() -> None:
-    """Redirect standard output to the null device after a failed write."""
+def discard_output(stream: TextIO | None = None) -> None:
+    """Redirect a stream, by default standard output, to the null device after a failed write.
+
+    What it still holds would fail again when Python ends, which changes the exit code to 120.
+    """
     with contextlib.suppress(OSError, ValueError):
-        number = sys.stdout.fileno()
+        number = (stream or sys.stdout).fileno()
         null_device = os.open(os.devnull, os.O_WRONLY)
         os.dup2(null_device, number)
         os.close(null_device)
@@ -183,9 +187,11 @@ def discard_output() -> None:
 
 def write_message(message: str) -> None:
     """Write a line to standard error; it is lost where that cannot be written."""
-    with contextlib.suppress(OSError, ValueError):
+    try:
         sys.stderr.write(f"{message}\n")
         sys.stderr.flush()
+    except (OSError, ValueError):
+        discard_output(sys.stderr)
 
 
 def _open_if_closed(number: int) -> None:

@@ -10,6 +10,7 @@ from corpus_tools.head.cage import Cage, fit_sphere
 from corpus_tools.head.cards import EYE_TEXTURE
 from corpus_tools.head.piece import Eyeball, MaterialSpan, Piece
 from tts2face.numeric import smoothstep
+from tts2face.render.film.eyes import EDGE_RAD
 
 Floats = NDArray[np.float64]
 
@@ -23,7 +24,7 @@ GAZE_ANGLES = {
     "eyeLookIn": (0, -1, 25.0),
 }
 SCLERA, SCLERA_MOST = np.array([0.74, 0.72, 0.695]), 0.80  # warm grey, and the brightest value, sRGB
-TEXTURE_SIDE, EDGE_RAD = 512, 1.1  # pixels, and the angle from the gaze at the edge of the texture
+TEXTURE_SIDE = 512  # pixels
 # The eye in the package's picture, pixels: centre, and radii of pupil, iris and the painted part of the ball.
 SOURCE_CENTRE, SOURCE_PUPIL_PX, SOURCE_IRIS_PX, SOURCE_BALL_PX = (361.4, 151.1), 17.0, 60.0, 125.0
 SOURCE_SCLERA = np.array([0.66, 0.63, 0.60])

@@ -16,7 +16,8 @@ def run_redirected(*words: str, redirect: str = "", **environment: str) -> "subp
     """A command whose streams the shell redirects."""
     return subprocess.run(
         ["sh", "-c", f'"$@" {redirect}', "sh", *COMMAND, *words],
-        capture_output=True, encoding="utf-8", check=False, timeout=120, env={**os.environ, **environment},
+        capture_output=True, encoding="utf-8", check=False, timeout=120,
+        env={**os.environ, "PYTHONUNBUFFERED": "", **environment},  # what is held is written at the end, as for users
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from tts2face.render.film.visibility import NEAR, X, Y
 
 Array = NDArray[Any]
 
-EDGE_RAD = 1.1  # angle from the gaze at the edge of the texture (`corpus_tools.head.eyes`)
+EDGE_RAD = 1.1  # angle from the gaze at the edge of the texture
 REFRACTION = 1.45  # index of the cornea
 SOFT_EDGE = 0.035  # of a mirrored lamp, a share of its distance
 # Columns of a row for an eye: its centre, the rotation from its own axes, by rows, the edges of pupil and iris, and the
