@@ -1,13 +1,15 @@
 """``tts2face face``: import characters of other programs as faces, and show faces."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from cli.flags import Model, switch
+from cli.flags import Hair, HairColor, Model, add_option_flags, options_from_flags, switch
 from cli.process import write_message
 from cli.progress import progress_bar
+from lexicon.errors import InputError
+from tts2face.render.picture import Picture
 from tts2face.storage.output_names import check_file_name
 from tts2face.storage.overwrite import refuse_overwriting
 
@@ -132,6 +134,37 @@ def show(
     write_atomically(out, png_bytes(drawn))
     if not quiet:
         write_message(f"wrote {out}: {len(loaded.shape_names)} shapes")
+
+
+@face.command
+@add_option_flags(("Picture", Picture))
+def still(
+    name: Annotated[str, Parameter(help="Face: one of `tts2face faces`, or a .face file.")] = "",
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="Output picture (.png).", alias="-o")],
+    identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
+    hair: Hair = None,
+    hair_color: HairColor = None,
+    quiet: Annotated[bool, switch("Print no summary.")] = False,
+    **picture: Any,
+) -> None:
+    """Draw one picture of a face at rest, which needs nobody's consent if the face is a shipped one."""
+    check_file_name(out, "a picture", (".png",))
+    refuse_overwriting({"--out": out}, {"the face": name, "--hair": hair})
+    from tts2face.characters.pictures import png_bytes
+    from tts2face.render.draw import draw
+    from tts2face.session_cache import Models
+    from tts2face.storage.files import write_atomically
+
+    options = options_from_flags(Picture, picture)
+    shown = Models(face=name, identity=identity, hair=hair, hair_color=hair_color).shown_face()
+    if shown is None:
+        raise InputError("a talker's own face has no picture at rest; choose one of `tts2face faces`, or a .face file")
+    drawn = draw(shown, picture=options)
+    write_atomically(out, png_bytes(drawn))
+    if not quiet:
+        write_message(f"wrote {out}: {drawn.shape[1]} x {drawn.shape[0]} pixels")
 
 
 def _report_text(report: "ImportReport") -> str:

@@ -121,7 +121,7 @@ def mesh_renderer(face: Face, picture: Picture) -> MeshRenderer:
 
 def draw(
     face: Face,
-    weights: NDArray[np.floating],
+    weights: NDArray[np.floating] | None = None,
     head: NDArray[np.floating] = REST_HEAD,
     picture: Picture | None = None,
 ) -> NDArray[np.uint8]:
@@ -130,7 +130,7 @@ def draw(
     Parameters
     ----------
     weights : (K,)
-        Weights of the face's shapes.
+        Weights of the face's shapes; at rest when None.
     head : (6,)
         Head pose in the order of `tts2face.types.HEAD_CHANNELS`.
     picture
@@ -146,4 +146,5 @@ def draw(
     InputError
         The number of weights is not the number of the face's shapes.
     """
-    return mesh_renderer(face, picture or Picture()).draw(weights, head)
+    shown = np.zeros(len(face.shape_names), np.float32) if weights is None else weights
+    return mesh_renderer(face, picture or Picture()).draw(shown, head)

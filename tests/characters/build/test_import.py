@@ -231,7 +231,10 @@ def test_the_commands_import_and_show(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "jawOpen\tjawOpen\t1" in printed
     assert "missing cheekPuff: nothing" in printed
     assert run(["face", "show", str(face), "--out", str(tmp_path / "sheet.png"), "--quiet"]) == 0
-    for name, size in (("sheet.png", (8 * 192, 7 * 208)), ("check.png", (3 * 640, 640))):
+    assert run(["face", "still", str(face), "--size", "128x160", "--out", str(tmp_path / "still.png")]) == 0
+    assert "128 x 160 pixels" in capsys.readouterr().err
+    sizes = {"sheet.png": (8 * 192, 7 * 208), "check.png": (3 * 640, 640), "still.png": (128, 160)}
+    for name, size in sizes.items():
         with Image.open(tmp_path / name) as picture:
             assert picture.size == size
     before = character.read_bytes()
