@@ -46,13 +46,13 @@ def open_picture(
     limit = f"at most {MAX_PIXELS // 1_000_000} million are read; reduce its size"
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            warnings.filterwarnings("ignore", module=r"PIL\.")  # sizes are checked here
             picture = Image.open(file if isinstance(file, Path) else io.BytesIO(file), formats=formats)
-        with picture:
-            width, height = picture.size
-            if width * height > MAX_PIXELS:
-                raise DataError(f"{name} has {width} x {height} pixels; {limit}")
-            yield picture
+            with picture:
+                width, height = picture.size
+                if width * height > MAX_PIXELS:
+                    raise DataError(f"{name} has {width} x {height} pixels; {limit}")
+                yield picture
     except too_large as error:
         raise DataError(f"{name} is too large; {limit}") from error
     except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:

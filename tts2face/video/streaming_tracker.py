@@ -100,7 +100,7 @@ class StreamingTracker:
         before = None
         for number, picture in enumerate(pictures):
             small, scale = _shrink(picture.pixels)
-            n_faces = self._follower.count(small) if number % every == 0 else None
+            n_faces = len(self._follower.detect_faces(small)) if number % every == 0 else None
             grey = small[::CHANGE_STEP, ::CHANGE_STEP, 1].astype(np.int16)
             change = (
                 float(np.abs(grey - before).mean()) if before is not None and before.shape == grey.shape else np.inf

@@ -125,27 +125,28 @@ class FaceTracker:
         """Crop around the most prominent face of an (H, W, 3) picture, or None."""
         boxes, scores, shift, scale = self._detections(pixels)
         best = int(scores.argmax())
-        if scores[best] < MIN_FACE_LOGIT:
-            return None
-        row = boxes[best].reshape(8, 2)  # centre, size, then right eye, left eye, nose, mouth, ears
-        centre, right_eye, left_eye = (row[[0, 2, 3]] + self._anchors[best] * DETECTOR_SIZE - shift) / scale
-        side = CROP_SCALE * float(row[1].max()) / scale
-        level = left_eye - right_eye
-        return Crop(float(centre[0]), float(centre[1]), side, float(np.arctan2(level[1], level[0])))
+        return None if scores[best] < MIN_FACE_LOGIT else self._detected(boxes, best, shift, scale)
 
-    def count(self, pixels: NDArray[np.uint8]) -> int:
-        """Number of faces in a picture; overlapping detections are merged by `SAME_FACE_DISTANCE`."""
-        boxes, scores, _, _ = self._detections(pixels)
+    def detect_faces(self, pixels: NDArray[np.uint8]) -> list[Crop]:
+        """Crops around the faces of a picture, the most certain first; overlaps are merged by `SAME_FACE_DISTANCE`."""
+        boxes, scores, shift, scale = self._detections(pixels)
         rows = boxes.reshape(len(boxes), 8, 2)
         centres, sizes = rows[:, 0] + self._anchors * DETECTOR_SIZE, rows[:, 1].max(axis=1)
         kept: list[int] = []
-        for number in np.argsort(scores)[::-1]:
+        for number in np.argsort(scores)[::-1].tolist():
             if scores[number] < MIN_FURTHER_FACE_LOGIT:
                 break
             distances = [float(np.linalg.norm(centres[number] - centres[other])) / sizes[other] for other in kept]
             if all(distance > SAME_FACE_DISTANCE for distance in distances):
-                kept.append(int(number))
-        return len(kept)
+                kept.append(number)
+        return [self._detected(boxes, number, shift, scale) for number in kept]
+
+    def _detected(self, boxes: NDArray[np.float32], number: int, shift: NDArray[np.float64], scale: float) -> Crop:
+        row = boxes[number].reshape(8, 2)  # centre, size, then right eye, left eye, nose, mouth, ears
+        centre, right_eye, left_eye = (row[[0, 2, 3]] + self._anchors[number] * DETECTOR_SIZE - shift) / scale
+        side = CROP_SCALE * float(row[1].max()) / scale
+        level = left_eye - right_eye
+        return Crop(float(centre[0]), float(centre[1]), side, float(np.arctan2(level[1], level[0])))
 
     def _detections(
         self, pixels: NDArray[np.uint8]

@@ -1,0 +1,1 @@
+"""Photographs and pictures of people: reading, and the face in them."""

@@ -1,0 +1,191 @@
+"""The face in a photograph: its landmarks, pose and size, and what it cannot be used for."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError, InputError
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, FACE_OVAL
+from tts2face.retargeting.performer import eye_aperture
+from tts2face.video.pose import head_angles, rigid_points, similarity_transforms
+from tts2face.video.track import MIN_CONTRAST, MIN_SCORE, Crop, FaceTracker, crop_around
+
+CROP_STEP = 0.02  # between the nine crops from which landmarks are read, of the side of the crop
+MAX_YAW_DEG, DOUBTFUL_YAW_DEG = 40.0, 25.0
+MAX_PITCH_DEG = 35.0
+MIN_FACE_PX, BLURRED_FACE_PX = 40.0, 90.0  # width of the oval of the face in pixels of the file
+MAX_SPREAD = 0.012  # of landmarks over the crops, of the eye distance; .003 to .006 from the front, .010 at 45 degrees
+CLOSED_EYES = 0.16  # height over width of an eye; open ones have .28 to .50, shut ones .08
+MAX_OUTSIDE = 0.3  # of the oval of the face beyond the picture: portraits often end at the forehead
+TILE_SHARES = (0.5, 0.3)  # sides of parts of a picture that are searched for small faces, of its shorter side
+SAME_FACE = 0.5  # crops whose centres are nearer than this share of the side show one face
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundFace:
+    """A face in a picture.
+
+    Parameters
+    ----------
+    landmarks : (478, 3)
+        Pixels of the picture: x right and y down from the centre of the top left pixel, z away from the camera.
+    spread
+        Mean standard deviation of the landmarks over the crops, pixels.
+    angles_deg
+        Pitch (nod down), yaw (to the person's left) and roll of the head.
+    eye_distance_px
+        Of the outer eye corners, as if the face were seen from the front.
+    n_faces
+        Faces in the picture.
+    warnings
+        Sentences for the user.
+    """
+
+    landmarks: NDArray[np.float64]
+    spread: float
+    angles_deg: tuple[float, float, float]
+    eye_distance_px: float
+    n_faces: int
+    warnings: tuple[str, ...] = ()
+
+
+def find_face(
+    pixels: NDArray[np.uint8], tracker: FaceTracker, name: str | Path, *, number: int = 1, reduced_by: float = 1.0
+) -> FoundFace:
+    """Find a face in a picture (H, W, 3) and check that it can be moved.
+
+    Parameters
+    ----------
+    name
+        The picture's name in messages.
+    number
+        Which face, from 1, the largest first.
+    reduced_by
+        Pixels of the file along a side for each of these.
+
+    Raises
+    ------
+    InputError
+        There is no such face.
+    DataError
+        The picture shows no face, or none that can be moved: too small, from the side, cut off or with closed eyes.
+    """
+    crops = _faces(pixels, tracker, number)
+    if not crops:
+        raise DataError(
+            f"there is no face in {name}; give a picture that shows a face from the front, larger in the picture"
+        )
+    if not 1 <= number <= len(crops):
+        raise InputError(f"{name} has {_count(len(crops))}, and no face {number}; choose 1 to {len(crops)}")
+    found = _read(pixels, tracker, crops[number - 1], len(crops))
+    _check(found, pixels.shape[:2], str(name), reduced_by)
+    return replace(found, warnings=tuple(_warnings(found, str(name), number, reduced_by)))
+
+
+def _count(n: int) -> str:
+    return "one face" if n == 1 else f"{n} faces"
+
+
+def _faces(pixels: NDArray[np.uint8], tracker: FaceTracker, wanted: int) -> list[Crop]:
+    """Crops around faces of a picture, the largest first; where the whole shows too few, parts of it are searched.
+
+    The detector reads 128 pixels, in which it sees no face narrower than about 15.
+    """
+    if float(pixels.std()) < MIN_CONTRAST:
+        return []
+    kept: list[Crop] = []
+    for part, left, top in _parts(pixels):
+        for crop in tracker.detect_faces(part):
+            placed = replace(crop, x=crop.x + left, y=crop.y + top)
+            points, score = tracker.read_crop(pixels, placed)
+            if score >= MIN_SCORE:
+                around = crop_around(points)
+                if all(np.hypot(around.x - other.x, around.y - other.y) > SAME_FACE * other.side for other in kept):
+                    kept.append(around)
+        if len(kept) >= wanted and part is pixels:
+            break
+    return sorted(kept, key=lambda crop: -crop.side)
+
+
+def _parts(pixels: NDArray[np.uint8]) -> Iterator[tuple[NDArray[np.uint8], int, int]]:
+    """The picture, then overlapping squares of it, with their left and top edges."""
+    yield pixels, 0, 0
+    height, width = pixels.shape[:2]
+    for share in TILE_SHARES:
+        side = round(share * min(height, width))
+        for top in _starts(height, side):
+            for left in _starts(width, side):
+                yield pixels[top : top + side, left : left + side], left, top
+
+
+def _starts(length: int, side: int) -> Sequence[int]:
+    n = -(-2 * (length - side) // side) + 1  # neighbours overlap by half or more
+    return [round(start) for start in np.linspace(0, length - side, n).tolist()]
+
+
+def _read(pixels: NDArray[np.uint8], tracker: FaceTracker, crop: Crop, n_faces: int) -> FoundFace:
+    steps = [(across, down) for across in (-1, 0, 1) for down in (-1, 0, 1)]
+    step = CROP_STEP * crop.side
+    readings = [tracker.read_crop(pixels, replace(crop, x=crop.x + a * step, y=crop.y + d * step)) for a, d in steps]
+    every = np.array([points for points, _ in readings], np.float64)
+    landmarks = every.mean(axis=0)
+    indices, canonical, weights = rigid_points()
+    turns, scales = similarity_transforms((landmarks * (1, -1, -1))[None, indices], canonical, weights)
+    angles = np.degrees(head_angles(np.swapaxes(turns, 1, 2)))[0]
+    between = np.linalg.norm(canonical[indices == EYE_OUTER_LEFT] - canonical[indices == EYE_OUTER_RIGHT])
+    return FoundFace(
+        landmarks,
+        float(every[..., :2].std(axis=0).mean()),
+        (float(angles[0]), float(angles[1]), float(angles[2])),
+        float(between / scales[0]),
+        n_faces,
+    )
+
+
+def _check(found: FoundFace, shape: tuple[int, ...], name: str, reduced_by: float) -> None:
+    pitch, yaw, _ = found.angles_deg
+    if abs(yaw) > MAX_YAW_DEG:
+        raise DataError(
+            f"the face in {name} is turned {abs(yaw):.0f} degrees to the side; give a picture that is turned less than "
+            f"{MAX_YAW_DEG:.0f}"
+        )
+    if abs(pitch) > MAX_PITCH_DEG:
+        raise DataError(
+            f"the face in {name} is bent {abs(pitch):.0f} degrees {'down' if pitch > 0 else 'up'}; give a picture that "
+            f"is bent less than {MAX_PITCH_DEG:.0f}"
+        )
+    oval = found.landmarks[list(FACE_OVAL), :2]
+    width = float(np.ptp(oval[:, 0])) * reduced_by
+    if width < MIN_FACE_PX:
+        raise DataError(
+            f"the face in {name} is {width:.0f} pixels wide; it needs {MIN_FACE_PX:.0f}: give a larger picture"
+        )
+    outside = ((oval < -0.5) | (oval > np.array(shape[::-1]) - 0.5)).any(axis=1).mean()
+    if outside > MAX_OUTSIDE:
+        raise DataError(f"the face in {name} is cut off by the edge of the picture; give one that shows the whole face")
+    if found.spread > MAX_SPREAD * found.eye_distance_px:
+        raise DataError(
+            f"the face in {name} cannot be read: something may lie before it, or it is blurred or too dark; give "
+            "a clearer picture"
+        )
+    heights = [float(eye_aperture(found.landmarks[None], side)[0]) for side in ("Left", "Right")]
+    if max(heights) < CLOSED_EYES:
+        raise DataError(f"the eyes of the face in {name} are closed; give a picture with open eyes")
+
+
+def _warnings(found: FoundFace, name: str, number: int, reduced_by: float) -> Iterator[str]:
+    if found.n_faces > 1 and number == 1:
+        yield (
+            f"{name} has {found.n_faces} faces, and the largest is used; another one is chosen by its number, as in "
+            "photo.jpg@2"
+        )
+    if abs(found.angles_deg[1]) > DOUBTFUL_YAW_DEG:
+        yield f"the face in {name} is turned {abs(found.angles_deg[1]):.0f} degrees; from the front it moves better"
+    width = float(np.ptp(found.landmarks[list(FACE_OVAL), 0])) * reduced_by
+    if width < BLURRED_FACE_PX:
+        yield (
+            f"the face in {name} is {width:.0f} pixels wide and looks blurred; {BLURRED_FACE_PX:.0f} or more look sharp"
+        )
