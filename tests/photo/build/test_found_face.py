@@ -33,18 +33,24 @@ def still(name: str, *, side: int = SIDE, head: tuple[float, ...] = (0, 0, 0), *
     return draw(face, values, pose, picture=Picture(size=f"{side}x{side}"))
 
 
+def projected(name: str, **weights: float) -> np.ndarray:
+    """Places (478, 2) of the landmarks of a shipped face in its picture."""
+    face = load_face(name)
+    values = np.array([[weights.get(shape, 0.0) for shape in face.shape_names]], np.float32)
+    camera = camera_matrices(Picture().view, face, (SIDE, SIDE))
+    points = moved_landmarks(face, Trajectory(face.shape_names, values, 30.0))[0] @ camera.view[:, :3].T
+    points += camera.view[:, 3]
+    return camera.lens[1:3] + camera.lens[0] * points[:, :2] / points[:, 2:] - 0.5
+
+
 def found(pixels: np.ndarray, tracker: FaceTracker, **options: object) -> FoundFace:
     return find_face(pixels, tracker, "me.png", **options)
 
 
 @pytest.mark.parametrize("name", [*DRAWN, *REALISTIC, "head"])
 def test_landmarks_lie_where_the_face_has_them(name: str, tracker: FaceTracker) -> None:
-    face = load_face(name)
     shown = found(still(name), tracker)
-    view, lens = (part.astype(float) for part in _optics(face))
-    rest = Trajectory(face.shape_names, np.zeros((1, len(face.shape_names)), np.float32), 30.0)
-    points = moved_landmarks(face, rest)[0, :N_MESH_LANDMARKS] @ view[:, :3].T + view[:, 3]
-    wanted = lens[1:3] + lens[0] * points[:, :2] / points[:, 2:] - 0.5
+    wanted = projected(name)[:N_MESH_LANDMARKS]
     apart = np.linalg.norm(shown.landmarks[:N_MESH_LANDMARKS, :2] - wanted, axis=1)
     eyes = np.linalg.norm(wanted[EYE_OUTER_LEFT] - wanted[EYE_OUTER_RIGHT])
     assert np.median(apart) < 0.06 * eyes
@@ -53,11 +59,6 @@ def test_landmarks_lie_where_the_face_has_them(name: str, tracker: FaceTracker) 
     assert shown.n_faces == 1
     assert abs(shown.angles_deg[1]) < 4
     assert not shown.warnings
-
-
-def _optics(face):
-    camera = camera_matrices(Picture().view, face, (SIDE, SIDE))
-    return camera.view, camera.lens
 
 
 @pytest.mark.parametrize("yaw", [-20, 20, -35, 35])

@@ -1,0 +1,159 @@
+"""The line between the lips of a photograph: the tracker's landmarks, moved onto the edges that the picture shows."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LIP_LOWER, OUTER_LIP_UPPER
+from tts2face.photo.found_face import FoundFace
+
+Floats = NDArray[np.float64]
+
+N_POINTS = 41  # along a lip, from the person's right corner to the left one
+CLOSED_GAP = 0.02  # of the eye distance, as all lengths below; closed lips have up to .017, narrow smiles from .024
+REACH = 0.03  # to either side of the landmarks
+N_PLACES = 25  # that are compared across the line at each point
+SEAM_BLUR, LIP_BLUR = 0.005, 0.004
+SEAM_STIFFNESS, LIP_STIFFNESS = 2.0, 1.0  # cost of a step of .01 between neighbours
+SEAM_REST, LIP_REST = 0.15 / 0.02**2, 0.25 / 0.03**2  # cost of a distance from the landmarks
+EDGE_GAIN = 2.0
+LIP_SHARE = 0.9  # of a lip's thickness at its inner edge, in which the edge is looked for
+LIP_SPREAD = np.array([22.0, 7.0, 9.0])  # of a lip's colour in Lab
+N_SIDE = 3  # places on each side of an edge whose colours are compared
+SMOOTHING, CORNER_POINTS = 5, 4  # points of a mean, and points over which corners take less
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LipLine:
+    """Inner edges of the lips.
+
+    Parameters
+    ----------
+    upper, lower : (41, 3)
+        Pixels and depth as landmarks have them; equal in the corners, and everywhere if the mouth is closed.
+    gap
+        Largest opening by the landmarks, of the eye distance.
+    """
+
+    upper: Floats
+    lower: Floats
+    gap: float
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the lips touch."""
+        return self.gap < CLOSED_GAP
+
+
+def find_lip_line(pixels: NDArray[np.uint8], face: FoundFace) -> LipLine:
+    """Inner edges of the lips of a face in a picture (H, W, 3).
+
+    Notes
+    -----
+    Closed lips meet in the darkest seam near the landmarks, open ones end where the colour of the lip does; both are
+    cheapest paths (dynamic programming) over places across the line.
+    """
+    weights = spline_weights(len(INNER_LIP_UPPER), N_POINTS)
+    inner = [weights @ face.landmarks[list(numbers)] for numbers in (INNER_LIP_UPPER, INNER_LIP_LOWER)]
+    gap = float(np.linalg.norm((inner[0] - inner[1])[:, :2], axis=1).max() / face.eye_distance_px)
+    scale = face.eye_distance_px
+    if gap < CLOSED_GAP:
+        seam = _seam(pixels, (inner[0] + inner[1]) / 2, scale)
+        return LipLine(seam, seam.copy(), gap)
+    outer = [weights @ face.landmarks[list(numbers)] for numbers in (OUTER_LIP_UPPER, OUTER_LIP_LOWER)]
+    upper, lower = (_edge(pixels, line, around, scale) for line, around in zip(inner, outer, strict=True))
+    crossed = lower[:, 1] < upper[:, 1]
+    crossed[[0, -1]] = True
+    upper[crossed] = lower[crossed] = ((upper + lower) / 2)[crossed]
+    return LipLine(upper, lower, gap)
+
+
+def spline_weights(n: int, m: int) -> Floats:
+    """(m, n) values at m places of the natural cubic spline through n equidistant ones."""
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(np.linspace(0, 1, n), np.eye(n), bc_type="natural")(np.linspace(0, 1, m)))
+
+
+def _seam(pixels: NDArray[np.uint8], line: Floats, scale: float) -> Floats:
+    """A line (N, 3) moved to the darkest seam."""
+    along = line[-1, :2] - line[0, :2]
+    across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+    offsets = np.linspace(-REACH, REACH, N_PLACES)
+    places = line[:, None, :2] + (offsets * scale)[None, :, None] * across
+    grey = _sample(pixels.mean(axis=2, dtype=np.float32)[..., None], places, max(0.6, SEAM_BLUR * scale))[..., 0]
+    darkness = (grey - grey.mean(axis=1, keepdims=True)) / (grey.std() + 1e-3)
+    moved = line.copy()
+    moved[:, :2] += _path(darkness + SEAM_REST * offsets**2, offsets, SEAM_STIFFNESS)[:, None] * scale * across
+    return moved
+
+
+def _edge(pixels: NDArray[np.uint8], line: Floats, outer: Floats, scale: float) -> Floats:
+    """The inner edge (N, 3) of one lip, from its landmarks and those of its outer edge."""
+    inwards = (line - outer)[:, :2]
+    inwards /= np.linalg.norm(inwards, axis=1, keepdims=True) + 1e-6
+    inwards[:CORNER_POINTS], inwards[-CORNER_POINTS:] = inwards[CORNER_POINTS], inwards[-CORNER_POINTS - 1]
+    inwards = _smooth(inwards, 7)
+    offsets = np.linspace(-REACH, REACH, N_PLACES)
+    places = line[:, None, :2] + (offsets * scale)[None, :, None] * inwards[:, None]
+    middle = ((line + outer) / 2)[6:-6, None, :2]
+    blur = max(0.5, LIP_BLUR * scale)
+    colours = _sample(_lab(pixels), np.concatenate([places.reshape(-1, 1, 2), middle]), blur)[:, 0]
+    lip = np.median(colours[places[..., 0].size :], axis=0)
+    unlike = (((colours[: places[..., 0].size] - lip) / LIP_SPREAD) ** 2).sum(axis=1).reshape(places.shape[:2])
+    thickness = np.linalg.norm((line - outer)[:, :2], axis=1) / scale
+    is_lip = offsets < -LIP_SHARE * thickness[:, None]  # for thin lips, beyond their outer edge
+    likeness = np.minimum.accumulate(np.where(is_lip, 1.0, np.exp(-unlike / 2)), axis=1)  # no lip beyond the first edge
+    cost = np.full(likeness.shape, EDGE_GAIN)
+    sums = np.concatenate([np.zeros((len(likeness), 1)), np.cumsum(likeness, axis=1)], axis=1)
+    at = np.arange(N_SIDE, N_PLACES - N_SIDE)
+    before = (sums[:, at] - sums[:, at - N_SIDE]) / N_SIDE
+    behind = (sums[:, at + 1 + N_SIDE] - sums[:, at + 1]) / N_SIDE
+    cost[:, at] = -EDGE_GAIN * (before - behind)
+    cost[is_lip] = EDGE_GAIN
+    steps = _path(cost + LIP_REST * offsets**2, offsets, LIP_STIFFNESS)
+    from_corner = np.minimum(np.arange(N_POINTS), np.arange(N_POINTS)[::-1])
+    moved = line.copy()
+    moved[:, :2] += (steps * np.minimum(1, from_corner / CORNER_POINTS))[:, None] * scale * inwards
+    return moved
+
+
+def _path(cost: Floats, offsets: Floats, stiffness: float) -> Floats:
+    """Offset (N,) of each row of the cheapest path through costs (N, P), smoothed."""
+    step = stiffness * ((offsets[:, None] - offsets) / 0.01) ** 2
+    total, came = cost[0].copy(), np.zeros(cost.shape, np.int64)
+    for row in range(1, len(cost)):
+        each = total[None] + step
+        came[row] = each.argmin(axis=1)
+        total = each.min(axis=1) + cost[row]
+    chosen = [int(total.argmin())]
+    for row in range(len(cost) - 1, 0, -1):
+        chosen.append(int(came[row, chosen[-1]]))
+    return _smooth(offsets[chosen[::-1]][:, None], SMOOTHING)[:, 0]
+
+
+def _smooth(values: Floats, n: int) -> Floats:
+    """Means of n neighbours along the first axis, (N, K); the ends are held."""
+    padded = np.pad(values, ((n // 2, n // 2), (0, 0)), mode="edge")
+    kernel = np.ones(n) / n
+    return np.stack([np.convolve(column, kernel, "valid") for column in padded.T], axis=1)
+
+
+def _lab(pixels: NDArray[np.uint8]) -> NDArray[np.float32]:
+    import cv2
+
+    return np.asarray(cv2.cvtColor(pixels, cv2.COLOR_RGB2LAB), np.float32)
+
+
+def _sample(values: NDArray[np.float32], places: Floats, blur: float) -> Floats:
+    """Values (..., C) of a blurred picture (H, W, C) at places (..., 2), x and y; only what is near is read."""
+    from scipy.ndimage import gaussian_filter, map_coordinates
+
+    margin = int(np.ceil(4 * blur)) + 1
+    low = np.maximum(np.floor(places.reshape(-1, 2).min(axis=0)).astype(int) - margin, 0)
+    high = np.ceil(places.reshape(-1, 2).max(axis=0)).astype(int) + margin + 1
+    part = values[low[1] : max(high[1], low[1] + 1), low[0] : max(high[0], low[0] + 1)]
+    soft = gaussian_filter(part.astype(np.float64), (blur, blur, 0))
+    at = np.moveaxis(places - low, -1, 0)[::-1]
+    return np.stack([map_coordinates(soft[..., c], at, order=1, mode="nearest") for c in range(soft.shape[2])], axis=-1)
