@@ -51,6 +51,11 @@ class FoundFace:
     n_faces: int
     warnings: tuple[str, ...] = ()
 
+    @property
+    def width_px(self) -> float:
+        """Width of the oval of the face."""
+        return float(np.ptp(self.landmarks[list(FACE_OVAL), 0]))
+
 
 def find_face(
     pixels: NDArray[np.uint8], tracker: FaceTracker, name: str | Path, *, number: int = 1, reduced_by: float = 1.0
@@ -158,7 +163,7 @@ def _check(found: FoundFace, shape: tuple[int, ...], name: str, reduced_by: floa
             f"is bent less than {MAX_PITCH_DEG:.0f}"
         )
     oval = found.landmarks[list(FACE_OVAL), :2]
-    width = float(np.ptp(oval[:, 0])) * reduced_by
+    width = found.width_px * reduced_by
     if width < MIN_FACE_PX:
         raise DataError(
             f"the face in {name} is {width:.0f} pixels wide; it needs {MIN_FACE_PX:.0f}: give a larger picture"
@@ -184,7 +189,7 @@ def _warnings(found: FoundFace, name: str, number: int, reduced_by: float) -> It
         )
     if abs(found.angles_deg[1]) > DOUBTFUL_YAW_DEG:
         yield f"the face in {name} is turned {abs(found.angles_deg[1]):.0f} degrees; from the front it moves better"
-    width = float(np.ptp(found.landmarks[list(FACE_OVAL), 0])) * reduced_by
+    width = found.width_px * reduced_by
     if width < BLURRED_FACE_PX:
         yield (
             f"the face in {name} is {width:.0f} pixels wide and looks blurred; {BLURRED_FACE_PX:.0f} or more look sharp"

@@ -18,7 +18,6 @@ SEAM_BLUR, LIP_BLUR = 0.005, 0.004
 SEAM_STIFFNESS, LIP_STIFFNESS = 2.0, 1.0  # cost of a step of .01 between neighbours
 SEAM_REST, LIP_REST = 0.15 / 0.02**2, 0.25 / 0.03**2  # cost of a distance from the landmarks
 EDGE_GAIN = 2.0
-LIP_SHARE = 0.9  # of a lip's thickness at its inner edge, in which the edge is looked for
 LIP_SPREAD = np.array([22.0, 7.0, 9.0])  # of a lip's colour in Lab
 N_SIDE = 3  # places on each side of an edge whose colours are compared
 SMOOTHING, CORNER_POINTS = 5, 4  # points of a mean, and points over which corners take less
@@ -102,16 +101,13 @@ def _edge(pixels: NDArray[np.uint8], line: Floats, outer: Floats, scale: float) 
     colours = _sample(_lab(pixels), np.concatenate([places.reshape(-1, 1, 2), middle]), blur)[:, 0]
     lip = np.median(colours[places[..., 0].size :], axis=0)
     unlike = (((colours[: places[..., 0].size] - lip) / LIP_SPREAD) ** 2).sum(axis=1).reshape(places.shape[:2])
-    thickness = np.linalg.norm((line - outer)[:, :2], axis=1) / scale
-    is_lip = offsets < -LIP_SHARE * thickness[:, None]  # for thin lips, beyond their outer edge
-    likeness = np.minimum.accumulate(np.where(is_lip, 1.0, np.exp(-unlike / 2)), axis=1)  # no lip beyond the first edge
+    likeness = np.minimum.accumulate(np.exp(-unlike / 2), axis=1)  # beyond the first edge there is no lip
     cost = np.full(likeness.shape, EDGE_GAIN)
     sums = np.concatenate([np.zeros((len(likeness), 1)), np.cumsum(likeness, axis=1)], axis=1)
     at = np.arange(N_SIDE, N_PLACES - N_SIDE)
     before = (sums[:, at] - sums[:, at - N_SIDE]) / N_SIDE
     behind = (sums[:, at + 1 + N_SIDE] - sums[:, at + 1]) / N_SIDE
     cost[:, at] = -EDGE_GAIN * (before - behind)
-    cost[is_lip] = EDGE_GAIN
     steps = _path(cost + LIP_REST * offsets**2, offsets, LIP_STIFFNESS)
     from_corner = np.minimum(np.arange(N_POINTS), np.arange(N_POINTS)[::-1])
     moved = line.copy()

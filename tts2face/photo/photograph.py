@@ -54,6 +54,8 @@ def read_photograph(path: Path) -> Photograph:
         It is no picture that can be read, has a side below `MIN_SIDE_PX`, or more than `MAX_FILE_PIXELS`; HEIC needs
         pillow-heif.
     """
+    from PIL import ImageOps
+
     formats = ("HEIF",) if _is_heic(path) else FORMATS
     with open_picture(path, "the photo", formats, advice=ADVICE) as file:
         width, height = file.size
@@ -69,7 +71,7 @@ def read_photograph(path: Path) -> Photograph:
         file.draft(
             None, (KEPT_WIDTH, KEPT_WIDTH)
         )  # JPEG: decoded at a half, a quarter or an eighth where that suffices
-        picture = _upright(file)
+        picture = ImageOps.exif_transpose(file)
         scale = min(1.0, KEPT_WIDTH / picture.width, KEPT_HEIGHT / picture.height)
         if scale < 1:
             picture = _reduced(picture, scale)
@@ -94,16 +96,6 @@ def _is_heic(path: Path) -> bool:
         ) from missing
     register_heif_opener()
     return True
-
-
-def _upright(file: "Picture") -> "Picture":
-    from PIL import ImageOps
-
-    file.load()
-    turned = ImageOps.exif_transpose(file)
-    if "icc_profile" in file.info:
-        turned.info["icc_profile"] = file.info["icc_profile"]
-    return turned
 
 
 def _reduced(picture: "Picture", scale: float) -> "Picture":
