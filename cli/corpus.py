@@ -33,7 +33,7 @@ Provenance = Annotated[
 @corpus.command
 def setup() -> None:
     """Download the face landmark model with pip, verify it, and keep it for `corpus build`."""
-    from corpus_tools.setup_models import set_up_model
+    from tts2face.video.setup_models import set_up_model
 
     write_message(f"face landmark model: {set_up_model()}")
 
@@ -109,7 +109,7 @@ def check_suffix(out: Path, kind: str) -> None:
 
 def _request_consent(name: str, statement: str | None) -> Mapping[str, str]:
     """The consent of the person shown; read from the terminal if there is no statement."""
-    from corpus_tools.build_talker import consent_record
+    from tts2face.models.consent import consent_record
 
     if statement is None and sys.stdin.isatty():
         statement = input(f"The output will contain pictures of {name}'s face. Statement of consent: ")

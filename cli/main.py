@@ -17,6 +17,7 @@ from cli.flags import Exports, Face, Hair, HairColor, Out, add_option_flags, che
 from cli.jobs import jobs, worker
 from cli.lists import LISTS
 from cli.mimic import mimic
+from cli.photo import Consent, Photo, Yes, face_of_photo, refuse_face_beside
 from cli.process import (
     BROKEN_PIPE_CODE,
     INTERRUPTED,
@@ -121,6 +122,9 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
     hair: Hair = None,
     hair_color: HairColor = None,
+    photo: Photo = None,
+    consent: Consent = None,
+    yes: Yes = False,
     palette: Annotated[
         str, Parameter(help="Palette of gesture styles: a shipped palette or a .palette file.")
     ] = "starter",
@@ -138,11 +142,14 @@ def speak(  # noqa: PLR0913 - one parameter a flag
         raise InputError("the text is given twice, as an argument and as --text; remove one of them")
     options["gestures"] = _gesture_method(options.get("gestures"), noise=noise, none=no_gestures)
     needs_text = options.get("audio") is None and options.get("idle") is None
+    refuse_face_beside(photo, face, identity, hair or hair_color)
     from cli.speak import SpeakOptions, run_request
 
     request = options_from_flags(
         Request, options, text=_read_text(text if text_option is None else text_option, file, is_needed=needs_text)
     )
+    if photo is not None:
+        face = face_of_photo(photo, consent, yes=yes, quiet=quiet)
     speak_options = SpeakOptions(
         out,
         Models(talker, face or "", identity, palette, hair, hair_color),

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
-from corpus_tools.build_talker import PROVENANCE, BuiltTalker, build_talker, consent_record
+from corpus_tools.build_talker import PROVENANCE, BuiltTalker, build_talker
 from corpus_tools.message_lines import line_progress, write_line
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, Tts2faceError
@@ -21,6 +21,7 @@ from tts2face.child_process import received_order
 from tts2face.jobs.refused_file import RefusedFileError
 from tts2face.jobs.resource_check import TALKER, check_resource
 from tts2face.limited_process import ProcessLimits, limit_process
+from tts2face.models.consent import consent_record
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,6 @@ from tts2face.video.landmark_models import find_bundle
 
 PROVENANCE = "provenance.json"  # in the folder of recordings: their sources and licence
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
-MIN_STATEMENT_WORDS = 3  # shorter statements are treated as typing errors
 NOT_STATED = "not stated"
 READING_STAGE = "reading recordings"  # name of the first stage
 NETWORK_STAGE = "learning phone network"
@@ -268,19 +267,3 @@ def _command_line(recordings: Path, out: Path, name: str | None, provenance: Pat
     words += ["--name", name] if name else []
     words += ["--provenance", provenance.name] if provenance else []
     return shlex.join([*words, "--out", out.name])
-
-
-def consent_record(name: str, statement: str | None, *, date: str | None = None) -> Mapping[str, str]:
-    """Consent record for the metadata of a file: name, statement, date.
-
-    Raises
-    ------
-    InputError
-        The statement is missing or too short.
-    """
-    if statement is None or len(statement.split()) < MIN_STATEMENT_WORDS:
-        raise InputError(
-            f"the file will contain pictures of {name}'s face; state the consent: "
-            '--consent "I, NAME, agree that my face is used for ..."'
-        )
-    return {"name": name, "statement": statement.strip(), "date": date or datetime.now(UTC).date().isoformat()}

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from tts2face.models.palette import load_palette as load_palette
     from tts2face.models.talker import Talker as Talker
     from tts2face.models.talker import load_talker as load_talker
+    from tts2face.photo.face_from_photo import face_from_photo as face_from_photo
     from tts2face.project.project import Project as Project
     from tts2face.project.project_file import load_project as load_project
     from tts2face.project.project_file import save_project as save_project
@@ -104,6 +105,7 @@ __all__ = [
     "WrittenClip",
     "convert",
     "export",
+    "face_from_photo",
     "faces",
     "formats",
     "hair_colors",
@@ -156,6 +158,7 @@ _MODULES = {
     "tts2face.models.face_loading": ("load_face",),
     "tts2face.models.palette": ("Palette", "load_palette"),
     "tts2face.models.talker": ("Talker", "load_talker"),
+    "tts2face.photo.face_from_photo": ("face_from_photo",),
     "tts2face.project.project": ("Project",),
     "tts2face.project.project_file": ("load_project", "save_project"),
     "tts2face.render.picture": ("Picture",),

@@ -5,6 +5,7 @@ from copy import copy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lexicon.errors import InputError
 from tts2face.models.face import Face
 from tts2face.models.palette import Derivation, Palette
 from tts2face.models.talker import Talker
@@ -45,6 +46,9 @@ class Session:
         drawn woman, or for the realistic head where an identity or hair is chosen.
     identity
         Name of a preset of the face's age, sex and ancestry.
+    photo, consent
+        Picture of a person who speaks in place of a face, and that person's consent, as for
+        `tts2face.face_from_photo`.
     hair, hair_color
         Haircut and colour of the hair, as for `tts2face.load_face`; None for the face's own.
     palette
@@ -77,9 +81,13 @@ class Session:
         palette: str | Path | Palette | None = "starter",
         hair: str | None = None,
         hair_color: str | None = None,
+        photo: str | Path | None = None,
+        consent: str | None = None,
         voices: VoicePool | None = None,
         memory_mb: float = 0.0,
     ) -> None:
+        if photo is not None:
+            face = _face_of(photo, consent, (face, identity, hair, hair_color))
         memory = SentenceMemory(round(memory_mb * 1e6))
         self._models = SessionModels(talker, shown_face(face, identity, hair, hair_color), palette, voices, memory)
 
@@ -343,3 +351,12 @@ class Session:
             renderer = None if outputs.out is None else self.renderer(picture, has_gestures=has_gestures)
             with outputs.open(face, renderer, progress.report_frames) as files:
                 return write_pieces(pieces, files, outputs, progress, on_piece)
+
+
+def _face_of(photo: str | Path, consent: str | None, others: tuple[object, ...]) -> Face:
+    """Face of a photo, beside which there are no other choices of a face."""
+    from tts2face.photo.face_from_photo import face_from_photo
+
+    if any(other is not None for other in others):
+        raise InputError("a photo has its own face and hair; remove face, identity and hair, or the photo")
+    return face_from_photo(photo, consent=consent)

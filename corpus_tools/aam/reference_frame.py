@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from tts2face.interpolation import sample_triangles
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
+from tts2face.numeric import points_in_polygon
 
 RING_SCALE = 1.35  # scale of the ring of skin around the face, relative to its oval
 MOUTH_LANDMARKS = (*INNER_LIP_UPPER, *INNER_LIP_LOWER[-2:0:-1])  # in order around the inner lips
@@ -112,15 +113,3 @@ def face_ring(points: NDArray[np.floating]) -> NDArray[np.float64]:
     oval = np.asarray(points[..., list(FACE_OVAL), :], np.float64)
     middle = oval.mean(axis=-2, keepdims=True)
     return np.asarray(middle + RING_SCALE * (oval - middle))
-
-
-def points_in_polygon(places: NDArray[np.floating], polygon: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """(P,) whether points (P, 2) are inside a polygon (N, 2), by counting the edges to their right."""
-    x, y = places[:, 0, None], places[:, 1, None]
-    (ax, ay), (bx, by) = polygon.T, np.roll(polygon, -1, axis=0).T
-    spans = (ay > y) != (by > y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossing = ax + (y - ay) * (bx - ax) / (by - ay)
-    counts: NDArray[np.int64] = (spans & (x < crossing)).sum(axis=1)
-    odd: NDArray[np.bool_] = counts % 2 == 1
-    return odd

@@ -19,7 +19,7 @@ Find = Callable[[str, str], Iterator[str]]  # of the text and the name of a modu
 # Places that start Python, outside the room of child processes, which is to start all of them.
 PROCESS_ROOM = "tts2face.child_process"
 STARTS_PYTHON = (
-    "corpus_tools.head.source", "corpus_tools.setup_models", "tts2face.batch.render_process", "tts2face.jobs.engine",
+    "corpus_tools.head.source", "tts2face.video.setup_models", "tts2face.batch.render_process", "tts2face.jobs.engine",
     "tts2face.jobs.talker_job", "tts2face.render.vtk_renderer", "tts2face.service.synthesis.remote_aligner",
     "tts2face.service.synthesis.warm_process", "tts2face.service.uploads.upload_folder",
     "tts2face.studio.puppetry.live_camera", "tts2face.studio.recording.take_checks",

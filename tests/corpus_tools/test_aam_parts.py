@@ -16,8 +16,8 @@ from corpus_tools.aam.reference_frame import (
 )
 from corpus_tools.aam.source_videos import AppearanceRecording
 from corpus_tools.aam.train_appearance import camera_axes, fit_lighting, speech_weights
-from corpus_tools.build_talker import consent_record
 from lexicon.errors import InputError
+from tts2face.models.consent import consent_record
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.render.own_face import ring_triangles
 

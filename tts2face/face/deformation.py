@@ -98,6 +98,8 @@ def build_rig(face: Face) -> FaceRig:
 
 def head_share(face: Face) -> NDArray[np.float32]:
     """Share (V,) of the head motion that each vertex follows: 1 on the head, falling to 0 at the end of the neck."""
+    if face.photograph is not None:
+        return face.photograph.follow
     height = face.vertices[:, 1]
     chin = np.flatnonzero(face.landmarks == CHIN)
     if not len(chin):

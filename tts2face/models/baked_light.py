@@ -100,6 +100,11 @@ class HairLight:
         return np.where(self.triangles < 0, ~self.triangles, self.triangles)
 
     @property
+    def changes_in_texels(self) -> bool:
+        """Whether colours in texels change with turns of the head or the camera."""
+        return len(self.turn_modes) + len(self.camera_modes) > 0
+
+    @property
     def turn_side(self) -> int:
         """Side of a page of the texels of change."""
         return side_of(self.n_texels)

@@ -11,8 +11,17 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.baked_light import BakedLight
-from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Hairdo, Part, Texture
-from tts2face.models.face_layout import LIGHT, MAX_TEXTURES, SCORE_INPUTS, WIDE_OPEN, check_face, texture_number
+from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Hairdo, Part, PhotoView, Texture
+from tts2face.models.face_layout import (
+    FOLLOW,
+    LIGHT,
+    MAX_TEXTURES,
+    PHOTOGRAPH,
+    SCORE_INPUTS,
+    WIDE_OPEN,
+    check_face,
+    texture_number,
+)
 from tts2face.models.late import Late
 from tts2face.models.light_coding import decode_light, encode_light
 from tts2face.models.mesh_coding import decode_tangents, decode_uv, encode_tangents, encode_uv
@@ -71,13 +80,7 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
     }
     least_mm = LEAST_STEP * float(np.ptp(face.vertices, axis=0).max())
     arrays |= pack_shapes(face.shapes, least_mm)
-    if face.uv is not None and face.textures:
-        arrays["uv"] = encode_uv(face.uv)
-    for number, texture in enumerate(face.textures):
-        pixels, alpha = texture_tensors(number)
-        arrays[pixels] = encode_colours(texture.pixels)
-        if texture.alpha is not None:
-            arrays[alpha] = encode_coverage(texture.alpha)
+    arrays |= _picture_arrays(face)
     if face.tangents is not None:
         arrays["tangents"] = encode_tangents(face.tangents)
     if face.occlusion is not None:
@@ -106,6 +109,10 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
         header[SCORE_INPUTS] = list(face.scores.inputs)
     for light in face.light:
         arrays[LIGHT], header[LIGHT] = encode_light(light)
+    if face.photograph is not None:
+        view = face.photograph
+        arrays[FOLLOW] = np.rint(255 * view.follow).astype(np.uint8)
+        header[PHOTOGRAPH] = {"size": list(view.size), "view": view.view.tolist(), "lens": view.lens.tolist()}
     write_tensors(path, KIND, FORMAT_VERSION, arrays, header, is_packed=True)
 
 
@@ -133,6 +140,19 @@ def read_face(path: Path, identity: str | None = None, *, checks_pictures: bool 
         tuple(face.textures)
         tuple(face.light)
     return face if identity is None else _apply_identity(face, arrays, header, names.index(identity))
+
+
+def _picture_arrays(face: Face) -> dict[str, NDArray[Any]]:
+    """Textures of a face, and the places of its vertices in them or in a photograph."""
+    arrays: dict[str, NDArray[Any]] = {}
+    if face.uv is not None and (face.textures or face.photograph is not None):
+        arrays["uv"] = encode_uv(face.uv)
+    for number, texture in enumerate(face.textures):
+        pixels, alpha = texture_tensors(number)
+        arrays[pixels] = encode_colours(texture.pixels)
+        if texture.alpha is not None:
+            arrays[alpha] = encode_coverage(texture.alpha)
+    return arrays
 
 
 def _pack_identities(presets: Mapping[str, Identity], least_mm: float) -> dict[str, NDArray[Any]]:
@@ -196,6 +216,15 @@ def _read_light(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], p
     return Late(1, lambda: [decode_light(arrays[LIGHT], header[LIGHT], sizes, path)])
 
 
+def _read_photograph(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> PhotoView | None:
+    if PHOTOGRAPH not in header:
+        return None
+    stored = header[PHOTOGRAPH]
+    wide, high = stored["size"]
+    follow = arrays[FOLLOW].astype(np.float32) / np.float32(255)
+    return PhotoView((wide, high), np.array(stored["view"]), np.array(stored["lens"]), follow)
+
+
 def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Face:
     eyes = [
         Eye(
@@ -229,6 +258,7 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
         metadata=header["metadata"],
         scores=score_map_from_arrays(arrays, tuple(header.get(SCORE_INPUTS, ()))),
         light=_read_light(arrays, header, path),
+        photograph=_read_photograph(arrays, header),
     )
 
 

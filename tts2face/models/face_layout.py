@@ -34,8 +34,10 @@ from tts2face.storage.schema import (
 )
 
 SCORE_INPUTS = "score_inputs"  # key of the metadata: names of the shapes that the score map reads
+PHOTOGRAPH, FOLLOW = "photograph", "follow"  # key of the metadata, and array of the view of a photographed face
 LIGHT = "light"  # array of baked light, and the key of the metadata that describes it
 MAX_TEXTURES = 16
+MAX_PHOTO_PX = 8192  # side of a photograph
 MAX_WEIGHT = 100.0  # of a shape; common shapes have 0 to 1, gesture modes up to about 30
 MIN_EXTENT_MM = 1.0  # least width and height of a face
 SUM_WITHIN = 1e-3  # tolerance of the sum of barycentric weights; 32-bit rounding is 1e-7
@@ -62,6 +64,13 @@ _PART = record(
 _EYE = record(
     {"first": _INDEX, "count": _INDEX, "centre": _POINT, "turns": table(list_of(number(-math.pi, math.pi), 3))}
 )
+_PHOTOGRAPH = record(
+    {
+        "size": list_of(whole(1, MAX_PHOTO_PX), 2),
+        "view": list_of(list_of(number(-MAX_MM, MAX_MM), 4), 3),
+        "lens": list_of(number(-1e6, 1e6), 3),
+    }
+)
 _IDENTITY = row(text, table(list_of(number(0.0, 100.0), 3)), text)
 METADATA: Mapping[str, Check] = {
     "parts": list_of(_PART),
@@ -80,6 +89,7 @@ TENSORS: Mapping[str, Tensor] = {
     "tangents": Tensor("int8", ("vertices", 3), is_optional=True),
     "occlusion": Tensor("uint8", ("bytes of occlusion",), is_optional=True),
     LIGHT: Tensor("uint8", ("bytes of light",), is_optional=True),
+    FOLLOW: Tensor("uint8", ("vertices",), is_optional=True),
     "landmarks": Tensor("int32", ("landmarks",), may_be_empty=True),
     "landmark_vertices": Tensor("int32", ("landmarks", N_CORNERS), may_be_empty=True),
     "landmark_weights": Tensor("float32", ("landmarks", N_CORNERS), -SUM_WITHIN, 1 + SUM_WITHIN, may_be_empty=True),
@@ -118,6 +128,7 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
     contents.indices("landmarks", N_LANDMARKS, "landmarks of the face mesh")
     contents.distinct("landmarks")
     _check_light(contents)
+    _check_photograph(contents)
     _check_textures(contents)
     _check_places(contents)
     _check_shapes(contents)
@@ -128,7 +139,8 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
 def _check_textures(contents: Contents) -> None:
     arrays = contents.arrays
     n_textures = sum(texture_tensors(at)[0] in arrays for at in range(MAX_TEXTURES))
-    contents.require(("uv" in arrays) == (n_textures > 0), "has only one of uv and texture")
+    has_pictures = n_textures > 0 or PHOTOGRAPH in contents.header
+    contents.require(("uv" in arrays) == has_pictures, "has only one of uv and texture")
     for at in range(MAX_TEXTURES):
         has_texture, has_alpha = (name in arrays for name in texture_tensors(at))
         contents.require(has_texture == (at < n_textures), f"lacks the texture before texture{at}")
@@ -146,6 +158,15 @@ def _check_light(contents: Contents) -> None:
     contents.require((LIGHT in arrays) == (LIGHT in header), "has only one of light and what describes it")
     lacks = set(LIP_RING) - set(arrays["landmarks"].tolist())
     contents.require(LIGHT not in arrays or not lacks, f"has light, but not the landmark {min(lacks, default=0)}")
+
+
+def _check_photograph(contents: Contents) -> None:
+    arrays, header = contents.arrays, contents.header
+    needs = {PHOTOGRAPH in header, FOLLOW in arrays}
+    contents.require(len(needs) == 1, "has only one of photograph and follow")
+    if PHOTOGRAPH in header:
+        _PHOTOGRAPH(header[PHOTOGRAPH], f"{contents.path}: metadata: {PHOTOGRAPH}")
+        contents.require(LIGHT in arrays, "has a photograph, but no light")
 
 
 def texture_number(part: Mapping[str, Any]) -> int:

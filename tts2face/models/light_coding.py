@@ -175,18 +175,16 @@ def _checked(contents: Contents, sizes: Mapping[str, int]) -> dict[str, Any]:
     numbers = np.where(drawn < 0, ~drawn, drawn)
     contents.require(int(numbers.max()) < sizes["triangles"], f"light draws a triangle beyond its {sizes['triangles']}")
     pages = [decode_colours(arrays[f"page{number}"], path) for number in range(N_PAGES)]
-    side = len(pages[0])
-    is_square = (
-        all(page.shape == (side, side, 3) for page in pages)
-        and LEAST_SIDE <= side <= MAX_SIDE
-        and side.bit_count() == 1
+    sides = pages[0].shape[:2]
+    fit = all(page.shape == (*sides, 3) for page in pages) and all(
+        LEAST_SIDE <= side <= MAX_SIDE and side.bit_count() == 1 for side in sides
     )
-    contents.require(is_square, f"pages of light are not squares of a power of two from {LEAST_SIDE}")
+    contents.require(fit, f"pages of light differ, or have a side that is not a power of two from {LEAST_SIDE}")
     whole = fills_pages(arrays["turn_modes"].shape[2], arrays["camera_modes"].shape[2])
     contents.require(whole, "texels of change of light do not fill their pages")
     coded = (*PICTURES, "triangle_steps", "tint_colours", "tint_vertices")
     kept = {name: array for name, array in arrays.items() if name not in coded}
-    tint = _tint(contents, sizes["vertices"], side)
+    tint = _tint(contents, sizes["vertices"], sides[0])
     return kept | {"triangles": drawn.astype(np.int32), "pages": np.stack(pages), "tint": tint}
 
 

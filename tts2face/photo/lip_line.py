@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LIP_LOWER, OUTER_LIP_UPPER
+from tts2face.photo.colours import grey_at, lab_at
 from tts2face.photo.found_face import FoundFace
 
 Floats = NDArray[np.float64]
@@ -20,6 +22,7 @@ SEAM_REST, LIP_REST = 0.15 / 0.02**2, 0.25 / 0.03**2  # cost of a distance from 
 EDGE_GAIN = 2.0
 LIP_SPREAD = np.array([22.0, 7.0, 9.0])  # of a lip's colour in Lab
 N_SIDE = 3  # places on each side of an edge whose colours are compared
+EDGE_SHADE, EDGE_DARKNESS = 0.006, 0.55  # reach of the shadow between lips that meet, and its share of the light
 SMOOTHING, CORNER_POINTS = 5, 4  # points of a mean, and points over which corners take less
 
 
@@ -75,13 +78,33 @@ def spline_weights(n: int, m: int) -> Floats:
     return np.asarray(CubicSpline(np.linspace(0, 1, n), np.eye(n), bc_type="natural")(np.linspace(0, 1, m)))
 
 
+def darken_lip_edges(pixels: NDArray[np.uint8], lips: LipLine, scale: float) -> NDArray[np.uint8]:
+    """Picture (H, W, 3) whose parted lips darken towards their inner edges, as lips that meet do."""
+    if lips.is_closed:
+        return pixels
+    margin = int(np.ceil(3 * EDGE_SHADE * scale)) + 2
+    every = np.concatenate([lips.upper, lips.lower])[:, :2]
+    low = np.maximum(np.floor(every.min(axis=0)).astype(int) - margin, 0)
+    high = np.minimum(np.ceil(every.max(axis=0)).astype(int) + margin, pixels.shape[1::-1])
+    down, across = np.mgrid[low[1] : high[1], low[0] : high[0]]
+    places = np.column_stack([across.ravel(), down.ravel()]).astype(np.float64)
+    fine = spline_weights(N_POINTS, 4 * N_POINTS)
+    edges = np.concatenate([fine @ lips.upper, fine @ lips.lower])[:, :2]
+    away = np.asarray(cKDTree(edges).query(places)[0]).reshape(down.shape)
+    bright = 1 - EDGE_DARKNESS * np.exp(-((away / (EDGE_SHADE * scale)) ** 2))
+    darker = pixels.copy()
+    part = pixels[low[1] : high[1], low[0] : high[0]] * bright[..., None]
+    darker[low[1] : high[1], low[0] : high[0]] = np.rint(part).astype(np.uint8)
+    return darker
+
+
 def _seam(pixels: NDArray[np.uint8], line: Floats, scale: float) -> Floats:
     """A line (N, 3) moved to the darkest seam."""
     along = line[-1, :2] - line[0, :2]
     across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
     offsets = np.linspace(-REACH, REACH, N_PLACES)
     places = line[:, None, :2] + (offsets * scale)[None, :, None] * across
-    grey = _sample(pixels.mean(axis=2, dtype=np.float32)[..., None], places, max(0.6, SEAM_BLUR * scale))[..., 0]
+    grey = grey_at(pixels, places, max(0.6, SEAM_BLUR * scale))
     darkness = (grey - grey.mean(axis=1, keepdims=True)) / (grey.std() + 1e-3)
     moved = line.copy()
     moved[:, :2] += _path(darkness + SEAM_REST * offsets**2, offsets, SEAM_STIFFNESS)[:, None] * scale * across
@@ -98,7 +121,7 @@ def _edge(pixels: NDArray[np.uint8], line: Floats, outer: Floats, scale: float) 
     places = line[:, None, :2] + (offsets * scale)[None, :, None] * inwards[:, None]
     middle = ((line + outer) / 2)[6:-6, None, :2]
     blur = max(0.5, LIP_BLUR * scale)
-    colours = _sample(_lab(pixels), np.concatenate([places.reshape(-1, 1, 2), middle]), blur)[:, 0]
+    colours = lab_at(pixels, np.concatenate([places.reshape(-1, 1, 2), middle]), blur)[:, 0]
     lip = np.median(colours[places[..., 0].size :], axis=0)
     unlike = (((colours[: places[..., 0].size] - lip) / LIP_SPREAD) ** 2).sum(axis=1).reshape(places.shape[:2])
     likeness = np.minimum.accumulate(np.exp(-unlike / 2), axis=1)  # beyond the first edge there is no lip
@@ -134,22 +157,3 @@ def _smooth(values: Floats, n: int) -> Floats:
     padded = np.pad(values, ((n // 2, n // 2), (0, 0)), mode="edge")
     kernel = np.ones(n) / n
     return np.stack([np.convolve(column, kernel, "valid") for column in padded.T], axis=1)
-
-
-def _lab(pixels: NDArray[np.uint8]) -> NDArray[np.float32]:
-    import cv2
-
-    return np.asarray(cv2.cvtColor(pixels, cv2.COLOR_RGB2LAB), np.float32)
-
-
-def _sample(values: NDArray[np.float32], places: Floats, blur: float) -> Floats:
-    """Values (..., C) of a blurred picture (H, W, C) at places (..., 2), x and y; only what is near is read."""
-    from scipy.ndimage import gaussian_filter, map_coordinates
-
-    margin = int(np.ceil(4 * blur)) + 1
-    low = np.maximum(np.floor(places.reshape(-1, 2).min(axis=0)).astype(int) - margin, 0)
-    high = np.ceil(places.reshape(-1, 2).max(axis=0)).astype(int) + margin + 1
-    part = values[low[1] : max(high[1], low[1] + 1), low[0] : max(high[0], low[0] + 1)]
-    soft = gaussian_filter(part.astype(np.float64), (blur, blur, 0))
-    at = np.moveaxis(places - low, -1, 0)[::-1]
-    return np.stack([map_coordinates(soft[..., c], at, order=1, mode="nearest") for c in range(soft.shape[2])], axis=-1)

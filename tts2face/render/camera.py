@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.models.face import Face
+from lexicon.errors import InputError
+from tts2face.models.face import Face, PhotoView
 from tts2face.models.landmarks import CHIN
 from tts2face.render.camera_views import CameraView
 
@@ -14,6 +15,9 @@ FIELD_OF_VIEW_RAD = math.radians(
     22.0
 )  # opening angle across the frame: a portrait lens, with little perspective distortion
 FRAME_MARGIN = 0.06  # margin on each side as a share of the head's size
+MAX_PHOTO_TURN_DEG = 5.0  # of a camera from that of a photograph, whose named views look down a little
+PHOTO_DISTANCE_MM = 1000.0  # of a camera that shows as much of a photograph as it can
+NEAR_PHOTO_MM = 20.0
 NECK_SHARE = 0.28  # length of neck below the chin, as a share of the head's height
 
 
@@ -30,7 +34,15 @@ class CameraMatrices:
 
 
 def camera_matrices(camera: CameraView, face: Face, size: tuple[int, int]) -> CameraMatrices:
-    """Camera matrices that frame a face in a picture of `size` (width, height) in samples."""
+    """Camera matrices that frame a face in a picture of `size` (width, height) in samples.
+
+    Raises
+    ------
+    InputError
+        The face is that of a photograph, and the camera does not see it from where it was taken.
+    """
+    if face.photograph is not None:
+        return _photo_matrices(face.photograph, photo_crop(camera, face, size), size)
     low, high = framing_box(face)
     yaw, pitch = math.radians(camera.yaw_deg), math.radians(camera.pitch_deg)
     ahead = -np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)])
@@ -45,6 +57,53 @@ def camera_matrices(camera: CameraView, face: Face, size: tuple[int, int]) -> Ca
     extent = float(np.abs(face.vertices).max()) + distance
     near = max(distance / 50, extent * focal * 256 / 2**29)  # keeps grid coordinates below the int32 limit
     return CameraMatrices(view, np.array([focal, size[0] / 2, size[1] / 2, near]))
+
+
+def photo_crop(camera: CameraView, face: Face, size: tuple[int, int]) -> tuple[float, float, float, float]:
+    """Left, top, right and bottom, in pixels of its photograph, of what a camera shows in a picture of `size`.
+
+    The picture is filled, with the face as near its middle as it can be.
+
+    Raises
+    ------
+    InputError
+        The camera does not see the face from where the photograph was taken.
+    """
+    view = face.photograph
+    if view is None:
+        raise InputError("the face is not that of a photograph")
+    if max(abs(camera.yaw_deg), abs(camera.pitch_deg)) > MAX_PHOTO_TURN_DEG:
+        raise InputError(
+            "a photograph is seen from where it was taken; choose the camera front or close, or a distance such as "
+            "0,0,800"
+        )
+    wide, high = view.size
+    part = min(wide / size[0], high / size[1])
+    low, top = _in_photo(face, view)
+    if camera.share < 1:
+        part = min(part, float((top - low).max()) / camera.share / min(size))
+    elif camera.distance:
+        part *= min(1.0, camera.distance / PHOTO_DISTANCE_MM)
+    half = np.array(size) * part / 2
+    middle = np.clip((low + top) / 2, half, np.maximum(np.array([wide, high]) - half, half))
+    left, above, right, below = (float(edge) for edge in (*(middle - half), *(middle + half)))
+    return left, above, right, below
+
+
+def _in_photo(face: Face, view: PhotoView) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Least and greatest (2,) pixel of the landmarks of a photographed face."""
+    corners = face.vertices[face.landmark_vertices].astype(np.float64)
+    points = np.einsum("lc,lcx->lx", face.landmark_weights, corners)
+    seen = points @ view.view[:, :3].T + view.view[:, 3]
+    places = seen[:, :2] * (view.lens[0] / seen[:, 2:]) + view.lens[1:] + 0.5
+    return places.min(axis=0), places.max(axis=0)
+
+
+def _photo_matrices(view: PhotoView, crop: tuple[float, float, float, float], size: tuple[int, int]) -> CameraMatrices:
+    scale = size[0] / (crop[2] - crop[0])
+    focal, across, down = view.lens * scale
+    middle = (across + scale * (0.5 - crop[0]), down + scale * (0.5 - crop[1]))
+    return CameraMatrices(view.view, np.array([focal, *middle, NEAR_PHOTO_MM]))
 
 
 def framing_box(face: Face) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.build_talker import consent_record
 from corpus_tools.dense.adapt_head import RIGID_MOUTH_PARTS, adapt_head
 from corpus_tools.dense.build_face import build_face
 from corpus_tools.dense.mesh_fit import OPEN_JAW_WEIGHT, align_to_head, face_landmarks, part_vertices
@@ -19,6 +18,7 @@ from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
 from tests.face.posing import posed_vertices
 from tests.rendered_takes import ONLY_RENDERED
+from tts2face.models.consent import consent_record
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS, N_MESH_LANDMARKS

@@ -30,13 +30,14 @@ from tts2face.render.film.shading import (
 )
 from tts2face.render.film.surface import TEXELS_A_PIXEL, LitSurface, build_surface, stack_pages, still_change
 from tts2face.render.film.turns import Cardinal, camera_weights, turn_weights, yaw_and_pitch_deg
-from tts2face.render.film.visibility import BLOCK, RED, X, fill_bands, find_bands, find_nearest, project
+from tts2face.render.film.visibility import BLOCK, NEAR, RED, X, fill_bands, find_bands, find_nearest, project
 from tts2face.render.picture import Picture
 
 Float32Array = NDArray[np.float32]
 
 BLINK_SHRINK = 0.075  # of the ball behind a shut lid, times its weight to the fourth power
 BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")  # of the face's eyes
+BEHIND_SHARE = np.float32(0.8)  # of the nearness of what lies in openings
 BAND_PIXELS = 32_768
 
 
@@ -124,11 +125,14 @@ class LitScene:
     def draw(self, weights: Float32Array, head: Float32Array, buffers: LitBuffers, pixels: NDArray[np.uint8]) -> None:
         """Draw the face with shape weights (K,) and a head pose (6,) over the background in `pixels`, in place."""
         surface, side = self.surface, self.picture.samples_per_side
+        if self.face.photograph is not None:
+            head = self.face.photograph.bearable(head)
         points = self.deform(weights)
         self.light_pose(points, head, buffers)
         self.move(weights, head, points)
         optics = (self.optics.view.astype(np.float32), self.optics.lens.astype(np.float32))
         project(points, surface.source, *optics, buffers.table)
+        buffers.table[surface.behind, NEAR] *= BEHIND_SHARE
         rows = buffers.band_rows
         order, ends = self._sort(len(pixels) * side, buffers)
         buffers.frame += 1
@@ -165,9 +169,11 @@ class LitScene:
         marks = (buffers.done, buffers.frame)
         lay_planes(buffers.triangle, count, buffers.table, surface.triangles, marks, buffers.planes)
         evaluate(found[0], found[1], found[2], count, buffers.planes, values)
-        width = surface.light.turn_side
-        change = (buffers.changed, (width, len(buffers.changed) // width))
-        for (texels, size), coding in (((self.texels, self.texture_size), COLOUR_CODING), (change, CHANGE_CODING)):
+        read = [(self.texels, self.texture_size, COLOUR_CODING)]
+        if surface.light.changes_in_texels:
+            width = surface.light.turn_side
+            read.append((buffers.changed, (width, len(buffers.changed) // width), CHANGE_CODING))
+        for texels, size, coding in read:
             find_texels(values, count, size, buffers.texel, buffers.share)
             fetch(texels, size[0], buffers.texel, count, buffers.corners)
             add_texels(buffers.corners, buffers.share, count, coding, values)
@@ -205,6 +211,8 @@ class LitScene:
             add_responses(base, answer, terms, first, out)
             buffers.table[at : at + out.shape[1], RED:] = out.T
             at += out.shape[1]
+        if not light.changes_in_texels:
+            return
         turn = self.turns.at(yaw_and_pitch_deg(head))
         modes = light.turn_modes.reshape(len(light.turn_modes), -1)
         add_modes(self.from_camera.reshape(-1), modes, turn @ light.turn_weights, buffers.change.reshape(-1))
@@ -289,11 +297,12 @@ def _level(surface: LitSurface, optics: CameraMatrices, side: int) -> int:
     corners = table[surface.triangles]
     edges = corners[:, 1:] - corners[:, :1]
     seen = edges[:, 0, X] * edges[:, 1, X + 1] - edges[:, 0, X + 1] * edges[:, 1, X]
-    places = edges[:, :, 3:5] * np.array([surface.light.pages.shape[1], surface.light.pages.shape[1] * 2], np.float32)
+    height, width = surface.light.pages.shape[1:3]
+    places = edges[:, :, 3:5] * np.array([width, 2 * height], np.float32)
     texels = np.abs(places[:, 0, 0] * places[:, 1, 1] - places[:, 0, 1] * places[:, 1, 0])
     ahead = (seen < 0) & (texels > 0)
     ratio = math.sqrt(float(texels[ahead].sum()) / max(float(-seen[ahead].sum()) / side**2, 1.0))
-    most = int(math.log2(surface.light.pages.shape[1] / LEAST_SIDE))
+    most = int(math.log2(min(height, width) / LEAST_SIDE))
     return max(0, min(most, math.ceil(math.log2(max(ratio, 1e-3) / TEXELS_A_PIXEL))))
 
 

@@ -28,6 +28,8 @@ class LitSurface:
     ----------
     source : (V,)
         Vertex of the face of each row.
+    behind : (V,)
+        Rows of what lies in openings of a photographed skin, which hides them wherever it is.
     template : (V, 8)
         Texture coordinates, and the light that is constant.
     triangles : (D, 3)
@@ -42,6 +44,7 @@ class LitSurface:
     light: BakedLight
     rig: FaceRig
     source: NDArray[np.int32]
+    behind: NDArray[np.bool_]
     template: NDArray[np.float32]
     triangles: NDArray[np.int32]
     piece_of: NDArray[np.int32]
@@ -90,6 +93,7 @@ def build_surface(face: Face, light: BakedLight) -> LitSurface:
         light=light,
         rig=build_rig(face),
         source=source,
+        behind=(page_of[order] != 0) if face.photograph is not None else np.zeros(len(order), bool),
         template=template,
         triangles=np.ascontiguousarray(row_of[keys]),
         piece_of=_pieces(face, corners),
@@ -123,15 +127,15 @@ def page_places(uv: NDArray[np.float64], page: NDArray[np.int64], least_side: in
 
 
 def stack_pages(pages: NDArray[np.uint8], level: int) -> tuple[NDArray[np.int32], tuple[int, int]]:
-    """Texels (N,) of three numbers of 8 bits, of pages (2, S, S, 3) halved `level` times; and (width, height)."""
+    """Texels (N,) of three numbers of 8 bits, of pages (2, H, W, 3) halved `level` times; and (width, height)."""
     shrunk = pages.astype(np.float64)
     for _ in range(level):
         shrunk = (shrunk[:, ::2, ::2] + shrunk[:, 1::2, ::2] + shrunk[:, ::2, 1::2] + shrunk[:, 1::2, 1::2]) / 4
-    side = shrunk.shape[1]
-    black = np.zeros((side // BLACK_SHARE, side, 3))
+    height, width = shrunk.shape[1:3]
+    black = np.zeros((height // BLACK_SHARE, width, 3))
     numbers = np.rint(np.concatenate([*shrunk, black])).astype(np.int32)
     packed = numbers[:, :, 0] | numbers[:, :, 1] << 8 | numbers[:, :, 2] << 16
-    return packed.ravel(), (side, len(packed))
+    return packed.ravel(), (width, len(packed))
 
 
 def still_change(side: int) -> tuple[NDArray[np.int32], tuple[int, int]]:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from corpus_tools import setup_models as setup
-from corpus_tools.setup_models import fetch_bundle
 from lexicon.errors import BackendError
 from tts2face.video import landmark_models as model
+from tts2face.video import setup_models as setup
+from tts2face.video.setup_models import fetch_bundle
 
 CONTENT = b"a bundle"
 

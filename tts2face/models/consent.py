@@ -1,0 +1,26 @@
+"""Consent of the person whose face a file shows."""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+
+from lexicon.errors import InputError
+
+MIN_STATEMENT_WORDS = 3  # shorter statements are treated as typing errors
+DRAWN = "drawn"  # the statement for a face that is not that of a real person
+
+
+def consent_record(name: str, statement: str | None, *, date: str | None = None) -> Mapping[str, str]:
+    """Consent record for the metadata of a file: name, statement, date.
+
+    Raises
+    ------
+    InputError
+        The statement is missing or too short.
+    """
+    said = "" if statement is None else statement.strip()
+    if said != DRAWN and len(said.split()) < MIN_STATEMENT_WORDS:
+        raise InputError(
+            f"the file will contain pictures of {name}'s face; state the consent: "
+            '--consent "I, NAME, agree that my face is used for ...", or --consent drawn if it is nobody\'s'
+        )
+    return {"name": name, "statement": said, "date": date or datetime.now(UTC).date().isoformat()}

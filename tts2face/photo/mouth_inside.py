@@ -1,0 +1,151 @@
+"""What a photograph does not show of a mouth: the head's teeth, gums and tongue, and the walls of the mouth."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.colour import decode_srgb, encode_srgb
+from tts2face.models.face import Face
+from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, UPPER_LIP_INNER_MID
+from tts2face.photo.photo_mesh import PhotoMesh, vertex_normals
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+TEETH, OTHERS = ("teeth_upper", "teeth_lower"), ("gums_upper", "gums_lower", "tongue")
+WIDTH_LIMITS = (0.88, 1.1)  # of the mouth over the head's
+PARTED_WIDTH = 0.85  # of a mouth that is open in the picture, and wider for it
+BEHIND_MM = 1.0  # further back than in the head: lips are thinner than the head's
+OPEN_TOOTH = 70  # percentile of the head's colours of teeth
+GUM_SHARE = np.array([0.8, 0.66, 0.66])  # of the light of teeth that falls on gums and tongue
+GAP_SHARE = 0.45  # of the darkness of gaps between teeth
+DEPTH_MM, TONGUE_DEPTH_MM = 13.0, 17.0  # over which light falls to 1/e
+DEEP_TINT = np.array([1.0, 0.62, 0.55])  # of light that has gone deep
+AMBIENT = 0.30  # of the light of a tooth that faces the viewer
+LIGHT_FROM = np.array([0.1, 0.35, 0.93])
+CHEEKS = (50, 280, 205, 425, 101, 330)
+LIP_RED = (15, 16, 86, 316, 12)
+TEETH_LIMITS = (0.06, 0.75)  # of the luminance of teeth
+LUMINANCE = np.array([0.21, 0.72, 0.07])
+WALL_MM = (0.0, 2.5, 8.0, 22.0)  # depth of the rings of the wall behind the lips
+WALL_OUT_MM = (0.0, 0.8, 5.0, 7.0)  # and how much wider than the opening they are
+WALL_FOLLOW = (1.0, 1.0, 0.8, 0.5)  # share of the motion of the lips that they follow
+WALL_LIGHT = (0.42, 0.20, 0.08, 0.02)  # of the light of the lips
+WALL_TINT = np.array([1.0, 0.55, 0.5])
+BACK_MM, BACK_LIGHT = 40.0, 0.006
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MouthInside:
+    """Parts in the mouth: vertices (M, 3), mm, their shapes (K, M, 3), colours (M, 3) 0..255, and triangles by part."""
+
+    vertices: Floats
+    shapes: Floats
+    colours: Floats
+    parts: dict[str, Ints]
+
+
+def head_mouth(head: Face, head_landmarks: Floats, landmarks: Floats, lip: Floats, light: "MouthLight") -> MouthInside:
+    """Teeth, gums and tongue of a head behind lips, where `landmarks` (478, 3) and the lip's middle (3,) are in mm."""
+    names = (*TEETH, *OTHERS)
+    triangles, kinds = [], []
+    for part in head.parts:
+        if part.name in names:
+            triangles.append(head.triangles[part.first : part.first + part.count].astype(np.int64))
+            kinds.append(part.name)
+    used, rows = np.unique(np.concatenate(triangles), return_inverse=True)
+    ends = np.cumsum([len(one) for one in triangles])
+    by_part = dict(zip(kinds, np.split(rows.reshape(-1, 3), ends[:-1]), strict=True))
+    wide = np.linalg.norm(np.diff(landmarks[[MOUTH_CORNER_RIGHT, MOUTH_CORNER_LEFT]], axis=0)) / np.linalg.norm(
+        np.diff(head_landmarks[[MOUTH_CORNER_RIGHT, MOUTH_CORNER_LEFT]], axis=0)
+    )
+    size = float(np.clip(wide * (PARTED_WIDTH if light.is_parted else 1.0), *WIDTH_LIMITS))
+    middle = head_landmarks[UPPER_LIP_INNER_MID]
+    vertices = (head.vertices[used] - middle) * size + lip - (0.0, 0.0, BEHIND_MM)
+    shapes = head.shapes[:, used].astype(np.float64) * size
+    return MouthInside(vertices, shapes, _colours(head, used, by_part, vertices, light), by_part)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MouthLight:
+    """Linear light of the teeth (3,) and of the lips (3,), and whether the lips of the picture are parted."""
+
+    teeth: Floats
+    lips: Floats
+    is_parted: bool
+
+
+def mouth_light(pixels: NDArray[np.uint8], landmarks: Floats, sclera: Floats, *, is_parted: bool) -> MouthLight:
+    """Light in a mouth from the colours of cheeks, lips and the white of the eyes (3,), 0..255."""
+    skin, lips = (
+        _median(pixels, landmarks[list(numbers), :2], reach) for numbers, reach in ((CHEEKS, 3), (LIP_RED, 1))
+    )
+    white = decode_srgb(sclera / 255)
+    bright = float(np.clip(max(1.05 * (skin @ LUMINANCE), white @ LUMINANCE), *TEETH_LIMITS))
+    warm, warm_skin = (white / (white @ LUMINANCE)) ** 0.6, (skin / (skin @ LUMINANCE)) ** 0.35
+    tint = 0.75 * warm + 0.25 * warm_skin
+    return MouthLight(bright * tint / float(tint @ LUMINANCE), lips, is_parted)
+
+
+def _median(pixels: NDArray[np.uint8], places: Floats, reach: int) -> Floats:
+    """Median linear light (3,) of the pixels around places (N, 2)."""
+    found = []
+    for across, down in np.rint(places).astype(int):
+        part = pixels[max(down - reach, 0) : down + reach + 1, max(across - reach, 0) : across + reach + 1]
+        found.append(part.reshape(-1, 3))
+    every = np.concatenate(found)
+    return decode_srgb(np.median(every if len(every) else pixels.reshape(-1, 3), axis=0) / 255)
+
+
+def _colours(head: Face, used: Ints, parts: dict[str, Ints], vertices: Floats, light: MouthLight) -> Floats:
+    """(M, 3) colours in open light, 0..255."""
+    own = decode_srgb(head.colours[used] / 255.0)
+    is_tooth = np.isin(np.arange(len(used)), np.concatenate([parts[name] for name in TEETH]))
+    usual = np.percentile(
+        own[np.unique(parts[TEETH[0]])], OPEN_TOOTH, axis=0
+    )  # others are darkened by what covers them
+    own[is_tooth] = np.where(own[is_tooth] < usual, usual - (usual - own[is_tooth]) * GAP_SHARE, own[is_tooth])
+    gain = light.teeth / float(usual @ LUMINANCE)
+    own[~is_tooth] *= GUM_SHARE
+    front = vertices[np.unique(parts[TEETH[0]]), 2].max()
+    reach = np.full(len(used), DEPTH_MM)
+    reach[np.unique(parts["tongue"])] = TONGUE_DEPTH_MM
+    share = np.exp(-np.clip(front - vertices[:, 2], 0, None) / reach)
+    facing = np.clip(
+        vertex_normals(vertices, np.concatenate(list(parts.values()))) @ (LIGHT_FROM / np.linalg.norm(LIGHT_FROM)), 0, 1
+    )
+    lit = own * gain * ((AMBIENT + (1 - AMBIENT) * facing) * share)[:, None] * DEEP_TINT ** (1 - share[:, None])
+    return encode_srgb(lit).astype(np.float64)
+
+
+def mouth_walls(mesh: PhotoMesh, vertices: Floats, shapes: Floats, light: MouthLight) -> MouthInside:
+    """Walls of a mouth, from the edges of the lips (of vertices (V, 3) and shapes (K, V, 3), mm) to the dark."""
+    ring = np.concatenate([mesh.upper_lip, mesh.lower_lip[-2:0:-1]])
+    n = len(ring)
+    edge, middle = vertices[ring], vertices[ring].mean(axis=0)
+    out = np.zeros((n, 3))
+    out[1 : len(mesh.upper_lip) - 1, 1], out[len(mesh.upper_lip) :, 1] = 1.0, -1.0
+    out[[0, len(mesh.upper_lip) - 1], 0] = np.sign(edge[[0, len(mesh.upper_lip) - 1], 0] - middle[0])
+    rows, moves, colours = [], [], []
+    lips = light.lips * WALL_TINT
+    for back, wider, follow, bright in zip(WALL_MM, WALL_OUT_MM, WALL_FOLLOW, WALL_LIGHT, strict=True):
+        rows.append(edge + wider * out - (0.0, 0.0, back))
+        moves.append(follow * shapes[:, ring])
+        colours.append(np.tile(encode_srgb(lips * bright), (n, 1)))
+    rows.append(middle[None] - (0.0, 0.0, BACK_MM))
+    moves.append(np.zeros((len(shapes), 1, 3)))
+    colours.append(encode_srgb(lips * BACK_LIGHT)[None])
+    triangles = []
+    for k in range(len(WALL_MM) - 1):
+        for i in range(n):
+            a, b, c, d = k * n + i, k * n + (i + 1) % n, (k + 1) * n + i, (k + 1) * n + (i + 1) % n
+            triangles += [(a, d, b), (a, c, d)]
+    last, end = (len(WALL_MM) - 1) * n, len(WALL_MM) * n
+    triangles += [(last + (i + 1) % n, last + i, end) for i in range(n)]
+    return MouthInside(
+        np.concatenate(rows),
+        np.concatenate(moves, axis=1),
+        np.concatenate(colours).astype(np.float64),
+        {"walls": np.array(triangles, np.int64)},
+    )

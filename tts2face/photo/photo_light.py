@@ -1,0 +1,168 @@
+"""Light of a photograph: that of its skin, which turns with it, and that in the mouth, which comes through the lips."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from tts2face.colour import decode_srgb
+from tts2face.models.baked_light import (
+    BLACK_SHARE,
+    LEAST_SIDE,
+    LIMIT_STEP,
+    N_BALL_TERMS,
+    N_LAMP_NUMBERS,
+    N_MOUTH_TERMS,
+    N_PAGES,
+    N_TERMS,
+    TABLE_SIDE,
+    BakedLight,
+)
+from tts2face.models.landmarks import LEFT_LIDS, OUTER_LIP_LOWER, OUTER_LIP_UPPER, RIGHT_LIDS
+from tts2face.numeric import smoothstep
+from tts2face.photo.photo_mesh import PhotoMesh, vertex_normals
+from tts2face.photo.photo_surface import EYES, LIDS, SKIN
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+BLUR = 0.03  # of the width of the face
+NOSE_AND_BROWS = (46, 53, 52, 65, 55, 276, 283, 282, 295, 285, 1, 2, 98, 327)
+USUAL_LIGHT = np.array([0.6, 0.0, 0.18, 0.4])  # constant, and from the left, above and in front, of the median
+RIDGE = np.array([0.2, 1.0, 1.0, 1.0]) * 0.06
+ROUNDS = 6  # of the robust fit
+GAMMA = 2.2
+LEAST_LIGHT = 0.25
+MOST_TURNED = 30.0  # of 255, change of the skin's light
+MOUTH_BASE, MOUTH_BY_OPENING = 0.45, 0.7  # of the colour in open light: in the dark, and times the root of the opening
+ROOT_TERM = 2  # of `tts2face.render.film.response.write_mouth_terms`
+
+
+def skin_light(pixels: NDArray[np.uint8], mesh: PhotoMesh, vertices: Floats) -> tuple[Ints, Floats]:
+    """Vertices (N,) whose colour follows their normal, and (3, 3, N) its change by x, y and z of the normal's turn.
+
+    Light of first order (Basri and Jacobs 2003) is fitted to the skin's luminance.
+    """
+    points = vertices[: len(mesh.places)]
+    normals = vertex_normals(points, mesh.triangles)
+    wide = float(np.ptp(mesh.places[mesh.landmark_vertices, 0]))
+    spread = BLUR * wide
+    soft = gaussian_filter(decode_srgb(pixels / 255.0), (spread, spread, 0))
+    colours = np.stack([_at(soft[..., c], mesh.places) for c in range(3)], axis=1)
+    luminance = colours @ (0.21, 0.72, 0.07)
+    avoided = {
+        *OUTER_LIP_UPPER,
+        *OUTER_LIP_LOWER,
+        *NOSE_AND_BROWS,
+        *(n for lids in (RIGHT_LIDS, LEFT_LIDS) for n in (*lids[0], *lids[1])),
+    }
+    is_near = np.isin(mesh.landmarks, list(avoided))
+    places = mesh.places[mesh.landmark_vertices]
+    away = np.linalg.norm(places[:, None] - places[is_near][None], axis=2).min(axis=1)
+    used = mesh.landmark_vertices[(away > 0.06 * wide) & (mesh.outside[mesh.landmark_vertices] < -0.04 * wide)]
+    terms = np.column_stack([np.ones(len(used)), normals[used]])
+    light = _fit(terms, luminance[used])
+    shade = np.maximum(light[0] + normals @ light[1:], LEAST_LIGHT * float(np.median(luminance[used])))
+    lit = 1 - smoothstep(mesh.outside / wide, -0.015, 0.08)
+    rows = np.flatnonzero(lit > 0)
+    displayed = np.stack(
+        [_at(gaussian_filter(pixels[..., c].astype(np.float64), spread), mesh.places[rows]) for c in range(3)]
+    )
+    per_turn = light[1:, None] * (lit[rows] / (GAMMA * shade[rows]))
+    return rows, per_turn[:, None] * displayed[None]
+
+
+def _fit(terms: Floats, values: Floats) -> Floats:
+    usual = float(np.median(values)) * USUAL_LIGHT
+    ridge = np.diag(RIDGE) * len(values)
+    weights = np.ones(len(values))
+    for _ in range(ROUNDS):
+        weighted = terms * weights[:, None]
+        light = np.linalg.solve(weighted.T @ terms + ridge, weighted.T @ values + ridge @ usual)
+        off = np.abs(values - terms @ light)
+        weights = 1 / (1 + (off / (np.median(off) + 1e-4)) ** 2)
+    return np.asarray(light)
+
+
+def _at(values: Floats, places: Floats) -> Floats:
+    return np.asarray(map_coordinates(values, places.T[::-1], order=1, mode="nearest"))
+
+
+def picture_light(
+    pixels: NDArray[np.uint8],
+    pages: NDArray[np.uint8],
+    skin: tuple[PhotoMesh, Floats],
+    drawn: Ints,
+    mouth: tuple[NDArray[np.uint8], tuple[Ints, Ints]],
+) -> BakedLight:
+    """Light of a face in a picture (H, W, 3): that of the skin turns with it, that of the mouth comes through the lips.
+
+    Parameters
+    ----------
+    pages : (2, H, W, 3)
+        As the face's parts show them.
+    skin
+        Mesh of the picture and its vertices (V, 3), mm.
+    drawn : (D,)
+        Triangles that move.
+    mouth
+        Colours of all vertices in open light, and the vertices of teeth, gums and tongue, and of the mouth's walls.
+    """
+    rows, turned = skin_light(pixels, *skin)
+    responses = np.zeros((N_TERMS, 3, len(rows)))
+    responses[1:4] = turned
+    answers, sizes = _in_steps(responses)
+    colours, (teeth, walls) = mouth
+    mouth_rows = np.concatenate([teeth, walls])
+    lit = colours[mouth_rows].astype(np.float64)
+    openings = np.zeros((N_MOUTH_TERMS, 3, len(mouth_rows)))
+    openings[ROOT_TERM, :, : len(teeth)] = MOUTH_BY_OPENING * lit[: len(teeth)].T
+    lit[: len(teeth)] *= MOUTH_BASE
+    mouth_answers, mouth_sizes = _in_steps(openings)
+    n_texels = N_PAGES * LEAST_SIDE**2 + LEAST_SIDE * (LEAST_SIDE // BLACK_SHARE)
+    no_colours = np.zeros((0, 3), np.float32)
+    return BakedLight(
+        pages=pages,
+        triangles=drawn.astype(np.int32),
+        is_inside=np.zeros(len(drawn), bool),
+        base=np.zeros((len(rows), 3), np.uint8),
+        turns_deg=np.zeros((0, 2), np.float32),
+        turn_weights=np.zeros((0, 0), np.float32),
+        turn_modes=np.zeros((0, 3, n_texels), np.int8),
+        camera_yaws_deg=np.zeros(0, np.float32),
+        camera_modes=np.zeros((0, 3, LEAST_SIDE**2), np.int8),
+        camera_sizes=np.zeros(0, np.float32),
+        page_of={SKIN: 0, LIDS: 0, EYES: 1},
+        rows=rows.astype(np.int32),
+        responses=answers,
+        response_sizes=sizes,
+        limits=_limits(MOST_TURNED, len(rows)),
+        partners=rows.astype(np.int32),
+        mouth_rows=mouth_rows.astype(np.int32),
+        mouth_base=np.rint(lit).astype(np.uint8),
+        mouth_responses=mouth_answers,
+        mouth_sizes=mouth_sizes,
+        mouth_limits=_limits(255.0, len(mouth_rows)),
+        ball_rows=np.zeros(0, np.int32),
+        ball_base=no_colours,
+        ball_responses=np.zeros((N_BALL_TERMS, 3, 0), np.int8),
+        ball_sizes=np.ones(N_BALL_TERMS, np.float32),
+        lamps=np.zeros((0, N_LAMP_NUMBERS), np.float32),
+        head_lamps=0,
+        sky=np.zeros(3, np.float32),
+        eye_gain=1.0,
+        eye_edges=np.array([0.2, 0.4], np.float32),
+        view=np.zeros((TABLE_SIDE, TABLE_SIDE, TABLE_SIDE, 3), np.uint8),
+        backdrop=pixels,
+    )
+
+
+def _in_steps(values: Floats) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
+    """Responses (T, 3, N) in 8 bits, and the size (T,) of their steps."""
+    sizes = np.maximum(np.abs(values).max(axis=(1, 2), initial=0.0) / 127, 1e-6)
+    return np.rint(values / sizes[:, None, None]).astype(np.int8), sizes.astype(np.float32)
+
+
+def _limits(most: float, n: int) -> NDArray[np.int8]:
+    """(2, 3, n) limits of a change of light, of 255."""
+    steps = min(round(most / LIMIT_STEP), 127)
+    return np.tile(np.array([-steps, steps], np.int8)[:, None, None], (1, 3, n))

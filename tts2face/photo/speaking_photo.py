@@ -1,0 +1,205 @@
+"""A face that speaks in a photograph: a mesh with the shapes of the shipped head, in the light of the picture."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from tts2face.models.face import Face, Part, PhotoView
+from tts2face.models.landmarks import N_LANDMARKS, UPPER_LIP_INNER_MID
+from tts2face.photo.eye_pictures import BEHIND_MM, SIDES, EyePatch, eye_patch, gaze_shapes
+from tts2face.photo.found_face import FoundFace
+from tts2face.photo.landmark_places import place_landmarks
+from tts2face.photo.lid_lines import find_lid_lines
+from tts2face.photo.lids import add_lids
+from tts2face.photo.lip_line import LipLine, darken_lip_edges, find_lip_line
+from tts2face.photo.mouth_inside import MouthInside, head_mouth, mouth_light, mouth_walls
+from tts2face.photo.photo_camera import PhotoCamera, find_camera
+from tts2face.photo.photo_light import picture_light
+from tts2face.photo.photo_mesh import PhotoMesh, build_mesh
+from tts2face.photo.photo_shapes import (
+    GAZE_LIDS,
+    PhotoPerson,
+    blink,
+    breathing,
+    closing,
+    depths,
+    face_shapes,
+    head_follow,
+)
+from tts2face.photo.photo_surface import EYES, SKIN, PhotoSurface, Vertices, lay_pages, moves
+from tts2face.photo.spreading import Spreading
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+BREATH, SMILE_SHAPES = "breath", ("mouthSmileLeft", "mouthSmileRight")
+SMILE_KEPT = 0.6  # of a smile with parted lips, while they speak
+INTO_LIP = 0.006  # of the eye distance, by which the edges of parted lips are taken from within the lip
+N_NEAR = 6  # vertices of the skin around a place behind it
+FOLLOW_STEPS = 255  # of the share of the head's motion, as files hold it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Model:
+    """The shipped head without hair, its landmarks (478, 3), mm, and the names of the shapes of photographed faces."""
+
+    head: Face
+    landmarks: Floats
+    names: tuple[str, ...]
+
+    @classmethod
+    def of(cls, head: Face) -> "_Model":
+        landmarks = np.full((N_LANDMARKS, 3), np.nan)
+        landmarks[head.landmarks] = _on_landmarks(head, head.vertices)
+        return cls(head, landmarks, (*head.shape_names, BREATH))
+
+    def motion(self) -> dict[str, Floats]:
+        """(478, 3) motion of the landmarks in each shape, mm."""
+        found = {}
+        for name, shape in zip(self.head.shape_names, self.head.shapes, strict=True):
+            found[name] = np.zeros((N_LANDMARKS, 3))
+            found[name][self.head.landmarks] = _on_landmarks(self.head, shape)
+        return found
+
+
+def _on_landmarks(face: Face, values: NDArray[np.floating]) -> Floats:
+    corners = values[face.landmark_vertices].astype(np.float64)
+    return np.asarray(np.einsum("lc,lcx->lx", face.landmark_weights, corners))
+
+
+def speaking_photo(
+    pixels: NDArray[np.uint8], found: FoundFace, smile: float, head: Face, metadata: Mapping[str, Any]
+) -> Face:
+    """Face of a picture (H, W, 3) in which a face was found, with the shapes of a head without hair.
+
+    Parameters
+    ----------
+    smile
+        Score of the picture's smile, 0 to 1.
+    metadata
+        Name and consent.
+    """
+    model = _Model.of(head)
+    camera = find_camera(found, model.landmarks)
+    landmarks, scale = camera.depths_of(found.landmarks), found.eye_distance_px
+    line = find_lip_line(pixels, found)
+    lips = LipLine(camera.depths_of(line.upper), camera.depths_of(line.lower), line.gap)
+    person = PhotoPerson((pixels.shape[1], pixels.shape[0]), landmarks, lips, smile, scale)
+    lids = find_lid_lines(pixels, landmarks, scale)
+    mesh = build_mesh(person.size, landmarks, lips, lids, scale)
+    photo, skin = _skin(mesh, person, camera, model)
+    patches = [eye_patch(pixels, landmarks, lids, eye, scale) for eye in (0, 1)]
+    pages = lay_pages(darken_lip_edges(pixels, lips, scale), mesh, moves(skin), patches)
+    surface = PhotoSurface()
+    surface.add(skin, uv=pages.uv(_shown_places(mesh, person)))
+    surface.parts.append((SKIN, mesh.triangles))
+    add_lids(surface, mesh, pages, scale)
+    eyes = []
+    for eye, patch in enumerate(patches):
+        uv = pages.uv(patch.places, pages.eye_corners[eye])
+        eyes.append(surface.add(_eye_vertices(patch, eye, photo, camera, model), uv=uv))
+        surface.parts.append((EYES, eyes[eye][patch.triangles]))
+    corners, weights = place_landmarks(mesh, landmarks, list(zip(patches, eyes, strict=True)))
+    white = np.mean([patch.white for patch in patches], axis=0)
+    light = mouth_light(pixels, landmarks, white, is_parted=person.is_parted)
+    at_rest = np.einsum("lc,lcx->lx", weights, surface.every().places[corners])
+    inside = head_mouth(head, model.landmarks, at_rest, at_rest[UPPER_LIP_INNER_MID], light)
+    mouth = (_add_inside(surface, inside), _add_inside(surface, mouth_walls(mesh, skin.places, skin.shapes, light)))
+    every = surface.every()
+    triangles = np.concatenate([part for _, part in surface.parts])
+    drawn = np.flatnonzero(moves(every)[triangles].any(axis=1))
+    colours = np.rint(np.concatenate(surface.colours)).clip(0, 255).astype(np.uint8)
+    return Face(
+        vertices=every.places.astype(np.float32),
+        triangles=triangles.astype(np.int32),
+        parts=_parts(surface),
+        shape_names=model.names,
+        shapes=every.shapes.astype(np.float32),
+        limits=np.concatenate([head.limits, [[0.0, 1.0]]]).astype(np.float32),
+        eyes=(),
+        colours=colours,
+        uv=np.concatenate(surface.uv).astype(np.float32),
+        textures=(),
+        landmarks=np.arange(N_LANDMARKS, dtype=np.int32),
+        landmark_vertices=corners,
+        landmark_weights=weights,
+        pivot=head.pivot,
+        metadata=dict(metadata),
+        scores=head.scores,
+        light=(picture_light(pixels, pages.pages, (mesh, skin.places), drawn, (colours, mouth)),),
+        photograph=_view(person, camera, every.follow),
+    )
+
+
+def _view(person: PhotoPerson, camera: PhotoCamera, follow: Floats) -> PhotoView:
+    lens = np.array([camera.focal_px, *camera.origin])
+    rounded = np.rint(follow * FOLLOW_STEPS) / FOLLOW_STEPS
+    return PhotoView(person.size, camera.view, lens, rounded.astype(np.float32))
+
+
+def _parts(surface: PhotoSurface) -> tuple[Part, ...]:
+    first, parts = 0, []
+    for name, triangles in surface.parts:
+        parts.append(Part(name, first, len(triangles)))
+        first += len(triangles)
+    return tuple(parts)
+
+
+def _skin(mesh: PhotoMesh, person: PhotoPerson, camera: PhotoCamera, model: _Model) -> tuple[Floats, Vertices]:
+    """Pixels and depths (V, 3) of the picture, and vertices of its skin with closed lips."""
+    spreading = Spreading(mesh.places, mesh.triangles, person.scale)
+    found = face_shapes(mesh, spreading, model.motion(), person)
+    follow = head_follow(mesh, person)
+    for eye, side in enumerate(SIDES):
+        shut = camera.ways_to_head(blink(mesh, spreading, person, eye))
+        found[f"eyeBlink{side}"] = shut
+        found |= {f"{name}{side}": share * shut for name, share in GAZE_LIDS.items()}
+    found[BREATH] = camera.ways_to_head(breathing(mesh, person, follow, camera.scale))
+    depth = depths(mesh, spreading, person, camera, model.head.pivot.astype(np.float64))
+    photo = np.column_stack([mesh.places, depth])
+    rest = camera.to_head(photo) + camera.ways_to_head(closing(mesh, spreading, person))
+    if person.is_parted:
+        rest -= (1 - SMILE_KEPT) * person.smile * np.sum([found[name] for name in SMILE_SHAPES], axis=0)
+    share = person.upper_share
+    met = (1 - share) * rest[mesh.upper_lip] + share * rest[mesh.lower_lip]
+    rest[mesh.upper_lip] = rest[mesh.lower_lip] = met
+    zero = np.zeros_like(rest)
+    return photo, Vertices(rest, np.stack([found.get(name, zero) for name in model.names]), follow)
+
+
+def _shown_places(mesh: PhotoMesh, person: PhotoPerson) -> Floats:
+    """(V, 2) pixels that vertices show: their own, and some way into the lip at the edges of parted lips."""
+    places = mesh.places.copy()
+    if not person.lips.is_closed:
+        ways = places[mesh.lower_lip] - places[mesh.upper_lip]
+        into = INTO_LIP * person.scale
+        ways *= into / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), into)
+        places[mesh.upper_lip] -= ways
+        places[mesh.lower_lip] += ways
+    return places
+
+
+def _eye_vertices(patch: EyePatch, eye: int, photo: Floats, camera: PhotoCamera, model: _Model) -> Vertices:
+    """Vertices of a patch behind the skin around it, which is given by the pixels and depths (V, 3) of all skin."""
+    away, near = cKDTree(photo[:, :2]).query(patch.places, N_NEAR)
+    shares = 1 / (np.asarray(away) + 1)
+    depth = (photo[near, 2] * shares).sum(axis=1) / shares.sum(axis=1) - BEHIND_MM * camera.scale
+    shapes = np.zeros((len(model.names), len(patch.places), 3))
+    for name, way in gaze_shapes(model.head, patch.turning, eye).items():
+        shapes[model.names.index(name)] = way
+    places = camera.to_head(np.column_stack([patch.places, depth]))
+    return Vertices(places, shapes, np.ones(len(places)))
+
+
+def _add_inside(surface: PhotoSurface, inside: MouthInside) -> Ints:
+    """Vertices of what lies in the mouth."""
+    n = len(inside.vertices)
+    shapes = np.zeros((surface.vertices[0].shapes.shape[0], n, 3))
+    shapes[: len(inside.shapes)] = inside.shapes
+    numbers = surface.add(Vertices(inside.vertices, shapes, np.ones(n)), colours=inside.colours)
+    surface.parts += [(name, numbers[triangles]) for name, triangles in inside.parts.items()]
+    return numbers
