@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from cli.flags import Hair, HairColor, Model, add_option_flags, options_from_flags, switch
+from cli.photo import Consent, Yes, make_face
 from cli.process import write_message
 from cli.progress import progress_bar
 from lexicon.errors import InputError
@@ -74,6 +75,38 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
     if not quiet:
         print(_report_text(imported.report), end="")  # noqa: T201 - the result
         write_message(f"wrote {out}")
+
+
+@face.command
+def picture(  # noqa: PLR0913 - one parameter a flag
+    photo: Annotated[str, Parameter(help="Picture of a person; photo.jpg@2 is its second largest face.")],
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="Output face (.face).", alias="-o")],
+    consent: Consent = None,
+    name: Annotated[str | None, Parameter(help="The person's name; by default the file's name.")] = None,
+    preview: Annotated[Path | None, Parameter(help="Write a picture with what was found drawn in it (.png).")] = None,
+    model: Model = None,
+    yes: Yes = False,
+    quiet: Annotated[bool, switch("Print no warnings and no summary.")] = False,
+) -> None:
+    """Make a .face file of a picture of a person, who speaks in it."""
+    check_file_name(out, "a face", (".face",))
+    if preview is not None:
+        check_file_name(preview, "a picture", (".png",))
+    from tts2face.photo.photograph import split_number
+
+    refuse_overwriting({"--out": out, "--preview": preview}, {"the photo": split_number(photo)[0], "--model": model})
+    from tts2face.characters.pictures import draw_preview, png_bytes
+    from tts2face.characters.saving import save_face
+    from tts2face.storage.files import write_atomically
+
+    made = make_face(photo, consent, name=name, model=model, yes=yes, quiet=quiet)
+    if preview is not None:
+        write_atomically(preview, png_bytes(draw_preview(made)))
+    save_face(out, made)
+    if not quiet:
+        write_message(f"wrote {out}: {made.metadata['name']}, {made.metadata['consent']['date']}")
 
 
 @face.command

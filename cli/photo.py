@@ -2,13 +2,17 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from cli.flags import switch
 from cli.process import write_message
 from lexicon.errors import BackendError, InputError
+from tts2face.models.consent import consent_record
+
+if TYPE_CHECKING:
+    from tts2face.models.face import Face
 
 Photo = Annotated[
     str | None,
@@ -33,22 +37,38 @@ def face_of_photo(photo: str, consent: str | None, *, yes: bool, quiet: bool) ->
     BackendError
         The landmark model is not installed, and shall not be.
     """
-    from tts2face.photo.face_from_photo import face_from_photo, keep_face, kept_face, split_number
+    from tts2face.photo.kept_faces import keep_face, kept_face
 
     kept = kept_face(photo)
-    if kept.is_file() and consent is None:
-        return str(kept)
-    name = split_number(photo)[0].stem
-    offer_model(None, yes=yes)
+    if consent is not None or not kept.is_file():
+        keep_face(make_face(photo, consent, yes=yes, quiet=quiet), kept)
+    return str(kept)
+
+
+def make_face(
+    photo: str,
+    consent: str | None,
+    *,
+    name: str | None = None,
+    model: Path | None = None,
+    yes: bool,
+    quiet: bool,
+) -> "Face":
+    """Face of a photo, whose consent is asked for at a terminal; errors as `face_of_photo`."""
+    from tts2face.photo.face_from_photo import face_from_photo
+    from tts2face.photo.photograph import split_number
+
+    shown = name or split_number(photo)[0].stem
     if consent is None and sys.stdin.isatty():
-        consent = input(f"The clip will show {name} speaking. Statement of consent of the person (or: drawn): ")
+        consent = input(f"The clips will show {shown} speaking. Statement of consent of the person (or: drawn): ")
+    consent_record(shown, consent)  # before anything is downloaded
+    offer_model(model, yes=yes)
 
     def warn(sentence: str) -> None:
         if not quiet:
             write_message(f"tts2face: warning: {sentence}")
 
-    keep_face(face_from_photo(photo, consent=consent, on_warning=warn), kept)
-    return str(kept)
+    return face_from_photo(photo, consent=consent, name=name, model=model, on_warning=warn)
 
 
 def offer_model(model: Path | None, *, yes: bool) -> None:

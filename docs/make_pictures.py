@@ -1,6 +1,7 @@
 """The pictures of the README and the docs: ``python docs/make_pictures.py [--own-face me.talker]``."""
 
 import argparse
+import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -19,7 +20,8 @@ from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
-from tts2face.render.draw import draw
+from tts2face.photo.face_from_photo import face_from_photo
+from tts2face.render.draw import draw, mesh_renderer
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.session import Session
@@ -50,6 +52,14 @@ HAIR_VIEWS = ("front", "three-quarter")
 CAST_VIEWS, CAST_COLUMNS = ("front", "three-quarter", "profile", "close"), 9
 CAST_TEXT, CAST_PHONES = "My father, thin as he was, saw you leave the room.", ("m", "f", "ɑ", "θ", "u", "i")
 SMILE = {"mouthSmile": 0.9, "cheekSquint": 0.5, "eyeSquint": 0.2}
+PHOTOGRAPHED = ("ada", "tomas", "noor")
+PHOTO_POSES: Sequence[tuple[str, dict[str, float], tuple[int, int, int]]] = (
+    ("a", {"jawOpen": 0.55}, (0, 0, 0)),
+    ("i", {"jawOpen": 0.15, "mouthStretchLeft": 0.5, "mouthStretchRight": 0.5}, (0, 0, 0)),
+    ("u", {"jawOpen": 0.1, "mouthPucker": 0.8, "mouthFunnel": 0.3}, (0, 0, 0)),
+    ("blink", {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0}, (0, 0, 0)),
+    ("turned", {"eyeLookOutLeft": 0.3, "eyeLookInRight": 0.3}, (4, 14, 3)),
+)  # shapes, and pitch, yaw and roll in degrees
 SIDE = 320
 WORD_PIXELS = 18
 JPEG_QUALITY = 88
@@ -184,6 +194,23 @@ def moods_sheet() -> Image.Image:
     return sheet(pictures, N_MOOD_FRAMES)
 
 
+def photo_sheet() -> Image.Image:
+    """Pictures of shipped people, each as it is and as it speaks, blinks and turns."""
+    cells = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name in PHOTOGRAPHED:
+            path = Path(folder) / f"{name}.png"
+            Image.fromarray(draw(load_face(name), picture=Picture(size="640x640"))).save(path)
+            face = face_from_photo(path, consent="drawn")
+            renderer = mesh_renderer(face, Picture(size=f"{SIDE}x{SIDE}", camera="0,0,760"))
+            cells.append(labelled(renderer.draw(np.zeros(len(face.shape_names), np.float32)), name))
+            for label, weights, head in PHOTO_POSES:
+                values = np.array([weights.get(shape, 0.0) for shape in face.shape_names], np.float32)
+                pose = np.array([*np.radians(head), 0, 0, 0], np.float32)
+                cells.append(labelled(renderer.draw(values, pose), label))
+    return sheet(cells, 1 + len(PHOTO_POSES))
+
+
 def own_face_sheet(talker: Path) -> Image.Image:
     """Frames of new sentences on the talker's own face, in the order of speech."""
     ready = Session(load_talker(str(talker)), "self")
@@ -211,6 +238,7 @@ def main() -> None:
     write_gestures("starter", HERE / "gestures.png", GestureOptions())
     sheets = {
         "cast": cast_sheet,
+        "photo": photo_sheet,
         "drawn-hair": drawn_hair_sheet,
         "clip": clip_sheet,
         "faces": faces_sheet,

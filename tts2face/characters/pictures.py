@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tts2face.characters.shape_names import VISEME_PREFIX
 from tts2face.face.deformation import build_rig
+from tts2face.face.eyelids import BLINK_SHAPES
 from tts2face.face.landmark_fit import scatter_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import (
@@ -20,7 +21,7 @@ from tts2face.models.landmarks import (
 )
 from tts2face.render.camera import camera_matrices
 from tts2face.render.draw import mesh_renderer
-from tts2face.render.picture import Picture
+from tts2face.render.picture import STUDIO, Picture
 from tts2face.types import Progress
 
 # Lines through landmarks and their sRGB colours: lids, inner lips, outer lips, outline.
@@ -35,19 +36,26 @@ LINES = (
 PREVIEW_PX, CELL_PX, LABEL_PX, N_COLUMNS = 640, 192, 16, 8
 OPEN_WEIGHT = 0.5  # of the opening shape in the second picture of the preview
 OPENING_SHAPES = ("jawOpen", f"{VISEME_PREFIX}aa")
+WALL = "#8a8f98"
 PAPER, INK = (245, 245, 243), (20, 20, 20)
 
 Pixels = NDArray[np.uint8]
 
 
 def draw_preview(face: Face) -> Pixels:
-    """Picture (H, W, 3) of the face with its landmarks: at rest, with an open mouth, and three-quarter."""
+    """Picture (H, W, 3) of the face with its landmarks: at rest, with an open mouth, and three-quarter.
+
+    That of a photograph is shown with shut eyes in place of the last.
+    """
     opened = np.zeros(len(face.shape_names), np.float32)
     opening = next((name for name in OPENING_SHAPES if name in face.shape_names), None)
     if opening is not None:
         opened[face.shape_names.index(opening)] = OPEN_WEIGHT
     rest = np.zeros_like(opened)
     views = ((rest, "front"), (opened, "front"), (rest, "three-quarter"))
+    if face.photograph is not None:
+        shut = np.isin(face.shape_names, BLINK_SHAPES).astype(np.float32)
+        views = ((rest, "close"), (opened, "close"), (shut, "close"))
     return np.concatenate([_draw_landmarks(face, weights, camera) for weights, camera in views], axis=1)
 
 
@@ -87,7 +95,8 @@ def png_bytes(pixels: Pixels) -> bytes:
 def _draw_landmarks(face: Face, weights: NDArray[np.float32], camera: str) -> Pixels:
     from PIL import Image, ImageDraw
 
-    picture = Picture(size=f"{PREVIEW_PX}x{PREVIEW_PX}", camera=camera, background="#8a8f98")
+    background = WALL if face.photograph is None else STUDIO
+    picture = Picture(size=f"{PREVIEW_PX}x{PREVIEW_PX}", camera=camera, background=background)
     drawn = Image.fromarray(mesh_renderer(face, picture).draw(weights))
     pen = ImageDraw.Draw(drawn)
     posed = np.einsum(

@@ -93,19 +93,23 @@ class PhotoView:
     """How a photographed face is seen and moved: by the camera that took the picture, its light's backdrop.
 
     ``view`` (3, 4) goes from the face to that camera (x right, y down, z ahead, mm), and ``lens`` (3,) is its focal
-    length and centre in pixels of the picture, which has a ``size`` (width, height). Vertices follow the head's motion
-    by the shares ``follow`` (V,).
+    length and centre in pixels of the picture, which has a ``size`` (width, height) and the coverage ``alpha`` (H, W)
+    unless it is opaque. Vertices follow the head's motion by the shares ``follow`` (V,). The first page of the light
+    begins at the pixel ``corner`` (2,).
     """
 
     size: tuple[int, int]
     view: NDArray[np.float64]
     lens: NDArray[np.float64]
     follow: NDArray[np.float32]
+    corner: tuple[int, int]
+    alpha: NDArray[np.uint8] | None = None
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
-        for array in (self.view, self.lens, self.follow):
-            array.setflags(write=False)
+        for array in (self.view, self.lens, self.follow, self.alpha):
+            if array is not None:
+                array.setflags(write=False)
 
     def bearable(self, head: NDArray[np.floating]) -> NDArray[np.float32]:
         """The part of a head pose (6,), rad and mm, that the picture bears: less where the head is turned in it."""

@@ -16,6 +16,7 @@ from tts2face.models.face_layout import (
     FOLLOW,
     LIGHT,
     MAX_TEXTURES,
+    PHOTO_ALPHA,
     PHOTOGRAPH,
     SCORE_INPUTS,
     WIDE_OPEN,
@@ -112,7 +113,10 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
     if face.photograph is not None:
         view = face.photograph
         arrays[FOLLOW] = np.rint(255 * view.follow).astype(np.uint8)
-        header[PHOTOGRAPH] = {"size": list(view.size), "view": view.view.tolist(), "lens": view.lens.tolist()}
+        if view.alpha is not None:
+            arrays[PHOTO_ALPHA] = encode_coverage(view.alpha)
+        numbers = {"size": view.size, "view": view.view.tolist(), "lens": view.lens.tolist(), "corner": view.corner}
+        header[PHOTOGRAPH] = {name: list(value) for name, value in numbers.items()}
     write_tensors(path, KIND, FORMAT_VERSION, arrays, header, is_packed=True)
 
 
@@ -216,13 +220,17 @@ def _read_light(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], p
     return Late(1, lambda: [decode_light(arrays[LIGHT], header[LIGHT], sizes, path)])
 
 
-def _read_photograph(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> PhotoView | None:
+def _read_photograph(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> PhotoView | None:
     if PHOTOGRAPH not in header:
         return None
     stored = header[PHOTOGRAPH]
     wide, high = stored["size"]
     follow = arrays[FOLLOW].astype(np.float32) / np.float32(255)
-    return PhotoView((wide, high), np.array(stored["view"]), np.array(stored["lens"]), follow)
+    alpha = decode_coverage(arrays[PHOTO_ALPHA], path) if PHOTO_ALPHA in arrays else None
+    if alpha is not None and alpha.shape != (high, wide):
+        raise DataError(f"{path}: the photograph and its alpha differ in size; build or copy the face again")
+    left, top = stored["corner"]
+    return PhotoView((wide, high), np.array(stored["view"]), np.array(stored["lens"]), follow, (left, top), alpha)
 
 
 def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Face:
@@ -258,7 +266,7 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
         metadata=header["metadata"],
         scores=score_map_from_arrays(arrays, tuple(header.get(SCORE_INPUTS, ()))),
         light=_read_light(arrays, header, path),
-        photograph=_read_photograph(arrays, header),
+        photograph=_read_photograph(arrays, header, path),
     )
 
 

@@ -34,7 +34,8 @@ from tts2face.storage.schema import (
 )
 
 SCORE_INPUTS = "score_inputs"  # key of the metadata: names of the shapes that the score map reads
-PHOTOGRAPH, FOLLOW = "photograph", "follow"  # key of the metadata, and array of the view of a photographed face
+# Key of the metadata, and arrays, of the view of a photographed face.
+PHOTOGRAPH, FOLLOW, PHOTO_ALPHA = "photograph", "follow", "photo_alpha"
 LIGHT = "light"  # array of baked light, and the key of the metadata that describes it
 MAX_TEXTURES = 16
 MAX_PHOTO_PX = 8192  # side of a photograph
@@ -69,6 +70,7 @@ _PHOTOGRAPH = record(
         "size": list_of(whole(1, MAX_PHOTO_PX), 2),
         "view": list_of(list_of(number(-MAX_MM, MAX_MM), 4), 3),
         "lens": list_of(number(-1e6, 1e6), 3),
+        "corner": list_of(whole(-MAX_PHOTO_PX, MAX_PHOTO_PX), 2),
     }
 )
 _IDENTITY = row(text, table(list_of(number(0.0, 100.0), 3)), text)
@@ -90,6 +92,7 @@ TENSORS: Mapping[str, Tensor] = {
     "occlusion": Tensor("uint8", ("bytes of occlusion",), is_optional=True),
     LIGHT: Tensor("uint8", ("bytes of light",), is_optional=True),
     FOLLOW: Tensor("uint8", ("vertices",), is_optional=True),
+    PHOTO_ALPHA: Tensor("uint8", (f"bytes of {PHOTO_ALPHA}",), is_optional=True),
     "landmarks": Tensor("int32", ("landmarks",), may_be_empty=True),
     "landmark_vertices": Tensor("int32", ("landmarks", N_CORNERS), may_be_empty=True),
     "landmark_weights": Tensor("float32", ("landmarks", N_CORNERS), -SUM_WITHIN, 1 + SUM_WITHIN, may_be_empty=True),
@@ -164,6 +167,7 @@ def _check_photograph(contents: Contents) -> None:
     arrays, header = contents.arrays, contents.header
     needs = {PHOTOGRAPH in header, FOLLOW in arrays}
     contents.require(len(needs) == 1, "has only one of photograph and follow")
+    contents.require(PHOTOGRAPH in header or PHOTO_ALPHA not in arrays, "has the alpha of a photograph, but none")
     if PHOTOGRAPH in header:
         _PHOTOGRAPH(header[PHOTOGRAPH], f"{contents.path}: metadata: {PHOTOGRAPH}")
         contents.require(LIGHT in arrays, "has a photograph, but no light")

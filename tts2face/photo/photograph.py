@@ -1,14 +1,15 @@
 """Picture files of people, read as upright sRGB pixels."""
 
 import io
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import DataError
+from lexicon.errors import DataError, InputError
 from tts2face.storage.picture_files import open_picture
 
 if TYPE_CHECKING:
@@ -21,7 +22,8 @@ ADVICE = "give a JPEG, PNG, WebP, HEIC or TIFF picture"
 MIN_SIDE_PX = 64
 MAX_FILE_PIXELS = 60_000_000
 KEPT_WIDTH, KEPT_HEIGHT = 3840, 2160  # pixels of a picture that is drawn at its own size; larger ones are reduced
-OPAQUE = 255
+NUMBERED = re.compile(r"(.+)@(\d{1,3})")  # a photo, and which of its faces
+OPAQUE, HALF = 255, 128
 WIDE_MODES = ("I", "I;16", "I;16L", "I;16B", "I;16N")  # of Pillow: greys of more than 8 bits
 HEIC_BRANDS = (b"heic", b"heix", b"heim", b"heis", b"hevc", b"mif1", b"msf1")
 
@@ -43,6 +45,15 @@ class Photograph:
     pixels: Pixels
     alpha: Pixels | None
     reduced_by: float
+
+    def filled(self) -> "Photograph":
+        """The picture with the colour of the nearest opaque pixel where it is transparent."""
+        if self.alpha is None or not (self.alpha >= HALF).any():
+            return self
+        from scipy.ndimage import distance_transform_edt
+
+        rows, columns = distance_transform_edt(self.alpha < HALF, return_distances=False, return_indices=True)
+        return replace(self, pixels=np.ascontiguousarray(self.pixels[rows, columns]))
 
 
 def read_photograph(path: Path) -> Photograph:
@@ -151,3 +162,14 @@ def _in_srgb(picture: "Picture", profile: bytes | None) -> "Picture":
         if found is not None:
             return found
     return picture.convert("RGB")
+
+
+def split_number(photo: str | Path) -> tuple[Path, int]:
+    """Path of a photo, and which of its faces: ``photo.jpg@2`` is the second largest one."""
+    path = Path(photo)
+    match = NUMBERED.fullmatch(str(photo))
+    if match is not None and not path.exists():
+        path = Path(match[1])
+    if not path.is_file():
+        raise InputError(f"there is no photo {path}; check the path")
+    return path, int(match[2]) if match is not None and str(path) == match[1] else 1

@@ -30,7 +30,8 @@ from tts2face.photo.photo_shapes import (
     face_shapes,
     head_follow,
 )
-from tts2face.photo.photo_surface import EYES, SKIN, PhotoSurface, Vertices, lay_pages, moves
+from tts2face.photo.photo_surface import EYES, SKIN, PhotoPages, PhotoSurface, Vertices, lay_pages, moves
+from tts2face.photo.photograph import Photograph
 from tts2face.photo.spreading import Spreading
 
 Floats = NDArray[np.float64]
@@ -72,9 +73,9 @@ def _on_landmarks(face: Face, values: NDArray[np.floating]) -> Floats:
 
 
 def speaking_photo(
-    pixels: NDArray[np.uint8], found: FoundFace, smile: float, head: Face, metadata: Mapping[str, Any]
+    picture: Photograph, found: FoundFace, smile: float, head: Face, metadata: Mapping[str, Any]
 ) -> Face:
-    """Face of a picture (H, W, 3) in which a face was found, with the shapes of a head without hair.
+    """Face of a picture in which a face was found, with the shapes of a head without hair.
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ def speaking_photo(
     metadata
         Name and consent.
     """
-    model = _Model.of(head)
+    model, pixels = _Model.of(head), picture.pixels
     camera = find_camera(found, model.landmarks)
     landmarks, scale = camera.depths_of(found.landmarks), found.eye_distance_px
     line = find_lip_line(pixels, found)
@@ -131,14 +132,17 @@ def speaking_photo(
         metadata=dict(metadata),
         scores=head.scores,
         light=(picture_light(pixels, pages.pages, (mesh, skin.places), drawn, (colours, mouth)),),
-        photograph=_view(person, camera, every.follow),
+        photograph=_view(person, camera, every.follow, pages, picture.alpha),
     )
 
 
-def _view(person: PhotoPerson, camera: PhotoCamera, follow: Floats) -> PhotoView:
+def _view(
+    person: PhotoPerson, camera: PhotoCamera, follow: Floats, pages: PhotoPages, alpha: NDArray[np.uint8] | None
+) -> PhotoView:
     lens = np.array([camera.focal_px, *camera.origin])
     rounded = np.rint(follow * FOLLOW_STEPS) / FOLLOW_STEPS
-    return PhotoView(person.size, camera.view, lens, rounded.astype(np.float32))
+    corner = (round(float(pages.corner[0])), round(float(pages.corner[1])))
+    return PhotoView(person.size, camera.view, lens, rounded.astype(np.float32), corner, alpha)
 
 
 def _parts(surface: PhotoSurface) -> tuple[Part, ...]:

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,9 +13,9 @@ from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face import Face
 from tts2face.prefetch import map_in_order
 from tts2face.render import vtk_renderer
-from tts2face.render.camera import photo_crop
+from tts2face.render.film.photo_scene import build_photo_scene
 from tts2face.render.film.scene import LitScene, build_lit_scene
-from tts2face.render.picture import AUTO_SIZE, PYVISTA, Picture
+from tts2face.render.picture import PYVISTA, Picture
 from tts2face.render.scene import Scene, available_cores, build_scene, draw_background
 from tts2face.types import Clip
 
@@ -100,6 +100,8 @@ class MeshRenderer:
         scene, picture = self.scene, self.picture
         pixels = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
         pixels[:, :, :3] = scene.background
+        if isinstance(scene, LitScene) and scene.cut_out is not None and picture.is_transparent:
+            pixels[:, :, 3] = scene.cut_out.still
         scene.draw(weights, head, buffers, pixels)
         return pixels
 
@@ -109,36 +111,19 @@ def mesh_renderer(face: Face, picture: Picture) -> MeshRenderer:
 
     Raises
     ------
+    InputError
+        The picture asks for what a photograph does not show.
     BackendError
         The renderer that the picture names is not available on this machine.
     """
+    if face.photograph is not None:
+        return MeshRenderer(build_photo_scene(face, face.photograph, picture))
     if picture.renderer == PYVISTA:
         vtk_renderer.require_gl()
     elif face.light:
-        picture = _at_own_size(face, picture)
-        background = draw_background(picture, _own_background(face, picture))
+        background = draw_background(picture, face.light[0].backdrop)
         return MeshRenderer(build_lit_scene(face, face.light[0], picture, background))
     return MeshRenderer(build_scene(face, picture))
-
-
-def _at_own_size(face: Face, picture: Picture) -> Picture:
-    """The picture, in the size of the photograph where none is asked for."""
-    if face.photograph is None or picture.size != AUTO_SIZE:
-        return picture
-    wide, high = (side - side % 2 for side in face.photograph.size)
-    return replace(picture, size=f"{wide}x{high}")
-
-
-def _own_background(face: Face, picture: Picture) -> NDArray[np.uint8]:
-    """The wall behind a face with light, or what a camera shows of a photograph."""
-    backdrop = face.light[0].backdrop
-    if face.photograph is None:
-        return backdrop
-    from PIL import Image
-
-    size = (picture.width, picture.height)
-    shown = Image.fromarray(backdrop).resize(size, Image.Resampling.LANCZOS, photo_crop(picture.view, face, size))
-    return np.asarray(shown)
 
 
 def draw(

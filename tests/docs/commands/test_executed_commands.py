@@ -12,6 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from cli.main import run
 from tests.characters.made import write_character_file, write_landmarks
@@ -23,7 +24,9 @@ from tests.docs.blocks import (
 )
 from tts2face import Picture, Project, Request, export, import_face, save_face, save_project, session
 from tts2face.jobs.database import prepare_database
+from tts2face.models.face_loading import load_face
 from tts2face.models.palette import Palette, load_palette, write_palette
+from tts2face.render.draw import draw
 from tts2face.storage.files import SHIPPED_FOLDER
 
 SMALL = {"--size": "64x64", "--fps": "5"}
@@ -89,6 +92,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
         file.writeframes((sound.samples * 32767).astype("<i2").tobytes())
     shutil.copy(SHIPPED_FOLDER / "grid_s1.talker", folder / "me.talker")
     shutil.copy(SHIPPED_FOLDER / "head.face", folder / "me.face")
+    Image.fromarray(draw(load_face("tomas"), picture=Picture(size="320x320"))).save(folder / "me.jpg")
     starter = load_palette("starter")
     styles = {"mine" if name == "grid_s1" else name: style for name, style in starter.styles.items()}
     write_palette(folder / "mine.palette", Palette(starter.neutral, starter.regions, styles, {}))

@@ -7,14 +7,9 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from tests.face.people import DRAWN, REALISTIC
-from tts2face.face.face_motion import moved_landmarks
-from tts2face.models.face_loading import load_face
+from tests.photo.pictures import projected, still
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_MESH_LANDMARKS
 from tts2face.photo.found_face import FoundFace, find_face
-from tts2face.render.camera import camera_matrices
-from tts2face.render.draw import draw
-from tts2face.render.picture import Picture
-from tts2face.types import Trajectory
 from tts2face.video.track import FaceTracker
 
 SIDE = 480
@@ -25,32 +20,14 @@ def tracker(face_model: Path) -> FaceTracker:
     return FaceTracker(face_model)
 
 
-def still(name: str, *, side: int = SIDE, head: tuple[float, ...] = (0, 0, 0), **weights: float) -> np.ndarray:
-    """Picture of a shipped face, with a head turned by pitch, yaw and roll in degrees."""
-    face = load_face(name)
-    values = np.array([weights.get(shape, 0.0) for shape in face.shape_names], np.float32)
-    pose = np.array([*np.radians(head), 0, 0, 0], np.float32)
-    return draw(face, values, pose, picture=Picture(size=f"{side}x{side}"))
-
-
-def projected(name: str, **weights: float) -> np.ndarray:
-    """Places (478, 2) of the landmarks of a shipped face in its picture."""
-    face = load_face(name)
-    values = np.array([[weights.get(shape, 0.0) for shape in face.shape_names]], np.float32)
-    camera = camera_matrices(Picture().view, face, (SIDE, SIDE))
-    points = moved_landmarks(face, Trajectory(face.shape_names, values, 30.0))[0] @ camera.view[:, :3].T
-    points += camera.view[:, 3]
-    return camera.lens[1:3] + camera.lens[0] * points[:, :2] / points[:, 2:] - 0.5
-
-
 def found(pixels: np.ndarray, tracker: FaceTracker, **options: object) -> FoundFace:
     return find_face(pixels, tracker, "me.png", **options)
 
 
 @pytest.mark.parametrize("name", [*DRAWN, *REALISTIC, "head"])
 def test_landmarks_lie_where_the_face_has_them(name: str, tracker: FaceTracker) -> None:
-    shown = found(still(name), tracker)
-    wanted = projected(name)[:N_MESH_LANDMARKS]
+    shown = found(still(name, SIDE), tracker)
+    wanted = projected(name, SIDE)[:N_MESH_LANDMARKS, :2]
     apart = np.linalg.norm(shown.landmarks[:N_MESH_LANDMARKS, :2] - wanted, axis=1)
     eyes = np.linalg.norm(wanted[EYE_OUTER_LEFT] - wanted[EYE_OUTER_RIGHT])
     assert np.median(apart) < 0.06 * eyes
@@ -63,7 +40,7 @@ def test_landmarks_lie_where_the_face_has_them(name: str, tracker: FaceTracker) 
 
 @pytest.mark.parametrize("yaw", [-20, 20, -35, 35])
 def test_a_turned_head_is_told_from_a_straight_one(yaw: float, tracker: FaceTracker) -> None:
-    shown = found(still("mara", head=(0, yaw, 0)), tracker)
+    shown = found(still("mara", SIDE, head=(0, yaw, 0)), tracker)
     assert shown.angles_deg[1] == pytest.approx(yaw, abs=6)
     assert [warning for warning in shown.warnings if "turned" in warning] == list(shown.warnings)
     assert len(shown.warnings) == (abs(yaw) > 25)
@@ -80,26 +57,28 @@ def test_a_turned_head_is_told_from_a_straight_one(yaw: float, tracker: FaceTrac
 )
 def test_what_cannot_be_moved_is_told(options: dict, sentence: str, tracker: FaceTracker) -> None:
     with pytest.raises(DataError, match=sentence):
-        found(still("mara", **options), tracker)
+        found(still("mara", **{"side": SIDE, **options}), tracker)
 
 
 def test_pictures_without_a_face_are_told(tracker: FaceTracker) -> None:
     noise = np.random.default_rng(0).integers(0, 255, (300, 200, 3)).astype(np.uint8)
-    for pixels in (noise, np.full((200, 300, 3), 90, np.uint8), still("mara", head=(0, 85, 0))):
+    for pixels in (noise, np.full((200, 300, 3), 90, np.uint8), still("mara", SIDE, head=(0, 85, 0))):
         with pytest.raises(DataError, match=r"there is no face in me\.png; give a picture"):
             found(pixels, tracker)
 
 
 def test_a_face_that_is_cut_off_is_told(tracker: FaceTracker) -> None:
     with pytest.raises(DataError, match="cut off by the edge of the picture"):
-        found(still("mara")[:, : round(0.62 * SIDE)], tracker)
-    assert not found(still("mara")[round(0.35 * SIDE) :], tracker).warnings  # a portrait that ends at the forehead
+        found(still("mara", SIDE)[:, : round(0.62 * SIDE)], tracker)
+    assert not found(
+        still("mara", SIDE)[round(0.35 * SIDE) :], tracker
+    ).warnings  # a portrait that ends at the forehead
 
 
 def test_one_of_several_faces_is_chosen_by_its_number(tracker: FaceTracker) -> None:
     both = np.full((SIDE, 2 * SIDE, 3), 120, np.uint8)
-    both[:, :SIDE] = still("ada")
-    both[60:420, SIDE + 60 : 2 * SIDE - 60] = still("ben", side=360)
+    both[:, :SIDE] = still("ada", SIDE)
+    both[60:420, SIDE + 60 : 2 * SIDE - 60] = still("ben", 360)
     first = found(both, tracker)
     assert first.landmarks[:, 0].max() < SIDE
     assert [warning for warning in first.warnings if "2 faces, and the largest is used" in warning]
@@ -111,7 +90,7 @@ def test_one_of_several_faces_is_chosen_by_its_number(tracker: FaceTracker) -> N
 
 def test_a_small_face_in_a_large_picture_is_found(tracker: FaceTracker) -> None:
     wide = np.full((1200, 1800, 3), 150, np.uint8)
-    wide[700:860, 1500:1660] = still("tomas", side=160)
+    wide[700:860, 1500:1660] = still("tomas", 160)
     shown = found(wide, tracker)
     assert 1500 < shown.landmarks[:, 0].mean() < 1660
     assert [warning for warning in shown.warnings if "pixels wide and looks blurred" in warning]

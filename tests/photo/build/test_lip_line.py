@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from tests.face.people import DRAWN, REALISTIC
-from tests.photo.build.test_found_face import found, projected, still
+from tests.photo.build.test_found_face import SIDE, found
+from tests.photo.pictures import projected, still
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.photo.found_face import FoundFace
 from tts2face.photo.lip_line import N_POINTS, LipLine, find_lip_line, spline_weights
@@ -24,11 +25,11 @@ def tracker(face_model: Path) -> FaceTracker:
 
 def errors(name: str, tracker: FaceTracker, **weights: float) -> tuple[LipLine, float, float]:
     """The line of a rendered face, and the mean vertical errors of it and of the tracker, of the eye distance."""
-    pixels = still(name, **weights)
+    pixels = still(name, SIDE, **weights)
     face = found(pixels, tracker)
     line = find_lip_line(pixels, face)
-    places = projected(name, **weights)
-    wanted = [SPREAD_LINES @ places[list(numbers)] for numbers in (INNER_LIP_UPPER, INNER_LIP_LOWER)]
+    places = projected(name, SIDE, **weights)
+    wanted = [SPREAD_LINES @ places[list(numbers), :2] for numbers in (INNER_LIP_UPPER, INNER_LIP_LOWER)]
     tracked = [SPREAD_LINES @ face.landmarks[list(numbers), :2] for numbers in (INNER_LIP_UPPER, INNER_LIP_LOWER)]
     return line, _apart((line.upper, line.lower), wanted, face), _apart(tracked, wanted, face)
 

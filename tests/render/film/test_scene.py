@@ -168,7 +168,7 @@ def test_light_is_the_same_after_it_was_written(tmp_path) -> None:
         ({"response_sizes": FACE.light[0].response_sizes[1:]}, "response_sizes has the shape"),
         ({"partners": FACE.light[0].partners[1:]}, "partners has the shape"),
         ({"sky": np.full(3, np.nan, np.float32)}, "sky holds nan"),
-        ({"pages": np.zeros((2, 48, 48, 3), np.uint8)}, "squares of a power of two"),
+        ({"pages": np.zeros((2, 48, 48, 3), np.uint8)}, "a side that is not a power of two"),
         ({"turn_modes": np.zeros((1, 3, 50), np.int8)}, "do not fill"),
         ({"head_lamps": 2}, "has 2 head_lamps, but 0 lamps"),
         ({"page_of": {"skin": 2}}, "page_of"),

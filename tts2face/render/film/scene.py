@@ -12,6 +12,7 @@ from tts2face.face.pupils import DILATION, PUPIL_SHAPE
 from tts2face.models.baked_light import LEAST_SIDE, N_BALL_TERMS, N_PAGES, N_TERMS, BakedLight
 from tts2face.models.face import Face
 from tts2face.render.camera import CameraMatrices, camera_matrices
+from tts2face.render.film.cut_out import CutOut, build_cut_out
 from tts2face.render.film.eyes import CENTRE, N_EYE_COLUMNS, PUPIL, TURN, colour_eyes
 from tts2face.render.film.light import add_modes, pack_change
 from tts2face.render.film.response import LightTerms, TermBuffers, add_responses, light_terms, still_eyes
@@ -88,6 +89,7 @@ class LitScene:
     bases: tuple[Float32Array, ...]
     answers: tuple[Any, ...]
     turns: Cardinal
+    cut_out: CutOut | None = None
 
     def allocate_buffers(self) -> LitBuffers:
         """Buffers for pictures of this scene."""
@@ -151,7 +153,11 @@ class LitScene:
                 self._colour(found, count, buffers)
                 shapes = (buffers.table, surface.triangles, surface.eye_of)
                 colour_eyes(found, count, shapes, eyes, light, buffers.values[AT_RED:])
-                compose(starts, buffers.samples, side * side, buffers.values[AT_RED:], band)
+                fragments = (starts, buffers.samples, side * side)
+                compose(*fragments, buffers.values[AT_RED:], band)
+                if self.cut_out is not None:
+                    places = (buffers.texel, buffers.share, buffers.corners, count)
+                    self.cut_out.blend(slice(first, first + len(band)), fragments, places, buffers.values, band)
 
     def _sort(self, height: int, buffers: LitBuffers) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
         """Numbers of the triangles that are drawn, by bands of rows of samples, and the end of each band."""
@@ -248,12 +254,22 @@ def _weight(face: Face, weights: Float32Array, name: str) -> float:
     return float(weights[face.shape_names.index(name)]) if name in face.shape_names else 0.0
 
 
-def build_lit_scene(face: Face, light: BakedLight, picture: Picture, background: NDArray[np.uint8]) -> LitScene:
-    """Scene of a face with baked light before a background (H, W, 3)."""
+def build_lit_scene(
+    face: Face,
+    light: BakedLight,
+    picture: Picture,
+    background: NDArray[np.uint8],
+    cover: NDArray[np.uint8] | None = None,
+) -> LitScene:
+    """Scene of a face with baked light before a background (H, W, 3), of which a photograph covers a part (H, W)."""
     side, light = picture.samples_per_side, light.of_drawn(face.triangles)
     surface = build_surface(face, light)
     optics = camera_matrices(picture.view, face, (picture.width * side, picture.height * side))
-    texels, size = stack_pages(light.pages, _level(surface, optics, side))
+    level = _level(surface, optics, side)
+    texels, size = stack_pages(light.pages, level)
+    cut_out = None
+    if face.photograph is not None and cover is not None:
+        cut_out = build_cut_out(light, face.photograph, cover, background, level)
     axes = optics.view[:, :3]
     place = -axes.T @ optics.view[:, 3]
     camera = np.concatenate([place, axes.ravel(), optics.lens[:3]]).astype(np.float32)
@@ -276,6 +292,7 @@ def build_lit_scene(face: Face, light: BakedLight, picture: Picture, background:
             (light.ball_responses, light.ball_sizes, _no_limits(len(light.ball_rows))),
         ),
         turns=turn_weights(light.turns_deg),
+        cut_out=cut_out,
     )
 
 

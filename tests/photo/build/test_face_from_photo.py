@@ -1,0 +1,73 @@
+"""Pictures of the shipped people, found by the tracker, speak: what it reads in the clip is what was said."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from lexicon.errors import InputError
+from tests.face.people import LIT
+from tests.photo.pictures import still
+from tts2face.face.face_motion import moved_landmarks
+from tts2face.models.face import Face
+from tts2face.models.landmarks import inner_lip_gaps, lip_opening, lip_width
+from tts2face.photo.face_from_photo import face_from_photo
+from tts2face.render.picture import Picture
+from tts2face.session import Session
+from tts2face.types import Clip
+from tts2face.video.pose import remove_pose
+from tts2face.video.track import FaceTracker
+
+SIDE = 480
+PANGRAM = "We were away a year ago, but Bob may move five big maps."
+EYE_DISTANCE_MM, OPEN_MM = 87.3, 5.0
+
+
+@pytest.fixture(scope="module", params=["head", *LIT])
+def photo(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("photo") / f"{request.param}.png"
+    Image.fromarray(still(request.param, SIDE)).save(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def face(photo: Path, face_model: Path) -> Face:
+    return face_from_photo(photo, consent="drawn", model=face_model)
+
+
+def test_what_is_said_is_seen(face: Face, face_model: Path) -> None:
+    session = Session(face=face)
+    clip = session.clip(PANGRAM)
+    renderer = session.renderer(Picture(size="512x512", camera="close"))
+    frames = list(renderer.frames(clip))
+    wanted = moved_landmarks(session.mesh, clip.motion)
+    tracking = FaceTracker(face_model).track(lambda: iter(frames), clip.fps)
+    assert not tracking.is_missing.any()
+    seen = remove_pose(tracking.points, clip.fps).landmarks
+    assert np.corrcoef(lip_opening(seen), lip_opening(wanted))[0, 1] > 0.94
+    assert np.corrcoef(lip_width(seen), lip_width(wanted))[0, 1] > 0.87
+    opened = lip_opening(wanted) * EYE_DISTANCE_MM > OPEN_MM
+    assert np.median(lip_opening(seen)[closures(clip, wanted)]) < 0.35 * np.median(lip_opening(seen)[opened])
+
+
+def closures(clip: Clip, landmarks: np.ndarray) -> list[int]:
+    """The frame of each p, b and m in which the lips (T, 478, 3) are nearest to each other."""
+    gaps, phones = inner_lip_gaps(landmarks)[:, 1:-1].max(axis=1), clip.speech.phones
+    spans = zip(phones.phones, np.rint(clip.fps * np.asarray(phones.edges)).astype(int), strict=False)
+    begins = [(begin, phone) for phone, begin in spans if phone in ("p", "b", "m")]
+    return [begin + int(gaps[begin : begin + 3].argmin()) for begin, _ in begins]
+
+
+def test_the_same_photo_gives_the_same_face(photo: Path, face: Face, face_model: Path) -> None:
+    again = face_from_photo(photo, consent="drawn", model=face_model)
+    np.testing.assert_array_equal(again.vertices, face.vertices)
+    np.testing.assert_array_equal(again.shapes, face.shapes)
+    assert face.metadata["name"] == photo.stem
+
+
+def test_a_session_shows_a_photo(photo: Path) -> None:
+    with pytest.raises(InputError, match="a photo has its own face and hair"):
+        Session(face="ada", photo=photo, consent="drawn")
+    with pytest.raises(InputError, match="state the consent"):
+        Session(photo=photo)

@@ -1,0 +1,42 @@
+"""Pictures of shipped faces, and where their landmarks lie in them."""
+
+import numpy as np
+
+from tts2face.face.face_motion import moved_landmarks
+from tts2face.models.face import Face
+from tts2face.models.face_loading import load_face
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
+from tts2face.photo.found_face import FoundFace
+from tts2face.render.camera import camera_matrices
+from tts2face.render.draw import draw
+from tts2face.render.picture import Picture
+from tts2face.types import Trajectory
+
+
+def still(name: str, side: int, *, head: tuple[float, ...] = (0, 0, 0), **weights: float) -> np.ndarray:
+    """Picture (S, S, 3) of a shipped face, with a head turned by pitch, yaw and roll in degrees."""
+    face = load_face(name)
+    pose = np.array([*np.radians(head), 0, 0, 0], np.float32)
+    return draw(face, _weights(face, weights)[0], pose, picture=Picture(size=f"{side}x{side}"))
+
+
+def projected(name: str, side: int, **weights: float) -> np.ndarray:
+    """Places (478, 3) of the landmarks of a shipped face in its picture: pixels, and depths away from the camera."""
+    face = load_face(name)
+    camera = camera_matrices(Picture().view, face, (side, side))
+    motion = Trajectory(face.shape_names, _weights(face, weights), 30.0)
+    points = moved_landmarks(face, motion)[0] @ camera.view[:, :3].T + camera.view[:, 3]
+    places = camera.lens[1:3] + camera.lens[0] * points[:, :2] / points[:, 2:] - 0.5
+    depths = (points[:, 2] - points[:, 2].mean()) * camera.lens[0] / points[:, 2].mean()
+    return np.column_stack([places, depths])
+
+
+def found_in(name: str, side: int) -> FoundFace:
+    """A shipped face in its picture, as if a tracker had found it without error."""
+    places = projected(name, side)
+    eyes = float(np.linalg.norm(places[EYE_OUTER_LEFT, :2] - places[EYE_OUTER_RIGHT, :2]))
+    return FoundFace(places, 0.0, (0.0, 0.0, 0.0), eyes, 1)
+
+
+def _weights(face: Face, weights: dict[str, float]) -> np.ndarray:
+    return np.array([[weights.get(shape, 0.0) for shape in face.shape_names]], np.float32)

@@ -1,0 +1,208 @@
+"""A picture of the shipped head, with the landmarks that it has there, speaks: at rest it is the picture itself."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lexicon.errors import InputError
+from tests.photo.pictures import found_in, still
+from tts2face.face.deformation import REST_HEAD
+from tts2face.face.face_motion import moved_landmarks
+from tts2face.models.face import Face
+from tts2face.models.face_file import read_face, write_face
+from tts2face.models.face_loading import load_face
+from tts2face.models.landmarks import inner_lip_gaps, lip_opening
+from tts2face.photo.photo_surface import EYES, LIDS, SKIN
+from tts2face.photo.photograph import Photograph, split_number
+from tts2face.photo.speaking_photo import speaking_photo
+from tts2face.render.draw import MeshRenderer, draw, mesh_renderer
+from tts2face.render.film.scene import BEHIND_SHARE
+from tts2face.render.film.visibility import NEAR, TRIANGLE_MASK, nearest_triangles, project
+from tts2face.render.picture import Picture
+from tts2face.session import Session
+
+SIDE = 400
+NAME = "head"
+MOST_FOLDED = 10  # triangles, at the corners of shut lids
+PANGRAM = "We were away a year ago, but Bob may move five big maps."
+BLINK = {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0}
+
+
+@pytest.fixture(scope="module")
+def pixels() -> np.ndarray:
+    return still(NAME, SIDE)
+
+
+@pytest.fixture(scope="module")
+def face(pixels: np.ndarray) -> Face:
+    head = load_face("head", hair="bald")
+    metadata = {"name": "Ada", "consent": {"statement": "drawn"}}
+    return speaking_photo(Photograph(pixels, None, 1.0), found_in(NAME, SIDE), 0.0, head, metadata)
+
+
+@pytest.fixture(scope="module")
+def renderer(face: Face) -> MeshRenderer:
+    return mesh_renderer(face, Picture())
+
+
+def drawn(renderer: MeshRenderer, head: np.ndarray = REST_HEAD, **weights: float) -> np.ndarray:
+    return renderer.draw(weights_of(renderer.scene.face, **weights), head)
+
+
+def weights_of(face: Face, **weights: float) -> np.ndarray:
+    return np.array([weights.get(name, 0.0) for name in face.shape_names], np.float32)
+
+
+def samples_of_parts(renderer: MeshRenderer, **weights: float) -> dict[str, int]:
+    """Samples in which each part of a face is seen."""
+    scene = renderer.scene
+    table = scene.surface.template.copy()
+    optics = (scene.optics.view.astype(np.float32), scene.optics.lens.astype(np.float32))
+    project(scene.pose(weights_of(scene.face, **weights), REST_HEAD), scene.surface.source, *optics, table)
+    table[scene.surface.behind, NEAR] *= BEHIND_SHARE
+    nearest, _, _ = nearest_triangles(table, scene.surface.triangles, (2 * SIDE, 2 * SIDE))
+    seen = (nearest[nearest > 0] & TRIANGLE_MASK) - 1
+    names = np.repeat([part.name for part in scene.face.parts], [part.count for part in scene.face.parts])
+    shown, counts = np.unique(names[scene.surface.light.triangle_numbers[seen]], return_counts=True)
+    return dict(zip(shown.tolist(), counts.tolist(), strict=True))
+
+
+def test_at_rest_it_is_the_picture(renderer: MeshRenderer, pixels: np.ndarray) -> None:
+    shown = drawn(renderer)
+    assert shown.shape == pixels.shape
+    apart = np.abs(shown.astype(int) - pixels).max(axis=2)
+    assert np.median(apart) == 0
+    assert np.percentile(apart, 99) <= 6
+    assert apart.max() < 90  # at the line between the lips and at the rims of the eyes
+
+
+def test_what_does_not_move_is_the_picture_in_every_frame(renderer: MeshRenderer, pixels: np.ndarray) -> None:
+    shown = drawn(renderer, np.array([0.05, 0.1, 0.03, 0, 0, 0], np.float32), jawOpen=0.5, browInnerUp=0.5)
+    corners = [np.s_[:20, :20], np.s_[:20, -20:]]
+    for corner in corners:
+        np.testing.assert_array_equal(shown[corner], pixels[corner])
+    assert np.abs(shown.astype(int) - pixels).max() > 60
+
+
+def test_shapes_move_the_skin_without_folds(face: Face) -> None:
+    view = face.photograph.view
+    triangles = face.triangles[: next(part for part in face.parts if part.name == SKIN).count]
+
+    def areas(points: np.ndarray) -> np.ndarray:
+        seen = points @ view[:, :3].T + view[:, 3]
+        places = seen[:, :2] / seen[:, 2:] * face.photograph.lens[0]
+        a, b, c = (places[triangles[:, k]] for k in range(3))
+        first, second = b - a, c - a
+        return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+
+    ahead = areas(face.vertices.astype(float)) < 0
+    assert ahead.mean() > 0.995
+    for name, shape in zip(face.shape_names, face.shapes, strict=True):
+        turned = areas(face.vertices.astype(float) + shape)[ahead]
+        assert (turned > 0.5).sum() <= MOST_FOLDED, name
+
+
+def test_lids_cover_the_eyes(renderer: MeshRenderer) -> None:
+    open_eyes, shut = samples_of_parts(renderer), samples_of_parts(renderer, **BLINK)
+    assert LIDS not in open_eyes
+    assert shut.get(EYES, 0) < 0.05 * open_eyes[EYES]
+    assert shut[LIDS] > 0.2 * open_eyes[EYES]
+    half = samples_of_parts(renderer, eyeBlinkLeft=0.5, eyeBlinkRight=0.5)
+    assert 0.3 < half[EYES] / open_eyes[EYES] < 0.7
+
+
+def test_the_inside_of_the_mouth_is_seen_through_parted_lips_alone(renderer: MeshRenderer) -> None:
+    inside = ("teeth_upper", "teeth_lower", "gums_upper", "gums_lower", "tongue", "walls")
+    shut, opened = samples_of_parts(renderer), samples_of_parts(renderer, jawOpen=0.6)
+    assert sum(shut.get(name, 0) for name in inside) == 0
+    assert min(opened.get(name, 0) for name in ("teeth_upper", "tongue", "walls")) > 20
+
+
+def test_gaze_moves_the_iris_and_not_the_lids(renderer: MeshRenderer) -> None:
+    ahead, aside = drawn(renderer), drawn(renderer, eyeLookOutLeft=0.6, eyeLookInRight=0.6)
+    changed = np.abs(ahead.astype(int) - aside).max(axis=2) > 8
+    rows, columns = np.flatnonzero(changed.any(axis=1)), np.flatnonzero(changed.any(axis=0))
+    assert len(rows) < 0.1 * SIDE
+    assert 0.1 * SIDE < len(columns) < 0.4 * SIDE
+
+
+def test_lips_of_speech_close_and_open_as_those_of_the_head(face: Face) -> None:
+    clip, wanted = (Session(face=one).clip(PANGRAM, gestures="none") for one in (face, "head"))
+    landmarks = [moved_landmarks(one, shown.motion) for one, shown in ((face, clip), (load_face("head"), wanted))]
+    openings = [lip_opening(points) for points in landmarks]
+    assert np.corrcoef(*openings)[0, 1] > 0.98
+    gaps = inner_lip_gaps(landmarks[0])[:, 1:-1].max(axis=1)
+    phones = clip.speech.phones
+    for phone, begin, end in zip(phones.phones, phones.edges[:-1], phones.edges[1:], strict=True):
+        if phone in ("p", "b", "m"):
+            frames = gaps[int(begin * clip.fps) : int(np.ceil(end * clip.fps)) + 1]
+            assert frames.min() < 0.05, (phone, begin)
+
+
+def test_a_file_keeps_the_face(face: Face, renderer: MeshRenderer, tmp_path: Path) -> None:
+    path = tmp_path / "me.face"
+    write_face(path, face)
+    assert path.stat().st_size < 2_000_000
+    kept = read_face(path)
+    assert kept.metadata == face.metadata
+    assert "photograph of Ada" in kept.synthetic_notice
+    pose = {"jawOpen": 0.4, "eyeBlinkLeft": 0.5, "mouthSmileLeft": 0.3}
+    again = mesh_renderer(kept, Picture())
+    apart = np.abs(drawn(again, **pose).astype(int) - drawn(renderer, **pose))
+    assert apart.mean() < 1.5  # pages are JPEG in files
+
+
+def test_a_picture_is_seen_from_where_it_was_taken(face: Face, renderer: MeshRenderer) -> None:
+    assert (renderer.picture.width, renderer.picture.height) == (SIDE, SIDE)
+    wide = mesh_renderer(face, Picture(size="320x180"))
+    assert wide.draw(weights_of(face)).shape == (180, 320, 3)
+    near = mesh_renderer(face, Picture(size="200x200", camera="close")).scene.optics
+    far = mesh_renderer(face, Picture(size="200x200")).scene.optics
+    assert near.lens[0] > 1.2 * far.lens[0]
+    for camera in ("profile", "three-quarter", "20,0"):
+        with pytest.raises(InputError, match="a photograph is seen from where it was taken; choose the camera front"):
+            mesh_renderer(face, Picture(camera=camera))
+
+
+def test_an_opaque_picture_keeps_its_background(face: Face) -> None:
+    for background in ("transparent", "red"):
+        with pytest.raises(InputError, match="the photograph is opaque and keeps its own background"):
+            mesh_renderer(face, Picture(background=background))
+
+
+def test_a_cut_out_person_moves_before_any_background() -> None:
+    head = load_face("head", hair="bald")
+    shown = draw(load_face(NAME), picture=Picture(size=f"{SIDE}x{SIDE}", background="transparent"))
+    picture = Photograph(shown[..., :3].copy(), shown[..., 3].copy(), 1.0).filled()
+    cut = speaking_photo(picture, found_in(NAME, SIDE), 0.0, head, {"name": "Ada"})
+    pose, turned = {"jawOpen": 0.3}, np.array([0, 0.12, 0, 0, 0, 0], np.float32)
+    free = drawn(mesh_renderer(cut, Picture(background="transparent")), turned, **pose)
+    red = drawn(mesh_renderer(cut, Picture(background="#ff0000")), turned, **pose)
+    assert free.shape == (SIDE, SIDE, 4)
+    assert abs(free[..., 3].mean() - shown[..., 3].mean()) < 4
+    alpha = free[..., 3:] / 255.0
+    mixed = alpha * free[..., :3] + (1 - alpha) * np.array([255, 0, 0])
+    assert np.abs(mixed - red).mean() < 0.5
+    np.testing.assert_array_equal(red[:20, :20], np.full((20, 20, 3), (255, 0, 0)))
+
+
+def test_the_head_moves_within_what_the_picture_bears(face: Face) -> None:
+    view = face.photograph
+    small, large = (view.bearable(np.array([0, yaw, 0, 4, 4, 9], float)) for yaw in (0.05, 1.0))
+    assert 0.5 * 0.05 < small[1] < 0.05
+    assert large[1] <= np.radians(9)
+    assert small[5] == 0
+    assert 0 < small[3] < 4
+
+
+def test_one_of_several_faces_is_named_after_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "me.jpg"
+    path.touch()
+    assert split_number(path) == (path, 1)
+    assert split_number(f"{path}@2") == (path, 2)
+    odd = tmp_path / "me@2"
+    odd.touch()
+    assert split_number(odd) == (odd, 1)
+    with pytest.raises(InputError, match=r"there is no photo .*nobody"):
+        split_number(tmp_path / "nobody.jpg")
