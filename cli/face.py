@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from cli.flags import Hair, HairColor, Model, add_option_flags, options_from_flags, switch
-from cli.photo import Consent, Yes, make_face
+from cli.photo import Consent, Yes, agreed, make_face, warner
 from cli.process import write_message
 from cli.progress import progress_bar
 from lexicon.errors import InputError
@@ -107,6 +107,42 @@ def picture(  # noqa: PLR0913 - one parameter a flag
     save_face(out, made)
     if not quiet:
         write_message(f"wrote {out}: {made.metadata['name']}, {made.metadata['consent']['date']}")
+
+
+@face.command
+def photo(  # noqa: PLR0913 - one parameter a flag
+    photos: Annotated[
+        list[str], Parameter(help="Pictures of one person, the first from the front; photo.jpg@2 is its second face.")
+    ],
+    /,
+    *,
+    out: Annotated[Path, Parameter(help="Output face (.face).", alias="-o")],
+    consent: Consent = None,
+    name: Annotated[str | None, Parameter(help="The person's name; by default the first file's name.")] = None,
+    preview: Annotated[Path | None, Parameter(help="Write a picture of the head with its landmarks (.png).")] = None,
+    model: Model = None,
+    yes: Yes = False,
+    quiet: Annotated[bool, switch("Print no warnings and no summary.")] = False,
+) -> None:
+    """Make a .face file of the person in pictures: a head that turns, with shape, skin, eyes, hair and clothes."""
+    check_file_name(out, "a face", (".face",))
+    if preview is not None:
+        check_file_name(preview, "a picture", (".png",))
+    from corpus_tools.dense.photo_avatar import build_avatar
+    from tts2face.characters.pictures import draw_preview, png_bytes
+    from tts2face.models.face_loading import load_face
+    from tts2face.photo.photograph import split_number
+    from tts2face.storage.files import write_atomically
+
+    inputs = {f"the photo {one}": split_number(one)[0] for one in photos}
+    refuse_overwriting({"--out": out, "--preview": preview}, inputs | {"--model": model})
+    consent = agreed(photos[0], consent, name, model=model, yes=yes)
+    result = build_avatar(photos, out, consent=consent, name=name, model=model, on_warning=warner(quiet=quiet))
+    if preview is not None:
+        write_atomically(preview, png_bytes(draw_preview(load_face(str(out)))))
+    if not quiet:
+        write_message(result.look.summary())
+        write_message(f"wrote {out}")
 
 
 @face.command

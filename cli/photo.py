@@ -1,6 +1,7 @@
 """``--photo``: the face of a photograph, asked for once and kept."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -56,6 +57,21 @@ def make_face(
 ) -> "Face":
     """Face of a photo, whose consent is asked for at a terminal; errors as `face_of_photo`."""
     from tts2face.photo.face_from_photo import face_from_photo
+
+    consent = agreed(photo, consent, name, model=model, yes=yes)
+    return face_from_photo(photo, consent=consent, name=name, model=model, on_warning=warner(quiet=quiet))
+
+
+def agreed(photo: str, consent: str | None, name: str | None, *, model: Path | None, yes: bool) -> str | None:
+    """The consent of the person in a photo, given or asked for; then the landmark model is there.
+
+    Raises
+    ------
+    InputError
+        There is no such photo, or no consent.
+    BackendError
+        The landmark model is not installed, and shall not be.
+    """
     from tts2face.photo.photograph import split_number
 
     shown = name or split_number(photo)[0].stem
@@ -63,12 +79,17 @@ def make_face(
         consent = input(f"The clips will show {shown} speaking. Statement of consent of the person (or: drawn): ")
     consent_record(shown, consent)  # before anything is downloaded
     offer_model(model, yes=yes)
+    return consent
+
+
+def warner(*, quiet: bool) -> Callable[[str], None]:
+    """Writes warnings to standard error, or nothing."""
 
     def warn(sentence: str) -> None:
         if not quiet:
             write_message(f"tts2face: warning: {sentence}")
 
-    return face_from_photo(photo, consent=consent, name=name, model=model, on_warning=warn)
+    return warn
 
 
 def offer_model(model: Path | None, *, yes: bool) -> None:

@@ -59,11 +59,12 @@ def fix_signs(axes: NDArray[AnyFloat]) -> NDArray[AnyFloat]:
 
 def points_in_polygon(places: NDArray[np.floating], polygon: NDArray[np.floating]) -> NDArray[np.bool_]:
     """(P,) whether points (P, 2) are inside a polygon (N, 2), by counting the edges to their right."""
-    x, y = places[:, 0, None], places[:, 1, None]
+    near = np.flatnonzero(((places >= polygon.min(axis=0)) & (places <= polygon.max(axis=0))).all(axis=1))
+    x, y = places[near, 0, None], places[near, 1, None]
     (ax, ay), (bx, by) = polygon.T, np.roll(polygon, -1, axis=0).T
     spans = (ay > y) != (by > y)
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = ax + (y - ay) * (bx - ax) / (by - ay)
-    counts: NDArray[np.int64] = (spans & (x < crossing)).sum(axis=1)
-    odd: NDArray[np.bool_] = counts % 2 == 1
-    return odd
+    inside = np.zeros(len(places), bool)
+    inside[near] = (spans & (x < crossing)).sum(axis=1) % 2 == 1
+    return inside

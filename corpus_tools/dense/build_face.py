@@ -1,12 +1,13 @@
 """Build a textured head of a talker from videos."""
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from corpus_tools.build_talker import NOT_STATED, PROVENANCE, read_provenance
 from corpus_tools.dense.adapt_head import adapt_head
@@ -21,11 +22,12 @@ from corpus_tools.dense.modes import MOST_MODES, DenseModel, add_modes, dense_mo
 from corpus_tools.dense.person_look import LookSampler, PersonLook, dress_head
 from corpus_tools.dense.skin_colour import average_skin_colours, build_picture_fitter
 from corpus_tools.dense.texture_painting import paint_skin
-from corpus_tools.dense.video_landmarks import find_videos, resting_landmarks, track_videos
+from corpus_tools.dense.video_landmarks import VideoLandmarks, find_videos, resting_landmarks, track_videos
 from corpus_tools.dense.visible_texels import build_canvas
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
+from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.render.occlusion import bake_occlusion
@@ -33,6 +35,8 @@ from tts2face.render.scene import available_cores
 from tts2face.storage.files import find_file
 from tts2face.types import Progress
 from tts2face.video.landmark_models import find_bundle
+
+Floats = NDArray[np.float64]
 
 SOURCE_FACE = "head"  # the shipped face that is adapted
 CONTENT = "a head with the shape and, with the stated consent, the skin of a real person"
@@ -92,26 +96,14 @@ def build_face(
     report = on_progress or (lambda done, of: None)
     landmarks = track_videos(videos, eyes, lambda done, of: report(done, 2 * of))
     head = read_face(find_file(SOURCE_FACE, "face"))
-    talker = resting_landmarks(landmarks)
-    rest = face_landmarks(head, head.vertices)[:N_MESH_LANDMARKS]
-    target = align_to_head(talker, rest)
-    used = np.flatnonzero(select_consistent_landmarks(rest, correct_lips_and_lids(rest, target)))
-    shaped = adapt_head(head, talker)
-    canvas = build_canvas(shaped)
-    fit = build_picture_fitter(shaped, canvas.opened, used)
-    model = dense_model(shaped, mode_fitter(shaped, used), landmarks, talker, n_modes) if n_modes else None
-    sampler = LookSampler(fit)
-    skin = average_skin_colours(
-        shaped,
-        canvas,
-        fit,
-        landmarks,
-        on_frame=sampler.add,
-        on_progress=lambda done, of: report(len(videos) + done * len(videos) // of, 2 * len(videos)),
+    fitted = fit_person(head, resting_landmarks(landmarks))
+    model = None
+    if n_modes:
+        mode = mode_fitter(fitted.shaped, fitted.used)
+        model = dense_model(fitted.shaped, mode, landmarks, fitted.person, n_modes)
+    face, look = paint_person(
+        fitted, landmarks, lambda done, of: report(len(videos) + done * len(videos) // of, 2 * len(videos))
     )
-    look = sampler.look()
-    skin = replace(skin, colour=remove_cast(skin.colour, look.cast, look.skin))
-    face = dress_head(paint_skin(shaped, canvas, skin), look)
     words = ["tts2face", "corpus", "face", recordings.name, "--out", out.name]
     metadata = {
         **head.metadata,
@@ -127,7 +119,43 @@ def build_face(
     if model is not None:
         face, metadata = add_modes(face, model), {**metadata, "dense": model.summary()}
     write_face(out, bake_occlusion(replace(face, metadata=metadata), available_cores()))
-    reached = face_landmarks(shaped, shaped.vertices)[:N_MESH_LANDMARKS]
-    again = align_to_head(talker, reached)
-    error = float(np.linalg.norm(again - reached, axis=1)[used].mean())
-    return BuiltFace(len(landmarks), len(videos), error, look, model)
+    return BuiltFace(len(landmarks), len(videos), fitted.error_mm(), look, model)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedHead:
+    """The head in the shape of a person with resting landmarks (478, 3), and the landmarks that it was fitted to."""
+
+    shaped: Face
+    person: Floats
+    used: NDArray[np.int64]
+
+    def error_mm(self) -> float:
+        """Mean distance of the head's landmarks from the person's."""
+        reached = face_landmarks(self.shaped, self.shaped.vertices)[:N_MESH_LANDMARKS]
+        again = align_to_head(self.person, reached)
+        return float(np.linalg.norm(again - reached, axis=1)[self.used].mean())
+
+
+def fit_person(head: Face, person: Floats) -> FittedHead:
+    """The head in the shape of a person whose landmarks (478, 3) at rest have any size."""
+    rest = face_landmarks(head, head.vertices)[:N_MESH_LANDMARKS]
+    target = correct_lips_and_lids(rest, align_to_head(person, rest))
+    return FittedHead(adapt_head(head, person), person, np.flatnonzero(select_consistent_landmarks(rest, target)))
+
+
+def paint_person(fitted: FittedHead, seen: Sequence[VideoLandmarks], on_progress: Progress) -> tuple[Face, PersonLook]:
+    """The head with the skin, eyes, hair and shirt that frames show, and what was found.
+
+    Raises
+    ------
+    DataError
+        No frame shows open eyes.
+    """
+    canvas = build_canvas(fitted.shaped)
+    fit = build_picture_fitter(fitted.shaped, canvas.opened, fitted.used)
+    sampler = LookSampler(fit)
+    skin = average_skin_colours(fitted.shaped, canvas, fit, seen, on_frame=sampler.add, on_progress=on_progress)
+    look = sampler.look()
+    skin = replace(skin, colour=remove_cast(skin.colour, look.cast, look.skin))
+    return dress_head(paint_skin(fitted.shaped, canvas, skin), look), look

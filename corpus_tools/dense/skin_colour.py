@@ -13,9 +13,8 @@ from lexicon.errors import DataError
 from tts2face.face.rbf import DECAY_LENGTH, FACE_WIDTH, rbf_values
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
-from tts2face.numeric import smoothstep, unit_vectors
+from tts2face.numeric import points_in_polygon, smoothstep, unit_vectors
 from tts2face.types import Progress
-from tts2face.video.media import read_frames
 from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
@@ -95,14 +94,18 @@ def average_skin_colours(
     normals = vertex_normals(face)
     own_normals = unit_vectors(np.einsum("pk,pkd->pd", weights, normals[corners]))
     total, weight = np.zeros((len(rows), 3)), np.zeros(len(rows))
-    for picture, points in select_frames(seen, on_progress):
+    for one, picture, points in select_frames(seen, on_progress):
         placed, turn = fit.fit(points)
         flat = placed[:, :2] * (1.0, -1.0)
-        colour, inside = sample_picture(picture, np.einsum("pk,pkd->pd", weights, flat[corners]))
-        facing = smoothstep(own_normals @ turn[2], *FACING_COSINES) * inside
+        places = np.einsum("pk,pkd->pd", weights, flat[corners])
+        colour, inside = sample_picture(picture, places)
+        if one.opening is not None:
+            inside = inside & ~points_in_polygon(places, one.opening)
+        facing = one.weight * smoothstep(own_normals @ turn[2], *FACING_COSINES) * inside
         total += facing[:, None] * colour
         weight += facing
-        on_frame(picture, points)
+        if one.weight == 1:
+            on_frame(picture, points)
     if not weight.any():
         raise DataError("no frame shows the face with open eyes; give a video of the person looking at the camera")
     all_colours, all_weights = np.zeros((len(canvas.share), 3)), np.zeros(len(canvas.share))
@@ -113,17 +116,17 @@ def average_skin_colours(
 
 def select_frames(
     videos: Sequence[VideoLandmarks], on_progress: Progress
-) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.float32]]]:
-    """Yield picture (H, W, 3) and landmarks (478, 3) of `N_FRAMES` frames spread over the videos, eyes open."""
+) -> Iterator[tuple[VideoLandmarks, NDArray[np.uint8], NDArray[np.float32]]]:
+    """Yield video, picture (H, W, 3) and landmarks (478, 3) of `N_FRAMES` frames over the videos, eyes open."""
     per_video = int(np.ceil(N_FRAMES / len(videos)))
     usual = float(np.nanmedian(np.concatenate([eye_opening(one.landmarks) for one in videos])))
     for number, one in enumerate(videos):
         awake = np.flatnonzero(np.nan_to_num(eye_opening(one.landmarks)) > MIN_EYE_OPENING * usual)
         if len(awake):
             wanted = set(awake[np.linspace(0, len(awake) - 1, per_video).round().astype(int)].tolist())
-            for at, picture in enumerate(read_frames(one.video)):
+            for at, pixels in enumerate(one.frames()):
                 if at in wanted:
-                    yield picture.pixels, one.points[at]
+                    yield one, pixels, one.points[at]
         on_progress(number + 1, len(videos))
 
 

@@ -1,6 +1,6 @@
 """Landmarks of a talker in videos, in the picture and pose-free."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from corpus_tools.recordings.folder import VIDEO_SUFFIXES, find_recordings
 from lexicon.errors import DataError, InputError
 from tts2face.models.landmarks import lip_opening
 from tts2face.types import Progress
+from tts2face.video.media import read_frames
 from tts2face.video.pose import remove_pose
 
 Floats = NDArray[np.float64]
@@ -27,12 +28,26 @@ RIGHT_LIDS, LEFT_LIDS = (159, 145), (386, 374)  # upper and lower, in the middle
 class VideoLandmarks:
     """One video: `points` (T, 478, 3) pixels as the tracker gives them, `landmarks` (T, 478, 3) mm without pose.
 
-    Both are NaN in frames without a face; frame i is the video's i-th.
+    Both are NaN in frames without a face; frame i is the video's i-th. A photograph has its picture with it, a mirrored
+    one a small weight, and parted lips an opening (N, 2) between them, pixels, in which there is no skin.
     """
 
     video: Path
     points: NDArray[np.float32]
     landmarks: NDArray[np.float32]
+    pictures: tuple[NDArray[np.uint8], ...] = ()
+    weight: float = 1.0
+    opening: Floats | None = None
+
+    def frames(self) -> Iterator[NDArray[np.uint8]]:
+        """The frames (H, W, 3) in their order.
+
+        Raises
+        ------
+        DataError
+            The video can no longer be read.
+        """
+        return iter(self.pictures) if self.pictures else (frame.pixels for frame in read_frames(self.video))
 
 
 def find_videos(recordings: Path) -> tuple[Path, ...]:

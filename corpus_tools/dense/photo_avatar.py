@@ -1,0 +1,149 @@
+"""A head of a person from photographs: shape, skin, eyes and hair, for everything that a head can."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from corpus_tools.dense.build_face import (
+    CONTENT,
+    SOURCE_FACE,
+    BuiltFace,
+    fit_person,
+    paint_person,
+)
+from corpus_tools.dense.mesh_fit import face_landmarks
+from corpus_tools.dense.video_landmarks import VideoLandmarks
+from tts2face.models.consent import consent_record
+from tts2face.models.face import Face
+from tts2face.models.face_file import read_face, write_face
+from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.photo.found_face import find_face
+from tts2face.photo.lip_line import find_lip_line
+from tts2face.photo.photograph import read_photograph, split_number
+from tts2face.render.occlusion import bake_occlusion
+from tts2face.render.scene import available_cores
+from tts2face.storage.files import find_file
+from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
+from tts2face.video.pose import remove_pose
+from tts2face.video.track import FaceTracker
+
+Floats = NDArray[np.float64]
+
+MIRRORED_WEIGHT = 0.03  # of a mirrored picture, which fills what a turned head hides
+OPENING_SCALE = np.array([1.02, 1.25])  # of the opening between lips, for its rim
+EXPRESSION_FROM = 0.1  # score of a shape from which it is taken as an expression, not as the build of a face
+EXPRESSIONS = ("jawOpen", "mouthSmile", "mouthUpperUp", "mouthLowerDown", "mouthStretch", "mouthPucker", "mouthFunnel",
+               "mouthFrown", "browDown", "browInnerUp", "browOuterUp", "eyeSquint", "cheekSquint")  # fmt: skip
+
+
+def build_avatar(
+    photos: Sequence[str | Path],
+    out: Path,
+    *,
+    consent: str | None,
+    name: str | None = None,
+    model: Path | None = None,
+    on_warning: Callable[[str], None] = lambda _: None,
+) -> BuiltFace:
+    """Adapt the realistic head to a person in photographs, and write it as a face.
+
+    Parameters
+    ----------
+    photos
+        Pictures of the same person; ``photo.jpg@2`` is the second largest face. One from the front is enough; others
+        from the sides show more of the skin.
+    consent, name, model, on_warning
+        As for `tts2face.face_from_photo`.
+
+    Raises
+    ------
+    InputError
+        There is no such file or face, or no consent.
+    DataError
+        A picture cannot be read, or shows no face that can be used.
+    BackendError
+        The landmark models or a package are missing, or the file cannot be written.
+    """
+    record = consent_record(name or split_number(photos[0])[0].stem, consent)
+    head = read_face(find_file(SOURCE_FACE, "face"))
+    seen, neutral = _read(photos, head, model, on_warning)
+    mirrored = [_mirrored(one, mirror_table(head)) for one in seen]
+    fitted = fit_person(head, np.mean(neutral, axis=0))
+    face, look = paint_person(fitted, [*seen, *mirrored], lambda done, of: None)
+    face = replace(face, metadata=_metadata(head, record, look.summary()))
+    write_face(out, bake_occlusion(face, available_cores()))
+    return BuiltFace(len(seen), len(photos), fitted.error_mm(), look)
+
+
+def _read(
+    photos: Sequence[str | Path], head: Face, model: Path | None, on_warning: Callable[[str], None]
+) -> tuple[list[VideoLandmarks], list[Floats]]:
+    """What the pictures show, and the landmarks (478, 3) of each without its expression, mm."""
+    tracker, reader = FaceTracker(model), BlendshapeReader(model)
+    seen, neutral = [], []
+    for photo in photos:
+        path, number = split_number(photo)
+        picture = read_photograph(path).filled()
+        found = find_face(picture.pixels, tracker, path, number=number, reduced_by=picture.reduced_by)
+        for warning in found.warnings:
+            on_warning(warning)
+        points = found.landmarks[None].astype(np.float32)
+        landmarks = remove_pose(points, 1.0).landmarks
+        lips = find_lip_line(picture.pixels, found)
+        opening = None if lips.is_closed else widened(np.concatenate([lips.upper, lips.lower[-2:0:-1]])[:, :2])
+        seen.append(VideoLandmarks(path, points, landmarks, (picture.pixels,), 1.0, opening))
+        scores = dict(zip(BLENDSHAPES, reader.blendshape_scores(found.landmarks).tolist(), strict=True))
+        neutral.append(without_expression(landmarks[0].astype(np.float64), scores, head))
+    return seen, neutral
+
+
+def widened(opening: Floats) -> Floats:
+    """An opening (N, 2) with the rim that its darkness colours."""
+    middle = opening.mean(axis=0)
+    grown: Floats = middle + OPENING_SCALE * (opening - middle)
+    return grown
+
+
+def without_expression(landmarks: Floats, scores: Mapping[str, float], head: Face) -> Floats:
+    """Landmarks (478, 3) without the expression that scores tell, moved back by the head's shapes."""
+    still = landmarks.copy()
+    for name, shape in zip(head.shape_names, head.shapes, strict=True):
+        if name.startswith(EXPRESSIONS):
+            weight = max(scores.get(name, 0.0) - EXPRESSION_FROM, 0.0)
+            still -= weight * face_landmarks(head, shape.astype(np.float64))
+    return still
+
+
+def mirror_table(head: Face) -> NDArray[np.int64]:
+    """(478,) landmark on the other side of the face."""
+    places = face_landmarks(head, head.vertices.astype(np.float64))[:N_LANDMARKS]
+    return np.asarray(cKDTree(places).query(places * (-1.0, 1.0, 1.0))[1], np.int64)
+
+
+def _mirrored(seen: VideoLandmarks, table: NDArray[np.int64]) -> VideoLandmarks:
+    """The mirror image of pictures, which counts where they show nothing."""
+    (pixels,) = seen.pictures
+    width = pixels.shape[1]
+    points, landmarks = seen.points[:, table].copy(), seen.landmarks[:, table] * np.array([-1, 1, 1], np.float32)
+    points[..., 0] = width - 1 - points[..., 0]
+    picture = np.ascontiguousarray(pixels[:, ::-1])
+    opening = None if seen.opening is None else np.array([width - 1, 0]) + seen.opening * (-1, 1)
+    return VideoLandmarks(seen.video, points, landmarks, (picture,), MIRRORED_WEIGHT, opening)
+
+
+def _metadata(head: Face, record: Mapping[str, str], look: str) -> dict[str, object]:
+    return {
+        **head.metadata,
+        "name": record["name"],
+        "licence": f"mesh: {head.metadata['licence']}; likeness of the person: as stated in the consent",
+        "content": CONTENT,
+        "look": look,
+        "consent": dict(record),
+        "made_by": "tts2face face photo",
+        "created": datetime.now(UTC).date().isoformat(),
+    }
