@@ -111,9 +111,11 @@ def lay_planes(
 ) -> None:
     """Write the plane (3, 5) of each value over the picture of the triangles of fragments: at 0, per column, per row.
 
-    `mark` (F,) and a number that it does not hold yet tell which triangles are done.
+    From one sample to the next, light changes by no more than within the triangle: a fragment may lie beside one that
+    is narrower, as at the rims of lips. `mark` (F,) and a number that it does not hold yet tell which are done.
     """
     done, frame = mark
+    zero, third = np.float32(0), np.float32(1 / 3)
     for i in range(count):
         t = triangle[i]
         if done[t] == frame:
@@ -126,7 +128,12 @@ def lay_planes(
         for k in range(N_VALUES):
             at, e1, e2 = table[a, U + k], table[b, U + k] - table[a, U + k], table[c, U + k] - table[a, U + k]
             columns, rows = (e1 * cy - e2 * by) * inverse, (e2 * bx - e1 * cx) * inverse
-            planes[t, 0, k], planes[t, 1, k], planes[t, 2, k] = at - columns * ax - rows * ay, columns, rows
+            x, y, steep = ax, ay, abs(columns) + abs(rows)
+            span = max(e1, e2, zero) - min(e1, e2, zero)
+            if k >= AT_RED and steep > span:
+                columns, rows = columns * (span / steep), rows * (span / steep)
+                at, x, y = at + (e1 + e2) * third, ax + (bx + cx) * third, ay + (by + cy) * third
+            planes[t, 0, k], planes[t, 1, k], planes[t, 2, k] = at - columns * x - rows * y, columns, rows
 
 
 @vectorized_kernel
