@@ -26,6 +26,7 @@ Float32Array = NDArray[np.float32]
 
 MOVE_MM = np.float32(8.0)  # movement that counts as much as a turn of 1 rad
 GAP_MM = np.float32(2.0)  # of an opening that is half as good as a wide one
+HALF_FACTOR = np.float32(0.2)  # form factor of an opening through which teeth are displayed half as light as they get
 PLACE_KEY = np.array([1, 1 << 21, 1 << 42])  # of a place in um, each coordinate below 1 m
 
 
@@ -161,9 +162,10 @@ def write_terms(points: Array, source: Array, partners: Array, table: Array, res
 
 @vectorized_kernel
 def write_mouth_terms(points: Array, mouth: Array, table: Array, ring: Array, terms: Array, ways: Array) -> None:
-    """Write terms 1 to 5 of vertices in the mouth: the form factor of the ring (L, 3), its root, and its vector.
+    """Write terms 1 to 5 of vertices in the mouth: the form factor of the ring (L, 3), a curve of it, and its vector.
 
-    `ways` (6, M) is scratch space: places, and ways to the corner before, of length 1.
+    The curve is flat where the opening is narrow or wide, as that of a display. `ways` (6, M) is scratch space: places,
+    and ways to the corner before, of length 1.
     """
     zero, one, half, least = np.float32(0), np.float32(1), np.float32(0.5), np.float32(1e-7)
     n = len(mouth)
@@ -194,7 +196,8 @@ def write_mouth_terms(points: Array, mouth: Array, table: Array, ring: Array, te
             bx[i], by[i], bz[i] = x, y, z
     for i in range(n):
         factor = right[i] * table[i, NORMAL] + up[i] * table[i, NORMAL + 1] + ahead[i] * table[i, NORMAL + 2]
-        terms[1, i], terms[2, i] = factor, np.sqrt(max(factor, zero))
+        squared = max(factor, zero) * factor
+        terms[1, i], terms[2, i] = factor, squared / (squared + HALF_FACTOR * HALF_FACTOR)
 
 
 @vectorized_kernel
