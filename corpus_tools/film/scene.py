@@ -201,9 +201,19 @@ class FilmScene:
         render.resolution_x = render.resolution_y = side
         render.resolution_percentage = 100
 
-    def render(self, path: Path, samples: int, *, has_wall: bool = True) -> None:
-        """Write a picture; without its wall it has a transparent background."""
+    def render(
+        self, path: Path, samples: int, *, has_wall: bool = True, window: NDArray[np.floating] | None = None
+    ) -> None:
+        """Write a picture; without its wall it has a transparent background.
+
+        Outside a window, two corners (2, 2) in shares of the picture from its upper left one, it is transparent, too.
+        """
         scene = bpy.context.scene
+        scene.render.use_border = window is not None
+        if window is not None:
+            border = scene.render
+            (border.border_min_x, top), (border.border_max_x, bottom) = np.clip(window, 0, 1).tolist()
+            border.border_min_y, border.border_max_y = 1 - bottom, 1 - top
         for made in self._wall:
             made.hide_render = not has_wall
         scene.render.film_transparent = not has_wall

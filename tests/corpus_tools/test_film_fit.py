@@ -1,14 +1,21 @@
-"""Fit of baked light: how vertices answer to the terms of a pose, who lies across the lips, and modes of turns."""
+"""Fit of baked light: how vertices answer to the terms of a pose or to pictures, partners, and modes of turns."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from corpus_tools.film.fit_light import HIDDEN_WEIGHT, RIDGE
+from corpus_tools.film.fit_pictures import SIDE_PX, fit_to_pictures
 from corpus_tools.film.fit_responses import find_partners, fit_responses, limits_of, quantised
 from corpus_tools.film.fit_texels import principal_modes
+from corpus_tools.film.poses import LitPose
+from tests.render.film.lit_face import lit_tiny_face
 from tts2face.models.baked_light import LIMIT_STEP
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
+from tts2face.render.draw import mesh_renderer
+from tts2face.render.picture import Picture
 
 N_POSES, N_TERMS, N_VERTICES = 30, 5, 50
 
@@ -96,3 +103,21 @@ def test_modes_of_turns_are_orthonormal() -> None:
     assert np.einsum("pc,cxn->pxn", weights, modes) == pytest.approx(changes, abs=1e-9)
     few, of_few = principal_modes(changes, 2)
     assert len(few) == of_few.shape[1] == 2
+
+
+def test_what_pictures_show_corrects_the_light() -> None:
+    face = lit_tiny_face()
+    still = np.zeros(6, np.float32)
+    weights = [np.zeros(len(face.shape_names), np.float32), np.full(len(face.shape_names), 0.4, np.float32)]
+    poses = [LitPose(str(number), one, still) for number, one in enumerate(weights)]
+    picture = Picture(size=f"{SIDE_PX}x{SIDE_PX}", background="transparent")
+    before = [mesh_renderer(face, picture).draw(pose.weights, pose.head) for pose in poses]
+    wanted = {pose.name: np.array(one) for pose, one in zip(poses, before, strict=True)}
+    for one in wanted.values():
+        one[..., 0] -= np.where(one[..., 3] > 0, 20, 0).astype(np.uint8)
+    fitted = replace(face, light=(fit_to_pictures(face, poses, wanted),))
+    for pose, old in zip(poses, before, strict=True):
+        new = mesh_renderer(fitted, picture).draw(pose.weights, pose.head).astype(np.float64)
+        off, apart = (np.abs(one - wanted[pose.name])[old[..., 3] == 255] for one in (new, old.astype(np.float64)))
+        assert off[:, 0].mean() < 0.5 * apart[:, 0].mean()
+        assert off[:, 1:].mean() < 1

@@ -1,0 +1,199 @@
+"""Fit of the light round the mouth to the path tracer's pictures, pixel by pixel.
+
+A baked vertex of a tooth lies behind a lip where the opening is narrow, and is dark; what is seen of the tooth between
+two such vertices is not. Texels in the fold of a lip are coarse. So responses are corrected by what the pictures of the
+fitted poses show: ridge regression on all of their pixels, by conjugate gradients (Hestenes and Stiefel 1952).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from corpus_tools.film.compare import over_grey
+from corpus_tools.film.fit_light import MOST_SHARE
+from corpus_tools.film.fit_responses import quantised
+from corpus_tools.film.poses import LitPose
+from tts2face.models.baked_light import LIMIT_STEP, BakedLight
+from tts2face.models.face import Face
+from tts2face.render.draw import mesh_renderer
+from tts2face.render.film.scene import LitScene
+from tts2face.render.film.visibility import TRIANGLE_MASK, X, Y, nearest_triangles, project
+from tts2face.render.picture import Picture
+
+Floats = NDArray[np.float64]
+Pixels = NDArray[np.uint8]
+
+SIDE_PX = 640
+RIDGE = 60.0  # of changes of responses, in pixels
+ALIKE_RIDGE = 1e-4  # of those of all vertices of a part alike, of their squares
+MOST_MISSING = 80.0  # of 255: more is another surface at an edge
+ROUNDS = 40  # of conjugate gradients
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Missing:
+    """What a drawn picture lacks in n pixels of one surface each.
+
+    Attributes
+    ----------
+    shares : (n, N)
+        Of the lit vertices in each pixel.
+    light : (n, 3)
+    terms : (T, N)
+    """
+
+    shares: Any
+    light: Floats
+    terms: Floats
+
+
+def fit_to_pictures(face: Face, poses: Sequence[LitPose], pictures: Mapping[str, Pixels]) -> BakedLight:
+    """Light of a face whose pictures (S, S, 4) of poses, by their names, are nearer to these; S is `SIDE_PX`."""
+    scene, skin, mouth = _missing(face, poses, pictures)
+    (light,), drawn = face.light, scene.surface.light
+    rows, mouth_rows = (
+        np.flatnonzero(np.isin(every, own))
+        for every, own in ((light.rows, drawn.rows), (light.mouth_rows, drawn.mouth_rows))
+    )
+    parts = _vertex_parts(face)[drawn.mouth_rows]
+    alike = np.zeros((len(light.mouth_responses), 3, len(parts)))
+    for name in np.unique(parts):
+        own = parts == name
+        alike[:, :, own] = _alike([_among(one, own) for one in mouth])[:, :, None]
+    of_skin = _corrected((light.responses, light.response_sizes, light.limits), rows, skin, _changes(skin))
+    answers = (light.mouth_responses, light.mouth_sizes, light.mouth_limits)
+    of_mouth = _corrected(answers, mouth_rows, mouth, alike)
+    return replace(
+        light,
+        responses=of_skin[0],
+        response_sizes=of_skin[1],
+        limits=of_skin[2],
+        mouth_responses=of_mouth[0],
+        mouth_sizes=of_mouth[1],
+        mouth_limits=of_mouth[2],
+    )
+
+
+def _missing(
+    face: Face, poses: Sequence[LitPose], pictures: Mapping[str, Pixels]
+) -> tuple[LitScene, list[Missing], list[Missing]]:
+    """What is missing in each pose, of the skin's and the mouth's vertices that are drawn."""
+    renderer = mesh_renderer(face, Picture(size=f"{SIDE_PX}x{SIDE_PX}", background="transparent"))
+    scene = renderer.scene
+    if not isinstance(scene, LitScene):
+        raise TypeError("the face has no baked light")
+    n, m = len(scene.surface.light.rows), len(scene.surface.light.mouth_rows)
+    buffers = scene.terms.allocate_buffers()
+    found: tuple[list[Missing], list[Missing]] = ([], [])
+    for pose in poses:
+        shares, pixels = _shares(scene, pose, pictures[pose.name][:, :, 3] == 255)
+        drawn = over_grey(renderer.draw(pose.weights, pose.head))[pixels].astype(np.float64)
+        light = np.clip(over_grey(pictures[pose.name])[pixels] - drawn, -MOST_MISSING, MOST_MISSING)
+        scene.terms.update(scene.deform(pose.weights), buffers)
+        for own, span, terms in (
+            (found[0], slice(0, n), buffers.terms[:, :n]),
+            (found[1], slice(n, n + m), buffers.mouth),
+        ):
+            among = shares[:, span]
+            lit = np.asarray(among.sum(axis=1)).ravel() > 0
+            own.append(Missing(among[lit], light[lit], terms.astype(np.float64)))
+    return scene, *found
+
+
+def _shares(scene: LitScene, pose: LitPose, wanted: NDArray[np.bool_]) -> tuple[Any, Any]:
+    """Shares (n, V) of the surface's vertices in those wanted pixels (S, S) that one piece fills, and the pixels."""
+    surface, side, n = scene.surface, SIDE_PX, scene.picture.samples_per_side
+    table = surface.template.copy()
+    optics = (scene.optics.view.astype(np.float32), scene.optics.lens.astype(np.float32))
+    project(scene.pose(pose.weights, pose.head), surface.source, *optics, table)
+    nearest, _, _ = nearest_triangles(table, surface.triangles, (side * n, side * n))
+    seen = (nearest[:, : side * n] & TRIANGLE_MASK) - 1
+    samples = seen.reshape(side, n, side, n).transpose(0, 2, 1, 3).reshape(side, side, n * n)
+    pieces = np.where(samples >= 0, surface.piece_of[samples], -1)
+    down, across = np.nonzero(wanted & (samples >= 0).all(axis=2) & (pieces == pieces[:, :, :1]).all(axis=2))
+    corners = surface.triangles[samples[down, across, n * n // 2]]
+    a, b, c = np.moveaxis(table[corners][:, :, [X, Y]].astype(np.float64), 1, 0)
+    place = np.column_stack([across, down]) * n + (n - 1) / 2 - a
+    first, second = b - a, c - a
+    whole = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    at_b = (place[:, 0] * second[:, 1] - place[:, 1] * second[:, 0]) / whole
+    at_c = (first[:, 0] * place[:, 1] - first[:, 1] * place[:, 0]) / whole
+    shares = np.clip(np.column_stack([1 - at_b - at_c, at_b, at_c]), 0, 1)
+    shares /= shares.sum(axis=1, keepdims=True)
+    starts = np.arange(0, shares.size + 1, 3)
+    return sparse.csr_matrix((shares.ravel(), corners.ravel(), starts), (len(corners), len(table))), (down, across)
+
+
+def _vertex_parts(face: Face) -> NDArray[np.str_]:
+    """(V,) name of the part of each vertex."""
+    found = np.full(len(face.vertices), "", dtype="U32")
+    for part in face.parts:
+        found[face.triangles[part.first : part.first + part.count]] = part.name
+    return found
+
+
+def _among(one: Missing, own: NDArray[np.bool_]) -> Missing:
+    """What is missing in the pixels of some vertices (N,) of a part."""
+    shares = one.shares[:, own]
+    seen = np.asarray(shares.sum(axis=1)).ravel() > 0
+    return Missing(shares[seen], one.light[seen], one.terms[:, own])
+
+
+def _alike(missing: Sequence[Missing]) -> Floats:
+    """(T, 3) change of the responses of all vertices of a part; each pose counts by the root of its pixels."""
+    rows = [(one.shares @ one.terms.T, one.light, max(len(one.light), 1) ** -0.5) for one in missing]
+    gram = sum(share * terms.T @ terms for terms, _, share in rows)
+    sizes = np.sqrt(np.diag(gram)) + 1e-9
+    moments = sum(share * terms.T @ light for terms, light, share in rows)
+    scaled = gram / np.outer(sizes, sizes) + ALIKE_RIDGE * np.eye(len(gram))
+    change: Floats = np.linalg.solve(scaled, moments / sizes[:, None]) / sizes[:, None]
+    return change
+
+
+def _corrected(
+    answers: tuple[NDArray[np.int8], NDArray[np.float32], NDArray[np.int8]],
+    rows: NDArray[np.int64],
+    missing: Sequence[Missing],
+    changes: Floats,
+) -> tuple[NDArray[np.int8], NDArray[np.float32], NDArray[np.int8]]:
+    """Responses (T, 3, N), their sizes and limits, of which those of rows (n,) take changes (T, 3, n)."""
+    responses, sizes, limits = answers
+    found = responses.astype(np.float64) * sizes[:, None, None]
+    found[:, :, rows] += changes
+    least, most = limits[:, :, rows].astype(np.float64) * LIMIT_STEP
+    for one in missing:
+        shown = np.asarray(one.shares.sum(axis=0)).ravel() > 0
+        change = np.where(shown, np.einsum("tn,tcn->cn", one.terms, found[:, :, rows]), 0.0)
+        least, most = np.minimum(least, change), np.maximum(most, change)
+    wider = limits.copy()
+    wider[:, :, rows] = np.clip(np.rint(np.array([least, most]) / LIMIT_STEP), -127, 127)
+    return *quantised(found, MOST_SHARE), wider
+
+
+def _changes(missing: Sequence[Missing]) -> Floats:
+    """(T, 3, N) changes of responses that add what is missing."""
+    sizes = np.sqrt(np.mean([(one.terms**2).mean(axis=1) for one in missing], axis=0)) + 1e-9
+    terms = [(one.terms / sizes[:, None])[:, :, None] for one in missing]
+    back = [one.shares.T.tocsr() for one in missing]
+
+    def normal(change: Floats) -> Floats:
+        total: Floats = RIDGE * change
+        for one, own, gather in zip(missing, terms, back, strict=True):
+            total += own * (gather @ (one.shares @ (own * change).sum(axis=0)))
+        return total
+
+    change = np.zeros((*terms[0].shape[:2], 3))
+    rest = sum(own * (gather @ one.light) for one, own, gather in zip(missing, terms, back, strict=True))
+    step, size = rest.copy(), (rest**2).sum(axis=(0, 1))
+    for _ in range(ROUNDS):
+        ahead = normal(step)
+        share = size / np.maximum((step * ahead).sum(axis=(0, 1)), 1e-12)
+        change, rest = change + share * step, rest - share * ahead
+        before, size = size, (rest**2).sum(axis=(0, 1))
+        step = rest + size / np.maximum(before, 1e-12) * step
+    found: Floats = change / sizes[:, None, None]
+    return found.transpose(0, 2, 1)

@@ -1,0 +1,83 @@
+"""``python -m corpus_tools.film.refine_film``: fits the light of mouths to pictures of the fitted poses. Needs bpy.
+
+It takes what `corpus_tools.film.build_film` has written.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from corpus_tools.drawn.build_drawn import cast_parser, step_reporter
+from corpus_tools.film.compare import LIPS
+from corpus_tools.film.fit_pictures import SIDE_PX, fit_to_pictures
+from corpus_tools.film.measure_film import build_scene
+from corpus_tools.film.poses import LitPose, lit_poses
+from corpus_tools.film.scene import FilmScene
+from corpus_tools.head.source import fetch_data, read_source
+from corpus_tools.training.score_files import calibrate_face_file
+from tts2face.face.deformation import build_rig
+from tts2face.models.face import Face
+from tts2face.models.face_file import read_face, write_face
+from tts2face.render.camera import camera_matrices
+from tts2face.render.camera_views import parse_camera
+
+Pixels = NDArray[np.uint8]
+
+SAMPLES, MARGIN_PX = 24, 7
+CAMERA = parse_camera("front")
+
+
+def trace_mouths(
+    scene: Callable[[], FilmScene], face: Face, poses: Sequence[LitPose], prefix: Path, report: Callable[[str], None]
+) -> dict[str, Pixels]:
+    """Pictures (S, S, 4) of the mouth by the name of the pose; files that are there are not made again."""
+    paths = {pose.name: prefix.with_name(f"{prefix.name} mouth {pose.name}.png") for pose in poses}
+    wanted = [pose for pose in poses if not paths[pose.name].is_file()]
+    if wanted:
+        traced, rig = scene(), build_rig(face)
+        traced.look_from(CAMERA, SIDE_PX)
+        for pose in wanted:
+            report(pose.name)
+            traced.pose(pose.weights, pose.head)
+            window = _mouth_window(face, rig.pose(pose.weights, pose.head))
+            traced.render(paths[pose.name], SAMPLES, has_wall=False, window=window)
+    return {name: np.asarray(Image.open(path)) for name, path in paths.items()}
+
+
+def _mouth_window(face: Face, points: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Corners (2, 2), in shares of the picture, of a rectangle round the lips of posed vertices (V, 3)."""
+    numbers = {int(number): row for row, number in enumerate(face.landmarks)}
+    used = [numbers[name] for name in LIPS]
+    optics = camera_matrices(CAMERA, face, (SIDE_PX, SIDE_PX))
+    lips = np.einsum("lc,lcx->lx", face.landmark_weights[used], points[face.landmark_vertices[used]])
+    seen = lips @ optics.view[:, :3].T + optics.view[:, 3]
+    places = seen[:, :2] / seen[:, 2:] * optics.lens[0] + optics.lens[1:3]
+    return np.array([places.min(axis=0) - MARGIN_PX, places.max(axis=0) + MARGIN_PX]) / SIDE_PX
+
+
+def main() -> None:
+    """Trace the mouths, fit and write the light; steps go to standard error."""
+    parser, report = cast_parser(__doc__), step_reporter()
+    parser.add_argument("--traced", type=Path, required=True, help="folder in which the traced pictures are kept")
+    arguments = parser.parse_args()
+    source = read_source(arguments.data or fetch_data(Path.home() / ".cache/tts2face"))
+    arguments.traced.mkdir(parents=True, exist_ok=True)
+    for name in arguments.names:
+        path = arguments.faces / f"{name}.face"
+        face = read_face(path)
+        poses = [pose for pose in lit_poses(face) if not pose.head.any()]
+        scene = partial(build_scene, source, face, name)
+        pictures = trace_mouths(scene, face, poses, arguments.traced / name, report)
+        report(f"{name}: fit")
+        write_face(path, replace(face, light=(fit_to_pictures(face, poses, pictures),)))
+        report(f"{name}: calibration")  # again: the tracker sees other pictures of it now
+        calibrate_face_file(str(path), path)
+
+
+if __name__ == "__main__":
+    main()
