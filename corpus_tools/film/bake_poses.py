@@ -38,7 +38,7 @@ class Effort:
     wall: int = 64
 
 
-HAIRCUT = Effort(pose_side=192, rest=12, turn=24, reference=64)  # of the light of another haircut at rest and in turns
+HAIRCUT = Effort(pose_side=256, rest=12, turn=24, reference=64)  # of the light of another haircut at rest and in turns
 
 
 def bake_poses(

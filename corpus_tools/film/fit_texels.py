@@ -1,5 +1,7 @@
 """Fit of a face's light in texels: its pages at rest, and how they change with turns of the head and cameras."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, binary_erosion, distance_transform_edt, gaussian_filter, map_coordinates
@@ -16,7 +18,7 @@ Floats = NDArray[np.float64]
 
 SKIN_FLOOR = (34.0, 12.0, 11.0)  # of the texels: nothing of a face is black
 SKIN_LIT, FAR_LIT, BLACK_LIT = 0.05, 0.06, 0.02  # displayed light below which a texel was hidden from the bake
-TURN_SIDE, TURN_BLUR = 192, 0.8  # texels; the shadows of hair are soft, what is left of noise is not
+TURN_SIDE, TURN_BLUR = 256, 1.1  # texels; the shadows of hair are soft, what is left of noise is not
 DRAWN_MARGIN = 2  # texels
 NO_CHANGE, CHANGE = 1.0, 3.0  # of 255, in any turn or camera
 RELIT = 4.0, 12.0  # of 255, of skin with another haircut
@@ -30,22 +32,24 @@ def principal_modes(changes: Floats, number: int) -> tuple[Floats, Floats]:
     return v[:n].reshape(n, *changes.shape[1:]), u[:, :n] * s[:n]
 
 
-def _halved(maps: NDArray[np.floating]) -> Floats:
-    """(P, 192, 192, 3) means of squares of maps (P, S, S, 3)."""
-    n = maps.shape[1] // TURN_SIDE
-    means: Floats = maps.reshape(len(maps), TURN_SIDE, n, TURN_SIDE, n, 3).mean(axis=(2, 4)).astype(np.float64)
+def _shrunk(maps: NDArray[np.floating]) -> Floats:
+    """(P, s, s, 3) means of squares of maps (P, S, S, 3); s is `TURN_SIDE`, of which S need be no multiple."""
+    shared = math.gcd(maps.shape[1], TURN_SIDE)
+    n = maps.shape[1] // shared
+    finer = maps.repeat(TURN_SIDE // shared, axis=1).repeat(TURN_SIDE // shared, axis=2)
+    means: Floats = finer.reshape(len(maps), TURN_SIDE, n, TURN_SIDE, n, 3).mean(axis=(2, 4)).astype(np.float64)
     return means
 
 
 def _far_changes(poses: PoseLight) -> Floats:
     """(T + C + 1, 3, s s) changes of the second page from rest."""
-    halved = _halved(poses.far - poses.far[:1]) * 255
-    return halved.transpose(0, 3, 1, 2).reshape(len(halved), 3, -1)
+    shrunk = _shrunk(poses.far - poses.far[:1]) * 255
+    return shrunk.transpose(0, 3, 1, 2).reshape(len(shrunk), 3, -1)
 
 
 def _skin_turns(poses: PoseLight, light: NDArray[np.floating]) -> Floats:
     """(N, 3, s s) changes of the skin's light (N, S, S, 3) from rest, without noise."""
-    changes = gaussian_filter(_halved(light - poses.skin[:1]) * 255, (0, TURN_BLUR, TURN_BLUR, 0))
+    changes = gaussian_filter(_shrunk(light - poses.skin[:1]) * 255, (0, TURN_BLUR, TURN_BLUR, 0))
     return np.asarray(changes.transpose(0, 3, 1, 2).reshape(len(light), 3, -1))
 
 
@@ -71,7 +75,7 @@ def camera_changes(poses: PoseLight, drawn: NDArray[np.bool_]) -> Floats:
 
 def relit_skin(own: PoseLight, worn: PoseLight) -> Floats:
     """(s s,) share of the texels of the skin whose light at rest is another with another haircut."""
-    apart = np.abs(_halved(worn.skin[:1])[0] - _halved(own.skin[:1])[0]).max(axis=2) * 255
+    apart = np.abs(_shrunk(worn.skin[:1])[0] - _shrunk(own.skin[:1])[0]).max(axis=2) * 255
     share: Floats = smoothstep(gaussian_filter(apart, TURN_BLUR), *RELIT)
     return share.ravel()
 

@@ -50,7 +50,10 @@ HELD_OUT_TURNS_DEG = ((12, 6), (-14, -5), (8, 4), (-6, 8), (17, 2), (-10, -9))  
 N_HELD_OUT = 12
 N_SPEECH = 32
 GAZE_SHARE = 0.4  # of the gaze in the distance between poses
-TURNS_DEG = ((-20, 0), (-10, 0), (10, 0), (20, 0), (0, -12), (0, 12), (14, -8), (-14, 8))  # yaw and pitch
+TURNS_DEG = (
+    *((-20, 0), (-10, 0), (10, 0), (20, 0), (0, -12), (0, 12)),
+    *((14, -8), (-14, 8), (14, 8), (-14, -8)),
+)  # yaw and pitch
 
 
 @dataclass(frozen=True, slots=True, eq=False)
