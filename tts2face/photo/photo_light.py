@@ -33,8 +33,8 @@ ROUNDS = 6  # of the robust fit
 GAMMA = 2.2
 LEAST_LIGHT = 0.25
 MOST_TURNED = 30.0  # of 255, change of the skin's light
-MOUTH_BASE, MOUTH_BY_OPENING = 0.45, 0.7  # of the colour in open light: in the dark, and times the root of the opening
-ROOT_TERM = 2  # of `tts2face.render.film.response.write_mouth_terms`
+MOUTH_BASE, MOUTH_BY_OPENING = 0.5, 0.6  # of the colour in open light: in the dark, and times the curve of the opening
+CURVE_TERM = 2  # of `tts2face.render.film.response.write_mouth_terms`
 
 
 def skin_light(pixels: NDArray[np.uint8], mesh: PhotoMesh, vertices: Floats) -> tuple[Ints, Floats]:
@@ -115,7 +115,7 @@ def picture_light(
     mouth_rows = np.concatenate([teeth, walls])
     lit = colours[mouth_rows].astype(np.float64)
     openings = np.zeros((N_MOUTH_TERMS, 3, len(mouth_rows)))
-    openings[ROOT_TERM, :, : len(teeth)] = MOUTH_BY_OPENING * lit[: len(teeth)].T
+    openings[CURVE_TERM, :, : len(teeth)] = MOUTH_BY_OPENING * lit[: len(teeth)].T
     lit[: len(teeth)] *= MOUTH_BASE
     mouth_answers, mouth_sizes = _in_steps(openings)
     n_texels = N_PAGES * LEAST_SIDE**2 + LEAST_SIDE * (LEAST_SIDE // BLACK_SHARE)
