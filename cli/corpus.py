@@ -8,6 +8,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from cli.flags import Cache, Jobs, Model, switch, whole_number
+from cli.landmark_model import Yes
 from cli.process import write_message
 from cli.progress import progress_bar, stage_bar
 from cli.prompts import prompts
@@ -66,8 +67,10 @@ def build(  # noqa: PLR0913 - one parameter a flag
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
+    yes: Yes = False,
 ) -> None:
     """Build a talker from recordings. After an interruption, the same command resumes the build."""
+    del yes  # read where the model is missing
     check_suffix(out, "talker")
     folder = recordings if recordings.is_dir() else recordings.parent  # transcripts are beside the video
     inputs = {"the recordings": recordings, "--provenance": provenance, "--model": model}
@@ -137,8 +140,10 @@ def face(  # noqa: PLR0913 - one parameter a flag
     ] = 0,
     cache: Cache = None,
     model: Model = None,
+    yes: Yes = False,
 ) -> None:
     """Build a head with the shape, skin, hair and eyes of the person in videos, for `--face`."""
+    del yes  # read where the model is missing
     check_suffix(out, "face")
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--model": model})
     from corpus_tools.dense.build_face import build_face

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from cli.flags import Hair, HairColor, Model, add_option_flags, options_from_flags, switch
-from cli.photo import Consent, Yes, agreed, make_face, warner
+from cli.landmark_model import Yes
+from cli.photo import Consent, agreed, make_face, warner
 from cli.process import write_message
 from cli.progress import progress_bar
 from lexicon.errors import InputError
@@ -40,10 +41,12 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
     preview: Annotated[Path | None, Parameter(help="Write a picture with the landmarks drawn (.png).")] = None,
     write_landmarks: Annotated[Path | None, Parameter(help="Write the landmarks as a table to edit (.tsv).")] = None,
     write_mapping: Annotated[Path | None, Parameter(help="Write the used mapping as a table to edit (.tsv).")] = None,
-    model: Annotated[Path | None, Parameter(help="Path of face_landmarker.task; by default found or set up.")] = None,
+    model: Model = None,
+    yes: Yes = False,
     quiet: Annotated[bool, switch("Print no report.")] = False,
 ) -> None:
     """Make a .face file of a character; print the mapping of its shapes, and what replaces missing ones."""
+    del yes
     check_file_name(out, "a face", (".face",))
     for path, what, suffix in (
         (preview, "a picture", ".png"),
@@ -91,6 +94,7 @@ def picture(  # noqa: PLR0913 - one parameter a flag
     quiet: Annotated[bool, switch("Print no warnings and no summary.")] = False,
 ) -> None:
     """Make a .face file of a picture of a person, who speaks in it."""
+    del yes  # read where the model is missing
     check_file_name(out, "a face", (".face",))
     if preview is not None:
         check_file_name(preview, "a picture", (".png",))
@@ -101,7 +105,7 @@ def picture(  # noqa: PLR0913 - one parameter a flag
     from tts2face.characters.saving import save_face
     from tts2face.storage.files import write_atomically
 
-    made = make_face(photo, consent, name=name, model=model, yes=yes, quiet=quiet)
+    made = make_face(photo, consent, name=name, model=model, quiet=quiet)
     if preview is not None:
         write_atomically(preview, png_bytes(draw_preview(made)))
     save_face(out, made)
@@ -125,6 +129,7 @@ def photo(  # noqa: PLR0913 - one parameter a flag
     quiet: Annotated[bool, switch("Print no warnings and no summary.")] = False,
 ) -> None:
     """Make a .face file of the person in pictures: a head that turns, with shape, skin, eyes, hair and clothes."""
+    del yes
     check_file_name(out, "a face", (".face",))
     if preview is not None:
         check_file_name(preview, "a picture", (".png",))
@@ -136,7 +141,7 @@ def photo(  # noqa: PLR0913 - one parameter a flag
 
     inputs = {f"the photo {one}": split_number(one)[0] for one in photos}
     refuse_overwriting({"--out": out, "--preview": preview}, inputs | {"--model": model})
-    consent = agreed(photos[0], consent, name, model=model, yes=yes)
+    consent = agreed(photos[0], consent, name)
     result = build_avatar(photos, out, consent=consent, name=name, model=model, on_warning=warner(quiet=quiet))
     if preview is not None:
         write_atomically(preview, png_bytes(draw_preview(load_face(str(out)))))

@@ -15,9 +15,10 @@ from cli.corpus import corpus
 from cli.face import face as face_commands
 from cli.flags import Exports, Face, Hair, HairColor, Out, add_option_flags, check_options, options_from_flags, switch
 from cli.jobs import jobs, worker
+from cli.landmark_model import Yes, is_missing_model, sets_up_model
 from cli.lists import LISTS
 from cli.mimic import mimic
-from cli.photo import Consent, Photo, Yes, face_of_photo, refuse_face_beside
+from cli.photo import Consent, Photo, face_of_photo, refuse_face_beside
 from cli.process import (
     BROKEN_PIPE_CODE,
     INTERRUPTED,
@@ -34,7 +35,7 @@ from cli.process import (
 from cli.render import render
 from cli.report import report
 from cli.serve import keys, serve
-from lexicon.errors import DataError, InputError, Tts2faceError
+from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from lexicon.inputs import LARGEST_TEXT_BYTES, decode_utf8, read_bounded, read_text
 from tts2face import __version__
 from tts2face.render.picture import Picture
@@ -138,6 +139,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     **options: Any,
 ) -> None:
     """Synthesise a talking face from text."""
+    del yes  # read where the model is missing
     if text is not None and text_option is not None:
         raise InputError("the text is given twice, as an argument and as --text; remove one of them")
     options["gestures"] = _gesture_method(options.get("gestures"), noise=noise, none=no_gestures)
@@ -149,7 +151,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
         Request, options, text=_read_text(text if text_option is None else text_option, file, is_needed=needs_text)
     )
     if photo is not None:
-        face = face_of_photo(photo, consent, yes=yes, quiet=quiet)
+        face = face_of_photo(photo, consent, quiet=quiet)
     speak_options = SpeakOptions(
         out,
         Models(talker, face or "", identity, palette, hair, hair_color),
@@ -193,12 +195,21 @@ def _read_text(text: str | None, file: Path | None, *, is_needed: bool) -> str:
         raise InputError(str(wrong)) from wrong
 
 
+def _call(arguments: Sequence[str]) -> None:
+    check_options(app, arguments)
+    app(list(arguments), exit_on_error=False, print_error=False, result_action="return_none")
+    sys.stdout.flush()
+
+
 def run(arguments: Sequence[str]) -> int:
     """Run a command line; its exit code. An error is reported on one line of standard error."""
     try:
-        check_options(app, arguments)
-        app(list(arguments), exit_on_error=False, print_error=False, result_action="return_none")
-        sys.stdout.flush()
+        try:
+            _call(arguments)
+        except BackendError as missing:
+            if not is_missing_model(missing) or not sets_up_model(arguments):
+                raise
+            _call(arguments)
     except BaseException as ended:
         INTERRUPTION.end()
         if INTERRUPTION.number or isinstance(ended, KeyboardInterrupt):  # whatever the interruption has led to

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from cli.flags import Exports, Face, Hair, HairColor, Out, switch
+from cli.flags import Exports, Face, Hair, HairColor, Model, Out, switch
+from cli.landmark_model import Yes
 from cli.process import write_message
 from cli.progress import stage_bar
 from lexicon.errors import InputError
@@ -46,10 +47,12 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
         str, Parameter(help="Width x height in pixels; auto: 512x512, or the size of the talker's video.")
     ] = "auto",
     background: Annotated[str, Parameter(help="studio, transparent, a colour, or an image file.")] = "studio",
-    model: Annotated[Path | None, Parameter(help="Path of face_landmarker.task; by default found or set up.")] = None,
+    model: Model = None,
+    yes: Yes = False,
     quiet: Annotated[bool, switch("Print no progress bar and no summary.")] = False,
 ) -> None:
     """Transfer recorded motion of lips, eyes, brows and head to a face; the sound is copied."""
+    del yes  # read where the model is missing
     began = time.perf_counter()
     from tts2face.render.picture import Picture
     from tts2face.session_cache import Models

