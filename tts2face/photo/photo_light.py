@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 BLUR = 0.03  # of the width of the face
+SMALL_SPREAD_PX = 3.0  # blur of the smaller picture in which that is done
 NOSE_AND_BROWS = (46, 53, 52, 65, 55, 276, 283, 282, 295, 285, 1, 2, 98, 327)
 USUAL_LIGHT = np.array([0.6, 0.0, 0.18, 0.4])  # constant, and from the left, above and in front, of the median
 RIDGE = np.array([0.2, 1.0, 1.0, 1.0]) * 0.06
@@ -45,9 +46,8 @@ def skin_light(pixels: NDArray[np.uint8], mesh: PhotoMesh, vertices: Floats) -> 
     points = vertices[: len(mesh.places)]
     normals = vertex_normals(points, mesh.triangles)
     wide = float(np.ptp(mesh.places[mesh.landmark_vertices, 0]))
-    spread = BLUR * wide
-    soft = gaussian_filter(decode_srgb(pixels / 255.0), (spread, spread, 0))
-    colours = np.stack([_at(soft[..., c], mesh.places) for c in range(3)], axis=1)
+    soft = _blurred(pixels, BLUR * wide, mesh.places)
+    colours = decode_srgb(soft / 255.0)
     luminance = colours @ (0.21, 0.72, 0.07)
     avoided = {
         *OUTER_LIP_UPPER,
@@ -64,11 +64,8 @@ def skin_light(pixels: NDArray[np.uint8], mesh: PhotoMesh, vertices: Floats) -> 
     shade = np.maximum(light[0] + normals @ light[1:], LEAST_LIGHT * float(np.median(luminance[used])))
     lit = 1 - smoothstep(mesh.outside / wide, -0.015, 0.08)
     rows = np.flatnonzero(lit > 0)
-    displayed = np.stack(
-        [_at(gaussian_filter(pixels[..., c].astype(np.float64), spread), mesh.places[rows]) for c in range(3)]
-    )
     per_turn = light[1:, None] * (lit[rows] / (GAMMA * shade[rows]))
-    return rows, per_turn[:, None] * displayed[None]
+    return rows, per_turn[:, None] * soft[rows].T[None]
 
 
 def _fit(terms: Floats, values: Floats) -> Floats:
@@ -83,8 +80,17 @@ def _fit(terms: Floats, values: Floats) -> Floats:
     return np.asarray(light)
 
 
-def _at(values: Floats, places: Floats) -> Floats:
-    return np.asarray(map_coordinates(values, places.T[::-1], order=1, mode="nearest"))
+def _blurred(pixels: NDArray[np.uint8], spread: float, places: Floats) -> Floats:
+    """Colours (N, 3) of a blurred picture (H, W, 3) at places (N, 2): of a smaller one, which shows the same."""
+    from PIL import Image
+
+    shrink = max(1.0, spread / SMALL_SPREAD_PX)
+    size = tuple(max(1, round(side / shrink)) for side in pixels.shape[1::-1])
+    small = np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX), np.float64)
+    per_pixel = np.array(size) / np.array(pixels.shape[1::-1])
+    at = ((places + 0.5) * per_pixel - 0.5).T[::-1]
+    soft = gaussian_filter(small, (spread / shrink, spread / shrink, 0))
+    return np.stack([map_coordinates(soft[..., c], at, order=1, mode="nearest") for c in range(3)], axis=1)
 
 
 def picture_light(

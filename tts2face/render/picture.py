@@ -47,6 +47,7 @@ class Picture:
         "draft (one sample a pixel, no light under the skin), standard, or high (3 x 3 samples in every pixel).",
     )
     renderer: str = option("numba", "numba (any machine) or pyvista (VTK, with a GPU or software GL).")
+    visible_mark: bool = option(False, "Write the word synthetic into the lower right corner of clips.")
 
     def __post_init__(self) -> None:
         """Validate every option."""

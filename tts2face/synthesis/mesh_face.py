@@ -111,8 +111,9 @@ class MeshFace:
     def renderer(self, picture: Picture) -> FrameRenderer:
         """Create the renderer of the mesh."""
         from tts2face.render.draw import mesh_renderer  # exports draw nothing
+        from tts2face.render.visible_mark import marked
 
-        return mesh_renderer(self.mesh, picture)
+        return marked(mesh_renderer(self.mesh, picture))
 
 
 def mesh_face(talker: Talker, exemplars: ExemplarModel, face: Face) -> MeshFace:

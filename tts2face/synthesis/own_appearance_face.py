@@ -131,8 +131,9 @@ class OwnAppearanceFace:
     def renderer(self, picture: Picture) -> FrameRenderer:
         """Create the renderer that draws the face over the talker's video."""
         from tts2face.render.own_face import own_face_renderer  # exports draw nothing
+        from tts2face.render.visible_mark import marked
 
-        return own_face_renderer(self.talker, picture, self.gestures)
+        return marked(own_face_renderer(self.talker, picture, self.gestures))
 
 
 def own_appearance_face(talker: Talker, exemplars: ExemplarModel) -> OwnAppearanceFace:
