@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
     from tts2face.session import Session
 
-TALKER, FACE, PALETTE, DICTIONARY, CHARACTER = "talker", "face", "palette", "dictionary", "character"
+TALKER, FACE, PALETTE, DICTIONARY = "talker", "face", "palette", "dictionary"
+CHARACTER, PHOTO = "character", "photo"  # files that become faces
 RESOURCE_KINDS = (TALKER, FACE, PALETTE, DICTIONARY)
 CONTENT, DESCRIPTION, PICTURE = "content", "description.json", "picture.png"  # files of a checked resource
 MAX_TEXT = 200  # characters of a text of the description
@@ -35,6 +36,14 @@ FOREIGN = {
     b"glTF": "a glTF character", b"RIFF": "a sound or video", b"\x1aE\xdf\xa3": "a video",
 }  # fmt: skip
 GLTF_MAGIC = b"glTF"
+PICTURE_MAGIC = (b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"BM", b"II*\x00", b"MM\x00*")
+BOXED_PICTURES = (
+    (0, b"RIFF", b"WEBP"),
+    (4, b"ftyp", b"hei"),
+    (4, b"ftyp", b"mif1"),
+)  # offset, box, kind
+N_MAGIC = 12  # bytes by which a picture is told
+CONSENT = "consent.txt"  # beside a photo: what the person shown has stated
 
 
 def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> None:
@@ -43,7 +52,8 @@ def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> N
     Parameters
     ----------
     kind
-        One of `RESOURCE_KINDS`, or `CHARACTER`: a .glb or .vrm file that becomes a face.
+        One of `RESOURCE_KINDS`. Characters (.glb, .vrm) and photos, which have a file `CONSENT` beside them, become
+        faces.
     max_bytes
         Largest size of the written content.
 
@@ -52,14 +62,16 @@ def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> N
     RefusedFileError
         The file is of another type, damaged, or does not work.
     """
-    if kind == FACE and source.read_bytes()[: len(GLTF_MAGIC)] == GLTF_MAGIC:
-        kind = CHARACTER
+    with source.open("rb") as file:
+        head = file.read(N_MAGIC)
+    if kind == FACE:
+        kind = CHARACTER if head.startswith(GLTF_MAGIC) else PHOTO if is_picture(head) else FACE
     try:
-        if kind not in {DICTIONARY, CHARACTER}:
+        if kind not in {DICTIONARY, CHARACTER, PHOTO}:
             _check_type(kind, source)
         _describe(_CHECKS[kind](source, folder / CONTENT), folder)
         if kind != DICTIONARY:
-            draw_resource(FACE if kind == CHARACTER else kind, folder / CONTENT, folder / PICTURE)
+            draw_resource(FACE if kind in {CHARACTER, PHOTO} else kind, folder / CONTENT, folder / PICTURE)
     except (DataError, InputError, BackendError) as error:
         raise RefusedFileError(_sentence(error, source, folder)) from error
     except MemoryError as error:
@@ -68,6 +80,12 @@ def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> N
         raise RefusedFileError(f"it is no {kind} that works ({type(error).__name__})") from error
     if (folder / CONTENT).stat().st_size > max_bytes:
         raise RefusedFileError(f"it has more than {max_bytes / 1e6:g} MB as a {kind}")
+
+
+def is_picture(head: bytes) -> bool:
+    """Whether the first bytes of a file are those of a picture."""
+    boxed = (head[at : at + 4] == box and head[8:].startswith(kind) for at, box, kind in BOXED_PICTURES)
+    return head.startswith(PICTURE_MAGIC) or any(boxed)
 
 
 def draw_resource(kind: str, source: Path, picture: Path) -> None:
@@ -132,6 +150,18 @@ def _check_character(source: Path, out: Path) -> dict[str, Any]:
     made = out.with_name("imported.face")
     write_face(made, imported.face)
     return _check_face(made, out) | {"notes": list(imported.report.notes)}
+
+
+def _check_photo(source: Path, out: Path) -> dict[str, Any]:
+    """Make a face that speaks in a photo."""
+    from tts2face.models.face_file import write_face
+    from tts2face.photo.face_from_photo import face_from_photo
+
+    stated, notes = source.with_name(CONSENT), list[str]()
+    consent = stated.read_text(encoding="utf-8") if stated.is_file() else None
+    made = out.with_name("photo.face")
+    write_face(made, face_from_photo(source, consent=consent, on_warning=notes.append))
+    return _check_face(made, out) | {"notes": [note.replace(str(source), "the photo") for note in notes]}
 
 
 def _check_palette(source: Path, out: Path) -> dict[str, Any]:
@@ -232,6 +262,7 @@ _CHECKS: Mapping[str, Callable[[Path, Path], dict[str, Any]]] = {
     PALETTE: _check_palette,
     DICTIONARY: _check_dictionary,
     CHARACTER: _check_character,
+    PHOTO: _check_photo,
 }
 _DRAW: Mapping[str, Callable[[Path], "Image"]] = {TALKER: _draw_talker, FACE: _draw_face, PALETTE: _draw_palette}
 

@@ -75,6 +75,18 @@ def names(answer: httpx.Response) -> list[tuple[str, str | None]]:
     return [(one["name"], one["owner"]) for one in answer.json()["data"]]
 
 
+def test_photos_are_refused_where_the_operator_does_not_allow_them(ask: Ask) -> None:
+    content = io.BytesIO()
+    Image.new("RGB", (100, 100)).save(content, "PNG")
+    parts = {"data": {"name": "me", "consent": "I agree to this."}, "files": {"file": ("me.png", content.getvalue())}}
+    answer = ask("ann", "POST", "/v1/faces", **parts)
+    assert refusal(answer) == (403, "forbidden")
+    assert "its operator allows it with the setting photos" in answer.json()["error"]["message"]
+    words = form("names")
+    words["data"]["consent"] = "I agree."
+    assert refusal(ask("ann", "POST", "/v1/dictionaries", **words)) == (422, "invalid_request")
+
+
 def test_the_services_own_are_listed_and_shown(ask: Ask) -> None:
     assert names(ask("reader", "GET", "/v1/talkers")) == [("grid_s1", None)]
     shipped = ["ada", "ben", "head", "mara", "noor", "tomas", "zuri"]

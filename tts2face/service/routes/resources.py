@@ -12,7 +12,7 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import JSONResponse, Response
 from starlette.datastructures import FormData, UploadFile
 
-from tts2face.jobs.resource_check import DICTIONARY, RESOURCE_KINDS
+from tts2face.jobs.resource_check import DICTIONARY, FACE, N_MAGIC, RESOURCE_KINDS, is_picture
 from tts2face.jobs.resource_table import StoredResource
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.access.scopes import require_scope
@@ -32,7 +32,7 @@ from tts2face.service.uploads.upload_folder import upload_folder
 
 router = APIRouter(prefix="/v1", tags=["resources"])
 
-MAX_NAME = 40
+MAX_NAME, MAX_CONSENT = 40, 1000
 Name = Annotated[str, InPath(description="Its name.", max_length=MAX_NAME, examples=["head"])]
 Owner = Annotated[
     str | None, Query(description="With scope admin: the key that uploaded it.", max_length=200, examples=["studio"])
@@ -42,7 +42,7 @@ PICTURE_ANSWERS: dict[int | str, dict[str, Any]] = {
     304: {"description": "The picture has not changed."},
 }
 CONTENTS = {
-    "talker": "A .talker file.", "face": "A .face file, or a character: .glb or .vrm.",
+    "talker": "A .talker file.", "face": "A .face file, a character (.glb, .vrm), or a photo where it is allowed.",
     "palette": "A .palette file.", "dictionary": "A pronunciation dictionary, UTF-8 text.",
 }  # fmt: skip
 
@@ -108,6 +108,11 @@ def _form(kind: str) -> dict[str, Any]:
             "description": "Its name in requests: letters a-z, digits and hyphens.",
         },
     }  # fmt: skip
+    if kind == FACE:
+        fields["consent"] = {
+            "type": "string", "example": "I agree that my face speaks what this service is asked for.",
+            "description": "With a photo: the person's statement, kept in the face; drawn if it is nobody's.",
+        }  # fmt: skip
     schema = {"type": "object", "properties": fields, "required": ["file", "name"]}
     return {"required": True, "content": {"multipart/form-data": {"schema": schema}}}
 
@@ -159,24 +164,37 @@ async def _store(request: HttpRequest, kind: str) -> StoredResource:
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         raise RefusedError(422, "invalid_request", "send a form (multipart/form-data) with the parts file and name")
     async with AsyncExitStack() as stack:
-        form = await stack.enter_async_context(request.form(max_files=1, max_fields=2))
-        name, file = _read_form(form)
+        form = await stack.enter_async_context(request.form(max_files=1, max_fields=3))
+        name, file, consent = _read_form(form, kind)
+        if kind == FACE and not state.settings.photos:
+            await _refuse_photo(file)
         check_new_name(kind, name)
         await asyncio.to_thread(state.library.check_room, key, kind, name, file.size or 0)
         folder = await stack.enter_async_context(upload_folder(state.settings))
         await stack.enter_async_context(state.checks)
-        checked = await folder.resource(kind, file, state.library.limits(key).n_bytes)
+        checked = await folder.resource(kind, file, state.library.limits(key).n_bytes, consent)
         return await asyncio.to_thread(state.library.add, key, kind, name, checked)
 
 
-def _read_form(form: FormData) -> tuple[str, UploadFile]:
-    unknown = set(form) - {"file", "name"}
-    name, file = form.get("name"), form.get("file")
+def _read_form(form: FormData, kind: str) -> tuple[str, UploadFile, str | None]:
+    unknown = set(form) - {"file", "name"} - ({"consent"} if kind == FACE else set())
+    name, file, consent = form.get("name"), form.get("file"), form.get("consent")
     if unknown:
         raise RefusedError(422, "invalid_request", f"there is no part {min(unknown)[:40]!r}; send file and name")
     if not isinstance(name, str) or not isinstance(file, UploadFile):
         raise RefusedError(422, "invalid_request", "the form needs a part file, with a file name, and a part name")
-    return name, file
+    if consent is not None and (not isinstance(consent, str) or len(consent) > MAX_CONSENT):
+        raise RefusedError(422, "invalid_request", f"the part consent has up to {MAX_CONSENT} characters of text")
+    return name, file, consent
+
+
+async def _refuse_photo(file: UploadFile) -> None:
+    head = await file.read(N_MAGIC)
+    await file.seek(0)
+    if is_picture(head):
+        raise RefusedError(
+            403, "forbidden", "this service makes no faces of photos; its operator allows it with the setting photos"
+        )
 
 
 async def _picture(request: HttpRequest, path: Path) -> Response:

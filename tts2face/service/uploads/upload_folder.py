@@ -11,6 +11,7 @@ from pathlib import Path
 from starlette.datastructures import UploadFile
 
 from lexicon.inputs import parse_json
+from tts2face.jobs.resource_check import CONSENT
 from tts2face.limited_process import bare_environment
 from tts2face.service.errors import RefusedError
 from tts2face.service.settings import ServiceSettings
@@ -79,8 +80,10 @@ class UploadFolder:
         facts = parse_json(checked.read_text(), name)
         return given.rename(given.with_suffix(facts["suffix"])), float(facts["seconds"])
 
-    async def resource(self, kind: str, upload: UploadFile, max_bytes: float) -> Path:
+    async def resource(self, kind: str, upload: UploadFile, max_bytes: float, consent: str | None = None) -> Path:
         """Folder with a checked talker, face, palette or dictionary (`tts2face.jobs.resource_check`).
+
+        `consent` is the statement of the person in a photo that becomes a face.
 
         Raises
         ------
@@ -89,6 +92,8 @@ class UploadFolder:
         """
         given, checked = await self._save(kind, upload), self.path / "checked"
         checked.mkdir()
+        if consent is not None:
+            given.with_name(CONSENT).write_text(consent, encoding="utf-8")
         await decode_file((kind, given, checked, max_bytes), f"the {kind}", RESOURCE_TIMEOUT_S)
         return checked
 
