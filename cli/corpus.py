@@ -9,7 +9,7 @@ from cyclopts import App, Parameter
 
 from cli.flags import Cache, Jobs, Model, switch, whole_number
 from cli.landmark_model import Yes
-from cli.process import write_message
+from cli.process import ask, write_message
 from cli.progress import progress_bar, stage_bar
 from cli.prompts import prompts
 from cli.recording_check import check
@@ -115,7 +115,7 @@ def _request_consent(name: str, statement: str | None) -> Mapping[str, str]:
     from tts2face.models.consent import consent_record
 
     if statement is None and sys.stdin.isatty():
-        statement = input(f"The output will contain pictures of {name}'s face. Statement of consent: ")
+        statement = ask(f"The output will contain pictures of {name}'s face. Statement of consent:")
     return consent_record(name, statement)
 
 

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from typing import Annotated
 
 from cli.flags import END_OF_OPTIONS, switch
-from cli.process import write_message
+from cli.process import ask, write_message
 from lexicon.errors import BackendError
 
-YES = "--yes"
+YES, AGREED = "--yes", ("y", "yes")
 Yes = Annotated[bool, switch("Download the face landmark model without asking, if it is not installed.")]
 
 
@@ -29,11 +29,8 @@ def sets_up_model(arguments: Sequence[str]) -> bool:
     from tts2face.video.setup_models import SOURCE, set_up_model
 
     options = arguments[: arguments.index(END_OF_OPTIONS)] if END_OF_OPTIONS in arguments else arguments
-    if YES not in options and not (sys.stdin.isatty() and _agrees(f"Faces are found with {SOURCE}. Download it now?")):
+    question = f"Faces are found with {SOURCE}. Download it now? [y/N]"
+    if YES not in options and ask(question).lower() not in AGREED:
         return False
     write_message(f"face landmark model: {set_up_model()}")
     return True
-
-
-def _agrees(question: str) -> bool:
-    return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")

@@ -18,7 +18,7 @@ from cli.jobs import jobs, worker
 from cli.landmark_model import Yes, is_missing_model, sets_up_model
 from cli.lists import LISTS
 from cli.mimic import mimic
-from cli.photo import Consent, Photo, face_of_photo, refuse_face_beside
+from cli.photo import Consent, Photo, check_photo, face_of_photo, refuse_others
 from cli.process import (
     BROKEN_PIPE_CODE,
     INTERRUPTED,
@@ -144,14 +144,16 @@ def speak(  # noqa: PLR0913 - one parameter a flag
         raise InputError("the text is given twice, as an argument and as --text; remove one of them")
     options["gestures"] = _gesture_method(options.get("gestures"), noise=noise, none=no_gestures)
     needs_text = options.get("audio") is None and options.get("idle") is None
-    refuse_face_beside(photo, face, identity, hair or hair_color)
+    refuse_others(photo, consent, {"--face": face, "--identity": identity, "--hair": hair, "--hair-color": hair_color})
+    picture = options_from_flags(Picture, options)
+    if photo is not None:  # before a text is read: a command that has to set up the landmark model is run again
+        check_photo(photo, {"--out": out, "--explain": explain, **{one: one for one in export or ()}})
+        face = face_of_photo(photo, consent, quiet=quiet)
     from cli.speak import SpeakOptions, run_request
 
     request = options_from_flags(
         Request, options, text=_read_text(text if text_option is None else text_option, file, is_needed=needs_text)
     )
-    if photo is not None:
-        face = face_of_photo(photo, consent, quiet=quiet)
     speak_options = SpeakOptions(
         out,
         Models(talker, face or "", identity, palette, hair, hair_color),
@@ -161,7 +163,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
         file,
         tuple(export or ()),
     ).with_export_of_out()
-    run_request(request, options_from_flags(Picture, options), speak_options)
+    run_request(request, picture, speak_options)
 
 
 def _gesture_method(method: str | None, *, noise: bool, none: bool) -> str:

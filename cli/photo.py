@@ -1,14 +1,13 @@
 """``--photo``: the face of a photograph, asked for once and kept."""
 
 import functools
-import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from cli.process import write_message
+from cli.process import ask, write_message
 from lexicon.errors import InputError
 from tts2face.models.consent import consent_record
 
@@ -37,12 +36,10 @@ def face_of_photo(photo: str, consent: str | None, *, quiet: bool) -> str:
     BackendError
         The landmark model or a package is not installed.
     """
-    from tts2face.photo.kept_faces import keep_face, kept_face
+    from tts2face.photo.kept_faces import find_kept, keep_face
 
-    kept = kept_face(photo)
-    if consent is not None or not kept.is_file():
-        keep_face(make_face(photo, consent, quiet=quiet), kept)
-    return str(kept)
+    found = find_kept(photo, consent)
+    return str(found or keep_face(make_face(photo, consent, quiet=quiet), photo))
 
 
 def make_face(
@@ -72,8 +69,8 @@ def agreed(photo: str, consent: str | None, name: str | None) -> str | None:
     from tts2face.photo.photograph import split_number
 
     shown = name or split_number(photo)[0].stem
-    if consent is None and sys.stdin.isatty():
-        consent = input(f"The clips will show {shown} speaking. Statement of consent of the person (or: drawn): ")
+    if consent is None:
+        consent = ask(f"The clips will show {shown} speaking. Statement of consent of the person (or: drawn):") or None
     consent_record(shown, consent)  # before anything is downloaded
     return consent
 
@@ -88,8 +85,21 @@ def warner(*, quiet: bool) -> Callable[[str], None]:
     return warn
 
 
-def refuse_face_beside(photo: str | None, face: str | None, identity: str | None, hair: str | None) -> None:
-    """Refuse another face, an identity or a haircut beside a photo."""
-    for name, given in (("--face", face), ("--identity", identity), ("--hair", hair)):
+def refuse_others(photo: str | None, consent: str | None, others: Mapping[str, str | None]) -> None:
+    """Refuse other faces and hair, by their flags, beside a photo, and a consent without one."""
+    for name, given in others.items():
         if photo is not None and given is not None:
             raise InputError(f"--photo cannot be combined with {name}; remove one of them")
+    if photo is None and consent is not None:
+        raise InputError("--consent belongs to --photo; add the photo, or remove it")
+
+
+def check_photo(photo: str, outputs: Mapping[str, str | Path | None]) -> None:
+    """Refuse a photo that does not exist, no output, and outputs, by their flags, that would overwrite the photo."""
+    from tts2face.photo.photograph import split_number
+    from tts2face.storage.overwrite import refuse_overwriting
+
+    path, _ = split_number(photo)
+    if all(output is None for output in outputs.values()):
+        raise InputError("there is no output; add --out clip.mp4 (or .webm, .gif, or a folder for .png files)")
+    refuse_overwriting(outputs, {"--photo": path})

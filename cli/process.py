@@ -185,6 +185,15 @@ def discard_output(stream: TextIO | None = None) -> None:
         os.close(null_device)
 
 
+def ask(question: str) -> str:
+    """What a person at the terminal answers to a question on standard error; empty without a terminal or an answer."""
+    if not sys.stdin.isatty():
+        return ""
+    sys.stderr.write(f"{question} ")
+    sys.stderr.flush()
+    return sys.stdin.readline().strip()
+
+
 def write_message(message: str) -> None:
     """Write a line to standard error; it is lost where that cannot be written."""
     try:

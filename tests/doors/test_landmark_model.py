@@ -51,7 +51,7 @@ def test_nothing_is_downloaded_without_a_yes(
     photo: Path, downloads: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert run(command(photo, "--consent", "drawn")) != 0
-    assert "add --yes, or run `tts2face corpus setup`" in capsys.readouterr().err
+    assert "run `tts2face corpus setup`" in capsys.readouterr().err
     monkeypatch.setattr(sys, "stdin", Terminal("n\n"))
     assert run(command(photo, "--consent", "drawn")) != 0
     shown = capsys.readouterr()
@@ -82,8 +82,22 @@ def test_consent_is_asked_for_before_anything_is_downloaded(
 
 
 def test_a_photo_stands_alone(photo: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for other in (["--face", "ada"], ["--identity", "kofi"], ["--hair", "long"]):
+    for other in (["--face", "ada"], ["--identity", "kofi"], ["--hair", "long"], ["--hair-color", "red"]):
         assert run(["Hello.", "--photo", str(photo), *other, "--out", str(photo.with_suffix(".mp4"))]) != 0
-        assert "--photo cannot be combined with" in capsys.readouterr().err
+        assert f"--photo cannot be combined with {other[0]};" in capsys.readouterr().err
     assert run(["Hello.", "--photo", "nobody.jpg", "--out", str(photo.with_suffix(".mp4"))]) != 0
     assert "there is no photo nobody.jpg; check the path" in capsys.readouterr().err
+    assert run(["Hello.", "--consent", "I agree to this.", "--out", "me.mp4"]) != 0
+    assert "--consent belongs to --photo" in capsys.readouterr().err
+
+
+def test_a_photo_is_not_asked_about_in_vain(photo: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["Hello.", "--photo", str(photo), "--consent", "drawn"]) != 0
+    assert "there is no output" in capsys.readouterr().err
+    shown = photo.with_suffix(".gif")
+    with Image.open(photo) as picture:
+        picture.save(shown)
+    content = shown.read_bytes()
+    assert run(["Hello.", "--photo", str(shown), "--consent", "drawn", "--out", str(shown)]) != 0
+    assert "--photo" in capsys.readouterr().err
+    assert shown.read_bytes() == content

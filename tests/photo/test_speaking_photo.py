@@ -1,5 +1,6 @@
 """A picture of the shipped head, with the landmarks that it has there, speaks: at rest it is the picture itself."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import inner_lip_gaps, lip_opening
+from tts2face.photo.found_face import FoundFace
 from tts2face.photo.photo_surface import EYES, LIDS, SKIN
 from tts2face.photo.photograph import Photograph, split_number
 from tts2face.photo.speaking_photo import speaking_photo
@@ -196,11 +198,64 @@ def test_the_head_moves_within_what_the_picture_bears(face: Face) -> None:
     assert 0 < small[3] < 4
 
 
+def placed(side: int, corner: tuple[int, int], size: tuple[int, int]) -> tuple[Photograph, FoundFace]:
+    """A picture of a size in which the head has a side, with its left top corner at a place."""
+    across, down = corner
+    pixels = np.full((size[1], size[0], 3), (120, 130, 140), np.uint8)
+    shown = still(NAME, side)
+    rows, columns = slice(max(down, 0), down + side), slice(max(across, 0), across + side)
+    pixels[rows, columns] = shown[max(-down, 0) :, max(-across, 0) :][: size[1] - rows.start, : size[0] - columns.start]
+    found = found_in(NAME, side)
+    return Photograph(pixels, None, 1.0), replace(found, landmarks=found.landmarks + np.array([across, down, 0]))
+
+
+@pytest.mark.parametrize(
+    ("side", "corner", "size"),
+    [
+        (150, (1700, 900), (3840, 2160)),  # a small face in a large picture
+        (300, (-70, 20), (401, 351)),  # cut by the edge, in a picture of odd sides
+        (64, (0, 0), (64, 64)),
+    ],
+)
+def test_faces_anywhere_in_pictures_of_any_size_are_kept(
+    side: int, corner: tuple[int, int], size: tuple[int, int], tmp_path: Path
+) -> None:
+    picture, found = placed(side, corner, size)
+    made = speaking_photo(picture, found, 0.0, load_face("head", hair="bald"), {"name": "Ada"})
+    assert len(made.vertices) < 20_000
+    write_face(tmp_path / "me.face", made)
+    kept = read_face(tmp_path / "me.face")
+    shown = drawn(mesh_renderer(kept, Picture()))
+    even = [length - length % 2 for length in size]
+    assert shown.shape == (even[1], even[0], 3)
+    apart = np.abs(shown.astype(int) - picture.pixels[: even[1], : even[0]])
+    assert np.median(apart) <= 1  # pages are JPEG in files
+    assert apart.mean() < 2
+
+
+def test_pictures_do_not_depend_on_the_number_of_threads(face: Face) -> None:
+    session = Session(face=face)
+    clip = session.clip("Hello.", fps=10)
+    one, three = (
+        np.array(list(session.renderer(Picture(size="128x128")).frames(clip, threads=threads))) for threads in (1, 3)
+    )
+    np.testing.assert_array_equal(one, three)
+
+
+def test_an_export_shows_the_picture(face: Face, tmp_path: Path) -> None:
+    session = Session(face=face)
+    session.export("Hi.", [str(tmp_path / "me.glb")])
+    content = (tmp_path / "me.glb").read_bytes()
+    assert content.count(b"\xff\xd8\xff") == 2  # the picture and its eyes
+    assert b"photograph of Ada" in content
+
+
 def test_one_of_several_faces_is_named_after_the_file(tmp_path: Path) -> None:
     path = tmp_path / "me.jpg"
     path.touch()
     assert split_number(path) == (path, 1)
     assert split_number(f"{path}@2") == (path, 2)
+    assert split_number(f"{tmp_path}/./me.jpg@2") == (path, 2)
     odd = tmp_path / "me@2"
     odd.touch()
     assert split_number(odd) == (odd, 1)

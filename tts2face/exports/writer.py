@@ -10,6 +10,7 @@ from lexicon.errors import InputError
 from tts2face.clock import exact_rate
 from tts2face.exports.formats import FormatInfo, find_format, sound_name, split_format
 from tts2face.exports.parts import FormatWriter, FrameGrid, Target
+from tts2face.exports.rest_light import in_rest_light
 from tts2face.models.face import Face
 from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.output_names import check_name
@@ -78,7 +79,7 @@ class HasMesh(Protocol):
 
 
 def mesh_of(face: Face | HasMesh | None, files: Iterable[ExportFile]) -> Face | None:
-    """Mesh of a face if one of the files uses it, else None.
+    """Mesh of a face if one of the files uses it, else None; that of a photograph with its picture for textures.
 
     Raises
     ------
@@ -86,8 +87,10 @@ def mesh_of(face: Face | HasMesh | None, files: Iterable[ExportFile]) -> Face | 
         The face is a talker's own face, which has no mesh.
     """
     if face is None or isinstance(face, Face) or not any(file.format.uses_face for file in files):
-        return face if isinstance(face, Face) else None
-    return face.mesh
+        mesh = face if isinstance(face, Face) else None
+    else:
+        mesh = face.mesh
+    return mesh if mesh is None or mesh.photograph is None else in_rest_light(mesh)[0]
 
 
 def _check_path(path: Path) -> None:

@@ -43,7 +43,7 @@ BOXED_PICTURES = (
     (4, b"ftyp", b"mif1"),
 )  # offset, box, kind
 N_MAGIC = 12  # bytes by which a picture is told
-CONSENT = "consent.txt"  # beside a photo: what the person shown has stated
+STATEMENT = "statement.json"  # beside a photo: the name of the face, and what the person shown has stated
 
 
 def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> None:
@@ -52,7 +52,7 @@ def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> N
     Parameters
     ----------
     kind
-        One of `RESOURCE_KINDS`. Characters (.glb, .vrm) and photos, which have a file `CONSENT` beside them, become
+        One of `RESOURCE_KINDS`. Characters (.glb, .vrm) and photos, which have a file `STATEMENT` beside them, become
         faces.
     max_bytes
         Largest size of the written content.
@@ -76,7 +76,14 @@ def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> N
         raise RefusedFileError(_sentence(error, source, folder)) from error
     except MemoryError as error:
         raise RefusedFileError("it needs too much memory") from error
-    except (ValueError, TypeError, KeyError, IndexError, ArithmeticError) as error:  # valid in form, but not usable
+    except (
+        ValueError,
+        TypeError,
+        KeyError,
+        IndexError,
+        ArithmeticError,
+        EOFError,
+    ) as error:  # valid in form, but not usable
         raise RefusedFileError(f"it is no {kind} that works ({type(error).__name__})") from error
     if (folder / CONTENT).stat().st_size > max_bytes:
         raise RefusedFileError(f"it has more than {max_bytes / 1e6:g} MB as a {kind}")
@@ -134,6 +141,8 @@ def _check_face(source: Path, out: Path) -> dict[str, Any]:
 
     _rewrite(source, out, FACE, face_file.FORMAT_VERSION)
     face = face_file.read_face(out)
+    if face.photograph is not None and "consent" not in face.metadata:
+        raise DataError("it shows a person's photograph, but states no consent; make it with --consent")
     for identity in describe_face(out).identities:
         face_file.read_face(out, identity)
     return _without_name(asdict(describe_face(out))) | {"licence": str(face.metadata.get("licence", "not stated"))}
@@ -154,13 +163,15 @@ def _check_character(source: Path, out: Path) -> dict[str, Any]:
 
 def _check_photo(source: Path, out: Path) -> dict[str, Any]:
     """Make a face that speaks in a photo."""
+    from lexicon.inputs import parse_json, read_text
     from tts2face.models.face_file import write_face
     from tts2face.photo.face_from_photo import face_from_photo
 
-    stated, notes = source.with_name(CONSENT), list[str]()
-    consent = stated.read_text(encoding="utf-8") if stated.is_file() else None
+    notes: list[str] = []
+    stated = parse_json(read_text(source.with_name(STATEMENT)), STATEMENT)
     made = out.with_name("photo.face")
-    write_face(made, face_from_photo(source, consent=consent, on_warning=notes.append))
+    face = face_from_photo(source, consent=stated["consent"], name=stated["name"], on_warning=notes.append)
+    write_face(made, face)
     return _check_face(made, out) | {"notes": [note.replace(str(source), "the photo") for note in notes]}
 
 
@@ -290,6 +301,12 @@ def _bounded(value: Any) -> Any:
 def _sentence(error: Exception, source: Path, folder: Path) -> str:
     """The message of an error without paths of this machine."""
     text = " ".join(str(error).split())
-    for path in (source, folder / CONTENT, source.with_name("character.glb"), folder / "imported.face"):
+    for path in (
+        source,
+        folder / CONTENT,
+        source.with_name("character.glb"),
+        folder / "imported.face",
+        folder / "photo.face",
+    ):
         text = text.replace(f"{path}: ", "").replace(str(path), "it")
     return text

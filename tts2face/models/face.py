@@ -191,8 +191,8 @@ class Face:
 
     @property
     def synthetic_notice(self) -> str:
-        """Comment for files that show the face; empty unless it is the likeness of a real person."""
-        if "consent" not in self.metadata:
+        """Comment for files that show the face; empty unless it is the likeness of a real person, or a photograph."""
+        if "consent" not in self.metadata and self.photograph is None:
             return ""
         notice = SYNTHETIC_NOTICE if self.photograph is None else PHOTO_NOTICE
         return notice.format(name=self.metadata.get("name", "a person"))

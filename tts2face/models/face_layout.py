@@ -171,6 +171,7 @@ def _check_photograph(contents: Contents) -> None:
     if PHOTOGRAPH in header:
         _PHOTOGRAPH(header[PHOTOGRAPH], f"{contents.path}: metadata: {PHOTOGRAPH}")
         contents.require(LIGHT in arrays, "has a photograph, but no light")
+        contents.require(header[PHOTOGRAPH]["lens"][0] > 0, "has a photograph without a focal length")
 
 
 def texture_number(part: Mapping[str, Any]) -> int:

@@ -15,7 +15,7 @@ from tts2face.video.track import MIN_CONTRAST, MIN_SCORE, Crop, FaceTracker, cro
 
 CROP_STEP = 0.02  # between the nine crops from which landmarks are read, of the side of the crop
 MAX_YAW_DEG, DOUBTFUL_YAW_DEG = 40.0, 25.0
-MAX_PITCH_DEG = 35.0
+MAX_PITCH_DEG, MAX_ROLL_DEG = 35.0, 60.0
 MIN_FACE_PX, BLURRED_FACE_PX = 40.0, 90.0  # width of the oval of the face in pixels of the file
 MAX_SPREAD = 0.012  # of landmarks over the crops, of the eye distance; .003 to .006 from the front, .010 at 45 degrees
 CLOSED_EYES = 0.16  # height over width of an eye; open ones have .28 to .50, shut ones .08
@@ -151,7 +151,9 @@ def _read(pixels: NDArray[np.uint8], tracker: FaceTracker, crop: Crop, n_faces: 
 
 
 def _check(found: FoundFace, shape: tuple[int, ...], name: str, reduced_by: float) -> None:
-    pitch, yaw, _ = found.angles_deg
+    pitch, yaw, roll = found.angles_deg
+    if abs(roll) > MAX_ROLL_DEG:
+        raise DataError(f"the face in {name} lies {abs(roll):.0f} degrees on its side; turn the picture upright")
     if abs(yaw) > MAX_YAW_DEG:
         raise DataError(
             f"the face in {name} is turned {abs(yaw):.0f} degrees to the side; give a picture that is turned less than "

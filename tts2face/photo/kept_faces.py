@@ -1,29 +1,59 @@
 """Faces of photos in the user's cache folder, with their consent, so that each is made and asked for once."""
 
 import hashlib
+import os
+import time
+from contextlib import suppress
 from pathlib import Path
 
+from lexicon.errors import DataError, InputError
+from tts2face import __version__
 from tts2face.models.face import Face
-from tts2face.models.face_file import write_face
+from tts2face.models.face_file import FORMAT_VERSION, KIND, read_face, write_face
 from tts2face.photo.photograph import split_number
 from tts2face.storage.user_folders import user_cache
 
 FOLDER, N_KEPT = "photos", 8
-VERSION = "1"  # of how they are made
+LEAST_AGE_S = 3600.0  # of a face that is removed: another process may be about to read a younger one
+MAKING = "1"  # raised when faces of photos are made in another way
 
 
-def kept_face(photo: str | Path) -> Path:
-    """Where `keep_face` keeps the face of a photo, by the content of the file."""
+def kept_path(photo: str | Path) -> Path:
+    """Where the face of a photo is kept: by the content and the name of the file, and what made it."""
     path, number = split_number(photo)
     content = hashlib.sha256(path.read_bytes())
-    content.update(f"{VERSION} {number}".encode())
-    return user_cache() / FOLDER / f"{content.hexdigest()[:32]}.face"
+    content.update(f"{__version__} {FORMAT_VERSION} {MAKING} {number} {path.stem}".encode())
+    return user_cache() / FOLDER / f"{content.hexdigest()[:32]}.{KIND}"
 
 
-def keep_face(face: Face, kept: Path) -> None:
-    """Keep the face of a photo in the user's cache folder; the last ones are kept."""
-    kept.parent.mkdir(parents=True, exist_ok=True)
+def find_kept(photo: str | Path, consent: str | None) -> Path | None:
+    """The kept face of a photo, if one can be read and has the statement of consent that is given, if any."""
+    kept = kept_path(photo)
+    with suppress(InputError, DataError, OSError):
+        stated = read_face(kept).metadata["consent"]["statement"]
+        if consent is None or consent.strip() == stated:
+            os.utime(kept)  # the last ones used are kept
+            return kept
+    return None
+
+
+def keep_face(face: Face, photo: str | Path) -> Path:
+    """Keep the face of a photo; where it is.
+
+    Raises
+    ------
+    BackendError
+        The cache folder cannot be written.
+    """
+    kept = kept_path(photo)
+    with suppress(OSError):
+        kept.parent.mkdir(parents=True, exist_ok=True)
     write_face(kept, face)
-    others = sorted(kept.parent.glob("*.face"), key=lambda path: path.stat().st_mtime)
-    for path in others[:-N_KEPT]:
-        path.unlink(missing_ok=True)
+    ages = {}
+    for path in kept.parent.glob(f"*.{KIND}"):
+        with suppress(OSError):
+            ages[path] = time.time() - path.stat().st_mtime
+    for path in sorted(ages, key=lambda path: ages[path])[N_KEPT:]:
+        if ages[path] > LEAST_AGE_S:
+            path.unlink(missing_ok=True)
+    return kept

@@ -27,6 +27,7 @@ LIGHT_FROM = np.array([0.1, 0.35, 0.93])
 CHEEKS = (50, 280, 205, 425, 101, 330)
 LIP_RED = (15, 16, 86, 316, 12)
 TEETH_LIMITS = (0.06, 0.75)  # of the luminance of teeth
+LEAST_LIGHT = 1e-3  # of any colour that is measured, so that black has a hue
 LUMINANCE = np.array([0.21, 0.72, 0.07])
 WALL_MM = (0.0, 2.5, 8.0, 22.0)  # depth of the rings of the wall behind the lips
 WALL_OUT_MM = (0.0, 0.8, 5.0, 7.0)  # and how much wider than the opening they are
@@ -81,7 +82,7 @@ def mouth_light(pixels: NDArray[np.uint8], landmarks: Floats, sclera: Floats, *,
     skin, lips = (
         _median(pixels, landmarks[list(numbers), :2], reach) for numbers, reach in ((CHEEKS, 3), (LIP_RED, 1))
     )
-    white = decode_srgb(sclera / 255)
+    white = np.maximum(decode_srgb(sclera / 255), LEAST_LIGHT)
     bright = float(np.clip(max(1.05 * (skin @ LUMINANCE), white @ LUMINANCE), *TEETH_LIMITS))
     warm, warm_skin = (white / (white @ LUMINANCE)) ** 0.6, (skin / (skin @ LUMINANCE)) ** 0.35
     tint = 0.75 * warm + 0.25 * warm_skin
@@ -92,10 +93,10 @@ def _median(pixels: NDArray[np.uint8], places: Floats, reach: int) -> Floats:
     """Median linear light (3,) of the pixels around places (N, 2)."""
     found = []
     for across, down in np.rint(places).astype(int):
-        part = pixels[max(down - reach, 0) : down + reach + 1, max(across - reach, 0) : across + reach + 1]
-        found.append(part.reshape(-1, 3))
+        rows, columns = (slice(max(at - reach, 0), max(at + reach + 1, 0)) for at in (down, across))
+        found.append(pixels[rows, columns].reshape(-1, 3))
     every = np.concatenate(found)
-    return decode_srgb(np.median(every if len(every) else pixels.reshape(-1, 3), axis=0) / 255)
+    return np.maximum(decode_srgb(np.median(every if len(every) else pixels.reshape(-1, 3), axis=0) / 255), LEAST_LIGHT)
 
 
 def _colours(head: Face, used: Ints, parts: dict[str, Ints], vertices: Floats, light: MouthLight) -> Floats:

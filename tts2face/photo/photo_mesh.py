@@ -26,6 +26,7 @@ from tts2face.photo.lip_line import LipLine
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+Frame = tuple[Floats, Floats]
 
 LIP_RINGS = (
     (62, 183, 42, 41, 38, 12, 268, 271, 272, 407, 292),
@@ -38,6 +39,8 @@ PART_REACH = 0.5  # over which that fades
 LEAST_DISTANCE = 0.011  # of a landmark from lips and lids
 GRIDS = ((0.035, -np.inf, 0.15), (0.075, 0.15, 0.8), (0.16, 0.8, np.inf))  # step, from and to what way from the face
 GRID_CLEAR = 0.55  # of its step, which a point of a grid keeps from all others
+ROW_STEP = 0.87  # between the rows of a grid, of its step
+MOST_REACH = 4.0  # of what moves from the oval of the face, of the eye distance
 EDGE_PX = 2.0  # from the picture's edge, which landmarks keep
 
 
@@ -66,7 +69,9 @@ class PhotoMesh:
     outside : (V,)
         Way to the oval of the face, less than 0 in it, pixels.
     border
-        Vertices at the edges of the picture.
+        Vertices at the edges of the mesh.
+    frame
+        Least and greatest (2,) pixel of the mesh: what may move of the picture.
     """
 
     places: Floats
@@ -83,6 +88,7 @@ class PhotoMesh:
     landmark_vertices: Ints
     outside: Floats
     border: Ints
+    frame: Frame
 
 
 def build_mesh(size: tuple[int, int], landmarks: Floats, lips: LipLine, lids: LidLines, scale: float) -> PhotoMesh:
@@ -109,9 +115,10 @@ def build_mesh(size: tuple[int, int], landmarks: Floats, lips: LipLine, lids: Li
     landmark_vertices = points.add(landmarks[used])
     known = points.every
     oval = landmarks[list(FACE_OVAL), :2]
-    grid = np.concatenate([*_grids(size, oval, known[:, :2], scale)])
+    frame = _frame(size, oval, scale)
+    grid = np.concatenate([*_grids(frame, oval, known[:, :2], scale)])
     grid = grid[~np.any([points_in_polygon(grid, polygon) for polygon in (*openings, *bands)], axis=0)]
-    border = _border(size, scale)
+    border = _border(frame, scale)
     places = np.concatenate([known[:, :2], grid, border])
     parted = mouth.part(places, np.zeros(len(places)))
     for line, side in ((upper_lip, -1.0), (lower_lip, 1.0)):
@@ -143,6 +150,7 @@ def build_mesh(size: tuple[int, int], landmarks: Floats, lips: LipLine, lids: Li
         landmark_vertices=landmark_vertices,
         outside=way_outside(places, oval),
         border=len(known) + len(grid) + np.arange(len(border)),
+        frame=frame,
     )
 
 
@@ -250,30 +258,37 @@ def way_outside(places: Floats, oval: Floats) -> Floats:
     return signed
 
 
-def _grids(size: tuple[int, int], oval: Floats, near: Floats, scale: float) -> Iterator[Floats]:
+def _frame(size: tuple[int, int], oval: Floats, scale: float) -> Frame:
+    """What may move of a picture (width, height) around the oval of a face."""
+    low = np.maximum(oval.min(axis=0) - MOST_REACH * scale, -0.5)
+    high = np.minimum(oval.max(axis=0) + MOST_REACH * scale, np.array(size) - 0.5)
+    return low, high
+
+
+def _grids(frame: Frame, oval: Floats, near: Floats, scale: float) -> Iterator[Floats]:
     tree = cKDTree(near)
     for share, first, last in GRIDS:
-        step = share * scale
+        step, reach = share * scale, min(last, MOST_REACH) * scale
+        low, high = np.maximum(frame[0], oval.min(axis=0) - reach), np.minimum(frame[1], oval.max(axis=0) + reach)
         across, down = np.meshgrid(
-            np.arange(0.7 * step, size[0] - step / 2, step), np.arange(0.7 * step, size[1] - step / 2, 0.87 * step)
+            np.arange(low[0] + 0.7 * step, high[0] - step / 2, step),
+            np.arange(low[1] + 0.7 * step, high[1] - step / 2, ROW_STEP * step),
         )
         across[1::2] += step / 2
         places = np.column_stack([across.ravel(), down.ravel()])
-        places = places[places[:, 0] < size[0] - EDGE_PX]
+        places = places[places[:, 0] < high[0] - step / 4]
         way = way_outside(places, oval)
         places = places[(way >= first * scale) & (way < last * scale)]
         yield places[tree.query(places)[0] > GRID_CLEAR * step] if len(places) else places
 
 
-def _border(size: tuple[int, int], scale: float) -> Floats:
+def _border(frame: Frame, scale: float) -> Floats:
     step = GRIDS[-1][0] * scale
-    across, down = (np.linspace(-0.5, side - 0.5, max(8, int(side / step))) for side in size)
-    top, left = (
-        np.column_stack([across, np.full(len(across), -0.5)]),
-        np.column_stack([np.full(len(down), -0.5), down]),
-    )
-    shift = np.array(size, np.float64)
-    return np.concatenate([top, top + shift * (0, 1), left[1:-1], left[1:-1] + shift * (1, 0)])
+    (left, top), (right, bottom) = frame
+    across, down = (np.linspace(a, b, max(8, int((b - a) / step))) for a, b in ((left, right), (top, bottom)))
+    rows = [np.column_stack([across, np.full(len(across), edge)]) for edge in (top, bottom)]
+    columns = [np.column_stack([np.full(len(down), edge), down])[1:-1] for edge in (left, right)]
+    return np.concatenate([*rows, *columns])
 
 
 def _triangles(places: Floats, slits: Sequence[tuple[Ints, Ints]]) -> Ints:

@@ -51,13 +51,14 @@ PARTED = 0.03  # of the eye distance: a gap of lips that do not touch
 LIP_STILL = 0.34  # of the eye distance from the mouth, beyond which closing lips move nothing
 BREATH_MM = 3.0  # rise of the shoulders
 SHOULDERS = (0.1, 0.9)  # below the chin, of the eye distance, over which they begin
+BELOW_SHOULDERS = (2.0, 3.6)  # over which their rise fades downwards
 BESIDE_SHOULDERS = (1.2, 2.0)  # from the middle of the face, of its width, over which they end
 NECK_FADE = (-0.05, 0.95)  # below the chin, of the eye distance, over which skin stops following the head
 HEAD_ELLIPSE = (0.66, 0.78, 0.66)  # half axes of the head: of the face's width to the side, of its height up and down
 HEAD_MIDDLE = 0.14  # of the height of the face above its middle
 HEAD_FADE = (1.0, 1.75)  # half axes over which the background stops following the head
 BESIDE_NECK = (0.35, 0.75)  # of the face's width
-EDGE_FADE = 0.25  # of the eye distance, over which nothing moves at the edges of the picture
+EDGE_STILL_PX, EDGE_FADE = 0.5, 0.25  # at the edges of the mesh: pixels that never move; of the eye distance beyond
 DEPTH_PULL, RIM_DEPTH_PULL = 0.015, 0.001  # towards known depths, and those at the oval of the face
 BACKGROUND_DEPTH, BEYOND_DEPTH = 0.12, 0.05  # of the background before the pivot, and what may lie beyond it
 
@@ -233,9 +234,10 @@ def head_follow(mesh: PhotoMesh, person: PhotoPerson) -> Floats:
 
 
 def edge_share(mesh: PhotoMesh, person: PhotoPerson) -> Floats:
-    """(V,) 1 in the picture, falling to 0 at its edges."""
-    far = np.array(person.size) - 1 - mesh.places
-    return smoothstep(np.minimum(mesh.places, far).min(axis=1) / person.scale, 0.0, EDGE_FADE)
+    """(V,) 1 in what may move of the picture, falling to 0 at its edges."""
+    low, high = mesh.frame
+    inside = np.minimum(mesh.places - low, high - mesh.places).min(axis=1)
+    return smoothstep(np.maximum(inside - EDGE_STILL_PX, 0.0) / person.scale, 0.0, EDGE_FADE)
 
 
 def breathing(mesh: PhotoMesh, person: PhotoPerson, follow: Floats, px_per_mm: float) -> Floats:
@@ -243,7 +245,8 @@ def breathing(mesh: PhotoMesh, person: PhotoPerson, follow: Floats, px_per_mm: f
     region = HeadRegion.of(person.landmarks)
     below = (mesh.places - region.chin) @ region.down / person.scale
     aside = np.abs((mesh.places - region.middle) @ region.across) / region.width
-    share = smoothstep(below, *SHOULDERS) * (1 - follow) * (1 - smoothstep(aside, *BESIDE_SHOULDERS))
+    share = smoothstep(below, *SHOULDERS) * (1 - smoothstep(below, *BELOW_SHOULDERS))
+    share *= (1 - follow) * (1 - smoothstep(aside, *BESIDE_SHOULDERS))
     rise = BREATH_MM * px_per_mm * np.append(-region.down, 0.0)
     found: Floats = (share * edge_share(mesh, person))[:, None] * rise
     return found

@@ -77,7 +77,7 @@ def read_photograph(path: Path) -> Photograph:
             )
         if min(width, height) < MIN_SIDE_PX:
             raise DataError(
-                f"the photo {path} has {width} x {height} pixels; a face needs at least {MIN_SIDE_PX} along each side"
+                f"the photo {path} has {width} x {height} pixels; give one with at least {MIN_SIDE_PX} along each side"
             )
         file.draft(
             None, (KEPT_WIDTH, KEPT_WIDTH)
@@ -166,10 +166,10 @@ def _in_srgb(picture: "Picture", profile: bytes | None) -> "Picture":
 
 def split_number(photo: str | Path) -> tuple[Path, int]:
     """Path of a photo, and which of its faces: ``photo.jpg@2`` is the second largest one."""
-    path = Path(photo)
+    path, number = Path(photo), 1
     match = NUMBERED.fullmatch(str(photo))
     if match is not None and not path.exists():
-        path = Path(match[1])
+        path, number = Path(match[1]), int(match[2])
     if not path.is_file():
         raise InputError(f"there is no photo {path}; check the path")
-    return path, int(match[2]) if match is not None and str(path) == match[1] else 1
+    return path, number

@@ -78,7 +78,7 @@ def photo_crop(camera: CameraView, face: Face, size: tuple[int, int]) -> tuple[f
             "0,0,800"
         )
     wide, high = view.size
-    part = min(wide / size[0], high / size[1])
+    part = _own_pixels(view.size, size) or min(wide / size[0], high / size[1])
     low, top = _in_photo(face, view)
     if camera.share < 1:
         part = min(part, float((top - low).max()) / camera.share / min(size))
@@ -88,6 +88,13 @@ def photo_crop(camera: CameraView, face: Face, size: tuple[int, int]) -> tuple[f
     middle = np.clip((low + top) / 2, half, np.maximum(np.array([wide, high]) - half, half))
     left, above, right, below = (float(edge) for edge in (*(middle - half), *(middle + half)))
     return left, above, right, below
+
+
+def _own_pixels(photo: tuple[int, int], size: tuple[int, int]) -> float | None:
+    """Pixels of a photograph a sample, for a picture in its own size but for an odd row or column; None for others."""
+    samples = max(round(size[0] / photo[0]), 1)
+    is_own = all(0 <= own * samples - side < 2 * samples for own, side in zip(photo, size, strict=True))
+    return 1 / samples if is_own else None
 
 
 def _in_photo(face: Face, view: PhotoView) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -42,15 +42,24 @@ class MarkedRenderer:
         return self._marked(self.renderer.frame(clip, number))
 
     def _marked(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        height, width = self.label.shape
-        marked = pixels.copy()
-        part = marked[-height:, -width:]
-        brightness = PAPER + (INK - PAPER) * self.label[..., None]
-        opacity = np.maximum(self.label, SHADE)[..., None]
-        part[..., :3] = np.rint(part[..., :3] * (1 - opacity) + brightness * opacity).astype(np.uint8)
-        if pixels.shape[2] == 4:
-            part[..., 3] = np.maximum(part[..., 3], np.rint(255 * opacity[..., 0])).astype(np.uint8)
-        return marked
+        return _with_label(pixels, self.label)
+
+
+def mark_picture(pixels: NDArray[np.uint8], picture: Picture) -> NDArray[np.uint8]:
+    """A picture (H, W, 3 or 4), with the label where it shall have it."""
+    return _with_label(pixels, _label(*pixels.shape[1::-1])) if picture.visible_mark else pixels
+
+
+def _with_label(pixels: NDArray[np.uint8], label: NDArray[np.float32]) -> NDArray[np.uint8]:
+    height, width = label.shape
+    marked = pixels.copy()
+    part = marked[-height:, -width:]
+    brightness = PAPER + (INK - PAPER) * label[..., None]
+    opacity = np.maximum(label, SHADE)[..., None]
+    part[..., :3] = np.rint(part[..., :3] * (1 - opacity) + brightness * opacity).astype(np.uint8)
+    if pixels.shape[2] == 4:
+        part[..., 3] = np.maximum(part[..., 3], np.rint(255 * opacity[..., 0])).astype(np.uint8)
+    return marked
 
 
 def marked(renderer: FrameRenderer) -> FrameRenderer:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError
+from lexicon.errors import BackendError, InputError
 from tts2face.models.face import Face
 from tts2face.render.camera import CameraMatrices, camera_matrices
 from tts2face.render.picture import Picture, parse_background
@@ -37,9 +37,13 @@ def show_clip(clip: Clip, face: Face, picture: Picture) -> None:
 
     Raises
     ------
+    InputError
+        The face is that of a photograph.
     BackendError
         pyvista is not installed, or there is no display or no GL for it.
     """
+    if face.photograph is not None:
+        raise InputError("--view shows heads; write a file of a photograph with --out clip.mp4")
     require_display("--view")
     player = ClipPlayer(clip, face, picture)
     try:

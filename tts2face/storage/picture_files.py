@@ -55,7 +55,7 @@ def open_picture(
                 yield picture
     except too_large as error:
         raise DataError(f"{name} is too large; {limit}") from error
-    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
+    except (UnidentifiedImageError, OSError, EOFError, SyntaxError, ValueError) as error:
         if isinstance(error, DataError):
             raise
         raise DataError(f"cannot read {name}; {advice}") from error

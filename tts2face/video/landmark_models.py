@@ -58,7 +58,7 @@ def find_bundle(path: Path | None = None) -> Path:
         if is_bundle(candidate):
             return candidate
     raise MissingModelError(
-        "face tracking needs the landmark models, which are not installed: add --yes, or run `tts2face corpus setup`"
+        "face tracking needs the landmark models, which are not installed: run `tts2face corpus setup`"
     )
 
 

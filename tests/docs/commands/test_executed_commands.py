@@ -26,6 +26,7 @@ from tts2face import Picture, Project, Request, export, import_face, save_face, 
 from tts2face.jobs.database import prepare_database
 from tts2face.models.face_loading import load_face
 from tts2face.models.palette import Palette, load_palette, write_palette
+from tts2face.photo import kept_faces
 from tts2face.render.draw import draw
 from tts2face.storage.files import SHIPPED_FOLDER
 
@@ -113,6 +114,7 @@ def here(inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     if importlib.util.find_spec("dbos"):
         prepare_database(f"sqlite:///{tmp_path / 'jobs.sqlite'}")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(kept_faces, "user_cache", lambda: tmp_path / "cache")
     return tmp_path
 
 

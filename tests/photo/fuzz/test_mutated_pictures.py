@@ -11,12 +11,14 @@ from lexicon.errors import DataError
 from tts2face.photo.photograph import read_photograph
 
 N_FILES = 100  # of each format
-FORMATS = ("JPEG", "PNG", "WEBP", "TIFF", "GIF")
+FORMATS = ("JPEG", "PNG", "WEBP", "TIFF", "GIF", "BMP", "HEIF")
 
 
 @pytest.mark.parametrize("kind", FORMATS)
 def test_mutated_pictures_never_crash(tmp_path: Path, kind: str) -> None:
     rng = np.random.default_rng(FORMATS.index(kind))
+    if kind == "HEIF":
+        pytest.importorskip("pillow_heif").register_heif_opener()
     content = io.BytesIO()
     exif = Image.Exif()
     exif[0x0112] = 6

@@ -19,7 +19,7 @@ from tests.characters.made import write_character_file
 from tests.model_files.made import write_made_models, write_made_talker
 from tests.photo.pictures import still
 from tts2face.characters.binding import KEY
-from tts2face.jobs.resource_check import CONSENT, draw_resource, is_picture
+from tts2face.jobs.resource_check import STATEMENT, draw_resource, is_picture
 from tts2face.models.face_file import read_face
 from tts2face.service.uploads.decode_process import REFUSED
 from tts2face.storage.files import find_file
@@ -130,16 +130,18 @@ def test_pictures_are_told_by_their_first_bytes(form: str, files: dict[str, Path
 @pytest.mark.usefixtures("face_model")
 def test_a_photo_becomes_a_face_that_keeps_the_consent(tmp_path: Path) -> None:
     Image.fromarray(still("tomas", 320)).save(tmp_path / "photo.jpg")
+    (tmp_path / STATEMENT).write_text('{"name": "tom", "consent": null}')
     code, message, _ = check("face", tmp_path / "photo.jpg", tmp_path)
     assert code == REFUSED
     assert "state the consent" in message
     (tmp_path / "checked").rmdir()
-    (tmp_path / CONSENT).write_text("I agree to this.")
+    (tmp_path / STATEMENT).write_text('{"name": "tom", "consent": "I agree to this."}')
     code, message, checked = check("face", tmp_path / "photo.jpg", tmp_path)
     assert (code, message) == (0, "")
     face = read_face(checked / "content")
     assert face.photograph is not None
     assert face.metadata["consent"]["statement"] == "I agree to this."
+    assert face.metadata["name"] == "tom"
     with Image.open(checked / "picture.png") as picture:
         assert np.asarray(picture).std() > 30
 
@@ -147,7 +149,7 @@ def test_a_photo_becomes_a_face_that_keeps_the_consent(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("face_model")
 def test_a_picture_without_a_face_is_refused(tmp_path: Path) -> None:
     Image.fromarray(np.full((200, 200, 3), 90, np.uint8)).save(tmp_path / "wall.png")
-    (tmp_path / CONSENT).write_text("drawn")
+    (tmp_path / STATEMENT).write_text('{"name": "wall", "consent": "drawn"}')
     code, message, _ = check("face", tmp_path / "wall.png", tmp_path)
     assert code == REFUSED
     assert "there is no face in" in message

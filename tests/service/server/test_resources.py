@@ -81,7 +81,7 @@ def test_photos_are_refused_where_the_operator_does_not_allow_them(ask: Ask) -> 
     parts = {"data": {"name": "me", "consent": "I agree to this."}, "files": {"file": ("me.png", content.getvalue())}}
     answer = ask("ann", "POST", "/v1/faces", **parts)
     assert refusal(answer) == (403, "forbidden")
-    assert "its operator allows it with the setting photos" in answer.json()["error"]["message"]
+    assert "its operator allows them with the setting photos" in answer.json()["error"]["message"]
     words = form("names")
     words["data"]["consent"] = "I agree."
     assert refusal(ask("ann", "POST", "/v1/dictionaries", **words)) == (422, "invalid_request")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import InputError
+from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face, PhotoView
 from tts2face.render.camera import photo_crop
 from tts2face.render.film.scene import LitScene, build_lit_scene
@@ -21,7 +21,7 @@ def build_photo_scene(face: Face, view: PhotoView, picture: Picture) -> LitScene
     InputError
         The camera does not see the face from where it was taken, or an opaque picture shall have another background.
     DataError
-        The background image cannot be read.
+        The background image cannot be read, or the photograph does not fit its view.
     """
     if picture.renderer == PYVISTA:
         raise InputError("a photograph is drawn by the renderer numba; remove --renderer pyvista")
@@ -32,6 +32,8 @@ def build_photo_scene(face: Face, view: PhotoView, picture: Picture) -> LitScene
         )
     if picture.size == AUTO_SIZE:
         picture = replace(picture, size=_own_size(view))
+    if face.light[0].backdrop.shape[1::-1] != view.size:
+        raise DataError("the photograph of the face has another size than its view; make or copy the face again")
     size = (picture.width, picture.height)
     crop = photo_crop(picture.view, face, size)
     shown = _resized(face.light[0].backdrop, size, crop)

@@ -2,7 +2,9 @@
 
 import asyncio
 import hashlib
-from contextlib import AsyncExitStack
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,8 +14,10 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import JSONResponse, Response
 from starlette.datastructures import FormData, UploadFile
 
-from tts2face.jobs.resource_check import DICTIONARY, FACE, N_MAGIC, RESOURCE_KINDS, is_picture
+from tts2face.jobs.resource_check import CONTENT, DICTIONARY, FACE, N_MAGIC, RESOURCE_KINDS, is_picture
 from tts2face.jobs.resource_table import StoredResource
+from tts2face.models.face_file import FORMAT_VERSION
+from tts2face.models.face_layout import PHOTOGRAPH
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.access.scopes import require_scope
 from tts2face.service.errors import RefusedError
@@ -26,13 +30,16 @@ from tts2face.service.routes.resource_models import (
     shipped_resource,
     uploaded_resource,
 )
+from tts2face.service.state import ServiceState
 from tts2face.service.uploads.library import check_new_name, describe_shipped, plural, shipped_names
 from tts2face.service.uploads.shipped_pictures import shipped_picture
-from tts2face.service.uploads.upload_folder import upload_folder
+from tts2face.service.uploads.upload_folder import save_upload, upload_folder
+from tts2face.storage.tensors import read_metadata
 
 router = APIRouter(prefix="/v1", tags=["resources"])
 
 MAX_NAME, MAX_CONSENT = 40, 1000
+NO_PHOTOS = "this service has no faces of photos; its operator allows them with the setting photos"
 Name = Annotated[str, InPath(description="Its name.", max_length=MAX_NAME, examples=["head"])]
 Owner = Annotated[
     str | None, Query(description="With scope admin: the key that uploaded it.", max_length=200, examples=["studio"])
@@ -163,17 +170,46 @@ async def _store(request: HttpRequest, kind: str) -> StoredResource:
     state = service_state(request)
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         raise RefusedError(422, "invalid_request", "send a form (multipart/form-data) with the parts file and name")
-    async with AsyncExitStack() as stack:
-        form = await stack.enter_async_context(request.form(max_files=1, max_fields=3))
+    async with request.form(max_files=1, max_fields=3) as form:
         name, file, consent = _read_form(form, kind)
         if kind == FACE and not state.settings.photos:
             await _refuse_photo(file)
-        check_new_name(kind, name)
-        await asyncio.to_thread(state.library.check_room, key, kind, name, file.size or 0)
-        folder = await stack.enter_async_context(upload_folder(state.settings))
-        await stack.enter_async_context(state.checks)
-        checked = await folder.resource(kind, file, state.library.limits(key).n_bytes, consent)
-        return await asyncio.to_thread(state.library.add, key, kind, name, checked)
+        sent = Sent(kind, name, file.size or 0, partial(save_upload, file), consent)
+        return await store_resource(state, key, sent)
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """A file that a client sends to be kept under a name: its kind, its size in bytes, and how it is saved to a path.
+
+    ``consent`` is the statement of the person in a photo.
+    """
+
+    kind: str
+    name: str
+    size: int
+    save: Callable[[Path], Awaitable[None]]
+    consent: str | None = None
+
+
+async def store_resource(state: ServiceState, key: ApiKey, sent: Sent) -> StoredResource:
+    """Check a file in a child process, and store it.
+
+    Raises
+    ------
+    RefusedError
+        The name is wrong or taken, the quota is used up, too many files are checked, or this one is refused.
+    """
+    check_new_name(sent.kind, sent.name)
+    await asyncio.to_thread(state.library.check_room, key, sent.kind, sent.name, sent.size)
+    async with upload_folder(state.settings) as folder, state.checks:
+        given = folder.path / f"{sent.kind}.upload"
+        await sent.save(given)
+        stated = {"name": sent.name, "consent": sent.consent}
+        checked = await folder.resource(sent.kind, given, state.library.limits(key).n_bytes, stated)
+        if sent.kind == FACE and not state.settings.photos:
+            await asyncio.to_thread(_refuse_photograph, checked / CONTENT)
+        return await asyncio.to_thread(state.library.add, key, sent.kind, sent.name, checked)
 
 
 def _read_form(form: FormData, kind: str) -> tuple[str, UploadFile, str | None]:
@@ -192,9 +228,13 @@ async def _refuse_photo(file: UploadFile) -> None:
     head = await file.read(N_MAGIC)
     await file.seek(0)
     if is_picture(head):
-        raise RefusedError(
-            403, "forbidden", "this service makes no faces of photos; its operator allows it with the setting photos"
-        )
+        raise RefusedError(403, "forbidden", NO_PHOTOS)
+
+
+def _refuse_photograph(face: Path) -> None:
+    """Refuse the file of a face that speaks in a photograph."""
+    if PHOTOGRAPH in read_metadata(face, FACE, FORMAT_VERSION):
+        raise RefusedError(403, "forbidden", NO_PHOTOS)
 
 
 async def _picture(request: HttpRequest, path: Path) -> Response:

@@ -1,9 +1,10 @@
 """Uploaded files: never opened by the server itself, never stored under a client's name."""
 
 import asyncio
+import json
 import sys
 import tempfile
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ from pathlib import Path
 from starlette.datastructures import UploadFile
 
 from lexicon.inputs import parse_json
-from tts2face.jobs.resource_check import CONSENT
+from tts2face.jobs.resource_check import STATEMENT
 from tts2face.limited_process import bare_environment
 from tts2face.service.errors import RefusedError
 from tts2face.service.settings import ServiceSettings
@@ -80,20 +81,19 @@ class UploadFolder:
         facts = parse_json(checked.read_text(), name)
         return given.rename(given.with_suffix(facts["suffix"])), float(facts["seconds"])
 
-    async def resource(self, kind: str, upload: UploadFile, max_bytes: float, consent: str | None = None) -> Path:
-        """Folder with a checked talker, face, palette or dictionary (`tts2face.jobs.resource_check`).
+    async def resource(self, kind: str, given: Path, max_bytes: float, stated: Mapping[str, str | None]) -> Path:
+        """Folder with a checked talker, face, palette or dictionary (`tts2face.jobs.resource_check`) of a saved file.
 
-        `consent` is the statement of the person in a photo that becomes a face.
+        `stated` is the name, and the consent of the person in a photo that becomes a face.
 
         Raises
         ------
         RefusedError
             It is none, or larger than `max_bytes`.
         """
-        given, checked = await self._save(kind, upload), self.path / "checked"
+        checked = self.path / "checked"
         checked.mkdir()
-        if consent is not None:
-            given.with_name(CONSENT).write_text(consent, encoding="utf-8")
+        given.with_name(STATEMENT).write_text(json.dumps(stated))
         await decode_file((kind, given, checked, max_bytes), f"the {kind}", RESOURCE_TIMEOUT_S)
         return checked
 
@@ -105,10 +105,15 @@ class UploadFolder:
 
     async def _save(self, name: str, upload: UploadFile) -> Path:
         path = self.path / f"{name}.upload"
-        with path.open("wb") as file:
-            while block := await upload.read(BLOCK_BYTES):
-                file.write(block)
+        await save_upload(upload, path)
         return path
+
+
+async def save_upload(upload: UploadFile, path: Path) -> None:
+    """Write an uploaded file to a path."""
+    with path.open("wb") as file:
+        while block := await upload.read(BLOCK_BYTES):
+            file.write(block)
 
 
 async def decode_file(arguments: tuple[str, Path, Path, float], name: str, timeout_s: float) -> None:

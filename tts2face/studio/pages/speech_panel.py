@@ -10,6 +10,7 @@ from tts2face.request import GESTURES, OWN_FACE
 from tts2face.studio.pages.choices import languages, looks, models, voices
 from tts2face.studio.pages.frame import heading
 from tts2face.studio.pages.open_page import OpenPage
+from tts2face.studio.pages.photo_dialog import PhotoDialog, may_make_faces
 
 LOOKS = {"identity": "Identity", "hair": "Hair", "hair_color": "Hair colour"}  # of a face, with their labels
 TYPING_MS = 350  # of rest after which a text is spoken
@@ -43,6 +44,9 @@ class SpeechPanel:
         found = await self._models()
         for kind in (TALKER, FACE):
             self._select("models", kind, kind.capitalize(), found[kind])
+        if may_make_faces(page):
+            dialog = PhotoDialog(page, self._show_made)
+            ui.button("A face from a photo", on_click=dialog.open).props("outline dense")
         offered = await looks(library, key, project.models.face)
         for name, label in LOOKS.items():
             self._select("models", name, label, offered[name])
@@ -60,6 +64,12 @@ class SpeechPanel:
         for kind, options in (await self._models()).items():
             value = self._value(kind)
             self._controls[kind].set_options({value: value, **options}, value=value)
+
+    async def _show_made(self, face: str) -> None:
+        """Show a face that was made just now."""
+        await self.show_models()
+        await self._change("models", FACE, face)
+        self._show(FACE)
 
     async def show_looks(self) -> None:
         """Offer the identities and the hair of the present face."""
