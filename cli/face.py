@@ -228,7 +228,6 @@ def still(
     refuse_overwriting({"--out": out}, {"the face": name, "--hair": hair})
     from tts2face.characters.pictures import png_bytes
     from tts2face.render.draw import draw
-    from tts2face.render.visible_mark import mark_picture
     from tts2face.session_cache import Models
     from tts2face.storage.files import write_atomically
 
@@ -236,7 +235,7 @@ def still(
     shown = Models(face=name, identity=identity, hair=hair, hair_color=hair_color).shown_face()
     if shown is None:
         raise InputError("a talker's own face has no picture at rest; choose one of `tts2face faces`, or a .face file")
-    drawn = mark_picture(draw(shown, picture=options), options)
+    drawn = draw(shown, picture=options)
     write_atomically(out, png_bytes(drawn))
     if not quiet:
         write_message(f"wrote {out}: {drawn.shape[1]} x {drawn.shape[0]} pixels")

@@ -114,7 +114,7 @@ def test_heic_is_read_or_its_package_is_named(
 
 
 def test_what_cannot_be_used_is_told(tmp_path: Path, picture: Image.Image, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(DataError, match=r"40 x 90 pixels; a face needs at least 64"):
+    with pytest.raises(DataError, match=r"40 x 90 pixels; give one with at least 64 along each side"):
         read_photograph(written(tmp_path, picture.resize((40, 90)), "small.png"))
     for name, content in (("none.jpg", None), ("text.jpg", b"not a picture"), ("empty.png", b"")):
         path = tmp_path / name

@@ -18,7 +18,10 @@ from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 REST = np.zeros(4)
 SMALL = Picture(size="96x80", background="#204060")
-OTHERS = {"size": "80x96", "camera": "three-quarter", "background": "white", "supersampling": 1, "quality": "draft"}
+OTHERS = {
+    "size": "80x96", "camera": "three-quarter", "background": "white", "supersampling": 1, "quality": "draft",
+    "visible_mark": True,
+}  # fmt: skip
 
 
 def clip_of(face, n_frames, fps=25.0, rate=8000):

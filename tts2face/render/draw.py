@@ -17,6 +17,7 @@ from tts2face.render.film.photo_scene import build_photo_scene
 from tts2face.render.film.scene import LitScene, build_lit_scene
 from tts2face.render.picture import PYVISTA, Picture
 from tts2face.render.scene import Scene, available_cores, build_scene, draw_background
+from tts2face.render.visible_mark import mark_picture
 from tts2face.types import Clip
 
 
@@ -154,4 +155,5 @@ def draw(
         The number of weights is not the number of the face's shapes.
     """
     shown = np.zeros(len(face.shape_names), np.float32) if weights is None else weights
-    return mesh_renderer(face, picture or Picture()).draw(shown, head)
+    renderer = mesh_renderer(face, picture or Picture())
+    return mark_picture(renderer.draw(shown, head), renderer.picture)
