@@ -1,6 +1,5 @@
 """``tts2face corpus``: build talkers from recordings, show them and evaluate them."""
 
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
@@ -114,7 +113,7 @@ def _request_consent(name: str, statement: str | None) -> Mapping[str, str]:
     """The consent of the person shown; read from the terminal if there is no statement."""
     from tts2face.models.consent import consent_record
 
-    if statement is None and sys.stdin.isatty():
+    if statement is None:
         statement = ask(f"The output will contain pictures of {name}'s face. Statement of consent:")
     return consent_record(name, statement)
 

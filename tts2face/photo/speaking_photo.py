@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Face, Part, PhotoView
 from tts2face.models.landmarks import N_LANDMARKS, UPPER_LIP_INNER_MID
 from tts2face.photo.eye_pictures import BEHIND_MM, SIDES, EyePatch, eye_patch, gaze_shapes
@@ -54,22 +55,13 @@ class _Model:
 
     @classmethod
     def of(cls, head: Face) -> "_Model":
-        landmarks = np.full((N_LANDMARKS, 3), np.nan)
-        landmarks[head.landmarks] = _on_landmarks(head, head.vertices)
-        return cls(head, landmarks, (*head.shape_names, BREATH))
+        return cls(head, scatter_landmarks(head, landmark_positions(head)), (*head.shape_names, BREATH))
 
     def motion(self) -> dict[str, Floats]:
-        """(478, 3) motion of the landmarks in each shape, mm."""
-        found = {}
-        for name, shape in zip(self.head.shape_names, self.head.shapes, strict=True):
-            found[name] = np.zeros((N_LANDMARKS, 3))
-            found[name][self.head.landmarks] = _on_landmarks(self.head, shape)
-        return found
-
-
-def _on_landmarks(face: Face, values: NDArray[np.floating]) -> Floats:
-    corners = values[face.landmark_vertices].astype(np.float64)
-    return np.asarray(np.einsum("lc,lcx->lx", face.landmark_weights, corners))
+        """(478, 3) motion of the landmarks in each shape, mm; 0 for those that the head lacks."""
+        moved = landmark_motion(self.head, np.arange(len(self.head.shapes)))
+        spread = np.nan_to_num(scatter_landmarks(self.head, moved))
+        return dict(zip(self.head.shape_names, np.moveaxis(spread, -1, 0), strict=True))
 
 
 def speaking_photo(

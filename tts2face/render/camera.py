@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
+from tts2face.face.landmark_fit import landmark_positions
 from tts2face.models.face import Face, PhotoView
 from tts2face.models.landmarks import CHIN
 from tts2face.render.camera_views import CameraView
@@ -99,9 +100,7 @@ def _own_pixels(photo: tuple[int, int], size: tuple[int, int]) -> float | None:
 
 def _in_photo(face: Face, view: PhotoView) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Least and greatest (2,) pixel of the landmarks of a photographed face."""
-    corners = face.vertices[face.landmark_vertices].astype(np.float64)
-    points = np.einsum("lc,lcx->lx", face.landmark_weights, corners)
-    seen = points @ view.view[:, :3].T + view.view[:, 3]
+    seen = landmark_positions(face) @ view.view[:, :3].T + view.view[:, 3]
     places = seen[:, :2] * (view.lens[0] / seen[:, 2:]) + view.lens[1:] + 0.5
     return places.min(axis=0), places.max(axis=0)
 
