@@ -236,7 +236,7 @@ def still(
     if shown is None:
         raise InputError("a talker's own face has no picture at rest; choose one of `tts2face faces`, or a .face file")
     drawn = draw(shown, picture=options)
-    write_atomically(out, png_bytes(drawn))
+    write_atomically(out, png_bytes(drawn, shown.synthetic_notice))
     if not quiet:
         write_message(f"wrote {out}: {drawn.shape[1]} x {drawn.shape[0]} pixels")
 
