@@ -10,6 +10,7 @@ from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.hair import BALD
 from tts2face.photo.found_face import find_face
+from tts2face.photo.photo_fit import NOTHING_GIVEN, PhotoFit, read_fit
 from tts2face.photo.photograph import read_photograph, split_number
 from tts2face.photo.speaking_photo import speaking_photo
 from tts2face.request import REALISTIC_FACE
@@ -22,6 +23,7 @@ def face_from_photo(
     *,
     consent: str | None = None,
     name: str | None = None,
+    fit: str | Path | PhotoFit | None = None,
     model: Path | None = None,
     on_warning: Callable[[str], None] = lambda _: None,
 ) -> Face:
@@ -35,6 +37,9 @@ def face_from_photo(
         Statement of consent of the person shown, kept in the face with its date; ``drawn`` for a face that is nobody's.
     name
         The person's name; the file's name if omitted.
+    fit
+        Corrections of what is found, or the path of their file (docs/photo.md); ``face.metadata["fit"]`` of a face has
+        the places that were used.
     model
         Path of face_landmarker.task; found or set up if omitted.
     on_warning
@@ -45,7 +50,7 @@ def face_from_photo(
     InputError
         There is no such file or face, or no consent.
     DataError
-        The picture cannot be read, or shows no face that can be moved.
+        The picture cannot be read, or shows no face that can be moved; the fit is none, or that of another picture.
     BackendError
         The landmark models or a package are not installed.
     """
@@ -54,6 +59,7 @@ def face_from_photo(
 
     path, number = split_number(photo)
     record = consent_record(name or path.stem, consent)
+    given = fit if isinstance(fit, PhotoFit) else NOTHING_GIVEN if fit is None else read_fit(Path(fit))
     picture = read_photograph(path).filled()
     found = find_face(picture.pixels, FaceTracker(model), path, number=number, reduced_by=picture.reduced_by)
     for warning in found.warnings:
@@ -61,4 +67,4 @@ def face_from_photo(
     scores = BlendshapeReader(model).blendshape_scores(found.landmarks)
     smile = float(np.mean([scores[BLENDSHAPES.index(shape)] for shape in SMILES]))
     metadata = {"name": record["name"], "consent": dict(record), "made_by": "tts2face --photo"}
-    return speaking_photo(picture, found, smile, load_face(REALISTIC_FACE, hair=BALD), metadata)
+    return speaking_photo(picture, found, smile, load_face(REALISTIC_FACE, hair=BALD), metadata, given)
