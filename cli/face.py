@@ -158,8 +158,10 @@ def calibrate(
     out: Annotated[Path, Parameter(help="Output face (.face); may be the face itself.", alias="-o")],
     talker: Annotated[str, Parameter(help="Talker whose speech gives the poses.")] = "grid_s1",
     model: Model = None,
+    yes: Yes = False,
 ) -> None:
     """Measure what the face tracker reads in a face's mouth, so that it opens as the person's (some minutes)."""
+    del yes  # read where the model is missing
     check_file_name(out, "a face", (".face",))
     refuse_overwriting({"--out": out}, {"--talker": talker, "--model": model})
     from corpus_tools.training.score_files import calibrate_face_file
