@@ -194,7 +194,7 @@ def clone(
 
 
 @corpus.command
-def audio_maps(
+def audio_maps(  # noqa: PLR0913 - one parameter a flag
     recordings: Annotated[Path, Parameter(help="Folder of recordings from which the talker was built.")],
     /,
     *,

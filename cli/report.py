@@ -73,7 +73,7 @@ def gestures(
 
 
 @report.command
-def moods(
+def moods(  # noqa: PLR0913 - one parameter a flag
     palette: Annotated[str, Parameter(help="Shipped palette or .palette file.")] = "starter",
     /,
     *,

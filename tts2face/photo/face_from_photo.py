@@ -9,8 +9,8 @@ from tts2face.models.consent import consent_record
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.hair import BALD
-from tts2face.photo.found_face import find_face
-from tts2face.photo.photograph import read_photograph, split_number
+from tts2face.photo.found_face import PhotoReader
+from tts2face.photo.photograph import split_number
 from tts2face.photo.speaking_photo import speaking_photo
 from tts2face.request import REALISTIC_FACE
 
@@ -49,16 +49,8 @@ def face_from_photo(
     BackendError
         The landmark models or a package are not installed.
     """
-    from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
-    from tts2face.video.track import FaceTracker
-
-    path, number = split_number(photo)
-    record = consent_record(name or path.stem, consent)
-    picture = read_photograph(path).filled()
-    found = find_face(picture.pixels, FaceTracker(model), path, number=number, reduced_by=picture.reduced_by)
-    for warning in found.warnings:
-        on_warning(warning)
-    scores = BlendshapeReader(model).blendshape_scores(found.landmarks)
-    smile = float(np.mean([scores[BLENDSHAPES.index(shape)] for shape in SMILES]))
+    record = consent_record(name or split_number(photo)[0].stem, consent)
+    seen = PhotoReader(model, on_warning).read(photo)
+    smile = float(np.mean([seen.scores[shape] for shape in SMILES]))
     metadata = {"name": record["name"], "consent": dict(record), "made_by": "tts2face --photo"}
-    return speaking_photo(picture, found, smile, load_face(REALISTIC_FACE, hair=BALD), metadata)
+    return speaking_photo(seen.picture, seen.found, smile, load_face(REALISTIC_FACE, hair=BALD), metadata)

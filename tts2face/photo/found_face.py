@@ -1,6 +1,6 @@
 """The face in a photograph: its landmarks, pose and size, and what it cannot be used for."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, FACE_OVAL
+from tts2face.photo.photograph import Photograph, read_photograph, split_number
 from tts2face.retargeting.performer import eye_aperture
+from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.pose import head_angles, rigid_points, similarity_transforms
 from tts2face.video.track import MIN_CONTRAST, MIN_SCORE, Crop, FaceTracker, crop_around
 
@@ -55,6 +57,45 @@ class FoundFace:
     def width_px(self) -> float:
         """Width of the oval of the face."""
         return float(np.ptp(self.landmarks[list(FACE_OVAL), 0]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhotographedFace:
+    """A photograph without transparent parts, the face in it, and the tracker's scores of its expression by shape."""
+
+    picture: Photograph
+    found: FoundFace
+    scores: Mapping[str, float]
+
+
+class PhotoReader:
+    """Reads photographs and the faces in them.
+
+    Parameters
+    ----------
+    model
+        Path of face_landmarker.task; found if None.
+    on_warning
+        Gets sentences about what may look worse.
+
+    Raises
+    ------
+    BackendError
+        The landmark models or a package are not installed.
+    """
+
+    def __init__(self, model: Path | None = None, on_warning: Callable[[str], None] = lambda _: None) -> None:
+        self._tracker, self._expressions, self._warn = FaceTracker(model), BlendshapeReader(model), on_warning
+
+    def read(self, photo: str | Path) -> PhotographedFace:
+        """The face in a picture file; ``photo.jpg@2`` is its second largest one; errors as `find_face`."""
+        path, number = split_number(photo)
+        picture = read_photograph(path).filled()
+        found = find_face(picture.pixels, self._tracker, path, number=number, reduced_by=picture.reduced_by)
+        for warning in found.warnings:
+            self._warn(warning)
+        scores = self._expressions.blendshape_scores(found.landmarks).tolist()
+        return PhotographedFace(picture, found, dict(zip(BLENDSHAPES, scores, strict=True)))
 
 
 def find_face(

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from tts2face.colour import decode_srgb, encode_srgb
 from tts2face.models.face import Face
 from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, UPPER_LIP_INNER_MID
-from tts2face.photo.photo_mesh import PhotoMesh, vertex_normals
+from tts2face.numeric import vertex_normals
+from tts2face.photo.photo_mesh import PhotoMesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

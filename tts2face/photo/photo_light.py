@@ -18,8 +18,8 @@ from tts2face.models.baked_light import (
     BakedLight,
 )
 from tts2face.models.landmarks import LEFT_LIDS, OUTER_LIP_LOWER, OUTER_LIP_UPPER, RIGHT_LIDS
-from tts2face.numeric import smoothstep
-from tts2face.photo.photo_mesh import PhotoMesh, vertex_normals
+from tts2face.numeric import smoothstep, vertex_normals
+from tts2face.photo.photo_mesh import PhotoMesh
 from tts2face.photo.photo_surface import EYES, LIDS, SKIN
 
 Floats = NDArray[np.float64]
