@@ -10,6 +10,7 @@ from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.hair import BALD
 from tts2face.photo.found_face import PhotoReader
+from tts2face.photo.photo_fit import NOTHING_GIVEN, PhotoFit, read_fit
 from tts2face.photo.photograph import split_number
 from tts2face.photo.speaking_photo import speaking_photo
 from tts2face.request import REALISTIC_FACE
@@ -22,6 +23,7 @@ def face_from_photo(
     *,
     consent: str | None = None,
     name: str | None = None,
+    fit: str | Path | PhotoFit | None = None,
     model: Path | None = None,
     on_warning: Callable[[str], None] = lambda _: None,
 ) -> Face:
@@ -35,6 +37,9 @@ def face_from_photo(
         Statement of consent of the person shown, kept in the face with its date; ``drawn`` for a face that is nobody's.
     name
         The person's name; the file's name if omitted.
+    fit
+        Corrections of what is found, or the path of their file (docs/photo.md); ``face.metadata["fit"]`` of a face has
+        the places that were used.
     model
         Path of face_landmarker.task; found or set up if omitted.
     on_warning
@@ -45,12 +50,13 @@ def face_from_photo(
     InputError
         There is no such file or face, or no consent.
     DataError
-        The picture cannot be read, or shows no face that can be moved.
+        The picture cannot be read, or shows no face that can be moved; the fit is none, or that of another picture.
     BackendError
         The landmark models or a package are not installed.
     """
     record = consent_record(name or split_number(photo)[0].stem, consent)
+    given = fit if isinstance(fit, PhotoFit) else NOTHING_GIVEN if fit is None else read_fit(Path(fit))
     seen = PhotoReader(model, on_warning).read(photo)
     smile = float(np.mean([seen.scores[shape] for shape in SMILES]))
     metadata = {"name": record["name"], "consent": dict(record), "made_by": "tts2face --photo"}
-    return speaking_photo(seen.picture, seen.found, smile, load_face(REALISTIC_FACE, hair=BALD), metadata)
+    return speaking_photo(seen.picture, seen.found, smile, load_face(REALISTIC_FACE, hair=BALD), metadata, given)
