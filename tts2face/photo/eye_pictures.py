@@ -10,6 +10,7 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter
 from tts2face.models.face import Face
 from tts2face.numeric import points_in_polygon, smoothstep
 from tts2face.photo.lid_lines import LidLines
+from tts2face.photo.photo_mesh import grid_triangles
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -57,16 +58,13 @@ def eye_patch(pixels: NDArray[np.uint8], landmarks: Floats, lids: LidLines, eye:
     across, down = np.meshgrid(np.linspace(low[0], high[0] - 1, N_COLUMNS), np.linspace(low[1], high[1] - 1, N_ROWS))
     places = np.column_stack([across.ravel(), down.ravel()])
     away = np.linalg.norm(places - middle, axis=1) / radius
-    at = np.arange(N_ROWS * N_COLUMNS).reshape(N_ROWS, N_COLUMNS)
-    a, b, c, d = at[:-1, :-1].ravel(), at[:-1, 1:].ravel(), at[1:, :-1].ravel(), at[1:, 1:].ravel()
-    triangles = np.concatenate([np.column_stack([a, c, d]), np.column_stack([a, d, b])])
     return EyePatch(
         np.rint(picture).clip(0, 255).astype(np.uint8),
         white,
         (int(low[0]), int(low[1])),
         places,
         1 - smoothstep(away, RIGID_TO, STILL_FROM),
-        triangles,
+        grid_triangles(np.arange(N_ROWS * N_COLUMNS).reshape(N_ROWS, N_COLUMNS)),
     )
 
 

@@ -67,6 +67,10 @@ class PhotographedFace:
     found: FoundFace
     scores: Mapping[str, float]
 
+    def mean_score(self, shapes: Sequence[str]) -> float:
+        """Mean score of shapes, 0 to 1."""
+        return float(np.mean([self.scores[shape] for shape in shapes]))
+
 
 class PhotoReader:
     """Reads photographs and the faces in them.
@@ -87,11 +91,18 @@ class PhotoReader:
     def __init__(self, model: Path | None = None, on_warning: Callable[[str], None] = lambda _: None) -> None:
         self._tracker, self._expressions, self._warn = FaceTracker(model), BlendshapeReader(model), on_warning
 
-    def read(self, photo: str | Path) -> PhotographedFace:
+    def read(self, photo: str | Path, *, with_open_eyes: bool = True) -> PhotographedFace:
         """The face in a picture file; ``photo.jpg@2`` is its second largest one; errors as `find_face`."""
         path, number = split_number(photo)
         picture = read_photograph(path).filled()
-        found = find_face(picture.pixels, self._tracker, path, number=number, reduced_by=picture.reduced_by)
+        found = find_face(
+            picture.pixels,
+            self._tracker,
+            path,
+            number=number,
+            reduced_by=picture.reduced_by,
+            with_open_eyes=with_open_eyes,
+        )
         for warning in found.warnings:
             self._warn(warning)
         scores = self._expressions.blendshape_scores(found.landmarks).tolist()
@@ -99,7 +110,13 @@ class PhotoReader:
 
 
 def find_face(
-    pixels: NDArray[np.uint8], tracker: FaceTracker, name: str | Path, *, number: int = 1, reduced_by: float = 1.0
+    pixels: NDArray[np.uint8],
+    tracker: FaceTracker,
+    name: str | Path,
+    *,
+    number: int = 1,
+    reduced_by: float = 1.0,
+    with_open_eyes: bool = True,
 ) -> FoundFace:
     """Find a face in a picture (H, W, 3) and check that it can be moved.
 
@@ -111,6 +128,8 @@ def find_face(
         Which face, from 1, the largest first.
     reduced_by
         Pixels of the file along a side for each of these.
+    with_open_eyes
+        Whether closed eyes are refused.
 
     Raises
     ------
@@ -128,6 +147,8 @@ def find_face(
         raise InputError(f"{name} has {_count(len(crops))}, and no face {number}; choose 1 to {len(crops)}")
     found = _read(pixels, tracker, crops[number - 1], len(crops))
     _check(found, pixels.shape[:2], str(name), reduced_by)
+    if with_open_eyes:
+        _check_eyes(found, str(name))
     return replace(found, warnings=tuple(_warnings(found, str(name), number, reduced_by)))
 
 
@@ -219,6 +240,9 @@ def _check(found: FoundFace, shape: tuple[int, ...], name: str, reduced_by: floa
             f"the face in {name} cannot be read: something may lie before it, or it is blurred or too dark; give "
             "a clearer picture"
         )
+
+
+def _check_eyes(found: FoundFace, name: str) -> None:
     heights = [float(eye_aperture(found.landmarks[None], side)[0]) for side in ("Left", "Right")]
     if max(heights) < CLOSED_EYES:
         raise DataError(f"the eyes of the face in {name} are closed; give a picture with open eyes")

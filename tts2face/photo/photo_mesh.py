@@ -307,3 +307,9 @@ def _triangles(places: Floats, slits: Sequence[tuple[Ints, Ints]]) -> Ints:
         kept &= ~within
     left: Ints = found[kept]
     return left
+
+
+def grid_triangles(numbers: Ints) -> Ints:
+    """Triangles of a grid of vertices (R, C), of rows from above and columns from the left, seen from ahead."""
+    a, b, c, d = (part.ravel() for part in (numbers[:-1, :-1], numbers[:-1, 1:], numbers[1:, :-1], numbers[1:, 1:]))
+    return np.concatenate([np.column_stack([a, c, d]), np.column_stack([a, d, b])])
