@@ -40,6 +40,8 @@ GAMMA = 2.2
 LEAST_LIGHT = 0.25
 MOST_TURNED = 30.0  # of 255, change of the skin's light
 MOUTH_BASE, MOUTH_BY_OPENING = 0.5, 0.6  # of the colour in open light: in the dark, and times the curve of the opening
+SHADE_TINT = np.array([0.8, 1.05, 1.1])  # of what wrinkles darken: light between them is redder
+TURN_TERMS, MOVE_TERMS = slice(1, 4), slice(4, 7)  # of `tts2face.render.film.response.write_terms`
 CURVE_TERM = 2  # of `tts2face.render.film.response.write_mouth_terms`
 
 
@@ -71,10 +73,13 @@ class MouthRows:
         return np.concatenate(rows), np.concatenate(bases), np.concatenate(responses, axis=2)
 
 
-def skin_light(pixels: NDArray[np.uint8], mesh: PhotoMesh, vertices: Floats) -> tuple[Ints, Floats]:
-    """Vertices (N,) whose colour follows their normal, and (3, 3, N) its change by x, y and z of the normal's turn.
+def skin_light(
+    pixels: NDArray[np.uint8], mesh: PhotoMesh, vertices: Floats, by_movement: Floats
+) -> tuple[Ints, Floats]:
+    """Vertices (N,) whose colour follows their normal and movement, and (10, 3, N) its responses.
 
-    Light of first order (Basri and Jacobs 2003) is fitted to the skin's luminance.
+    Light of first order (Basri and Jacobs 2003) is fitted to the skin's luminance. `by_movement` (3, V) is the change
+    of the light of all vertices by their movement, of their colour.
     """
     points = vertices[: len(mesh.places)]
     normals = vertex_normals(points, mesh.triangles)
@@ -98,7 +103,10 @@ def skin_light(pixels: NDArray[np.uint8], mesh: PhotoMesh, vertices: Floats) -> 
     lit = 1 - smoothstep(mesh.outside / wide, -0.015, 0.08)
     rows = np.flatnonzero(lit > 0)
     per_turn = light[1:, None] * (lit[rows] / (GAMMA * shade[rows]))
-    return rows, per_turn[:, None] * soft[rows].T[None]
+    responses = np.zeros((N_TERMS, 3, len(rows)))
+    responses[TURN_TERMS] = per_turn[:, None] * soft[rows].T
+    responses[MOVE_TERMS] = (by_movement[:, rows] * lit[rows])[:, None] * (SHADE_TINT * soft[rows]).T
+    return rows, responses
 
 
 def _fit(terms: Floats, values: Floats) -> Floats:
@@ -129,7 +137,7 @@ def _blurred(pixels: NDArray[np.uint8], spread: float, places: Floats) -> Floats
 def picture_light(
     pixels: NDArray[np.uint8],
     pages: NDArray[np.uint8],
-    skin: tuple[PhotoMesh, Floats],
+    skin: tuple[PhotoMesh, Floats, Floats],
     drawn: Ints,
     mouth: MouthRows,
 ) -> BakedLight:
@@ -140,15 +148,13 @@ def picture_light(
     pages : (2, H, W, 3)
         As the face's parts show them.
     skin
-        Mesh of the picture and its vertices (V, 3), mm.
+        Mesh of the picture, its vertices (V, 3), mm, and the change of their light by movement (3, V).
     drawn : (D,)
         Triangles that move.
     mouth
         Vertices behind the lips.
     """
-    rows, turned = skin_light(pixels, *skin)
-    responses = np.zeros((N_TERMS, 3, len(rows)))
-    responses[1:4] = turned
+    rows, responses = skin_light(pixels, *skin)
     answers, sizes = _in_steps(responses)
     mouth_rows, lit, openings = mouth.light()
     mouth_answers, mouth_sizes = _in_steps(openings)

@@ -35,6 +35,7 @@ from tts2face.photo.photo_shapes import (
 )
 from tts2face.photo.photo_surface import EYES, SKIN, PhotoPages, PhotoSurface, Vertices, lay_pages, moves
 from tts2face.photo.spreading import Spreading
+from tts2face.photo.wrinkles import wrinkles
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -101,6 +102,7 @@ def speaking_photo(
     pivot = given.point("pivot", camera.to_pixels(head.pivot[None].astype(np.float64))[0])
     mesh = build_mesh(person.size, landmarks, lips, lids, scale)
     photo, skin = _skin(mesh, person, camera, model)
+    creases = wrinkles(pixels, mesh, dict(zip(model.names, skin.shapes, strict=True)), person)
     patches = [eye_patch(pixels, landmarks, lids, eye, scale) for eye in (0, 1)]
     teeth = find_teeth(pixels, found, lips, camera, head) if teeth is None else teeth
     teeth = None if teeth is None else teeth.in_light_of(cheek_light(pixels, landmarks))
@@ -116,8 +118,7 @@ def speaking_photo(
         eyes.append(surface.add(_eye_vertices(patch, eye, photo, camera, model), uv=uv))
         surface.parts.append((EYES, eyes[eye][patch.triangles]))
     corners, weights = place_landmarks(mesh, landmarks, list(zip(patches, eyes, strict=True)))
-    white = np.mean([patch.white for patch in patches], axis=0)
-    light = mouth_light(pixels, landmarks, white)
+    light = mouth_light(pixels, landmarks, np.mean([patch.white for patch in patches], axis=0))
     at_rest = np.einsum("lc,lcx->lx", weights, surface.every().places[corners])
     inside = teeth_and_tongue(head, MouthPlace.of(model.landmarks, at_rest, is_parted=person.is_parted), light, teeth)
     edge = given.point("teeth", camera.to_pixels(inside[0].teeth_edge[None])[0])
@@ -150,7 +151,7 @@ def speaking_photo(
         pivot=camera.to_head(pivot[None])[0].astype(np.float32),
         metadata={**metadata, "fit": given.used(lips, lids, {"teeth": edge, "pivot": pivot}).as_json()},
         scores=head.scores,
-        light=(picture_light(pixels, pages.pages, (mesh, skin.places), drawn, rows),),
+        light=(picture_light(pixels, pages.pages, (mesh, skin.places, creases), drawn, rows),),
         photograph=_view(person, camera, every.follow, pages, picture.alpha),
     )
 
