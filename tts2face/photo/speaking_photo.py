@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Face, Part, PhotoView
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.photo.eye_pictures import BEHIND_MM, SIDES, EyePatch, eye_patch, gaze_shapes
+from tts2face.photo.eye_pictures import BEHIND_MM, SIDES, EyePatch, eye_patches, gaze_shapes
 from tts2face.photo.found_face import PhotographedFace
 from tts2face.photo.landmark_places import place_landmarks
 from tts2face.photo.lid_lines import find_lid_lines
@@ -103,29 +103,32 @@ def speaking_photo(
     mesh = build_mesh(person.size, landmarks, lips, lids, scale)
     photo, skin = _skin(mesh, person, camera, model)
     creases = wrinkles(pixels, mesh, dict(zip(model.names, skin.shapes, strict=True)), person)
-    patches = [eye_patch(pixels, landmarks, lids, eye, scale) for eye in (0, 1)]
+    patches = eye_patches(pixels, landmarks, lids, scale)
     teeth = find_teeth(pixels, found, lips, camera, head) if teeth is None else teeth
     teeth = None if teeth is None else teeth.in_light_of(cheek_light(pixels, landmarks))
-    pictures: list[EyePatch | OwnTeeth] = [*patches, *([] if teeth is None else [teeth])]
+    pictures: list[EyePatch | OwnTeeth] = [*patches[0], *patches[1], *([] if teeth is None else [teeth])]
     pages = lay_pages(darken_lip_edges(pixels, lips, scale), mesh, moves(skin), pictures)
     surface = PhotoSurface()
     surface.add(skin, uv=pages.uv(_shown_places(mesh, person)))
     surface.parts.append((SKIN, mesh.triangles))
     add_lids(surface, mesh, pages, scale)
-    eyes = []
-    for eye, patch in enumerate(patches):
-        uv = pages.uv(patch.places, pages.patch_corners[eye])
-        eyes.append(surface.add(_eye_vertices(patch, eye, photo, camera, model), uv=uv))
-        surface.parts.append((EYES, eyes[eye][patch.triangles]))
-    corners, weights = place_landmarks(mesh, landmarks, list(zip(patches, eyes, strict=True)))
-    light = mouth_light(pixels, landmarks, np.mean([patch.white for patch in patches], axis=0))
+    eyes, corners_of = [], iter(pages.patch_corners)
+    for eye, parts in enumerate(patches):
+        for patch in parts:
+            rows = surface.add(
+                _eye_vertices(patch, eye, photo, camera, model), uv=pages.uv(patch.places, next(corners_of))
+            )
+            surface.parts.append((EYES, rows[patch.triangles]))
+            eyes += [(patch, rows)] if patch is parts[0] else []
+    corners, weights = place_landmarks(mesh, landmarks, eyes)
+    light = mouth_light(pixels, landmarks, np.mean([parts[0].white for parts in patches], axis=0))
     at_rest = np.einsum("lc,lcx->lx", weights, surface.every().places[corners])
     inside = teeth_and_tongue(head, MouthPlace.of(model.landmarks, at_rest, is_parted=person.is_parted), light, teeth)
     edge = given.point("teeth", camera.to_pixels(inside[0].teeth_edge[None])[0])
     way = camera.to_head(edge[None])[0] - inside[0].teeth_edge
     inside = [one.moved(way) for one in inside]
     walls = mouth_walls(mesh, skin.places, skin.shapes, light)
-    rows = MouthRows(
+    mouth = MouthRows(
         pictured=[_add_inside(surface, one, pages) for one in inside if one.texels is not None],
         lit=[_add_inside(surface, one, pages) for one in inside if one.texels is None],
         walls=[_add_inside(surface, walls, pages)],
@@ -151,7 +154,7 @@ def speaking_photo(
         pivot=camera.to_head(pivot[None])[0].astype(np.float32),
         metadata={**metadata, "fit": given.used(lips, lids, {"teeth": edge, "pivot": pivot}).as_json()},
         scores=head.scores,
-        light=(picture_light(pixels, pages.pages, (mesh, skin.places, creases), drawn, rows),),
+        light=(picture_light(pixels, pages.pages, (mesh, skin.places, creases), drawn, mouth),),
         photograph=_view(person, camera, every.follow, pages, picture.alpha),
     )
 
@@ -211,7 +214,7 @@ def _eye_vertices(patch: EyePatch, eye: int, photo: Floats, camera: PhotoCamera,
     """Vertices of a patch behind the skin around it, which is given by the pixels and depths (V, 3) of all skin."""
     away, near = cKDTree(photo[:, :2]).query(patch.places, N_NEAR)
     shares = 1 / (np.asarray(away) + 1)
-    depth = (photo[near, 2] * shares).sum(axis=1) / shares.sum(axis=1) - BEHIND_MM * camera.scale
+    depth = (photo[near, 2] * shares).sum(axis=1) / shares.sum(axis=1) + (patch.ahead_mm - BEHIND_MM) * camera.scale
     shapes = np.zeros((len(model.names), len(patch.places), 3))
     for name, way in gaze_shapes(model.head, patch.turning, eye).items():
         shapes[model.names.index(name)] = way

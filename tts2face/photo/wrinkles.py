@@ -78,7 +78,8 @@ def _forehead_lines(pixels: NDArray[np.uint8], mesh: PhotoMesh, person: PhotoPer
     faint = FAINT_LINES * np.cos(2 * np.pi * N_LINES * share)
     shown = _shown_lines(pixels, mesh.places, np.broadcast_to(along, mesh.places.shape), person.scale)
     inside = _between(share, FOREHEAD) * (1 - smoothstep(np.abs(across) / half, *FOREHEAD_SIDE))
-    return inside * (faint + DEEPER * shown)
+    found: Floats = inside * (faint + DEEPER * shown)
+    return found
 
 
 def _smile_folds(pixels: NDArray[np.uint8], mesh: PhotoMesh, person: PhotoPerson) -> Floats:
@@ -107,7 +108,8 @@ def _nearest(line: Floats, places: Floats) -> tuple[Floats, Floats, Floats]:
     rows = np.arange(len(places))
     direction = steps[best]
     right = np.column_stack([np.abs(direction[:, 1]), -direction[:, 0] * np.sign(direction[:, 1])])
-    return (off[rows, best] * right).sum(axis=1), best / (len(fine) - 1), direction
+    way: Floats = (off[rows, best] * right).sum(axis=1)
+    return way, best / (len(fine) - 1), direction
 
 
 def _shown_lines(pixels: NDArray[np.uint8], places: Floats, direction: Floats, scale: float) -> Floats:
@@ -117,7 +119,8 @@ def _shown_lines(pixels: NDArray[np.uint8], places: Floats, direction: Floats, s
     off = [one + way * scale * side for way in ASIDE for one in on]
     grey = grey_at(pixels, np.stack([*on, *off], axis=1), max(0.6, BLUR * scale))
     own, others = grey[:, : len(on)].mean(axis=1), grey[:, len(on) :].mean(axis=1)
-    return np.clip((own - others) / np.maximum(others, 1.0), -MOST_SHOWN, MOST_SHOWN)
+    found: Floats = np.clip((own - others) / np.maximum(others, 1.0), -MOST_SHOWN, MOST_SHOWN)
+    return found
 
 
 def _between(share: Floats, limits: tuple[float, float, float, float]) -> Floats:
