@@ -22,7 +22,7 @@ from corpus_tools.dense.modes import MOST_MODES, DenseModel, add_modes, dense_mo
 from corpus_tools.dense.person_look import LookSampler, PersonLook, dress_head
 from corpus_tools.dense.skin_colour import average_skin_colours, build_picture_fitter
 from corpus_tools.dense.texture_painting import paint_skin
-from corpus_tools.dense.video_landmarks import VideoLandmarks, find_videos, resting_landmarks, track_videos
+from corpus_tools.dense.video_landmarks import TrackedPictures, find_videos, resting_landmarks, track_videos
 from corpus_tools.dense.visible_texels import build_canvas
 from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.run_options import RunOptions
@@ -144,7 +144,7 @@ def fit_person(head: Face, person: Floats) -> FittedHead:
     return FittedHead(adapt_head(head, person), person, np.flatnonzero(select_consistent_landmarks(rest, target)))
 
 
-def paint_person(fitted: FittedHead, seen: Sequence[VideoLandmarks], on_progress: Progress) -> tuple[Face, PersonLook]:
+def paint_person(fitted: FittedHead, seen: Sequence[TrackedPictures], on_progress: Progress) -> tuple[Face, PersonLook]:
     """The head with the skin, eyes, hair and shirt that frames show, and what was found.
 
     Raises

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.mesh_fit import face_landmarks, face_width
-from corpus_tools.dense.video_landmarks import VideoLandmarks, eye_opening
+from corpus_tools.dense.video_landmarks import TrackedPictures, eye_opening
 from corpus_tools.dense.visible_texels import SkinCanvas
 from lexicon.errors import DataError
 from tts2face.face.rbf import DECAY_LENGTH, FACE_WIDTH, rbf_values
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
-from tts2face.numeric import points_in_polygon, smoothstep, unit_vectors
+from tts2face.numeric import points_in_polygon, smoothstep, unit_vectors, vertex_normals
 from tts2face.types import Progress
 from tts2face.video.pose import similarity_transforms
 
@@ -77,7 +77,7 @@ def average_skin_colours(
     face: Face,
     canvas: SkinCanvas,
     fit: PictureFitter,
-    seen: Sequence[VideoLandmarks],
+    seen: Sequence[TrackedPictures],
     *,
     on_frame: OnFrame,
     on_progress: Progress,
@@ -91,7 +91,7 @@ def average_skin_colours(
     """
     rows = np.flatnonzero(canvas.share > 0)
     corners, weights = canvas.texels.corners[rows], canvas.texels.weights[rows]
-    normals = vertex_normals(face)
+    normals = welded_normals(face)
     own_normals = unit_vectors(np.einsum("pk,pkd->pd", weights, normals[corners]))
     total, weight = np.zeros((len(rows), 3)), np.zeros(len(rows))
     for one, picture, points in select_frames(seen, on_progress):
@@ -115,8 +115,8 @@ def average_skin_colours(
 
 
 def select_frames(
-    videos: Sequence[VideoLandmarks], on_progress: Progress
-) -> Iterator[tuple[VideoLandmarks, NDArray[np.uint8], NDArray[np.float32]]]:
+    videos: Sequence[TrackedPictures], on_progress: Progress
+) -> Iterator[tuple[TrackedPictures, NDArray[np.uint8], NDArray[np.float32]]]:
     """Yield video, picture (H, W, 3) and landmarks (478, 3) of `N_FRAMES` frames over the videos, eyes open."""
     per_video = int(np.ceil(N_FRAMES / len(videos)))
     usual = float(np.nanmedian(np.concatenate([eye_opening(one.landmarks) for one in videos])))
@@ -143,13 +143,8 @@ def sample_picture(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, 
     return found.reshape(-1, 3)[:n].astype(np.float64), inside
 
 
-def vertex_normals(face: Face) -> Floats:
+def welded_normals(face: Face) -> Floats:
     """(V, 3) outward unit normals of the face at rest; vertices at one position share one normal."""
-    corners = face.vertices[face.triangles].astype(np.float64)
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    _, place = np.unique(face.vertices, axis=0, return_inverse=True)
-    place = place.reshape(-1)
-    total = np.zeros((len(face.vertices), 3))
-    for corner in range(3):
-        np.add.at(total, place[face.triangles[:, corner]], across)
-    return unit_vectors(total[place])
+    places, shared = np.unique(face.vertices, axis=0, return_inverse=True)
+    shared = shared.reshape(-1)
+    return vertex_normals(places.astype(np.float64), shared[face.triangles])[shared]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from corpus_tools.dense.hair_region import OTHER_HUE
 from corpus_tools.dense.light_cast import linear_light, log_colour
 from corpus_tools.dense.mesh_fit import face_landmarks
-from corpus_tools.dense.skin_colour import SkinColours, vertex_normals
+from corpus_tools.dense.skin_colour import SkinColours, welded_normals
 from corpus_tools.dense.texels import Texels
 from corpus_tools.dense.visible_texels import SkinCanvas, soften_edges
 from tts2face.colour import encode_light
@@ -43,7 +43,7 @@ def paint_skin(face: Face, canvas: SkinCanvas, skin: SkinColours) -> Face:
     texels = canvas.texels
     base = canvas.texture[texels.rows, texels.columns].astype(np.float64)
     share = canvas.share * smoothstep(skin.weight / skin.weight.max(), 0.0, MIN_TEXEL_WEIGHT)
-    own = _remove_shading(canvas.texels.interpolate(vertex_normals(face)), skin.colour, share)
+    own = _remove_shading(canvas.texels.interpolate(welded_normals(face)), skin.colour, share)
     own = _even_yellow(canvas, own, share)
     share = soften_edges(_remove_fringe(face, canvas, own, share), texels, len(canvas.texture))
     dark = 1.0 - smoothstep(base @ LUMA, *LASH_LUMA)

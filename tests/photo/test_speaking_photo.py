@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from lexicon.errors import InputError
 from tests.exports.test_stage_glb import Read
-from tests.photo.pictures import found_in, still
+from tests.photo.pictures import found_in, photographed, still
 from tts2face.exports.stage_glb import stage_glb
 from tts2face.face.deformation import REST_HEAD
 from tts2face.face.face_motion import moved_landmarks
@@ -43,7 +43,7 @@ def pixels() -> np.ndarray:
 def face(pixels: np.ndarray) -> Face:
     head = load_face("head", hair="bald")
     metadata = {"name": "Ada", "consent": {"statement": "drawn"}}
-    return speaking_photo(Photograph(pixels, None, 1.0), found_in(NAME, SIDE), 0.0, head, metadata)
+    return speaking_photo(photographed(Photograph(pixels, None, 1.0), found_in(NAME, SIDE)), head, metadata)
 
 
 @pytest.fixture(scope="module")
@@ -180,7 +180,7 @@ def test_a_cut_out_person_moves_before_any_background() -> None:
     head = load_face("head", hair="bald")
     shown = draw(load_face(NAME), picture=Picture(size=f"{SIDE}x{SIDE}", background="transparent"))
     picture = Photograph(shown[..., :3].copy(), shown[..., 3].copy(), 1.0).filled()
-    cut = speaking_photo(picture, found_in(NAME, SIDE), 0.0, head, {"name": "Ada"})
+    cut = speaking_photo(photographed(picture, found_in(NAME, SIDE)), head, {"name": "Ada"})
     pose, turned = {"jawOpen": 0.3}, np.array([0, 0.12, 0, 0, 0, 0], np.float32)
     free = drawn(mesh_renderer(cut, Picture(background="transparent")), turned, **pose)
     red = drawn(mesh_renderer(cut, Picture(background="#ff0000")), turned, **pose)
@@ -224,7 +224,7 @@ def test_faces_anywhere_in_pictures_of_any_size_are_kept(
     side: int, corner: tuple[int, int], size: tuple[int, int], tmp_path: Path
 ) -> None:
     picture, found = placed(side, corner, size)
-    made = speaking_photo(picture, found, 0.0, load_face("head", hair="bald"), {"name": "Ada"})
+    made = speaking_photo(photographed(picture, found), load_face("head", hair="bald"), {"name": "Ada"})
     assert len(made.vertices) < 20_000
     write_face(tmp_path / "me.face", made)
     kept = read_face(tmp_path / "me.face")

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.photo.lid_lines import N_LID
-from tts2face.photo.photo_mesh import PhotoMesh
+from tts2face.photo.photo_mesh import PhotoMesh, grid_triangles
 from tts2face.photo.photo_surface import LIDS, PhotoPages, PhotoSurface
 
 Floats = NDArray[np.float64]
@@ -25,8 +25,6 @@ def add_lids(surface: PhotoSurface, mesh: PhotoMesh, pages: PhotoPages, scale: f
         for share in np.linspace(0, 1, N_ROWS):
             shown = mesh.places[fold] + way * (1 - abs(2 * share - 1))
             rows.append(surface.add(skin.at(fold).between(skin.at(moving), float(share)), uv=pages.uv(shown)))
-        grid = np.stack(rows)
-        a, b, c, d = (part.ravel() for part in (grid[:-1, :-1], grid[:-1, 1:], grid[1:, :-1], grid[1:, 1:]))
-        triangles = np.concatenate([np.column_stack([a, c, d]), np.column_stack([a, d, b])])
+        triangles = grid_triangles(np.stack(rows))
         is_mirrored = mesh.places[fold[0], 0] > mesh.places[fold[-1], 0]
         surface.parts.append((LIDS, triangles[:, ::-1] if is_mirrored else triangles))

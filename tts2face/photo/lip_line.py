@@ -107,7 +107,7 @@ def _seam(pixels: NDArray[np.uint8], line: Floats, scale: float) -> Floats:
     grey = grey_at(pixels, places, max(0.6, SEAM_BLUR * scale))
     darkness = (grey - grey.mean(axis=1, keepdims=True)) / (grey.std() + 1e-3)
     moved = line.copy()
-    moved[:, :2] += _path(darkness + SEAM_REST * offsets**2, offsets, SEAM_STIFFNESS)[:, None] * scale * across
+    moved[:, :2] += cheapest_path(darkness + SEAM_REST * offsets**2, offsets, SEAM_STIFFNESS)[:, None] * scale * across
     return moved
 
 
@@ -131,14 +131,14 @@ def _edge(pixels: NDArray[np.uint8], line: Floats, outer: Floats, scale: float) 
     before = (sums[:, at] - sums[:, at - N_SIDE]) / N_SIDE
     behind = (sums[:, at + 1 + N_SIDE] - sums[:, at + 1]) / N_SIDE
     cost[:, at] = -EDGE_GAIN * (before - behind)
-    steps = _path(cost + LIP_REST * offsets**2, offsets, LIP_STIFFNESS)
+    steps = cheapest_path(cost + LIP_REST * offsets**2, offsets, LIP_STIFFNESS)
     from_corner = np.minimum(np.arange(N_POINTS), np.arange(N_POINTS)[::-1])
     moved = line.copy()
     moved[:, :2] += (steps * np.minimum(1, from_corner / CORNER_POINTS))[:, None] * scale * inwards
     return moved
 
 
-def _path(cost: Floats, offsets: Floats, stiffness: float) -> Floats:
+def cheapest_path(cost: Floats, offsets: Floats, stiffness: float) -> Floats:
     """Offset (N,) of each row of the cheapest path through costs (N, P), smoothed."""
     step = stiffness * ((offsets[:, None] - offsets) / 0.01) ** 2
     total, came = cost[0].copy(), np.zeros(cost.shape, np.int64)

@@ -19,7 +19,7 @@ from tts2face.models.landmarks import (
     OUTER_LIP_LOWER,
     OUTER_LIP_UPPER,
 )
-from tts2face.numeric import points_in_polygon, unit_vectors
+from tts2face.numeric import points_in_polygon
 from tts2face.photo.lid_lines import LIDS, N_LID, LidLines
 from tts2face.photo.lip_line import LipLine
 
@@ -309,11 +309,7 @@ def _triangles(places: Floats, slits: Sequence[tuple[Ints, Ints]]) -> Ints:
     return left
 
 
-def vertex_normals(points: Floats, triangles: Ints) -> Floats:
-    """(V, 3) unit normals of vertices (V, 3)."""
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    flat = np.cross(b - a, c - a)
-    found = np.zeros_like(points)
-    for k in range(3):
-        np.add.at(found, triangles[:, k], flat)
-    return unit_vectors(found)
+def grid_triangles(numbers: Ints) -> Ints:
+    """Triangles of a grid of vertices (R, C), of rows from above and columns from the left, seen from ahead."""
+    a, b, c, d = (part.ravel() for part in (numbers[:-1, :-1], numbers[:-1, 1:], numbers[1:, :-1], numbers[1:, 1:]))
+    return np.concatenate([np.column_stack([a, c, d]), np.column_stack([a, d, b])])
