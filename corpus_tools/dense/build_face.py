@@ -153,7 +153,8 @@ def paint_person(fitted: FittedHead, seen: Sequence[TrackedPictures], on_progres
         No frame shows open eyes.
     """
     canvas = build_canvas(fitted.shaped)
-    fit = build_picture_fitter(fitted.shaped, canvas.opened, fitted.used)
+    seen_vertices = np.unique(canvas.texels.corners[canvas.share > 0])
+    fit = build_picture_fitter(fitted.shaped, canvas.opened, fitted.used, seen_vertices)
     sampler = LookSampler(fit)
     skin = average_skin_colours(fitted.shaped, canvas, fit, seen, on_frame=sampler.add, on_progress=on_progress)
     look = sampler.look()
