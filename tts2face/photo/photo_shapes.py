@@ -46,8 +46,7 @@ FOLD_FOLLOW, BELOW_FOLLOW = 0.12, 0.35  # of the way of the lid beside them, by 
 FEATURES_STILL = 0.2  # of the eye distance outside the face, beyond which blinks and closing lips move nothing
 GAZE_LIDS = {"eyeLookDown": 0.22, "eyeLookUp": -0.10}  # of a blink, by which the lids follow the gaze
 UPPER_SHARE, SMILING_SHARE = 0.25, 0.3  # of the way on which lips meet, of the upper lip; more in a smile
-THICKNESS, SMILING_THICKNESS = 0.8, -0.3  # share of that way of the outer edge of a lip
-LOWER_RED, LOWER_MORE = 0.97, 0.05  # of the lower lip: share of its red in that way, and more of its outer edge
+LOWER_FOLLOW = (0.97, 1.05)  # of that way, by which the red of the lower lip and its outer edge follow
 PARTED = 0.03  # of the eye distance: a gap of lips that do not touch
 MOUTH_MIDDLE = (0, 17, 13)  # landmarks of the upper edge, the lower edge and the middle of the mouth
 LIP_STILL = 0.34  # of the eye distance from the mouth, beyond which closing lips move nothing
@@ -168,15 +167,14 @@ def closing(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson) -> Float
     if person.lips.is_closed:
         return np.zeros((len(mesh.places), 3))
     shares = np.array([person.upper_share, person.upper_share - 1])
-    thick = THICKNESS + SMILING_THICKNESS * person.smile * person.is_parted
     ways = person.lips.lower - person.lips.upper
     numbers = np.arange(N_LIP)
     follow: dict[int, Floats] = {}
     vertex_of = dict(zip(mesh.landmarks.tolist(), mesh.landmark_vertices.tolist(), strict=True))
     at_landmark = np.linspace(0, N_LIP - 1, len(INNER_LIP_UPPER))
     for line, outer, ring, share, near, far in (
-        (mesh.upper_lip, OUTER_LIP_UPPER, LIP_RINGS[0], shares[0], (1 + thick) / 2, thick),
-        (mesh.lower_lip, OUTER_LIP_LOWER, LIP_RINGS[1], shares[1], LOWER_RED, LOWER_MORE + thick),
+        (mesh.upper_lip, OUTER_LIP_UPPER, LIP_RINGS[0], shares[0], 1.0, 1.0),
+        (mesh.lower_lip, OUTER_LIP_LOWER, LIP_RINGS[1], shares[1], *LOWER_FOLLOW),
     ):
         follow |= {int(vertex): share * ways[k] for k, vertex in zip(numbers, line, strict=True)}
         for row, part in ((ring, near), (outer, far)):

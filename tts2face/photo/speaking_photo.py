@@ -42,7 +42,7 @@ Ints = NDArray[np.int64]
 
 BREATH = "breath"
 SMILE_KEPT = 0.6  # of a smile with parted lips, while they speak
-INTO_LIP = 0.006  # of the eye distance, by which the edges of parted lips are taken from within the lip
+INTO_LIP = 0.012  # of the eye distance, by which the edges of parted lips are taken from within the lip
 N_NEAR = 6  # vertices of the skin around a place behind it
 FOLLOW_STEPS = 255  # of the share of the head's motion, as files hold it
 
