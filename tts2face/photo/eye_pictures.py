@@ -22,13 +22,17 @@ MARGIN = 0.12  # of the eye distance around the opening, and the radius of the i
 FINE = 3  # places along a pixel's side at which its share of the opening is counted
 SCLERA_FROM = 1.12  # radii of the iris from its middle
 IRIS_EDGE = (0.98, 1.28)  # over which the iris fades into the sclera
-N_RINGS = 10  # of the iris, whose mean colours complete it
+N_RINGS, N_RINGS_INSIDE = 10, 8  # whose mean colours complete the iris, and those within its radius
+RING_WIDTH, LEAST_IN_RING = 0.1, 3  # radii to either side of a ring, and pixels for its own colour
 LEAST_SEEN = 12  # pixels of the sclera for its own colours
+SCLERA_SCALE = 8.0  # of the places of its polynomial, of the eye distance
+SCLERA_RIDGE = np.array([0.0005, 0.05, 0.05, 0.05])  # that keeps its terms small
+SCLERA_LIMITS = (10, 97)  # per cent of its colours, between which it stays
 DARK_SHARE, DARK_WEIGHT = 35, 0.15  # per cent of its pixels that lids shade, and how much they count
 SHADE_FADE = 0.03  # of the eye distance, over which the shadow of the lids goes on beyond them
-RIGID_TO, STILL_FROM = 1.2, 3.2  # radii around the iris that turn with it, and beyond which nothing does
-WHOLE, HALF, SHOWN = 0.99, 0.5, 0.4  # shares of a pixel within the opening: for colours, for the white, and as seen
-SHADE_BLUR_PX = 0.7
+GAZE_FADE = (1.2, 3.2)  # radii around the iris that turn with it, and beyond which nothing does
+WHOLE, MOSTLY, SHOWN = 0.99, 0.5, 0.4  # shares of a pixel within the opening: for colours, for the white, and as seen
+SHADE_BLUR_PX = 0.7  # of that shadow
 CATCHLIGHT_IRIS_PX = 9.0  # radius of an iris on which catchlights are sharp enough to lie still
 CATCHLIGHT_WITHIN, CATCHLIGHT_REACH = 0.95, 1.2  # radii of the iris, in which its peak and all of it lie
 CATCHLIGHT_LEAST, CATCHLIGHT_OVER_WHITE = 45.0, 8.0  # of 255, its peak over the iris around it, and over the white
@@ -36,11 +40,11 @@ CATCHLIGHT_EDGE, CATCHLIGHT_PEAKS = 0.3, 0.6  # of the highest peak: the edge of
 BRIGHT_WHITE = 95  # per cent of the white of the eye are darker than what catchlights are compared with
 CATCHLIGHT_SOLID = 0.55  # of the area of the polygon around one, which crescents of the white do not fill
 CATCHLIGHT_SHARES = (0.004, 0.2)  # of the area of the iris
-CATCHLIGHT_RIM_PX, CATCHLIGHT_BLUR_PX = 0.9, 1.0
+CATCHLIGHT_RIM_PX = 0.9  # by which a catchlight is widened
 CATCHLIGHT_FOLLOW = 0.45  # of the iris's motion: so moves the middle of the cornea's sphere, which mirrors the lamp
-CATCHLIGHT_AHEAD_MM = 1.0
+CATCHLIGHT_AHEAD_MM = 1.0  # of the eye: what moves behind it must not come through
 EYE_RADIUS_MM = 12.0
-BEHIND_MM = 1.5  # the skin around it
+EYE_BEHIND_MM = 1.5  # the skin around it
 N_CATCHLIGHT = 8  # directions in which a catchlight is widened
 N_COLUMNS, N_ROWS = 25, 17  # vertices of a patch
 
@@ -87,7 +91,7 @@ def _patches(
     across, down = np.meshgrid(np.linspace(low[0], high[0] - 1, N_COLUMNS), np.linspace(low[1], high[1] - 1, N_ROWS))
     places = np.column_stack([across.ravel(), down.ravel()])
     away = np.linalg.norm(places - middle, axis=1) / radius
-    turning = 1 - smoothstep(away, RIGID_TO, STILL_FROM)
+    turning = 1 - smoothstep(away, *GAZE_FADE)
     triangles = grid_triangles(np.arange(N_ROWS * N_COLUMNS).reshape(N_ROWS, N_COLUMNS))
     corner = (int(low[0]), int(low[1]))
     picture = np.rint(shown.picture).clip(0, 255).astype(np.uint8)
@@ -139,7 +143,9 @@ def _without_lids(
     ring_iris = _rings(colours, inside & (away < SCLERA_FROM), away)
     share = (1 - smoothstep(away, *IRIS_EDGE))[..., None]
     base = sclera * (1 - share) + ring_iris * share
-    white = np.median(np.asarray(sclera)[opening > HALF], axis=0) if (opening > HALF).any() else colours.mean((0, 1))
+    white = (
+        np.median(np.asarray(sclera)[opening > MOSTLY], axis=0) if (opening > MOSTLY).any() else colours.mean((0, 1))
+    )
     if not inside.any():
         return _Shown(base, white, [])
     catchlights = _catchlights(colours, base, inside, away, radius) if stay else []
@@ -186,27 +192,27 @@ def _sclera(colours: Floats, seen: NDArray[np.bool_], off: tuple[Floats, Floats]
     """Colours (h, w, 3) of the white of the eye: a polynomial through what is seen of it."""
     if int(seen.sum()) <= LEAST_SEEN:
         return None
-    across, down = (way / scale * 8 for way in off)
+    across, down = (way / scale * SCLERA_SCALE for way in off)
     terms = np.stack([np.ones_like(across), across, down, across**2], axis=-1)
     rows, values = terms[seen], colours[seen]
     brightness = values.mean(axis=1)
     weights = np.where(brightness < np.percentile(brightness, DARK_SHARE), DARK_WEIGHT, 1.0)[:, None]
-    ridge = np.diag([0.01, 1, 1, 1]) * len(rows) * 0.05
+    ridge = np.diag(SCLERA_RIDGE) * len(rows)
     factors = np.linalg.solve((rows * weights).T @ rows + ridge, (rows * weights).T @ values)
-    limits = np.percentile(values, (10, 97), axis=0)
+    limits = np.percentile(values, SCLERA_LIMITS, axis=0)
     return np.clip(terms @ factors, limits[0], limits[1])
 
 
 def _rings(colours: Floats, seen: NDArray[np.bool_], away: Floats) -> Floats:
     """Colours (h, w, 3) of an iris that is seen whole: the means of its rings."""
-    middles = (np.arange(N_RINGS) + 0.5) / (N_RINGS - 2)
+    middles = (np.arange(N_RINGS) + 0.5) / N_RINGS_INSIDE
     profile: list[Floats] = []
     for middle in middles:
-        ring = seen & (np.abs(away - middle) < 0.1)
+        ring = seen & (np.abs(away - middle) < RING_WIDTH)
         usual = (
             profile[-1] if profile else np.median(colours[seen], axis=0) if seen.any() else colours.mean(axis=(0, 1))
         )
-        profile.append(np.median(colours[ring], axis=0) if int(ring.sum()) > 3 else usual)
+        profile.append(np.median(colours[ring], axis=0) if int(ring.sum()) > LEAST_IN_RING else usual)
     return np.stack([np.interp(away, middles, np.array(profile)[:, c]) for c in range(3)], axis=-1)
 
 

@@ -9,8 +9,8 @@ from tts2face.photo.photo_surface import LIDS, PhotoPages, PhotoSurface
 
 Floats = NDArray[np.float64]
 
-N_ROWS = 5  # of vertices, from the fold to the band
-REACH = 0.018  # of the eye distance above the fold, whose skin a lid shows on its way there and back
+N_LID_ROWS = 5  # of vertices, from the fold to the band
+SHOWN_ABOVE = 0.018  # of the eye distance above the fold, whose skin a lid shows on its way there and back
 
 
 def add_lids(surface: PhotoSurface, mesh: PhotoMesh, pages: PhotoPages, scale: float) -> None:
@@ -20,9 +20,9 @@ def add_lids(surface: PhotoSurface, mesh: PhotoMesh, pages: PhotoPages, scale: f
     for fold, band, margin in zip(mesh.folds, mesh.bands, mesh.upper_lids, strict=True):
         moving = np.concatenate([fold[:1], band[-1], fold[-1:]])
         up = mesh.places[fold] - mesh.places[margin]
-        way = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-6) * (REACH * scale) * bow
+        way = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-6) * (SHOWN_ABOVE * scale) * bow
         rows = []
-        for share in np.linspace(0, 1, N_ROWS):
+        for share in np.linspace(0, 1, N_LID_ROWS):
             shown = mesh.places[fold] + way * (1 - abs(2 * share - 1))
             rows.append(surface.add(skin.at(fold).between(skin.at(moving), float(share)), uv=pages.uv(shown)))
         triangles = grid_triangles(np.stack(rows))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.colour import decode_srgb, encode_srgb
+from tts2face.colour import LUMINANCE, decode_srgb, encode_srgb
 from tts2face.models.face import Face
 from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, UPPER_LIP_INNER_MID
 from tts2face.numeric import vertex_normals
@@ -29,10 +29,12 @@ AMBIENT = 0.30  # of the light of a tooth that faces the viewer
 LIGHT_FROM = np.array([0.1, 0.35, 0.93])
 CHEEKS = (50, 280, 205, 425, 101, 330)
 LIP_RED = (15, 16, 86, 316, 12)
+CHEEK_PX, LIP_PX = 3, 1  # around these, whose colours are taken
 EDGE_MM = 4.0  # around the middle of the upper teeth, and behind their front, within which their edge is looked for
+TEETH_OVER_SKIN = 1.05  # least luminance of teeth, of the cheeks'
+TINT_POWERS, SKIN_SHARE = (0.6, 0.35), 0.25  # of the hues of the eyes' white and the skin in teeth; the skin's share
 TEETH_LIMITS = (0.06, 0.75)  # of the luminance of teeth
 LEAST_LIGHT = 1e-3  # of any colour that is measured, so that black has a hue
-LUMINANCE = np.array([0.21, 0.72, 0.07])
 WALL_MM = (0.0, 2.5, 8.0, 22.0)  # depth of the rings of the wall behind the lips
 WALL_OUT_MM = (0.0, 0.8, 5.0, 7.0)  # and how much wider than the opening they are
 WALL_FOLLOW = (1.0, 1.0, 0.8, 0.5)  # share of the motion of the lips that they follow
@@ -127,17 +129,17 @@ class MouthLight:
 
 def mouth_light(pixels: NDArray[np.uint8], landmarks: Floats, sclera: Floats) -> MouthLight:
     """Light in a mouth from the colours of cheeks, lips and the white of the eyes (3,), 0..255."""
-    skin, lips = cheek_light(pixels, landmarks), _median(pixels, landmarks[list(LIP_RED), :2], 1)
+    skin, lips = cheek_light(pixels, landmarks), _median(pixels, landmarks[list(LIP_RED), :2], LIP_PX)
     white = np.maximum(decode_srgb(sclera / 255), LEAST_LIGHT)
-    bright = float(np.clip(max(1.05 * (skin @ LUMINANCE), white @ LUMINANCE), *TEETH_LIMITS))
-    warm, warm_skin = (white / (white @ LUMINANCE)) ** 0.6, (skin / (skin @ LUMINANCE)) ** 0.35
-    tint = 0.75 * warm + 0.25 * warm_skin
+    bright = float(np.clip(max(TEETH_OVER_SKIN * (skin @ LUMINANCE), white @ LUMINANCE), *TEETH_LIMITS))
+    tints = [(light / (light @ LUMINANCE)) ** power for light, power in zip((white, skin), TINT_POWERS, strict=True)]
+    tint = (1 - SKIN_SHARE) * tints[0] + SKIN_SHARE * tints[1]
     return MouthLight(bright * tint / float(tint @ LUMINANCE), lips)
 
 
 def cheek_light(pixels: NDArray[np.uint8], landmarks: Floats) -> Floats:
     """Linear light (3,) of the cheeks of a face with landmarks (478, 2 or 3) in a picture (H, W, 3)."""
-    return _median(pixels, landmarks[list(CHEEKS), :2], 3)
+    return _median(pixels, landmarks[list(CHEEKS), :2], CHEEK_PX)
 
 
 def _median(pixels: NDArray[np.uint8], places: Floats, reach: int) -> Floats:

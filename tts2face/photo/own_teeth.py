@@ -15,7 +15,7 @@ from tts2face.models.landmarks import UPPER_LIP_INNER_MID
 from tts2face.numeric import points_in_polygon, smoothstep
 from tts2face.photo.colours import colours_at, lab_at
 from tts2face.photo.found_face import FoundFace, PhotoReader
-from tts2face.photo.lip_line import LipLine, cheapest_path, find_lip_line
+from tts2face.photo.lip_line import LEAST_LIP_BLUR_PX, LipLine, cheapest_path, find_lip_line
 from tts2face.photo.mouth_inside import PICTURED, TEETH, MouthInside, MouthLight, MouthPlace, cheek_light, head_mouth
 from tts2face.photo.photo_camera import TO_CAMERA, PhotoCamera, find_camera
 from tts2face.photo.photo_mesh import LIP_RINGS, grid_triangles
@@ -29,9 +29,11 @@ UPPER = TEETH[0]  # of the head
 HALF_WIDTH_MM, AROUND_MM = 26.0, 3.0  # that are searched: to either side, and above and below the opening
 HIGHEST_MM, LOWEST_MM = 30.0, 35.0  # of the opening, over and under the edges of the head's teeth
 COLUMN_MM, ROW_MM = 0.75, 0.25  # steps of the search
-BLUR = 0.003  # of the eye distance
+TEETH_BLUR = 0.003  # of the eye distance
 BRIGHTER, LESS_RED, LIKE_TOOTH = 60.0, 8.0, (0.5, 1.5)  # than lips, of L and a in 8 bits: their sum tells teeth
-LEAST_BRIGHT = 0.55  # of the brightest teeth
+TOOTH = 0.5  # likeness from which something is a tooth
+ARCH_STEP_MM = 2.0  # between places along the arch whose depths are measured, and to either side of them
+LEAST_BRIGHT = (0.45, 0.65)  # of the brightest teeth
 BRIGHTEST = 90  # per cent of what may be teeth are darker
 OVER_EDGE_MM, UNDER_EDGE_MM = 2.0, 1.0  # that are compared across the edges of teeth
 SEAM_GAIN = 0.6  # of a dark line, such as that between upper and lower teeth, over the change of colour at an edge
@@ -47,10 +49,10 @@ GAP_MM = 2.0  # between teeth that are one row
 INSETS_MM = np.array([1.0, 0.3])  # from lips, which shade teeth, and from edges, whose pixels are mixed
 HIDDEN_MM = 2.0  # from the lower lip, within which teeth end in it
 LONGER_MM = 5.0  # at most, than they are seen
-CROWN_MM, GUM_FADE_MM = 10.5, 2.0  # height of a tooth where a lip hides it, and over which gums begin
+CROWN_MM, GUM_FADE_MM, GUM_MM = 10.5, 2.0, 4.0  # height of a hidden tooth, over which gums begin, and of gums
 JOIN_MM, JOIN_GAIN = 3.0, (0.6, 1.6)  # over which both sides are compared, where one goes on as the other's image
 HIDDEN_BLUR_MM = 0.7  # along the row, above what is seen
-ALONG = 4.0  # times nearer are pixels above and below one another, for what is hidden
+NEARER_ALONG = 4.0  # times nearer are pixels above and below one another, for what is hidden
 LIGHT_GAIN = (0.25, 4.0)  # between pictures of one person
 SHEET_STEP_MM, SHEET_ROWS = 0.8, (0.0, 0.06, 0.12, 0.25, 0.5, 0.75, 1.0)  # of vertices, the rows from the edges up
 ROUND_MM = 2.5  # of the corners of the last teeth
@@ -118,8 +120,8 @@ class Arch:
         """Front of the upper teeth of a head."""
         part = next(part for part in head.parts if part.name == UPPER)
         teeth = head.vertices[np.unique(head.triangles[part.first : part.first + part.count])].astype(np.float64)
-        ways = np.arange(0.0, np.abs(teeth[:, 0]).max(), 2.0)
-        depths = [teeth[np.abs(np.abs(teeth[:, 0]) - way) < 2.0, 2].max() for way in ways]
+        ways = np.arange(0.0, np.abs(teeth[:, 0]).max(), ARCH_STEP_MM)
+        depths = [teeth[np.abs(np.abs(teeth[:, 0]) - way) < ARCH_STEP_MM, 2].max() for way in ways]
         return cls(float(teeth[:, 1].min()), ways, gaussian_filter(np.array(depths), 1.0, mode="nearest"))
 
     def points(self, across: Floats, up: Floats) -> Floats:
@@ -192,7 +194,7 @@ class _View:
     ) -> None:
         self._pixels, self._camera, self._arch = pixels, camera, arch
         self._opening = np.concatenate([lips.upper, lips.lower[::-1]])[:, :2]
-        self._blur = max(0.5, BLUR * face.eye_distance_px)
+        self._blur = max(LEAST_LIP_BLUR_PX, TEETH_BLUR * face.eye_distance_px)
         places = face.landmarks[[number for ring in LIP_RINGS for number in ring[2:-2]], :2]
         self._lip = np.median(lab_at(pixels, places, self._blur), axis=0)
         self._skin = cheek_light(pixels, face.landmarks)
@@ -230,9 +232,9 @@ class _View:
         off = colours - self._lip
         alike = smoothstep(off[..., 0] / BRIGHTER - off[..., 1] / LESS_RED, *LIKE_TOOTH) * is_open
         bright = colours[..., 0]
-        if (alike > 0.5).any():
-            brightest = float(np.percentile(bright[alike > 0.5], BRIGHTEST))
-            alike = alike * smoothstep(bright / brightest, LEAST_BRIGHT - 0.1, LEAST_BRIGHT + 0.1)
+        if (alike > TOOTH).any():
+            brightest = float(np.percentile(bright[alike > TOOTH], BRIGHTEST))
+            alike = alike * smoothstep(bright / brightest, *LEAST_BRIGHT)
         return alike, np.where(is_open, bright, np.nan)
 
     def opening(self, across: Floats, up: Floats) -> tuple[Floats, Floats]:
@@ -253,9 +255,9 @@ class _View:
             columns > 0, edge[-1] - np.interp(-across[-1], across, edge), edge[0] - np.interp(-across[0], across, edge)
         )
         line = np.where(own, line, line[::-1] + ends)
-        rows = np.arange(line.max() + CROWN_MM + 2 * GUM_FADE_MM, line.min() - LONGER_MM, -step)
+        rows = np.arange(line.max() + CROWN_MM + GUM_MM, line.min() - LONGER_MM, -step)
         places = self._places(columns, rows)
-        inset = np.maximum(INSETS_MM, 1.0 / self._camera.scale) / step
+        inset = np.maximum(INSETS_MM, 1 / self._camera.scale) / step
         over = rows[:, None] > line
         under_lip, over_edge = (distance_transform_edt(part) for part in (self._is_open(places) | ~over, over))
         is_seen = own & (under_lip > inset[0]) & (over_edge > inset[1])
@@ -263,7 +265,9 @@ class _View:
         mirrored = is_seen[:, ::-1] & ~own
         colours = np.where(mirrored[..., None], colours[:, ::-1] * _mirror_gain(colours, is_seen, columns), colours)
         known = is_seen | mirrored
-        nearest = distance_transform_edt(~known, sampling=(1.0, ALONG), return_distances=False, return_indices=True)
+        nearest = distance_transform_edt(
+            ~known, sampling=(1.0, NEARER_ALONG), return_distances=False, return_indices=True
+        )
         colours = colours[nearest[0], nearest[1]]
         soft = gaussian_filter(colours, (0, HIDDEN_BLUR_MM / step, 0))
         colours = np.where((known | ~over)[..., None], colours, soft)
@@ -342,7 +346,7 @@ def _edges(likeness: Floats, bright: Floats, up: Floats) -> tuple[Floats, Floats
     cost = behind - before - SEAM_GAIN * seam
     offsets = up[rows] / EYE_DISTANCE_MM
     edge = cheapest_path(np.ascontiguousarray(cost.T), offsets, EDGE_STIFFNESS) * EYE_DISTANCE_MM
-    is_tooth = (likeness > 0.5) & (up[:, None] > edge)
+    is_tooth = (likeness > TOOTH) & (up[:, None] > edge)
     top = np.where(is_tooth.any(axis=0), up[is_tooth.argmax(axis=0)], edge)
     return edge, is_tooth.sum(axis=0) * ROW_MM, top
 

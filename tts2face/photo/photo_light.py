@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from tts2face.colour import decode_srgb
+from tts2face.colour import LUMINANCE, decode_srgb
 from tts2face.models.baked_light import (
     BLACK_SHARE,
     LEAST_SIDE,
-    LIMIT_STEP,
     N_BALL_TERMS,
     N_LAMP_NUMBERS,
     N_MOUTH_TERMS,
@@ -19,6 +18,8 @@ from tts2face.models.baked_light import (
     N_TERMS,
     TABLE_SIDE,
     BakedLight,
+    equal_limits,
+    quantised,
 )
 from tts2face.models.landmarks import LEFT_LIDS, OUTER_LIP_LOWER, OUTER_LIP_UPPER, RIGHT_LIDS
 from tts2face.numeric import smoothstep, vertex_normals
@@ -30,18 +31,22 @@ from tts2face.photo.photo_surface import EYES, LIDS, SKIN
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-BLUR = 0.03  # of the width of the face
+LIGHT_BLUR = 0.03  # of the width of the face
 SMALL_SPREAD_PX = 3.0  # blur of the smaller picture in which that is done
 NOSE_AND_BROWS = (46, 53, 52, 65, 55, 276, 283, 282, 295, 285, 1, 2, 98, 327)
 USUAL_LIGHT = np.array([0.6, 0.0, 0.18, 0.4])  # constant, and from the left, above and in front, of the median
-RIDGE = np.array([0.2, 1.0, 1.0, 1.0]) * 0.06
-ROUNDS = 6  # of the robust fit
-GAMMA = 2.2
-LEAST_LIGHT = 0.25
+LIGHT_RIDGE = np.array([0.2, 1.0, 1.0, 1.0]) * 0.06
+ROUNDS, LEAST_OFF = 6, 1e-4  # of the robust fit, and the least error by which others are weighed
+CLEAR, WITHIN_OVAL = 0.06, 0.04  # of the width: from features and within the oval, where skin is measured
+LIT_FADE = (-0.015, 0.08)  # of the width outside the oval, over which the light of the skin ends
+GAMMA = 2.2  # of a display
+LEAST_SHADE = 0.25  # of the median, of skin in the shade
 MOST_TURNED = 30.0  # of 255, change of the skin's light
 MOUTH_BASE, MOUTH_BY_OPENING = 0.5, 0.6  # of the colour in open light: in the dark, and times the curve of the opening
 SHADE_TINT = np.array([0.8, 1.05, 1.1])  # of what wrinkles darken: light between them is redder
+NO_EYES = np.array([0.2, 0.4], np.float32)  # edges of pupil and iris, of which a photographed face has none
 TURN_TERMS, MOVE_TERMS = slice(1, 4), slice(4, 7)  # of `tts2face.render.film.response.write_terms`
+LEAST_RESPONSE = 1e-6  # of 255, of a response
 CURVE_TERM = 2  # of `tts2face.render.film.response.write_mouth_terms`
 
 
@@ -84,9 +89,9 @@ def skin_light(
     points = vertices[: len(mesh.places)]
     normals = vertex_normals(points, mesh.triangles)
     wide = float(np.ptp(mesh.places[mesh.landmark_vertices, 0]))
-    soft = _blurred(pixels, BLUR * wide, mesh.places)
+    soft = _blurred(pixels, LIGHT_BLUR * wide, mesh.places)
     colours = decode_srgb(soft / 255.0)
-    luminance = colours @ (0.21, 0.72, 0.07)
+    luminance = colours @ LUMINANCE
     avoided = {
         *OUTER_LIP_UPPER,
         *OUTER_LIP_LOWER,
@@ -96,11 +101,11 @@ def skin_light(
     is_near = np.isin(mesh.landmarks, list(avoided))
     places = mesh.places[mesh.landmark_vertices]
     away = np.linalg.norm(places[:, None] - places[is_near][None], axis=2).min(axis=1)
-    used = mesh.landmark_vertices[(away > 0.06 * wide) & (mesh.outside[mesh.landmark_vertices] < -0.04 * wide)]
+    used = mesh.landmark_vertices[(away > CLEAR * wide) & (mesh.outside[mesh.landmark_vertices] < -WITHIN_OVAL * wide)]
     terms = np.column_stack([np.ones(len(used)), normals[used]])
     light = _fit(terms, luminance[used])
-    shade = np.maximum(light[0] + normals @ light[1:], LEAST_LIGHT * float(np.median(luminance[used])))
-    lit = 1 - smoothstep(mesh.outside / wide, -0.015, 0.08)
+    shade = np.maximum(light[0] + normals @ light[1:], LEAST_SHADE * float(np.median(luminance[used])))
+    lit = 1 - smoothstep(mesh.outside / wide, *LIT_FADE)
     rows = np.flatnonzero(lit > 0)
     per_turn = light[1:, None] * (lit[rows] / (GAMMA * shade[rows]))
     responses = np.zeros((N_TERMS, 3, len(rows)))
@@ -111,13 +116,13 @@ def skin_light(
 
 def _fit(terms: Floats, values: Floats) -> Floats:
     usual = float(np.median(values)) * USUAL_LIGHT
-    ridge = np.diag(RIDGE) * len(values)
+    ridge = np.diag(LIGHT_RIDGE) * len(values)
     weights = np.ones(len(values))
     for _ in range(ROUNDS):
         weighted = terms * weights[:, None]
         light = np.linalg.solve(weighted.T @ terms + ridge, weighted.T @ values + ridge @ usual)
         off = np.abs(values - terms @ light)
-        weights = 1 / (1 + (off / (np.median(off) + 1e-4)) ** 2)
+        weights = 1 / (1 + (off / (np.median(off) + LEAST_OFF)) ** 2)
     return np.asarray(light)
 
 
@@ -155,9 +160,9 @@ def picture_light(
         Vertices behind the lips.
     """
     rows, responses = skin_light(pixels, *skin)
-    answers, sizes = _in_steps(responses)
+    answers, sizes = quantised(responses, least=LEAST_RESPONSE)
     mouth_rows, lit, openings = mouth.light()
-    mouth_answers, mouth_sizes = _in_steps(openings)
+    mouth_answers, mouth_sizes = quantised(openings, least=LEAST_RESPONSE)
     n_texels = N_PAGES * LEAST_SIDE**2 + LEAST_SIDE * (LEAST_SIDE // BLACK_SHARE)
     no_colours = np.zeros((0, 3), np.float32)
     return BakedLight(
@@ -175,13 +180,13 @@ def picture_light(
         rows=rows.astype(np.int32),
         responses=answers,
         response_sizes=sizes,
-        limits=_limits(MOST_TURNED, len(rows)),
+        limits=equal_limits(MOST_TURNED, len(rows)),
         partners=rows.astype(np.int32),
         mouth_rows=mouth_rows.astype(np.int32),
         mouth_base=np.rint(lit).astype(np.uint8),
         mouth_responses=mouth_answers,
         mouth_sizes=mouth_sizes,
-        mouth_limits=_limits(255.0, len(mouth_rows)),
+        mouth_limits=equal_limits(255.0, len(mouth_rows)),
         ball_rows=np.zeros(0, np.int32),
         ball_base=no_colours,
         ball_responses=np.zeros((N_BALL_TERMS, 3, 0), np.int8),
@@ -190,19 +195,7 @@ def picture_light(
         head_lamps=0,
         sky=np.zeros(3, np.float32),
         eye_gain=1.0,
-        eye_edges=np.array([0.2, 0.4], np.float32),
+        eye_edges=NO_EYES,
         view=np.zeros((TABLE_SIDE, TABLE_SIDE, TABLE_SIDE, 3), np.uint8),
         backdrop=pixels,
     )
-
-
-def _in_steps(values: Floats) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
-    """Responses (T, 3, N) in 8 bits, and the size (T,) of their steps."""
-    sizes = np.maximum(np.abs(values).max(axis=(1, 2), initial=0.0) / 127, 1e-6)
-    return np.rint(values / sizes[:, None, None]).astype(np.int8), sizes.astype(np.float32)
-
-
-def _limits(most: float, n: int) -> NDArray[np.int8]:
-    """(2, 3, n) limits of a change of light, of 255."""
-    steps = min(round(most / LIMIT_STEP), 127)
-    return np.tile(np.array([-steps, steps], np.int8)[:, None, None], (1, 3, n))

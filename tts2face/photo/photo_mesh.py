@@ -20,7 +20,7 @@ from tts2face.models.landmarks import (
     OUTER_LIP_UPPER,
 )
 from tts2face.numeric import points_in_polygon
-from tts2face.photo.lid_lines import LIDS, N_LID, LidLines
+from tts2face.photo.lid_lines import LID_MARGINS, N_LID, LidLines
 from tts2face.photo.lip_line import LipLine
 
 Floats = NDArray[np.float64]
@@ -232,7 +232,11 @@ def _landmarks(
 ) -> Ints:
     """Landmarks that become vertices: not on the lines, in the openings, or on the other side of the mouth."""
     size, scale = of_picture
-    on_lines = {*INNER_LIP_UPPER, *INNER_LIP_LOWER, *(number for lids in LIDS for line in lids for number in line)}
+    on_lines = {
+        *INNER_LIP_UPPER,
+        *INNER_LIP_LOWER,
+        *(number for lids in LID_MARGINS for line in lids for number in line),
+    }
     used = np.array([number for number in range(N_MESH_LANDMARKS) if number not in on_lines])
     places = landmarks[used, :2]
     side = np.zeros(N_MESH_LANDMARKS)

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Face, Part, PhotoView
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.photo.eye_pictures import BEHIND_MM, SIDES, EyePatch, eye_patches, gaze_shapes
+from tts2face.photo.eye_pictures import EYE_BEHIND_MM, SIDES, EyePatch, eye_patches, gaze_shapes
 from tts2face.photo.found_face import PhotographedFace
 from tts2face.photo.landmark_places import place_landmarks
 from tts2face.photo.lid_lines import find_lid_lines
@@ -35,14 +35,14 @@ from tts2face.photo.photo_shapes import (
 )
 from tts2face.photo.photo_surface import EYES, SKIN, PhotoPages, PhotoSurface, Vertices, lay_pages, moves
 from tts2face.photo.spreading import Spreading
-from tts2face.photo.wrinkles import wrinkles
+from tts2face.photo.wrinkles import SMILING, wrinkles
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-BREATH, SMILE_SHAPES = "breath", ("mouthSmileLeft", "mouthSmileRight")
+BREATH = "breath"
 SMILE_KEPT = 0.6  # of a smile with parted lips, while they speak
-INTO_LIP = 0.006  # of the eye distance, by which the edges of parted lips are taken from within the lip
+INTO_LIP = 0.012  # of the eye distance, by which the edges of parted lips are taken from within the lip
 N_NEAR = 6  # vertices of the skin around a place behind it
 FOLLOW_STEPS = 255  # of the share of the head's motion, as files hold it
 
@@ -97,7 +97,7 @@ def speaking_photo(
     line = find_lip_line(pixels, found)
     given = PhotoPlaces(fit, (pixels.shape[1], pixels.shape[0]), picture.reduced_by, scale)
     lips = given.lips(LipLine(camera.depths_of(line.upper), camera.depths_of(line.lower), line.gap))
-    person = PhotoPerson(given.size, landmarks, lips, seen.mean_score(SMILE_SHAPES), scale)
+    person = PhotoPerson(given.size, landmarks, lips, seen.mean_score(SMILING), scale)
     lids = given.lids(find_lid_lines(pixels, landmarks, scale))
     pivot = given.point("pivot", camera.to_pixels(head.pivot[None].astype(np.float64))[0])
     mesh = build_mesh(person.size, landmarks, lips, lids, scale)
@@ -190,7 +190,7 @@ def _skin(mesh: PhotoMesh, person: PhotoPerson, camera: PhotoCamera, model: _Mod
     photo = np.column_stack([mesh.places, depth])
     rest = camera.to_head(photo) + camera.ways_to_head(closing(mesh, spreading, person))
     if person.is_parted:
-        rest -= (1 - SMILE_KEPT) * person.smile * np.sum([found[name] for name in SMILE_SHAPES], axis=0)
+        rest -= (1 - SMILE_KEPT) * person.smile * np.sum([found[name] for name in SMILING], axis=0)
     share = person.upper_share
     met = (1 - share) * rest[mesh.upper_lip] + share * rest[mesh.lower_lip]
     rest[mesh.upper_lip] = rest[mesh.lower_lip] = met
@@ -214,7 +214,7 @@ def _eye_vertices(patch: EyePatch, eye: int, photo: Floats, camera: PhotoCamera,
     """Vertices of a patch behind the skin around it, which is given by the pixels and depths (V, 3) of all skin."""
     away, near = cKDTree(photo[:, :2]).query(patch.places, N_NEAR)
     shares = 1 / (np.asarray(away) + 1)
-    depth = (photo[near, 2] * shares).sum(axis=1) / shares.sum(axis=1) + (patch.ahead_mm - BEHIND_MM) * camera.scale
+    depth = (photo[near, 2] * shares).sum(axis=1) / shares.sum(axis=1) + (patch.ahead_mm - EYE_BEHIND_MM) * camera.scale
     shapes = np.zeros((len(model.names), len(patch.places), 3))
     for name, way in gaze_shapes(model.head, patch.turning, eye).items():
         shapes[model.names.index(name)] = way
