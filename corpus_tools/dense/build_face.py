@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.build_talker import NOT_STATED, PROVENANCE, read_provenance
 from corpus_tools.dense.adapt_head import adapt_head
-from corpus_tools.dense.light_cast import remove_cast
+from corpus_tools.dense.light_cast import remove_cast, skin_texture
 from corpus_tools.dense.mesh_fit import (
     align_to_head,
     correct_lips_and_lids,
@@ -158,5 +158,5 @@ def paint_person(fitted: FittedHead, seen: Sequence[TrackedPictures], on_progres
     sampler = LookSampler(fit)
     skin = average_skin_colours(fitted.shaped, canvas, fit, seen, on_frame=sampler.add, on_progress=on_progress)
     look = sampler.look()
-    skin = replace(skin, colour=remove_cast(skin.colour, look.cast, look.skin))
+    skin = replace(skin, colour=skin_texture(remove_cast(skin.colour, look.cast, look.skin)))
     return dress_head(paint_skin(fitted.shaped, canvas, skin), look), look
