@@ -9,8 +9,9 @@ from tts2face.models.consent import consent_record
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.hair import BALD
-from tts2face.photo.found_face import find_face
-from tts2face.photo.photograph import read_photograph, split_number
+from tts2face.photo.found_face import FoundFace, find_face
+from tts2face.photo.person_matte import part_background
+from tts2face.photo.photograph import Photograph, read_photograph, split_number
 from tts2face.photo.speaking_photo import speaking_photo
 from tts2face.request import REALISTIC_FACE
 
@@ -58,7 +59,33 @@ def face_from_photo(
     found = find_face(picture.pixels, FaceTracker(model), path, number=number, reduced_by=picture.reduced_by)
     for warning in found.warnings:
         on_warning(warning)
+    picture = _without_background(picture, found, model, path, on_warning)
     scores = BlendshapeReader(model).blendshape_scores(found.landmarks)
     smile = float(np.mean([scores[BLENDSHAPES.index(shape)] for shape in SMILES]))
     metadata = {"name": record["name"], "consent": dict(record), "made_by": "tts2face --photo"}
     return speaking_photo(picture, found, smile, load_face(REALISTIC_FACE, hair=BALD), metadata)
+
+
+def _without_background(
+    picture: Photograph, found: FoundFace, model: Path | None, name: Path, on_warning: Callable[[str], None]
+) -> Photograph:
+    """An opaque picture in two layers, person and background, if they can be told apart."""
+    from tts2face.video.landmark_models import LandmarkNetwork, find_segmenter
+
+    if picture.alpha is not None:
+        return picture
+    segmenter = find_segmenter(model)
+    if segmenter is None:
+        on_warning(
+            f"the background of {name} bends where the head turns: `tts2face corpus setup` adds the model that tells "
+            "persons from backgrounds"
+        )
+        return picture
+    network = LandmarkNetwork(segmenter.read_bytes())
+    parted = part_background(picture, found.landmarks, found.eye_distance_px, network)
+    if parted.alpha is None:
+        on_warning(
+            f"the person in {name} is not told from the background, which bends where the head turns; a calmer "
+            "background, or a PNG picture whose background is transparent, does not"
+        )
+    return parted

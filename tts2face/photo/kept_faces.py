@@ -11,17 +11,19 @@ from tts2face.models.face import Face
 from tts2face.models.face_file import FORMAT_VERSION, KIND, read_face, write_face
 from tts2face.photo.photograph import split_number
 from tts2face.storage.user_folders import user_cache
+from tts2face.video.landmark_models import find_segmenter
 
 FOLDER, N_KEPT = "photos", 8
 LEAST_AGE_S = 3600.0  # of a face that is removed: another process may be about to read a younger one
-MAKING = 1  # raised when faces of photos are made in another way, or of another head
+MAKING = 2  # raised when faces of photos are made in another way, or of another head
 
 
 def kept_path(photo: str | Path) -> Path:
     """Where the face of a photo is kept: by the content and the name of the file, and what made it."""
     path, number = split_number(photo)
     content = hashlib.sha256(path.read_bytes())
-    content.update(f"{FORMAT_VERSION} {MAKING} {number} {path.stem}".encode())
+    tells_persons = find_segmenter() is not None
+    content.update(f"{FORMAT_VERSION} {MAKING} {tells_persons} {number} {path.stem}".encode())
     return user_cache() / FOLDER / f"{content.hexdigest()[:32]}.{KIND}"
 
 

@@ -124,17 +124,17 @@ def speaking_photo(
         metadata=dict(metadata),
         scores=head.scores,
         light=(picture_light(pixels, pages.pages, (mesh, skin.places), drawn, (colours, mouth)),),
-        photograph=_view(person, camera, every.follow, pages, picture.alpha),
+        photograph=_view(picture, camera, every.follow, pages),
     )
 
 
-def _view(
-    person: PhotoPerson, camera: PhotoCamera, follow: Floats, pages: PhotoPages, alpha: NDArray[np.uint8] | None
-) -> PhotoView:
+def _view(picture: Photograph, camera: PhotoCamera, follow: Floats, pages: PhotoPages) -> PhotoView:
+    high, wide = picture.pixels.shape[:2]
     lens = np.array([camera.focal_px, *camera.origin])
     rounded = np.rint(follow * FOLLOW_STEPS) / FOLLOW_STEPS
     corner = (round(float(pages.corner[0])), round(float(pages.corner[1])))
-    return PhotoView(person.size, camera.view, lens, rounded.astype(np.float32), corner, alpha)
+    layers = (picture.alpha, picture.behind)
+    return PhotoView((wide, high), camera.view, lens, rounded.astype(np.float32), corner, *layers)
 
 
 def _parts(surface: PhotoSurface) -> tuple[Part, ...]:
