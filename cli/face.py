@@ -1,5 +1,6 @@
 """``tts2face face``: import characters of other programs as faces, and show faces."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -7,7 +8,7 @@ from cyclopts import App, Parameter
 
 from cli.flags import Hair, HairColor, Model, add_option_flags, options_from_flags, switch
 from cli.landmark_model import Yes
-from cli.photo import Consent, agreed, make_face, warner
+from cli.photo import Consent, Fit, agreed, make_face, warner
 from cli.process import write_message
 from cli.progress import progress_bar
 from lexicon.errors import InputError
@@ -17,6 +18,15 @@ from tts2face.storage.overwrite import refuse_overwriting
 
 if TYPE_CHECKING:
     from tts2face.characters.importing import ImportReport
+    from tts2face.models.face import Face
+
+OUTPUTS = {
+    "--out": ("a face", (".face",)),
+    "--preview": ("a picture", (".png",)),
+    "--write-landmarks": ("a table of landmarks", (".tsv",)),
+    "--write-mapping": ("a mapping", (".tsv",)),
+    "--write-fit": ("a fit", (".json",)),
+}  # what each flag of a file that is written is, and its endings
 
 face = App(name="face", help="Import characters as faces, show faces.")
 
@@ -47,29 +57,18 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Make a .face file of a character; print the mapping of its shapes, and what replaces missing ones."""
     del yes
-    check_file_name(out, "a face", (".face",))
-    for path, what, suffix in (
-        (preview, "a picture", ".png"),
-        (write_landmarks, "a table of landmarks", ".tsv"),
-        (write_mapping, "a mapping", ".tsv"),
-    ):
-        if path is not None:
-            check_file_name(path, what, (suffix,))
-    outputs = {"--out": out, "--preview": preview, "--write-landmarks": write_landmarks}
-    refuse_overwriting(
-        outputs | {"--write-mapping": write_mapping},
+    _check_outputs(
+        {"--out": out, "--preview": preview, "--write-landmarks": write_landmarks, "--write-mapping": write_mapping},
         {"the character": character, "--mapping": mapping, "--landmarks": landmarks, "--model": model},
     )
     from tts2face.characters.importing import import_face
     from tts2face.characters.landmark_table import landmark_table
-    from tts2face.characters.pictures import draw_preview, png_bytes
     from tts2face.characters.saving import save_face
     from tts2face.characters.shape_mapping import mapping_table
     from tts2face.storage.files import write_atomically
 
     imported = import_face(character, mapping=mapping, landmarks=landmarks, front=front, model=model)
-    if preview is not None:
-        write_atomically(preview, png_bytes(draw_preview(imported.face)))
+    _write_preview(preview, imported.face)
     if write_landmarks is not None:
         write_atomically(write_landmarks, landmark_table(imported.report.landmarks).encode())
     if write_mapping is not None:
@@ -89,25 +88,27 @@ def picture(  # noqa: PLR0913 - one parameter a flag
     consent: Consent = None,
     name: Annotated[str | None, Parameter(help="The person's name; by default the file's name.")] = None,
     preview: Annotated[Path | None, Parameter(help="Write a picture with what was found drawn in it (.png).")] = None,
+    fit: Fit = None,
+    write_fit: Annotated[Path | None, Parameter(help="Write what was found, to edit it for --fit (.json).")] = None,
     model: Model = None,
     yes: Yes = False,
     quiet: Annotated[bool, switch("Print no warnings and no summary.")] = False,
 ) -> None:
     """Make a .face file of a picture of a person, who speaks in it."""
     del yes  # read where the model is missing
-    check_file_name(out, "a face", (".face",))
-    if preview is not None:
-        check_file_name(preview, "a picture", (".png",))
     from tts2face.photo.photograph import split_number
 
-    refuse_overwriting({"--out": out, "--preview": preview}, {"the photo": split_number(photo)[0], "--model": model})
-    from tts2face.characters.pictures import draw_preview, png_bytes
+    _check_outputs(
+        {"--out": out, "--preview": preview, "--write-fit": write_fit},
+        {"the photo": split_number(photo)[0], "--fit": fit, "--model": model},
+    )
     from tts2face.characters.saving import save_face
-    from tts2face.storage.files import write_atomically
+    from tts2face.photo.photo_fit import write_fit as write_fit_file
 
-    made = make_face(photo, consent, name=name, model=model, quiet=quiet)
-    if preview is not None:
-        write_atomically(preview, png_bytes(draw_preview(made)))
+    made = make_face(photo, consent, name=name, fit=fit, model=model, quiet=quiet)
+    _write_preview(preview, made)
+    if write_fit is not None:
+        write_fit_file(write_fit, made.metadata["fit"])
     save_face(out, made)
     if not quiet:
         write_message(f"wrote {out}: {made.metadata['name']}, {made.metadata['consent']['date']}")
@@ -130,21 +131,17 @@ def photo(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Make a .face file of the person in pictures: a head that turns, with shape, skin, eyes, hair and clothes."""
     del yes
-    check_file_name(out, "a face", (".face",))
-    if preview is not None:
-        check_file_name(preview, "a picture", (".png",))
-    from corpus_tools.dense.photo_avatar import build_avatar
-    from tts2face.characters.pictures import draw_preview, png_bytes
-    from tts2face.models.face_loading import load_face
     from tts2face.photo.photograph import split_number
-    from tts2face.storage.files import write_atomically
 
     inputs = {f"the photo {one}": split_number(one)[0] for one in photos}
-    refuse_overwriting({"--out": out, "--preview": preview}, inputs | {"--model": model})
+    _check_outputs({"--out": out, "--preview": preview}, inputs | {"--model": model})
+    from corpus_tools.dense.photo_avatar import build_avatar
+    from tts2face.models.face_loading import load_face
+
     consent = agreed(photos[0], consent, name)
     result = build_avatar(photos, out, consent=consent, name=name, model=model, on_warning=warner(quiet=quiet))
     if preview is not None:
-        write_atomically(preview, png_bytes(draw_preview(load_face(str(out)))))
+        _write_preview(preview, load_face(str(out)))
     if not quiet:
         write_message(result.look.summary())
         write_message(f"wrote {out}")
@@ -236,9 +233,25 @@ def still(
     if shown is None:
         raise InputError("a talker's own face has no picture at rest; choose one of `tts2face faces`, or a .face file")
     drawn = draw(shown, picture=options)
-    write_atomically(out, png_bytes(drawn))
+    write_atomically(out, png_bytes(drawn, shown.synthetic_notice))
     if not quiet:
         write_message(f"wrote {out}: {drawn.shape[1]} x {drawn.shape[0]} pixels")
+
+
+def _check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, str | Path | None]) -> None:
+    """Refuse outputs, by their flags, with wrong endings, and those that would overwrite inputs or each other."""
+    for flag, path in outputs.items():
+        if path is not None:
+            check_file_name(path, *OUTPUTS[flag])
+    refuse_overwriting(outputs, inputs)
+
+
+def _write_preview(preview: Path | None, made: "Face") -> None:
+    from tts2face.characters.pictures import draw_preview, png_bytes
+    from tts2face.storage.files import write_atomically
+
+    if preview is not None:
+        write_atomically(preview, png_bytes(draw_preview(made)))
 
 
 def _report_text(report: "ImportReport") -> str:

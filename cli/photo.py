@@ -22,9 +22,12 @@ Consent = Annotated[
     str | None,
     Parameter(help="Statement of consent of the person in --photo, asked for once; drawn for a face that is nobody's."),
 ]
+Fit = Annotated[
+    Path | None, Parameter(help="Corrections of lips, lids, teeth and pivot in the photo (.json, see docs/photo.md).")
+]
 
 
-def face_of_photo(photo: str, consent: str | None, *, quiet: bool) -> str:
+def face_of_photo(photo: str, consent: str | None, *, fit: Path | None = None, quiet: bool) -> str:
     """Path of the face of a photo, which is made and kept with the consent if it is not there yet.
 
     Raises
@@ -32,14 +35,16 @@ def face_of_photo(photo: str, consent: str | None, *, quiet: bool) -> str:
     InputError
         There is no such photo or face, or no consent.
     DataError
-        The picture shows no face that can be moved.
+        The picture shows no face that can be moved, or the fit is not that of the picture.
     BackendError
         The landmark model or a package is not installed.
     """
-    from tts2face.photo.kept_faces import find_kept, keep_face
+    from tts2face.photo.kept_faces import find_kept, keep_face, kept_path
 
-    found = find_kept(photo, consent)
-    return str(found or keep_face(make_face(photo, consent, quiet=quiet), photo))
+    kept = kept_path(photo, fit)
+    if not find_kept(kept, consent):
+        keep_face(make_face(photo, consent, fit=fit, quiet=quiet), kept)
+    return str(kept)
 
 
 def make_face(
@@ -47,6 +52,7 @@ def make_face(
     consent: str | None,
     *,
     name: str | None = None,
+    fit: Path | None = None,
     model: Path | None = None,
     quiet: bool,
 ) -> "Face":
@@ -54,7 +60,7 @@ def make_face(
     from tts2face.photo.face_from_photo import face_from_photo
 
     consent = agreed(photo, consent, name)
-    return face_from_photo(photo, consent=consent, name=name, model=model, on_warning=warner(quiet=quiet))
+    return face_from_photo(photo, consent=consent, name=name, fit=fit, model=model, on_warning=warner(quiet=quiet))
 
 
 @functools.cache  # asked for once, also where the command is run again with the landmark model
@@ -85,21 +91,24 @@ def warner(*, quiet: bool) -> Callable[[str], None]:
     return warn
 
 
-def refuse_others(photo: str | None, consent: str | None, others: Mapping[str, str | None]) -> None:
-    """Refuse other faces and hair, by their flags, beside a photo, and a consent without one."""
+def refuse_others(
+    photo: str | None, belonging: Mapping[str, str | Path | None], others: Mapping[str, str | None]
+) -> None:
+    """Refuse other faces and hair beside a photo, and what belongs to a photo without one, by their flags."""
     for name, given in others.items():
         if photo is not None and given is not None:
             raise InputError(f"--photo cannot be combined with {name}; remove one of them")
-    if photo is None and consent is not None:
-        raise InputError("--consent belongs to --photo; add the photo, or remove it")
+    for name, value in belonging.items():
+        if photo is None and value is not None:
+            raise InputError(f"{name} belongs to --photo; add the photo, or remove it")
 
 
-def check_photo(photo: str, outputs: Mapping[str, str | Path | None]) -> None:
-    """Refuse a photo that does not exist, no output, and outputs, by their flags, that would overwrite the photo."""
+def check_photo(photo: str, fit: Path | None, outputs: Mapping[str, str | Path | None]) -> None:
+    """Refuse a photo that does not exist, no output, and outputs, by their flags, that would overwrite photo or fit."""
     from tts2face.photo.photograph import split_number
     from tts2face.storage.overwrite import refuse_overwriting
 
     path, _ = split_number(photo)
     if all(output is None for output in outputs.values()):
         raise InputError("there is no output; add --out clip.mp4 (or .webm, .gif, or a folder for .png files)")
-    refuse_overwriting(outputs, {"--photo": path})
+    refuse_overwriting(outputs, {"--photo": path, "--fit": fit})

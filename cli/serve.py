@@ -54,6 +54,7 @@ def add(  # noqa: PLR0913 - one parameter a flag
     concurrent: Annotated[int | None, whole_number("Requests at the same time.")] = None,
     resources: Annotated[int | None, whole_number("Uploads that it may have.")] = None,
     resources_mb: Annotated[float | None, Parameter(help="MB of its uploads.")] = None,
+    photos_per_day: Annotated[int | None, Parameter(help="Faces that it may make of photos in a day; 0: none.")] = None,
     speech_s_per_day: Annotated[int | None, whole_number("Seconds of speech a day.")] = None,
 ) -> None:
     """Create a key and print it; the file holds only its hash."""
@@ -61,7 +62,7 @@ def add(  # noqa: PLR0913 - one parameter a flag
 
     limits = {
         "requests_per_minute": requests_per_minute, "concurrent": concurrent, "speech_s_per_day": speech_s_per_day,
-        "resources": resources, "resources_mb": resources_mb,
+        "resources": resources, "resources_mb": resources_mb, "photos_per_day": photos_per_day,
     }  # fmt: skip
     print(add_key(file, name, scope or ["speak"], **limits))  # noqa: T201 - the result
 

@@ -1,13 +1,16 @@
-"""Work on one take of a person for the studio, in a process with limits and without a network.
+"""Work on one take of a person for the service and the studio, in a process with limits and without a network.
 
-``python -m corpus_tools.take_process``, started by `tts2face.studio.take_tools`: standard input holds one line of JSON,
-an order, and ends with the parent process; lines of JSON on standard output tell the progress (``stage``, ``done``,
-``of``) and at last the result, or the ``error`` and its ``message``. A take is a video or a Live Link Face table.
+``python -m corpus_tools.take_process``, started by `tts2face.service.uploads.tool_process`: standard input holds one
+line of JSON, an order, and ends with the parent process; lines of JSON on standard output tell the progress (``stage``,
+``done``, ``of``) and at last the result, or the ``error`` and its ``message``. A take is a video, a Live Link Face
+table, or a photo.
 
 ``{"kind": "check", "take", "cache"}`` gives ``seconds`` and ``findings``, objects with ``severity`` and ``message``,
 refusals first. ``{"kind": "style", "take", "cache", "base", "name", "out"}`` writes the palette `base` with a style of
 this name. ``{"kind": "capture", "take", "table", "sound"}`` writes a video as a Live Link table, and its sound if it
 has any (``has_sound``). ``{"kind": "film", "take", "sound", "out"}`` renders a table with its sound, or null.
+``{"kind": "avatar", "take", "out", "max_bytes"}`` makes a head of the person in a photo, beside which is what is stated
+of it, checks it as an upload, and writes it into the folder `out`.
 """
 
 import json
@@ -19,10 +22,13 @@ from typing import Any
 
 from corpus_tools.build_palette import StyleSource, build_style
 from corpus_tools.decomposition.gesture_take import check_gesture_take
+from corpus_tools.dense.photo_avatar import build_avatar
 from corpus_tools.message_lines import line_progress, write_line
 from corpus_tools.run_options import RunOptions
-from lexicon.errors import Tts2faceError
+from lexicon.errors import DataError, Tts2faceError
 from tts2face.child_process import received_order
+from tts2face.jobs.refused_file import RefusedFileError
+from tts2face.jobs.resource_check import FACE, check_resource, read_statement
 from tts2face.limited_process import ProcessLimits, limit_process
 from tts2face.models.palette import load_palette
 from tts2face.types import Progress
@@ -83,8 +89,22 @@ def _film(order: Mapping[str, Any], stages: Stages) -> dict[str, Any]:
     return {"seconds": round(written.seconds, 2)}
 
 
+def _avatar(order: Mapping[str, Any], stages: Stages) -> dict[str, Any]:
+    photo, folder = Path(order["take"]), Path(order["out"])
+    stated, made, notes = read_statement(photo), photo.with_name("avatar.face"), list[str]()
+    progress = stages("making the head")
+    progress(0, 2)
+    built = build_avatar([photo], made, consent=stated["consent"], name=stated["name"], on_warning=notes.append)
+    progress(1, 2)
+    try:
+        check_resource(FACE, made, folder, order["max_bytes"])
+    except RefusedFileError as refused:
+        raise DataError(f"the head cannot be used: {refused}") from refused
+    return {"look": built.look.summary(), "notes": notes}
+
+
 _KINDS: Mapping[str, Callable[[Mapping[str, Any], Stages], dict[str, Any]]] = {
-    "check": _check, "style": _style, "capture": _capture, "film": _film,
+    "check": _check, "style": _style, "capture": _capture, "film": _film, "avatar": _avatar,
 }  # fmt: skip
 
 

@@ -23,7 +23,7 @@ STARTS_PYTHON = (
     "tts2face.jobs.talker_job", "tts2face.render.vtk_renderer", "tts2face.service.synthesis.remote_aligner",
     "tts2face.service.synthesis.warm_process", "tts2face.service.uploads.upload_folder",
     "tts2face.studio.puppetry.live_camera", "tts2face.studio.recording.take_checks",
-    "tts2face.studio.recording.talker_building", "tts2face.studio.take_tools", "tts2face.synthesis.warm_up",
+    "tts2face.studio.recording.talker_building", "tts2face.service.uploads.tool_process", "tts2face.synthesis.warm_up",
     "tts2face.voice.espeak",
 )  # fmt: skip
 # Modules that read JSON or TOML themselves; `lexicon.inputs` does it for others.
@@ -40,7 +40,7 @@ NAMES_HIGHER = (
     "tts2face.jobs.talker_job: corpus_tools.build_process",
     "tts2face.studio.recording.take_checks: corpus_tools.recording_process",
     "tts2face.studio.reports.reports: corpus_tools.report_process",
-    "tts2face.studio.take_tools: corpus_tools.take_process",
+    "tts2face.service.uploads.tool_process: corpus_tools.take_process",
 )
 PARSERS = {"json": {"load", "loads", "JSONDecoder"}, "tomllib": {"load", "loads"}}
 

@@ -6,10 +6,14 @@ import sys
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from corpus_tools.decomposition.gesture_take import GOOD_S, LEAST_S, check_gesture_take
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
+from tests.photo.pictures import still
+from tts2face.jobs.resource_check import CONTENT, STATEMENT
+from tts2face.models.face_file import read_face
 from tts2face.models.palette import load_palette, read_palette
 
 HEADER = "Timecode,BlendshapeCount,JawOpen,EyeBlinkLeft,EyeBlinkRight,BrowInnerUp,HeadYaw,HeadPitch,HeadRoll"
@@ -84,3 +88,23 @@ def test_an_error_names_no_path(tmp_path: Path) -> None:
     assert error["error"] == "InputError"
     assert "the palette has a style delighted already" in str(error["message"])
     assert str(tmp_path) not in str(error["message"])
+
+
+@pytest.mark.usefixtures("face_model")
+def test_a_photo_becomes_the_head_of_its_person(tmp_path: Path) -> None:
+    photo, out = tmp_path / "face.upload", tmp_path / "checked"
+    out.mkdir()
+    Image.fromarray(still("tomas", 360)).save(photo, "PNG")
+    order = {"kind": "avatar", "take": str(photo), "out": str(out), "max_bytes": 2e7, "cpu_s": 200}
+    stated = {"name": "tom", "consent": None, "max_pixels": 1_000_000}
+    (tmp_path / STATEMENT).write_text(json.dumps(stated))
+    (*_, refused) = ordered(order)
+    assert refused["error"] == "InputError"
+    assert "state the consent" in str(refused["message"])
+    (tmp_path / STATEMENT).write_text(json.dumps(stated | {"consent": "drawn"}))
+    (*_, made) = ordered(order)
+    assert str(made["look"]).startswith("hair: ")
+    face = read_face(out / CONTENT)
+    assert face.photograph is None
+    assert face.metadata["consent"]["statement"] == "drawn"
+    assert face.hairdo is not None

@@ -31,9 +31,9 @@ def projected(name: str, side: int, **weights: float) -> np.ndarray:
     return np.column_stack([places, depths])
 
 
-def found_in(name: str, side: int) -> FoundFace:
+def found_in(name: str, side: int, **weights: float) -> FoundFace:
     """A shipped face in its picture, as if a tracker had found it without error."""
-    places = projected(name, side)
+    places = projected(name, side, **weights)
     eyes = float(np.linalg.norm(places[EYE_OUTER_LEFT, :2] - places[EYE_OUTER_RIGHT, :2]))
     return FoundFace(places, 0.0, (0.0, 0.0, 0.0), eyes, 1)
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from lexicon.errors import InputError
 from tests.model_files.made import write_made_face
 from tts2face.models.face_file import read_face
 from tts2face.photo import kept_faces
@@ -23,27 +24,41 @@ def keep(photo: Path, statement: str) -> Path:
     write_made_face(made)
     face = read_face(made)
     object.__setattr__(face, "metadata", {**face.metadata, "consent": {"statement": statement}})
-    return keep_face(face, photo)
+    kept = kept_path(photo)
+    keep_face(face, kept)
+    return kept
 
 
 def test_a_face_is_found_again_with_its_consent(photo: Path) -> None:
-    assert find_kept(photo, None) is None
+    assert not find_kept(kept_path(photo), None)
     kept = keep(photo, "I agree to this.")
-    assert find_kept(photo, None) == find_kept(photo, " I agree to this. ") == kept
-    assert find_kept(photo, "drawn") is None
-    assert find_kept(f"{photo}@2", None) is None
+    assert find_kept(kept, None)
+    assert find_kept(kept, " I agree to this. ")
+    assert not find_kept(kept_path(photo), "drawn")
+    assert not find_kept(kept_path(f"{photo}@2"), None)
     other = photo.with_name("anna.jpg")
     other.write_bytes(photo.read_bytes())
-    assert find_kept(other, None) is None  # its clips name another person
+    assert not find_kept(kept_path(other), None)  # its clips name another person
+
+
+def test_a_correction_makes_another_face(photo: Path) -> None:
+    keep(photo, "drawn")
+    fit = photo.with_name("fit.json")
+    fit.write_text('{"pivot": [10, 10]}')
+    corrected = kept_path(photo, fit)
+    assert not find_kept(corrected, "drawn")
+    fit.write_text('{"pivot": [10, 11]}')
+    assert len({kept_path(photo), corrected, kept_path(photo, fit)}) == 3
+    with pytest.raises(InputError, match=r"cannot read .*no\.json"):
+        kept_path(photo, photo.with_name("no.json"))
 
 
 def test_a_damaged_face_is_made_again(photo: Path) -> None:
     kept = keep(photo, "drawn")
     kept.write_bytes(kept.read_bytes()[:500])
-    assert find_kept(photo, None) is None
-    assert find_kept(photo.parent / "me.jpg", "drawn") is None
+    assert not find_kept(kept_path(photo), None)
     keep(photo, "drawn")
-    assert find_kept(photo, None) == kept
+    assert find_kept(kept, None)
 
 
 def test_the_oldest_faces_are_removed(photo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -54,4 +69,4 @@ def test_the_oldest_faces_are_removed(photo: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(kept_faces, "LEAST_AGE_S", -1.0)
     keep(photo, "drawn")
     assert len(list(kept_path(photo).parent.iterdir())) == N_KEPT
-    assert find_kept(photo, None) is not None
+    assert find_kept(kept_path(photo), None)

@@ -6,9 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
+from scipy.spatial import cKDTree
 
 from lexicon.errors import DataError, InputError
+from tests.exports.test_stage_glb import Read
 from tests.photo.pictures import found_in, still
+from tts2face.exports.stage_glb import stage_glb
 from tts2face.face.deformation import REST_HEAD
 from tts2face.face.face_motion import moved_landmarks
 from tts2face.models.face import Face
@@ -357,3 +360,27 @@ def test_one_of_several_faces_is_named_after_the_file(tmp_path: Path) -> None:
     assert split_number(odd) == (odd, 1)
     with pytest.raises(InputError, match=r"there is no photo .*nobody"):
         split_number(tmp_path / "nobody.jpg")
+
+
+def test_the_stage_shows_it_as_the_picture_does(face: Face) -> None:
+    view = face.photograph
+    angle = np.radians(12)
+    roll = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    leaning = replace(face, photograph=replace(view, view=np.column_stack([roll @ view.view[:, :3], view.view[:, 3]])))
+    made = Read(stage_glb(leaning, leaning.shape_names))
+    seen = leaning.vertices @ leaning.photograph.view[:, :3].T + leaning.photograph.view[:, 3]
+    expected = seen[:, :2] / seen[:, 2:]
+    primitives, materials = made.json["meshes"][0]["primitives"], made.json["materials"]
+    for primitive, material in zip(primitives, materials, strict=True):
+        places = 1000 * made.accessor(primitive["attributes"]["POSITION"])
+        shown = places[:, :2] * (1, -1) / (view.view[2, 3] - places[:, 2:])
+        apart, _ = cKDTree(expected).query(shown)
+        assert apart.max() < 1e-6
+        assert material["extras"]["unlit"]
+        assert material["extras"]["behind"] == (material["name"] not in (SKIN, LIDS))
+    stage = made.json["asset"]["extras"]
+    assert list(stage["views"]) == ["front", "close"]
+    assert stage["photo"]["gain"] == pytest.approx(leaning.photograph.head_gain)
+    low, high = np.array(stage["frame"])
+    assert ((high - low)[:2] > 0.2).all()  # metres: a head with some of what is around it
+    assert ((high - low)[:2] < 0.5).all()

@@ -58,6 +58,31 @@ def test_seconds_of_speech_a_day_are_limited() -> None:
         limits.check_speech(key)
 
 
+def test_photos_of_a_key_are_made_one_after_another_and_so_many_a_day() -> None:
+    clock = Clock()
+    limits, key = RateLimits(clock), ApiKey("a", "")
+    with limits.photo(key, 2):
+        with pytest.raises(RefusedError, match="a face of a photo of the key a is being made"), limits.photo(key, 2):
+            pass
+        with limits.photo(replace(key, name="b"), 2):
+            pass
+    with limits.photo(key, 2, counts=False), pytest.raises(RefusedError):
+        limits.photo(key, 2).__enter__()
+    with limits.photo(key, 2):
+        pass
+    with pytest.raises(RefusedError, match="the key a has used its 2 photos a day") as refused, limits.photo(key, 2):
+        pass
+    assert (refused.value.status, refused.value.headers["Retry-After"]) == (429, str(int(12 * HOUR_S)))
+    clock.now = 12 * HOUR_S
+    with limits.photo(key, 2):
+        pass
+    with limits.photo(replace(key, name="c", photos_per_day=10), 0):
+        pass
+    barred = replace(key, photos_per_day=0)
+    with pytest.raises(RefusedError, match="may make no faces of photos"), limits.photo(barred, 2):
+        pass
+
+
 class OnePartPool:
     """A pool that makes 10 s of speech in a part, and then waits for ever."""
 

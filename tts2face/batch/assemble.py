@@ -18,6 +18,7 @@ from tts2face.batch.track import open_track
 from tts2face.clock import exact_rate, first_sample
 from tts2face.render.movie import MOV_MOVIE, MP4_MOVIE, SOUND_RATE, WEBM_MOVIE, MovieKind
 from tts2face.render.output_path import MOV, MP4, WEBM, make_temporary, move_into_place
+from tts2face.render.provenance import append_to_mp4
 from tts2face.storage.files import translate_disk_errors
 
 KINDS = {MP4: MP4_MOVIE, MOV: MOV_MOVIE, WEBM: WEBM_MOVIE}
@@ -57,6 +58,8 @@ def join_segments(segments: Sequence[Path], out: Path, fps: float, sounds: Seque
                 with av.open(str(path)) as source:
                     joined.append(source, path, sound)
             joined.finish()
+        if out.suffix == MP4:
+            append_to_mp4(temporary.path, joined.notice)
         move_into_place(temporary, out)
     except av.FFmpegError as broken:
         raise DataError(
@@ -75,13 +78,14 @@ class _Joined:
         self._video: Any = None
         self._audio: Any = None
         self._settings: tuple[Any, ...] = ()
+        self.notice = ""
         self.n_frames = self._n_samples = 0
 
     def _open(self, source: Any) -> None:
         """Streams like those of the first segment."""
         for name, value in source.metadata.items():
             if name.lower() == "comment":
-                self._target.metadata["comment"] = value
+                self._target.metadata["comment"] = self.notice = value
         first = source.streams.video[0]
         self._video = self._target.add_stream_from_template(first)
         if "alpha_mode" in (name.lower() for name in first.metadata):

@@ -22,6 +22,7 @@ from tts2face.models.landmarks import (
 from tts2face.render.camera import camera_matrices
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.picture import STUDIO, Picture
+from tts2face.render.provenance import png_labels
 from tts2face.types import Progress
 
 # Lines through landmarks and their sRGB colours: lids, inner lips, outer lips, outline.
@@ -83,12 +84,12 @@ def draw_contact_sheet(face: Face, on_progress: Progress | None = None) -> Pixel
     return np.array(sheet)
 
 
-def png_bytes(pixels: Pixels) -> bytes:
-    """Content of a PNG file of a picture."""
+def png_bytes(pixels: Pixels, notice: str = "") -> bytes:
+    """Content of a PNG file of a picture, labelled by the face's `notice`."""
     from PIL import Image
 
     content = io.BytesIO()
-    Image.fromarray(pixels).save(content, "PNG")
+    Image.fromarray(pixels).save(content, "PNG", pnginfo=png_labels(notice))
     return content.getvalue()
 
 

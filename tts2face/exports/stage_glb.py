@@ -7,7 +7,7 @@ glTF does not: visibility of the light, share of the head's motion, kinds of mat
 
 import io
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,8 @@ from tts2face.exports.rest_light import in_rest_light
 from tts2face.exports.skeleton import HEAD, Skeleton, build_skeleton
 from tts2face.exports.stage_surfaces import stage_surfaces
 from tts2face.exports.surfaces import MM_PER_M, ExportSurface, linear_colours
-from tts2face.models.face import Face, Texture
+from tts2face.face.landmark_fit import landmark_positions
+from tts2face.models.face import HEAD_LIMIT_RAD, SHIFT_GAIN, Face, Texture
 from tts2face.render import studio_light
 from tts2face.render.camera import FIELD_OF_VIEW_RAD, framing_box
 from tts2face.render.camera_views import NAMED_VIEWS
@@ -39,6 +40,7 @@ HALF = 127  # of the coverage of a texel
 LEAST_APART = 0.1  # of typical colours
 FULL = 32767  # of a quantised displacement
 FIELD_SCALE = 2.0  # light fields lie within 2
+PHOTO_MARGIN = 0.5  # around the face in a photograph, of its size
 TEXTURE_EXTENSION, QUANTISED = "EXT_texture_webp", "KHR_mesh_quantization"
 
 
@@ -55,9 +57,10 @@ class _Rows:
 def stage_glb(face: Face, channels: tuple[str, ...]) -> bytes:
     """The face as binary glTF whose morph targets are `channels`, its first shapes.
 
-    Target k has weight 1 where its channel has the value ``scales[k]`` of the mesh's extras.
+    Target k has weight 1 where its channel has the value ``scales[k]`` of the mesh's extras. A face in a photograph is
+    turned as the picture shows it.
     """
-    face, unlit = in_rest_light(face)
+    face, unlit = in_rest_light(_as_seen(face))
     surface = build_surface(face, scatters=False)
     skeleton, buffer = build_skeleton(face, len(channels)), GltfBuffer()
     moves, scales = quantised_moves(face.shapes[: len(channels)])
@@ -85,6 +88,17 @@ def stage_glb(face: Face, channels: tuple[str, ...]) -> bytes:
         **_textures(face, buffer),
     }
     return _container(content, buffer)
+
+
+def _as_seen(face: Face) -> Face:
+    """The face, that of a photograph in the axes of the camera that took it."""
+    if face.photograph is None:
+        return face
+    turn = face.photograph.turn
+    vertices, shapes, pivot = (
+        (values @ turn.T).astype(np.float32) for values in (face.vertices, face.shapes, face.pivot)
+    )
+    return replace(face, vertices=vertices, shapes=shapes, pivot=pivot)
 
 
 def _rows(face: Face, surface: Surface, skeleton: Skeleton, fields: NDArray[np.float32]) -> _Rows:
@@ -142,7 +156,7 @@ def quantised_moves(shapes: NDArray[np.floating]) -> tuple[NDArray[np.int16], ND
 
 def _material(surface: ExportSurface, built: Surface, face: Face, *, unlit: bool) -> dict[str, Any]:
     """Material with the values of the renderer's table in its extras."""
-    part = surface.part
+    part, is_photo = surface.part, face.photograph is not None
     row = built.materials[face.parts.index(part)]
     shading: dict[str, Any] = {"baseColorFactor": [1, 1, 1, part.opacity], "metallicFactor": 0}
     more: dict[str, Any] = {}
@@ -153,10 +167,11 @@ def _material(surface: ExportSurface, built: Surface, face: Face, *, unlit: bool
     extras: dict[str, Any] = {name: round(float(row[at]), 5) for name, at in columns.items()}
     extras |= {
         "kind": part.kind,
-        "open": bool(row[OPEN_SURFACE]),
+        "open": bool(row[OPEN_SURFACE]) or is_photo,
         "opacity": part.opacity,
         "cutout": part.cutout,
-        "unlit": unlit,
+        "unlit": unlit or is_photo,  # also the colours of its mouth are those of the picture's light
+        "behind": is_photo and part.texture != 0,  # eyes and mouth, which the skin hides anywhere
         **more,
     }
     material = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": shading, "extras": extras}
@@ -197,7 +212,7 @@ def _webp(texture: Texture) -> bytes:
 
 def _stage(face: Face, surface: Surface, skeleton: Skeleton, channels: tuple[str, ...]) -> Mapping[str, Any]:
     """What the preview takes from the renderer: lamps, cameras, joints; lengths in metres."""
-    low, high = framing_box(face)
+    low, high = _framed(face)
     jaw = face.shape_names.index("jawOpen") if "jawOpen" in face.shape_names else -1
     opening = lip_opening(face, jaw)[: len(channels)]
     eyes = [
@@ -222,6 +237,7 @@ def _stage(face: Face, surface: Surface, skeleton: Skeleton, channels: tuple[str
         "opening": {name: float(value) for name, value in zip(channels, opening, strict=True) if value},
         "frame": [(low / MM_PER_M).tolist(), (high / MM_PER_M).tolist()],
         "views": {name: [view.yaw_deg, view.pitch_deg, view.share] for name, view in NAMED_VIEWS.items()},
+        **_photo(face),
         "field_of_view": FIELD_OF_VIEW_RAD,
         "lamps": [[yaw, pitch, list(colour)] for yaw, pitch, colour in studio_light.LAMPS],
         "sky": list(studio_light.SKY_COLOUR),
@@ -229,6 +245,30 @@ def _stage(face: Face, surface: Surface, skeleton: Skeleton, channels: tuple[str
         "brightness": studio_light.BRIGHTNESS,
         "wall": _wall(face),
     }
+
+
+def _framed(face: Face) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners (3,) of the box that the cameras frame, mm: of a photograph the head, as far as the picture shows it."""
+    if face.photograph is None:
+        return framing_box(face)
+    landmarks = landmark_positions(face)
+    low, high = landmarks.min(axis=0), landmarks.max(axis=0)
+    margin = PHOTO_MARGIN * (high - low)
+    return np.maximum(low - margin, face.vertices.min(axis=0)), np.minimum(high + margin, face.vertices.max(axis=0))
+
+
+def _photo(face: Face) -> dict[str, Any]:
+    """Of a photograph: its few cameras, and how the head moves in it (`PhotoView.bearable`)."""
+    if face.photograph is None:
+        return {}
+    close = NAMED_VIEWS["close"].share
+    return {
+        "views": {"front": [0.0, 0.0, 1.0], "close": [0.0, 0.0, close]},
+        "photo": {
+            "turn": face.photograph.turn.tolist(), "gain": face.photograph.head_gain,
+            "limit": float(HEAD_LIMIT_RAD), "shift": SHIFT_GAIN,
+        },
+    }  # fmt: skip
 
 
 def _wall(face: Face) -> list[list[float]]:

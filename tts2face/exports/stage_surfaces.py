@@ -15,6 +15,7 @@ SKIN_MM, MOUTH_MM = 0.8, 0.2  # error of skin that no channel moves, and the lea
 EYE_MM, INSIDE_MM, CLOTH_MM = 0.3, 0.25, 1.2  # of eyeballs; teeth, gums and tongue; clothes
 CLOTH_LENGTH_MM = 150.0  # of a surface that is no part of the head
 LEAST_TRIANGLES = 200  # of a surface that is reduced
+LEAST_PHOTO_TRIANGLES = 500  # in a photograph, whose lids are narrow and fit the skin exactly
 N_MOTIONS = 3  # principal motions of a surface, which its triangles interpolate
 LIGHT_MM = 4.0  # error of the whole sky's light
 TEXTURE_SHARE = 0.3  # of a shift of the texture over the surface in its error
@@ -47,10 +48,14 @@ def _reduced(
 ) -> ExportSurface:
     """The surface without what no view shows, and with fewer triangles; cards of hair stay as they are."""
     part, own, triangles = surface.part, surface.vertices, surface.triangles
-    if part.kind == STRANDS or len(triangles) < LEAST_TRIANGLES:
+    is_photo = face.photograph is not None and part.texture == 0
+    if part.kind == STRANDS or len(triangles) < (LEAST_PHOTO_TRIANGLES if is_photo else LEAST_TRIANGLES):
         return surface
     points = _points(face, surface, *values)
-    triangles = decimate(points, triangles, _tolerances(surface, points[:, :N_SPACE], shown, values[0]))
+    if is_photo:
+        shown = np.ones_like(shown)
+    tolerances = _tolerances(surface, points[:, :N_SPACE], shown, values[0], is_skin=is_photo or part.kind == SKIN)
+    triangles = decimate(points, triangles, tolerances)
     if part.kind == SKIN:
         triangles = triangles[shown[own[triangles]].any(axis=1)]
     elif part.kind == EYE_KIND:
@@ -77,11 +82,11 @@ def _points(face: Face, surface: ExportSurface, moves: NDArray[np.float32], ligh
 
 
 def _tolerances(
-    surface: ExportSurface, places: FloatArray, shown: NDArray[np.bool_], moves: NDArray[np.float32]
+    surface: ExportSurface, places: FloatArray, shown: NDArray[np.bool_], moves: NDArray[np.float32], *, is_skin: bool
 ) -> FloatArray:
     """Errors (n,) in mm of a surface: least where many channels move it, which lips and lids do."""
     own, kind = surface.vertices, surface.part.kind
-    if kind != SKIN:
+    if not is_skin:
         is_cloth = np.ptp(places, axis=0).max() > CLOTH_LENGTH_MM
         return np.full(len(own), EYE_MM if kind == EYE_KIND else CLOTH_MM if is_cloth else INSIDE_MM)
     lengths = np.linalg.norm(moves, axis=2)

@@ -43,7 +43,9 @@ BOXED_PICTURES = (
     (4, b"ftyp", b"mif1"),
 )  # offset, box, kind
 N_MAGIC = 12  # bytes by which a picture is told
-STATEMENT = "statement.json"  # beside a photo: the name of the face, and what the person shown has stated
+STATEMENT = "statement.json"  # beside a photo: name of the face, consent of the person shown, pixels, corrections
+SHOWN, PLACES = "shown.jpg", "places.json"  # files of a photo whose places a person may correct
+SHOWN_PX = 1600  # side of the picture that is shown for it, at most
 
 
 def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> None:
@@ -163,16 +165,70 @@ def _check_character(source: Path, out: Path) -> dict[str, Any]:
 
 def _check_photo(source: Path, out: Path) -> dict[str, Any]:
     """Make a face that speaks in a photo."""
-    from lexicon.inputs import parse_json, read_text
+    from lexicon.inputs import parse_json
     from tts2face.models.face_file import write_face
     from tts2face.photo.face_from_photo import face_from_photo
+    from tts2face.photo.photo_fit import parse_fit
 
     notes: list[str] = []
-    stated = parse_json(read_text(source.with_name(STATEMENT)), STATEMENT)
+    stated = read_statement(source)
+    fit = stated.get("fit")
+    given = None if fit is None else parse_fit(parse_json(fit, "the fit"))
     made = out.with_name("photo.face")
-    face = face_from_photo(source, consent=stated["consent"], name=stated["name"], on_warning=notes.append)
+    face = face_from_photo(source, consent=stated["consent"], name=stated["name"], fit=given, on_warning=notes.append)
     write_face(made, face)
     return _check_face(made, out) | {"notes": [note.replace(str(source), "the photo") for note in notes]}
+
+
+def read_statement(photo: Path) -> dict[str, Any]:
+    """What is stated of a photo, whose size is checked.
+
+    Raises
+    ------
+    DataError
+        It has too many pixels.
+    """
+    from lexicon.inputs import read_json
+    from tts2face.photo.photograph import open_photograph
+
+    stated: dict[str, Any] = read_json(photo.with_name(STATEMENT))
+    with open_photograph(photo) as file:
+        if file.width * file.height > stated["max_pixels"]:
+            raise DataError(
+                f"{photo} has {file.width} x {file.height} pixels, more than {stated['max_pixels']}; reduce its size"
+            )
+    return stated
+
+
+def find_places(source: Path, folder: Path) -> None:
+    """Find lips, lids, teeth and pivot in a photo with a `STATEMENT`: write `PLACES`, and the picture as `SHOWN`.
+
+    Raises
+    ------
+    RefusedFileError
+        It is no picture, or shows no face that can be moved.
+    """
+    from PIL import Image
+
+    from tts2face.photo.face_from_photo import places_in_photo
+
+    notes: list[str] = []
+    try:
+        read_statement(source)
+        picture, fit = places_in_photo(source, notes.append)
+    except (DataError, InputError, BackendError) as error:
+        raise RefusedFileError(_sentence(error, source, folder)) from error
+    except MemoryError as error:
+        raise RefusedFileError("it needs too much memory") from error
+    height, width = picture.pixels.shape[:2]
+    places = {
+        "size": [round(width * picture.reduced_by), round(height * picture.reduced_by)], "fit": fit,
+        "notes": [note.replace(str(source), "the photo") for note in notes],
+    }  # fmt: skip
+    (folder / PLACES).write_text(json.dumps(places))
+    shown = Image.fromarray(picture.pixels)
+    shown.thumbnail((SHOWN_PX, SHOWN_PX))
+    shown.save(folder / SHOWN, "JPEG", quality=88)
 
 
 def _check_palette(source: Path, out: Path) -> dict[str, Any]:

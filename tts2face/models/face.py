@@ -113,11 +113,20 @@ class PhotoView:
             if array is not None:
                 array.setflags(write=False)
 
-    def bearable(self, head: NDArray[np.floating]) -> NDArray[np.float32]:
-        """The part of a head pose (6,), rad and mm, that the picture bears: less where the head is turned in it."""
+    @property
+    def turn(self) -> NDArray[np.float64]:
+        """(3, 3) from the axes of the face to x right, y up, z towards the camera."""
+        return self.view[:, :3] * np.array([[1.0], [-1.0], [-1.0]])
+
+    @property
+    def head_gain(self) -> float:
+        """Share of the turns of a head that the picture bears, where they are small: less where it is turned in it."""
         turned_deg = float(np.degrees(np.arctan2(abs(self.view[0, 2]), abs(self.view[2, 2]))))
-        gain = HEAD_GAIN * max(0.0, 1 - turned_deg / NO_TURN_DEG)
-        turns = HEAD_LIMIT_RAD * np.tanh(gain * np.asarray(head[:3], np.float64) / HEAD_LIMIT_RAD)
+        return HEAD_GAIN * max(0.0, 1 - turned_deg / NO_TURN_DEG)
+
+    def bearable(self, head: NDArray[np.floating]) -> NDArray[np.float32]:
+        """The part of a head pose (6,), rad and mm, that the picture bears."""
+        turns = HEAD_LIMIT_RAD * np.tanh(self.head_gain * np.asarray(head[:3], np.float64) / HEAD_LIMIT_RAD)
         return np.array([*turns, *(SHIFT_GAIN * np.asarray(head[3:5], np.float64)), 0.0], np.float32)
 
 

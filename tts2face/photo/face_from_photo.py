@@ -1,7 +1,8 @@
 """A face that speaks in a photograph, from its file."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from tts2face.models.face_loading import load_face
 from tts2face.models.hair import BALD
 from tts2face.photo.found_face import FoundFace, find_face
 from tts2face.photo.person_matte import part_background
+from tts2face.photo.photo_fit import NOTHING_GIVEN, PhotoFit, read_fit
 from tts2face.photo.photograph import Photograph, read_photograph, split_number
 from tts2face.photo.speaking_photo import speaking_photo
 from tts2face.request import REALISTIC_FACE
@@ -23,6 +25,7 @@ def face_from_photo(
     *,
     consent: str | None = None,
     name: str | None = None,
+    fit: str | Path | PhotoFit | None = None,
     model: Path | None = None,
     on_warning: Callable[[str], None] = lambda _: None,
 ) -> Face:
@@ -36,6 +39,9 @@ def face_from_photo(
         Statement of consent of the person shown, kept in the face with its date; ``drawn`` for a face that is nobody's.
     name
         The person's name; the file's name if omitted.
+    fit
+        Corrections of what is found, or the path of their file (docs/photo.md); ``face.metadata["fit"]`` of a face has
+        the places that were used.
     model
         Path of face_landmarker.task; found or set up if omitted.
     on_warning
@@ -46,24 +52,45 @@ def face_from_photo(
     InputError
         There is no such file or face, or no consent.
     DataError
-        The picture cannot be read, or shows no face that can be moved.
+        The picture cannot be read, or shows no face that can be moved; the fit is none, or that of another picture.
     BackendError
         The landmark models or a package are not installed.
     """
+    path, _ = split_number(photo)
+    record = consent_record(name or path.stem, consent)
+    given = fit if isinstance(fit, PhotoFit) else NOTHING_GIVEN if fit is None else read_fit(Path(fit))
+    metadata = {"name": record["name"], "consent": dict(record), "made_by": "tts2face --photo"}
+    return _made(photo, metadata, given, model, on_warning)[1]
+
+
+def places_in_photo(photo: str | Path, on_warning: Callable[[str], None]) -> tuple[Photograph, dict[str, Any]]:
+    """The picture of a photo, and the places of lips, lids, teeth and pivot that are found in it, as a fit in JSON.
+
+    Errors are those of `face_from_photo`.
+    """
+    picture, face = _made(photo, {}, NOTHING_GIVEN, None, on_warning)
+    return picture, face.metadata["fit"]
+
+
+def _made(
+    photo: str | Path,
+    metadata: Mapping[str, Any],
+    fit: PhotoFit,
+    model: Path | None,
+    on_warning: Callable[[str], None],
+) -> tuple[Photograph, Face]:
     from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
     from tts2face.video.track import FaceTracker
 
     path, number = split_number(photo)
-    record = consent_record(name or path.stem, consent)
     picture = read_photograph(path).filled()
     found = find_face(picture.pixels, FaceTracker(model), path, number=number, reduced_by=picture.reduced_by)
     for warning in found.warnings:
         on_warning(warning)
-    picture = _without_background(picture, found, model, path, on_warning)
+    layers = _without_background(picture, found, model, path, on_warning)
     scores = BlendshapeReader(model).blendshape_scores(found.landmarks)
     smile = float(np.mean([scores[BLENDSHAPES.index(shape)] for shape in SMILES]))
-    metadata = {"name": record["name"], "consent": dict(record), "made_by": "tts2face --photo"}
-    return speaking_photo(picture, found, smile, load_face(REALISTIC_FACE, hair=BALD), metadata)
+    return picture, speaking_photo(layers, found, smile, load_face(REALISTIC_FACE, hair=BALD), metadata, fit)
 
 
 def _without_background(

@@ -15,38 +15,47 @@ from tts2face.video.landmark_models import find_segmenter
 
 FOLDER, N_KEPT = "photos", 8
 LEAST_AGE_S = 3600.0  # of a face that is removed: another process may be about to read a younger one
-MAKING = 2  # raised when faces of photos are made in another way, or of another head
+MAKING = 3  # raised when faces of photos are made in another way, or of another head
 
 
-def kept_path(photo: str | Path) -> Path:
-    """Where the face of a photo is kept: by the content and the name of the file, and what made it."""
+def kept_path(photo: str | Path, *others: Path | None) -> Path:
+    """Where the face of a photo is kept: by the content and name of the file, other files that it takes, and the maker.
+
+    Raises
+    ------
+    InputError
+        There is no such photo, or one of the other files cannot be read.
+    """
     path, number = split_number(photo)
     content = hashlib.sha256(path.read_bytes())
     tells_persons = find_segmenter() is not None
     content.update(f"{FORMAT_VERSION} {MAKING} {tells_persons} {number} {path.stem}".encode())
+    for other in others:
+        try:
+            content.update(hashlib.sha256(b"" if other is None else other.read_bytes()).digest())
+        except OSError as refused:
+            raise InputError(f"cannot read {other}: {refused.strerror}; check the path") from refused
     return user_cache() / FOLDER / f"{content.hexdigest()[:32]}.{KIND}"
 
 
-def find_kept(photo: str | Path, consent: str | None) -> Path | None:
-    """The kept face of a photo, if one can be read and has the statement of consent that is given, if any."""
-    kept = kept_path(photo)
+def find_kept(kept: Path, consent: str | None) -> bool:
+    """Whether a kept face can be read, and has the statement of consent that is given, if any."""
     with suppress(InputError, DataError, OSError):
         stated = read_face(kept).metadata["consent"]["statement"]
         if consent is None or consent.strip() == stated:
             os.utime(kept)  # the last ones used are kept
-            return kept
-    return None
+            return True
+    return False
 
 
-def keep_face(face: Face, photo: str | Path) -> Path:
-    """Keep the face of a photo; where it is.
+def keep_face(face: Face, kept: Path) -> None:
+    """Keep the face of a photo at its `kept_path`.
 
     Raises
     ------
     BackendError
         The cache folder cannot be written.
     """
-    kept = kept_path(photo)
     with suppress(OSError):
         kept.parent.mkdir(parents=True, exist_ok=True)
     write_face(kept, face)
@@ -57,4 +66,3 @@ def keep_face(face: Face, photo: str | Path) -> Path:
     for path in sorted(ages, key=lambda path: ages[path])[N_KEPT:]:
         if ages[path] > LEAST_AGE_S:
             path.unlink(missing_ok=True)
-    return kept

@@ -1,6 +1,6 @@
 """What a photograph does not show of a mouth: the head's teeth, gums and tongue, and the walls of the mouth."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ AMBIENT = 0.30  # of the light of a tooth that faces the viewer
 LIGHT_FROM = np.array([0.1, 0.35, 0.93])
 CHEEKS = (50, 280, 205, 425, 101, 330)
 LIP_RED = (15, 16, 86, 316, 12)
+EDGE_MM = 4.0  # around the middle of the upper teeth, and behind their front, within which their edge is looked for
 TEETH_LIMITS = (0.06, 0.75)  # of the luminance of teeth
 LEAST_LIGHT = 1e-3  # of any colour that is measured, so that black has a hue
 LUMINANCE = np.array([0.21, 0.72, 0.07])
@@ -45,6 +46,19 @@ class MouthInside:
     shapes: Floats
     colours: Floats
     parts: dict[str, Ints]
+
+    @property
+    def teeth_edge(self) -> Floats:
+        """(3,) middle of the edge of the upper teeth, mm."""
+        teeth = self.vertices[np.unique(self.parts[TEETH[0]])]
+        middle = (teeth[:, 0].min() + teeth[:, 0].max()) / 2
+        front = teeth[(np.abs(teeth[:, 0] - middle) < EDGE_MM) & (teeth[:, 2] > teeth[:, 2].max() - EDGE_MM)]
+        place: Floats = front[front[:, 1].argmin()] * (0, 1, 1) + (middle, 0, 0)
+        return place
+
+    def moved(self, way: Floats) -> "MouthInside":
+        """What lies in the mouth, moved by a way (3,), mm."""
+        return replace(self, vertices=self.vertices + way)
 
 
 def head_mouth(head: Face, head_landmarks: Floats, landmarks: Floats, lip: Floats, light: "MouthLight") -> MouthInside:

@@ -2,6 +2,7 @@
 
 import io
 import re
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -70,8 +71,7 @@ def read_photograph(path: Path) -> Photograph:
     """
     from PIL import ImageOps
 
-    formats = ("HEIF",) if _is_heic(path) else FORMATS
-    with open_picture(path, "the photo", formats, advice=ADVICE) as file:
+    with open_photograph(path) as file:
         width, height = file.size
         if width * height > MAX_FILE_PIXELS:
             raise DataError(
@@ -91,6 +91,12 @@ def read_photograph(path: Path) -> Photograph:
             picture = _reduced(picture, scale)
         colours, alpha = _colours(picture)
     return Photograph(colours, alpha, max(width, height) / max(colours.shape[:2]))
+
+
+def open_photograph(path: Path) -> AbstractContextManager["Picture"]:
+    """The file of a picture, opened; its pixels are decoded at their first use. Errors as `read_photograph`."""
+    formats = ("HEIF",) if _is_heic(path) else FORMATS
+    return open_picture(path, "the photo", formats, advice=ADVICE)
 
 
 def _is_heic(path: Path) -> bool:

@@ -19,6 +19,7 @@ from tts2face.photo.lids import add_lids
 from tts2face.photo.lip_line import LipLine, darken_lip_edges, find_lip_line
 from tts2face.photo.mouth_inside import MouthInside, head_mouth, mouth_light, mouth_walls
 from tts2face.photo.photo_camera import PhotoCamera, find_camera
+from tts2face.photo.photo_fit import NOTHING_GIVEN, PhotoFit, PhotoPlaces
 from tts2face.photo.photo_light import picture_light
 from tts2face.photo.photo_mesh import PhotoMesh, build_mesh
 from tts2face.photo.photo_shapes import (
@@ -65,7 +66,12 @@ class _Model:
 
 
 def speaking_photo(
-    picture: Photograph, found: FoundFace, smile: float, head: Face, metadata: Mapping[str, Any]
+    picture: Photograph,
+    found: FoundFace,
+    smile: float,
+    head: Face,
+    metadata: Mapping[str, Any],
+    fit: PhotoFit = NOTHING_GIVEN,
 ) -> Face:
     """Face of a picture in which a face was found, with the shapes of a head without hair.
 
@@ -75,14 +81,23 @@ def speaking_photo(
         Score of the picture's smile, 0 to 1.
     metadata
         Name and consent.
+    fit
+        Corrections by a person. The places that were used are those of the fit in the metadata of the face.
+
+    Raises
+    ------
+    DataError
+        The fit is not that of this picture and face.
     """
     model, pixels = _Model.of(head), picture.pixels
     camera = find_camera(found, model.landmarks)
     landmarks, scale = camera.depths_of(found.landmarks), found.eye_distance_px
     line = find_lip_line(pixels, found)
-    lips = LipLine(camera.depths_of(line.upper), camera.depths_of(line.lower), line.gap)
-    person = PhotoPerson((pixels.shape[1], pixels.shape[0]), landmarks, lips, smile, scale)
-    lids = find_lid_lines(pixels, landmarks, scale)
+    given = PhotoPlaces(fit, (pixels.shape[1], pixels.shape[0]), picture.reduced_by, scale)
+    lips = given.lips(LipLine(camera.depths_of(line.upper), camera.depths_of(line.lower), line.gap))
+    person = PhotoPerson(given.size, landmarks, lips, smile, scale)
+    lids = given.lids(find_lid_lines(pixels, landmarks, scale))
+    pivot = given.point("pivot", camera.to_pixels(head.pivot[None].astype(np.float64))[0])
     mesh = build_mesh(person.size, landmarks, lips, lids, scale)
     photo, skin = _skin(mesh, person, camera, model)
     patches = [eye_patch(pixels, landmarks, lids, eye, scale) for eye in (0, 1)]
@@ -101,6 +116,8 @@ def speaking_photo(
     light = mouth_light(pixels, landmarks, white, is_parted=person.is_parted)
     at_rest = np.einsum("lc,lcx->lx", weights, surface.every().places[corners])
     inside = head_mouth(head, model.landmarks, at_rest, at_rest[UPPER_LIP_INNER_MID], light)
+    teeth = given.point("teeth", camera.to_pixels(inside.teeth_edge[None])[0])
+    inside = inside.moved(camera.to_head(teeth[None])[0] - inside.teeth_edge)
     mouth = (_add_inside(surface, inside), _add_inside(surface, mouth_walls(mesh, skin.places, skin.shapes, light)))
     every = surface.every()
     triangles = np.concatenate([part for _, part in surface.parts])
@@ -120,8 +137,8 @@ def speaking_photo(
         landmarks=np.arange(N_LANDMARKS, dtype=np.int32),
         landmark_vertices=corners,
         landmark_weights=weights,
-        pivot=head.pivot,
-        metadata=dict(metadata),
+        pivot=camera.to_head(pivot[None])[0].astype(np.float32),
+        metadata={**metadata, "fit": given.used(lips, lids, {"teeth": teeth, "pivot": pivot}).as_json()},
         scores=head.scores,
         light=(picture_light(pixels, pages.pages, (mesh, skin.places), drawn, (colours, mouth)),),
         photograph=_view(picture, camera, every.follow, pages),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.render.provenance import append_to_mp4
 from tts2face.render.write_buffer import WriteBuffer
 
 SOUND_RATE = 48_000  # Hz; the usual rate of players and editors, required by Opus
@@ -77,7 +78,7 @@ class MovieWriter:
     ) -> None:
         """Open a file, or a stream, for pictures of `shape` (H, W, 3 or 4) and mono sound at `clock` (fps, Hz).
 
-        `notice` becomes the comment in its metadata.
+        `notice` becomes the comment in its metadata, and in MP4 an XMP packet.
         """
         import av
         from av.video.reformatter import VideoReformatter
@@ -85,6 +86,7 @@ class MovieWriter:
         self._reformatter = VideoReformatter()  # one for all pictures: making one takes as long as a conversion
         self._has_alpha = shape[2] == 4
         self._fps, self._rate = clock
+        self._path, self._notice = path, notice if kind.container == "mp4" else ""
         fps = self._fps
         self._n_frames = self._n_samples = 0
         self._fill_colour: NDArray[np.uint8] | None = None
@@ -150,6 +152,7 @@ class MovieWriter:
         self._container.mux(self._video.encode(None))
         self._container.mux(self._audio.encode(None))
         self._container.close()
+        append_to_mp4(self._path, self._notice)
 
     def abandon(self) -> None:
         """Close the file without completing it."""

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.render.provenance import png_labels
 from tts2face.storage.wave_files import open_wave, pcm_bytes
 
 SOUND_NAME = "sound.wav"
@@ -16,19 +17,16 @@ class PngFolderWriter:
     """Sink that writes pictures to a folder."""
 
     def __init__(self, folder: Path, sound_rate: int, notice: str = "") -> None:
-        """Open an existing folder; `notice` becomes the comment of every picture."""
-        self._folder, self._n_frames, self._notice = folder, 0, notice
+        """Open an existing folder; `notice` becomes the comment and an XMP packet of every picture."""
+        self._folder, self._n_frames, self._labels = folder, 0, png_labels(notice)
         self._sound = open_wave(str(folder / SOUND_NAME), sound_rate)
 
     def picture(self, pixels: NDArray[np.uint8]) -> None:
         """Write one picture (H, W, 3 or 4)."""
-        from PIL import Image, PngImagePlugin
+        from PIL import Image
 
-        comment = PngImagePlugin.PngInfo()
-        if self._notice:
-            comment.add_text("Comment", self._notice)
         path = self._folder / f"{self._n_frames:0{NUMBER_DIGITS}d}.png"
-        Image.fromarray(pixels).save(path, compress_level=COMPRESSION, pnginfo=comment)
+        Image.fromarray(pixels).save(path, compress_level=COMPRESSION, pnginfo=self._labels)
         self._n_frames += 1
 
     def sound(self, samples: NDArray[np.float32]) -> None:

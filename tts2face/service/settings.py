@@ -94,6 +94,7 @@ class ServiceSettings:
     drain_s: float = setting(30.0, "Seconds that running requests have to finish after SIGTERM.", (0, 3600))
     studio: bool = setting(True, "Serve the studio at /studio, if NiceGUI is installed (extra studio).")
     photos: bool = setting(False, "Make faces of uploaded pictures of people (extra photo).")
+    photos_per_day: int = setting(50, "Faces that a key may make of pictures in a day.", (0, 1_000_000))
     warm_studio: bool = setting(True, "Make the face of new projects of the studio when the server starts.")
     sentences_mb: int = setting(
         100, "Finished sentences of the studio that each session of a synthesis process keeps, in MB.", (0, 1e5)

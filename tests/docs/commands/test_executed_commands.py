@@ -94,6 +94,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(SHIPPED_FOLDER / "grid_s1.talker", folder / "me.talker")
     shutil.copy(SHIPPED_FOLDER / "head.face", folder / "me.face")
     Image.fromarray(draw(load_face("tomas"), picture=Picture(size="320x320"))).save(folder / "me.jpg")
+    (folder / "fit.json").write_text('{"pivot": [160, 200]}', encoding="utf-8")
     starter = load_palette("starter")
     styles = {"mine" if name == "grid_s1" else name: style for name, style in starter.styles.items()}
     write_palette(folder / "mine.palette", Palette(starter.neutral, starter.regions, styles, {}))

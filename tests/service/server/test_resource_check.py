@@ -19,7 +19,7 @@ from tests.characters.made import write_character_file
 from tests.model_files.made import write_made_models, write_made_talker
 from tests.photo.pictures import still
 from tts2face.characters.binding import KEY
-from tts2face.jobs.resource_check import STATEMENT, draw_resource, is_picture
+from tts2face.jobs.resource_check import PLACES, SHOWN, STATEMENT, draw_resource, is_picture
 from tts2face.models.face_file import read_face
 from tts2face.service.uploads.decode_process import REFUSED
 from tts2face.storage.files import find_file
@@ -130,18 +130,19 @@ def test_pictures_are_told_by_their_first_bytes(form: str, files: dict[str, Path
 @pytest.mark.usefixtures("face_model")
 def test_a_photo_becomes_a_face_that_keeps_the_consent(tmp_path: Path) -> None:
     Image.fromarray(still("tomas", 320)).save(tmp_path / "photo.jpg")
-    (tmp_path / STATEMENT).write_text('{"name": "tom", "consent": null}')
+    state(tmp_path, consent=None)
     code, message, _ = check("face", tmp_path / "photo.jpg", tmp_path)
     assert code == REFUSED
     assert "state the consent" in message
     (tmp_path / "checked").rmdir()
-    (tmp_path / STATEMENT).write_text('{"name": "tom", "consent": "I agree to this."}')
+    state(tmp_path, consent="I agree to this.", fit='{"pivot": [170, 200]}')
     code, message, checked = check("face", tmp_path / "photo.jpg", tmp_path)
     assert (code, message) == (0, "")
     face = read_face(checked / "content")
     assert face.photograph is not None
     assert face.metadata["consent"]["statement"] == "I agree to this."
     assert face.metadata["name"] == "tom"
+    assert face.metadata["fit"]["pivot"] == pytest.approx([170, 200], abs=0.2)
     with Image.open(checked / "picture.png") as picture:
         assert np.asarray(picture).std() > 30
 
@@ -149,11 +150,44 @@ def test_a_photo_becomes_a_face_that_keeps_the_consent(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("face_model")
 def test_a_picture_without_a_face_is_refused(tmp_path: Path) -> None:
     Image.fromarray(np.full((200, 200, 3), 90, np.uint8)).save(tmp_path / "wall.png")
-    (tmp_path / STATEMENT).write_text('{"name": "wall", "consent": "drawn"}')
+    state(tmp_path)
     code, message, _ = check("face", tmp_path / "wall.png", tmp_path)
     assert code == REFUSED
     assert "there is no face in" in message
     assert str(tmp_path) not in message
+
+
+def state(folder: Path, **more: Any) -> None:
+    """State who is shown in a photo of a folder."""
+    stated = {"name": "tom", "consent": "drawn", "max_pixels": 1_000_000} | more
+    (folder / STATEMENT).write_text(json.dumps(stated))
+
+
+@pytest.mark.usefixtures("face_model")
+def test_places_of_a_photo_are_found_for_a_person_to_correct(tmp_path: Path) -> None:
+    Image.fromarray(still("tomas", 320)).save(tmp_path / "photo.jpg")
+    state(tmp_path, consent=None)
+    code, message, folder = check("places", tmp_path / "photo.jpg", tmp_path)
+    assert (code, message) == (0, "")
+    found = json.loads((folder / PLACES).read_text())
+    assert (found["size"], found["notes"]) == ([320, 320], [])
+    assert set(found["fit"]) == {"lips", "right_eye", "left_eye", "teeth", "pivot"}
+    with Image.open(folder / SHOWN) as shown:
+        assert shown.size == (320, 320)
+
+
+def test_a_photo_of_too_many_pixels_and_a_wrong_fit_are_refused(tmp_path: Path) -> None:
+    Image.new("RGB", (320, 200)).save(tmp_path / "photo.png")
+    for more, reason in (
+        ({"max_pixels": 60_000}, "it has 320 x 200 pixels, more than 60000; reduce its size"),
+        ({"fit": "{"}, "the fit, line 1: not JSON"),
+        ({"fit": '{"lip": {}}'}, "the fit: there is no 'lip' here"),
+    ):
+        state(tmp_path, **more)
+        code, message, checked = check("face", tmp_path / "photo.png", tmp_path)
+        assert code == REFUSED
+        assert reason in message
+        checked.rmdir()
 
 
 def zip_bomb() -> bytes:

@@ -1,18 +1,23 @@
 """Talkers, faces, palettes and dictionaries over HTTP: names, owners, scopes, quotas; no synthesis process runs."""
 
 import asyncio
+import hashlib
 import io
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 from PIL import Image
 
 from lexicon.errors import BackendError
 from tests.jobs.conftest import database, postgres  # noqa: F401 - fixtures
 from tests.model_files.made import write_made_face
+from tests.photo.pictures import still
 from tts2face.jobs.blobs import open_blobs
 from tts2face.jobs.database import database_url
 from tts2face.jobs.job_runner import RESOURCES
@@ -36,11 +41,12 @@ def settings(tmp_path: Path) -> ServiceSettings:
 
 @pytest.fixture
 def keys(tmp_path: Path) -> dict[str, str]:
-    """Secrets of four keys."""
+    """Secrets of five keys."""
     path = tmp_path / "keys.toml"
     return {
         "ann": add_key(path, "ann", ["speak", "build"]),
         "bob": add_key(path, "bob", ["speak", "build"], resources=2, resources_mb=0.0001),
+        "eve": add_key(path, "eve", ["speak", "build"], photos_per_day=0),
         "reader": add_key(path, "reader", ["speak"]),
         "boss": add_key(path, "boss", ["speak", "build", "admin"]),
     }
@@ -49,6 +55,19 @@ def keys(tmp_path: Path) -> dict[str, str]:
 @pytest.fixture
 def ask(settings: ServiceSettings, keys: dict[str, str]) -> Iterator[Ask]:
     """Function that sends one request as a key."""
+    with asking(settings, keys) as ask_as:
+        yield ask_as
+
+
+@pytest.fixture
+def ask_with_photos(settings: ServiceSettings, keys: dict[str, str]) -> Iterator[Ask]:
+    """As `ask`, of a service that makes faces of photos."""
+    with asking(replace(settings, photos=True, upload_pixels=200_000), keys) as ask_as:
+        yield ask_as
+
+
+@contextmanager
+def asking(settings: ServiceSettings, keys: dict[str, str]) -> Iterator[Ask]:
     app = create_app(settings)
 
     def ask_as(key: str, method: str, path: str, **options: Any) -> httpx.Response:
@@ -76,15 +95,60 @@ def names(answer: httpx.Response) -> list[tuple[str, str | None]]:
 
 
 def test_photos_are_refused_where_the_operator_does_not_allow_them(ask: Ask) -> None:
-    content = io.BytesIO()
-    Image.new("RGB", (100, 100)).save(content, "PNG")
-    parts = {"data": {"name": "me", "consent": "I agree to this."}, "files": {"file": ("me.png", content.getvalue())}}
-    answer = ask("ann", "POST", "/v1/faces", **parts)
+    answer = ask("ann", "POST", "/v1/faces", **photo(np.zeros((100, 100, 3), np.uint8), consent="I agree to this."))
     assert refusal(answer) == (403, "forbidden")
     assert "its operator allows them with the setting photos" in answer.json()["error"]["message"]
     words = form("names")
     words["data"]["consent"] = "I agree."
     assert refusal(ask("ann", "POST", "/v1/dictionaries", **words)) == (422, "invalid_request")
+
+
+def png(picture: np.ndarray) -> bytes:
+    content = io.BytesIO()
+    Image.fromarray(picture).save(content, "PNG")
+    return content.getvalue()
+
+
+def photo(picture: np.ndarray, **parts: str) -> dict[str, Any]:
+    return {"data": {"name": "tom"} | parts, "files": {"file": ("me.png", png(picture))}}
+
+
+def test_parts_that_belong_to_a_photo_are_checked(ask_with_photos: Ask) -> None:
+    plain = np.full((100, 100, 3), 90, np.uint8)
+    for parts, reason in (
+        ({"makes": "video"}, "the part makes is picture or avatar"),
+        ({"makes": "avatar", "fit": "{}"}, "a fit corrects a picture that speaks; leave out fit, or makes"),
+        ({"consent": "x" * 1001}, "the part consent has up to 1000 characters of text"),
+        ({"fit": " " * 100_001}, "the part fit has up to 100000 characters of text"),
+    ):
+        answer = ask_with_photos("ann", "POST", "/v1/faces", **photo(plain, **parts))
+        assert refusal(answer) == (422, "invalid_request")
+        assert answer.json()["error"]["message"] == reason
+    barred = ask_with_photos("eve", "POST", "/v1/faces", **photo(plain, consent="drawn"))
+    assert refusal(barred) == (403, "forbidden")
+    assert "the key eve may make no faces of photos" in barred.json()["error"]["message"]
+    no_picture = form("tom") | {"data": {"name": "tom", "makes": "avatar"}}
+    assert "a head is made of a picture" in ask_with_photos("ann", "POST", "/v1/faces", **no_picture).text
+
+
+@pytest.mark.usefixtures("face_model")
+def test_a_photo_becomes_a_head_and_is_not_kept(
+    ask_with_photos: Ask, settings: ServiceSettings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    picture = still("tomas", 400)
+    made = ask_with_photos("ann", "POST", "/v1/faces", **photo(picture, consent="I agree to this.", makes="avatar"))
+    assert made.status_code == 201, made.text
+    assert made.json()["about"]["takes_haircuts"]
+    parts = photo(still("tomas", 480), name="large", consent="drawn", makes="avatar")
+    large = ask_with_photos("ann", "POST", "/v1/faces", **parts)
+    assert refusal(large) == (422, "invalid_data")
+    assert "the photo has 480 x 480 pixels, more than 200000" in large.json()["error"]["message"]
+    assert not list(tmp_path.glob("tts2face-upload-*"))
+    stored = [path for path in settings.data_folder.rglob("*") if path.is_file() and "store" in path.parts]
+    assert len(stored) == 2  # the face, and a picture that is drawn of it
+    assert made.json()["sha256"] in {path.name for path in stored}
+    assert {path.name for path in stored}.isdisjoint({hashlib.sha256(png(picture)).hexdigest()})
 
 
 def test_the_services_own_are_listed_and_shown(ask: Ask) -> None:

@@ -17,7 +17,8 @@ SCOPES = ("speak", "build", "admin")  # synthesis; uploads and talkers; everybod
 KEY_PREFIX = "t2f_"
 N_KEY_BYTES = 32
 MAX_FILE_BYTES = 1_000_000
-LIMITS = ("requests_per_minute", "concurrent", "speech_s_per_day", "resources", "resources_mb")
+LIMITS = ("requests_per_minute", "concurrent", "speech_s_per_day", "resources", "resources_mb", "photos_per_day")
+MAY_BE_NONE = ("resources", "resources_mb", "photos_per_day")  # limits of which 0 is one, too
 MAX_LIMIT = 1e9
 NAMES = {"name", "hash", "scopes", *LIMITS}
 NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
@@ -33,8 +34,8 @@ class ApiKey:
         SHA-256 of the key, hexadecimal; a key has 256 random bits, so that no slow hash is needed.
     requests_per_minute, concurrent, speech_s_per_day
         Limits; None: none.
-    resources, resources_mb
-        Uploads and their MB; None: those of the settings.
+    resources, resources_mb, photos_per_day
+        Uploads, their MB, and the faces that are made of photos in a day; None: those of the settings.
     """
 
     name: str
@@ -45,6 +46,7 @@ class ApiKey:
     speech_s_per_day: int | None = None
     resources: int | None = None
     resources_mb: float | None = None
+    photos_per_day: int | None = None
 
 
 LOCAL_KEY = ApiKey("local", "", SCOPES)  # of requests to a service without keys
@@ -152,7 +154,7 @@ def _key(path: Path, content: Any) -> ApiKey:
 
 def _check_limits(limits: Mapping[str, Any]) -> None:
     for name, value in limits.items():
-        if name.startswith("resources") and value is not None:  # none at all is a limit, too
+        if name in MAY_BE_NONE and value is not None:
             if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= MAX_LIMIT:
                 raise InputError(f"{name} must be a number from 0 to {MAX_LIMIT:g}, not {value!r}")
         elif value is not None and (type(value) is not int or value < 1):

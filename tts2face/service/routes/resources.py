@@ -3,6 +3,7 @@
 import asyncio
 import hashlib
 from collections.abc import Awaitable, Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -33,12 +34,14 @@ from tts2face.service.routes.resource_models import (
 from tts2face.service.state import ServiceState
 from tts2face.service.uploads.library import check_new_name, describe_shipped, plural, shipped_names
 from tts2face.service.uploads.shipped_pictures import shipped_picture
-from tts2face.service.uploads.upload_folder import save_upload, upload_folder
+from tts2face.service.uploads.upload_folder import UploadFolder, save_upload, upload_folder
 from tts2face.storage.tensors import read_metadata
 
 router = APIRouter(prefix="/v1", tags=["resources"])
 
-MAX_NAME, MAX_CONSENT = 40, 1000
+MAX_NAME, MAX_CONSENT, MAX_FIT = 40, 1000, 100_000
+SPEAKING_PICTURE, AVATAR = "picture", "avatar"  # what is made of a photo
+PHOTO_PARTS = ("consent", "fit", "makes")  # of the form of a face
 NO_PHOTOS = "this service has no faces of photos; its operator allows them with the setting photos"
 Name = Annotated[str, InPath(description="Its name.", max_length=MAX_NAME, examples=["head"])]
 Owner = Annotated[
@@ -117,8 +120,19 @@ def _form(kind: str) -> dict[str, Any]:
     }  # fmt: skip
     if kind == FACE:
         fields["consent"] = {
-            "type": "string", "example": "I agree that my face speaks what this service is asked for.",
+            "type": "string",
+            "example": "I agree that my face speaks what this service is asked for.",
             "description": "With a photo: the person's statement, kept in the face; drawn if it is nobody's.",
+        }
+        fields["makes"] = {
+            "type": "string",
+            "enum": [SPEAKING_PICTURE, AVATAR],
+            "default": SPEAKING_PICTURE,
+            "description": "With a photo: a face that speaks in the picture, or a head of the person, which turns.",
+        }
+        fields["fit"] = {
+            "type": "string", "maxLength": MAX_FIT,
+            "description": "With a photo that speaks: corrections of what is found in it, JSON (docs/photo.md).",
         }  # fmt: skip
     schema = {"type": "object", "properties": fields, "required": ["file", "name"]}
     return {"required": True, "content": {"multipart/form-data": {"schema": schema}}}
@@ -170,19 +184,15 @@ async def _store(request: HttpRequest, kind: str) -> StoredResource:
     state = service_state(request)
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         raise RefusedError(422, "invalid_request", "send a form (multipart/form-data) with the parts file and name")
-    async with request.form(max_files=1, max_fields=3) as form:
-        name, file, consent = _read_form(form, kind)
-        if kind == FACE and not state.settings.photos:
-            await _refuse_photo(file)
-        sent = Sent(kind, name, file.size or 0, partial(save_upload, file), consent)
-        return await store_resource(state, key, sent)
+    async with request.form(max_files=1, max_fields=2 + len(PHOTO_PARTS)) as form:
+        return await store_resource(state, key, _read_form(form, kind))
 
 
 @dataclass(frozen=True, slots=True)
 class Sent:
     """A file that a client sends to be kept under a name: its kind, its size in bytes, and how it is saved to a path.
 
-    ``consent`` is the statement of the person in a photo.
+    With a photo come ``consent``, the statement of the person shown, the JSON of a ``fit``, and what it ``makes``.
     """
 
     kind: str
@@ -190,6 +200,8 @@ class Sent:
     size: int
     save: Callable[[Path], Awaitable[None]]
     consent: str | None = None
+    fit: str | None = None
+    makes: str = SPEAKING_PICTURE
 
 
 async def store_resource(state: ServiceState, key: ApiKey, sent: Sent) -> StoredResource:
@@ -205,30 +217,60 @@ async def store_resource(state: ServiceState, key: ApiKey, sent: Sent) -> Stored
     async with upload_folder(state.settings) as folder, state.checks:
         given = folder.path / f"{sent.kind}.upload"
         await sent.save(given)
-        stated = {"name": sent.name, "consent": sent.consent}
-        checked = await folder.resource(sent.kind, given, state.library.limits(key).n_bytes, stated)
-        if sent.kind == FACE and not state.settings.photos:
-            await asyncio.to_thread(_refuse_photograph, checked / CONTENT)
+        checked = await _checked(state, key, sent, folder, given)
         return await asyncio.to_thread(state.library.add, key, sent.kind, sent.name, checked)
 
 
-def _read_form(form: FormData, kind: str) -> tuple[str, UploadFile, str | None]:
-    unknown = set(form) - {"file", "name"} - ({"consent"} if kind == FACE else set())
-    name, file, consent = form.get("name"), form.get("file"), form.get("consent")
+async def _checked(state: ServiceState, key: ApiKey, sent: Sent, folder: UploadFolder, given: Path) -> Path:
+    """Folder with a checked resource of a saved file."""
+    n_bytes = state.library.limits(key).n_bytes
+    if sent.kind == FACE and await asyncio.to_thread(_is_photo, given):
+        with photo_turn(state, key):
+            folder.state(given, sent.name, sent.consent, sent.fit)
+            if sent.makes == AVATAR:
+                return await folder.avatar(given, n_bytes)
+            return await folder.resource(FACE, given, n_bytes)
+    if sent.makes == AVATAR:
+        raise RefusedError(422, "invalid_request", "a head is made of a picture; send one, or leave out makes")
+    checked = await folder.resource(sent.kind, given, n_bytes)
+    if sent.kind == FACE and not state.settings.photos:
+        await asyncio.to_thread(_refuse_photograph, checked / CONTENT)
+    return checked
+
+
+def photo_turn(state: ServiceState, key: ApiKey, *, counts: bool = True) -> AbstractContextManager[None]:
+    """A turn of a key to read a photo, if the operator allows them; errors as `RateLimits.photo`."""
+    if not state.settings.photos:
+        raise RefusedError(403, "forbidden", NO_PHOTOS)
+    return state.limits.photo(key, state.settings.photos_per_day, counts=counts)
+
+
+def _read_form(form: FormData, kind: str) -> Sent:
+    more = PHOTO_PARTS if kind == FACE else ()
+    unknown = set(form) - {"file", "name", *more}
+    name, file, makes = form.get("name"), form.get("file"), form.get("makes", SPEAKING_PICTURE)
     if unknown:
         raise RefusedError(422, "invalid_request", f"there is no part {min(unknown)[:40]!r}; send file and name")
     if not isinstance(name, str) or not isinstance(file, UploadFile):
         raise RefusedError(422, "invalid_request", "the form needs a part file, with a file name, and a part name")
-    if consent is not None and (not isinstance(consent, str) or len(consent) > MAX_CONSENT):
-        raise RefusedError(422, "invalid_request", f"the part consent has up to {MAX_CONSENT} characters of text")
-    return name, file, consent
+    if makes not in (SPEAKING_PICTURE, AVATAR):
+        raise RefusedError(422, "invalid_request", f"the part makes is {SPEAKING_PICTURE} or {AVATAR}")
+    consent, fit = (_text(form, part, most) for part, most in (("consent", MAX_CONSENT), ("fit", MAX_FIT)))
+    if fit is not None and makes == AVATAR:
+        raise RefusedError(422, "invalid_request", "a fit corrects a picture that speaks; leave out fit, or makes")
+    return Sent(kind, name, file.size or 0, partial(save_upload, file), consent, fit, str(makes))
 
 
-async def _refuse_photo(file: UploadFile) -> None:
-    head = await file.read(N_MAGIC)
-    await file.seek(0)
-    if is_picture(head):
-        raise RefusedError(403, "forbidden", NO_PHOTOS)
+def _text(form: FormData, part: str, most: int) -> str | None:
+    text = form.get(part)
+    if text is not None and (not isinstance(text, str) or len(text) > most):
+        raise RefusedError(422, "invalid_request", f"the part {part} has up to {most} characters of text")
+    return text
+
+
+def _is_photo(file: Path) -> bool:
+    with file.open("rb") as opened:
+        return is_picture(opened.read(N_MAGIC))
 
 
 def _refuse_photograph(face: Path) -> None:

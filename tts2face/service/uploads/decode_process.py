@@ -2,9 +2,10 @@
 
 ``python -m tts2face.service.uploads.decode_process KIND SOURCE TARGET LIMIT``: a file becomes a plain one (sound: mono
 .wav at 48 kHz; picture: .png); a resource (talker, face, palette, dictionary) is checked and written, with its
-description and picture, into the folder TARGET; ``draw-`` and its kind draw the picture TARGET only; ``subtitles-`` and
-an encoding check subtitles; a video is measured. LIMIT is the largest duration in seconds, number of pixels or cues, or
-size in bytes. The exit code is 0, or 2 with one sentence on standard error.
+description and picture, into the folder TARGET; ``draw-`` and its kind draw the picture TARGET only; ``places`` finds
+lips and lids in a photo for the folder TARGET; ``subtitles-`` and an encoding check subtitles; a video is measured.
+LIMIT is the largest duration in seconds, number of pixels or cues, or size in bytes. The exit code is 0, or 2 with one
+sentence on standard error.
 """
 
 import json
@@ -16,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from tts2face.jobs.refused_file import RefusedFileError
-from tts2face.jobs.resource_check import RESOURCE_KINDS, check_resource, draw_resource
+from tts2face.jobs.resource_check import RESOURCE_KINDS, check_resource, draw_resource, find_places
 from tts2face.limited_process import ProcessLimits, limit_process
 
-SOUND, PICTURE, VIDEO, DRAW, SUBTITLES = "sound", "picture", "video", "draw-", "subtitles-"
+SOUND, PICTURE, VIDEO, DRAW, SUBTITLES, PLACES = "sound", "picture", "video", "draw-", "subtitles-", "places"
 LIMITS = ProcessLimits(memory_bytes=2 << 30, cpu_s=60, file_bytes=1 << 30, n_files=64)
 RESOURCE_CPU_S = 180  # a resource with its picture takes 3 to 5 s, at the first time with the compilation of kernels
 SOUND_RATE = 48_000  # Hz
@@ -163,6 +164,8 @@ def decode(kind: str, source: Path, target: Path, limit: float) -> None:
         check_resource(kind, source, target, limit)
     elif kind.startswith(SUBTITLES):
         check_subtitles(source, target, limit, kind.removeprefix(SUBTITLES) or None)
+    elif kind == PLACES:
+        find_places(source, target)
     elif kind.startswith(DRAW):
         draw_resource(kind.removeprefix(DRAW), source, target)
     else:

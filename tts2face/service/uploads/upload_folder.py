@@ -4,21 +4,26 @@ import asyncio
 import json
 import sys
 import tempfile
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from starlette.datastructures import UploadFile
 
+from lexicon.errors import Tts2faceError
 from lexicon.inputs import parse_json
+from tts2face.jobs import resource_check
 from tts2face.jobs.resource_check import STATEMENT
 from tts2face.limited_process import bare_environment
 from tts2face.service.errors import RefusedError
 from tts2face.service.settings import ServiceSettings
-from tts2face.service.uploads.decode_process import PICTURE, REFUSED, SOUND, SUBTITLES, VIDEO
+from tts2face.service.uploads.decode_process import PICTURE, PLACES, REFUSED, SOUND, SUBTITLES, VIDEO
+from tts2face.service.uploads.tool_process import run_take_process
 
 RESOURCE_TIMEOUT_S = 300.0  # a check takes 3 to 7 s; with other work on the machine, and kernels to compile, longer
+AVATAR_CPU_S = 240  # the head of a person takes 15 s
 MAX_REASON = 300  # characters
 MAX_TEXT_BYTES = 1_000_000
 BLOCK_BYTES = 1 << 20
@@ -81,10 +86,10 @@ class UploadFolder:
         facts = parse_json(checked.read_text(), name)
         return given.rename(given.with_suffix(facts["suffix"])), float(facts["seconds"])
 
-    async def resource(self, kind: str, given: Path, max_bytes: float, stated: Mapping[str, str | None]) -> Path:
+    async def resource(self, kind: str, given: Path, max_bytes: float) -> Path:
         """Folder with a checked talker, face, palette or dictionary (`tts2face.jobs.resource_check`) of a saved file.
 
-        `stated` is the name, and the consent of the person in a photo that becomes a face.
+        A photo, beside which is what is `stated` of it, becomes a face.
 
         Raises
         ------
@@ -93,9 +98,44 @@ class UploadFolder:
         """
         checked = self.path / "checked"
         checked.mkdir()
-        given.with_name(STATEMENT).write_text(json.dumps(stated))
         await decode_file((kind, given, checked, max_bytes), f"the {kind}", RESOURCE_TIMEOUT_S)
         return checked
+
+    async def avatar(self, photo: Path, max_bytes: float) -> Path:
+        """Folder with the checked head of a person in a photo, beside which is its statement; errors as `resource`."""
+        checked = self.path / "checked"
+        checked.mkdir()
+        order = {
+            "kind": "avatar",
+            "take": str(photo),
+            "out": str(checked),
+            "max_bytes": max_bytes,
+            "cpu_s": AVATAR_CPU_S,
+        }
+        try:
+            async with asyncio.timeout(RESOURCE_TIMEOUT_S):
+                await run_take_process(order, lambda *_: None)
+        except (Tts2faceError, TimeoutError) as wrong:
+            reason = "it needs too much memory or time" if isinstance(wrong, TimeoutError) else str(wrong)
+            raise _refused("the photo", reason.replace(photo.name, "the photo")) from wrong
+        return checked
+
+    async def places(self, photo: Path) -> tuple[Path, dict[str, Any]]:
+        """The picture of a saved photo as a browser shows it, and what was found in it: size, fit and notes.
+
+        Raises
+        ------
+        RefusedError
+            It shows no face that can be moved.
+        """
+        await decode_file((PLACES, photo, self.path, 0.0), "the photo", RESOURCE_TIMEOUT_S)
+        found: dict[str, Any] = parse_json((self.path / resource_check.PLACES).read_text(), "the photo")
+        return self.path / resource_check.SHOWN, found
+
+    def state(self, photo: Path, name: str, consent: str | None, fit: str | None) -> None:
+        """Write what is stated of a photo beside it."""
+        stated = {"name": name, "consent": consent, "fit": fit, "max_pixels": self.settings.upload_pixels}
+        photo.with_name(STATEMENT).write_text(json.dumps(stated))
 
     async def _decode(self, kind: str, name: str, upload: UploadFile, suffix: str, limit: float) -> Path:
         given, decoded = await self._save(name, upload), self.path / f"{name}{suffix}"
@@ -143,7 +183,11 @@ async def decode_file(arguments: tuple[str, Path, Path, float], name: str, timeo
     if child.returncode == 0:
         return
     reason = written.decode(errors="replace") if child.returncode == REFUSED else "it needs too much memory or time"
-    raise RefusedError(422, "invalid_data", f"{name} cannot be used: {reason[:MAX_REASON]}; send another file")
+    raise _refused(name, reason)
+
+
+def _refused(name: str, reason: str) -> RefusedError:
+    return RefusedError(422, "invalid_data", f"{name} cannot be used: {reason[:MAX_REASON]}; send another file")
 
 
 @asynccontextmanager

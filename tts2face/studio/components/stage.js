@@ -108,6 +108,8 @@ export default {
       try {
         await this.scene.setFace(this.face, signal);
         this.scene.setBackground(this.environment);
+        const { views } = this.scene.face.stage;
+        this.views = Object.fromEntries(Object.entries(VIEWS).filter(([name]) => name in views));
         this.message = "";
         metrics.face_ms = performance.now() - begin;
         this.resize();
@@ -235,7 +237,7 @@ export default {
     },
 
     onKey(event) {
-      const names = Object.keys(VIEWS);
+      const names = Object.keys(this.views);
       if (event.key >= "1" && event.key <= String(names.length)) this.view(names[event.key - 1]);
       else if (event.key.startsWith("Arrow")) this.turn(event.key);
       else if (event.key === "+" || event.key === "-") this.approach(event.key === "+" ? 0.9 : 1 / 0.9);

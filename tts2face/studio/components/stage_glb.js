@@ -58,7 +58,7 @@ export function mergePrimitives(file, mesh) {
   for (const primitive of mesh.primitives) {
     const { extras, pbrMetallicRoughness, name } = file.json.materials[primitive.material];
     const texture = pbrMetallicRoughness.baseColorTexture?.index ?? -1;
-    const key = JSON.stringify([texture, extras.kind, extras.open, extras.cutout, extras.opacity, extras.second, extras.unlit, name === "hair"]);
+    const key = JSON.stringify([texture, extras.kind, extras.open, extras.cutout, extras.opacity, extras.second, extras.unlit, extras.behind, name === "hair"]);
     if (!groups.has(key)) groups.set(key, []);
     groups.get(key).push(primitive);
   }

@@ -3,6 +3,8 @@
 import { THREE } from "nicegui-scene";
 import { FRAGMENT, LAMPS, VERTEX } from "./stage_shader.js";
 
+const BEHIND_UNITS = 8000; // of a depth of 24 bits: at one metre about 25 mm further back
+
 /** Values that all materials of a face share; those of the lamps and the eyes follow the camera and the motion. */
 export function sharedUniforms(stage) {
   const colours = stage.lamps.map(([, , colour]) => new THREE.Vector3(...colour));
@@ -49,6 +51,8 @@ export function partMaterial(part, shared, samples) {
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
     vertexColors: !part.texture,
+    polygonOffset: extras.behind,
+    polygonOffsetUnits: BEHIND_UNITS,
     side: extras.open || extras.cutout ? THREE.DoubleSide : THREE.FrontSide,
     alphaToCoverage: layered && samples,
     transparent: extras.opacity < 1 || (extras.cutout && !layered),

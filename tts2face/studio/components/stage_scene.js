@@ -7,6 +7,7 @@ import { partMaterial, sharedUniforms, wallMaterial } from "./stage_materials.js
 const RADIAN = Math.PI / 180;
 const MM = 0.001;
 const WALL_STEPS = [24, 18]; // of the gradient over the canvas
+const PHOTO_TURN = 0.3; // radians of the camera around a photograph, which has no sides
 const LIGHT_STEP = 0.05; // radians of the camera's yaw between two directions of the lamps
 
 export class StageScene {
@@ -47,6 +48,8 @@ export class StageScene {
     this.half = high.clone().sub(low).multiplyScalar(0.5);
     this.weights = new Float32Array(face.names.length);
     this.head = new Float32Array(6);
+    const most = face.stage.photo ? PHOTO_TURN : Infinity;
+    Object.assign(this.controls, { minAzimuthAngle: -most, maxAzimuthAngle: most });
     this.view(this.viewName ?? "front");
     this.pose();
   }
@@ -122,12 +125,20 @@ export class StageScene {
   }
 
   pose() {
-    const { face, shared } = this, [pitch, yaw, roll, x, y, z] = this.head;
+    const { face, shared } = this, { photo } = face.stage;
+    const [pitch, yaw, roll, x, y, z] = photo ? bearable(this.head, photo) : this.head;
     face.pose(this.weights);
     shared.opening.value = face.opening();
     const pivot = new THREE.Vector3(...face.stage.pivot);
     const turn = new THREE.Matrix4().makeRotationFromEuler(new THREE.Euler(pitch, yaw, roll, "YXZ"));
-    const head = about(turn, pivot).premultiply(new THREE.Matrix4().makeTranslation(x * MM, y * MM, z * MM));
+    const way = new THREE.Vector3(x, y, z).multiplyScalar(MM);
+    if (photo) {
+      // the head moves in its own axes, the face lies in those of the camera
+      const axes = new THREE.Matrix4().setFromMatrix3(new THREE.Matrix3().set(...photo.turn.flat()));
+      way.applyMatrix4(axes);
+      turn.premultiply(axes).multiply(axes.clone().transpose());
+    }
+    const head = about(turn, pivot).premultiply(new THREE.Matrix4().makeTranslation(way));
     const joints = shared.joints.value;
     joints[0].identity();
     joints[1].copy(head);
@@ -197,6 +208,12 @@ function drawsInSoftware() {
   const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
   gl.getExtension("WEBGL_lose_context")?.loseContext();
   return /swiftshader|llvmpipe|softpipe|basic render/i.test(name);
+}
+
+/** The part of a head pose that a photograph bears, as `PhotoView.bearable` has it. */
+function bearable(head, { gain, limit, shift }) {
+  const turns = head.slice(0, 3).map((angle) => limit * Math.tanh((gain * angle) / limit));
+  return [...turns, shift * head[3], shift * head[4], 0];
 }
 
 /** A rotation about a point. */

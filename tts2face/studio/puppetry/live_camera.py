@@ -14,7 +14,7 @@ from fastapi import WebSocket, WebSocketDisconnect
 
 from tts2face.limited_process import bare_environment
 from tts2face.service.access.keys import ApiKey
-from tts2face.studio.take_tools import end_process
+from tts2face.service.uploads.tool_process import end_process
 
 PROCESS = "tts2face.service.synthesis.camera_process"
 HEADER = struct.Struct("<dI")  # as the process reads it

@@ -16,6 +16,7 @@ from lexicon.errors import InputError, Tts2faceError
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
 from tts2face.service.uploads.decode_process import SOUND as SOUND_KIND
+from tts2face.service.uploads.tool_process import run_take_process
 from tts2face.service.uploads.upload_folder import decode_file
 from tts2face.storage.files import translate_disk_errors, write_atomically
 from tts2face.studio.host import StudioHost
@@ -34,7 +35,6 @@ from tts2face.studio.puppetry.store import (
 from tts2face.studio.requests import events_of
 from tts2face.studio.styles.palette_store import SUFFIXES
 from tts2face.studio.styles.styles import Styles
-from tts2face.studio.take_tools import run_take_process
 
 QUIET_RATE = 8000  # Hz of the silence that a take without sound has on the stage, whose clock it is
 FLOAT_BYTES = 4

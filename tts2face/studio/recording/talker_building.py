@@ -16,7 +16,7 @@ from pathlib import Path
 from lexicon.errors import BackendError
 from tts2face.jobs.talker_job import BUILDER, CPU_S, CPU_S_PER_S, LIMITS, SLOWNESS
 from tts2face.limited_process import bare_environment
-from tts2face.studio.take_tools import end_process, run_tool
+from tts2face.service.uploads.tool_process import end_process, run_tool
 
 TALKER, REPORT, CLIP = "talker.talker", "report.html", "first.mp4"  # files in the folder of a recording
 MADE, CHECKED = "made.talker", "checked"  # as the builder names them

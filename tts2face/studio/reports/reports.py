@@ -21,9 +21,9 @@ from tts2face.limited_process import ProcessLimits
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
 from tts2face.service.uploads.library import Library
+from tts2face.service.uploads.tool_process import run_tool
 from tts2face.storage.files import translate_disk_errors, write_atomically
 from tts2face.studio.projects.renders import CANCELLED, DONE, FAILED, RUNNING, WAITING
-from tts2face.studio.take_tools import run_tool
 
 REPORT_PROCESS = "corpus_tools.report_process"  # by name: the tools stand above this package
 LIMITS = ProcessLimits(memory_bytes=6 << 30, cpu_s=3600, file_bytes=200 << 20, n_files=256)

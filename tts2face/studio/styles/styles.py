@@ -20,12 +20,12 @@ from tts2face.models.palette_editing import (
 from tts2face.project import style_names
 from tts2face.project.project import Project
 from tts2face.service.access.keys import ApiKey
+from tts2face.service.uploads.tool_process import run_take_process
 from tts2face.storage.files import translate_disk_errors, write_atomically
 from tts2face.studio.host import StudioHost
 from tts2face.studio.projects.store import ProjectEntry
 from tts2face.studio.requests import data_of
 from tts2face.studio.styles.palette_store import CACHE, MADE, SHIPPED, PaletteStore, is_own_palette
-from tts2face.studio.take_tools import run_take_process
 
 GOOD, WEAK, REFUSED = "good", "weak", "refused"  # states of a take that was checked
 CHECKING, MAKING, CHECKED = "checking", "making", "checked"

@@ -1,4 +1,4 @@
-"""Processes of the tools that work on one order: takes to styles, tables and films; recordings to talkers.
+"""Processes of the tools that work on one order: takes to styles, tables and films; photos to heads; talkers.
 
 They read files of strangers: each has limits of memory, time and files, and no network, and ends with the server.
 """
