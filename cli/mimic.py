@@ -46,7 +46,7 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     size: Annotated[
         str, Parameter(help="Width x height in pixels; auto: 512x512, or the size of the talker's video.")
     ] = "auto",
-    background: Annotated[str, Parameter(help="studio, transparent, a colour, or an image file.")] = "studio",
+    background: Annotated[str, Parameter(help="studio, transparent, blur, a colour, or an image file.")] = "studio",
     model: Model = None,
     yes: Yes = False,
     quiet: Annotated[bool, switch("Print no progress bar and no summary.")] = False,

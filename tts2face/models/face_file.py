@@ -17,6 +17,7 @@ from tts2face.models.face_layout import (
     LIGHT,
     MAX_TEXTURES,
     PHOTO_ALPHA,
+    PHOTO_BEHIND,
     PHOTOGRAPH,
     SCORE_INPUTS,
     WIDE_OPEN,
@@ -115,6 +116,8 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
         arrays[FOLLOW] = np.rint(255 * view.follow).astype(np.uint8)
         if view.alpha is not None:
             arrays[PHOTO_ALPHA] = encode_coverage(view.alpha)
+        if view.behind is not None:
+            arrays[PHOTO_BEHIND] = encode_colours(view.behind)
         numbers = {"size": view.size, "view": view.view.tolist(), "lens": view.lens.tolist(), "corner": view.corner}
         header[PHOTOGRAPH] = {name: list(value) for name, value in numbers.items()}
     write_tensors(path, KIND, FORMAT_VERSION, arrays, header, is_packed=True)
@@ -227,10 +230,11 @@ def _read_photograph(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, An
     wide, high = stored["size"]
     follow = arrays[FOLLOW].astype(np.float32) / np.float32(255)
     alpha = decode_coverage(arrays[PHOTO_ALPHA], path) if PHOTO_ALPHA in arrays else None
-    if alpha is not None and alpha.shape != (high, wide):
-        raise DataError(f"{path}: the photograph and its alpha differ in size; build or copy the face again")
-    left, top = stored["corner"]
-    return PhotoView((wide, high), np.array(stored["view"]), np.array(stored["lens"]), follow, (left, top), alpha)
+    behind = decode_colours(arrays[PHOTO_BEHIND], path) if PHOTO_BEHIND in arrays else None
+    if any(layer is not None and layer.shape[:2] != (high, wide) for layer in (alpha, behind)):
+        raise DataError(f"{path}: the photograph and its layers differ in size; build or copy the face again")
+    lens, (left, top) = np.array(stored["lens"]), stored["corner"]
+    return PhotoView((wide, high), np.array(stored["view"]), lens, follow, (left, top), alpha, behind)
 
 
 def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Face:

@@ -35,7 +35,8 @@ from tts2face.storage.schema import (
 
 SCORE_INPUTS = "score_inputs"  # key of the metadata: names of the shapes that the score map reads
 # Key of the metadata, and arrays, of the view of a photographed face.
-PHOTOGRAPH, FOLLOW, PHOTO_ALPHA = "photograph", "follow", "photo_alpha"
+PHOTOGRAPH, FOLLOW = "photograph", "follow"
+PHOTO_LAYERS = PHOTO_ALPHA, PHOTO_BEHIND = "photo_alpha", "photo_behind"
 LIGHT = "light"  # array of baked light, and the key of the metadata that describes it
 MAX_TEXTURES = 16
 MAX_PHOTO_PX = 8192  # side of a photograph
@@ -92,7 +93,7 @@ TENSORS: Mapping[str, Tensor] = {
     "occlusion": Tensor("uint8", ("bytes of occlusion",), is_optional=True),
     LIGHT: Tensor("uint8", ("bytes of light",), is_optional=True),
     FOLLOW: Tensor("uint8", ("vertices",), is_optional=True),
-    PHOTO_ALPHA: Tensor("uint8", (f"bytes of {PHOTO_ALPHA}",), is_optional=True),
+    **{name: Tensor("uint8", (f"bytes of {name}",), is_optional=True) for name in PHOTO_LAYERS},
     "landmarks": Tensor("int32", ("landmarks",), may_be_empty=True),
     "landmark_vertices": Tensor("int32", ("landmarks", N_CORNERS), may_be_empty=True),
     "landmark_weights": Tensor("float32", ("landmarks", N_CORNERS), -SUM_WITHIN, 1 + SUM_WITHIN, may_be_empty=True),
@@ -168,6 +169,9 @@ def _check_photograph(contents: Contents) -> None:
     needs = {PHOTOGRAPH in header, FOLLOW in arrays}
     contents.require(len(needs) == 1, "has only one of photograph and follow")
     contents.require(PHOTOGRAPH in header or PHOTO_ALPHA not in arrays, "has the alpha of a photograph, but none")
+    contents.require(
+        PHOTO_ALPHA in arrays or PHOTO_BEHIND not in arrays, "has what lies behind a photograph, but not its alpha"
+    )
     if PHOTOGRAPH in header:
         _PHOTOGRAPH(header[PHOTOGRAPH], f"{contents.path}: metadata: {PHOTOGRAPH}")
         contents.require(LIGHT in arrays, "has a photograph, but no light")

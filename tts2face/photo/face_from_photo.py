@@ -1,6 +1,7 @@
 """A face that speaks in a photograph, from its file."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +9,9 @@ from tts2face.models.consent import consent_record
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.hair import BALD
-from tts2face.photo.found_face import PhotoReader
+from tts2face.photo.found_face import PhotographedFace, PhotoReader
 from tts2face.photo.own_teeth import read_teeth
+from tts2face.photo.person_matte import part_background
 from tts2face.photo.photo_fit import NOTHING_GIVEN, PhotoFit, read_fit
 from tts2face.photo.photograph import Photograph, split_number
 from tts2face.photo.speaking_photo import speaking_photo
@@ -77,4 +79,28 @@ def _made(
 ) -> tuple[Photograph, Face]:
     head, seen = load_face(REALISTIC_FACE, hair=BALD), reader.read(photo)
     teeth = None if smile is None else read_teeth(reader, smile, photo, seen.found, head)
-    return seen.picture, speaking_photo(seen, head, metadata, teeth=teeth, fit=fit)
+    layers = _without_background(seen, reader, split_number(photo)[0])
+    return seen.picture, speaking_photo(layers, head, metadata, teeth=teeth, fit=fit)
+
+
+def _without_background(seen: PhotographedFace, reader: PhotoReader, name: Path) -> PhotographedFace:
+    """An opaque picture in two layers, person and background, if they can be told apart."""
+    from tts2face.video.landmark_models import LandmarkNetwork, find_segmenter
+
+    if seen.picture.alpha is not None:
+        return seen
+    segmenter = find_segmenter(reader.model)
+    if segmenter is None:
+        reader.warn(
+            f"the background of {name} bends where the head turns: `tts2face corpus setup` adds the model that tells "
+            "persons from backgrounds"
+        )
+        return seen
+    network = LandmarkNetwork(segmenter.read_bytes())
+    parted = part_background(seen.picture, seen.found.landmarks, seen.found.eye_distance_px, network)
+    if parted.alpha is None:
+        reader.warn(
+            f"the person in {name} is not told from the background, which bends where the head turns; a calmer "
+            "background, or a PNG picture whose background is transparent, does not"
+        )
+    return replace(seen, picture=parted)

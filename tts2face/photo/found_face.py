@@ -89,7 +89,8 @@ class PhotoReader:
     """
 
     def __init__(self, model: Path | None = None, on_warning: Callable[[str], None] = lambda _: None) -> None:
-        self._tracker, self._expressions, self._warn = FaceTracker(model), BlendshapeReader(model), on_warning
+        self.model, self.warn = model, on_warning
+        self._tracker, self._expressions = FaceTracker(model), BlendshapeReader(model)
 
     def read(self, photo: str | Path, *, with_open_eyes: bool = True) -> PhotographedFace:
         """The face in a picture file; ``photo.jpg@2`` is its second largest one; errors as `find_face`."""
@@ -104,7 +105,7 @@ class PhotoReader:
             with_open_eyes=with_open_eyes,
         )
         for warning in found.warnings:
-            self._warn(warning)
+            self.warn(warning)
         scores = self._expressions.blendshape_scores(found.landmarks).tolist()
         return PhotographedFace(picture, found, dict(zip(BLENDSHAPES, scores, strict=True)))
 

@@ -11,10 +11,11 @@ from tts2face.models.face import Face
 from tts2face.models.face_file import FORMAT_VERSION, KIND, read_face, write_face
 from tts2face.photo.photograph import split_number
 from tts2face.storage.user_folders import user_cache
+from tts2face.video.landmark_models import find_segmenter
 
 FOLDER, N_KEPT = "photos", 8
 LEAST_AGE_S = 3600.0  # of a face that is removed: another process may be about to read a younger one
-MAKING = 3  # raised when faces of photos are made in another way, or of another head
+MAKING = 4  # raised when faces of photos are made in another way, or of another head
 
 
 def kept_path(photo: str | Path, fit: Path | None = None, smile: str | Path | None = None) -> Path:
@@ -28,7 +29,9 @@ def kept_path(photo: str | Path, fit: Path | None = None, smile: str | Path | No
     path, number = split_number(photo)
     smiling, smile_number = (None, 0) if smile is None else split_number(smile)
     content = hashlib.sha256(path.read_bytes())
-    content.update(f"{FORMAT_VERSION} {MAKING} {number} {path.stem} {smile_number}".encode())
+    content.update(
+        f"{FORMAT_VERSION} {MAKING} {number} {path.stem} {smile_number} {find_segmenter() is not None}".encode()
+    )
     for other in (fit, smiling):
         try:
             content.update(hashlib.sha256(b"" if other is None else other.read_bytes()).digest())

@@ -41,11 +41,14 @@ class Photograph:
         Coverage; None for an opaque picture.
     reduced_by
         Pixels of the file along a side for each of these.
+    behind : (H, W, 3) or None
+        The picture's own background behind what `alpha` covers.
     """
 
     pixels: Pixels
     alpha: Pixels | None
     reduced_by: float
+    behind: Pixels | None = None
 
     def filled(self) -> "Photograph":
         """The picture with the colour of the nearest opaque pixel where it is transparent."""

@@ -34,6 +34,7 @@ from tts2face.photo.photo_shapes import (
     head_follow,
 )
 from tts2face.photo.photo_surface import EYES, SKIN, PhotoPages, PhotoSurface, Vertices, lay_pages, moves
+from tts2face.photo.photograph import Photograph
 from tts2face.photo.spreading import Spreading
 from tts2face.photo.wrinkles import SMILING, wrinkles
 
@@ -155,17 +156,17 @@ def speaking_photo(
         metadata={**metadata, "fit": given.used(lips, lids, {"teeth": edge, "pivot": pivot}).as_json()},
         scores=head.scores,
         light=(picture_light(pixels, pages.pages, (mesh, skin.places, creases), drawn, mouth),),
-        photograph=_view(person, camera, every.follow, pages, picture.alpha),
+        photograph=_view(picture, camera, every.follow, pages),
     )
 
 
-def _view(
-    person: PhotoPerson, camera: PhotoCamera, follow: Floats, pages: PhotoPages, alpha: NDArray[np.uint8] | None
-) -> PhotoView:
+def _view(picture: Photograph, camera: PhotoCamera, follow: Floats, pages: PhotoPages) -> PhotoView:
+    high, wide = picture.pixels.shape[:2]
     lens = np.array([camera.focal_px, *camera.origin])
     rounded = np.rint(follow * FOLLOW_STEPS) / FOLLOW_STEPS
     corner = (round(float(pages.corner[0])), round(float(pages.corner[1])))
-    return PhotoView(person.size, camera.view, lens, rounded.astype(np.float32), corner, alpha)
+    layers = (picture.alpha, picture.behind)
+    return PhotoView((wide, high), camera.view, lens, rounded.astype(np.float32), corner, *layers)
 
 
 def _parts(surface: PhotoSurface) -> tuple[Part, ...]:

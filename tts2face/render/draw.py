@@ -98,12 +98,10 @@ class MeshRenderer:
         return np.pad(clip.motion.values, ((0, 0), (0, len(names) - n_channels)))
 
     def _draw(self, weights: NDArray[np.float32], head: NDArray[np.float32], buffers: Any) -> NDArray[np.uint8]:
-        scene, picture = self.scene, self.picture
+        picture, background = self.picture, self.scene.background
         pixels = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
-        pixels[:, :, :3] = scene.background
-        if isinstance(scene, LitScene) and scene.cut_out is not None and picture.is_transparent:
-            pixels[:, :, 3] = scene.cut_out.still
-        scene.draw(weights, head, buffers, pixels)
+        pixels[:, :, : background.shape[2]] = background
+        self.scene.draw(weights, head, buffers, pixels)
         return pixels
 
 

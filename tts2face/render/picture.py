@@ -16,7 +16,7 @@ SUPERSAMPLING_FACTORS = (1, 2, 3)
 DRAFT, STANDARD, HIGH = QUALITIES = ("draft", "standard", "high")
 HIGH_SUPERSAMPLING = 3
 NUMBA, PYVISTA = RENDERERS = ("numba", "pyvista")
-STUDIO, TRANSPARENT = "studio", "transparent"
+STUDIO, TRANSPARENT, BLUR = "studio", "transparent", "blur"
 COLOURS = {
     "black": "000000", "white": "ffffff", "grey": "808080", "gray": "808080", "red": "c8282d", "green": "00b140",
     "blue": "0047bb", "navy": "14213d", "sky": "9ec9e8", "teal": "127475", "yellow": "f2c14e", "orange": "e07a1f",
@@ -40,7 +40,9 @@ class Picture:
         "Width x height in pixels, even numbers from 16 to 4096; auto: 512x512, or the size of a talker's own video.",
     )
     camera: str = option("front", "front, three-quarter, profile, close, or yaw,pitch[,distance] in degrees and mm.")
-    background: str = option("studio", "studio, transparent, a colour (name or #rrggbb), or an image file.")
+    background: str = option(
+        "studio", "studio, transparent, blur (of a photo's own), a colour (name or #rrggbb), or an image file."
+    )
     supersampling: int = option(2, "Samples along each side of a pixel: 1, 2 or 3.")
     quality: str = option(
         "standard",
@@ -116,14 +118,14 @@ def parse_size(size: str) -> tuple[int, int]:
 
 
 def parse_background(background: str) -> tuple[int, int, int] | Path | str:
-    """Colour (sRGB, 0-255), image path, or the word ``studio`` or ``transparent``.
+    """Colour (sRGB, 0-255), image path, or the word ``studio``, ``transparent`` or ``blur``.
 
     Raises
     ------
     InputError
         The text is none of these, or the image does not exist.
     """
-    if background in (STUDIO, TRANSPARENT):
+    if background in (STUDIO, TRANSPARENT, BLUR):
         return background
     digits = COLOURS.get(background.lower(), background.removeprefix("#"))
     if re.fullmatch(r"[0-9a-fA-F]{3}", digits):
@@ -133,7 +135,7 @@ def parse_background(background: str) -> tuple[int, int, int] | Path | str:
     path = Path(background)
     if path.suffix.lower() not in IMAGE_SUFFIXES:
         raise InputError(
-            f"there is no background {background!r}; give studio, transparent, #rrggbb, an image file, "
+            f"there is no background {background!r}; give studio, transparent, blur, #rrggbb, an image file, "
             f"or one of {', '.join(COLOURS)}"
         )
     if not is_file(path):

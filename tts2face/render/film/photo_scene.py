@@ -8,9 +8,12 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face, PhotoView
 from tts2face.render.camera import photo_crop
+from tts2face.render.film.cut_out import moving_pixels, page_covers, without_background
 from tts2face.render.film.scene import LitScene, build_lit_scene
-from tts2face.render.picture import AUTO_SIZE, PYVISTA, SIDE_LIMITS_PX, STUDIO, Picture
+from tts2face.render.picture import AUTO_SIZE, BLUR, PYVISTA, SIDE_LIMITS_PX, STUDIO, Picture
 from tts2face.render.scene import draw_background
+
+BLUR_MM = 12.0  # standard deviation, where the person is
 
 
 def build_photo_scene(face: Face, view: PhotoView, picture: Picture) -> LitScene:
@@ -27,9 +30,11 @@ def build_photo_scene(face: Face, view: PhotoView, picture: Picture) -> LitScene
         raise InputError("a photograph is drawn by the renderer numba; remove --renderer pyvista")
     if view.alpha is None and picture.background != STUDIO:
         raise InputError(
-            "the photograph is opaque and keeps its own background; remove --background, or give a PNG or WebP picture "
-            "whose background is transparent"
+            "the person in the photograph was not told from its background, which stays; remove --background, or give "
+            "a PNG or WebP picture whose background is transparent"
         )
+    if view.behind is None and picture.background == BLUR:
+        raise InputError("the photograph has no background that could be blurred; choose another --background")
     if picture.size == AUTO_SIZE:
         picture = replace(picture, size=_own_size(view))
     if face.light[0].backdrop.shape[1::-1] != view.size:
@@ -39,11 +44,34 @@ def build_photo_scene(face: Face, view: PhotoView, picture: Picture) -> LitScene
     shown = _resized(face.light[0].backdrop, size, crop)
     if view.alpha is None:
         return build_lit_scene(face, face.light[0], picture, shown)
-    cover, wall = _resized(view.alpha, size, crop), draw_background(picture)
-    part = cover[..., None] / 255.0
-    still = shown if picture.is_transparent else np.rint(part * shown + (1 - part) * wall).astype(np.uint8)
-    scene = build_lit_scene(face, face.light[0], picture, wall, cover)
-    return replace(scene, background=still)
+    light, cover = face.light[0], _resized(view.alpha, size, crop)
+    wall = (
+        draw_background(picture)
+        if picture.background not in (STUDIO, BLUR) or view.behind is None
+        else (_own_background(view, view.behind, picture, crop))
+    )
+    scene = build_lit_scene(face, light, picture, wall, page_covers(light, view))
+    optics = (scene.optics.view.astype(np.float32), scene.optics.lens.astype(np.float32))
+    cover = np.where(moving_pixels(scene.surface, optics, size, picture.samples_per_side), 0, cover)[..., None]
+    if picture.is_transparent:
+        still = np.concatenate([shown, cover], axis=2)
+    else:
+        still = np.rint((cover * shown.astype(np.float64) + (255 - cover) * wall.astype(np.float64)) / 255)
+    surface = without_background(scene.surface, scene.texels, scene.texture_size[0])
+    return replace(scene, surface=surface, background=still.astype(np.uint8))
+
+
+def _own_background(
+    view: PhotoView, behind: NDArray[np.uint8], picture: Picture, crop: tuple[float, float, float, float]
+) -> NDArray[np.uint8]:
+    """Background (H, W, 3) of a photograph in a picture, blurred if this is asked for."""
+    from PIL import Image, ImageFilter
+
+    shown = _resized(behind, (picture.width, picture.height), crop)
+    if picture.background != BLUR:
+        return shown
+    px_per_mm = float(view.lens[0] / view.view[2, 3]) * picture.width / (crop[2] - crop[0])
+    return np.asarray(Image.fromarray(shown).filter(ImageFilter.GaussianBlur(BLUR_MM * px_per_mm)))
 
 
 def _own_size(view: PhotoView) -> str:

@@ -12,7 +12,7 @@ from tts2face.face.pupils import DILATION, PUPIL_SHAPE
 from tts2face.models.baked_light import LEAST_SIDE, N_BALL_TERMS, N_PAGES, N_TERMS, BakedLight, equal_limits
 from tts2face.models.face import Face
 from tts2face.render.camera import CameraMatrices, camera_matrices
-from tts2face.render.film.cut_out import CutOut, build_cut_out
+from tts2face.render.film.cut_out import compose_over, find_covers
 from tts2face.render.film.eyes import CENTRE, N_EYE_COLUMNS, PUPIL, TURN, colour_eyes
 from tts2face.render.film.light import add_modes, pack_change
 from tts2face.render.film.response import LightTerms, TermBuffers, add_responses, light_terms, still_eyes
@@ -63,6 +63,7 @@ class LitBuffers:
     texel: NDArray[np.int32]
     share: Float32Array
     corners: NDArray[np.int32]
+    covers: Float32Array
     terms: TermBuffers
     light: Float32Array
     mouth: Float32Array
@@ -73,7 +74,10 @@ class LitBuffers:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LitScene:
-    """A face with baked light, its camera and its background; built by `build_lit_scene`."""
+    """A face with baked light, its camera and its background (H, W, 3 or 4); built by `build_lit_scene`.
+
+    ``wall`` (H, W, 3) lies behind a photographed person whose pages have a cover.
+    """
 
     face: Face
     picture: Picture
@@ -89,7 +93,7 @@ class LitScene:
     bases: tuple[Float32Array, ...]
     answers: tuple[Any, ...]
     turns: Cardinal
-    cut_out: CutOut | None = None
+    wall: NDArray[np.uint8] | None = None
 
     def allocate_buffers(self) -> LitBuffers:
         """Buffers for pictures of this scene."""
@@ -116,6 +120,7 @@ class LitScene:
             texel=np.zeros(n_fragments, np.int32),
             share=np.zeros((2, n_fragments), np.float32),
             corners=np.zeros((4, n_fragments), np.int32),
+            covers=np.zeros(n_fragments if self.wall is not None else 0, np.float32),
             terms=self.terms.allocate_buffers(),
             light=np.zeros((3, len(light.rows)), np.float32),
             mouth=np.zeros((3, len(light.mouth_rows)), np.float32),
@@ -153,11 +158,11 @@ class LitScene:
                 self._colour(found, count, buffers)
                 shapes = (buffers.table, surface.triangles, surface.eye_of)
                 colour_eyes(found, count, shapes, eyes, light, buffers.values[AT_RED:])
-                fragments = (starts, buffers.samples, side * side)
-                compose(*fragments, buffers.values[AT_RED:], band)
-                if self.cut_out is not None:
-                    places = (buffers.texel, buffers.share, buffers.corners, count)
-                    self.cut_out.blend(slice(first, first + len(band)), fragments, places, buffers.values, band)
+                fragments, colours = (starts, buffers.samples, side * side), buffers.values[AT_RED:]
+                if self.wall is None:
+                    compose(*fragments, colours, band)
+                else:
+                    compose_over(fragments, colours, buffers.covers, self.wall[first : first + len(band)], band)
 
     def _sort(self, height: int, buffers: LitBuffers) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
         """Numbers of the triangles that are drawn, by bands of rows of samples, and the end of each band."""
@@ -183,6 +188,8 @@ class LitScene:
             find_texels(values, count, size, buffers.texel, buffers.share)
             fetch(texels, size[0], buffers.texel, count, buffers.corners)
             add_texels(buffers.corners, buffers.share, count, coding, values)
+            if self.wall is not None and coding is COLOUR_CODING:
+                find_covers(buffers.corners, buffers.share, count, buffers.covers)
 
     def pose(self, weights: Float32Array, head: Float32Array) -> Float32Array:
         """(V, 3) vertices, mm; eyeballs look ahead, and are smaller behind shut lids."""
@@ -259,17 +266,14 @@ def build_lit_scene(
     light: BakedLight,
     picture: Picture,
     background: NDArray[np.uint8],
-    cover: NDArray[np.uint8] | None = None,
+    covers: NDArray[np.uint8] | None = None,
 ) -> LitScene:
-    """Scene of a face with baked light before a background (H, W, 3), of which a photograph covers a part (H, W)."""
+    """Scene of a face with baked light, whose pages may have a cover (2, H, W), before a background (H, W, 3)."""
     side, light = picture.samples_per_side, light.of_drawn(face.triangles)
     surface = build_surface(face, light)
     optics = camera_matrices(picture.view, face, (picture.width * side, picture.height * side))
     level = _level(surface, optics, side)
-    texels, size = stack_pages(light.pages, level)
-    cut_out = None
-    if face.photograph is not None and cover is not None:
-        cut_out = build_cut_out(light, face.photograph, cover, background, level)
+    texels, size = stack_pages(light.pages, level, covers)
     axes = optics.view[:, :3]
     place = -axes.T @ optics.view[:, 3]
     camera = np.concatenate([place, axes.ravel(), optics.lens[:3]]).astype(np.float32)
@@ -292,7 +296,7 @@ def build_lit_scene(
             (light.ball_responses, light.ball_sizes, equal_limits(255.0, len(light.ball_rows))),
         ),
         turns=turn_weights(light.turns_deg),
-        cut_out=cut_out,
+        wall=None if covers is None else background,
     )
 
 

@@ -171,7 +171,8 @@ def fetch(texels: Array, width: int, texel: Array, count: int, corners: Array) -
 def add_texels(corners: Array, share: Array, count: int, coding: tuple[int, Any, Any], values: Array) -> None:
     """Add the colour between four texels to the light of fragments.
 
-    `coding` of a texel's three numbers: bits of each, the number of no light, and the size of a step.
+    `coding` of a texel's three numbers: bits of each, the number of no light, and the size of a step. What lies above
+    them is not read.
     """
     bits, zero, step = coding
     mask, one = (1 << bits) - 1, np.float32(1)
@@ -187,7 +188,8 @@ def add_texels(corners: Array, share: Array, count: int, coding: tuple[int, Any,
         green = w0 * np.float32(a & mask) + w1 * np.float32(b & mask)
         green += w2 * np.float32(c & mask) + w3 * np.float32(d & mask)
         a, b, c, d = a >> bits, b >> bits, c >> bits, d >> bits
-        blue = w0 * np.float32(a) + w1 * np.float32(b) + w2 * np.float32(c) + w3 * np.float32(d)
+        blue = w0 * np.float32(a & mask) + w1 * np.float32(b & mask)
+        blue += w2 * np.float32(c & mask) + w3 * np.float32(d & mask)
         values[2, i] += (red - zero) * step
         values[3, i] += (green - zero) * step
         values[4, i] += (blue - zero) * step

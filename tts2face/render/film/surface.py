@@ -14,6 +14,7 @@ from tts2face.render.film.light import LIGHT_BITS, LIGHT_ZERO
 from tts2face.render.film.visibility import MAX_TRIANGLES, N_COLUMNS, RED, U, V
 
 DARK = (17.0, 6.0, 5.5)  # colour of skin that is seen from behind, in the mouth
+OPAQUE, COVER_SHIFT = 255, 24  # cover of pages without any, and its bits in a texel
 TEXELS_A_PIXEL = 1.0  # beyond which the next smaller texels are read
 
 
@@ -126,16 +127,30 @@ def page_places(uv: NDArray[np.float64], page: NDArray[np.int64], least_side: in
     return np.column_stack([np.where(page < N_PAGES, uv[:, 0], 0.5), down / (N_PAGES + 1 / BLACK_SHARE)])
 
 
-def stack_pages(pages: NDArray[np.uint8], level: int) -> tuple[NDArray[np.int32], tuple[int, int]]:
-    """Texels (N,) of three numbers of 8 bits, of pages (2, H, W, 3) halved `level` times; and (width, height)."""
-    shrunk = pages.astype(np.float64)
+def stack_pages(
+    pages: NDArray[np.uint8], level: int, covers: NDArray[np.uint8] | None = None
+) -> tuple[NDArray[np.int32], tuple[int, int]]:
+    """Texels (N,) of 8 bits a number, of pages (2, H, W, 3) halved `level` times; and (width, height).
+
+    The fourth number is the cover (2, H, W), if there is one.
+    """
+    height, width = (side >> level for side in pages.shape[1:3])
+    stacked = np.zeros((2 * height + height // BLACK_SHARE, width, 4), np.uint8)
+    stacked[: 2 * height, :, :3] = _halved(pages, level).reshape(-1, width, 3)
+    if covers is not None:
+        stacked[: 2 * height, :, 3] = _halved(covers, level).reshape(-1, width)
+        stacked[2 * height :, :, 3] = OPAQUE
+    return stacked.view("<i4").astype(np.int32, copy=False).ravel(), (width, len(stacked))
+
+
+def _halved(pages: NDArray[np.uint8], level: int) -> NDArray[np.uint8]:
+    """Pages (2, H, W, ...) halved `level` times."""
+    if level == 0:
+        return pages
+    shrunk = pages.astype(np.float32)
     for _ in range(level):
         shrunk = (shrunk[:, ::2, ::2] + shrunk[:, 1::2, ::2] + shrunk[:, ::2, 1::2] + shrunk[:, 1::2, 1::2]) / 4
-    height, width = shrunk.shape[1:3]
-    black = np.zeros((height // BLACK_SHARE, width, 3))
-    numbers = np.rint(np.concatenate([*shrunk, black])).astype(np.int32)
-    packed = numbers[:, :, 0] | numbers[:, :, 1] << 8 | numbers[:, :, 2] << 16
-    return packed.ravel(), (width, len(packed))
+    return np.rint(shrunk).astype(np.uint8)
 
 
 def still_change(side: int) -> tuple[NDArray[np.int32], tuple[int, int]]:

@@ -60,7 +60,9 @@ class ClipOptions(BaseModel):
     )
     size: Annotated[str, Field(description="Width x height in pixels.", examples=["512x512"])] = "auto"
     camera: Annotated[str, Field(description="front, three-quarter, profile, close, or yaw,pitch.")] = "front"
-    background: Annotated[str, Field(description="studio, transparent, or a colour.", examples=["#204060"])] = "studio"
+    background: Annotated[str, Field(description="studio, transparent, blur, or a colour.", examples=["#204060"])] = (
+        "studio"
+    )
     supersampling: Annotated[int, Field(ge=1, le=3, description="Samples along each side of a pixel.")] = 2
     quality: Annotated[str, Field(description="draft, standard or high.", examples=["draft"])] = "standard"
 

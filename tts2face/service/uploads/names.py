@@ -10,7 +10,7 @@ from tts2face import catalogue
 from tts2face.jobs.resource_check import DICTIONARY, FACE
 from tts2face.models.face_loading import default_face
 from tts2face.models.hair import parse_hair_colour
-from tts2face.render.picture import COLOURS, STUDIO, TRANSPARENT
+from tts2face.render.picture import BLUR, COLOURS, STUDIO, TRANSPARENT
 from tts2face.request import OWN_FACE
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
@@ -87,9 +87,11 @@ def check_voice(voice: str | None) -> None:
 
 def check_background(background: str) -> None:
     """Refuse backgrounds that are neither a word nor a colour."""
-    if background not in {STUDIO, TRANSPARENT, *COLOURS} and not COLOUR.fullmatch(background):
+    if background not in {STUDIO, TRANSPARENT, BLUR, *COLOURS} and not COLOUR.fullmatch(background):
         raise RefusedError(
-            400, "invalid_request", f"there is no background {background[:60]!r}; give studio, transparent or #rrggbb"
+            400,
+            "invalid_request",
+            f"there is no background {background[:60]!r}; give studio, transparent, blur or #rrggbb",
         )
 
 
