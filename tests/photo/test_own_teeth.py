@@ -75,6 +75,13 @@ def test_no_teeth_are_found_where_too_few_are_seen(weights: dict[str, float], he
     assert teeth_in(still(NAME, SIDE, **weights), weights, head) is None
 
 
+def test_teeth_of_a_grey_picture_are_found(smiling: np.ndarray, teeth: OwnTeeth, head: Face) -> None:
+    grey = np.repeat(smiling.mean(axis=2, keepdims=True), 3, axis=2).astype(np.uint8)
+    found = teeth_in(grey, SMILE, head)
+    assert found is not None
+    assert np.ptp(found.across) == pytest.approx(np.ptp(teeth.across), abs=4.0)  # mm
+
+
 def test_a_darker_picture_gives_the_same_teeth(smiling: np.ndarray, teeth: OwnTeeth, head: Face) -> None:
     dark = (smiling * 0.7).astype(np.uint8)
     found = teeth_in(dark, SMILE, head)

@@ -32,6 +32,7 @@ SIDE = 400
 NAME = "head"
 STRIPES = 7  # of the wall, px
 MOST_MOVED_PX = 40  # of a head that turns
+LEAST_TEETH = 60  # samples, of a mouth of 130 samples
 MOST_FOLDED = 10  # triangles, at the corners of shut lids
 PANGRAM = "We were away a year ago, but Bob may move five big maps."
 BLINK = {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0}
@@ -125,6 +126,18 @@ def test_the_inside_of_the_mouth_is_seen_through_parted_lips_alone(renderer: Mes
     shut, opened = samples_of_parts(renderer), samples_of_parts(renderer, jawOpen=0.6)
     assert sum(shut.get(name, 0) for name in inside) == 0
     assert min(opened.get(name, 0) for name in ("teeth_upper", "tongue", "walls")) > 20
+
+
+def test_upper_teeth_lie_on_the_lip_of_each_f_and_v(face: Face) -> None:
+    session = Session(face=face)
+    clip, renderer = session.clip("Five vivid foxes have fine fur."), session.renderer(Picture())
+    phones, rate = clip.speech.phones, clip.fps
+    spans = zip(phones.phones, phones.edges[:-1], phones.edges[1:], strict=True)
+    frames = [range(round(begin * rate), round(end * rate) + 1) for phone, begin, end in spans if phone in ("f", "v")]
+    assert len(frames) == 8
+    for span in frames:
+        poses = [dict(zip(clip.motion.channels, clip.motion.values[k].tolist(), strict=True)) for k in span]
+        assert max(samples_of_parts(renderer, **pose).get("teeth_upper", 0) for pose in poses) > LEAST_TEETH
 
 
 def test_gaze_moves_the_iris_and_not_the_lids(renderer: MeshRenderer) -> None:

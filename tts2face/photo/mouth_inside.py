@@ -34,6 +34,7 @@ EDGE_MM = 4.0  # around the middle of the upper teeth, and behind their front, w
 TEETH_OVER_SKIN = 1.05  # least luminance of teeth, of the cheeks'
 TINT_POWERS, SKIN_SHARE = (0.6, 0.35), 0.25  # of the hues of the eyes' white and the skin in teeth; the skin's share
 TEETH_LIMITS = (0.06, 0.75)  # of the luminance of teeth
+LEAST_HUE = 0.2  # range of the colours of lips, of the largest; .4 to .8 in colour pictures, 0 in grey ones
 LEAST_LIGHT = 1e-3  # of any colour that is measured, so that black has a hue
 WALL_MM = (0.0, 2.5, 8.0, 22.0)  # depth of the rings of the wall behind the lips
 WALL_OUT_MM = (0.0, 0.8, 5.0, 7.0)  # and how much wider than the opening they are
@@ -126,6 +127,12 @@ class MouthLight:
     teeth: Floats
     lips: Floats
 
+    def displayed(self, linear: Floats) -> Floats:
+        """Colours (N, 3), 0..255, of linear light (N, 3), in grey where the lips are grey."""
+        hue = min(1.0, float(np.ptp(self.lips) / self.lips.max()) / LEAST_HUE)
+        grey = (linear @ LUMINANCE)[:, None]
+        return encode_srgb(grey + hue * (linear - grey)).astype(np.float64)
+
 
 def mouth_light(pixels: NDArray[np.uint8], landmarks: Floats, sclera: Floats) -> MouthLight:
     """Light in a mouth from the colours of cheeks, lips and the white of the eyes (3,), 0..255."""
@@ -170,7 +177,7 @@ def _colours(head: Face, used: Ints, parts: dict[str, Ints], vertices: Floats, l
         vertex_normals(vertices, np.concatenate(list(parts.values()))) @ (LIGHT_FROM / np.linalg.norm(LIGHT_FROM)), 0, 1
     )
     lit = own * gain * ((AMBIENT + (1 - AMBIENT) * facing) * share)[:, None] * DEEP_TINT ** (1 - share[:, None])
-    return encode_srgb(lit).astype(np.float64)
+    return light.displayed(lit)
 
 
 def mouth_walls(mesh: PhotoMesh, vertices: Floats, shapes: Floats, light: MouthLight) -> MouthInside:
@@ -186,10 +193,10 @@ def mouth_walls(mesh: PhotoMesh, vertices: Floats, shapes: Floats, light: MouthL
     for back, wider, follow, bright in zip(WALL_MM, WALL_OUT_MM, WALL_FOLLOW, WALL_LIGHT, strict=True):
         rows.append(edge + wider * out - (0.0, 0.0, back))
         moves.append(follow * shapes[:, ring])
-        colours.append(np.tile(encode_srgb(lips * bright), (n, 1)))
+        colours.append(np.tile(lips * bright, (n, 1)))
     rows.append(middle[None] - (0.0, 0.0, BACK_MM))
     moves.append(np.zeros((len(shapes), 1, 3)))
-    colours.append(encode_srgb(lips * BACK_LIGHT)[None])
+    colours.append((lips * BACK_LIGHT)[None])
     triangles = []
     for k in range(len(WALL_MM) - 1):
         for i in range(n):
@@ -200,6 +207,6 @@ def mouth_walls(mesh: PhotoMesh, vertices: Floats, shapes: Floats, light: MouthL
     return MouthInside(
         np.concatenate(rows),
         np.concatenate(moves, axis=1),
-        np.concatenate(colours).astype(np.float64),
+        light.displayed(np.concatenate(colours)),
         {"walls": np.array(triangles, np.int64)},
     )

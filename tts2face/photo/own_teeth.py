@@ -16,7 +16,16 @@ from tts2face.numeric import points_in_polygon, smoothstep
 from tts2face.photo.colours import colours_at, lab_at
 from tts2face.photo.found_face import FoundFace, PhotoReader
 from tts2face.photo.lip_line import LEAST_LIP_BLUR_PX, LipLine, cheapest_path, find_lip_line
-from tts2face.photo.mouth_inside import PICTURED, TEETH, MouthInside, MouthLight, MouthPlace, cheek_light, head_mouth
+from tts2face.photo.mouth_inside import (
+    CHEEKS,
+    PICTURED,
+    TEETH,
+    MouthInside,
+    MouthLight,
+    MouthPlace,
+    cheek_light,
+    head_mouth,
+)
 from tts2face.photo.photo_camera import TO_CAMERA, PhotoCamera, find_camera
 from tts2face.photo.photo_mesh import LIP_RINGS, grid_triangles
 from tts2face.video.pose import rigid_points, similarity_transforms
@@ -31,6 +40,7 @@ HIGHEST_MM, LOWEST_MM = 30.0, 35.0  # of the opening, over and under the edges o
 COLUMN_MM, ROW_MM = 0.75, 0.25  # steps of the search
 TEETH_BLUR = 0.003  # of the eye distance
 BRIGHTER, LESS_RED, LIKE_TOOTH = 60.0, 8.0, (0.5, 1.5)  # than lips, of L and a in 8 bits: their sum tells teeth
+LIP_HUE, GREY_BRIGHTER = 3.0, 30.0  # of a: lips that are less redder than cheeks, as in grey pictures; L alone tells
 TOOTH = 0.5  # likeness from which something is a tooth
 ARCH_STEP_MM = 2.0  # between places along the arch whose depths are measured, and to either side of them
 LEAST_BRIGHT = (0.45, 0.65)  # of the brightest teeth
@@ -197,6 +207,9 @@ class _View:
         self._blur = max(LEAST_LIP_BLUR_PX, TEETH_BLUR * face.eye_distance_px)
         places = face.landmarks[[number for ring in LIP_RINGS for number in ring[2:-2]], :2]
         self._lip = np.median(lab_at(pixels, places, self._blur), axis=0)
+        cheeks = np.median(lab_at(pixels, face.landmarks[list(CHEEKS), :2], self._blur), axis=0)
+        has_hue = self._lip[1] - cheeks[1] > LIP_HUE
+        self._brighter = BRIGHTER if has_hue else GREY_BRIGHTER
         self._skin = cheek_light(pixels, face.landmarks)
         self._gum = np.median(self._sampled(places), axis=0)
         middle = camera.to_head(camera.depths_of(face.landmarks[[UPPER_LIP_INNER_MID]]))
@@ -230,7 +243,7 @@ class _View:
         colours = lab_at(self._pixels, places, self._blur)
         is_open = self._is_open(places)
         off = colours - self._lip
-        alike = smoothstep(off[..., 0] / BRIGHTER - off[..., 1] / LESS_RED, *LIKE_TOOTH) * is_open
+        alike = smoothstep(off[..., 0] / self._brighter - off[..., 1] / LESS_RED, *LIKE_TOOTH) * is_open
         bright = colours[..., 0]
         if (alike > TOOTH).any():
             brightest = float(np.percentile(bright[alike > TOOTH], BRIGHTEST))

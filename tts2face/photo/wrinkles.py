@@ -32,6 +32,7 @@ FOLDS = ((129, 203, 206, 216, 212), (358, 423, 426, 436, 432))  # from the wings
 FOLD_ENDS = (0.1, 0.3, 0.75, 1.0)  # of the way along it, over which it begins and ends
 FOLD_REACH, CHEEK_REACH = 0.024, 0.045  # of the eye distance, of the shade of a fold and of the light beside it
 CHEEK_SHARE = 0.5  # of that light
+FOLD_BAND = 0.1  # of the eye distance to either side of a fold, beyond which nothing is looked for
 NEAR_FOLD = 2.0  # reaches of a fold, in which what the picture shows is one
 N_FOLD_POINTS = 81  # points along a fold
 TINY = 1e-9  # mm squared
@@ -60,11 +61,12 @@ def wrinkles(pixels: NDArray[np.uint8], mesh: PhotoMesh, motion: Mapping[str, Fl
 
 def _answers(motion: Floats, others: Sequence[Floats]) -> Floats:
     """(V, 3) factors of a movement that are 1 together for a motion (V, 3), and as near to 0 as may be for others."""
+    moves = np.linalg.norm(motion, axis=1) > LEAST_MM
+    rows = np.stack([motion, *others], axis=1)[moves]
+    gram = rows @ rows.transpose(0, 2, 1) + np.diag([TINY] + [LEAST_MM**2] * len(others))
+    shares = np.linalg.solve(gram, np.eye(len(others) + 1)[:, :1])
     answers = np.zeros_like(motion)
-    for vertex in np.flatnonzero(np.linalg.norm(motion, axis=1) > LEAST_MM):
-        rows = np.array([motion[vertex], *(other[vertex] for other in others)])
-        gram = rows @ rows.T + np.diag([0.0] + [LEAST_MM**2] * len(others))
-        answers[vertex] = np.linalg.solve(gram + TINY * np.eye(len(rows)), np.eye(len(rows))[0]) @ rows
+    answers[moves] = (shares * rows).sum(axis=1)
     return answers
 
 
@@ -81,9 +83,10 @@ def _forehead_lines(pixels: NDArray[np.uint8], mesh: PhotoMesh, person: PhotoPer
     high = float((top - middle) @ up)
     share = ((mesh.places - middle) @ up - edge) / np.maximum(high - edge, LEAST_HIGH * half)
     faint = FAINT_LINES * np.cos(2 * np.pi * N_LINES * share)
-    shown = _shown_lines(pixels, mesh.places, np.broadcast_to(along, mesh.places.shape), person.scale)
     inside = _between(share, FOREHEAD) * (1 - smoothstep(np.abs(across) / half, *FOREHEAD_SIDE))
-    found: Floats = inside * (faint + DEEPER * shown)
+    rows = np.flatnonzero(inside)
+    faint[rows] += DEEPER * _shown_lines(pixels, mesh.places[rows], np.tile(along, (len(rows), 1)), person.scale)
+    found: Floats = inside * faint
     return found
 
 
@@ -93,13 +96,16 @@ def _smile_folds(pixels: NDArray[np.uint8], mesh: PhotoMesh, person: PhotoPerson
     for numbers in FOLDS:
         line = person.landmarks[list(numbers), :2]
         way, at, direction = _nearest(line, mesh.places)
-        outwards = np.sign((line[0] - person.landmarks[NOSE_TIP, :2]) @ (1, 0))
+        outwards = np.sign((line[0] - person.landmarks[NOSE_TIP, :2])[0])
         aside = way * outwards / person.scale
-        shade = -np.exp(-((aside / FOLD_REACH) ** 2))
-        shade += CHEEK_SHARE * np.where(aside > 0, np.exp(-(((aside - CHEEK_REACH) / CHEEK_REACH) ** 2)), 0.0)
-        shown = _shown_lines(pixels, mesh.places, direction, person.scale)
-        near = np.exp(-((aside / (NEAR_FOLD * FOLD_REACH)) ** 2))
-        found += _between(at, FOLD_ENDS) * (FAINT_FOLDS * shade + DEEPER * near * np.minimum(shown, 0.0))
+        beside = np.where(aside > 0, np.exp(-(((aside - CHEEK_REACH) / CHEEK_REACH) ** 2)), 0.0)
+        change = FAINT_FOLDS * (CHEEK_SHARE * beside - np.exp(-((aside / FOLD_REACH) ** 2)))
+        within = _between(at, FOLD_ENDS)
+        rows = np.flatnonzero((within > 0) & (np.abs(aside) < FOLD_BAND))
+        shown = _shown_lines(pixels, mesh.places[rows], direction[rows], person.scale)
+        near = np.exp(-((aside[rows] / (NEAR_FOLD * FOLD_REACH)) ** 2))
+        change[rows] += DEEPER * near * np.minimum(shown, 0.0)
+        found += within * change
     return found * (1 - person.smile)
 
 
@@ -121,6 +127,8 @@ def _nearest(line: Floats, places: Floats) -> tuple[Floats, Floats, Floats]:
 
 def _shown_lines(pixels: NDArray[np.uint8], places: Floats, direction: Floats, scale: float) -> Floats:
     """(V,) how much brighter a picture is on lines in a direction (V, 2) than to their sides, of its brightness."""
+    if not len(places):
+        return np.zeros(0)
     side = np.column_stack([-direction[:, 1], direction[:, 0]])
     on = [places + way * scale * direction for way in ON_LINE]
     off = [one + way * scale * side for way in BESIDE_LINE for one in on]
