@@ -85,13 +85,13 @@ class PhotoReader:
     """
 
     def __init__(self, model: Path | None = None, on_warning: Callable[[str], None] = lambda _: None) -> None:
-        self._tracker, self._expressions, self._warn = FaceTracker(model), BlendshapeReader(model), on_warning
+        self.tracker, self._expressions, self._warn = FaceTracker(model), BlendshapeReader(model), on_warning
 
     def read(self, photo: str | Path) -> PhotographedFace:
         """The face in a picture file; ``photo.jpg@2`` is its second largest one; errors as `find_face`."""
         path, number = split_number(photo)
         picture = read_photograph(path).filled()
-        found = find_face(picture.pixels, self._tracker, path, number=number, reduced_by=picture.reduced_by)
+        found = find_face(picture.pixels, self.tracker, path, number=number, reduced_by=picture.reduced_by)
         for warning in found.warnings:
             self._warn(warning)
         scores = self._expressions.blendshape_scores(found.landmarks).tolist()
