@@ -13,6 +13,7 @@ from corpus_tools.dense.build_face import (
     CONTENT,
     SOURCE_FACE,
     BuiltFace,
+    compared_landmarks,
     fit_person,
     paint_person,
 )
@@ -22,13 +23,14 @@ from tts2face.models.consent import consent_record
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.photo.found_face import PhotoReader
+from tts2face.photo.found_face import PhotographedFace, PhotoReader
 from tts2face.photo.lip_line import find_lip_line
 from tts2face.photo.photograph import split_number
 from tts2face.render.occlusion import bake_occlusion
 from tts2face.render.scene import available_cores
 from tts2face.storage.files import find_file
 from tts2face.video.pose import remove_pose
+from tts2face.video.track import FaceTracker
 
 Floats = NDArray[np.float64]
 
@@ -91,7 +93,7 @@ def _read(
         lips = find_lip_line(shown.picture.pixels, shown.found)
         opening = None if lips.is_closed else widened(np.concatenate([lips.upper, lips.lower[-2:0:-1]])[:, :2])
         seen.append(TrackedPictures(Path(photo), points, landmarks, (shown.picture.pixels,), 1.0, opening))
-        neutral.append(without_expression(landmarks[0].astype(np.float64), shown.scores, head))
+        neutral.append(person_landmarks(shown, head, reader.tracker))
     return seen, neutral
 
 
@@ -102,14 +104,12 @@ def widened(opening: Floats) -> Floats:
     return grown
 
 
-def without_expression(landmarks: Floats, scores: Mapping[str, float], head: Face) -> Floats:
-    """Landmarks (478, 3) without the expression that scores tell, moved back by the head's shapes."""
-    still = landmarks.copy()
-    for name, shape in zip(head.shape_names, head.shapes, strict=True):
-        if name.startswith(EXPRESSIONS):
-            weight = max(scores.get(name, 0.0) - EXPRESSION_FROM, 0.0)
-            still -= weight * face_landmarks(head, shape.astype(np.float64))
-    return still
+def person_landmarks(shown: PhotographedFace, head: Face, tracker: FaceTracker) -> Floats:
+    """Landmarks (468, 3) on a head, mm, of a photographed person without the expression."""
+    scores = np.array([shown.scores.get(name, 0.0) * name.startswith(EXPRESSIONS) for name in head.shape_names])
+    pose = np.concatenate([np.radians(shown.found.angles_deg), np.zeros(3)])
+    landmarks = remove_pose(shown.found.landmarks[None].astype(np.float32), 1.0).landmarks[0]
+    return compared_landmarks(landmarks, head, tracker, (np.maximum(scores - EXPRESSION_FROM, 0.0), pose))
 
 
 def mirror_table(head: Face) -> NDArray[np.int64]:

@@ -90,7 +90,7 @@ class PhotoReader:
 
     def __init__(self, model: Path | None = None, on_warning: Callable[[str], None] = lambda _: None) -> None:
         self.model, self.warn = model, on_warning
-        self._tracker, self._expressions = FaceTracker(model), BlendshapeReader(model)
+        self.tracker, self._expressions = FaceTracker(model), BlendshapeReader(model)
 
     def read(self, photo: str | Path, *, with_open_eyes: bool = True) -> PhotographedFace:
         """The face in a picture file; ``photo.jpg@2`` is its second largest one; errors as `find_face`."""
@@ -98,7 +98,7 @@ class PhotoReader:
         picture = read_photograph(path).filled()
         found = find_face(
             picture.pixels,
-            self._tracker,
+            self.tracker,
             path,
             number=number,
             reduced_by=picture.reduced_by,
