@@ -111,7 +111,7 @@ def _add_picture(kind: str) -> None:
 
 
 def _form(kind: str) -> dict[str, Any]:
-    fields = {
+    fields: dict[str, dict[str, Any]] = {
         "file": {"type": "string", "format": "binary", "description": CONTENTS[kind]},
         "name": {
             "type": "string", "pattern": "^[a-z0-9][a-z0-9-]{0,39}$", "example": "anna",

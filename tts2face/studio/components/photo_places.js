@@ -37,7 +37,7 @@ export default {
   data: () => ({ own: {}, held: null }),
 
   created() {
-    this.reset();
+    this.own = copy(this.fit);
   },
 
   mounted: addStyle,

@@ -30,6 +30,11 @@ class PhotoPlaces(Element, component="photo_places.js", esm={MODULES: str(COMPON
         self._props.update(picture=address, size=list(size), fit=dict(fit))
         self.update()
 
+    def hide(self) -> None:
+        """Show no picture."""
+        self._props["picture"] = ""
+        self.update()
+
     @staticmethod
     def _changed(event: events.GenericEventArguments, on_change: Callable[[Mapping[str, Any]], None]) -> None:
         on_change(event.args)

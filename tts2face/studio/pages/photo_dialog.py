@@ -34,7 +34,7 @@ MAKES = {SPEAKING_PICTURE: "Speaks in the picture", AVATAR: "3D head of the pers
 ABOUT = {
     SPEAKING_PICTURE: "Drag lips, lids, the edge of the upper teeth and the pivot where they were found wrongly.",
     AVATAR: "The head has the person's shape, skin, eyes, hair and clothes, and turns; haircut and hair colour can be "
-    "chosen afterwards. Making it takes some 20 seconds.",
+    "chosen afterwards. Making it takes half a minute.",
 }
 Made = Callable[[str], Awaitable[None]]
 
@@ -102,6 +102,8 @@ class PhotoDialog:
             self._name.value = self._name.value or face_name(event.file.name)
             self._show_found(True)
             self._status.text = " ".join(f"{note[:1].upper()}{note[1:]}." for note in self._found["notes"])
+        if not self._shown.visible:
+            self._forget()
 
     def _show_found(self, is_found: bool) -> None:
         for one in (self._shown, self._make, self._again):
@@ -119,12 +121,14 @@ class PhotoDialog:
         state, key = self._page.studio.state, self._page.workspace.key
         assert self._folder is not None
         photo, name = Path(self._folder.name) / "photo", (self._name.value or "").strip()
+
+        async def save(path: Path) -> None:
+            await asyncio.to_thread(shutil.copyfile, photo, path)
+
         is_corrected = self._makes.value == SPEAKING_PICTURE and self._fit != self._found["fit"]
         with shown_errors(), self._busy("The face is made."):
-            sent = Sent(
-                FACE, name, photo.stat().st_size, lambda path: asyncio.to_thread(shutil.copyfile, photo, path),
-                self._consent.value or None, json.dumps(self._fit) if is_corrected else None, self._makes.value,
-            )  # fmt: skip
+            fit = json.dumps(self._fit) if is_corrected else None
+            sent = Sent(FACE, name, photo.stat().st_size, save, self._consent.value or None, fit, self._makes.value)
             await store_resource(state, key, sent)
             self._dialog.close()
             await self._made(name)
@@ -149,6 +153,7 @@ class PhotoDialog:
         """Delete the picture, and show what the dialog begins with."""
         self._delete_picture()
         self._upload.reset()
+        self._places.hide()
         self._show_found(False)
         self._name.value, self._consent.value, self._status.text = "", "", ""
         self._makes.value = SPEAKING_PICTURE
