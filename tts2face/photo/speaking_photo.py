@@ -114,7 +114,7 @@ def speaking_photo(
     corners, weights = place_landmarks(mesh, landmarks, list(zip(patches, eyes, strict=True)))
     white = np.mean([patch.white for patch in patches], axis=0)
     light = mouth_light(pixels, landmarks, white, is_parted=person.is_parted)
-    at_rest = np.einsum("lc,lcx->lx", weights, surface.every().places[corners])
+    at_rest = np.einsum("lc,lcx->lx", weights, surface.places[corners])
     inside = head_mouth(head, model.landmarks, at_rest, at_rest[UPPER_LIP_INNER_MID], light)
     teeth = given.point("teeth", camera.to_pixels(inside.teeth_edge[None])[0])
     inside = inside.moved(camera.to_head(teeth[None])[0] - inside.teeth_edge)
