@@ -31,9 +31,10 @@ def paint_hole(pixels: Pixels, hole: Mask, scale: float) -> Pixels:
     found = _nearest(pixels, known, scale)
     down, across = np.nonzero(hole)
     sums, weights = LEAST_AGREED * found[down, across].astype(np.float32), np.full((len(down), 1), LEAST_AGREED)
-    for turned, (line, at) in ((False, (down, across)), (True, (across, down))):
-        layers = (pixels, ~hole, stands_out)
-        colours, weight = _between(*((one.swapaxes(0, 1) if turned else one) for one in layers), (line, at), scale)
+    for colours, weight in (
+        _between(pixels, ~hole, stands_out, (down, across), scale),
+        _between(pixels.swapaxes(0, 1), ~hole.T, stands_out.T, (across, down), scale),
+    ):
         sums, weights = sums + weight * colours, weights + weight
     found[down, across] = (sums / weights).clip(0, 255)
     return found

@@ -41,7 +41,6 @@ def place_landmarks(
 def _vertices(mesh: PhotoMesh) -> Mapping[int, int]:
     """Vertices that are landmarks: their own, and those of lips and lids on the lines through them."""
     lines: list[tuple[Ints, Sequence[int], int]] = [
-        (mesh.landmark_vertices, mesh.landmarks.tolist(), 1),
         (mesh.upper_lip, INNER_LIP_UPPER, (N_POINTS - 1) // (len(INNER_LIP_UPPER) - 1)),
         (mesh.lower_lip, INNER_LIP_LOWER, (N_POINTS - 1) // (len(INNER_LIP_LOWER) - 1)),
     ]
@@ -50,7 +49,8 @@ def _vertices(mesh: PhotoMesh) -> Mapping[int, int]:
             (line, numbers, (N_LID - 1) // (len(numbers) - 1))
             for line, numbers in zip((upper, lower), lids, strict=True)
         ]
-    return {int(number): int(line[k * step]) for line, numbers, step in lines for k, number in enumerate(numbers)}
+    on_lines = {int(number): int(line[k * step]) for line, numbers, step in lines for k, number in enumerate(numbers)}
+    return mesh.vertex_of | on_lines
 
 
 def _triangle_around(place: Floats, places: Floats, triangles: Ints) -> tuple[Ints, Floats]:

@@ -21,7 +21,7 @@ AROUND = 3.0  # of the eye distance, around the oval of the face, that the netwo
 SHIFT = 0.04  # of its side, by which a second reading of that part differs
 PART_FADE = 0.08  # of the part's side, over which its reading becomes that of the whole picture
 WHOLE_WEIGHT = 1e-3  # of the whole picture where the parts are read
-WORK_EYES_PX, WORK_SIDE_PX = 100.0, 1024.0  # most eye distance and side of the picture in which the matte is found
+WORK_EYES_PX, WORK_SIDE_PX = 100.0, 800.0  # most eye distance and side of the picture in which the matte is found
 SURE = 0.97  # share from which a place is the person's, and below 1 minus which it is the background's
 PERSON_WITHIN, BACKGROUND_WITHOUT = 0.03, 0.05  # of the eye distance, kept from there
 RIM_REACH = 0.3  # of the eye distance, from where the share is half: beyond it is the background
@@ -80,11 +80,12 @@ def part_background(picture: Photograph, landmarks: NDArray[np.float64], scale: 
     cover = _joined(cover, oval > 0, RIM_REACH * scale)
     around = _grown(cover > 0, AROUND_RIM * scale)
     behind = paint_hole(small, around, scale)
-    cover, near, *layers = (
-        cv2.resize(values, (width, height), interpolation=cv2.INTER_LINEAR) if shrink < 1 else values
-        for values in (cover, around.astype(np.uint8), of_person.clip(0, 255).astype(np.uint8), behind)
-    )
-    return _layered(picture, cover, near > 0, layers)
+    layers = [of_person.clip(0, 255).astype(np.uint8), behind]
+    if shrink < 1:
+        cover = np.asarray(cv2.resize(cover, (width, height)))
+        around = np.asarray(cv2.resize(around.astype(np.uint8), (width, height))) > 0
+        layers = [np.asarray(cv2.resize(layer, (width, height)), np.uint8) for layer in layers]
+    return _layered(picture, cover, around, layers)
 
 
 def read_person(pixels: Pixels, places: NDArray[np.float64], scale: float, network: Network) -> Reading:
@@ -177,24 +178,25 @@ def _joined(cover: Floats, face: Mask, reach: float) -> Floats:
 
 
 def _layered(picture: Photograph, cover: Floats, near: Mask, layers: Sequence[Pixels]) -> Photograph:
-    """Picture in two layers (H, W, 3) with the colours of person and background that are given near the person.
+    """Picture in two layers (H, W, 3), whose colours of person and background near the person are given and changed.
 
-    Where both are mixed they are changed so that they give the picture: mainly the person's, which move with the rim.
+    Where both are mixed they give the picture: mainly the person's are changed, which move with the rim.
     """
-    person, background = (layer.copy() for layer in layers)
-    person[(cover == 1) | ~near] = picture.pixels[(cover == 1) | ~near]
-    background[~near] = picture.pixels[~near]
-    beside = near & (cover == 0)
-    behind = background[beside].astype(np.float32)
-    missing = picture.pixels[beside] - behind
-    background[beside] = np.rint(behind + np.sign(missing) * np.maximum(np.abs(missing) - RIM_NOISE, 0))
-    rim = (cover > 0) & (cover < 1)
-    share = cover[rim][:, None]
+    person, background = layers
+    np.copyto(person, picture.pixels, where=((cover == 1) | ~near)[..., None])
+    np.copyto(background, picture.pixels, where=~near[..., None])
+    every, own, other = (one.reshape(-1, 3) for one in (picture.pixels, person, background))
+    beside = np.flatnonzero(near & (cover == 0))
+    behind = other[beside].astype(np.float32)
+    missing = every[beside] - behind
+    other[beside] = np.rint(behind + np.sign(missing) * np.maximum(np.abs(missing) - RIM_NOISE, 0))
+    rim = np.flatnonzero((cover > 0) & (cover < 1))
+    share = cover.ravel()[rim, None]
     rest = (1 - share) * BACKGROUND_CHANGE
-    colours, of_person, behind = (one[rim].astype(np.float32) for one in (picture.pixels, person, background))
+    colours, of_person, behind = (one[rim].astype(np.float32) for one in (every, own, other))
     missing = (colours - share * of_person - (1 - share) * behind) / (share**2 + rest * (1 - share))
-    person[rim] = np.rint(of_person + share * missing).clip(0, 255)
-    background[rim] = np.rint(behind + rest * missing).clip(0, 255)
+    own[rim] = np.rint(of_person + share * missing).clip(0, 255)
+    other[rim] = np.rint(behind + rest * missing).clip(0, 255)
     return replace(picture, pixels=person, alpha=np.rint(255 * cover).astype(np.uint8), behind=background)
 
 

@@ -90,6 +90,11 @@ class PhotoMesh:
     border: Ints
     frame: Frame
 
+    @property
+    def vertex_of(self) -> dict[int, int]:
+        """Vertices of the landmarks that are vertices."""
+        return dict(zip(self.landmarks.tolist(), self.landmark_vertices.tolist(), strict=True))
+
 
 def build_mesh(size: tuple[int, int], landmarks: Floats, lips: LipLine, lids: LidLines, scale: float) -> PhotoMesh:
     """Mesh of a picture of a size (width, height) with landmarks (478, 3), pixels and depths.

@@ -138,7 +138,7 @@ def blink(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, eye: int) 
     ways = {"upper": meeting - upper, "lower": meeting - lower}
     along = upper[-1, :2] - upper[0, :2]
     at_line = (upper[:, :2] - upper[0, :2]) @ along / (along @ along)
-    vertex_of = dict(zip(mesh.landmarks.tolist(), mesh.landmark_vertices.tolist(), strict=True))
+    vertex_of = mesh.vertex_of
     found: dict[int, Floats] = dict(zip(mesh.upper_lids[eye].tolist(), ways["upper"], strict=True))
     found |= dict(zip(mesh.lower_lids[eye].tolist(), ways["lower"], strict=True))
     for row in mesh.bands[eye]:
@@ -170,7 +170,7 @@ def closing(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson) -> Float
     ways = person.lips.lower - person.lips.upper
     numbers = np.arange(N_LIP)
     follow: dict[int, Floats] = {}
-    vertex_of = dict(zip(mesh.landmarks.tolist(), mesh.landmark_vertices.tolist(), strict=True))
+    vertex_of = mesh.vertex_of
     at_landmark = np.linspace(0, N_LIP - 1, len(INNER_LIP_UPPER))
     for line, outer, ring, share, near, far in (
         (mesh.upper_lip, OUTER_LIP_UPPER, LIP_RINGS[0], shares[0], 1.0, 1.0),

@@ -67,10 +67,15 @@ class PhotoSurface:
         self.colours.append(np.full((n, 3), UNSEEN) if colours is None else colours)
         return first + np.arange(n)
 
+    @property
+    def places(self) -> Floats:
+        """Places (V, 3) of all vertices, mm."""
+        return np.concatenate([one.places for one in self.vertices])
+
     def every(self) -> Vertices:
         """All vertices."""
         return Vertices(
-            np.concatenate([one.places for one in self.vertices]),
+            self.places,
             np.concatenate([one.shapes for one in self.vertices], axis=1),
             np.concatenate([one.follow for one in self.vertices]),
         )

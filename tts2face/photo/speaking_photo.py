@@ -123,7 +123,7 @@ def speaking_photo(
             eyes += [(patch, rows)] if patch is parts[0] else []
     corners, weights = place_landmarks(mesh, landmarks, eyes)
     light = mouth_light(pixels, landmarks, np.mean([parts[0].white for parts in patches], axis=0))
-    at_rest = np.einsum("lc,lcx->lx", weights, surface.every().places[corners])
+    at_rest = np.einsum("lc,lcx->lx", weights, surface.places[corners])
     inside = teeth_and_tongue(head, MouthPlace.of(model.landmarks, at_rest, is_parted=person.is_parted), light, teeth)
     edge = given.point("teeth", camera.to_pixels(inside[0].teeth_edge[None])[0])
     way = camera.to_head(edge[None])[0] - inside[0].teeth_edge

@@ -43,7 +43,7 @@ def camera_matrices(camera: CameraView, face: Face, size: tuple[int, int]) -> Ca
         The face is that of a photograph, and the camera does not see it from where it was taken.
     """
     if face.photograph is not None:
-        return _photo_matrices(face.photograph, photo_crop(camera, face, size), size)
+        return photo_matrices(face.photograph, photo_crop(camera, face, size), size)
     low, high = framing_box(face)
     yaw, pitch = math.radians(camera.yaw_deg), math.radians(camera.pitch_deg)
     ahead = -np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)])
@@ -105,7 +105,8 @@ def _in_photo(face: Face, view: PhotoView) -> tuple[NDArray[np.float64], NDArray
     return places.min(axis=0), places.max(axis=0)
 
 
-def _photo_matrices(view: PhotoView, crop: tuple[float, float, float, float], size: tuple[int, int]) -> CameraMatrices:
+def photo_matrices(view: PhotoView, crop: tuple[float, float, float, float], size: tuple[int, int]) -> CameraMatrices:
+    """Camera matrices that show a part of a photograph, of `photo_crop`, in a picture of `size` in samples."""
     scale = size[0] / (crop[2] - crop[0])
     focal, across, down = view.lens * scale
     middle = (across + scale * (0.5 - crop[0]), down + scale * (0.5 - crop[1]))

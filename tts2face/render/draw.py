@@ -13,6 +13,7 @@ from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face import Face
 from tts2face.prefetch import map_in_order
 from tts2face.render import vtk_renderer
+from tts2face.render.camera import camera_matrices
 from tts2face.render.film.photo_scene import build_photo_scene
 from tts2face.render.film.scene import LitScene, build_lit_scene
 from tts2face.render.picture import PYVISTA, Picture
@@ -121,7 +122,8 @@ def mesh_renderer(face: Face, picture: Picture) -> MeshRenderer:
         vtk_renderer.require_gl()
     elif face.light:
         background = draw_background(picture, face.light[0].backdrop)
-        return MeshRenderer(build_lit_scene(face, face.light[0], picture, background))
+        optics = camera_matrices(picture.view, face, picture.samples)
+        return MeshRenderer(build_lit_scene(face, picture, optics, background))
     return MeshRenderer(build_scene(face, picture))
 
 

@@ -80,6 +80,11 @@ class Picture:
         return {DRAFT: 1, HIGH: HIGH_SUPERSAMPLING}.get(self.quality, self.supersampling)
 
     @property
+    def samples(self) -> tuple[int, int]:
+        """Samples across and down."""
+        return self.width * self.samples_per_side, self.height * self.samples_per_side
+
+    @property
     def view(self) -> CameraView:
         """Camera view that `camera` names."""
         return parse_camera(self.camera)

@@ -80,9 +80,8 @@ def build_scene(face: Face, picture: Picture) -> Scene:
     DataError
         The background image cannot be read.
     """
-    side = picture.samples_per_side
     surface, towards = build_surface(face, scatters=picture.quality != DRAFT), lamp_directions(picture.view)
-    camera = camera_matrices(picture.view, face, (picture.width * side, picture.height * side))
+    camera = camera_matrices(picture.view, face, picture.samples)
     exposure = compute_exposure(face, surface, towards, available_cores())
     surface = without_hidden_backs(face, surface, picture.view)
     return Scene(face, picture, surface, camera, light_table(towards, camera), exposure, draw_background(picture))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from tts2face.compilation import kernel, vectorized_kernel
 from tts2face.models.baked_light import BakedLight
 from tts2face.models.face import PhotoView
+from tts2face.render.camera import CameraMatrices
 from tts2face.render.film.surface import COVER_SHIFT, OPAQUE, LitSurface
 from tts2face.render.film.visibility import U, V, nearest_triangles, project
 
@@ -17,23 +18,22 @@ Array = NDArray[Any]
 
 def page_covers(light: BakedLight, view: PhotoView) -> NDArray[np.uint8]:
     """Cover (2, H, W) of the pages of a photograph: that of the picture, and of all that is seen through openings."""
-    covers = np.full(light.pages.shape[:3], OPAQUE, np.uint8)
+    n_pages, tall, broad = light.pages.shape[:3]
+    covers = np.full((n_pages, tall, broad), OPAQUE, np.uint8)
     if view.alpha is None:
         return covers
     high, wide = view.alpha.shape
     left, top = view.corner
-    rows, columns = (
-        np.clip(np.arange(length) + first, 0, most - 1)
-        for length, first, most in zip(covers.shape[1:], (top, left), (high, wide), strict=True)
-    )
+    rows = np.clip(np.arange(tall) + top, 0, high - 1)
+    columns = np.clip(np.arange(broad) + left, 0, wide - 1)
     covers[0] = view.alpha[rows[:, None], columns]
     return covers
 
 
-def moving_pixels(surface: LitSurface, optics: tuple[Array, Array], size: tuple[int, int], side: int) -> Array:
+def moving_pixels(surface: LitSurface, optics: CameraMatrices, size: tuple[int, int], side: int) -> NDArray[np.bool_]:
     """(H, W) pixels of a picture (width, height) that the triangles of a face at rest cover in all samples."""
     table = surface.template.copy()
-    project(surface.rig.rest, surface.source, *optics, table)
+    project(surface.rig.rest, surface.source, optics.view.astype(np.float32), optics.lens.astype(np.float32), table)
     wide, high = size
     nearest, _, _ = nearest_triangles(table, surface.triangles, (high * side, wide * side))
     samples = nearest[:, : wide * side].reshape(high, side, wide, side) > 0

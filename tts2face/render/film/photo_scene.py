@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face, PhotoView
-from tts2face.render.camera import photo_crop
+from tts2face.render.camera import photo_crop, photo_matrices
 from tts2face.render.film.cut_out import moving_pixels, page_covers, without_background
 from tts2face.render.film.scene import LitScene, build_lit_scene
 from tts2face.render.picture import AUTO_SIZE, BLUR, PYVISTA, SIDE_LIMITS_PX, STUDIO, Picture
@@ -26,6 +26,32 @@ def build_photo_scene(face: Face, view: PhotoView, picture: Picture) -> LitScene
     DataError
         The background image cannot be read, or the photograph does not fit its view.
     """
+    _check(face, view, picture)
+    if picture.size == AUTO_SIZE:
+        picture = replace(picture, size=_own_size(view))
+    size = (picture.width, picture.height)
+    crop = photo_crop(picture.view, face, size)
+    optics = photo_matrices(view, crop, picture.samples)
+    shown = _resized(face.light[0].backdrop, size, crop)
+    if view.alpha is None:
+        return build_lit_scene(face, picture, optics, shown)
+    if view.behind is not None and picture.background in (STUDIO, BLUR):
+        wall = _own_background(view, view.behind, picture, crop)
+    else:
+        wall = draw_background(picture)
+    scene = build_lit_scene(face, picture, optics, wall, page_covers(face.light[0], view))
+    is_moving = moving_pixels(scene.surface, optics, size, picture.samples_per_side)
+    cover = np.where(is_moving, 0, _resized(view.alpha, size, crop))[..., None]
+    if picture.is_transparent:
+        still = np.concatenate([shown, cover], axis=2)
+    else:
+        still = np.rint((cover * shown.astype(np.float32) + (255 - cover) * wall.astype(np.float32)) / 255)
+    surface = without_background(scene.surface, scene.texels, scene.texture_size[0])
+    return replace(scene, surface=surface, background=still.astype(np.uint8))
+
+
+def _check(face: Face, view: PhotoView, picture: Picture) -> None:
+    """Refuse what a photograph does not show; errors as `build_photo_scene`."""
     if picture.renderer == PYVISTA:
         raise InputError("a photograph is drawn by the renderer numba; remove --renderer pyvista")
     if view.alpha is None and picture.background != STUDIO:
@@ -35,30 +61,8 @@ def build_photo_scene(face: Face, view: PhotoView, picture: Picture) -> LitScene
         )
     if view.behind is None and picture.background == BLUR:
         raise InputError("the photograph has no background that could be blurred; choose another --background")
-    if picture.size == AUTO_SIZE:
-        picture = replace(picture, size=_own_size(view))
     if face.light[0].backdrop.shape[1::-1] != view.size:
         raise DataError("the photograph of the face has another size than its view; make or copy the face again")
-    size = (picture.width, picture.height)
-    crop = photo_crop(picture.view, face, size)
-    shown = _resized(face.light[0].backdrop, size, crop)
-    if view.alpha is None:
-        return build_lit_scene(face, face.light[0], picture, shown)
-    light, cover = face.light[0], _resized(view.alpha, size, crop)
-    wall = (
-        draw_background(picture)
-        if picture.background not in (STUDIO, BLUR) or view.behind is None
-        else (_own_background(view, view.behind, picture, crop))
-    )
-    scene = build_lit_scene(face, light, picture, wall, page_covers(light, view))
-    optics = (scene.optics.view.astype(np.float32), scene.optics.lens.astype(np.float32))
-    cover = np.where(moving_pixels(scene.surface, optics, size, picture.samples_per_side), 0, cover)[..., None]
-    if picture.is_transparent:
-        still = np.concatenate([shown, cover], axis=2)
-    else:
-        still = np.rint((cover * shown.astype(np.float64) + (255 - cover) * wall.astype(np.float64)) / 255)
-    surface = without_background(scene.surface, scene.texels, scene.texture_size[0])
-    return replace(scene, surface=surface, background=still.astype(np.uint8))
 
 
 def _own_background(

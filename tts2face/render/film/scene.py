@@ -11,7 +11,7 @@ from tts2face.face.deformation import eye_rotations, head_transform
 from tts2face.face.pupils import DILATION, PUPIL_SHAPE
 from tts2face.models.baked_light import LEAST_SIDE, N_BALL_TERMS, N_PAGES, N_TERMS, BakedLight, equal_limits
 from tts2face.models.face import Face
-from tts2face.render.camera import CameraMatrices, camera_matrices
+from tts2face.render.camera import CameraMatrices
 from tts2face.render.film.cut_out import compose_over, find_covers
 from tts2face.render.film.eyes import CENTRE, N_EYE_COLUMNS, PUPIL, TURN, colour_eyes
 from tts2face.render.film.light import add_modes, pack_change
@@ -263,15 +263,14 @@ def _weight(face: Face, weights: Float32Array, name: str) -> float:
 
 def build_lit_scene(
     face: Face,
-    light: BakedLight,
     picture: Picture,
+    optics: CameraMatrices,
     background: NDArray[np.uint8],
     covers: NDArray[np.uint8] | None = None,
 ) -> LitScene:
     """Scene of a face with baked light, whose pages may have a cover (2, H, W), before a background (H, W, 3)."""
-    side, light = picture.samples_per_side, light.of_drawn(face.triangles)
+    side, light = picture.samples_per_side, face.light[0].of_drawn(face.triangles)
     surface = build_surface(face, light)
-    optics = camera_matrices(picture.view, face, (picture.width * side, picture.height * side))
     level = _level(surface, optics, side)
     texels, size = stack_pages(light.pages, level, covers)
     axes = optics.view[:, :3]

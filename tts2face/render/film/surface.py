@@ -149,7 +149,8 @@ def _halved(pages: NDArray[np.uint8], level: int) -> NDArray[np.uint8]:
         return pages
     shrunk = pages.astype(np.float32)
     for _ in range(level):
-        shrunk = (shrunk[:, ::2, ::2] + shrunk[:, 1::2, ::2] + shrunk[:, ::2, 1::2] + shrunk[:, 1::2, 1::2]) / 4
+        shrunk = shrunk[:, ::2, ::2] + shrunk[:, 1::2, ::2] + shrunk[:, ::2, 1::2] + shrunk[:, 1::2, 1::2]
+        shrunk *= np.float32(0.25)
     return np.rint(shrunk).astype(np.uint8)
 
 
