@@ -41,7 +41,7 @@ from tts2face.render.surface import weld_groups
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-N_TURN_MODES, HAIRCUT_TURN_MODES = 6, 4
+N_TURN_MODES, HAIRCUT_TURN_MODES = 10, 4
 RIDGE, MOUTH_RIDGE = 0.003, 0.1  # of responses
 HIDDEN_WEIGHT, MOUTH_HIDDEN_WEIGHT = 0.02, 0.002  # of a pose that hides a vertex
 MOST_SHARE = 99.9  # per cent of the responses that are not cut off
