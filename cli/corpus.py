@@ -195,7 +195,7 @@ def clone(
 
 
 @corpus.command
-def audio_maps(
+def audio_maps(  # noqa: PLR0913 - one parameter a flag
     recordings: Annotated[Path, Parameter(help="Folder of recordings from which the talker was built.")],
     /,
     *,
@@ -204,8 +204,10 @@ def audio_maps(
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
+    yes: Yes = False,
 ) -> None:
     """Train the audio maps of a talker that was built without them: speech motion from sound alone (`--audio`)."""
+    del yes  # read where the model is missing
     check_suffix(out, "talker")
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--talker": talker, "--model": model})
     from corpus_tools.build_talker import add_audio_maps
@@ -308,8 +310,10 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
+    yes: Yes = False,
 ) -> None:
     """Compare synthesised lip motion with held-out recordings."""
+    del yes  # read where the model is missing
     from cli.evaluation import ComparisonFlags, SplitFlags, run_evaluation
     from cli.learning_curve import run_learning_curve
     from cli.people import DEFAULT_TALKER, run_people_evaluation

@@ -8,7 +8,7 @@ from cyclopts import App, Parameter
 
 from cli.flags import Hair, HairColor, Model, add_option_flags, options_from_flags, switch
 from cli.landmark_model import Yes
-from cli.photo import Consent, Fit, agreed, make_face, warner
+from cli.photo import Consent, Fit, Smile, agreed, make_face, warner
 from cli.process import write_message
 from cli.progress import progress_bar
 from lexicon.errors import InputError
@@ -89,6 +89,7 @@ def picture(  # noqa: PLR0913 - one parameter a flag
     name: Annotated[str | None, Parameter(help="The person's name; by default the file's name.")] = None,
     preview: Annotated[Path | None, Parameter(help="Write a picture with what was found drawn in it (.png).")] = None,
     fit: Fit = None,
+    smile: Smile = None,
     write_fit: Annotated[Path | None, Parameter(help="Write what was found, to edit it for --fit (.json).")] = None,
     model: Model = None,
     yes: Yes = False,
@@ -100,12 +101,12 @@ def picture(  # noqa: PLR0913 - one parameter a flag
 
     _check_outputs(
         {"--out": out, "--preview": preview, "--write-fit": write_fit},
-        {"the photo": split_number(photo)[0], "--fit": fit, "--model": model},
+        {"the photo": split_number(photo)[0], "--fit": fit, "--smile": smile, "--model": model},
     )
     from tts2face.characters.saving import save_face
     from tts2face.photo.photo_fit import write_fit as write_fit_file
 
-    made = make_face(photo, consent, name=name, fit=fit, model=model, quiet=quiet)
+    made = make_face(photo, consent, name=name, fit=fit, smile=smile, model=model, quiet=quiet)
     _write_preview(preview, made)
     if write_fit is not None:
         write_fit_file(write_fit, made.metadata["fit"])
@@ -155,8 +156,10 @@ def calibrate(
     out: Annotated[Path, Parameter(help="Output face (.face); may be the face itself.", alias="-o")],
     talker: Annotated[str, Parameter(help="Talker whose speech gives the poses.")] = "grid_s1",
     model: Model = None,
+    yes: Yes = False,
 ) -> None:
     """Measure what the face tracker reads in a face's mouth, so that it opens as the person's (some minutes)."""
+    del yes  # read where the model is missing
     check_file_name(out, "a face", (".face",))
     refuse_overwriting({"--out": out}, {"--talker": talker, "--model": model})
     from corpus_tools.training.score_files import calibrate_face_file

@@ -7,6 +7,7 @@ from cyclopts import Parameter
 
 from cli.corpus import Provenance, check_suffix, corpus
 from cli.flags import Cache, Jobs, Model, switch
+from cli.landmark_model import Yes
 from cli.process import write_message
 from cli.progress import stage_bar
 from tts2face.storage.overwrite import refuse_overwriting
@@ -44,8 +45,10 @@ def gestures(  # noqa: PLR0913 - one parameter a flag
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
+    yes: Yes = False,
 ) -> None:
     """Build a gesture style for `--palette` from recordings of a person; transcripts are not needed."""
+    del yes  # read where the model is missing
     check_suffix(out, "palette")
     from corpus_tools.build_palette import StyleSource, build_style
     from corpus_tools.decomposition.capture_files import MarkerOptions

@@ -18,7 +18,7 @@ from cli.jobs import jobs, worker
 from cli.landmark_model import Yes, is_missing_model, sets_up_model
 from cli.lists import LISTS
 from cli.mimic import mimic
-from cli.photo import Consent, Fit, Photo, check_photo, face_of_photo, refuse_others
+from cli.photo import Consent, Fit, Photo, Smile, check_photo, face_of_photo, refuse_others
 from cli.process import (
     BROKEN_PIPE_CODE,
     INTERRUPTED,
@@ -126,6 +126,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     photo: Photo = None,
     consent: Consent = None,
     fit: Fit = None,
+    smile: Smile = None,
     yes: Yes = False,
     palette: Annotated[
         str, Parameter(help="Palette of gesture styles: a shipped palette or a .palette file.")
@@ -146,11 +147,12 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     options["gestures"] = _gesture_method(options.get("gestures"), noise=noise, none=no_gestures)
     needs_text = options.get("audio") is None and options.get("idle") is None
     others = {"--face": face, "--identity": identity, "--hair": hair, "--hair-color": hair_color}
-    refuse_others(photo, {"--consent": consent, "--fit": fit}, others)
+    files = {"--fit": fit, "--smile": smile}
+    refuse_others(photo, {"--consent": consent, **files}, others)
     picture = options_from_flags(Picture, options)
     if photo is not None:  # before a text is read: a command that has to set up the landmark model is run again
-        check_photo(photo, fit, {"--out": out, "--explain": explain, **{one: one for one in export or ()}})
-        face = face_of_photo(photo, consent, fit=fit, quiet=quiet)
+        check_photo(photo, files, {"--out": out, "--explain": explain, **{one: one for one in export or ()}})
+        face = face_of_photo(photo, consent, fit=fit, smile=smile, quiet=quiet)
     from cli.speak import SpeakOptions, run_request
 
     request = options_from_flags(

@@ -3,7 +3,7 @@
 import functools
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -25,9 +25,14 @@ Consent = Annotated[
 Fit = Annotated[
     Path | None, Parameter(help="Corrections of lips, lids, teeth and pivot in the photo (.json, see docs/photo.md).")
 ]
+Smile = Annotated[
+    str | None, Parameter(help="Second picture of the person in the photo, with a smile whose teeth the clips show.")
+]
 
 
-def face_of_photo(photo: str, consent: str | None, *, fit: Path | None = None, quiet: bool) -> str:
+def face_of_photo(
+    photo: str, consent: str | None, *, fit: Path | None = None, smile: str | None = None, quiet: bool
+) -> str:
     """Path of the face of a photo, which is made and kept with the consent if it is not there yet.
 
     Raises
@@ -35,32 +40,24 @@ def face_of_photo(photo: str, consent: str | None, *, fit: Path | None = None, q
     InputError
         There is no such photo or face, or no consent.
     DataError
-        The picture shows no face that can be moved, or the fit is not that of the picture.
+        The picture shows no face that can be moved, the fit is not that of the picture, or the smile shows no teeth.
     BackendError
         The landmark model or a package is not installed.
     """
     from tts2face.photo.kept_faces import find_kept, keep_face, kept_path
 
-    kept = kept_path(photo, fit)
+    kept = kept_path(photo, fit, smile)
     if not find_kept(kept, consent):
-        keep_face(make_face(photo, consent, fit=fit, quiet=quiet), kept)
+        keep_face(make_face(photo, consent, fit=fit, smile=smile, quiet=quiet), kept)
     return str(kept)
 
 
-def make_face(
-    photo: str,
-    consent: str | None,
-    *,
-    name: str | None = None,
-    fit: Path | None = None,
-    model: Path | None = None,
-    quiet: bool,
-) -> "Face":
-    """Face of a photo, whose consent is asked for at a terminal; errors as `face_of_photo`."""
+def make_face(photo: str, consent: str | None, *, name: str | None = None, quiet: bool, **options: Any) -> "Face":
+    """Face of a photo, whose consent is asked for at a terminal; options of `face_from_photo`, errors of both."""
     from tts2face.photo.face_from_photo import face_from_photo
 
     consent = agreed(photo, consent, name)
-    return face_from_photo(photo, consent=consent, name=name, fit=fit, model=model, on_warning=warner(quiet=quiet))
+    return face_from_photo(photo, consent=consent, name=name, on_warning=warner(quiet=quiet), **options)
 
 
 @functools.cache  # asked for once, also where the command is run again with the landmark model
@@ -103,12 +100,12 @@ def refuse_others(
             raise InputError(f"{name} belongs to --photo; add the photo, or remove it")
 
 
-def check_photo(photo: str, fit: Path | None, outputs: Mapping[str, str | Path | None]) -> None:
-    """Refuse a photo that does not exist, no output, and outputs, by their flags, that would overwrite photo or fit."""
+def check_photo(photo: str, others: Mapping[str, str | Path | None], outputs: Mapping[str, str | Path | None]) -> None:
+    """Refuse a photo that does not exist, no output, and outputs that would overwrite it or other files, by flags."""
     from tts2face.photo.photograph import split_number
     from tts2face.storage.overwrite import refuse_overwriting
 
     path, _ = split_number(photo)
     if all(output is None for output in outputs.values()):
         raise InputError("there is no output; add --out clip.mp4 (or .webm, .gif, or a folder for .png files)")
-    refuse_overwriting(outputs, {"--photo": path, "--fit": fit})
+    refuse_overwriting(outputs, {"--photo": path} | dict(others))

@@ -6,6 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from cli.flags import Cache, Model
+from cli.landmark_model import Yes
 from lexicon.errors import InputError
 
 
@@ -16,8 +17,10 @@ def check(
     text: Annotated[str | None, Parameter(help="What is said in one video, in place of a transcript.")] = None,
     cache: Cache = None,
     model: Model = None,
+    yes: Yes = False,
 ) -> None:
     """Check recordings for `corpus build`, one by one: light, sharpness, sound, words, and what to do better."""
+    del yes  # read where the model is missing
     if text is not None and recordings.is_dir():
         raise InputError("--text belongs to one video, not to a folder; write transcripts beside the videos")
     from corpus_tools.recordings.check_recording import RecordingChecker, recordings_to_check

@@ -6,6 +6,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from cli.flags import Cache, Face, Jobs, Model, whole_number
+from cli.landmark_model import Yes
 from cli.process import write_message
 from cli.progress import progress_bar, stage_bar
 from lexicon.errors import InputError
@@ -72,7 +73,7 @@ def gestures(
 
 
 @report.command
-def moods(
+def moods(  # noqa: PLR0913 - one parameter a flag
     palette: Annotated[str, Parameter(help="Shipped palette or .palette file.")] = "starter",
     /,
     *,
@@ -81,8 +82,10 @@ def moods(
     seeds: Annotated[int, whole_number("Number of clips of each mood; the first half trains the classifier.")] = 8,
     seed: Annotated[int, whole_number("Seed of the first clip.")] = 0,
     size: Annotated[int, whole_number("Width and height of the rendered pictures in pixels.")] = 256,
+    yes: Yes = False,
 ) -> None:
     """Render the derived styles of a palette and tell them apart by the face tracker's scores."""
+    del yes  # read where the model is missing
     refuse_overwriting({"--out": out}, {"the palette": palette, "--face": face})
     from corpus_tools.gesture_study.moods import MoodOptions
     from corpus_tools.gesture_study.write_moods import write_moods
@@ -108,8 +111,10 @@ def retarget(  # noqa: PLR0913 - one parameter a flag
     jobs: Jobs = None,
     cache: Cache = None,
     model: Model = None,
+    yes: Yes = False,
 ) -> None:
     """Compare what the face tracker reads in recordings and in a face that mimics them, phone by phone."""
+    del yes  # read where the model is missing
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--face": face, "--model": model})
     from corpus_tools.retargeting_study.write import write_retargeting
     from corpus_tools.run_options import RunOptions, ignore_stage

@@ -9,6 +9,7 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from cli.flags import switch, whole_number
+from cli.landmark_model import YES, Yes, sets_up_model
 from tts2face.service.settings import read_settings
 
 keys = App(name="keys", help="API keys of the service.")
@@ -24,6 +25,7 @@ def serve(  # noqa: PLR0913 - one parameter a flag
     data: Annotated[Path | None, Parameter(help="Folder of jobs, uploads and the studio's projects.")] = None,
     no_studio: Annotated[bool, switch("Leave the studio out, which is at /studio if NiceGUI is installed.")] = False,
     show_config: Annotated[bool, switch("Print the settings and exit.")] = False,
+    yes: Yes = False,
 ) -> None:
     """Serve speech, clips and curves over HTTP (docs/http.md)."""
     flags = {
@@ -34,6 +36,8 @@ def serve(  # noqa: PLR0913 - one parameter a flag
     if show_config:
         sys.stdout.write(chosen.as_toml())
         return
+    if yes:
+        sets_up_model([YES])  # cameras, recordings and photos are read in processes without a network
     from tts2face.service.server import serve as run_server
 
     if not chosen.studio or find_spec("nicegui") is None:

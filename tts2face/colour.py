@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB, IEC 61966-2-1
+
 
 def decode_srgb(srgb: NDArray[np.floating]) -> NDArray[np.float64]:
     """Linear light of sRGB values, both in [0, 1]."""

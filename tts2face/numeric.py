@@ -29,6 +29,16 @@ def unit_vectors(vectors: NDArray[AnyFloat]) -> NDArray[AnyFloat]:
     return units
 
 
+def vertex_normals(points: FloatArray, triangles: NDArray[np.integer]) -> FloatArray:
+    """Unit normals (V, 3) of vertices (V, 3) of a mesh: means over the triangles (T, 3) around, weighted by area."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    flat = np.cross(b - a, c - a)
+    found = np.zeros_like(points)
+    for k in range(3):
+        np.add.at(found, triangles[:, k], flat)
+    return unit_vectors(found)
+
+
 def smooth_gaussian(values: FloatArray, spread: float, reach: int) -> FloatArray:
     """Values (n,) smoothed by a Gaussian of `spread` samples, cut off at `reach` samples; ends are continued."""
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / spread) ** 2)

@@ -46,9 +46,9 @@ class Session:
         drawn woman, or for the realistic head where an identity or hair is chosen.
     identity
         Name of a preset of the face's age, sex and ancestry.
-    photo, consent
-        Picture of a person who speaks in place of a face, and that person's consent, as for
-        `tts2face.face_from_photo`.
+    photo, consent, smile
+        Picture of a person who speaks in place of a face, that person's consent, and a picture of the person's smile,
+        as for `tts2face.face_from_photo`.
     hair, hair_color
         Haircut and colour of the hair, as for `tts2face.load_face`; None for the face's own.
     palette
@@ -83,11 +83,12 @@ class Session:
         hair_color: str | None = None,
         photo: str | Path | None = None,
         consent: str | None = None,
+        smile: str | Path | None = None,
         voices: VoicePool | None = None,
         memory_mb: float = 0.0,
     ) -> None:
         if photo is not None:
-            face = _face_of(photo, consent, (face, identity, hair, hair_color))
+            face = _face_of(photo, consent, smile, (face, identity, hair, hair_color))
         memory = SentenceMemory(round(memory_mb * 1e6))
         self._models = SessionModels(talker, shown_face(face, identity, hair, hair_color), palette, voices, memory)
 
@@ -353,10 +354,10 @@ class Session:
                 return write_pieces(pieces, files, outputs, progress, on_piece)
 
 
-def _face_of(photo: str | Path, consent: str | None, others: tuple[object, ...]) -> Face:
+def _face_of(photo: str | Path, consent: str | None, smile: str | Path | None, others: tuple[object, ...]) -> Face:
     """Face of a photo, beside which there are no other choices of a face."""
     from tts2face.photo.face_from_photo import face_from_photo
 
     if any(other is not None for other in others):
         raise InputError("a photo has its own face and hair; remove face, identity and hair, or the photo")
-    return face_from_photo(photo, consent=consent)
+    return face_from_photo(photo, consent=consent, smile=smile)

@@ -1,5 +1,6 @@
 """Adaptation of the default head to a talker: vertices, eyes, teeth and all shapes."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from corpus_tools.dense.mesh_fit import HeadWarp, eyes_from_right, fit_head_warp, part_vertices
 from tts2face.models.face import Eye, Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
+from tts2face.render.scene import available_cores
 from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]
@@ -85,14 +87,18 @@ def _warp_shapes(face: Face, warp: HeadWarp, soft: NDArray[np.int64], moved: Flo
     shapes = np.zeros(face.shapes.shape)
     rest = face.vertices.astype(np.float64)
     jaw = face.shapes[face.shape_names.index("jawOpen")].astype(np.float64)
-    for number, name in enumerate(face.shape_names):
+
+    def write(number: int) -> None:
         shape = face.shapes[number].astype(np.float64)
         rows = soft[np.abs(shape[soft]).max(axis=1) > MIN_SHAPE_MOTION_MM]
-        if name == "mouthClose":
+        if face.shape_names[number] == "mouthClose":
             before = rest[rows] + jaw[rows]
             shapes[number, rows] = warp.apply(before + shape[rows], rows) - warp.apply(before, rows)
         else:
             shapes[number, rows] = warp.apply(rest[rows] + shape[rows], rows) - moved[rows]
+
+    with ThreadPoolExecutor(available_cores()) as pool:
+        list(pool.map(write, range(len(shapes))))
     return shapes
 
 

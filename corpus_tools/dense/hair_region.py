@@ -24,6 +24,9 @@ SHADED = 1.2  # the first of them outside the crown, where skin is in the shadow
 MIN_HAIRY_SHARE = 0.6  # of the crown: bald people .23 to .29, white stubble .43, others from .92
 LUMINANCE_SCALE, CHROMA_SCALE, WEAK_LIGHT = 1.0, 0.3, 0.01  # distances between colours of hair; dark ones have no hue
 VIVID = 0.4  # of the hair's difference in hue from skin: chroma scale of vivid hair, whose shine varies in hue
+LIGHT_SHARE = 0.9  # of the crown's cells: the others are shine
+LIGHTER, DARK = 1.0, -0.5  # logarithm by which other hair is lighter at most, and off skin what may always be hair
+BESIDE_SKIN = 0.3  # logarithm of luminance: no hair has so much darker and so much lighter cells than skin
 NEAR_HAIR, OFF_BACKGROUND = 0.35, 0.6
 WALL_MM = 150.0  # of height, over which a wall may change by a distance of 1
 N_GROWTHS = 6
@@ -36,7 +39,8 @@ NECK_MM = 45.0  # half width, in which nothing below the chin is hair
 # -7, long hair from 8. A side that shows none beside the temple does not count: its hair is like the wall.
 BOB_MM, LONG_MM, TEMPLE_HAIR_MM = -75.0, 0.0, 10.0
 FLAT_MM = (55.0, 30.0)  # hair above `FOREHEAD`, and both sides' at the temples: less of both lies on the skull
-SEE_THROUGH = 2.0  # difference from skin up to which flat hair is cropped: the skin shows through
+# Flat hair is cropped where the skin shows through, up to this difference from it, or where the temples show so little.
+SEE_THROUGH, CROPPED_MM = 2.0, 6.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +98,9 @@ def find_hair(portrait: Portrait, skin: Floats) -> SeenHair:
         return SeenHair("bald", plain.region, background | (known & (unlike < IS_HAIR)), plain.colour)
     is_inside = _oval_depth(portrait.marks, across, up) > INSIDE_MM
     throat = (up < portrait.marks[CHIN, 1]) & (np.abs(across) < NECK_MM)
-    allowed = known & (unlike > IS_HAIR) & ~is_inside & ~throat
+    seed = _without_gloss(seed, off[..., 0])
+    most = max(np.quantile(off[seed, 0], LIGHT_SHARE) + LIGHTER, DARK)
+    allowed = known & (unlike > IS_HAIR) & ~is_inside & ~throat & (off[..., 0] < most)
     space = _colour_space(colours, np.median(off[seed], axis=0))
     region = _grow(space, seed, background, (allowed, up < portrait.marks[CHIN, 1]))
     colour: Floats = np.median(colours[region], axis=0)
@@ -102,6 +108,14 @@ def find_hair(portrait: Portrait, skin: Floats) -> SeenHair:
     length = _length(region, portrait.marks, colour - skin)
     is_told = region.sum() > MIN_GROWTH * seed.sum()
     return SeenHair(length if is_told or length != "cropped" else "flat", region, other, colour)
+
+
+def _without_gloss(hair: Mask, light: Floats) -> Mask:
+    """Cells of a crown without those lighter than skin where others are darker: dark hair and gloss of the skin."""
+    if not hair.any():
+        return hair
+    low, high = np.quantile(light[hair], [1 - LIGHT_SHARE, LIGHT_SHARE])
+    return hair & (light < 0) if low < -BESIDE_SKIN and high > BESIDE_SKIN else hair
 
 
 def difference_from_skin(off: Floats, darker: float | Floats) -> Floats:
@@ -183,4 +197,4 @@ def _length(region: Mask, marks: Floats, off: Floats) -> str:
     thickness = sum((region & (side * ACROSS_MM > 0))[temples].sum(axis=1).mean() * CELL_MM for side in (-1, 1))
     if height > FLAT_MM[0] or thickness > FLAT_MM[1]:
         return "short"
-    return "cropped" if difference_from_skin(off, DARKER) < SEE_THROUGH else "flat"
+    return "cropped" if difference_from_skin(off, DARKER) < SEE_THROUGH or thickness < CROPPED_MM else "flat"

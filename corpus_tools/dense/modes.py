@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from corpus_tools.dense.adapt_head import EYE_PARTS, RIGID_MOUTH_PARTS
 from corpus_tools.dense.mesh_fit import face_landmarks, part_vertices
 from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
-from corpus_tools.dense.video_landmarks import VideoLandmarks
+from corpus_tools.dense.video_landmarks import TrackedPictures
 from lexicon.errors import InputError
 from tts2face.face.mouth_model import CHIN_LANDMARKS
 from tts2face.face.shape_transfer import append_shapes
@@ -141,7 +141,7 @@ def mode_fitter(face: Face, used: NDArray[np.int64]) -> PictureFitter:
 
 
 def dense_model(
-    face: Face, fit: PictureFitter, landmarks: Sequence[VideoLandmarks], talker: NDArray[np.floating], n_modes: int
+    face: Face, fit: PictureFitter, landmarks: Sequence[TrackedPictures], talker: NDArray[np.floating], n_modes: int
 ) -> DenseModel:
     """Fit the head's mesh to every frame of a talker's videos and find its modes.
 

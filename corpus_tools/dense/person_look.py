@@ -42,6 +42,7 @@ HAIRCUTS: Mapping[str, str] = {  # by length class
 UNSEEN, UNSEEN_HAIR = "flat", "dark-brown"  # class and colour where the top of the head is outside of the picture
 HAIR_LIGHT = (0.005, 0.36)  # luminance of the darkest and lightest hair
 CROPPED_LIGHT = -1.8  # most luminance of cropped hair, of the skin's, logarithm: what is seen is hair and skin mixed
+SEEN_SKIN = 0.4  # of what differs from skin, which cropped hair lets through: rendered heads of three tones
 SHINE = 0.5  # logarithm by which hair in a picture is lighter than its colour; median of rendered haircuts
 # Natural hair lies on a line of log R/G and B/G, from black and grey to brown and blond: browner by so much bluer less.
 # Casts of cameras and walls lead off it; what is further off than these is dyed or red.
@@ -52,7 +53,8 @@ EYE_COLOURS: Mapping[str, str] = {
 }  # fmt: skip  # sRGB
 NEUTRAL_IRIS = "58402f"
 IRIS_LIGHT, DARK_IRIS, DARK_IRIS_HUE = 0.012, 0.02, (0.55, -0.55)  # least luminance; up to which irises are brown
-BROWN_FROM, BROWN_SLOPE, BROWN_LIGHT = -0.45, -0.8, 0.035  # log B/G of brown irises, their least R/G, most luminance
+BROWN_FROM, BROWN_SLOPE, BROWN_LIGHT = -0.45, -0.8, 0.035  # log B/G of brown irises, their least R/G, usual luminance
+AMBER = -0.9  # log B/G up to which more yellow is redder; irises beyond are amber
 BROW_LIGHT = -1.9  # most luminance of brows, of the skin's, logarithm
 ROOT_MM, LASH_MM = 0.7, 10.0  # off the skin: roots of lashes, and lashes that are shown
 LASH_LENGTH = 0.55  # of the default head's, which are those of made-up eyes
@@ -119,8 +121,10 @@ class LookSampler:
         hair = find_hair(portrait, eyes.skin)
         colour, code = log_colour(255.0 * parse_hair_colour(UNSEEN_HAIR)), UNSEEN_HAIR
         if np.isfinite(hair.colour).all():
-            most = eyes.skin[0] + CROPPED_LIGHT if hair.length == "cropped" else 0.0
-            colour = hair_colour(neutral(hair.colour, cast), most)
+            seen, most = hair.colour, 0.0
+            if hair.length == "cropped":
+                seen, most = seen + SEEN_SKIN * (seen - eyes.skin), eyes.skin[0] + CROPPED_LIGHT
+            colour = hair_colour(neutral(seen, cast), most)
             code = "#{:02x}{:02x}{:02x}".format(*srgb_colour(colour).tolist())
         length, notes = hair.length or UNSEEN, [] if hair.length else ["top of the head not seen"]
         is_told = eyes.radius_px >= MIN_IRIS_PX and np.isfinite(eyes.iris).all()
@@ -162,7 +166,8 @@ def iris_colour(eyes: EyeColours, cast: Floats) -> Floats:
     if light < np.log(DARK_IRIS):
         return np.array([light, *DARK_IRIS_HUE])
     if blue < BROWN_FROM:
-        return np.array([min(light, np.log(BROWN_LIGHT)), max(red, BROWN_SLOPE * blue), blue])
+        usual = np.log(BROWN_LIGHT)
+        return np.array([min(light, (light + usual) / 2), max(red, BROWN_SLOPE * max(blue, AMBER)), blue])
     return np.array([light, red, blue])
 
 

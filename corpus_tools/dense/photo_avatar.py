@@ -13,22 +13,22 @@ from corpus_tools.dense.build_face import (
     CONTENT,
     SOURCE_FACE,
     BuiltFace,
+    compared_landmarks,
     fit_person,
     paint_person,
 )
 from corpus_tools.dense.mesh_fit import face_landmarks
-from corpus_tools.dense.video_landmarks import VideoLandmarks
+from corpus_tools.dense.video_landmarks import TrackedPictures
 from tts2face.models.consent import consent_record
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.photo.found_face import find_face
+from tts2face.photo.found_face import PhotographedFace, PhotoReader
 from tts2face.photo.lip_line import find_lip_line
-from tts2face.photo.photograph import read_photograph, split_number
+from tts2face.photo.photograph import split_number
 from tts2face.render.occlusion import bake_occlusion
 from tts2face.render.scene import available_cores
 from tts2face.storage.files import find_file
-from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.pose import remove_pose
 from tts2face.video.track import FaceTracker
 
@@ -82,23 +82,18 @@ def build_avatar(
 
 def _read(
     photos: Sequence[str | Path], head: Face, model: Path | None, on_warning: Callable[[str], None]
-) -> tuple[list[VideoLandmarks], list[Floats]]:
+) -> tuple[list[TrackedPictures], list[Floats]]:
     """What the pictures show, and the landmarks (478, 3) of each without its expression, mm."""
-    tracker, reader = FaceTracker(model), BlendshapeReader(model)
+    reader = PhotoReader(model, on_warning)
     seen, neutral = [], []
     for photo in photos:
-        path, number = split_number(photo)
-        picture = read_photograph(path).filled()
-        found = find_face(picture.pixels, tracker, path, number=number, reduced_by=picture.reduced_by)
-        for warning in found.warnings:
-            on_warning(warning)
-        points = found.landmarks[None].astype(np.float32)
+        shown = reader.read(photo)
+        points = shown.found.landmarks[None].astype(np.float32)
         landmarks = remove_pose(points, 1.0).landmarks
-        lips = find_lip_line(picture.pixels, found)
+        lips = find_lip_line(shown.picture.pixels, shown.found)
         opening = None if lips.is_closed else widened(np.concatenate([lips.upper, lips.lower[-2:0:-1]])[:, :2])
-        seen.append(VideoLandmarks(path, points, landmarks, (picture.pixels,), 1.0, opening))
-        scores = dict(zip(BLENDSHAPES, reader.blendshape_scores(found.landmarks).tolist(), strict=True))
-        neutral.append(without_expression(landmarks[0].astype(np.float64), scores, head))
+        seen.append(TrackedPictures(Path(photo), points, landmarks, (shown.picture.pixels,), 1.0, opening))
+        neutral.append(person_landmarks(shown, head, reader.tracker))
     return seen, neutral
 
 
@@ -109,14 +104,12 @@ def widened(opening: Floats) -> Floats:
     return grown
 
 
-def without_expression(landmarks: Floats, scores: Mapping[str, float], head: Face) -> Floats:
-    """Landmarks (478, 3) without the expression that scores tell, moved back by the head's shapes."""
-    still = landmarks.copy()
-    for name, shape in zip(head.shape_names, head.shapes, strict=True):
-        if name.startswith(EXPRESSIONS):
-            weight = max(scores.get(name, 0.0) - EXPRESSION_FROM, 0.0)
-            still -= weight * face_landmarks(head, shape.astype(np.float64))
-    return still
+def person_landmarks(shown: PhotographedFace, head: Face, tracker: FaceTracker) -> Floats:
+    """Landmarks (468, 3) on a head, mm, of a photographed person without the expression."""
+    scores = np.array([shown.scores.get(name, 0.0) * name.startswith(EXPRESSIONS) for name in head.shape_names])
+    pose = np.concatenate([np.radians(shown.found.angles_deg), np.zeros(3)])
+    landmarks = remove_pose(shown.found.landmarks[None].astype(np.float32), 1.0).landmarks[0]
+    return compared_landmarks(landmarks, head, tracker, (np.maximum(scores - EXPRESSION_FROM, 0.0), pose))
 
 
 def mirror_table(head: Face) -> NDArray[np.int64]:
@@ -125,7 +118,7 @@ def mirror_table(head: Face) -> NDArray[np.int64]:
     return np.asarray(cKDTree(places).query(places * (-1.0, 1.0, 1.0))[1], np.int64)
 
 
-def _mirrored(seen: VideoLandmarks, table: NDArray[np.int64]) -> VideoLandmarks:
+def _mirrored(seen: TrackedPictures, table: NDArray[np.int64]) -> TrackedPictures:
     """The mirror image of pictures, which counts where they show nothing."""
     (pixels,) = seen.pictures
     width = pixels.shape[1]
@@ -133,7 +126,7 @@ def _mirrored(seen: VideoLandmarks, table: NDArray[np.int64]) -> VideoLandmarks:
     points[..., 0] = width - 1 - points[..., 0]
     picture = np.ascontiguousarray(pixels[:, ::-1])
     opening = None if seen.opening is None else np.array([width - 1, 0]) + seen.opening * (-1, 1)
-    return VideoLandmarks(seen.video, points, landmarks, (picture,), MIRRORED_WEIGHT, opening)
+    return TrackedPictures(seen.file, points, landmarks, (picture,), MIRRORED_WEIGHT, opening)
 
 
 def _metadata(head: Face, record: Mapping[str, str], look: str) -> dict[str, object]:

@@ -1,19 +1,19 @@
 """The talker's skin colour, averaged over many frames: the dense mesh is fitted to each (eqs 3 and 4)."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.dense.mesh_fit import face_landmarks, face_width
-from corpus_tools.dense.video_landmarks import VideoLandmarks, eye_opening
+from corpus_tools.dense.video_landmarks import TrackedPictures, eye_opening
 from corpus_tools.dense.visible_texels import SkinCanvas
 from lexicon.errors import DataError
 from tts2face.face.rbf import DECAY_LENGTH, FACE_WIDTH, rbf_values
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
-from tts2face.numeric import points_in_polygon, smoothstep, unit_vectors
+from tts2face.numeric import points_in_polygon, smoothstep, unit_vectors, vertex_normals
 from tts2face.types import Progress
 from tts2face.video.pose import similarity_transforms
 
@@ -28,16 +28,21 @@ REMAP_COLUMNS = 1024  # OpenCV maps pictures, not lists
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkinColours:
-    """Colour (P, 3) and weight (P,) of each texel, sRGB 0..255."""
+    """Numbers (R,) of texels of a canvas that show the talker, their colours (R, 3), sRGB 0..255, and weights (R,)."""
 
+    rows: NDArray[np.int64]
     colour: Floats
     weight: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PictureFitter:
-    """Fit of a head's vertices to pictures: a similarity on the landmarks, then eqs 3 and 4 on the residual."""
+    """Fit of a head's vertices to pictures: a similarity on the landmarks, then eqs 3 and 4 on the residual.
 
+    ``rows`` (V,) are the numbers of these vertices in the face, rising.
+    """
+
+    rows: NDArray[np.int64]
     vertices: Floats
     marks: Floats
     used: NDArray[np.int64]
@@ -61,23 +66,26 @@ class PictureFitter:
         return np.asarray(points[self.used], np.float64) * (1.0, -1.0, -1.0)
 
 
-def build_picture_fitter(face: Face, opened: Floats, used: NDArray[np.int64]) -> PictureFitter:
-    """The fitter of a face; `opened` (V, 3) is where the interpolation takes place, the lips apart."""
+def build_picture_fitter(
+    face: Face, opened: Floats, used: NDArray[np.int64], rows: NDArray[np.int64] | None = None
+) -> PictureFitter:
+    """The fitter of all vertices of a face, or of `rows`; at `opened` (V, 3), the lips apart, is interpolated."""
     from scipy.linalg import solve
 
     centres = face_landmarks(face, opened)[used]
     marks = face_landmarks(face, face.vertices.astype(np.float64))[:N_MESH_LANDMARKS]
     reach = DECAY_LENGTH / FACE_WIDTH * face_width(marks)
     matrix = rbf_values(centres, centres, reach)
-    spread = solve(matrix, rbf_values(opened, centres, reach).T, assume_a="pos").T
-    return PictureFitter(face.vertices.astype(np.float64), marks, used, spread)
+    rows = np.arange(len(opened)) if rows is None else rows
+    spread = solve(matrix, rbf_values(opened[rows], centres, reach).T, assume_a="pos").T
+    return PictureFitter(rows, face.vertices[rows].astype(np.float64), marks, used, spread)
 
 
 def average_skin_colours(
     face: Face,
     canvas: SkinCanvas,
     fit: PictureFitter,
-    seen: Sequence[VideoLandmarks],
+    seen: Sequence[TrackedPictures],
     *,
     on_frame: OnFrame,
     on_progress: Progress,
@@ -90,14 +98,13 @@ def average_skin_colours(
         No frame is suitable, or a video can no longer be read.
     """
     rows = np.flatnonzero(canvas.share > 0)
-    corners, weights = canvas.texels.corners[rows], canvas.texels.weights[rows]
-    normals = vertex_normals(face)
-    own_normals = unit_vectors(np.einsum("pk,pkd->pd", weights, normals[corners]))
+    texels = canvas.texels.at(rows)
+    own_normals = unit_vectors(texels.interpolate(welded_normals(face)))
+    texels = replace(texels, corners=np.searchsorted(fit.rows, texels.corners))
     total, weight = np.zeros((len(rows), 3)), np.zeros(len(rows))
     for one, picture, points in select_frames(seen, on_progress):
         placed, turn = fit.fit(points)
-        flat = placed[:, :2] * (1.0, -1.0)
-        places = np.einsum("pk,pkd->pd", weights, flat[corners])
+        places = texels.interpolate(placed[:, :2] * (1.0, -1.0))
         colour, inside = sample_picture(picture, places)
         if one.opening is not None:
             inside = inside & ~points_in_polygon(places, one.opening)
@@ -108,15 +115,12 @@ def average_skin_colours(
             on_frame(picture, points)
     if not weight.any():
         raise DataError("no frame shows the face with open eyes; give a video of the person looking at the camera")
-    all_colours, all_weights = np.zeros((len(canvas.share), 3)), np.zeros(len(canvas.share))
-    all_colours[rows] = total / np.maximum(weight, 1e-9)[:, None]
-    all_weights[rows] = weight
-    return SkinColours(all_colours, all_weights)
+    return SkinColours(rows, total / np.maximum(weight, 1e-9)[:, None], weight)
 
 
 def select_frames(
-    videos: Sequence[VideoLandmarks], on_progress: Progress
-) -> Iterator[tuple[VideoLandmarks, NDArray[np.uint8], NDArray[np.float32]]]:
+    videos: Sequence[TrackedPictures], on_progress: Progress
+) -> Iterator[tuple[TrackedPictures, NDArray[np.uint8], NDArray[np.float32]]]:
     """Yield video, picture (H, W, 3) and landmarks (478, 3) of `N_FRAMES` frames over the videos, eyes open."""
     per_video = int(np.ceil(N_FRAMES / len(videos)))
     usual = float(np.nanmedian(np.concatenate([eye_opening(one.landmarks) for one in videos])))
@@ -143,13 +147,8 @@ def sample_picture(picture: NDArray[np.uint8], places: Floats) -> tuple[Floats, 
     return found.reshape(-1, 3)[:n].astype(np.float64), inside
 
 
-def vertex_normals(face: Face) -> Floats:
+def welded_normals(face: Face) -> Floats:
     """(V, 3) outward unit normals of the face at rest; vertices at one position share one normal."""
-    corners = face.vertices[face.triangles].astype(np.float64)
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    _, place = np.unique(face.vertices, axis=0, return_inverse=True)
-    place = place.reshape(-1)
-    total = np.zeros((len(face.vertices), 3))
-    for corner in range(3):
-        np.add.at(total, place[face.triangles[:, corner]], across)
-    return unit_vectors(total[place])
+    places, shared = np.unique(face.vertices, axis=0, return_inverse=True)
+    shared = shared.reshape(-1)
+    return vertex_normals(places.astype(np.float64), shared[face.triangles])[shared]

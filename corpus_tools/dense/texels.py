@@ -9,6 +9,7 @@ from tts2face.compilation import kernel
 
 Floats = NDArray[np.float64]
 
+LEAST_SPREAD = 6.0  # of a blur in pixels of a reduced picture, at which it differs by less than .001 of the values
 ISLANDS_TOP = 0.815  # v at which the layout of the shipped heads has mouth, neck and eye sockets, below the head
 
 
@@ -21,10 +22,41 @@ class Texels:
     corners: NDArray[np.int64]
     weights: Floats
 
+    def at(self, numbers: NDArray[np.int64]) -> "Texels":
+        """The texels of these numbers."""
+        return Texels(self.rows[numbers], self.columns[numbers], self.corners[numbers], self.weights[numbers])
+
     def interpolate(self, values: Floats) -> Floats:
         """(P, D) values at the texels, interpolated from vertex values (N, D)."""
-        interpolated: Floats = np.einsum("pk,pkd->pd", self.weights, values[self.corners])
+        interpolated = np.zeros((len(self.rows), values.shape[1]))
+        _interpolate(self.corners, self.weights, values, interpolated)
         return interpolated
+
+    def block_means(self, side: int, *values: Floats) -> list[Floats]:
+        """Means (B, D) of values (P, D) over the squares of `side` texels that hold any."""
+        squares = np.column_stack([self.rows // side, self.columns // side])
+        _, square, count = np.unique(squares, axis=0, return_inverse=True, return_counts=True)
+        sums = [[np.bincount(square.ravel(), column) / count for column in own.T] for own in values]
+        return [np.column_stack(columns) for columns in sums]
+
+    def blurred(self, values: Floats, side: int, spread: float) -> Floats:
+        """(P, D) values (P, D) in a picture that is 0 elsewhere, blurred by a Gaussian of `spread` texels."""
+        found = np.zeros_like(values)
+        for channel, own in enumerate(values.T):
+            picture = np.zeros((side, side), np.float32)
+            picture[self.rows, self.columns] = own
+            found[:, channel] = blur(picture, spread)[self.rows, self.columns]
+        return found
+
+
+def blur(picture: NDArray[np.float32], spread: float) -> NDArray[np.float32]:
+    """A picture (S, S) blurred by a Gaussian of `spread` pixels; a broad blur is computed in a reduced picture."""
+    import cv2
+
+    step = max(int(spread / LEAST_SPREAD), 1)
+    small = cv2.resize(picture, None, fx=1 / step, fy=1 / step, interpolation=cv2.INTER_AREA)
+    soft = cv2.GaussianBlur(small, (0, 0), spread / step, borderType=cv2.BORDER_REFLECT)
+    return np.asarray(cv2.resize(soft, picture.shape[::-1], interpolation=cv2.INTER_LINEAR), np.float32)
 
 
 def find_texels(uv: Floats, triangles: NDArray[np.int64], side: int) -> Texels:
@@ -34,6 +66,17 @@ def find_texels(uv: Floats, triangles: NDArray[np.int64], side: int) -> Texels:
     _find_owners(places[triangles], owner, weights)
     rows, columns = np.nonzero(owner >= 0)
     return Texels(rows, columns, triangles[owner[rows, columns]], weights[rows, columns])
+
+
+@kernel
+def _interpolate(corners, weights, values, interpolated):  # type: ignore[no-untyped-def]
+    """Write weighted sums (P, D) of the values (N, D) at corners (P, 3)."""
+    for p in range(len(corners)):
+        a, b, c = corners[p]
+        for d in range(values.shape[1]):
+            interpolated[p, d] = (
+                weights[p, 0] * values[a, d] + weights[p, 1] * values[b, d] + weights[p, 2] * values[c, d]
+            )
 
 
 @kernel

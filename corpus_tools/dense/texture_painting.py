@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from corpus_tools.dense.hair_region import OTHER_HUE
 from corpus_tools.dense.light_cast import linear_light, log_colour
-from corpus_tools.dense.mesh_fit import face_landmarks
-from corpus_tools.dense.skin_colour import SkinColours, vertex_normals
-from corpus_tools.dense.texels import Texels
+from corpus_tools.dense.mesh_fit import face_landmarks, part_vertices
+from corpus_tools.dense.skin_colour import SkinColours, welded_normals
+from corpus_tools.dense.texels import Texels, blur
 from corpus_tools.dense.visible_texels import SkinCanvas, soften_edges
 from tts2face.colour import encode_light
 from tts2face.models.face import Face, Texture
@@ -33,26 +33,28 @@ STRAND_TEXELS = 25  # about 4 mm of the forehead, for the shadow around a strand
 FRINGE_HUE = (1.0, 1.6)  # of `OTHER_HUE` from the median skin: up to the first skin, from the second hair
 FRINGE_LUMA = (0.78, 0.95)  # of the median skin: up to the first hair, from the second skin
 EVEN_TEXELS, EVEN_SHARE = 50.0, 0.7  # about 8 mm, Gaussian; share of slow variations of log B/G that is removed
-N_SAMPLES = 1500  # sample of the seen texels
+TINT_BLOCK = 24  # texels along a side of the squares over which the tint of seen skin is averaged: about 4 mm
 SHARP_TEXELS, SHARP_GAIN = 4.0, 0.7  # unsharp masking, Gaussian of this deviation
 MIN_TEXEL_WEIGHT = 0.02  # of the largest weight: texels below it are blended
 
 
 def paint_skin(face: Face, canvas: SkinCanvas, skin: SkinColours) -> Face:
     """The face with the talker's texture."""
-    texels = canvas.texels
-    base = canvas.texture[texels.rows, texels.columns].astype(np.float64)
-    share = canvas.share * smoothstep(skin.weight / skin.weight.max(), 0.0, MIN_TEXEL_WEIGHT)
-    own = _remove_shading(canvas.texels.interpolate(vertex_normals(face)), skin.colour, share)
-    own = _even_yellow(canvas, own, share)
-    share = soften_edges(_remove_fringe(face, canvas, own, share), texels, len(canvas.texture))
-    dark = 1.0 - smoothstep(base @ LUMA, *LASH_LUMA)
-    tint = _skin_tint(face, canvas, own / np.maximum(base, 1.0), (share, base @ LUMA))
-    tint = tint * (1 - dark)[:, None] + dark[:, None]
-    tint[canvas.in_mouth] = 1.0
-    own = sharpen(own, share, texels, len(canvas.texture))
-    colour = share[:, None] * own + (1 - share)[:, None] * base * tint
-    return replace(face, textures=(Texture(_fill_texture(canvas.texture, texels, colour)), *face.textures[1:]))
+    side, seen = len(canvas.texture), canvas.texels.at(skin.rows)
+    base = canvas.texture[canvas.texels.rows, canvas.texels.columns].astype(np.float64)
+    share = canvas.share[skin.rows] * smoothstep(skin.weight / skin.weight.max(), 0.0, MIN_TEXEL_WEIGHT)
+    own = _remove_shading(seen.interpolate(welded_normals(face)), skin.colour, share)
+    own = _even_yellow(seen, side, own, share)
+    share = soften_edges(_remove_fringe(face, (seen, side), own, share), seen, side)
+    tint = np.ones(base.shape)
+    tinted = np.flatnonzero(~canvas.in_mouth)
+    dark = 1.0 - smoothstep(base[tinted] @ LUMA, *LASH_LUMA)[:, None]
+    factors = _skin_tint(face, seen, own / np.maximum(base[skin.rows], 1.0), (share, base[skin.rows] @ LUMA))
+    tint[tinted] = canvas.texels.at(tinted).interpolate(factors) * (1 - dark) + dark
+    colour = base * tint
+    own = sharpen(own, share, seen, side)
+    colour[skin.rows] = share[:, None] * own + (1 - share)[:, None] * colour[skin.rows]
+    return replace(face, textures=(Texture(_fill_texture(canvas.texture, canvas.texels, colour)), *face.textures[1:]))
 
 
 def _remove_shading(normals: Floats, colour: Floats, share: Floats) -> Floats:
@@ -71,20 +73,17 @@ def _remove_shading(normals: Floats, colour: Floats, share: Floats) -> Floats:
     return flat
 
 
-def _even_yellow(canvas: SkinCanvas, own: Floats, share: Floats) -> Floats:
+def _even_yellow(texels: Texels, side: int, own: Floats, share: Floats) -> Floats:
     """Colours (P, 3) with less of the yellow and blue that vary slowly over skin: light of lamps and walls.
 
     Redness, which varies over a face by nature, and luminance stay.
     """
-    from scipy.ndimage import gaussian_filter
-
     colours = log_colour(own)
     luma = own @ LUMA
     weight = share * (luma > SKIN_LUMA * np.median(luma[share > 0.5]))
     usual = np.median(colours[weight > 0.5, 2])
-    texels, planes = canvas.texels, np.zeros((2, *canvas.texture.shape[:2]))
-    planes[:, texels.rows, texels.columns] = weight, weight * (colours[:, 2] - usual)
-    near, off = (gaussian_filter(plane, EVEN_TEXELS)[texels.rows, texels.columns] for plane in planes)
+    planes = np.column_stack([weight, weight * (colours[:, 2] - usual)])
+    near, off = texels.blurred(planes, side, EVEN_TEXELS).T
     colours[:, 2] -= EVEN_SHARE * off / np.maximum(near, 0.1)
     return 255.0 * encode_light(linear_light(colours))
 
@@ -94,12 +93,13 @@ def _shading_terms(normals: Floats) -> Floats:
     return np.column_stack([x, y, z, x * y, x * z, y * z, x * x - y * y])
 
 
-def _remove_fringe(face: Face, canvas: SkinCanvas, own: Floats, share: Floats) -> Floats:
+def _remove_fringe(face: Face, skin: tuple[Texels, int], own: Floats, share: Floats) -> Floats:
     """Shares (P,) without the strands of hair over the forehead and beside the eyes."""
-    from scipy.ndimage import gaussian_filter, minimum_filter
+    from scipy.ndimage import minimum_filter
 
+    texels, side = skin
     marks = face_landmarks(face, face.vertices)
-    places = canvas.texels.interpolate(face.vertices.astype(np.float64))
+    places = texels.interpolate(face.vertices.astype(np.float64))
     above = places[:, 1] - float(marks[list(BROW_LANDMARKS), 1].max())
     beside = np.abs(places[:, 0]) - float(np.abs(marks[[EYE_OUTER_RIGHT, EYE_OUTER_LEFT], 0]).mean())
     beside[places[:, 1] < marks[NOSE_BASE, 1]] = 0.0
@@ -109,47 +109,37 @@ def _remove_fringe(face: Face, canvas: SkinCanvas, own: Floats, share: Floats) -
     off = np.linalg.norm(hue - np.median(hue[share > 0.5], axis=0), axis=1) / OTHER_HUE
     clear = smoothstep(luma / usual, *FRINGE_LUMA) * (1.0 - smoothstep(off, *FRINGE_HUE))
     near = 1.0 - np.maximum(smoothstep(above, *FRINGE_MM), smoothstep(beside, *FRINGE_MM))
-    picture = np.ones(canvas.texture.shape[:2])
-    picture[canvas.texels.rows, canvas.texels.columns] = np.maximum(clear, near)
-    grown = gaussian_filter(minimum_filter(picture, STRAND_TEXELS), STRAND_TEXELS / 3)
-    kept: Floats = share * grown[canvas.texels.rows, canvas.texels.columns]
-    return kept
+    picture = np.ones((side, side), np.float32)
+    picture[texels.rows, texels.columns] = np.maximum(clear, near)
+    grown = blur(minimum_filter(picture, STRAND_TEXELS), STRAND_TEXELS / 3)
+    return np.asarray(share * grown[texels.rows, texels.columns])
 
 
-def _skin_tint(face: Face, canvas: SkinCanvas, ratio: Floats, share_and_luma: tuple[Floats, Floats]) -> Floats:
-    """(P, 3) tint factors for the head's skin: those of the nearest seen skin, blended with the median."""
+def _skin_tint(face: Face, texels: Texels, ratio: Floats, share_and_luma: tuple[Floats, Floats]) -> Floats:
+    """(V, 3) tint factors for the head's skin: those of the nearest seen texels, blended with the median."""
     from scipy.spatial.distance import cdist
 
     share, luma = share_and_luma
     skin = np.flatnonzero((share > 0.3) & (luma > SKIN_LUMA * np.median(luma[share > 0.3])))
-    chosen = skin[np.linspace(0, len(skin) - 1, min(N_SAMPLES, len(skin))).round().astype(int)]
-    logs = np.log(np.clip(ratio[chosen], *TINT_BOUNDS))
+    logs = np.log(np.clip(ratio[skin], *TINT_BOUNDS))
     usual = np.median(logs, axis=0)
     logs = np.clip(logs, usual - 0.35, usual + 0.35)
-    places = np.einsum("pk,pkd->pd", canvas.texels.weights[chosen], face.vertices[canvas.texels.corners[chosen]])
-    used = np.unique(canvas.texels.corners)
+    logs, places = texels.at(skin).block_means(
+        TINT_BLOCK, logs, texels.at(skin).interpolate(face.vertices.astype(np.float64))
+    )
+    used = part_vertices(face, ("skin",))
     near = np.exp(-((cdist(face.vertices[used], places) / TINT_REACH_MM) ** 2))
     mixed = (near @ logs + 0.5 * usual) / (near.sum(axis=1, keepdims=True) + 0.5)
-    of_vertices = np.zeros((len(face.vertices), 3))
-    of_vertices[used] = mixed
-    factors: Floats = np.exp(canvas.texels.interpolate(of_vertices))
+    factors = np.ones((len(face.vertices), 3))
+    factors[used] = np.exp(mixed)
     return factors
 
 
 def sharpen(colour: Floats, share: Floats, texels: Texels, side: int) -> Floats:
     """Sharpened colours (P, 3), which compensate the blur of averaging over frames with tracking noise."""
-    from scipy.ndimage import gaussian_filter
-
-    weight = np.zeros((side, side))
-    weight[texels.rows, texels.columns] = share
-    around = np.maximum(gaussian_filter(weight, SHARP_TEXELS), 1e-3)[texels.rows, texels.columns]
-    crisp = colour.copy()
-    for channel in range(3):
-        picture = np.zeros((side, side))
-        picture[texels.rows, texels.columns] = colour[:, channel] * share
-        smooth = gaussian_filter(picture, SHARP_TEXELS)[texels.rows, texels.columns] / around
-        crisp[:, channel] += SHARP_GAIN * share * (colour[:, channel] - smooth)
-    return crisp
+    weighted = texels.blurred(np.column_stack([share, share[:, None] * colour]), side, SHARP_TEXELS)
+    smooth = weighted[:, 1:] / np.maximum(weighted[:, :1], 1e-3)
+    return np.asarray(colour + SHARP_GAIN * share[:, None] * (colour - smooth))
 
 
 def _fill_texture(texture: NDArray[np.uint8], texels: Texels, colour: Floats) -> NDArray[np.uint8]:

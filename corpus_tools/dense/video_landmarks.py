@@ -1,4 +1,4 @@
-"""Landmarks of a talker in videos, in the picture and pose-free."""
+"""Landmarks of a talker in videos and photographs, in the picture and pose-free."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -25,14 +25,14 @@ RIGHT_LIDS, LEFT_LIDS = (159, 145), (386, 374)  # upper and lower, in the middle
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class VideoLandmarks:
-    """One video: `points` (T, 478, 3) pixels as the tracker gives them, `landmarks` (T, 478, 3) mm without pose.
+class TrackedPictures:
+    """One video or photograph: `points` (T, 478, 3) pixels as tracked, `landmarks` (T, 478, 3) mm without pose.
 
-    Both are NaN in frames without a face; frame i is the video's i-th. A photograph has its picture with it, a mirrored
-    one a small weight, and parted lips an opening (N, 2) between them, pixels, in which there is no skin.
+    Both are NaN in frames without a face; frame i is the i-th of the file. A photograph has its picture with it, a
+    mirrored one a small weight, and parted lips an opening (N, 2) between them, pixels, in which there is no skin.
     """
 
-    video: Path
+    file: Path
     points: NDArray[np.float32]
     landmarks: NDArray[np.float32]
     pictures: tuple[NDArray[np.uint8], ...] = ()
@@ -47,7 +47,7 @@ class VideoLandmarks:
         DataError
             The video can no longer be read.
         """
-        return iter(self.pictures) if self.pictures else (frame.pixels for frame in read_frames(self.video))
+        return iter(self.pictures) if self.pictures else (frame.pixels for frame in read_frames(self.file))
 
 
 def find_videos(recordings: Path) -> tuple[Path, ...]:
@@ -67,7 +67,7 @@ def find_videos(recordings: Path) -> tuple[Path, ...]:
     return tuple(found[row] for row in rows)
 
 
-def track_videos(videos: Sequence[Path], eyes: CachedTracker, on_progress: Progress) -> tuple[VideoLandmarks, ...]:
+def track_videos(videos: Sequence[Path], eyes: CachedTracker, on_progress: Progress) -> tuple[TrackedPictures, ...]:
     """Landmarks of the videos that can be read and show a face.
 
     Raises
@@ -80,7 +80,7 @@ def track_videos(videos: Sequence[Path], eyes: CachedTracker, on_progress: Progr
         try:
             found = eyes.track(video)
             posed = remove_pose(found.tracking.points, found.fps)
-            kept.append(VideoLandmarks(video, found.tracking.points, posed.landmarks))
+            kept.append(TrackedPictures(video, found.tracking.points, posed.landmarks))
         except DataError as refused:
             reason = f" ({video.name}: {refused})"
         on_progress(number + 1, len(videos))
@@ -89,7 +89,7 @@ def track_videos(videos: Sequence[Path], eyes: CachedTracker, on_progress: Progr
     return tuple(kept)
 
 
-def resting_landmarks(videos: Sequence[VideoLandmarks]) -> Floats:
+def resting_landmarks(videos: Sequence[TrackedPictures]) -> Floats:
     """(478, 3) mean landmarks in mm of the frames with closed lips and open eyes."""
     landmarks = np.concatenate([one.landmarks for one in videos])
     landmarks = landmarks[np.isfinite(landmarks[:, 0, 0])].astype(np.float64)

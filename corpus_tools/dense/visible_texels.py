@@ -79,9 +79,10 @@ def _front_share(face: Face, texels: Texels, opened: Floats) -> Floats:
     share = smoothstep(polygon_depth(place[:, :2], marks[list(FACE_OVAL), :2], RIM_MM[1] + 1), *RIM_MM)
     share[place[:, 2] < float(marks[list(FACE_OVAL), 2].min())] = 0.0
     share[_is_hidden(place)] = 0.0
-    share *= smoothstep(-polygon_depth(place[:, :2], marks[list(INNER_LIPS), :2], LIP_MM[1] + 1), *LIP_MM)
-    for lids in LID_RINGS:
-        share *= smoothstep(-polygon_depth(place[:, :2], marks[list(lids), :2], LID_MM[1] + 1), *LID_MM)
+    seen = np.flatnonzero(share)
+    for edge, limits in ((INNER_LIPS, LIP_MM), *((lids, LID_MM) for lids in LID_RINGS)):
+        depth = polygon_depth(place[seen, :2], marks[list(edge), :2], limits[1] + 1)
+        share[seen] *= smoothstep(-depth, *limits)
     return share
 
 
@@ -126,10 +127,5 @@ def _polygon_depths(places, polygon, depths):  # type: ignore[no-untyped-def]
 
 
 def soften_edges(share: Floats, texels: Texels, side: int) -> Floats:
-    """Blurred shares that do not exceed the original ones."""
-    from scipy.ndimage import gaussian_filter
-
-    picture = np.zeros((side, side))
-    picture[texels.rows, texels.columns] = share
-    blurred = gaussian_filter(picture, MASK_BLUR)[texels.rows, texels.columns]
-    return np.minimum(share, blurred)
+    """Blurred shares (P,) that do not exceed the original ones."""
+    return np.minimum(share, texels.blurred(share[:, None], side, MASK_BLUR)[:, 0])

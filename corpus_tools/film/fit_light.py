@@ -16,7 +16,6 @@ from corpus_tools.film.fit_responses import (
     limits_of,
     nearness,
     pose_terms,
-    quantised,
 )
 from corpus_tools.film.fit_texels import (
     SKIN_LIT,
@@ -34,7 +33,7 @@ from corpus_tools.film.pose_light import CAMERA_YAWS_DEG, FAR, MOUTH, SKIN, Pose
 from corpus_tools.film.seen import seen_triangles, shown_skin
 from corpus_tools.head.eyes import EyeStyle
 from tts2face.face.deformation import build_rig
-from tts2face.models.baked_light import N_BALL_TERMS, BakedLight, HairLight
+from tts2face.models.baked_light import N_BALL_TERMS, BakedLight, HairLight, quantised
 from tts2face.models.face import Face
 from tts2face.numeric import smoothstep
 from tts2face.render.surface import weld_groups

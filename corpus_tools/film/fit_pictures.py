@@ -15,9 +15,8 @@ from scipy import sparse
 
 from corpus_tools.film.compare import over_grey
 from corpus_tools.film.fit_light import MOST_SHARE
-from corpus_tools.film.fit_responses import quantised
 from corpus_tools.film.poses import LitPose
-from tts2face.models.baked_light import LIMIT_STEP, BakedLight
+from tts2face.models.baked_light import LIMIT_STEP, BakedLight, quantised
 from tts2face.models.face import Face
 from tts2face.render.draw import mesh_renderer
 from tts2face.render.film.scene import LitScene

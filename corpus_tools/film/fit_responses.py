@@ -56,19 +56,6 @@ def fit_responses(
     return responses.transpose(1, 2, 0)
 
 
-def quantised(
-    values: Floats, share: float = 100.0, least: float | Floats = 1e-9
-) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
-    """Rows (C, ...) in 8 bits, and the size (C,) of a step of each, at least `least`, of all or of each (C,).
-
-    Those above a share in per cent are cut off.
-    """
-    flat = values.reshape(len(values), -1)
-    sizes = np.maximum(np.percentile(np.abs(flat), share, axis=1) / 127, least)
-    steps = np.clip(np.rint(flat / sizes[:, None]), -127, 127).astype(np.int8)
-    return steps.reshape(values.shape), sizes.astype(np.float32)
-
-
 def limits_of(changes: Floats, shown: NDArray[np.bool_]) -> NDArray[np.int8]:
     """(2, 3, N) least and most of changes (P, N, 3) and 0 in the poses that show a vertex (P, N), in steps."""
     held = shown | ~shown.any(axis=0)

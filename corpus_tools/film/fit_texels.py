@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, binary_erosion, distance_transform_edt, gaussian_filter, map_coordinates
 
 from corpus_tools.dense.texels import find_texels
-from corpus_tools.film.fit_responses import quantised
 from corpus_tools.film.pose_light import FAR, SKIN, PoseLight
-from tts2face.models.baked_light import BLACK_SHARE, HairTint
+from tts2face.models.baked_light import BLACK_SHARE, HairTint, quantised
 from tts2face.models.face import Face
 from tts2face.numeric import smoothstep
 from tts2face.render.film.turns import yaw_and_pitch_deg

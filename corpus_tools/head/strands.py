@@ -8,14 +8,13 @@ from scipy import sparse
 from scipy.ndimage import gaussian_filter, minimum_filter, zoom
 from scipy.sparse.csgraph import connected_components
 
-from tts2face.colour import decode_srgb
+from tts2face.colour import LUMINANCE, decode_srgb
 from tts2face.numeric import unit_vectors
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 SHADE_PX = 22.0  # at 512 pixels; lighter and darker areas wider than this are painted highlights, and are removed
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 FINE_PX, FINE_STEPS = 0.55, 26  # width of a fine strand, and half its length, in pixels
 BROAD_PX, BROAD_STEPS = 2.2, 60
 FINE_GAIN, BROAD_GAIN, ALPHA_GAIN = 0.20, 0.165, 0.22

@@ -69,7 +69,7 @@ def seen_look(
     scale = lens.lens[0] / ahead
     points = np.column_stack([across * scale + lens.lens[1], down * scale + lens.lens[2], ahead * scale.mean()])
     used = np.arange(N_MESH_LANDMARKS)
-    sampler = LookSampler(PictureFitter(bare.vertices.astype(np.float64), marks[used], used, np.zeros((1, 1))))
+    sampler = LookSampler(PictureFitter(used, bare.vertices.astype(np.float64), marks[used], used, np.zeros((1, 1))))
     sampler.add(lit[::size, ::size].copy(), (points / size).astype(np.float32))
     return sampler.look()
 

@@ -1,15 +1,18 @@
 """Commands that look for faces set up the landmark model where it is missing, after one yes."""
 
+import inspect
 import io
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from cyclopts import App
 from PIL import Image
 
 from cli import photo as photo_command
-from cli.main import run
+from cli.main import app, run
 from lexicon.errors import BackendError
 from tts2face.video import landmark_models, setup_models
 
@@ -71,6 +74,21 @@ def test_a_yes_is_enough(
     assert run(command(photo, "--consent", "drawn", *([answer] if answer == "--yes" else []))) != 0
     assert downloads == ["download"]
     assert "the network is down" in capsys.readouterr().err
+
+
+def functions(commands: App) -> Iterator[Callable[..., object]]:
+    """Functions of all commands below one."""
+    for name in commands:
+        if not name.startswith("-"):
+            yield from functions(commands[name])
+    if commands.default_command is not None:
+        yield commands.default_command
+
+
+def test_every_command_with_a_model_takes_a_yes() -> None:
+    with_model = [set(taken) for one in functions(app) if "model" in (taken := inspect.signature(one).parameters)]
+    assert len(with_model) > 10
+    assert all("yes" in taken for taken in with_model)
 
 
 def test_consent_is_asked_for_before_anything_is_downloaded(

@@ -6,11 +6,19 @@ from tts2face.face.face_motion import moved_landmarks
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
-from tts2face.photo.found_face import FoundFace
+from tts2face.photo.eye_pictures import SIDES
+from tts2face.photo.found_face import FoundFace, PhotographedFace
+from tts2face.photo.photograph import Photograph
 from tts2face.render.camera import camera_matrices
 from tts2face.render.draw import draw
 from tts2face.render.picture import Picture
 from tts2face.types import Trajectory
+
+SMILE = {
+    **{f"{shape}{side}": weight for shape, weight in (("mouthSmile", 0.9), ("mouthUpperUp", 0.35)) for side in SIDES},
+    **{f"mouthLowerDown{side}": 0.5 for side in SIDES},
+    "jawOpen": 0.12,
+}  # whose upper teeth are seen
 
 
 def still(name: str, side: int, *, head: tuple[float, ...] = (0, 0, 0), **weights: float) -> np.ndarray:
@@ -36,6 +44,11 @@ def found_in(name: str, side: int, **weights: float) -> FoundFace:
     places = projected(name, side, **weights)
     eyes = float(np.linalg.norm(places[EYE_OUTER_LEFT, :2] - places[EYE_OUTER_RIGHT, :2]))
     return FoundFace(places, 0.0, (0.0, 0.0, 0.0), eyes, 1)
+
+
+def photographed(picture: Photograph, found: FoundFace, smile: float = 0.0) -> PhotographedFace:
+    """A picture and the face in it, with a score of its smile."""
+    return PhotographedFace(picture, found, {"mouthSmileLeft": smile, "mouthSmileRight": smile})
 
 
 def _weights(face: Face, weights: dict[str, float]) -> np.ndarray:

@@ -53,6 +53,17 @@ def test_a_correction_makes_another_face(photo: Path) -> None:
         kept_path(photo, photo.with_name("no.json"))
 
 
+def test_a_smile_makes_another_face(photo: Path) -> None:
+    smile = photo.with_name("smile.jpg")
+    smile.write_bytes(b"a smile")
+    first = kept_path(photo, smile=smile)
+    assert len({kept_path(photo), first, kept_path(photo, smile), kept_path(photo, smile=f"{smile}@2")}) == 4
+    smile.write_bytes(b"another smile")
+    assert kept_path(photo, smile=smile) != first
+    with pytest.raises(InputError, match=r"there is no photo .*no\.jpg"):
+        kept_path(photo, smile=photo.with_name("no.jpg"))
+
+
 def test_a_damaged_face_is_made_again(photo: Path) -> None:
     kept = keep(photo, "drawn")
     kept.write_bytes(kept.read_bytes()[:500])

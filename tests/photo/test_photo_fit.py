@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tests.photo.pictures import found_in, still
+from tests.photo.pictures import found_in, photographed, still
 from tts2face.face.landmark_fit import landmark_positions
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
@@ -24,7 +24,8 @@ SHIFT = np.array([0.0, 6.0])  # pixels of the file, three of the picture
 def face_with(fit: PhotoFit, **weights: float) -> Face:
     picture = Photograph(still(NAME, SIDE, **weights), None, REDUCED_BY)
     metadata = {"name": "Ada", "consent": {"statement": "drawn"}}
-    return speaking_photo(picture, found_in(NAME, SIDE, **weights), 0.0, load_face("head", hair="bald"), metadata, fit)
+    seen = photographed(picture, found_in(NAME, SIDE, **weights))
+    return speaking_photo(seen, load_face("head", hair="bald"), metadata, fit=fit)
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from lexicon.errors import DataError, InputError
 from tests.exports.test_stage_glb import Read
-from tests.photo.pictures import found_in, still
+from tests.photo.pictures import found_in, photographed, still
 from tts2face.exports.stage_glb import stage_glb
 from tts2face.face.deformation import REST_HEAD
 from tts2face.face.face_motion import moved_landmarks
@@ -32,6 +32,7 @@ SIDE = 400
 NAME = "head"
 STRIPES = 7  # of the wall, px
 MOST_MOVED_PX = 40  # of a head that turns
+LEAST_TEETH = 60  # samples, of a mouth of 130 samples
 MOST_FOLDED = 10  # triangles, at the corners of shut lids
 PANGRAM = "We were away a year ago, but Bob may move five big maps."
 BLINK = {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0}
@@ -46,7 +47,7 @@ def pixels() -> np.ndarray:
 def face(pixels: np.ndarray) -> Face:
     head = load_face("head", hair="bald")
     metadata = {"name": "Ada", "consent": {"statement": "drawn"}}
-    return speaking_photo(Photograph(pixels, None, 1.0), found_in(NAME, SIDE), 0.0, head, metadata)
+    return speaking_photo(photographed(Photograph(pixels, None, 1.0), found_in(NAME, SIDE)), head, metadata)
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +126,18 @@ def test_the_inside_of_the_mouth_is_seen_through_parted_lips_alone(renderer: Mes
     shut, opened = samples_of_parts(renderer), samples_of_parts(renderer, jawOpen=0.6)
     assert sum(shut.get(name, 0) for name in inside) == 0
     assert min(opened.get(name, 0) for name in ("teeth_upper", "tongue", "walls")) > 20
+
+
+def test_upper_teeth_lie_on_the_lip_of_each_f_and_v(face: Face) -> None:
+    session = Session(face=face)
+    clip, renderer = session.clip("Five vivid foxes have fine fur."), session.renderer(Picture())
+    phones, rate = clip.speech.phones, clip.fps
+    spans = zip(phones.phones, phones.edges[:-1], phones.edges[1:], strict=True)
+    frames = [range(round(begin * rate), round(end * rate) + 1) for phone, begin, end in spans if phone in ("f", "v")]
+    assert len(frames) == 8
+    for span in frames:
+        poses = [dict(zip(clip.motion.channels, clip.motion.values[k].tolist(), strict=True)) for k in span]
+        assert max(samples_of_parts(renderer, **pose).get("teeth_upper", 0) for pose in poses) > LEAST_TEETH
 
 
 def test_gaze_moves_the_iris_and_not_the_lids(renderer: MeshRenderer) -> None:
@@ -276,7 +289,7 @@ def test_a_cut_out_person_moves_before_any_background() -> None:
     head = load_face("head", hair="bald")
     shown = draw(load_face(NAME), picture=Picture(size=f"{SIDE}x{SIDE}", background="transparent"))
     picture = Photograph(shown[..., :3].copy(), shown[..., 3].copy(), 1.0).filled()
-    cut = speaking_photo(picture, found_in(NAME, SIDE), 0.0, head, {"name": "Ada"})
+    cut = speaking_photo(photographed(picture, found_in(NAME, SIDE)), head, {"name": "Ada"})
     pose, turned = {"jawOpen": 0.3}, np.array([0, 0.12, 0, 0, 0, 0], np.float32)
     free = drawn(mesh_renderer(cut, Picture(background="transparent")), turned, **pose)
     red = drawn(mesh_renderer(cut, Picture(background="#ff0000")), turned, **pose)
@@ -320,7 +333,7 @@ def test_faces_anywhere_in_pictures_of_any_size_are_kept(
     side: int, corner: tuple[int, int], size: tuple[int, int], tmp_path: Path
 ) -> None:
     picture, found = placed(side, corner, size)
-    made = speaking_photo(picture, found, 0.0, load_face("head", hair="bald"), {"name": "Ada"})
+    made = speaking_photo(photographed(picture, found), load_face("head", hair="bald"), {"name": "Ada"})
     assert len(made.vertices) < 20_000
     write_face(tmp_path / "me.face", made)
     kept = read_face(tmp_path / "me.face")

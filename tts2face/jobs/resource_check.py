@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import BackendError, DataError, InputError
 from tts2face.jobs.refused_file import RefusedFileError
+from tts2face.photo.photograph import HEIC_BRANDS
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -37,11 +38,7 @@ FOREIGN = {
 }  # fmt: skip
 GLTF_MAGIC = b"glTF"
 PICTURE_MAGIC = (b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"BM", b"II*\x00", b"MM\x00*")
-BOXED_PICTURES = (
-    (0, b"RIFF", b"WEBP"),
-    (4, b"ftyp", b"hei"),
-    (4, b"ftyp", b"mif1"),
-)  # offset, box, kind
+BOXED_PICTURES = ((0, b"RIFF", b"WEBP"), *((4, b"ftyp", brand) for brand in HEIC_BRANDS))  # offset, box, kind
 N_MAGIC = 12  # bytes by which a picture is told
 STATEMENT = "statement.json"  # beside a photo: name of the face, consent of the person shown, pixels, corrections
 SHOWN, PLACES = "shown.jpg", "places.json"  # files of a photo whose places a person may correct

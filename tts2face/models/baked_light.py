@@ -231,6 +231,25 @@ def fills_pages(n_texels: int, n_from_cameras: int) -> bool:
     )
 
 
+def quantised(
+    values: NDArray[np.float64], share: float = 100.0, least: float | NDArray[np.float64] = 1e-9
+) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
+    """Rows (C, ...) in 8 bits, and the size (C,) of a step of each, at least `least`, of all or of each (C,).
+
+    Those above a share in per cent are cut off.
+    """
+    flat = values.reshape(len(values), -1)
+    sizes = np.maximum(np.percentile(np.abs(flat), share, axis=1) / 127, least)
+    steps = np.clip(np.rint(flat / sizes[:, None]), -127, 127).astype(np.int8)
+    return steps.reshape(values.shape), sizes.astype(np.float32)
+
+
+def equal_limits(most: float, n: int) -> NDArray[np.int8]:
+    """(2, 3, n) limits of a change of light by `most` of 255; none is reached from 254 on."""
+    steps = min(round(most / LIMIT_STEP), 127)
+    return np.tile(np.array([-steps, steps], np.int8)[:, None, None], (1, 3, n))
+
+
 def _make_read_only(record: Any) -> None:
     for one in fields(record):
         if isinstance(array := getattr(record, one.name), np.ndarray):

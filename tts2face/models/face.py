@@ -116,7 +116,8 @@ class PhotoView:
     @property
     def turn(self) -> NDArray[np.float64]:
         """(3, 3) from the axes of the face to x right, y up, z towards the camera."""
-        return self.view[:, :3] * np.array([[1.0], [-1.0], [-1.0]])
+        turned: NDArray[np.float64] = self.view[:, :3] * np.array([[1.0], [-1.0], [-1.0]])
+        return turned
 
     @property
     def head_gain(self) -> float:

@@ -33,8 +33,16 @@ def _around(pixels: NDArray[np.uint8], places: Floats, blur: float) -> tuple[NDA
 
 def _sample(values: Floats, places: Floats, blur: float) -> Floats:
     """Values (..., C) of a blurred picture (h, w, C) at places (..., 2)."""
-    from scipy.ndimage import gaussian_filter, map_coordinates
+    from scipy.ndimage import gaussian_filter
 
-    soft = gaussian_filter(values, (blur, blur, 0))
+    return colours_at(gaussian_filter(values, (blur, blur, 0)), places)
+
+
+def colours_at(values: Floats, places: Floats) -> Floats:
+    """Values (..., C) of a picture (H, W, C) at places (..., 2), x and y, between its pixels."""
+    from scipy.ndimage import map_coordinates
+
     at = np.moveaxis(places, -1, 0)[::-1]
-    return np.stack([map_coordinates(soft[..., c], at, order=1, mode="nearest") for c in range(soft.shape[2])], axis=-1)
+    return np.stack(
+        [map_coordinates(part, at, order=1, mode="nearest") for part in np.moveaxis(values, -1, 0)], axis=-1
+    )

@@ -1,31 +1,30 @@
 """A face that speaks in a photograph, from its file."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from tts2face.models.consent import consent_record
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.hair import BALD
-from tts2face.photo.found_face import FoundFace, find_face
+from tts2face.photo.found_face import PhotographedFace, PhotoReader
+from tts2face.photo.own_teeth import read_teeth
 from tts2face.photo.person_matte import part_background
 from tts2face.photo.photo_fit import NOTHING_GIVEN, PhotoFit, read_fit
-from tts2face.photo.photograph import Photograph, read_photograph, split_number
+from tts2face.photo.photograph import Photograph, split_number
 from tts2face.photo.speaking_photo import speaking_photo
 from tts2face.request import REALISTIC_FACE
 
-SMILES = ("mouthSmileLeft", "mouthSmileRight")
 
-
-def face_from_photo(
+def face_from_photo(  # noqa: PLR0913 - one parameter an option
     photo: str | Path,
     *,
     consent: str | None = None,
     name: str | None = None,
     fit: str | Path | PhotoFit | None = None,
+    smile: str | Path | None = None,
     model: Path | None = None,
     on_warning: Callable[[str], None] = lambda _: None,
 ) -> Face:
@@ -42,6 +41,9 @@ def face_from_photo(
     fit
         Corrections of what is found, or the path of their file (docs/photo.md); ``face.metadata["fit"]`` of a face has
         the places that were used.
+    smile
+        Second picture of the person, with a smile whose teeth are shown between the lips of this one; a smile in the
+        first picture gives its own.
     model
         Path of face_landmarker.task; found or set up if omitted.
     on_warning
@@ -52,15 +54,15 @@ def face_from_photo(
     InputError
         There is no such file or face, or no consent.
     DataError
-        The picture cannot be read, or shows no face that can be moved; the fit is none, or that of another picture.
+        The picture cannot be read, or shows no face that can be moved; the fit is none, or that of another picture;
+        the smile shows another person, or no teeth.
     BackendError
         The landmark models or a package are not installed.
     """
-    path, _ = split_number(photo)
-    record = consent_record(name or path.stem, consent)
+    record = consent_record(name or split_number(photo)[0].stem, consent)
     given = fit if isinstance(fit, PhotoFit) else NOTHING_GIVEN if fit is None else read_fit(Path(fit))
     metadata = {"name": record["name"], "consent": dict(record), "made_by": "tts2face --photo"}
-    return _made(photo, metadata, given, model, on_warning)[1]
+    return _made(photo, metadata, smile, given, PhotoReader(model, on_warning))[1]
 
 
 def places_in_photo(photo: str | Path, on_warning: Callable[[str], None]) -> tuple[Photograph, dict[str, Any]]:
@@ -68,51 +70,37 @@ def places_in_photo(photo: str | Path, on_warning: Callable[[str], None]) -> tup
 
     Errors are those of `face_from_photo`.
     """
-    picture, face = _made(photo, {}, NOTHING_GIVEN, None, on_warning)
+    picture, face = _made(photo, {}, None, NOTHING_GIVEN, PhotoReader(None, on_warning))
     return picture, face.metadata["fit"]
 
 
 def _made(
-    photo: str | Path,
-    metadata: Mapping[str, Any],
-    fit: PhotoFit,
-    model: Path | None,
-    on_warning: Callable[[str], None],
+    photo: str | Path, metadata: Mapping[str, Any], smile: str | Path | None, fit: PhotoFit, reader: PhotoReader
 ) -> tuple[Photograph, Face]:
-    from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
-    from tts2face.video.track import FaceTracker
-
-    path, number = split_number(photo)
-    picture = read_photograph(path).filled()
-    found = find_face(picture.pixels, FaceTracker(model), path, number=number, reduced_by=picture.reduced_by)
-    for warning in found.warnings:
-        on_warning(warning)
-    layers = _without_background(picture, found, model, path, on_warning)
-    scores = BlendshapeReader(model).blendshape_scores(found.landmarks)
-    smile = float(np.mean([scores[BLENDSHAPES.index(shape)] for shape in SMILES]))
-    return picture, speaking_photo(layers, found, smile, load_face(REALISTIC_FACE, hair=BALD), metadata, fit)
+    head, seen = load_face(REALISTIC_FACE, hair=BALD), reader.read(photo)
+    teeth = None if smile is None else read_teeth(reader, smile, photo, seen.found, head)
+    layers = _without_background(seen, reader, split_number(photo)[0])
+    return seen.picture, speaking_photo(layers, head, metadata, teeth=teeth, fit=fit)
 
 
-def _without_background(
-    picture: Photograph, found: FoundFace, model: Path | None, name: Path, on_warning: Callable[[str], None]
-) -> Photograph:
+def _without_background(seen: PhotographedFace, reader: PhotoReader, name: Path) -> PhotographedFace:
     """An opaque picture in two layers, person and background, if they can be told apart."""
     from tts2face.video.landmark_models import LandmarkNetwork, find_segmenter
 
-    if picture.alpha is not None:
-        return picture
-    segmenter = find_segmenter(model)
+    if seen.picture.alpha is not None:
+        return seen
+    segmenter = find_segmenter(reader.model)
     if segmenter is None:
-        on_warning(
+        reader.warn(
             f"the background of {name} bends where the head turns: `tts2face corpus setup` adds the model that tells "
             "persons from backgrounds"
         )
-        return picture
+        return seen
     network = LandmarkNetwork(segmenter.read_bytes())
-    parted = part_background(picture, found.landmarks, found.eye_distance_px, network)
+    parted = part_background(seen.picture, seen.found.landmarks, seen.found.eye_distance_px, network)
     if parted.alpha is None:
-        on_warning(
+        reader.warn(
             f"the person in {name} is not told from the background, which bends where the head turns; a calmer "
             "background, or a PNG picture whose background is transparent, does not"
         )
-    return parted
+    return replace(seen, picture=parted)

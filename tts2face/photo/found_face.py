@@ -1,6 +1,6 @@
 """The face in a photograph: its landmarks, pose and size, and what it cannot be used for."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, FACE_OVAL
+from tts2face.photo.photograph import Photograph, read_photograph, split_number
 from tts2face.retargeting.performer import eye_aperture
+from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.pose import head_angles, rigid_points, similarity_transforms
 from tts2face.video.track import MIN_CONTRAST, MIN_SCORE, Crop, FaceTracker, crop_around
 
@@ -57,8 +59,65 @@ class FoundFace:
         return float(np.ptp(self.landmarks[list(FACE_OVAL), 0]))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PhotographedFace:
+    """A photograph without transparent parts, the face in it, and the tracker's scores of its expression by shape."""
+
+    picture: Photograph
+    found: FoundFace
+    scores: Mapping[str, float]
+
+    def mean_score(self, shapes: Sequence[str]) -> float:
+        """Mean score of shapes, 0 to 1."""
+        return float(np.mean([self.scores[shape] for shape in shapes]))
+
+
+class PhotoReader:
+    """Reads photographs and the faces in them.
+
+    Parameters
+    ----------
+    model
+        Path of face_landmarker.task; found if None.
+    on_warning
+        Gets sentences about what may look worse.
+
+    Raises
+    ------
+    BackendError
+        The landmark models or a package are not installed.
+    """
+
+    def __init__(self, model: Path | None = None, on_warning: Callable[[str], None] = lambda _: None) -> None:
+        self.model, self.warn = model, on_warning
+        self.tracker, self._expressions = FaceTracker(model), BlendshapeReader(model)
+
+    def read(self, photo: str | Path, *, with_open_eyes: bool = True) -> PhotographedFace:
+        """The face in a picture file; ``photo.jpg@2`` is its second largest one; errors as `find_face`."""
+        path, number = split_number(photo)
+        picture = read_photograph(path).filled()
+        found = find_face(
+            picture.pixels,
+            self.tracker,
+            path,
+            number=number,
+            reduced_by=picture.reduced_by,
+            with_open_eyes=with_open_eyes,
+        )
+        for warning in found.warnings:
+            self.warn(warning)
+        scores = self._expressions.blendshape_scores(found.landmarks).tolist()
+        return PhotographedFace(picture, found, dict(zip(BLENDSHAPES, scores, strict=True)))
+
+
 def find_face(
-    pixels: NDArray[np.uint8], tracker: FaceTracker, name: str | Path, *, number: int = 1, reduced_by: float = 1.0
+    pixels: NDArray[np.uint8],
+    tracker: FaceTracker,
+    name: str | Path,
+    *,
+    number: int = 1,
+    reduced_by: float = 1.0,
+    with_open_eyes: bool = True,
 ) -> FoundFace:
     """Find a face in a picture (H, W, 3) and check that it can be moved.
 
@@ -70,6 +129,8 @@ def find_face(
         Which face, from 1, the largest first.
     reduced_by
         Pixels of the file along a side for each of these.
+    with_open_eyes
+        Whether closed eyes are refused.
 
     Raises
     ------
@@ -87,6 +148,8 @@ def find_face(
         raise InputError(f"{name} has {_count(len(crops))}, and no face {number}; choose 1 to {len(crops)}")
     found = _read(pixels, tracker, crops[number - 1], len(crops))
     _check(found, pixels.shape[:2], str(name), reduced_by)
+    if with_open_eyes:
+        _check_eyes(found, str(name))
     return replace(found, warnings=tuple(_warnings(found, str(name), number, reduced_by)))
 
 
@@ -178,6 +241,9 @@ def _check(found: FoundFace, shape: tuple[int, ...], name: str, reduced_by: floa
             f"the face in {name} cannot be read: something may lie before it, or it is blurred or too dark; give "
             "a clearer picture"
         )
+
+
+def _check_eyes(found: FoundFace, name: str) -> None:
     heights = [float(eye_aperture(found.landmarks[None], side)[0]) for side in ("Left", "Right")]
     if max(heights) < CLOSED_EYES:
         raise DataError(f"the eyes of the face in {name} are closed; give a picture with open eyes")

@@ -15,22 +15,24 @@ from tts2face.video.landmark_models import find_segmenter
 
 FOLDER, N_KEPT = "photos", 8
 LEAST_AGE_S = 3600.0  # of a face that is removed: another process may be about to read a younger one
-MAKING = 3  # raised when faces of photos are made in another way, or of another head
+MAKING = 4  # raised when faces of photos are made in another way, or of another head
 
 
-def kept_path(photo: str | Path, *others: Path | None) -> Path:
+def kept_path(photo: str | Path, fit: Path | None = None, smile: str | Path | None = None) -> Path:
     """Where the face of a photo is kept: by the content and name of the file, other files that it takes, and the maker.
 
     Raises
     ------
     InputError
-        There is no such photo, or one of the other files cannot be read.
+        There is no such photo or smile, or the fit cannot be read.
     """
     path, number = split_number(photo)
+    smiling, smile_number = (None, 0) if smile is None else split_number(smile)
     content = hashlib.sha256(path.read_bytes())
-    tells_persons = find_segmenter() is not None
-    content.update(f"{FORMAT_VERSION} {MAKING} {tells_persons} {number} {path.stem}".encode())
-    for other in others:
+    content.update(
+        f"{FORMAT_VERSION} {MAKING} {number} {path.stem} {smile_number} {find_segmenter() is not None}".encode()
+    )
+    for other in (fit, smiling):
         try:
             content.update(hashlib.sha256(b"" if other is None else other.read_bytes()).digest())
         except OSError as refused:

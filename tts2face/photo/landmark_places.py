@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
 from tts2face.photo.eye_pictures import IRISES, EyePatch
-from tts2face.photo.lid_lines import LIDS, N_LID
+from tts2face.photo.lid_lines import LID_MARGINS, N_LID
 from tts2face.photo.lip_line import N_POINTS
 from tts2face.photo.photo_mesh import PhotoMesh
 
@@ -44,7 +44,7 @@ def _vertices(mesh: PhotoMesh) -> Mapping[int, int]:
         (mesh.upper_lip, INNER_LIP_UPPER, (N_POINTS - 1) // (len(INNER_LIP_UPPER) - 1)),
         (mesh.lower_lip, INNER_LIP_LOWER, (N_POINTS - 1) // (len(INNER_LIP_LOWER) - 1)),
     ]
-    for upper, lower, lids in zip(mesh.upper_lids, mesh.lower_lids, LIDS, strict=True):
+    for upper, lower, lids in zip(mesh.upper_lids, mesh.lower_lids, LID_MARGINS, strict=True):
         lines += [
             (line, numbers, (N_LID - 1) // (len(numbers) - 1))
             for line, numbers in zip((upper, lower), lids, strict=True)

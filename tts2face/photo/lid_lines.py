@@ -11,11 +11,11 @@ from tts2face.photo.lip_line import spline_weights
 
 Floats = NDArray[np.float64]
 
-LIDS = (RIGHT_LIDS, LEFT_LIDS)  # of the person, which the picture shows on its left and right
+LID_MARGINS = (RIGHT_LIDS, LEFT_LIDS)  # of the person, which the picture shows on its left and right
 N_LID = 25  # points along the margin of a lid, from the outer corner to the inner one
 BELOW = ((230, 231, 229, 118, 119, 117), (450, 451, 449, 347, 348, 346))  # landmarks of skin below the eyes
 ABOVE = ((225, 224, 223, 222), (445, 444, 443, 442))  # and between folds and brows
-BLUR = 0.004  # of the eye distance, as all lengths below
+LID_BLUR = 0.004  # of the eye distance, as all lengths below
 HUE_SPREAD, BRIGHT_SPREAD = 8.0, 30.0  # of the colours of skin in Lab
 LOWER_STEPS = np.arange(-0.012, 0.17, 0.006)  # of lower lids that are tried; drawn eyes are larger than the tracker's
 INSIDE, OUTSIDE = 0.012, 0.016  # of a lower lid, where the eye and skin are compared
@@ -26,7 +26,7 @@ LARGE_EYES_MORE = 0.025  # so that no rim of the eye is left when its lids are s
 CORNER_STEPS, CORNER_SKIN = np.arange(0.006, 0.05, 0.006), 0.25  # of corners, up to where there is skin
 MIDDLE = slice(4, -4)
 FOLD_STEPS = np.arange(0.04, 0.13, 0.006)  # of the fold above an upper lid: where skin begins
-FOLD_SHARE = 0.75  # of the way to the skin below the brow, at most
+FOLD_ROOM = 0.75  # of the way to the skin below the brow, at most
 FOLD_COLUMNS = slice(6, -6)
 FOLD_SKIN = 0.5
 
@@ -46,7 +46,7 @@ class LidLines:
 def find_lid_lines(pixels: NDArray[np.uint8], landmarks: Floats, scale: float) -> LidLines:
     """Margins of the lids in a picture (H, W, 3) from landmarks (478, 3); `scale` is the eye distance, pixels."""
     weights = spline_weights(len(RIGHT_LIDS[0]), N_LID)
-    lines = [[weights @ landmarks[list(numbers)] for numbers in lids] for lids in LIDS]
+    lines = [[weights @ landmarks[list(numbers)] for numbers in lids] for lids in LID_MARGINS]
     eyes = [_Eye(pixels, landmarks, upper, lower, scale, eye) for eye, (upper, lower) in enumerate(lines)]
     step = _lower_step(eyes)
     if step > 0:
@@ -86,7 +86,7 @@ class _Eye:
         self._skin = self._lab(landmarks[list(BELOW[eye]), :2]).mean(axis=0)
 
     def _lab(self, places: Floats) -> Floats:
-        return lab_at(self._pixels, places, max(0.6, BLUR * self._scale))
+        return lab_at(self._pixels, places, max(0.6, LID_BLUR * self._scale))
 
     def _is_skin(self, places: Floats) -> Floats:
         """(...) likeness of the hue at places (..., 2) to that of the skin below the eye."""
@@ -125,7 +125,7 @@ class _Eye:
         """(K,) likeness to skin below the brow, at `FOLD_STEPS` above the upper margin; 1 too near to that skin."""
         brow = self._landmarks[list(ABOVE[self._eye]), :2]
         skin = np.median(self._lab(brow), axis=0)
-        room = FOLD_SHARE * float(np.linalg.norm(brow.mean(axis=0) - self._upper[N_LID // 2, :2])) / self._scale
+        room = FOLD_ROOM * float(np.linalg.norm(brow.mean(axis=0) - self._upper[N_LID // 2, :2])) / self._scale
         ways = (FOLD_STEPS * self._scale)[:, None, None] * self._bow[FOLD_COLUMNS] * self._down
         off = (self._lab(self._upper[None, FOLD_COLUMNS, :2] - ways) - skin) / (BRIGHT_SPREAD, HUE_SPREAD, HUE_SPREAD)
         return np.where(room < FOLD_STEPS, 1.0, np.exp(-(off**2).sum(axis=2) / 2).mean(axis=1))

@@ -4,13 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.photo.lid_lines import N_LID
-from tts2face.photo.photo_mesh import PhotoMesh
+from tts2face.photo.photo_mesh import PhotoMesh, grid_triangles
 from tts2face.photo.photo_surface import LIDS, PhotoPages, PhotoSurface
 
 Floats = NDArray[np.float64]
 
-N_ROWS = 5  # of vertices, from the fold to the band
-REACH = 0.018  # of the eye distance above the fold, whose skin a lid shows on its way there and back
+N_LID_ROWS = 5  # of vertices, from the fold to the band
+SHOWN_ABOVE = 0.018  # of the eye distance above the fold, whose skin a lid shows on its way there and back
 
 
 def add_lids(surface: PhotoSurface, mesh: PhotoMesh, pages: PhotoPages, scale: float) -> None:
@@ -20,13 +20,11 @@ def add_lids(surface: PhotoSurface, mesh: PhotoMesh, pages: PhotoPages, scale: f
     for fold, band, margin in zip(mesh.folds, mesh.bands, mesh.upper_lids, strict=True):
         moving = np.concatenate([fold[:1], band[-1], fold[-1:]])
         up = mesh.places[fold] - mesh.places[margin]
-        way = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-6) * (REACH * scale) * bow
+        way = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-6) * (SHOWN_ABOVE * scale) * bow
         rows = []
-        for share in np.linspace(0, 1, N_ROWS):
+        for share in np.linspace(0, 1, N_LID_ROWS):
             shown = mesh.places[fold] + way * (1 - abs(2 * share - 1))
             rows.append(surface.add(skin.at(fold).between(skin.at(moving), float(share)), uv=pages.uv(shown)))
-        grid = np.stack(rows)
-        a, b, c, d = (part.ravel() for part in (grid[:-1, :-1], grid[:-1, 1:], grid[1:, :-1], grid[1:, 1:]))
-        triangles = np.concatenate([np.column_stack([a, c, d]), np.column_stack([a, d, b])])
+        triangles = grid_triangles(np.stack(rows))
         is_mirrored = mesh.places[fold[0], 0] > mesh.places[fold[-1], 0]
         surface.parts.append((LIDS, triangles[:, ::-1] if is_mirrored else triangles))

@@ -14,16 +14,20 @@ Floats = NDArray[np.float64]
 
 N_POINTS = 41  # along a lip, from the person's right corner to the left one
 CLOSED_GAP = 0.02  # of the eye distance, as all lengths below; closed lips have up to .017, narrow smiles from .024
-REACH = 0.03  # to either side of the landmarks
+SEARCHED = 0.03  # to either side of the landmarks
 N_PLACES = 25  # that are compared across the line at each point
 SEAM_BLUR, LIP_BLUR = 0.005, 0.004
-SEAM_STIFFNESS, LIP_STIFFNESS = 2.0, 1.0  # cost of a step of .01 between neighbours
+LEAST_BLUR_PX, LEAST_LIP_BLUR_PX, LEAST_CONTRAST, TINY_PX = 0.6, 0.5, 1e-3, 1e-6
+STIFF_STEP = 0.01  # between neighbours, whose cost is the stiffness of a path
+LIP_MIDDLE = slice(6, -6)  # points whose colours are those of the lip
+SEAM_STIFFNESS, LIP_STIFFNESS = 2.0, 1.0  # cost of steps between neighbours
 SEAM_REST, LIP_REST = 0.15 / 0.02**2, 0.25 / 0.03**2  # cost of a distance from the landmarks
 EDGE_GAIN = 2.0
 LIP_SPREAD = np.array([22.0, 7.0, 9.0])  # of a lip's colour in Lab
 N_SIDE = 3  # places on each side of an edge whose colours are compared
 EDGE_SHADE, EDGE_DARKNESS = 0.006, 0.55  # reach of the shadow between lips that meet, and its share of the light
-SMOOTHING, CORNER_POINTS = 5, 4  # points of a mean, and points over which corners take less
+EDGE_REACH, EDGE_FINE = 3, 4  # reaches beyond which there is no shade, and points of a finer edge
+SMOOTHING, WAY_SMOOTHING, CORNER_POINTS = 5, 7, 4  # points of means, and points over which corners take less
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,13 +86,13 @@ def darken_lip_edges(pixels: NDArray[np.uint8], lips: LipLine, scale: float) -> 
     """Picture (H, W, 3) whose parted lips darken towards their inner edges, as lips that meet do."""
     if lips.is_closed:
         return pixels
-    margin = int(np.ceil(3 * EDGE_SHADE * scale)) + 2
+    margin = int(np.ceil(EDGE_REACH * EDGE_SHADE * scale)) + 2
     every = np.concatenate([lips.upper, lips.lower])[:, :2]
     low = np.maximum(np.floor(every.min(axis=0)).astype(int) - margin, 0)
     high = np.minimum(np.ceil(every.max(axis=0)).astype(int) + margin, pixels.shape[1::-1])
     down, across = np.mgrid[low[1] : high[1], low[0] : high[0]]
     places = np.column_stack([across.ravel(), down.ravel()]).astype(np.float64)
-    fine = spline_weights(N_POINTS, 4 * N_POINTS)
+    fine = spline_weights(N_POINTS, EDGE_FINE * N_POINTS)
     edges = np.concatenate([fine @ lips.upper, fine @ lips.lower])[:, :2]
     away = np.asarray(cKDTree(edges).query(places)[0]).reshape(down.shape)
     bright = 1 - EDGE_DARKNESS * np.exp(-((away / (EDGE_SHADE * scale)) ** 2))
@@ -102,25 +106,25 @@ def _seam(pixels: NDArray[np.uint8], line: Floats, scale: float) -> Floats:
     """A line (N, 3) moved to the darkest seam."""
     along = line[-1, :2] - line[0, :2]
     across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
-    offsets = np.linspace(-REACH, REACH, N_PLACES)
+    offsets = np.linspace(-SEARCHED, SEARCHED, N_PLACES)
     places = line[:, None, :2] + (offsets * scale)[None, :, None] * across
-    grey = grey_at(pixels, places, max(0.6, SEAM_BLUR * scale))
-    darkness = (grey - grey.mean(axis=1, keepdims=True)) / (grey.std() + 1e-3)
+    grey = grey_at(pixels, places, max(LEAST_BLUR_PX, SEAM_BLUR * scale))
+    darkness = (grey - grey.mean(axis=1, keepdims=True)) / (grey.std() + LEAST_CONTRAST)
     moved = line.copy()
-    moved[:, :2] += _path(darkness + SEAM_REST * offsets**2, offsets, SEAM_STIFFNESS)[:, None] * scale * across
+    moved[:, :2] += cheapest_path(darkness + SEAM_REST * offsets**2, offsets, SEAM_STIFFNESS)[:, None] * scale * across
     return moved
 
 
 def _edge(pixels: NDArray[np.uint8], line: Floats, outer: Floats, scale: float) -> Floats:
     """The inner edge (N, 3) of one lip, from its landmarks and those of its outer edge."""
     inwards = (line - outer)[:, :2]
-    inwards /= np.linalg.norm(inwards, axis=1, keepdims=True) + 1e-6
+    inwards /= np.linalg.norm(inwards, axis=1, keepdims=True) + TINY_PX
     inwards[:CORNER_POINTS], inwards[-CORNER_POINTS:] = inwards[CORNER_POINTS], inwards[-CORNER_POINTS - 1]
-    inwards = _smooth(inwards, 7)
-    offsets = np.linspace(-REACH, REACH, N_PLACES)
+    inwards = _smooth(inwards, WAY_SMOOTHING)
+    offsets = np.linspace(-SEARCHED, SEARCHED, N_PLACES)
     places = line[:, None, :2] + (offsets * scale)[None, :, None] * inwards[:, None]
-    middle = ((line + outer) / 2)[6:-6, None, :2]
-    blur = max(0.5, LIP_BLUR * scale)
+    middle = ((line + outer) / 2)[LIP_MIDDLE, None, :2]
+    blur = max(LEAST_LIP_BLUR_PX, LIP_BLUR * scale)
     colours = lab_at(pixels, np.concatenate([places.reshape(-1, 1, 2), middle]), blur)[:, 0]
     lip = np.median(colours[places[..., 0].size :], axis=0)
     unlike = (((colours[: places[..., 0].size] - lip) / LIP_SPREAD) ** 2).sum(axis=1).reshape(places.shape[:2])
@@ -131,16 +135,16 @@ def _edge(pixels: NDArray[np.uint8], line: Floats, outer: Floats, scale: float) 
     before = (sums[:, at] - sums[:, at - N_SIDE]) / N_SIDE
     behind = (sums[:, at + 1 + N_SIDE] - sums[:, at + 1]) / N_SIDE
     cost[:, at] = -EDGE_GAIN * (before - behind)
-    steps = _path(cost + LIP_REST * offsets**2, offsets, LIP_STIFFNESS)
+    steps = cheapest_path(cost + LIP_REST * offsets**2, offsets, LIP_STIFFNESS)
     from_corner = np.minimum(np.arange(N_POINTS), np.arange(N_POINTS)[::-1])
     moved = line.copy()
     moved[:, :2] += (steps * np.minimum(1, from_corner / CORNER_POINTS))[:, None] * scale * inwards
     return moved
 
 
-def _path(cost: Floats, offsets: Floats, stiffness: float) -> Floats:
+def cheapest_path(cost: Floats, offsets: Floats, stiffness: float) -> Floats:
     """Offset (N,) of each row of the cheapest path through costs (N, P), smoothed."""
-    step = stiffness * ((offsets[:, None] - offsets) / 0.01) ** 2
+    step = stiffness * ((offsets[:, None] - offsets) / STIFF_STEP) ** 2
     total, came = cost[0].copy(), np.zeros(cost.shape, np.int64)
     for row in range(1, len(cost)):
         each = total[None] + step

@@ -1,14 +1,16 @@
 """Light of a photograph: that of its skin, which turns with it, and that in the mouth, which comes through the lips."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter, map_coordinates
+from scipy.ndimage import gaussian_filter
 
-from tts2face.colour import decode_srgb
+from tts2face.colour import LUMINANCE, decode_srgb
 from tts2face.models.baked_light import (
     BLACK_SHARE,
     LEAST_SIDE,
-    LIMIT_STEP,
     N_BALL_TERMS,
     N_LAMP_NUMBERS,
     N_MOUTH_TERMS,
@@ -16,39 +18,80 @@ from tts2face.models.baked_light import (
     N_TERMS,
     TABLE_SIDE,
     BakedLight,
+    equal_limits,
+    quantised,
 )
 from tts2face.models.landmarks import LEFT_LIDS, OUTER_LIP_LOWER, OUTER_LIP_UPPER, RIGHT_LIDS
-from tts2face.numeric import smoothstep
-from tts2face.photo.photo_mesh import PhotoMesh, vertex_normals
+from tts2face.numeric import smoothstep, vertex_normals
+from tts2face.photo.colours import colours_at
+from tts2face.photo.mouth_inside import PICTURED
+from tts2face.photo.photo_mesh import PhotoMesh
 from tts2face.photo.photo_surface import EYES, LIDS, SKIN
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-BLUR = 0.03  # of the width of the face
+LIGHT_BLUR = 0.03  # of the width of the face
 SMALL_SPREAD_PX = 3.0  # blur of the smaller picture in which that is done
 NOSE_AND_BROWS = (46, 53, 52, 65, 55, 276, 283, 282, 295, 285, 1, 2, 98, 327)
 USUAL_LIGHT = np.array([0.6, 0.0, 0.18, 0.4])  # constant, and from the left, above and in front, of the median
-RIDGE = np.array([0.2, 1.0, 1.0, 1.0]) * 0.06
-ROUNDS = 6  # of the robust fit
-GAMMA = 2.2
-LEAST_LIGHT = 0.25
+LIGHT_RIDGE = np.array([0.2, 1.0, 1.0, 1.0]) * 0.06
+ROUNDS, LEAST_OFF = 6, 1e-4  # of the robust fit, and the least error by which others are weighed
+CLEAR, WITHIN_OVAL = 0.06, 0.04  # of the width: from features and within the oval, where skin is measured
+LIT_FADE = (-0.015, 0.08)  # of the width outside the oval, over which the light of the skin ends
+GAMMA = 2.2  # of a display
+LEAST_SHADE = 0.25  # of the median, of skin in the shade
 MOST_TURNED = 30.0  # of 255, change of the skin's light
 MOUTH_BASE, MOUTH_BY_OPENING = 0.5, 0.6  # of the colour in open light: in the dark, and times the curve of the opening
+SHADE_TINT = np.array([0.8, 1.05, 1.1])  # of what wrinkles darken: light between them is redder
+NO_EYES = np.array([0.2, 0.4], np.float32)  # edges of pupil and iris, of which a photographed face has none
+TURN_TERMS, MOVE_TERMS = slice(1, 4), slice(4, 7)  # of `tts2face.render.film.response.write_terms`
+LEAST_RESPONSE = 1e-6  # of 255, of a response
 CURVE_TERM = 2  # of `tts2face.render.film.response.write_mouth_terms`
 
 
-def skin_light(pixels: NDArray[np.uint8], mesh: PhotoMesh, vertices: Floats) -> tuple[Ints, Floats]:
-    """Vertices (N,) whose colour follows their normal, and (3, 3, N) its change by x, y and z of the normal's turn.
+@dataclass(frozen=True, slots=True, eq=False)
+class MouthRows:
+    """Parts behind lips, each its vertices (N,) and their colours (N, 3) in open light.
 
-    Light of first order (Basri and Jacobs 2003) is fitted to the skin's luminance.
+    Those that a picture shows and those that are lit come from the dark as the lips open; the walls do not.
+    """
+
+    pictured: Sequence[tuple[Ints, Floats]]
+    lit: Sequence[tuple[Ints, Floats]]
+    walls: Sequence[tuple[Ints, Floats]]
+
+    def light(self) -> tuple[Ints, Floats, Floats]:
+        """Vertices (M,), their base (M, 3), which is added to that of a picture, and responses (6, 3, M)."""
+        rows, bases, responses = [], [], []
+        for parts, base, dark, opened in (
+            (self.pictured, 0.0, MOUTH_BASE - 1, MOUTH_BY_OPENING),
+            (self.lit, MOUTH_BASE, 0.0, MOUTH_BY_OPENING),
+            (self.walls, 1.0, 0.0, 0.0),
+        ):
+            for numbers, colours in parts:
+                answer = np.zeros((N_MOUTH_TERMS, 3, len(numbers)))
+                answer[0], answer[CURVE_TERM] = dark * colours.T, opened * colours.T
+                rows.append(numbers)
+                bases.append(base * colours)
+                responses.append(answer)
+        return np.concatenate(rows), np.concatenate(bases), np.concatenate(responses, axis=2)
+
+
+def skin_light(
+    pixels: NDArray[np.uint8], mesh: PhotoMesh, vertices: Floats, by_movement: Floats
+) -> tuple[Ints, Floats]:
+    """Vertices (N,) whose colour follows their normal and movement, and (10, 3, N) its responses.
+
+    Light of first order (Basri and Jacobs 2003) is fitted to the skin's luminance. `by_movement` (3, V) is the change
+    of the light of all vertices by their movement, of their colour.
     """
     points = vertices[: len(mesh.places)]
     normals = vertex_normals(points, mesh.triangles)
     wide = float(np.ptp(mesh.places[mesh.landmark_vertices, 0]))
-    soft = _blurred(pixels, BLUR * wide, mesh.places)
+    soft = _blurred(pixels, LIGHT_BLUR * wide, mesh.places)
     colours = decode_srgb(soft / 255.0)
-    luminance = colours @ (0.21, 0.72, 0.07)
+    luminance = colours @ LUMINANCE
     avoided = {
         *OUTER_LIP_UPPER,
         *OUTER_LIP_LOWER,
@@ -58,25 +101,28 @@ def skin_light(pixels: NDArray[np.uint8], mesh: PhotoMesh, vertices: Floats) -> 
     is_near = np.isin(mesh.landmarks, list(avoided))
     places = mesh.places[mesh.landmark_vertices]
     away = np.linalg.norm(places[:, None] - places[is_near][None], axis=2).min(axis=1)
-    used = mesh.landmark_vertices[(away > 0.06 * wide) & (mesh.outside[mesh.landmark_vertices] < -0.04 * wide)]
+    used = mesh.landmark_vertices[(away > CLEAR * wide) & (mesh.outside[mesh.landmark_vertices] < -WITHIN_OVAL * wide)]
     terms = np.column_stack([np.ones(len(used)), normals[used]])
     light = _fit(terms, luminance[used])
-    shade = np.maximum(light[0] + normals @ light[1:], LEAST_LIGHT * float(np.median(luminance[used])))
-    lit = 1 - smoothstep(mesh.outside / wide, -0.015, 0.08)
+    shade = np.maximum(light[0] + normals @ light[1:], LEAST_SHADE * float(np.median(luminance[used])))
+    lit = 1 - smoothstep(mesh.outside / wide, *LIT_FADE)
     rows = np.flatnonzero(lit > 0)
     per_turn = light[1:, None] * (lit[rows] / (GAMMA * shade[rows]))
-    return rows, per_turn[:, None] * soft[rows].T[None]
+    responses = np.zeros((N_TERMS, 3, len(rows)))
+    responses[TURN_TERMS] = per_turn[:, None] * soft[rows].T
+    responses[MOVE_TERMS] = (by_movement[:, rows] * lit[rows])[:, None] * (SHADE_TINT * soft[rows]).T
+    return rows, responses
 
 
 def _fit(terms: Floats, values: Floats) -> Floats:
     usual = float(np.median(values)) * USUAL_LIGHT
-    ridge = np.diag(RIDGE) * len(values)
+    ridge = np.diag(LIGHT_RIDGE) * len(values)
     weights = np.ones(len(values))
     for _ in range(ROUNDS):
         weighted = terms * weights[:, None]
         light = np.linalg.solve(weighted.T @ terms + ridge, weighted.T @ values + ridge @ usual)
         off = np.abs(values - terms @ light)
-        weights = 1 / (1 + (off / (np.median(off) + 1e-4)) ** 2)
+        weights = 1 / (1 + (off / (np.median(off) + LEAST_OFF)) ** 2)
     return np.asarray(light)
 
 
@@ -88,17 +134,17 @@ def _blurred(pixels: NDArray[np.uint8], spread: float, places: Floats) -> Floats
     size = tuple(max(1, round(side / shrink)) for side in pixels.shape[1::-1])
     small = np.asarray(Image.fromarray(pixels).resize(size, Image.Resampling.BOX), np.float64)
     per_pixel = np.array(size) / np.array(pixels.shape[1::-1])
-    at = ((places + 0.5) * per_pixel - 0.5).T[::-1]
+    at = (places + 0.5) * per_pixel - 0.5
     soft = gaussian_filter(small, (spread / shrink, spread / shrink, 0))
-    return np.stack([map_coordinates(soft[..., c], at, order=1, mode="nearest") for c in range(3)], axis=1)
+    return colours_at(soft, at)
 
 
 def picture_light(
     pixels: NDArray[np.uint8],
     pages: NDArray[np.uint8],
-    skin: tuple[PhotoMesh, Floats],
+    skin: tuple[PhotoMesh, Floats, Floats],
     drawn: Ints,
-    mouth: tuple[NDArray[np.uint8], tuple[Ints, Ints]],
+    mouth: MouthRows,
 ) -> BakedLight:
     """Light of a face in a picture (H, W, 3): that of the skin turns with it, that of the mouth comes through the lips.
 
@@ -107,23 +153,16 @@ def picture_light(
     pages : (2, H, W, 3)
         As the face's parts show them.
     skin
-        Mesh of the picture and its vertices (V, 3), mm.
+        Mesh of the picture, its vertices (V, 3), mm, and the change of their light by movement (3, V).
     drawn : (D,)
         Triangles that move.
     mouth
-        Colours of all vertices in open light, and the vertices of teeth, gums and tongue, and of the mouth's walls.
+        Vertices behind the lips.
     """
-    rows, turned = skin_light(pixels, *skin)
-    responses = np.zeros((N_TERMS, 3, len(rows)))
-    responses[1:4] = turned
-    answers, sizes = _in_steps(responses)
-    colours, (teeth, walls) = mouth
-    mouth_rows = np.concatenate([teeth, walls])
-    lit = colours[mouth_rows].astype(np.float64)
-    openings = np.zeros((N_MOUTH_TERMS, 3, len(mouth_rows)))
-    openings[CURVE_TERM, :, : len(teeth)] = MOUTH_BY_OPENING * lit[: len(teeth)].T
-    lit[: len(teeth)] *= MOUTH_BASE
-    mouth_answers, mouth_sizes = _in_steps(openings)
+    rows, responses = skin_light(pixels, *skin)
+    answers, sizes = quantised(responses, least=LEAST_RESPONSE)
+    mouth_rows, lit, openings = mouth.light()
+    mouth_answers, mouth_sizes = quantised(openings, least=LEAST_RESPONSE)
     n_texels = N_PAGES * LEAST_SIDE**2 + LEAST_SIDE * (LEAST_SIDE // BLACK_SHARE)
     no_colours = np.zeros((0, 3), np.float32)
     return BakedLight(
@@ -137,17 +176,17 @@ def picture_light(
         camera_yaws_deg=np.zeros(0, np.float32),
         camera_modes=np.zeros((0, 3, LEAST_SIDE**2), np.int8),
         camera_sizes=np.zeros(0, np.float32),
-        page_of={SKIN: 0, LIDS: 0, EYES: 1},
+        page_of={SKIN: 0, LIDS: 0, EYES: 1, PICTURED: 1},
         rows=rows.astype(np.int32),
         responses=answers,
         response_sizes=sizes,
-        limits=_limits(MOST_TURNED, len(rows)),
+        limits=equal_limits(MOST_TURNED, len(rows)),
         partners=rows.astype(np.int32),
         mouth_rows=mouth_rows.astype(np.int32),
         mouth_base=np.rint(lit).astype(np.uint8),
         mouth_responses=mouth_answers,
         mouth_sizes=mouth_sizes,
-        mouth_limits=_limits(255.0, len(mouth_rows)),
+        mouth_limits=equal_limits(255.0, len(mouth_rows)),
         ball_rows=np.zeros(0, np.int32),
         ball_base=no_colours,
         ball_responses=np.zeros((N_BALL_TERMS, 3, 0), np.int8),
@@ -156,19 +195,7 @@ def picture_light(
         head_lamps=0,
         sky=np.zeros(3, np.float32),
         eye_gain=1.0,
-        eye_edges=np.array([0.2, 0.4], np.float32),
+        eye_edges=NO_EYES,
         view=np.zeros((TABLE_SIDE, TABLE_SIDE, TABLE_SIDE, 3), np.uint8),
         backdrop=pixels,
     )
-
-
-def _in_steps(values: Floats) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
-    """Responses (T, 3, N) in 8 bits, and the size (T,) of their steps."""
-    sizes = np.maximum(np.abs(values).max(axis=(1, 2), initial=0.0) / 127, 1e-6)
-    return np.rint(values / sizes[:, None, None]).astype(np.int8), sizes.astype(np.float32)
-
-
-def _limits(most: float, n: int) -> NDArray[np.int8]:
-    """(2, 3, n) limits of a change of light, of 255."""
-    steps = min(round(most / LIMIT_STEP), 127)
-    return np.tile(np.array([-steps, steps], np.int8)[:, None, None], (1, 3, n))

@@ -19,8 +19,8 @@ from tts2face.models.landmarks import (
     OUTER_LIP_LOWER,
     OUTER_LIP_UPPER,
 )
-from tts2face.numeric import points_in_polygon, unit_vectors
-from tts2face.photo.lid_lines import LIDS, N_LID, LidLines
+from tts2face.numeric import points_in_polygon
+from tts2face.photo.lid_lines import LID_MARGINS, N_LID, LidLines
 from tts2face.photo.lip_line import LipLine
 
 Floats = NDArray[np.float64]
@@ -237,7 +237,11 @@ def _landmarks(
 ) -> Ints:
     """Landmarks that become vertices: not on the lines, in the openings, or on the other side of the mouth."""
     size, scale = of_picture
-    on_lines = {*INNER_LIP_UPPER, *INNER_LIP_LOWER, *(number for lids in LIDS for line in lids for number in line)}
+    on_lines = {
+        *INNER_LIP_UPPER,
+        *INNER_LIP_LOWER,
+        *(number for lids in LID_MARGINS for line in lids for number in line),
+    }
     used = np.array([number for number in range(N_MESH_LANDMARKS) if number not in on_lines])
     places = landmarks[used, :2]
     side = np.zeros(N_MESH_LANDMARKS)
@@ -314,11 +318,7 @@ def _triangles(places: Floats, slits: Sequence[tuple[Ints, Ints]]) -> Ints:
     return left
 
 
-def vertex_normals(points: Floats, triangles: Ints) -> Floats:
-    """(V, 3) unit normals of vertices (V, 3)."""
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    flat = np.cross(b - a, c - a)
-    found = np.zeros_like(points)
-    for k in range(3):
-        np.add.at(found, triangles[:, k], flat)
-    return unit_vectors(found)
+def grid_triangles(numbers: Ints) -> Ints:
+    """Triangles of a grid of vertices (R, C), of rows from above and columns from the left, seen from ahead."""
+    a, b, c, d = (part.ravel() for part in (numbers[:-1, :-1], numbers[:-1, 1:], numbers[1:, :-1], numbers[1:, 1:]))
+    return np.concatenate([np.column_stack([a, c, d]), np.column_stack([a, d, b])])

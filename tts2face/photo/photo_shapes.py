@@ -17,7 +17,7 @@ from tts2face.models.landmarks import (
     OUTER_LIP_UPPER,
 )
 from tts2face.numeric import smoothstep
-from tts2face.photo.lid_lines import LIDS, N_LID
+from tts2face.photo.lid_lines import LID_MARGINS, N_LID
 from tts2face.photo.lip_line import N_POINTS as N_LIP
 from tts2face.photo.lip_line import LipLine, spline_weights
 from tts2face.photo.photo_camera import PhotoCamera
@@ -42,23 +42,27 @@ ABOVE_LIDS = (
 )  # landmarks of the fold, from the outer corner to the inner one
 BELOW_LIDS = ((25, 110, 24, 23, 22, 26, 112), (255, 339, 254, 253, 252, 256, 341))
 AROUND_EYES = ((130, 243), (359, 463))
-FOLD_SHARE, BELOW_SHARE = 0.12, 0.35  # of the way of the lid beside them, by which folds and lower lids follow
-STILL_FROM_EYE = 0.2  # of the eye distance outside the face
+FOLD_FOLLOW, BELOW_FOLLOW = 0.12, 0.35  # of the way of the lid beside them, by which folds and lower lids follow
+FEATURES_STILL = 0.2  # of the eye distance outside the face, beyond which blinks and closing lips move nothing
 GAZE_LIDS = {"eyeLookDown": 0.22, "eyeLookUp": -0.10}  # of a blink, by which the lids follow the gaze
 UPPER_SHARE, SMILING_SHARE = 0.25, 0.3  # of the way on which lips meet, of the upper lip; more in a smile
-THICKNESS, SMILING_THICKNESS = 0.8, -0.3  # share of that way of the outer edge of a lip
+LOWER_FOLLOW = (0.97, 1.05)  # of that way, by which the red of the lower lip and its outer edge follow
 PARTED = 0.03  # of the eye distance: a gap of lips that do not touch
+MOUTH_MIDDLE = (0, 17, 13)  # landmarks of the upper edge, the lower edge and the middle of the mouth
 LIP_STILL = 0.34  # of the eye distance from the mouth, beyond which closing lips move nothing
 BREATH_MM = 3.0  # rise of the shoulders
 SHOULDERS = (0.1, 0.9)  # below the chin, of the eye distance, over which they begin
 BELOW_SHOULDERS = (2.0, 3.6)  # over which their rise fades downwards
 BESIDE_SHOULDERS = (1.2, 2.0)  # from the middle of the face, of its width, over which they end
 NECK_FADE = (-0.05, 0.95)  # below the chin, of the eye distance, over which skin stops following the head
+TOP, SIDES_OF_FACE = 10, (234, 454)  # landmarks
 HEAD_ELLIPSE = (0.66, 0.78, 0.66)  # half axes of the head: of the face's width to the side, of its height up and down
 HEAD_MIDDLE = 0.14  # of the height of the face above its middle
 HEAD_FADE = (1.0, 1.75)  # half axes over which the background stops following the head
 BESIDE_NECK = (0.35, 0.75)  # of the face's width
 EDGE_STILL_PX, EDGE_FADE = 0.5, 0.25  # at the edges of the mesh: pixels that never move; of the eye distance beyond
+AWAY, FAR = 0.05, 0.1  # half axes of the head, and eye distances from the face, from which background is
+RIM = 0.02  # of the eye distance within the face
 DEPTH_PULL, RIM_DEPTH_PULL = 0.015, 0.001  # towards known depths, and those at the oval of the face
 BACKGROUND_DEPTH, BEYOND_DEPTH = 0.12, 0.05  # of the background before the pivot, and what may lie beyond it
 
@@ -93,12 +97,12 @@ def face_shapes(
     for brow in BROWS:
         for pair in brow:
             moved[list(pair)] = moved[list(pair)].mean(axis=0)
-    of_lip, of_lid = spline_weights(len(INNER_LIP_UPPER), N_LIP), spline_weights(len(LIDS[0][0]), N_LID)
+    of_lip, of_lid = spline_weights(len(INNER_LIP_UPPER), N_LIP), spline_weights(len(LID_MARGINS[0][0]), N_LID)
     lines: list[tuple[Ints, Floats, Sequence[int]]] = [
         (mesh.upper_lip, of_lip, INNER_LIP_UPPER),
         (mesh.lower_lip, of_lip, INNER_LIP_LOWER),
     ]
-    for upper, lower, lids in zip(mesh.upper_lids, mesh.lower_lids, LIDS, strict=True):
+    for upper, lower, lids in zip(mesh.upper_lids, mesh.lower_lids, LID_MARGINS, strict=True):
         lines += [(upper, of_lid, lids[0]), (lower, of_lid, lids[1])]
     pull = np.full(len(mesh.landmarks), SKIN_PULL)
     pull[np.isin(mesh.landmarks, FACE_OVAL)] = OVAL_PULL
@@ -140,8 +144,8 @@ def blink(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, eye: int) 
     for row in mesh.bands[eye]:
         found |= dict(zip(row.tolist(), ways["upper"][1:-1], strict=True))
     for numbers, share, way in (
-        (ABOVE_LIDS[eye], FOLD_SHARE, ways["upper"]),
-        (BELOW_LIDS[eye], BELOW_SHARE, ways["lower"]),
+        (ABOVE_LIDS[eye], FOLD_FOLLOW, ways["upper"]),
+        (BELOW_LIDS[eye], BELOW_FOLLOW, ways["lower"]),
     ):
         for number in numbers:
             if number in vertex_of:
@@ -153,7 +157,7 @@ def blink(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, eye: int) 
         if number not in free:
             found.setdefault(vertex, zero)
     still = [mesh.upper_lids[1 - eye], mesh.lower_lids[1 - eye], mesh.upper_lip, mesh.lower_lip]
-    for vertex in np.concatenate([*still, _still(mesh, STILL_FROM_EYE * person.scale, still)]).tolist():
+    for vertex in np.concatenate([*still, _still(mesh, FEATURES_STILL * person.scale, still)]).tolist():
         found.setdefault(vertex, zero)
     return spreading.exact(np.array(list(found)), np.array(list(found.values())))
 
@@ -163,15 +167,14 @@ def closing(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson) -> Float
     if person.lips.is_closed:
         return np.zeros((len(mesh.places), 3))
     shares = np.array([person.upper_share, person.upper_share - 1])
-    thick = THICKNESS + SMILING_THICKNESS * person.smile * person.is_parted
     ways = person.lips.lower - person.lips.upper
     numbers = np.arange(N_LIP)
     follow: dict[int, Floats] = {}
     vertex_of = mesh.vertex_of
     at_landmark = np.linspace(0, N_LIP - 1, len(INNER_LIP_UPPER))
     for line, outer, ring, share, near, far in (
-        (mesh.upper_lip, OUTER_LIP_UPPER, LIP_RINGS[0], shares[0], 0.5 + 0.5 * thick, thick),
-        (mesh.lower_lip, OUTER_LIP_LOWER, LIP_RINGS[1], shares[1], 0.97, 0.05 + thick),
+        (mesh.upper_lip, OUTER_LIP_UPPER, LIP_RINGS[0], shares[0], 1.0, 1.0),
+        (mesh.lower_lip, OUTER_LIP_LOWER, LIP_RINGS[1], shares[1], *LOWER_FOLLOW),
     ):
         follow |= {int(vertex): share * ways[k] for k, vertex in zip(numbers, line, strict=True)}
         for row, part in ((ring, near), (outer, far)):
@@ -179,11 +182,11 @@ def closing(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson) -> Float
                 if number in vertex_of:
                     way = [np.interp(place, numbers, ways[:, c]) for c in range(3)]
                     follow.setdefault(vertex_of[number], share * part * np.array(way))
-    mouth = person.landmarks[[MOUTH_CORNER_RIGHT, MOUTH_CORNER_LEFT, 0, 17, 13], :2]
+    mouth = person.landmarks[[MOUTH_CORNER_RIGHT, MOUTH_CORNER_LEFT, *MOUTH_MIDDLE], :2]
     far_off = np.linalg.norm(mesh.places[mesh.landmark_vertices][:, None] - mouth, axis=2).min(axis=1)
     zero = np.zeros(3)
     still = [mesh.landmark_vertices[far_off > LIP_STILL * person.scale], *mesh.upper_lids, *mesh.lower_lids]
-    for vertex in np.concatenate([*still, _still(mesh, STILL_FROM_EYE * person.scale, still)]).tolist():
+    for vertex in np.concatenate([*still, _still(mesh, FEATURES_STILL * person.scale, still)]).tolist():
         follow.setdefault(vertex, zero)
     return spreading.exact(np.array(list(follow)), np.array(list(follow.values())))
 
@@ -202,9 +205,9 @@ class HeadRegion:
     @classmethod
     def of(cls, landmarks: Floats) -> "HeadRegion":
         """Region of landmarks (478, 2 or 3), pixels."""
-        top, chin = landmarks[10, :2], landmarks[CHIN, :2]
+        top, chin = landmarks[TOP, :2], landmarks[CHIN, :2]
         height = float(np.linalg.norm(chin - top))
-        width = float(np.linalg.norm(landmarks[234, :2] - landmarks[454, :2]))
+        width = float(np.linalg.norm(landmarks[SIDES_OF_FACE[0], :2] - landmarks[SIDES_OF_FACE[1], :2]))
         down = (chin - top) / height
         middle = (top + chin) / 2 - HEAD_MIDDLE * height * down
         side, up, below = HEAD_ELLIPSE
@@ -256,9 +259,9 @@ def depths(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, camera: P
     """(V,) depths of all vertices: of the background, a little before the pivot of the head."""
     scale = person.scale
     behind = camera.to_pixels(pivot[None])[0, 2] + BACKGROUND_DEPTH * scale
-    away = HeadRegion.of(person.landmarks).radius(mesh.places) > HEAD_FADE[0] + 0.05
-    far = np.setdiff1d(np.flatnonzero(away & (mesh.outside > 0.1 * scale)), mesh.known)
-    at_rim = mesh.outside[mesh.known] > -0.02 * scale
+    away = HeadRegion.of(person.landmarks).radius(mesh.places) > HEAD_FADE[0] + AWAY
+    far = np.setdiff1d(np.flatnonzero(away & (mesh.outside > FAR * scale)), mesh.known)
+    at_rim = mesh.outside[mesh.known] > -RIM * scale
     pulls = np.concatenate([np.where(at_rim, RIM_DEPTH_PULL, DEPTH_PULL), np.full(len(far), DEPTH_PULL)])
     values = np.concatenate([mesh.depths, np.full(len(far), behind)])
     found = spreading.near(np.concatenate([mesh.known, far]), values, pulls)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tts2face.models.baked_light import LEAST_SIDE
 from tts2face.photo.eye_pictures import EyePatch
+from tts2face.photo.own_teeth import OwnTeeth
 from tts2face.photo.photo_mesh import PhotoMesh
 
 Floats = NDArray[np.float64]
@@ -15,7 +16,7 @@ Ints = NDArray[np.int64]
 
 SKIN, LIDS, EYES = "skin", "lids", "eyes"  # parts, of which the first two show the picture itself
 PAGE_MARGIN = 1 / 64  # of a page, beyond what it shows: the places nearest to its edges are not read
-BETWEEN_PX = 4  # of pictures of eyes on their page
+BETWEEN_PX = 4  # of patches on their page
 MOVED = 1e-3  # mm, or share of the head's motion, from which a vertex moves
 UNSEEN = 128.0  # colour of vertices whose colour is a picture's
 
@@ -87,14 +88,14 @@ def moves(vertices: Vertices) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PhotoPages:
-    """Pages (2, H, W, 3): what moves of a picture, and its eyes without lids.
+    """Pages (2, H, W, 3): what moves of a picture, and patches such as its eyes without lids.
 
-    ``corner`` (2,) and ``eye_corners`` are the pixels of the picture that would lie at the left top of the pages.
+    ``corner`` (2,) and ``patch_corners`` are the pixels of the picture that would lie at the left top of the pages.
     """
 
     pages: NDArray[np.uint8]
     corner: Floats
-    eye_corners: Sequence[Floats]
+    patch_corners: Sequence[Floats]
 
     def uv(self, places: Floats, corner: Floats | None = None) -> Floats:
         """(N, 2) places in a page of pixels (N, 2) of the picture."""
@@ -104,13 +105,13 @@ class PhotoPages:
 
 
 def lay_pages(
-    pixels: NDArray[np.uint8], mesh: PhotoMesh, is_moving: NDArray[np.bool_], eyes: Sequence[EyePatch]
+    pixels: NDArray[np.uint8], mesh: PhotoMesh, is_moving: NDArray[np.bool_], patches: Sequence[EyePatch | OwnTeeth]
 ) -> PhotoPages:
-    """Pages of a picture (H, W, 3) whose vertices (V,) move, and of its eyes."""
+    """Pages of a picture (H, W, 3) whose vertices (V,) move, and of patches."""
     shown = mesh.places[mesh.triangles[is_moving[mesh.triangles].any(axis=1)]].reshape(-1, 2)
     low = np.clip(np.floor(shown.min(axis=0)).astype(int) - 2, 0, None)
     high = np.minimum(np.ceil(shown.max(axis=0)).astype(int) + 3, pixels.shape[1::-1])
-    sizes = [np.array(patch.picture.shape[1::-1]) for patch in eyes]
+    sizes = [np.array(patch.picture.shape[1::-1]) for patch in patches]
     beside = (sum(int(size[0]) + BETWEEN_PX for size in sizes), max(int(size[1]) for size in sizes))
     wide, tall = (_page_side(int(side)) for side in np.maximum(high - low, beside))
     left, top = round(PAGE_MARGIN * wide), round(PAGE_MARGIN * tall)
@@ -118,7 +119,7 @@ def lay_pages(
     around = ((top, below), (left, right), (0, 0))
     first = np.pad(pixels[low[1] : high[1], low[0] : high[0]], around, mode="edge")
     second, at, corners = np.zeros_like(first), left, []
-    for patch in eyes:
+    for patch in patches:
         h, w = patch.picture.shape[:2]
         second[top : top + h, at : at + w] = patch.picture
         corners.append(np.array(patch.corner, np.float64) - (at, top))

@@ -10,17 +10,18 @@ from scipy.spatial import cKDTree
 
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Face, Part, PhotoView
-from tts2face.models.landmarks import N_LANDMARKS, UPPER_LIP_INNER_MID
-from tts2face.photo.eye_pictures import BEHIND_MM, SIDES, EyePatch, eye_patch, gaze_shapes
-from tts2face.photo.found_face import FoundFace
+from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.photo.eye_pictures import EYE_BEHIND_MM, SIDES, EyePatch, eye_patches, gaze_shapes
+from tts2face.photo.found_face import PhotographedFace
 from tts2face.photo.landmark_places import place_landmarks
 from tts2face.photo.lid_lines import find_lid_lines
 from tts2face.photo.lids import add_lids
 from tts2face.photo.lip_line import LipLine, darken_lip_edges, find_lip_line
-from tts2face.photo.mouth_inside import MouthInside, head_mouth, mouth_light, mouth_walls
+from tts2face.photo.mouth_inside import MouthInside, MouthPlace, cheek_light, mouth_light, mouth_walls
+from tts2face.photo.own_teeth import OwnTeeth, find_teeth, teeth_and_tongue
 from tts2face.photo.photo_camera import PhotoCamera, find_camera
 from tts2face.photo.photo_fit import NOTHING_GIVEN, PhotoFit, PhotoPlaces
-from tts2face.photo.photo_light import picture_light
+from tts2face.photo.photo_light import MouthRows, picture_light
 from tts2face.photo.photo_mesh import PhotoMesh, build_mesh
 from tts2face.photo.photo_shapes import (
     GAZE_LIDS,
@@ -35,13 +36,14 @@ from tts2face.photo.photo_shapes import (
 from tts2face.photo.photo_surface import EYES, SKIN, PhotoPages, PhotoSurface, Vertices, lay_pages, moves
 from tts2face.photo.photograph import Photograph
 from tts2face.photo.spreading import Spreading
+from tts2face.photo.wrinkles import SMILING, wrinkles
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-BREATH, SMILE_SHAPES = "breath", ("mouthSmileLeft", "mouthSmileRight")
+BREATH = "breath"
 SMILE_KEPT = 0.6  # of a smile with parted lips, while they speak
-INTO_LIP = 0.006  # of the eye distance, by which the edges of parted lips are taken from within the lip
+INTO_LIP = 0.012  # of the eye distance, by which the edges of parted lips are taken from within the lip
 N_NEAR = 6  # vertices of the skin around a place behind it
 FOLLOW_STEPS = 255  # of the share of the head's motion, as files hold it
 
@@ -66,21 +68,21 @@ class _Model:
 
 
 def speaking_photo(
-    picture: Photograph,
-    found: FoundFace,
-    smile: float,
+    seen: PhotographedFace,
     head: Face,
     metadata: Mapping[str, Any],
+    *,
+    teeth: OwnTeeth | None = None,
     fit: PhotoFit = NOTHING_GIVEN,
 ) -> Face:
     """Face of a picture in which a face was found, with the shapes of a head without hair.
 
     Parameters
     ----------
-    smile
-        Score of the picture's smile, 0 to 1.
     metadata
         Name and consent.
+    teeth
+        Of the person in another picture; those in this one, or the head's, if omitted.
     fit
         Corrections by a person. The places that were used are those of the fit in the metadata of the face.
 
@@ -89,36 +91,49 @@ def speaking_photo(
     DataError
         The fit is not that of this picture and face.
     """
-    model, pixels = _Model.of(head), picture.pixels
+    model, picture, found = _Model.of(head), seen.picture, seen.found
+    pixels = picture.pixels
     camera = find_camera(found, model.landmarks)
     landmarks, scale = camera.depths_of(found.landmarks), found.eye_distance_px
     line = find_lip_line(pixels, found)
     given = PhotoPlaces(fit, (pixels.shape[1], pixels.shape[0]), picture.reduced_by, scale)
     lips = given.lips(LipLine(camera.depths_of(line.upper), camera.depths_of(line.lower), line.gap))
-    person = PhotoPerson(given.size, landmarks, lips, smile, scale)
+    person = PhotoPerson(given.size, landmarks, lips, seen.mean_score(SMILING), scale)
     lids = given.lids(find_lid_lines(pixels, landmarks, scale))
     pivot = given.point("pivot", camera.to_pixels(head.pivot[None].astype(np.float64))[0])
     mesh = build_mesh(person.size, landmarks, lips, lids, scale)
     photo, skin = _skin(mesh, person, camera, model)
-    patches = [eye_patch(pixels, landmarks, lids, eye, scale) for eye in (0, 1)]
-    pages = lay_pages(darken_lip_edges(pixels, lips, scale), mesh, moves(skin), patches)
+    creases = wrinkles(pixels, mesh, dict(zip(model.names, skin.shapes, strict=True)), person)
+    patches = eye_patches(pixels, landmarks, lids, scale)
+    teeth = find_teeth(pixels, found, lips, camera, head) if teeth is None else teeth
+    teeth = None if teeth is None else teeth.in_light_of(cheek_light(pixels, landmarks))
+    pictures: list[EyePatch | OwnTeeth] = [*patches[0], *patches[1], *([] if teeth is None else [teeth])]
+    pages = lay_pages(darken_lip_edges(pixels, lips, scale), mesh, moves(skin), pictures)
     surface = PhotoSurface()
     surface.add(skin, uv=pages.uv(_shown_places(mesh, person)))
     surface.parts.append((SKIN, mesh.triangles))
     add_lids(surface, mesh, pages, scale)
-    eyes = []
-    for eye, patch in enumerate(patches):
-        uv = pages.uv(patch.places, pages.eye_corners[eye])
-        eyes.append(surface.add(_eye_vertices(patch, eye, photo, camera, model), uv=uv))
-        surface.parts.append((EYES, eyes[eye][patch.triangles]))
-    corners, weights = place_landmarks(mesh, landmarks, list(zip(patches, eyes, strict=True)))
-    white = np.mean([patch.white for patch in patches], axis=0)
-    light = mouth_light(pixels, landmarks, white, is_parted=person.is_parted)
+    eyes, corners_of = [], iter(pages.patch_corners)
+    for eye, parts in enumerate(patches):
+        for patch in parts:
+            rows = surface.add(
+                _eye_vertices(patch, eye, photo, camera, model), uv=pages.uv(patch.places, next(corners_of))
+            )
+            surface.parts.append((EYES, rows[patch.triangles]))
+            eyes += [(patch, rows)] if patch is parts[0] else []
+    corners, weights = place_landmarks(mesh, landmarks, eyes)
+    light = mouth_light(pixels, landmarks, np.mean([parts[0].white for parts in patches], axis=0))
     at_rest = np.einsum("lc,lcx->lx", weights, surface.places[corners])
-    inside = head_mouth(head, model.landmarks, at_rest, at_rest[UPPER_LIP_INNER_MID], light)
-    teeth = given.point("teeth", camera.to_pixels(inside.teeth_edge[None])[0])
-    inside = inside.moved(camera.to_head(teeth[None])[0] - inside.teeth_edge)
-    mouth = (_add_inside(surface, inside), _add_inside(surface, mouth_walls(mesh, skin.places, skin.shapes, light)))
+    inside = teeth_and_tongue(head, MouthPlace.of(model.landmarks, at_rest, is_parted=person.is_parted), light, teeth)
+    edge = given.point("teeth", camera.to_pixels(inside[0].teeth_edge[None])[0])
+    way = camera.to_head(edge[None])[0] - inside[0].teeth_edge
+    inside = [one.moved(way) for one in inside]
+    walls = mouth_walls(mesh, skin.places, skin.shapes, light)
+    mouth = MouthRows(
+        pictured=[_add_inside(surface, one, pages) for one in inside if one.texels is not None],
+        lit=[_add_inside(surface, one, pages) for one in inside if one.texels is None],
+        walls=[_add_inside(surface, walls, pages)],
+    )
     every = surface.every()
     triangles = np.concatenate([part for _, part in surface.parts])
     drawn = np.flatnonzero(moves(every)[triangles].any(axis=1))
@@ -138,9 +153,9 @@ def speaking_photo(
         landmark_vertices=corners,
         landmark_weights=weights,
         pivot=camera.to_head(pivot[None])[0].astype(np.float32),
-        metadata={**metadata, "fit": given.used(lips, lids, {"teeth": teeth, "pivot": pivot}).as_json()},
+        metadata={**metadata, "fit": given.used(lips, lids, {"teeth": edge, "pivot": pivot}).as_json()},
         scores=head.scores,
-        light=(picture_light(pixels, pages.pages, (mesh, skin.places), drawn, (colours, mouth)),),
+        light=(picture_light(pixels, pages.pages, (mesh, skin.places, creases), drawn, mouth),),
         photograph=_view(picture, camera, every.follow, pages),
     )
 
@@ -176,7 +191,7 @@ def _skin(mesh: PhotoMesh, person: PhotoPerson, camera: PhotoCamera, model: _Mod
     photo = np.column_stack([mesh.places, depth])
     rest = camera.to_head(photo) + camera.ways_to_head(closing(mesh, spreading, person))
     if person.is_parted:
-        rest -= (1 - SMILE_KEPT) * person.smile * np.sum([found[name] for name in SMILE_SHAPES], axis=0)
+        rest -= (1 - SMILE_KEPT) * person.smile * np.sum([found[name] for name in SMILING], axis=0)
     share = person.upper_share
     met = (1 - share) * rest[mesh.upper_lip] + share * rest[mesh.lower_lip]
     rest[mesh.upper_lip] = rest[mesh.lower_lip] = met
@@ -200,7 +215,7 @@ def _eye_vertices(patch: EyePatch, eye: int, photo: Floats, camera: PhotoCamera,
     """Vertices of a patch behind the skin around it, which is given by the pixels and depths (V, 3) of all skin."""
     away, near = cKDTree(photo[:, :2]).query(patch.places, N_NEAR)
     shares = 1 / (np.asarray(away) + 1)
-    depth = (photo[near, 2] * shares).sum(axis=1) / shares.sum(axis=1) - BEHIND_MM * camera.scale
+    depth = (photo[near, 2] * shares).sum(axis=1) / shares.sum(axis=1) + (patch.ahead_mm - EYE_BEHIND_MM) * camera.scale
     shapes = np.zeros((len(model.names), len(patch.places), 3))
     for name, way in gaze_shapes(model.head, patch.turning, eye).items():
         shapes[model.names.index(name)] = way
@@ -208,11 +223,15 @@ def _eye_vertices(patch: EyePatch, eye: int, photo: Floats, camera: PhotoCamera,
     return Vertices(places, shapes, np.ones(len(places)))
 
 
-def _add_inside(surface: PhotoSurface, inside: MouthInside) -> Ints:
-    """Vertices of what lies in the mouth."""
+def _add_inside(surface: PhotoSurface, inside: MouthInside, pages: PhotoPages) -> tuple[Ints, Floats]:
+    """Vertices (N,) of what lies in the mouth, and their colours (N, 3) in open light."""
     n = len(inside.vertices)
     shapes = np.zeros((surface.vertices[0].shapes.shape[0], n, 3))
     shapes[: len(inside.shapes)] = inside.shapes
-    numbers = surface.add(Vertices(inside.vertices, shapes, np.ones(n)), colours=inside.colours)
+    vertices = Vertices(inside.vertices, shapes, np.ones(n))
+    if inside.texels is None:
+        numbers = surface.add(vertices, colours=inside.colours)
+    else:
+        numbers = surface.add(vertices, uv=pages.uv(inside.texels, pages.patch_corners[-1]))
     surface.parts += [(name, numbers[triangles]) for name, triangles in inside.parts.items()]
-    return numbers
+    return numbers, inside.colours

@@ -8,6 +8,7 @@ numbers that their bits are, so that nothing is lost.
 import math
 import zlib
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +29,13 @@ _PLAIN = (text, choice(*TYPES), list_of(whole(0, MAX_BYTES)))
 
 def deflate(content: bytes) -> NDArray[np.uint8]:
     """Deflated bytes (N,)."""
-    found = []
-    for strategy in STRATEGIES:
+
+    def compress(strategy: int) -> bytes:
         stream = zlib.compressobj(LEVEL, strategy=strategy)
-        found.append(stream.compress(content) + stream.flush())
-    return np.frombuffer(min(found, key=len), np.uint8)
+        return stream.compress(content) + stream.flush()
+
+    with ThreadPoolExecutor(len(STRATEGIES)) as pool:  # zlib lets other threads run
+        return np.frombuffer(min(pool.map(compress, STRATEGIES), key=len), np.uint8)
 
 
 def inflate(content: NDArray[Any], size: int, what: str, path: Path) -> bytes:

@@ -11,7 +11,7 @@ import pytest
 from corpus_tools.dense.adapt_head import RIGID_MOUTH_PARTS, adapt_head
 from corpus_tools.dense.build_face import build_face
 from corpus_tools.dense.mesh_fit import OPEN_JAW_WEIGHT, align_to_head, face_landmarks, part_vertices
-from corpus_tools.dense.skin_colour import build_picture_fitter, vertex_normals
+from corpus_tools.dense.skin_colour import build_picture_fitter, welded_normals
 from corpus_tools.dense.video_landmarks import find_videos
 from corpus_tools.dense.visible_texels import build_canvas, polygon_depth
 from corpus_tools.run_options import RunOptions
@@ -103,7 +103,7 @@ def test_no_triangle_of_the_skin_is_torn_or_turned_over(head: Face, long_head: F
     sides = [np.linalg.norm(np.diff(face.vertices[skin], axis=1), axis=2) for face in (head, long_head)]
     long_enough = sides[0] > 0.5
     assert (sides[1][long_enough] / sides[0][long_enough]).max() < 2.5
-    along = (vertex_normals(head) * vertex_normals(long_head)).sum(axis=1)[np.unique(skin)]
+    along = (welded_normals(head) * welded_normals(long_head)).sum(axis=1)[np.unique(skin)]
     assert np.percentile(along, 0.5) > 0.5
 
 

@@ -22,7 +22,7 @@ from corpus_tools.dense.modes import (
     spread_shapes,
 )
 from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
-from corpus_tools.dense.video_landmarks import VideoLandmarks
+from corpus_tools.dense.video_landmarks import TrackedPictures
 from lexicon.errors import InputError
 from tests.face.posing import posed_vertices
 from tests.rendered_takes import ONLY_RENDERED
@@ -51,7 +51,7 @@ def talker(head: Face) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def observed(head: Face, talker: np.ndarray) -> list[VideoLandmarks]:
+def observed(head: Face, talker: np.ndarray) -> list[TrackedPictures]:
     """Frames of five known shapes at random weights; one frame shows no face."""
     numbers = [head.shape_names.index(name) for name in SHOWN]
     directions = np.stack([face_landmarks(head, head.shapes[number]) for number in numbers])
@@ -59,7 +59,7 @@ def observed(head: Face, talker: np.ndarray) -> list[VideoLandmarks]:
     videos = talker + 0.5 * np.einsum("vtk,klc->vtlc", amounts, directions)
     videos[0, 3] = np.nan
     return [
-        VideoLandmarks(Path(f"{number}.mkv"), video, video) for number, video in enumerate(videos.astype(np.float32))
+        TrackedPictures(Path(f"{number}.mkv"), video, video) for number, video in enumerate(videos.astype(np.float32))
     ]
 
 
@@ -69,7 +69,7 @@ def fit(head: Face) -> PictureFitter:
 
 
 @pytest.fixture(scope="module")
-def model(head: Face, fit: PictureFitter, observed: list[VideoLandmarks], talker: np.ndarray) -> DenseModel:
+def model(head: Face, fit: PictureFitter, observed: list[TrackedPictures], talker: np.ndarray) -> DenseModel:
     return dense_model(head, fit, observed, talker, N_MODES)
 
 
@@ -82,7 +82,7 @@ def weights_of(face: Face, **shown: float) -> np.ndarray:
 
 
 def test_a_dense_fit_is_the_direct_solution_of_eqs_3_and_4(
-    head: Face, fit: PictureFitter, observed: list[VideoLandmarks], talker
+    head: Face, fit: PictureFitter, observed: list[TrackedPictures], talker
 ) -> None:
     """u = x - x0 at the constrained places, c = Phi^-1 u, f = sum c phi(|x - x_i|), phi(r) = exp(-r / 64) at 200 px."""
     moved = displacements(fit, observed[1].landmarks[:3], talker)
@@ -99,7 +99,7 @@ def test_a_dense_fit_is_the_direct_solution_of_eqs_3_and_4(
 
 
 def test_modes_are_the_principal_components_of_the_dense_shapes(
-    head: Face, fit: PictureFitter, observed: list[VideoLandmarks], talker: np.ndarray, model: DenseModel
+    head: Face, fit: PictureFitter, observed: list[TrackedPictures], talker: np.ndarray, model: DenseModel
 ) -> None:
     frames = np.concatenate([displacements(fit, one.landmarks, talker) for one in observed])
     assert model.n_frames == len(frames) == N_VIDEOS * N_FRAMES - 1
@@ -120,7 +120,7 @@ def test_modes_are_the_principal_components_of_the_dense_shapes(
 
 
 def test_the_sparse_model_is_that_of_the_landmarks(
-    observed: list[VideoLandmarks], fit: PictureFitter, talker, model: DenseModel
+    observed: list[TrackedPictures], fit: PictureFitter, talker, model: DenseModel
 ) -> None:
     frames = np.concatenate([displacements(fit, one.landmarks, talker) for one in observed]).reshape(model.n_frames, -1)
     scales = np.linalg.svd(frames - frames.mean(axis=0), compute_uv=False)
@@ -151,7 +151,7 @@ def test_errors_of_held_out_frames_are_those_of_dense_shapes() -> None:
 def test_a_face_file_shows_a_frame_by_its_parameters(
     head: Face,
     fit: PictureFitter,
-    observed: list[VideoLandmarks],
+    observed: list[TrackedPictures],
     talker: np.ndarray,
     model: DenseModel,
     tmp_path: Path,
@@ -208,7 +208,7 @@ def test_the_edge_of_the_lower_lip_follows_the_jaw_evenly(head: Face) -> None:
 
 @pytest.mark.parametrize("n_modes", [0, N_VIDEOS * N_FRAMES])
 def test_more_modes_than_frames_are_refused(
-    n_modes: int, head: Face, fit: PictureFitter, observed: list[VideoLandmarks], talker
+    n_modes: int, head: Face, fit: PictureFitter, observed: list[TrackedPictures], talker
 ) -> None:
     with pytest.raises(InputError, match=f"{n_modes} dense modes cannot be computed from 59 frames; choose 1 to 58"):
         dense_model(head, fit, observed, talker, n_modes)

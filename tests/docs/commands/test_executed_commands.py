@@ -22,12 +22,11 @@ from tests.docs.blocks import (
     reason_not_executed,
     shell_lines,
 )
+from tests.photo.pictures import SMILE, still
 from tts2face import Picture, Project, Request, export, import_face, save_face, save_project, session
 from tts2face.jobs.database import prepare_database
-from tts2face.models.face_loading import load_face
 from tts2face.models.palette import Palette, load_palette, write_palette
 from tts2face.photo import kept_faces
-from tts2face.render.draw import draw
 from tts2face.storage.files import SHIPPED_FOLDER
 
 SMALL = {"--size": "64x64", "--fps": "5"}
@@ -93,7 +92,8 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
         file.writeframes((sound.samples * 32767).astype("<i2").tobytes())
     shutil.copy(SHIPPED_FOLDER / "grid_s1.talker", folder / "me.talker")
     shutil.copy(SHIPPED_FOLDER / "head.face", folder / "me.face")
-    Image.fromarray(draw(load_face("tomas"), picture=Picture(size="320x320"))).save(folder / "me.jpg")
+    Image.fromarray(still("tomas", 320)).save(folder / "me.jpg")
+    Image.fromarray(still("tomas", 320, **SMILE)).save(folder / "me2.jpg")
     (folder / "fit.json").write_text('{"pivot": [160, 200]}', encoding="utf-8")
     starter = load_palette("starter")
     styles = {"mine" if name == "grid_s1" else name: style for name, style in starter.styles.items()}

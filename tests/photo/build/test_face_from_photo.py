@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lexicon.errors import InputError
+from lexicon.errors import DataError, InputError
 from tests.face.people import LIT
-from tests.photo.pictures import still
+from tests.photo.pictures import SMILE, still
 from tts2face.face.face_motion import moved_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import inner_lip_gaps, lip_opening, lip_width
 from tts2face.photo.face_from_photo import face_from_photo
+from tts2face.photo.mouth_inside import PICTURED
 from tts2face.render.picture import Picture
 from tts2face.session import Session
 from tts2face.types import Clip
@@ -64,6 +65,29 @@ def test_the_same_photo_gives_the_same_face(photo: Path, face: Face, face_model:
     np.testing.assert_array_equal(again.vertices, face.vertices)
     np.testing.assert_array_equal(again.shapes, face.shapes)
     assert face.metadata["name"] == photo.stem
+
+
+@pytest.fixture(scope="module")
+def smile(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("smile") / "smile.png"
+    Image.fromarray(still("head", SIDE, head=(4, 8, 0), **SMILE)).save(path)
+    return path
+
+
+def test_a_second_picture_gives_the_teeth(smile: Path, tmp_path: Path, face_model: Path) -> None:
+    photo, other = tmp_path / "me.png", tmp_path / "other.png"
+    Image.fromarray(still("head", SIDE)).save(photo)
+    Image.fromarray(still("zuri", SIDE, **SMILE)).save(other)
+    plain, own = (face_from_photo(photo, consent="drawn", model=face_model, smile=one) for one in (None, smile))
+    assert PICTURED not in {part.name for part in plain.parts}
+    assert PICTURED in {part.name for part in own.parts}
+    for wrong, reason in (
+        (photo, r"no upper teeth are seen in .*me\.png; give a picture of a smile that shows them clearly"),
+        (other, r"other\.png shows another face than .*me\.png; give a smile of the same person"),
+        (f"{smile}@2", r"smile\.png has one face, and no face 2"),
+    ):
+        with pytest.raises((DataError, InputError), match=reason):
+            face_from_photo(photo, consent="drawn", model=face_model, smile=wrong)
 
 
 def test_a_session_shows_a_photo(photo: Path) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tts2face.face.deformation import eye_rotations, head_transform
 from tts2face.face.pupils import DILATION, PUPIL_SHAPE
-from tts2face.models.baked_light import LEAST_SIDE, N_BALL_TERMS, N_PAGES, N_TERMS, BakedLight
+from tts2face.models.baked_light import LEAST_SIDE, N_BALL_TERMS, N_PAGES, N_TERMS, BakedLight, equal_limits
 from tts2face.models.face import Face
 from tts2face.render.camera import CameraMatrices
 from tts2face.render.film.cut_out import compose_over, find_covers
@@ -292,16 +292,11 @@ def build_lit_scene(
         answers=(
             (light.responses, light.response_sizes, light.limits),
             (light.mouth_responses, light.mouth_sizes, light.mouth_limits),
-            (light.ball_responses, light.ball_sizes, _no_limits(len(light.ball_rows))),
+            (light.ball_responses, light.ball_sizes, equal_limits(255.0, len(light.ball_rows))),
         ),
         turns=turn_weights(light.turns_deg),
         wall=None if covers is None else background,
     )
-
-
-def _no_limits(n: int) -> NDArray[np.int8]:
-    """(2, 3, n) limits that are never reached."""
-    return np.tile(np.array([-127, 127], np.int8)[:, None, None], (1, 3, n))
 
 
 def _planes(base: NDArray[np.generic]) -> Float32Array:

@@ -111,7 +111,7 @@ def _add_picture(kind: str) -> None:
 
 
 def _form(kind: str) -> dict[str, Any]:
-    fields = {
+    fields: dict[str, dict[str, Any]] = {
         "file": {"type": "string", "format": "binary", "description": CONTENTS[kind]},
         "name": {
             "type": "string", "pattern": "^[a-z0-9][a-z0-9-]{0,39}$", "example": "anna",
@@ -225,7 +225,7 @@ async def _checked(state: ServiceState, key: ApiKey, sent: Sent, folder: UploadF
     """Folder with a checked resource of a saved file."""
     n_bytes = state.library.limits(key).n_bytes
     if sent.kind == FACE and await asyncio.to_thread(_is_photo, given):
-        with photo_turn(state, key):
+        with _photo_turn(state, key):
             folder.state(given, sent.name, sent.consent, sent.fit)
             if sent.makes == AVATAR:
                 return await folder.avatar(given, n_bytes)
@@ -238,7 +238,23 @@ async def _checked(state: ServiceState, key: ApiKey, sent: Sent, folder: UploadF
     return checked
 
 
-def photo_turn(state: ServiceState, key: ApiKey, *, counts: bool = True) -> AbstractContextManager[None]:
+async def find_photo_places(
+    state: ServiceState, key: ApiKey, folder: UploadFolder, photo: Path
+) -> tuple[Path, dict[str, Any]]:
+    """Lips, lids, teeth and pivot in a photo that is saved in a private folder, as `UploadFolder.places`.
+
+    Raises
+    ------
+    RefusedError
+        The operator allows no photos, the key reads one already, too many files are checked, or it shows no face.
+    """
+    async with state.checks:
+        with _photo_turn(state, key, counts=False):
+            folder.state(photo, photo.name, None, None)
+            return await folder.places(photo)
+
+
+def _photo_turn(state: ServiceState, key: ApiKey, *, counts: bool = True) -> AbstractContextManager[None]:
     """A turn of a key to read a photo, if the operator allows them; errors as `RateLimits.photo`."""
     if not state.settings.photos:
         raise RefusedError(403, "forbidden", NO_PHOTOS)

@@ -24,6 +24,7 @@ from tts2face.service.uploads.tool_process import run_take_process
 
 RESOURCE_TIMEOUT_S = 300.0  # a check takes 3 to 7 s; with other work on the machine, and kernels to compile, longer
 AVATAR_CPU_S = 240  # the head of a person takes 15 s
+UPLOAD_PREFIX = "tts2face-upload-"  # of names of private folders
 MAX_REASON = 300  # characters
 MAX_TEXT_BYTES = 1_000_000
 BLOCK_BYTES = 1 << 20
@@ -193,5 +194,5 @@ def _refused(name: str, reason: str) -> RefusedError:
 @asynccontextmanager
 async def upload_folder(settings: ServiceSettings) -> AsyncIterator[UploadFolder]:
     """A private folder for the uploads of one request."""
-    with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
+    with tempfile.TemporaryDirectory(prefix=UPLOAD_PREFIX) as folder:
         yield UploadFolder(Path(folder), settings)

@@ -1,18 +1,41 @@
-"""A dialog in which a picture of a person becomes a face of the key."""
+"""A dialog in which a picture of a person becomes a face of the key: one that speaks in the picture, or a head."""
 
+import asyncio
+import json
 import re
-from collections.abc import Awaitable, Callable
+import shutil
+import tempfile
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from nicegui import events, ui
 
 from tts2face.jobs.resource_check import FACE
-from tts2face.service.routes.resources import MAX_CONSENT, MAX_NAME, Sent, store_resource
+from tts2face.service.routes.resources import (
+    AVATAR,
+    MAX_CONSENT,
+    MAX_NAME,
+    SPEAKING_PICTURE,
+    Sent,
+    find_photo_places,
+    store_resource,
+)
+from tts2face.service.uploads.upload_folder import UPLOAD_PREFIX, UploadFolder
+from tts2face.studio.components.photo_places import PhotoPlaces
 from tts2face.studio.pages.frame import heading, shown_errors
 from tts2face.studio.pages.open_page import OpenPage
 
 PICTURES = ".jpg,.jpeg,.png,.webp,.heic,.heif,.tif,.tiff,.bmp,.gif"
 MB = 1_000_000
+TITLE = "A face from a photo"
+MAKES = {SPEAKING_PICTURE: "Speaks in the picture", AVATAR: "3D head of the person"}
+ABOUT = {
+    SPEAKING_PICTURE: "Drag lips, lids, the edge of the upper teeth and the pivot where they were found wrongly.",
+    AVATAR: "The head has the person's shape, skin, eyes, hair and clothes, and turns; haircut and hair colour can be "
+    "chosen afterwards. Making it takes half a minute.",
+}
 Made = Callable[[str], Awaitable[None]]
 
 
@@ -22,44 +45,124 @@ def may_make_faces(page: OpenPage) -> bool:
 
 
 class PhotoDialog:
-    """Asks for a picture, a name and the person's consent; `made` gets the name of the face."""
+    """Asks for a picture, a name and the person's consent; `made` gets the name of the face.
+
+    The picture lies in a private folder while the dialog is open.
+    """
 
     def __init__(self, page: OpenPage, made: Made) -> None:
         self._page, self._made = page, made
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._found: Mapping[str, Any] = {}
+        self._fit: Mapping[str, Any] = {}
         limit = int(page.studio.state.settings.body_mb * MB)
-        with ui.dialog() as self._dialog, ui.card():
-            heading(2, "A face from a photo")
+        with ui.dialog().props(f'aria-label="{TITLE}"') as self._dialog, ui.card().classes("photo-dialog"):
+            heading(2, TITLE)
             ui.label(
                 "A picture of a person, a painting or a drawing, with the face from the front. The picture is deleted "
-                "when the face is made; every clip of it says that it is synthesised."
+                "when the dialog is closed; every clip of a face that speaks in it says that it is synthesised."
             ).classes("quiet")
-            self._name = ui.input("Name of the face").props(f"dense outlined maxlength={MAX_NAME}")
-            self._consent = ui.textarea("Statement of consent of the person, or: drawn").props(
-                f"outlined autogrow maxlength={MAX_CONSENT}"
-            )
-            self._status = ui.label().props("role=status").classes("note")
             self._upload = ui.upload(
                 label="Choose a picture, or drop it here", auto_upload=True, max_file_size=limit,
                 on_upload=self._uploaded,
                 on_rejected=lambda: ui.notify(f"The file is refused: give a picture of at most {limit / MB:g} MB.",
                                               type="negative"),
             ).props(f'accept="{PICTURES}" flat bordered').style("width: 100%")  # fmt: skip
-            self._upload.on("finish", self._upload.reset)
-            ui.button("Close", on_click=self._dialog.close).props("flat")
+            with ui.element("div").classes("photo-found") as self._shown:
+                self._makes = ui.radio(MAKES, value=SPEAKING_PICTURE, on_change=self._show_choice).props("inline dense")
+                self._about = ui.label().classes("quiet")
+                self._places = PhotoPlaces(self._change)
+                self._name = ui.input("Name of the face").props(f"dense outlined maxlength={MAX_NAME}")
+                self._consent = ui.textarea("Statement of consent of the person, or: drawn").props(
+                    f"outlined autogrow dense maxlength={MAX_CONSENT}"
+                )
+            self._status = ui.label().props("role=status").classes("note")
+            with ui.row():
+                self._make = ui.button("Make the face", on_click=self._store)
+                self._again = ui.button("Another picture", on_click=self._forget).props("outline")
+                self._close = ui.button("Close", on_click=self._dialog.close).props("flat")
+        self._dialog.on("hide", self._forget)
+        page.client.on_delete(self._delete_picture)
+        self._forget()
 
     def open(self) -> None:
         """Show the dialog."""
         self._dialog.open()
 
     async def _uploaded(self, event: events.UploadEventArguments) -> None:
-        name = (self._name.value or "").strip() or face_name(event.file.name)
-        self._status.text = "The face is made."
-        with shown_errors():
-            sent = Sent(FACE, name, event.file.size(), event.file.save, self._consent.value or None)
-            await store_resource(self._page.studio.state, self._page.workspace.key, sent)
+        self._forget()
+        self._folder = tempfile.TemporaryDirectory(prefix=UPLOAD_PREFIX)
+        page, folder = self._page, UploadFolder(Path(self._folder.name), self._page.studio.state.settings)
+        photo = folder.path / "photo"
+        await event.file.save(photo)
+        with shown_errors(), self._busy("Looking for lips and lids."):
+            shown, self._found = await find_photo_places(page.studio.state, page.workspace.key, folder, photo)
+            self._fit = self._found["fit"]
+            self._places.show(shown.read_bytes(), tuple(self._found["size"]), self._fit)
+            self._name.value = self._name.value or face_name(event.file.name)
+            self._show_found(True)
+            self._status.text = " ".join(f"{note[:1].upper()}{note[1:]}." for note in self._found["notes"])
+        if not self._shown.visible:
+            self._forget()
+
+    def _show_found(self, is_found: bool) -> None:
+        for one in (self._shown, self._make, self._again):
+            one.set_visibility(is_found)
+        self._upload.set_visibility(not is_found)
+
+    def _change(self, fit: Mapping[str, Any]) -> None:
+        self._fit = fit
+
+    def _show_choice(self) -> None:
+        self._places.set_visibility(self._makes.value == SPEAKING_PICTURE)
+        self._about.text = ABOUT[self._makes.value]
+
+    async def _store(self) -> None:
+        state, key = self._page.studio.state, self._page.workspace.key
+        assert self._folder is not None
+        photo, name = Path(self._folder.name) / "photo", (self._name.value or "").strip()
+
+        async def save(path: Path) -> None:
+            await asyncio.to_thread(shutil.copyfile, photo, path)
+
+        is_corrected = self._makes.value == SPEAKING_PICTURE and self._fit != self._found["fit"]
+        with shown_errors(), self._busy("The face is made."):
+            fit = json.dumps(self._fit) if is_corrected else None
+            sent = Sent(FACE, name, photo.stat().st_size, save, self._consent.value or None, fit, self._makes.value)
+            await store_resource(state, key, sent)
             self._dialog.close()
             await self._made(name)
-        self._status.text = ""
+
+    @contextmanager
+    def _busy(self, status: str) -> Iterator[None]:
+        """Show what is done, while nothing else can be."""
+        controls = (self._upload, self._make, self._again, self._close)
+        self._status.text = status
+        self._dialog.props("persistent")
+        for one in controls:
+            one.set_enabled(False)
+        try:
+            yield
+        finally:
+            self._dialog.props(remove="persistent")
+            self._status.text = "" if self._status.text == status else self._status.text
+            for one in controls:
+                one.set_enabled(True)
+
+    def _forget(self) -> None:
+        """Delete the picture, and show what the dialog begins with."""
+        self._delete_picture()
+        self._upload.reset()
+        self._places.hide()
+        self._show_found(False)
+        self._name.value, self._consent.value, self._status.text = "", "", ""
+        self._makes.value = SPEAKING_PICTURE
+        self._show_choice()
+
+    def _delete_picture(self) -> None:
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
 
 
 def face_name(file: str) -> str:

@@ -10,7 +10,7 @@ from tts2face.request import GESTURES, OWN_FACE
 from tts2face.studio.pages.choices import languages, looks, models, voices
 from tts2face.studio.pages.frame import heading
 from tts2face.studio.pages.open_page import OpenPage
-from tts2face.studio.pages.photo_dialog import PhotoDialog, may_make_faces
+from tts2face.studio.pages.photo_dialog import TITLE, PhotoDialog, may_make_faces
 
 LOOKS = {"identity": "Identity", "hair": "Hair", "hair_color": "Hair colour"}  # of a face, with their labels
 TYPING_MS = 350  # of rest after which a text is spoken
@@ -46,7 +46,7 @@ class SpeechPanel:
             self._select("models", kind, kind.capitalize(), found[kind])
         if may_make_faces(page):
             dialog = PhotoDialog(page, self._show_made)
-            ui.button("A face from a photo", on_click=dialog.open).props("outline dense")
+            ui.button(TITLE, on_click=dialog.open).props("outline dense")
         offered = await looks(library, key, project.models.face)
         for name, label in LOOKS.items():
             self._select("models", name, label, offered[name])
