@@ -30,24 +30,15 @@ from lexicon.errors import InputError
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
-from tts2face.photo.found_face import find_face
-from tts2face.render.draw import draw
 from tts2face.render.occlusion import bake_occlusion
-from tts2face.render.picture import Picture
 from tts2face.render.scene import available_cores
 from tts2face.storage.files import find_file
 from tts2face.types import Progress
 from tts2face.video.landmark_models import find_bundle
-from tts2face.video.pose import remove_pose
-from tts2face.video.track import FaceTracker
 
 Floats = NDArray[np.float64]
 
 SOURCE_FACE = "head"  # the shipped face that is adapted
-DRAWN_PX, DRAWN_CAMERA = 512, "0,0"
-# Of differences in depth, which the tracker hardly sees: with all of them, heads of the eight identities are 3.0 mm off
-# those in their pictures (mean of landmarks), with half of them 2.9, and 4.3 without the comparison to a drawn head.
-DEPTH_SHARE = 0.5
 CONTENT = "a head with the shape and, with the stated consent, the skin of a real person"
 
 
@@ -105,12 +96,11 @@ def build_face(
     report = on_progress or (lambda done, of: None)
     landmarks = track_videos(videos, eyes, lambda done, of: report(done, 2 * of))
     head = read_face(find_file(SOURCE_FACE, "face"))
-    resting = resting_landmarks(landmarks)
-    fitted = fit_person(head, compared_landmarks(resting, head, FaceTracker(run_options.model)))
+    fitted = fit_person(head, resting_landmarks(landmarks))
     model = None
     if n_modes:
         mode = mode_fitter(fitted.shaped, fitted.used)
-        model = dense_model(fitted.shaped, mode, landmarks, resting, n_modes)
+        model = dense_model(fitted.shaped, mode, landmarks, fitted.person, n_modes)
     face, look = paint_person(
         fitted, landmarks, lambda done, of: report(len(videos) + done * len(videos) // of, 2 * len(videos))
     )
@@ -134,7 +124,7 @@ def build_face(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedHead:
-    """The head in the shape of a person with resting landmarks (468, 3), and the landmarks that it was fitted to."""
+    """The head in the shape of a person with landmarks (468 or more, 3) at rest, and those that it was fitted to."""
 
     shaped: Face
     person: Floats
@@ -147,24 +137,8 @@ class FittedHead:
         return float(np.linalg.norm(again - reached, axis=1)[self.used].mean())
 
 
-def compared_landmarks(
-    landmarks: NDArray[np.floating], head: Face, tracker: FaceTracker, drawn: tuple[Floats, Floats] | None = None
-) -> Floats:
-    """Landmarks (468, 3) on a head, mm, of a person whom the tracker reads so, without pose (478, 3).
-
-    They are those of the head, moved by the difference from what the tracker reads in a picture of the head with the
-    same weights (K,) and pose (6,), or at rest from the front: what it errs by in both is no shape.
-    """
-    weights, pose = drawn or (np.zeros(len(head.shape_names)), np.zeros(6))
-    picture = draw(head, weights, pose, Picture(size=f"{DRAWN_PX}x{DRAWN_PX}", camera=DRAWN_CAMERA))
-    found = find_face(picture, tracker, "the head").landmarks[None].astype(np.float32)
-    rest = face_landmarks(head, head.vertices)[:N_MESH_LANDMARKS]
-    usual = align_to_head(remove_pose(found, 1.0).landmarks[0], rest)
-    return rest + (align_to_head(landmarks, rest) - usual) * (1.0, 1.0, DEPTH_SHARE)
-
-
 def fit_person(head: Face, person: Floats) -> FittedHead:
-    """The head in the shape of a person whose landmarks (468, 3) at rest have any size."""
+    """The head in the shape of a person whose landmarks (468 or more, 3) at rest have any size."""
     rest = face_landmarks(head, head.vertices)[:N_MESH_LANDMARKS]
     target = correct_lips_and_lids(rest, align_to_head(person, rest))
     return FittedHead(adapt_head(head, person), person, np.flatnonzero(select_consistent_landmarks(rest, target)))
