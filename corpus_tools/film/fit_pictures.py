@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from corpus_tools.film.compare import over_grey
-from corpus_tools.film.fit_light import MOST_SHARE
+from corpus_tools.film.fit_light import MOST_SHARE, neighbours
 from corpus_tools.film.poses import LitPose
 from tts2face.models.baked_light import LIMIT_STEP, BakedLight, quantised
 from tts2face.models.face import Face
@@ -30,7 +30,10 @@ SIDE_PX = 640
 RIDGE = 60.0  # of changes of responses, in pixels
 ALIKE_RIDGE = 1e-4  # of those of all vertices of a part alike, of their squares
 MOST_MISSING = 80.0  # of 255: more is another surface at an edge
+LIMIT_ROUNDS = 2  # of neighbours
+OPPONENT = np.array([[1, 1, 1], [1, -1, 0], [1, 1, -2]]).T / np.sqrt([3.0, 2.0, 6.0])  # colours to tone and two others
 ROUNDS = 40  # of conjugate gradients
+TONE_ROUNDS, COLOUR_ROUNDS = 3, 6  # of neighbours over which changes are alike; colours of teeth, too: else striped
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,11 +66,18 @@ def fit_to_pictures(face: Face, poses: Sequence[LitPose], pictures: Mapping[str,
     for name in np.unique(parts):
         own = parts == name
         alike[:, :, own] = _alike([_among(one, own) for one in mouth])[:, :, None]
-    of_skin = _corrected((light.responses, light.response_sizes, light.limits), rows, skin, _changes(skin))
+    near, among = _neighbours(face, drawn.rows), _neighbours(face, light.mouth_rows)
+    changes = _changes(skin, near)
+    of_skin = _corrected((light.responses, light.response_sizes, light.limits), rows, skin, changes, near)
     answers = (light.mouth_responses, light.mouth_sizes, light.mouth_limits)
-    of_mouth = _corrected(answers, mouth_rows, mouth, alike)
+    found = _unstriped(_responses(*answers[:2]).transpose(0, 2, 1), among).transpose(0, 2, 1)
+    of_mouth = _corrected(
+        (*quantised(found, MOST_SHARE), answers[2]), mouth_rows, mouth, alike, _neighbours(face, drawn.mouth_rows)
+    )
+    base = _unstriped(light.mouth_base[None].astype(np.float64), among)[0]
     return replace(
         light,
+        mouth_base=np.rint(base).clip(0, 255).astype(np.uint8),
         responses=of_skin[0],
         response_sizes=of_skin[1],
         limits=of_skin[2],
@@ -153,40 +163,80 @@ def _alike(missing: Sequence[Missing]) -> Floats:
     return change
 
 
+def _responses(steps: NDArray[np.int8], sizes: NDArray[np.float32]) -> Floats:
+    found: Floats = steps.astype(np.float64) * sizes[:, None, None]
+    return found
+
+
 def _corrected(
     answers: tuple[NDArray[np.int8], NDArray[np.float32], NDArray[np.int8]],
     rows: NDArray[np.int64],
     missing: Sequence[Missing],
     changes: Floats,
+    near: Any,
 ) -> tuple[NDArray[np.int8], NDArray[np.float32], NDArray[np.int8]]:
-    """Responses (T, 3, N), their sizes and limits, of which those of rows (n,) take changes (T, 3, n)."""
+    """Responses (T, 3, N), their sizes and limits, of which those of rows (n,) take changes (T, 3, n).
+
+    Limits are means over neighbours (n, n): single vertices that are cut off are specks.
+    """
     responses, sizes, limits = answers
-    found = responses.astype(np.float64) * sizes[:, None, None]
+    found = _responses(responses, sizes)
     found[:, :, rows] += changes
     least, most = limits[:, :, rows].astype(np.float64) * LIMIT_STEP
     for one in missing:
         shown = np.asarray(one.shares.sum(axis=0)).ravel() > 0
         change = np.where(shown, np.einsum("tn,tcn->cn", one.terms, found[:, :, rows]), 0.0)
         least, most = np.minimum(least, change), np.maximum(most, change)
+    for _ in range(LIMIT_ROUNDS):
+        least, most = least @ near.T, most @ near.T
     wider = limits.copy()
     wider[:, :, rows] = np.clip(np.rint(np.array([least, most]) / LIMIT_STEP), -127, 127)
     return *quantised(found, MOST_SHARE), wider
 
 
-def _changes(missing: Sequence[Missing]) -> Floats:
-    """(T, 3, N) changes of responses that add what is missing."""
+def _neighbours(face: Face, rows: NDArray[np.int32]) -> Any:
+    """(N, N) means over the neighbours of vertices (N,)."""
+    at = np.full(len(face.vertices), -1)
+    at[rows] = np.arange(len(rows))
+    corners = at[face.triangles]
+    return neighbours(corners[(corners >= 0).all(axis=1)], face.vertices[rows])
+
+
+def _smoothed(values: Floats, near: Any, tone_rounds: int) -> Floats:
+    """Values (T, N, 3) as means over neighbours (N, N): so many rounds for tones, `COLOUR_ROUNDS` for colours.
+
+    The channels are those of `OPPONENT`.
+    """
+    found = values.copy()
+    for channel, n_rounds in enumerate((tone_rounds, COLOUR_ROUNDS, COLOUR_ROUNDS)):
+        for _ in range(n_rounds):
+            found[:, :, channel] = found[:, :, channel] @ near.T
+    return found
+
+
+def _unstriped(values: Floats, near: Any) -> Floats:
+    """Values (T, N, 3) of vertices that change slowly over each part; noise makes stripes on teeth."""
+    found: Floats = _smoothed(values @ OPPONENT, near, TONE_ROUNDS) @ OPPONENT.T
+    return found
+
+
+def _changes(missing: Sequence[Missing], near: Any) -> Floats:
+    """(T, 3, N) changes of responses that add what is missing, smooth over neighbours (N, N)."""
     sizes = np.sqrt(np.mean([(one.terms**2).mean(axis=1) for one in missing], axis=0)) + 1e-9
     terms = [(one.terms / sizes[:, None])[:, :, None] for one in missing]
     back = [one.shares.T.tocsr() for one in missing]
 
     def normal(change: Floats) -> Floats:
-        total: Floats = RIDGE * change
-        for one, own, gather in zip(missing, terms, back, strict=True):
-            total += own * (gather @ (one.shares @ (own * change).sum(axis=0)))
-        return total
+        spread = _smoothed(change, near, TONE_ROUNDS)
+        total = sum(
+            own * (gather @ (one.shares @ (own * spread).sum(axis=0)))
+            for one, own, gather in zip(missing, terms, back, strict=True)
+        )
+        return RIDGE * change + _smoothed(total, near.T, TONE_ROUNDS)
 
     change = np.zeros((*terms[0].shape[:2], 3))
-    rest = sum(own * (gather @ one.light) for one, own, gather in zip(missing, terms, back, strict=True))
+    rest = sum(own * (gather @ (one.light @ OPPONENT)) for one, own, gather in zip(missing, terms, back, strict=True))
+    rest = _smoothed(rest, near.T, TONE_ROUNDS)
     step, size = rest.copy(), (rest**2).sum(axis=(0, 1))
     for _ in range(ROUNDS):
         ahead = normal(step)
@@ -194,5 +244,5 @@ def _changes(missing: Sequence[Missing]) -> Floats:
         change, rest = change + share * step, rest - share * ahead
         before, size = size, (rest**2).sum(axis=(0, 1))
         step = rest + size / np.maximum(before, 1e-12) * step
-    found: Floats = change / sizes[:, None, None]
+    found: Floats = _smoothed(change, near, TONE_ROUNDS) @ OPPONENT.T / sizes[:, None, None]
     return found.transpose(0, 2, 1)
