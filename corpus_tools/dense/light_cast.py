@@ -33,6 +33,7 @@ MIN_PIXELS = 6
 # Skin of cheeks and forehead in the renderer's studio light is gain * texture ** power in linear light, by channel:
 # least squares of logarithms over the head's eight identities, residuals .1. The tone curve compresses red.
 STUDIO_GAIN, STUDIO_POWER = np.array([1.02, 1.36, 1.51]), np.array([0.70, 0.96, 1.04])
+GLOSSY = (1.1, 1.4)  # of the skin's luminance, between which gloss begins to be removed
 SKIN_SHARE = (0.2, 0.7)  # of the skin's luminance: hair and shadow up to the first, skin from the second
 EYE_GRID = (41, 25)  # samples across and down an eye
 
@@ -158,7 +159,20 @@ def skin_texture(srgb: Floats) -> Floats:
     """
     light = decode_srgb(np.clip(srgb, 0.0, 255.0) / 255.0)
     usual = np.median(light, axis=0)
+    light = without_gloss(light, usual)
     gains = (usual / STUDIO_GAIN) ** (1.0 / STUDIO_POWER) / usual
     grey = (gains * usual) @ LUMINANCE / (usual @ LUMINANCE)
     is_skin = smoothstep(light @ LUMINANCE / (usual @ LUMINANCE), *SKIN_SHARE)
     return 255.0 * encode_light(light * grey * (gains / grey) ** is_skin[:, None])
+
+
+def without_gloss(light: Floats, usual: Floats) -> Floats:
+    """Linear light (N, 3) of skin without what is white in places lighter than the usual (3,) skin.
+
+    Shafer 1985, the dichromatic reflection model: light is a multiple of the skin's colour and a share of the lamp's,
+    which is white here. Wrinkles and shadows, which are darker, stay.
+    """
+    skin = np.maximum((light[:, 0] - light[:, 2]) / max(usual[0] - usual[2], DARKEST), 1.0)
+    share = smoothstep(light @ LUMINANCE / (usual @ LUMINANCE), *GLOSSY)[:, None]
+    found: Floats = light + share * (np.minimum(light, skin[:, None] * usual) - light)
+    return found

@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from corpus_tools.dense.hair_region import ACROSS_MM, UP_MM, Portrait, find_hair
-from corpus_tools.dense.light_cast import EyeColours, estimate_cast, log_colour, remove_cast, srgb_colour
+from corpus_tools.dense.light_cast import (
+    EyeColours,
+    estimate_cast,
+    log_colour,
+    remove_cast,
+    srgb_colour,
+    without_gloss,
+)
 from corpus_tools.dense.mesh_fit import face_landmarks, part_vertices
 from corpus_tools.dense.person_look import (
     LASH_LENGTH,
@@ -271,3 +278,12 @@ def test_lashes_become_shorter_and_still_follow_the_lids(head: Face) -> None:
 
 def _distances(places: np.ndarray, others: np.ndarray) -> np.ndarray:
     return np.array([np.linalg.norm(others - place, axis=1).min() for place in places])
+
+
+def test_gloss_goes_and_wrinkles_stay() -> None:
+    skin = np.array([0.42, 0.22, 0.14])
+    shade = np.array([0.3, 0.7, 1.0, 1.05])[:, None]
+    np.testing.assert_array_equal(without_gloss(shade * skin, skin), shade * skin)  # wrinkles and shadows
+    lit = np.array([[1.6], [2.0]]) * skin
+    np.testing.assert_allclose(without_gloss(lit + 0.15, skin), lit, atol=1e-12)  # what lies under gloss
+    np.testing.assert_allclose(without_gloss(np.ones((1, 3)), skin)[0], skin * 1.0, atol=1e-12)  # nothing is known
