@@ -203,7 +203,12 @@ def layers() -> Photograph:
 
 @pytest.fixture(scope="module")
 def parted(layers: Photograph) -> Face:
-    return speaking_photo(layers, found_in(NAME, SIDE), 0.0, load_face("head", hair="bald"), {"name": "Ada"})
+    return cut_out(layers)
+
+
+def cut_out(picture: Photograph) -> Face:
+    head = load_face("head", hair="bald")
+    return speaking_photo(photographed(picture, found_in(NAME, SIDE)), head, {"name": "Ada"})
 
 
 @pytest.fixture(scope="module")
@@ -276,9 +281,7 @@ def test_what_lies_behind_a_photograph_needs_its_coverage(parted: Face, tmp_path
 
 
 def test_only_photographs_with_a_background_are_blurred(layers: Photograph) -> None:
-    cut = speaking_photo(
-        replace(layers, behind=None), found_in(NAME, SIDE), 0.0, load_face("head", hair="bald"), {"name": "Ada"}
-    )
+    cut = cut_out(replace(layers, behind=None))
     with pytest.raises(InputError, match="the photograph has no background that could be blurred"):
         mesh_renderer(cut, Picture(background="blur"))
     with pytest.raises(InputError, match="--background blur is the background of a photograph, and the face is none"):
@@ -286,10 +289,8 @@ def test_only_photographs_with_a_background_are_blurred(layers: Photograph) -> N
 
 
 def test_a_cut_out_person_moves_before_any_background() -> None:
-    head = load_face("head", hair="bald")
     shown = draw(load_face(NAME), picture=Picture(size=f"{SIDE}x{SIDE}", background="transparent"))
-    picture = Photograph(shown[..., :3].copy(), shown[..., 3].copy(), 1.0).filled()
-    cut = speaking_photo(photographed(picture, found_in(NAME, SIDE)), head, {"name": "Ada"})
+    cut = cut_out(Photograph(shown[..., :3].copy(), shown[..., 3].copy(), 1.0).filled())
     pose, turned = {"jawOpen": 0.3}, np.array([0, 0.12, 0, 0, 0, 0], np.float32)
     free = drawn(mesh_renderer(cut, Picture(background="transparent")), turned, **pose)
     red = drawn(mesh_renderer(cut, Picture(background="#ff0000")), turned, **pose)
