@@ -7,13 +7,12 @@ from numpy.typing import NDArray
 
 from corpus_tools.dense.skin_colour import sample_picture
 from corpus_tools.dense.visible_texels import polygon_depth
-from tts2face.colour import decode_srgb, encode_light, encode_srgb
+from tts2face.colour import LUMINANCE, decode_srgb, encode_light, encode_srgb
 from tts2face.models.landmarks import LID_RINGS
 from tts2face.numeric import smoothstep
 
 Floats = NDArray[np.float64]
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB, IEC 61966-2-1
 DARKEST = 0.004  # linear light, added before logarithms: noise of dark pixels has no colour
 # log R/G and B/G in neutral light. Skin: between light and dark skin of a colour chart (.57 -.31; .71 -.37), and
 # rendered people of all tones (.53 to .89, -.32 to -.66): tones differ in luminance far more than in these. White of

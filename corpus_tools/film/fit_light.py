@@ -56,7 +56,7 @@ BALL_LIT = 0.45  # of the light in front below which a vertex of an eyeball lies
 
 def fit_light(face: Face, poses: PoseLight, look: Look, eyes: EyeStyle) -> BakedLight:
     """Light of a face from that of its poses."""
-    part_of = _vertex_parts(face)
+    part_of = vertex_parts(face)
     still = np.flatnonzero(~poses.heads.any(axis=1))
     shown, texels = shown_skin(face, poses, still, _corners(face, SKIN), poses.skin.shape[1])
     small_rows = np.flatnonzero(np.isin(part_of, np.unique(part_of[poses.rows])))
@@ -120,7 +120,7 @@ def fit_haircut(faces: tuple[Face, Face], own: PoseLight, worn: PoseLight, light
     other has the light.
     """
     plain, face = faces
-    part_of = _vertex_parts(face)
+    part_of = vertex_parts(face)
     still = np.flatnonzero(~own.heads.any(axis=1))
     side = own.skin.shape[1]
     shown, texels = shown_skin(plain, own, still, _corners(plain, SKIN), side)
@@ -171,7 +171,7 @@ def _light_in_texels(
     }
 
 
-def _vertex_parts(face: Face) -> NDArray[np.str_]:
+def vertex_parts(face: Face) -> NDArray[np.str_]:
     """(V,) name of the part of each vertex."""
     found = np.full(len(face.vertices), "", dtype="U32")
     for part in face.parts:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from corpus_tools.film.compare import over_grey
-from corpus_tools.film.fit_light import MOST_SHARE, neighbours
+from corpus_tools.film.fit_light import MOST_SHARE, neighbours, vertex_parts
 from corpus_tools.film.poses import LitPose
 from tts2face.models.baked_light import LIMIT_STEP, BakedLight, quantised
 from tts2face.models.face import Face
@@ -61,19 +61,18 @@ def fit_to_pictures(face: Face, poses: Sequence[LitPose], pictures: Mapping[str,
         np.flatnonzero(np.isin(every, own))
         for every, own in ((light.rows, drawn.rows), (light.mouth_rows, drawn.mouth_rows))
     )
-    parts = _vertex_parts(face)[drawn.mouth_rows]
+    parts = vertex_parts(face)[drawn.mouth_rows]
     alike = np.zeros((len(light.mouth_responses), 3, len(parts)))
     for name in np.unique(parts):
         own = parts == name
         alike[:, :, own] = _alike([_among(one, own) for one in mouth])[:, :, None]
     near, among = _neighbours(face, drawn.rows), _neighbours(face, light.mouth_rows)
     changes = _changes(skin, near)
-    of_skin = _corrected((light.responses, light.response_sizes, light.limits), rows, skin, changes, near)
-    answers = (light.mouth_responses, light.mouth_sizes, light.mouth_limits)
-    found = _unstriped(_responses(*answers[:2]).transpose(0, 2, 1), among).transpose(0, 2, 1)
-    of_mouth = _corrected(
-        (*quantised(found, MOST_SHARE), answers[2]), mouth_rows, mouth, alike, _neighbours(face, drawn.mouth_rows)
+    of_skin = _corrected((_responses(light.responses, light.response_sizes), light.limits), rows, skin, changes, near)
+    found = _unstriped(_responses(light.mouth_responses, light.mouth_sizes).transpose(0, 2, 1), among).transpose(
+        0, 2, 1
     )
+    of_mouth = _corrected((found, light.mouth_limits), mouth_rows, mouth, alike, _neighbours(face, drawn.mouth_rows))
     base = _unstriped(light.mouth_base[None].astype(np.float64), among)[0]
     return replace(
         light,
@@ -137,14 +136,6 @@ def _shares(scene: LitScene, pose: LitPose, wanted: NDArray[np.bool_]) -> tuple[
     return sparse.csr_matrix((shares.ravel(), corners.ravel(), starts), (len(corners), len(table))), (down, across)
 
 
-def _vertex_parts(face: Face) -> NDArray[np.str_]:
-    """(V,) name of the part of each vertex."""
-    found = np.full(len(face.vertices), "", dtype="U32")
-    for part in face.parts:
-        found[face.triangles[part.first : part.first + part.count]] = part.name
-    return found
-
-
 def _among(one: Missing, own: NDArray[np.bool_]) -> Missing:
     """What is missing in the pixels of some vertices (N,) of a part."""
     shares = one.shares[:, own]
@@ -169,18 +160,17 @@ def _responses(steps: NDArray[np.int8], sizes: NDArray[np.float32]) -> Floats:
 
 
 def _corrected(
-    answers: tuple[NDArray[np.int8], NDArray[np.float32], NDArray[np.int8]],
+    answers: tuple[Floats, NDArray[np.int8]],
     rows: NDArray[np.int64],
     missing: Sequence[Missing],
     changes: Floats,
     near: Any,
 ) -> tuple[NDArray[np.int8], NDArray[np.float32], NDArray[np.int8]]:
-    """Responses (T, 3, N), their sizes and limits, of which those of rows (n,) take changes (T, 3, n).
+    """Steps of responses (T, 3, N), their sizes and limits, of which those of rows (n,) take changes (T, 3, n).
 
     Limits are means over neighbours (n, n): single vertices that are cut off are specks.
     """
-    responses, sizes, limits = answers
-    found = _responses(responses, sizes)
+    found, limits = answers
     found[:, :, rows] += changes
     least, most = limits[:, :, rows].astype(np.float64) * LIMIT_STEP
     for one in missing:
