@@ -131,7 +131,7 @@ def _form(kind: str) -> dict[str, Any]:
             "description": "With a photo: a face that speaks in the picture, or a head of the person, which turns.",
         }
         fields["fit"] = {
-            "type": "string", "maxLength": MAX_FIT,
+            "type": "string", "maxLength": MAX_FIT, "example": '{"teeth": [397, 544]}',
             "description": "With a photo that speaks: corrections of what is found in it, JSON (docs/photo.md).",
         }  # fmt: skip
     schema = {"type": "object", "properties": fields, "required": ["file", "name"]}
