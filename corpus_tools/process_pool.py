@@ -9,7 +9,7 @@ from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
 from lexicon.errors import BackendError
-from tts2face.child_process import exit_after
+from tts2face.processes.child import exit_after
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")

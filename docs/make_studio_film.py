@@ -25,7 +25,7 @@ from PIL import Image
 from scipy.spatial import cKDTree
 
 from corpus_tools.prompts.coverage import count_units, sentence_units
-from corpus_tools.recording_process import prompts_answer
+from corpus_tools.tools.recordings import prompts_answer
 from tests.running import ServeProcess, serve_process
 from tests.studio.chromium import Browser, open_browser
 from tests.studio.fake_camera import write_fake_media

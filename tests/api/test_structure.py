@@ -17,31 +17,22 @@ from tests.api.test_import_graph import PACKAGES, ROOT
 Find = Callable[[str, str], Iterator[str]]  # of the text and the name of a module
 
 # Places that start Python, outside the room of child processes, which is to start all of them.
-PROCESS_ROOM = "tts2face.child_process"
+PROCESS_ROOM = "tts2face.processes"
 STARTS_PYTHON = (
-    "corpus_tools.head.source", "tts2face.video.setup_models", "tts2face.batch.render_process", "tts2face.jobs.engine",
-    "tts2face.jobs.talker_job", "tts2face.render.vtk_renderer", "tts2face.service.synthesis.remote_aligner",
-    "tts2face.service.synthesis.warm_process", "tts2face.service.uploads.upload_folder",
-    "tts2face.studio.puppetry.live_camera", "tts2face.studio.recording.take_checks",
-    "tts2face.studio.recording.talker_building", "tts2face.service.uploads.tool_process", "tts2face.synthesis.warm_up",
-    "tts2face.voice.espeak",
+    "corpus_tools.head.source", "tts2face.video.setup_models", "tts2face.jobs.engine", "tts2face.render.vtk_renderer",
+    "tts2face.service.synthesis.remote_aligner", "tts2face.service.synthesis.warm_process",
+    "tts2face.studio.recording.talker_building", "tts2face.synthesis.warm_up", "tts2face.voice.espeak",
 )  # fmt: skip
 # Modules that read JSON or TOML themselves; `lexicon.inputs` does it for others.
 PARSES = (
-    "corpus_tools.head.assets", "lexicon.inputs", "lexicon.part_of_speech", "tts2face.batch.render_process",
-    "tts2face.child_process", "tts2face.jobs.job_records", "tts2face.jobs.job_table", "tts2face.jobs.resource_table",
+    "corpus_tools.head.assets", "lexicon.inputs", "lexicon.part_of_speech", "tts2face.processes.message", "tts2face.jobs.job_records", "tts2face.jobs.job_table", "tts2face.jobs.resource_table",
     "tts2face.service.routes.answers", "tts2face.service.state", "tts2face.service.synthesis.alignment_process",
     "tts2face.service.synthesis.remote_aligner", "tts2face.service.synthesis.synthesis_process",
     "tts2face.service.synthesis.warm_process", "tts2face.storage.tensors", "tts2face.studio.projects.bundle",
     "tts2face.studio.requests", "tts2face.voice.espeak", "tts2face.voice.espeak_child",
 )  # fmt: skip
 # Strings that name a module of a package above their own.
-NAMES_HIGHER = (
-    "tts2face.jobs.talker_job: corpus_tools.build_process",
-    "tts2face.studio.recording.take_checks: corpus_tools.recording_process",
-    "tts2face.studio.reports.reports: corpus_tools.report_process",
-    "tts2face.service.uploads.tool_process: corpus_tools.take_process",
-)
+NAMES_HIGHER = ()
 PARSERS = {"json": {"load", "loads", "JSONDecoder"}, "tomllib": {"load", "loads"}}
 
 
@@ -75,7 +66,7 @@ def uses(text: str, wanted: dict[str, set[str]]) -> Iterator[str]:
 
 def starts_of_python(text: str, name: str) -> Iterator[str]:
     """The module, once for each time that it reads the path of Python."""
-    if name != PROCESS_ROOM and "executable" in text:
+    if not f"{name}.".startswith(f"{PROCESS_ROOM}.") and "executable" in text:
         yield from (name for _ in uses(text, {"sys": {"executable"}}))
 
 
@@ -136,16 +127,16 @@ def test_exceptions_only_become_fewer(what: str) -> None:
 
 def test_every_way_to_write_an_exception_is_found() -> None:
     made = (
-        '"""Serves corpus_tools.report_process."""\n'
+        '"""Serves corpus_tools.tools."""\n'
         "import json as j, sys\nfrom json import loads, dumps\nfrom sys import executable\nimport tomllib\n"
-        'run(sys.executable, "-m", "corpus_tools.build_process", f"cli.main {loads}", "tts2face.api", "cli.nothing")\n'
+        'run(sys.executable, "-m", "corpus_tools.run_options", f"cli.main {loads}", "tts2face.api", "cli.nothing")\n'
         "j.load(file); j.dumps({}); tomllib.loads(text)\n"
     )
     assert list(starts_of_python(made, "tts2face.x")) == ["tts2face.x"] * 2
     assert list(starts_of_python(made, PROCESS_ROOM)) == []
     assert sorted(uses(made, PARSERS)) == ["json.load", "json.loads", "tomllib.loads"]
     assert list(higher_names(made, "tts2face.x")) == [
-        "tts2face.x: corpus_tools.build_process", "tts2face.x: cli.main"
+        "tts2face.x: corpus_tools.run_options", "tts2face.x: cli.main"
     ]  # fmt: skip
     assert "lexicon.x: tts2face.api" in list(higher_names(made, "lexicon.x"))
     assert list(higher_names(made, "cli.x")) == []

@@ -6,19 +6,22 @@ Pictures of GRID s1 as JPEG of 480 x 360 pixels are sent one after the other, ea
 """
 
 import argparse
+import asyncio
 import io
-import json
 import os
-import struct
-import subprocess
-import sys
 import time
+from collections.abc import AsyncIterator, Mapping
+from contextlib import aclosing
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 from PIL import Image
 
+from tts2face.processes.parent import started
+from tts2face.service.synthesis.camera_process import FOLLOW
+from tts2face.studio.puppetry.live_camera import PROGRAM
 from tts2face.video.media import read_frames
 
 SIZE = (480, 360)
@@ -52,26 +55,46 @@ def main() -> None:
     parser.add_argument("--pictures", type=int, default=250)
     asked = parser.parse_args()
     pictures = jpegs(asked.recordings / "grid_s1" / "clips", asked.pictures)
-    command = [sys.executable, "-m", "tts2face.service.synthesis.camera_process"]
-    began = time.perf_counter()
-    child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-    assert child.stdin is not None
-    assert child.stdout is not None
-    child.stdout.readline()
-    print(f"ready after {time.perf_counter() - began:.1f} s")
-    spent: dict[str, list[tuple[float, float]]] = {}
-    for number, picture in enumerate(pictures):
-        sent, used = time.perf_counter(), cpu_seconds(child.pid)
-        child.stdin.write(struct.pack("<dI", number / FPS, len(picture)) + picture)
-        child.stdin.flush()
-        state = json.loads(child.stdout.readline())["state"]
-        spent.setdefault(state, []).append((time.perf_counter() - sent, cpu_seconds(child.pid) - used))
+    spent = asyncio.run(follow(pictures))
     for state, times in spent.items():
         answers, work = 1000 * np.array(times).T
         middle, late = np.percentile(answers, [50, 95])
         print(f"{state}: {len(times)} pictures, {middle:.0f} ms (95 %: {late:.0f} ms), processor {work.mean():.0f} ms")
-    child.stdin.close()
-    child.wait()
+
+
+async def follow(pictures: list[bytes]) -> dict[str, list[tuple[float, float]]]:
+    """Seconds until the answer and of the processor for each picture, by the state of the answer."""
+    is_asked, spent = asyncio.Event(), dict[str, list[tuple[float, float]]]()
+    sent = used = 0.0
+
+    async def given() -> AsyncIterator[tuple[Mapping[str, Any], bytes]]:
+        nonlocal sent, used
+        for number, picture in enumerate(pictures):
+            await is_asked.wait()
+            is_asked.clear()
+            sent, used = time.perf_counter(), children_seconds()
+            yield {"time": number / FPS}, picture
+
+    async with started(PROGRAM) as child, aclosing(child.stream(FOLLOW, {}, inputs=given())) as answers:
+        began, n_answers = time.perf_counter(), 0
+        async for answer in answers:
+            if "channels" in answer.content:
+                print(f"ready after {time.perf_counter() - began:.1f} s")
+            else:
+                times = (time.perf_counter() - sent, children_seconds() - used)
+                spent.setdefault(answer.content["state"], []).append(times)
+                n_answers += 1
+            if n_answers == len(pictures):
+                break
+            is_asked.set()
+    return spent
+
+
+def children_seconds() -> float:
+    """Processor time of the processes that this one has started."""
+    own = str(os.getpid())
+    parents = {path: path.read_text().rpartition(")")[2].split()[1] for path in Path("/proc").glob("[0-9]*/stat")}
+    return sum(cpu_seconds(int(path.parent.name)) for path, parent in parents.items() if parent == own)
 
 
 def cpu_seconds(process: int) -> float:

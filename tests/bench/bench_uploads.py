@@ -1,16 +1,22 @@
-"""Cost of the check of an uploaded model, with its picture, and of a talker's building: CPU seconds and memory."""
+"""Cost of the check of an uploaded model, with its picture, and of a talker's building: CPU seconds and memory.
 
-import json
-import os
-import subprocess
-import sys
+Memory is the largest of all children so far.
+"""
+
+import resource
 import tempfile
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from lexicon.errors import BackendError
 from tests.characters.made import write_character_file
 from tts2face import Session
-from tts2face.jobs.talker_job import BUILDER, LIMITS
+from tts2face.jobs.talker_job import BUILDER, LIMITS, TOOL
+from tts2face.processes.parent import Child
+from tts2face.processes.program import Program
+from tts2face.service.uploads.decode import DECODE, program
 from tts2face.storage.files import find_file
 from tts2face.video.landmark_models import find_bundle
 
@@ -41,7 +47,7 @@ def main() -> None:
 
 def check(kind: str, path: Path, out: Path) -> tuple[float, float]:
     out.mkdir()
-    return cost([sys.executable, "-m", "tts2face.service.uploads.decode_process", kind, str(path), str(out), "1e9"], "")
+    return cost(program(kind), DECODE, {"kind": kind, "source": str(path), "target": str(out), "limit": 1e9})
 
 
 def build(folder: Path, appearance: bool) -> tuple[tuple[float, float], Path]:
@@ -52,22 +58,18 @@ def build(folder: Path, appearance: bool) -> tuple[tuple[float, float], Path]:
     order = {
         "folder": str(folder), "name": "anna", "provenance": {}, "consent": "I agree to this." if appearance else None,
         "with_appearance": appearance, "with_report": False, "max_bytes": 1e9,
-        "limits": {"memory_bytes": LIMITS.memory_bytes, "cpu_s": 1200, "file_bytes": LIMITS.file_bytes, "n_files": 256},
     }  # fmt: skip
-    return cost([sys.executable, "-m", BUILDER], json.dumps(order) + "\n"), take
+    return cost(Program(BUILDER, replace(LIMITS, cpu_s=1200)), TOOL, order), take
 
 
-def cost(command: list[str], given: str) -> tuple[float, float]:
-    """CPU seconds and MB of a process."""
-    environment = os.environ | {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, env=environment, text=True)
-    assert child.stdin is not None
-    child.stdin.write(given)
-    child.stdin.flush()
-    _, status, usage = os.wait4(child.pid, 0)
-    assert status == 0, command
-    child.stdin.close()
-    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+def cost(program: Program, kind: str, order: Mapping[str, Any]) -> tuple[float, float]:
+    """CPU seconds and MB of a child."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    child = Child(program)
+    child.call(kind, order)
+    child.close()
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, after.ru_maxrss / 1024
 
 
 def report(what: str, measured: tuple[float, float], path: Path) -> None:

@@ -1,35 +1,33 @@
 """A builder of talkers that does what the name of the talker says."""
 
-import json
-import sys
+import os
 import time
 from pathlib import Path
+from typing import Any
 
-from corpus_tools.build_process import BuildOrder
+from corpus_tools.tools.talker import BuildOrder
 from tests.model_files.made import write_made_talker
+from tts2face.processes.child import Call
 
 
-def main() -> None:
-    order = BuildOrder(**json.loads(sys.stdin.readline()))
-    sys.stdout.write(json.dumps({"stage": "reading recordings", "done": 1, "of": 2}) + "\n")
-    sys.stdout.flush()
+def build(call: Call) -> dict[str, Any]:
+    order = BuildOrder(**call.content)
+    call.stage("reading recordings")(1, 2)
     if order.name == "dies":
-        sys.exit(9)
+        os._exit(9)
     if order.name == "sleeps":
         time.sleep(600)
     checked = Path(order.folder) / "checked"
     checked.mkdir()
     write_made_talker(checked / "content", has_face=False)
     (checked / "description.json").write_text("{}")
-    result = {
+    return {
         "n_kept": 6,
         "minutes": 0.1,
         "refused": [["a", "too dark"]],
         "warnings": [["b", f"weakness {number}"] for number in range(30)],
         "notes": ["record more"],
     }
-    sys.stdout.write(json.dumps(result) + "\n")
 
 
-if __name__ == "__main__":
-    main()
+HANDLERS = {"talker": build}

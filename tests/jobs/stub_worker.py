@@ -11,8 +11,8 @@ from pathlib import Path
 from lexicon.errors import InputError
 from tts2face.batch.segment import Segment
 from tts2face.batch.segment_result import SegmentResult
-from tts2face.child_process import exit_after
 from tts2face.jobs.worker import Worker
+from tts2face.processes.child import exit_after
 
 
 class Stub:

@@ -26,7 +26,7 @@ def events() -> list[dict[str, Any]]:
 @pytest.fixture
 def run(tmp_path: Path, events: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch) -> Run:
     """Function that executes a job."""
-    monkeypatch.setattr(talker_job, "BUILDER", "tests.jobs.stub_builder")
+    monkeypatch.setattr(talker_job, "BUILDER", "tests.jobs.stub_builder:HANDLERS")
     (tmp_path / "a.mp4").write_bytes(b"video")
     blobs = open_blobs(tmp_path / "store", "resources")
 
@@ -59,6 +59,7 @@ def test_a_talker_is_stored_once_however_often_its_job_runs(
     first = run()
     assert [one.name for one in first.files] == ["anna.talker"]
     assert events == [
+        {"type": "progress", "stage": "reading recordings", "done": 0, "of": 0},
         {"type": "progress", "stage": "reading recordings", "done": 1, "of": 2},
         {
             "type": "built",

@@ -14,10 +14,11 @@ from tempfile import TemporaryDirectory
 from typing import Protocol
 
 from lexicon.errors import BackendError, Tts2faceError
-from tts2face.batch.render_process import ChildDiedError, RenderProcess
+from tts2face.batch.render_process import RenderProcess
 from tts2face.batch.segment import Segment
 from tts2face.batch.segment_result import SEGMENT_SUFFIX, SegmentResult
 from tts2face.batch.store import Store, wait_for_store
+from tts2face.processes.parent import ChildEndedError
 
 MAX_TRIES = 3  # of a segment whose process ended; then it counts as failed
 MIN_FREE_BYTES = 200 << 20  # below which work pauses
@@ -131,7 +132,7 @@ def render_into(store: Store, segment: Segment, renderer: Renders, on_message: M
                 finally:
                     movie.unlink(missing_ok=True)
             return Rendered(address, result)
-        except ChildDiedError as died:
+        except ChildEndedError as died:
             reason = str(died)
             tries += 1
         except Tts2faceError as wrong:

@@ -1,5 +1,6 @@
 """The result of a rendered segment; a module without heavy imports."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
@@ -42,7 +43,7 @@ class SegmentResult:
         return asdict(self) | {"warnings": list(self.warnings)}
 
 
-def result_from_json(content: dict[str, Any]) -> SegmentResult:
+def result_from_json(content: Mapping[str, Any]) -> SegmentResult:
     """The result of `SegmentResult.as_json`; unknown names are ignored."""
     known = {field.name for field in fields(SegmentResult)}
     found = {name: value for name, value in content.items() if name in known}

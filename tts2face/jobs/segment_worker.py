@@ -10,12 +10,13 @@ from typing import Any
 
 from lexicon.errors import DataError, InputError, Tts2faceError
 from tts2face.batch.engine import Message, Renders, render_into
-from tts2face.batch.render_process import ChildDiedError, RenderProcess
+from tts2face.batch.render_process import RenderProcess
 from tts2face.batch.segment import Segment, segment_from_json
 from tts2face.batch.segment_result import SegmentResult
 from tts2face.batch.store import Store, wait_for_store
 from tts2face.jobs.blobs import BlobStore
 from tts2face.jobs.input_files import place_segment_files
+from tts2face.processes.parent import ChildEndedError
 from tts2face.storage.temporary import Temporary
 
 
@@ -99,7 +100,7 @@ class SegmentWorker:
         assert self._process is not None
         try:
             return self._process.render(segment, out)
-        except ChildDiedError:
+        except ChildEndedError:
             if self._is_cancelled:
                 raise InputError("cancelled") from None
             raise

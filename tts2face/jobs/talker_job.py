@@ -1,37 +1,33 @@
 """Jobs of kind ``talker``: a talker from an uploaded recording, which becomes a model of the key.
 
-The building runs in a process of its own (`corpus_tools.build_process`) with limits of memory and time.
+The building runs in a process of its own (the tool ``talker``) with limits of memory and time.
 """
 
-import json
 import os
-import queue
 import shutil
-import subprocess
-import sys
-import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from lexicon.errors import BackendError, DataError
-from lexicon.inputs import parse_json
-from tts2face.batch.render_process import KINDS
+from lexicon.errors import DataError
 from tts2face.jobs.connection import DatabaseAwayError
 from tts2face.jobs.job_kinds import JobTask, Product, Products
 from tts2face.jobs.resource_check import TALKER
 from tts2face.jobs.resource_table import ResourceTable, Usage, keep_files, over_quota, resource_from_folder
-from tts2face.limited_process import ProcessLimits, bare_environment
+from tts2face.processes.limits import ProcessLimits
+from tts2face.processes.message import Message
+from tts2face.processes.parent import Child, ChildEndedError
+from tts2face.processes.program import Program
 
-BUILDER = "corpus_tools.build_process"  # by name: the tools stand above this package
+BUILDER = TOOL = "talker"  # the program, and its handler
 LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=0, file_bytes=2 << 30, n_files=256)
 CPU_S, CPU_S_PER_S = 1200, 40  # of any recording, and for each of its seconds; 256 x 256 pixels take 1 s a second
 SLOWNESS = 5.0  # elapsed time in units of the processor time, on a machine that has other work
-LOOK_S, AWAY_S = 1.0, 2.0  # between two looks whether the job is wanted, and between tries to reach the database
+AWAY_S = 2.0  # between tries to reach the database
 N_SHOWN = 20  # refused parts, and warnings, that are reported
 
 
@@ -58,7 +54,7 @@ def run_talker(task: JobTask) -> Products:
     return Products(tuple(products))
 
 
-def _built_event(result: dict[str, Any]) -> dict[str, Any]:
+def _built_event(result: Mapping[str, Any]) -> dict[str, Any]:
     shown = {part: [f"{name}: {text}" for name, text in result[part][:N_SHOWN]] for part in ("refused", "warnings")}
     return {"type": "built", **{name: result[name] for name in ("n_kept", "minutes", "notes")}, **shown}
 
@@ -71,7 +67,7 @@ def _place(source: Path, target: Path) -> None:
         shutil.copyfile(source, target)
 
 
-def _build(task: JobTask) -> dict[str, Any]:
+def _build(task: JobTask) -> Mapping[str, Any]:
     """Run the builder; its result."""
     asked = task.request
     cpu_s = int(CPU_S + CPU_S_PER_S * float(asked["seconds"]))
@@ -79,57 +75,23 @@ def _build(task: JobTask) -> dict[str, Any]:
         "folder": str(task.folder), "name": asked["name"], "provenance": asked["provenance"],
         "consent": asked["consent"], "with_appearance": asked["appearance"],
         "with_report": find_spec("matplotlib") is not None, "max_bytes": asked["limits"]["n_bytes"],
-        "limits": asdict(replace(LIMITS, cpu_s=cpu_s)),
     }  # fmt: skip
-    for content in _messages(task, order, time.monotonic() + SLOWNESS * cpu_s):
-        if "error" in content:
-            raise KINDS.get(content["error"], BackendError)(content["message"])
-        if "n_kept" in content:
-            return content
+
+    def tell(event: Message) -> None:
         with suppress(DatabaseAwayError):
-            task.report({"type": "progress", **content})
-    raise DataError("the recording needs too much memory or time; send a shorter or smaller one")
+            task.report({"type": "progress", **event.content})
 
+    def look() -> None:
+        with suppress(DatabaseAwayError):
+            task.check()
 
-def _messages(task: JobTask, order: dict[str, Any], deadline: float) -> Iterator[dict[str, Any]]:
-    """Messages of the builder until it ends; it is ended when the job is no longer wanted, or late."""
-    child = subprocess.Popen(
-        [sys.executable, "-m", BUILDER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-        text=True, encoding="utf-8", env=bare_environment(),
-    )  # fmt: skip
-    assert child.stdin is not None
-    assert child.stdout is not None
-    lines: queue.SimpleQueue[str] = queue.SimpleQueue()
-    reader = threading.Thread(target=_read_lines, args=(child.stdout, lines), daemon=True)
+    child = Child(Program(BUILDER, replace(LIMITS, cpu_s=cpu_s)))
     try:
-        child.stdin.write(json.dumps(order) + "\n")
-        child.stdin.flush()
-        reader.start()
-        while time.monotonic() < deadline:
-            with suppress(DatabaseAwayError):
-                task.check()
-            try:
-                line = lines.get(timeout=LOOK_S)
-            except queue.Empty:
-                continue
-            if not line:
-                return
-            yield parse_json(line, "the builder")
+        return child.call(TOOL, order, on_event=tell, look=look, timeout_s=SLOWNESS * cpu_s).content
+    except ChildEndedError as ended:
+        raise DataError("the recording needs too much memory or time; send a shorter or smaller one") from ended
     finally:
-        child.kill()
-        child.wait()
-        with suppress(OSError):
-            child.stdin.close()
-        if reader.ident is not None:
-            reader.join()
-        child.stdout.close()
-
-
-def _read_lines(file: Any, lines: "queue.SimpleQueue[str]") -> None:
-    """Pass lines on; an empty one at the end."""
-    for line in file:
-        lines.put(line)
-    lines.put("")
+        child.close()
 
 
 def _store(task: JobTask) -> None:

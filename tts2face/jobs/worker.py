@@ -239,7 +239,7 @@ class Worker:
 
 def main() -> None:
     """Run one worker that ends with its parent: ``python -m tts2face.jobs.worker DATABASE STORE CORE NICENESS``."""
-    from tts2face.child_process import bind_to_core, exit_after
+    from tts2face.processes.child import bind_to_core, exit_after
 
     database, store, core, niceness = sys.argv[1:5]
     bound = int(core) if core.isdecimal() else None

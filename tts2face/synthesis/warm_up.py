@@ -21,7 +21,7 @@ from tts2face.render.picture import Picture
 
 COMPILE_CHILD_CODE = """
 import os
-from tts2face.child_process import exit_after
+from tts2face.processes.child import exit_after
 exit_after(lambda: os.read(0, 1))
 from tts2face.synthesis import warm_up
 warm_up.{}()

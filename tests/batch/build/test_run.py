@@ -19,12 +19,13 @@ from tests.batch.conftest import FPS, SRT, Planner
 from tests.synthesis.fake_voice import LEAD, LETTER, FakeVoice
 from tts2face.batch import engine as engines
 from tts2face.batch.engine import LocalEngine, Rendered
-from tts2face.batch.render_process import ChildDiedError, RenderProcess
+from tts2face.batch.render_process import RenderProcess
 from tts2face.batch.render_segment import SegmentRenderer
 from tts2face.batch.run import SEGMENT_FOLDER, run_batch
 from tts2face.batch.segment import Segment
 from tts2face.batch.segment_result import SegmentResult
 from tts2face.batch.store import FolderStore, Store
+from tts2face.processes.parent import ChildEndedError
 
 HALF_FRAME_S = 0.5 / FPS
 AAC_SMEAR_S = 0.025  # of an onset, by the transform's length of 1024 samples
@@ -220,7 +221,7 @@ class DyingRenderer:
     def render(self, segment: Segment, out: Path) -> SegmentResult:
         self.n_calls += 1
         if self.n_calls <= self.n_deaths:
-            raise ChildDiedError("the rendering process ended: killed")
+            raise ChildEndedError("the rendering process ended: killed")
         out.write_bytes(b"movie")
         return SegmentResult(15, 10.0)
 
@@ -294,7 +295,7 @@ class SlowProcess:
     def render(self, segment: Segment, out: Path) -> SegmentResult:
         if segment.request["text"] != "Hello there.":
             self.ends.append(self.closed.wait(3.0))
-            raise ChildDiedError("the rendering process ended: killed")
+            raise ChildEndedError("the rendering process ended: killed")
         out.write_bytes(b"movie")
         return SegmentResult(15, 10.0)
 
@@ -319,7 +320,7 @@ def test_an_interrupted_batch_ends_its_processes_while_they_render(
 def test_a_closed_process_is_not_started_again(plan_of: Planner, tmp_path: Path) -> None:
     process = RenderProcess()
     process.close()
-    with pytest.raises(BackendError, match="the rendering process was closed"):
+    with pytest.raises(BackendError, match="the child process was closed"):
         process.render(plan_of().outputs[0].segments[0], tmp_path / "x.mov")
     assert process.pid is None
 
@@ -342,7 +343,7 @@ def test_a_child_process_renders_the_same_bytes_and_dies_alone(plan_of: Planner,
             process.render(wrong, tmp_path / "wrong.mov")
         assert process.pid is not None
         os.kill(process.pid, signal.SIGKILL)
-        with pytest.raises(ChildDiedError, match="the rendering process ended"):
+        with pytest.raises(ChildEndedError, match="the process that was to render ended"):
             process.render(quiet, tmp_path / "again.mov")
         assert process.render(quiet, tmp_path / "again.mov").n_frames == own.n_frames
     finally:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from corpus_tools.prompts.coverage import count_units, sentence_units
-from corpus_tools.recording_process import prompts_answer
+from corpus_tools.tools.recordings import prompts_answer
 from tests.studio.chromium import Browser
 from tts2face.models.talker import load_talker
 from tts2face.service.access.keys import LOCAL_KEY

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.corpus_tools.test_take_process import write_table
+from tests.corpus_tools.test_takes_tool import write_table
 from tests.running import eventually
 from tests.studio.server.test_projects_http import create, edit, preview
 from tts2face.models.palette import load_palette, read_palette

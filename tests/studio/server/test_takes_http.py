@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 from websockets.sync.client import connect
 
-from tests.corpus_tools.test_take_process import write_table
+from tests.corpus_tools.test_takes_tool import write_table
 from tests.running import RunningService, eventually
 from tests.studio.server.test_styles_http import owned, wait_for_take  # noqa: F401 - a fixture
 from tts2face.session import Session

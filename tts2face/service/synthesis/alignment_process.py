@@ -17,7 +17,7 @@ import numpy as np
 
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.child_process import claim_standard_output
+from tts2face.processes.child import claim_standard_output
 from tts2face.speech.forced_alignment import Aligner, Alignment, Pronunciations
 from tts2face.types import Waveform
 

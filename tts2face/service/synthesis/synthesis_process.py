@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from typing import Any, BinaryIO
 
-from tts2face.child_process import bind_to_core, claim_standard_output, received_requests
+from tts2face.processes.child import bind_to_core, claim_standard_output, exit_after
 from tts2face.service.logs import configure_logs
 from tts2face.service.synthesis.messages import CANCELS, Message, MessageKind
 from tts2face.service.synthesis.remote_aligner import RemoteAligner
@@ -89,6 +89,21 @@ class SynthesisProcess:
             self._forget(message.task)
         self._file.write(message.encode())
         self._file.flush()
+
+
+def received_requests() -> "queue.Queue[tuple[Any, float]]":
+    """Lines of JSON of standard input, each with the second of the monotonic clock at which it arrived.
+
+    This process exits when the input ends.
+    """
+    requests: queue.Queue[tuple[Any, float]] = queue.Queue()
+
+    def read_lines() -> None:
+        while line := sys.stdin.buffer.readline():
+            requests.put((json.loads(line), time.monotonic()))
+
+    exit_after(read_lines)
+    return requests
 
 
 def main() -> None:

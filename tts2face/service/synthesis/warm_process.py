@@ -9,9 +9,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
-from lexicon.errors import BackendError
-from tts2face.batch.render_process import KINDS as ERROR_KINDS
-from tts2face.child_process import child_environment
+from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
+from tts2face.processes.limits import child_environment
 from tts2face.service.logs import REQUEST_ID, log_event
 from tts2face.service.synthesis.messages import DEFECT, HEADER, MAX_PAYLOAD_BYTES, Message, MessageKind
 from tts2face.service.synthesis.work import Work
@@ -29,7 +28,10 @@ class DefectError(BackendError):
     """A defect of the synthesis; the log has its traceback."""
 
 
-KINDS = ERROR_KINDS | {DEFECT: DefectError}  # of errors of a synthesis process
+# Errors of a synthesis process.
+KINDS: dict[str, type[Tts2faceError]] = {
+    "InputError": InputError, "DataError": DataError, "BackendError": BackendError, DEFECT: DefectError,
+}  # fmt: skip
 
 
 @dataclass(slots=True)

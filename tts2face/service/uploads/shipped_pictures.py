@@ -4,7 +4,7 @@ import asyncio
 from pathlib import Path
 
 from tts2face.batch.address import file_hash
-from tts2face.service.uploads.decode_process import DRAW
+from tts2face.service.uploads.decode import DRAW
 from tts2face.service.uploads.upload_folder import RESOURCE_TIMEOUT_S, decode_file
 from tts2face.storage.files import find_file, translate_disk_errors
 from tts2face.storage.temporary import Temporary

@@ -2,25 +2,25 @@
 
 import asyncio
 import json
-import sys
 import tempfile
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from starlette.datastructures import UploadFile
 
-from lexicon.errors import Tts2faceError
+from lexicon.errors import DataError, InputError, Tts2faceError
 from lexicon.inputs import parse_json
 from tts2face.jobs import resource_check
+from tts2face.jobs.refused_file import RefusedFileError
 from tts2face.jobs.resource_check import STATEMENT
-from tts2face.limited_process import bare_environment
+from tts2face.processes.parent import ChildEndedError, started
+from tts2face.processes.tools import run_take_tool
 from tts2face.service.errors import RefusedError
 from tts2face.service.settings import ServiceSettings
-from tts2face.service.uploads.decode_process import PICTURE, PLACES, REFUSED, SOUND, SUBTITLES, VIDEO
-from tts2face.service.uploads.tool_process import run_take_process
+from tts2face.service.uploads.decode import DECODE, PICTURE, PLACES, SOUND, SUBTITLES, VIDEO, program
 
 RESOURCE_TIMEOUT_S = 300.0  # a check takes 3 to 7 s; with other work on the machine, and kernels to compile, longer
 AVATAR_CPU_S = 240  # the head of a person takes 15 s
@@ -106,16 +106,10 @@ class UploadFolder:
         """Folder with the checked head of a person in a photo, beside which is its statement; errors as `resource`."""
         checked = self.path / "checked"
         checked.mkdir()
-        order = {
-            "kind": "avatar",
-            "take": str(photo),
-            "out": str(checked),
-            "max_bytes": max_bytes,
-            "cpu_s": AVATAR_CPU_S,
-        }
+        order = {"take": str(photo), "out": str(checked), "max_bytes": max_bytes}
         try:
             async with asyncio.timeout(RESOURCE_TIMEOUT_S):
-                await run_take_process(order, lambda *_: None)
+                await run_take_tool("avatar", order, lambda **_: None, cpu_s=AVATAR_CPU_S)
         except (Tts2faceError, TimeoutError) as wrong:
             reason = "it needs too much memory or time" if isinstance(wrong, TimeoutError) else str(wrong)
             raise _refused("the photo", reason.replace(photo.name, "the photo")) from wrong
@@ -158,33 +152,26 @@ async def save_upload(upload: UploadFile, path: Path) -> None:
 
 
 async def decode_file(arguments: tuple[str, Path, Path, float], name: str, timeout_s: float) -> None:
-    """Run `tts2face.service.uploads.decode_process` with its arguments; `name` names the file in messages.
+    """Decode a file (kind, source, target and limit of `tts2face.service.uploads.decode`); `name` is that in messages.
 
     Raises
     ------
     RefusedError
         The file is refused, or takes too much memory or time.
     """
-    child = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "tts2face.service.uploads.decode_process", *map(str, arguments),
-        stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.PIPE,
-        cwd=arguments[2].parent, env=bare_environment(),
-    )  # fmt: skip
+    kind, source, target, limit = arguments
+    order = {"kind": kind, "source": str(source), "target": str(target), "limit": limit}
     try:
-        _, written = await asyncio.wait_for(child.communicate(), timeout_s)
+        async with started(program(kind)) as child:
+            await child.call(DECODE, order, timeout_s=timeout_s)
     except TimeoutError as late:
         raise RefusedError(
             422, "invalid_data", f"{name} took more than {timeout_s:g} s to decode; send a simpler file"
         ) from late
-    finally:
-        if child.returncode is None:
-            with suppress(ProcessLookupError):
-                child.kill()
-            await child.wait()
-    if child.returncode == 0:
-        return
-    reason = written.decode(errors="replace") if child.returncode == REFUSED else "it needs too much memory or time"
-    raise _refused(name, reason)
+    except (RefusedFileError, InputError, DataError) as refused:
+        raise _refused(name, str(refused)) from refused
+    except ChildEndedError as ended:
+        raise _refused(name, "it needs too much memory or time") from ended
 
 
 def _refused(name: str, reason: str) -> RefusedError:

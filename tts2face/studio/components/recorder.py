@@ -49,7 +49,7 @@ class VisemeMap(Element, component="viseme_map.js"):
     Parameters
     ----------
     prompts, running
-        As `corpus_tools.recording_process` gives them.
+        As the tool ``recordings`` gives them.
     visemes
         The viseme of each phone.
     """

@@ -16,7 +16,7 @@ from tts2face.request import Request
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
 from tts2face.service.settings import ServiceSettings
-from tts2face.service.uploads.decode_process import SOUND, SUBTITLES
+from tts2face.service.uploads.decode import SOUND, SUBTITLES
 from tts2face.service.uploads.upload_folder import MAX_TEXT_BYTES, decode_file
 from tts2face.studio.host import StudioHost
 from tts2face.studio.requests import check_project

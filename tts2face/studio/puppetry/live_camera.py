@@ -7,22 +7,23 @@ first. The process ends with the connection.
 import asyncio
 import json
 import struct
-import sys
-from contextlib import suppress
+from collections.abc import AsyncIterator, Mapping
+from contextlib import aclosing, suppress
+from typing import Any
 
 from fastapi import WebSocket, WebSocketDisconnect
 
-from tts2face.limited_process import bare_environment
+from lexicon.errors import Tts2faceError
+from tts2face.processes.parent import started
+from tts2face.processes.program import Program
 from tts2face.service.access.keys import ApiKey
-from tts2face.service.uploads.tool_process import end_process
+from tts2face.service.synthesis.camera_process import FOLLOW, LIMITS
 
-PROCESS = "tts2face.service.synthesis.camera_process"
-HEADER = struct.Struct("<dI")  # as the process reads it
+PROGRAM = Program("tts2face.service.synthesis.camera_process:HANDLERS", LIMITS)
 TIME = struct.Struct("<d")  # before each JPEG of a client
 MAX_PICTURE_BYTES = 1 << 20
 MAX_LIVE_S = 3600.0
 ENDING_S, LOOK_S = 3.0, 0.05  # for which the end of an earlier connection is waited for, and between looks
-MAX_ANSWER = 1 << 16
 REFUSED = 1008  # close code of WebSockets
 
 
@@ -61,19 +62,14 @@ async def _is_free(owner: str, live: set[str]) -> bool:
 
 
 async def _follow(connection: WebSocket) -> None:
-    child = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", PROCESS, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.DEVNULL, env=bare_environment(), limit=MAX_ANSWER,
-    )  # fmt: skip
     newest: asyncio.Queue[bytes] = asyncio.Queue(1)
-    tasks = [asyncio.create_task(_receive(connection, newest)), asyncio.create_task(_answer(connection, child, newest))]
+    tasks = [asyncio.create_task(_receive(connection, newest)), asyncio.create_task(_answer(connection, newest))]
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        await end_process(child)
         with suppress(RuntimeError):
             await connection.close()
 
@@ -89,14 +85,23 @@ async def _receive(connection: WebSocket, newest: "asyncio.Queue[bytes]") -> Non
                 newest.put_nowait(picture)
 
 
-async def _answer(connection: WebSocket, child: asyncio.subprocess.Process, newest: "asyncio.Queue[bytes]") -> None:
+async def _answer(connection: WebSocket, newest: "asyncio.Queue[bytes]") -> None:
     """Give the process one picture after the other, and the client its answers."""
-    assert child.stdin is not None
-    assert child.stdout is not None
-    with suppress(WebSocketDisconnect, RuntimeError, OSError):
-        while line := await child.stdout.readline():
-            await connection.send_text(line.decode())
+    is_asked = asyncio.Event()  # for another picture, by an answer
+
+    async def pictures() -> AsyncIterator[tuple[Mapping[str, Any], bytes]]:
+        while True:
+            await is_asked.wait()
+            is_asked.clear()
             picture = await newest.get()
             (seconds,) = TIME.unpack_from(picture)
-            child.stdin.write(HEADER.pack(seconds, len(picture) - TIME.size) + picture[TIME.size :])
-            await child.stdin.drain()
+            yield {"time": seconds}, picture[TIME.size :]
+
+    with suppress(WebSocketDisconnect, RuntimeError):
+        try:
+            async with started(PROGRAM) as child, aclosing(child.stream(FOLLOW, {}, inputs=pictures())) as answers:
+                async for answer in answers:
+                    await connection.send_text(json.dumps(dict(answer.content)))
+                    is_asked.set()
+        except Tts2faceError as error:
+            await connection.send_text(json.dumps({"error": type(error).__name__, "message": str(error)}))

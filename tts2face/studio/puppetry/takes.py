@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from lexicon.errors import InputError, Tts2faceError
+from tts2face.processes.tools import run_take_tool
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
-from tts2face.service.uploads.decode_process import SOUND as SOUND_KIND
-from tts2face.service.uploads.tool_process import run_take_process
+from tts2face.service.uploads.decode import SOUND as SOUND_KIND
 from tts2face.service.uploads.upload_folder import decode_file
 from tts2face.storage.files import translate_disk_errors, write_atomically
 from tts2face.studio.host import StudioHost
@@ -123,8 +123,8 @@ class Takes:
         """Begin to render the take as a film."""
         folder, entry = self._ready(key, number)
         sound = str(folder / SOUND) if entry.has_sound else None
-        order = {"kind": "film", "take": str(folder / TABLE), "sound": sound, "out": str(folder / FILM)}
-        self._start(key, number, lambda show: run_take_process(order, show))
+        order = {"take": str(folder / TABLE), "sound": sound, "out": str(folder / FILM)}
+        self._start(key, number, lambda show: run_take_tool("film", order, show))
 
     async def make_style_take(self, key: ApiKey, number: str) -> None:
         """Make the take the one of which a style is made; errors as `Styles.add_take`."""
@@ -172,13 +172,13 @@ class Takes:
         folder = file.parent
         try:
             if file.name == TABLE:
-                found = await run_take_process({"kind": "check", "take": str(file), "cache": str(folder)}, show)
+                found = await run_take_tool("check", {"take": str(file), "cache": str(folder)}, show)
                 if not found["seconds"]:
                     raise InputError(found["findings"][0]["message"])
             else:
                 table, sound = folder / TABLE, folder / SOUND
-                order = {"kind": "capture", "take": str(file), "table": str(table), "sound": str(sound)}
-                found = await run_take_process(order, show)
+                order = {"take": str(file), "table": str(table), "sound": str(sound)}
+                found = await run_take_tool("capture", order, show)
             ready = replace(entry, state=READY, seconds=found["seconds"], has_sound=found.get("has_sound", False))
             self.store.write(ready)
         except Tts2faceError as wrong:

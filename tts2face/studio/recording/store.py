@@ -60,7 +60,7 @@ class RecordingStore:
         self.revision = 0  # increased with every change
 
     def create(self, owner: str, name: str, prompts: Mapping[str, Any]) -> str:
-        """Id of a new recording; `prompts` as `corpus_tools.recording_process` gives them.
+        """Id of a new recording; `prompts` as the tool ``recordings`` gives them.
 
         Raises
         ------

@@ -1,26 +1,25 @@
 """Prompts and checks of takes by a process of the tools, and the takes that wait for it.
 
-The process (`corpus_tools.recording_process`) is started by the first order, loads its networks once, and ends when
+The process (the tool ``recordings``) is started by the first order, loads its networks once, and ends when
 there was nothing to do for `IDLE_S`.
 """
 
 import asyncio
-import json
-import sys
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 from lexicon.errors import BackendError, Tts2faceError
-from lexicon.inputs import parse_json
-from tts2face.batch.render_process import KINDS
-from tts2face.limited_process import bare_environment
+from tts2face.processes.limits import ProcessLimits
+from tts2face.processes.parent import AsyncChild, ChildEndedError
+from tts2face.processes.program import Program
 from tts2face.studio.recording.store import CACHE, CHECKING, GOOD, REFUSED, WEAK, RecordingStore, Take
 
-PROCESS = "corpus_tools.recording_process"  # by name: the tools stand above this package
+TOOL = "recordings"
+LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=100_000, file_bytes=1 << 30, n_files=256)
 ANSWER_S = 120.0  # of one order, with the loading of the networks
 IDLE_S = 300.0
-LARGEST_ANSWER = 16 << 20  # bytes
 REFUSAL = "refusal"  # severity of a finding
 
 
@@ -29,20 +28,19 @@ class TakeChecks:
 
     def __init__(self, store: RecordingStore) -> None:
         self._store = store
-        self._child: asyncio.subprocess.Process | None = None
-        self._lock = asyncio.Lock()
+        self._child = AsyncChild(Program(TOOL, LIMITS))
         self._waiting: asyncio.Queue[tuple[str, int, Take]] = asyncio.Queue()
         self._worker: asyncio.Task[None] | None = None
 
-    async def prompts(self, minutes: float, language: str, text: str | None) -> dict[str, Any]:
-        """Prompts as `corpus_tools.recording_process` gives them; `text` is the path of the user's text.
+    async def prompts(self, minutes: float, language: str, text: str | None) -> Mapping[str, Any]:
+        """Prompts as the tool gives them; `text` is the path of the user's text.
 
         Raises
         ------
         InputError, DataError, BackendError
             As `tts2face corpus prompts` says.
         """
-        return await self._ask({"kind": "prompts", "minutes": minutes, "language": language, "text": text})
+        return await self._ask("prompts", {"minutes": minutes, "language": language, "text": text})
 
     def start(self) -> None:
         """Check the takes that wait, also those of an earlier run, from now on."""
@@ -62,15 +60,14 @@ class TakeChecks:
             self._worker.cancel()
             with suppress(asyncio.CancelledError):
                 await self._worker
-        await self._end_child()
+        await self._child.close()
 
     async def _check_all(self) -> None:
         while True:
             try:
                 number, at, take = await asyncio.wait_for(self._waiting.get(), IDLE_S)
             except TimeoutError:
-                async with self._lock:
-                    await self._end_child()
+                await self._child.close_when_idle()
                 continue
             await asyncio.to_thread(self._store.judge, number, at, await self._check(number, at, take))
 
@@ -79,12 +76,9 @@ class TakeChecks:
         video = self._store.path(number, take)
         if not video.is_file() or take.state != CHECKING:
             return take  # recorded again, or deleted
-        order = {
-            "kind": "check", "video": str(video), "text": self._store.transcript(number, at),
-            "cache": str(video.parents[1] / CACHE),
-        }  # fmt: skip
+        text, cache = self._store.transcript(number, at), str(video.parents[1] / CACHE)
         try:
-            answer = await self._ask(order)
+            answer = await self._ask("check", {"video": str(video), "text": text, "cache": cache})
         except Tts2faceError as error:
             return replace(take, state=REFUSED, advice=str(error))
         findings = answer["findings"]
@@ -93,37 +87,9 @@ class TakeChecks:
         state = REFUSED if findings[0]["severity"] == REFUSAL else WEAK
         return replace(take, state=state, advice=str(findings[0]["message"]), key=answer["key"])
 
-    async def _ask(self, order: dict[str, Any]) -> dict[str, Any]:
+    async def _ask(self, kind: str, order: Mapping[str, Any]) -> Mapping[str, Any]:
         """Answer of the process; it is started anew if it ended."""
-        async with self._lock:
-            child = self._child if self._child is not None and self._child.returncode is None else await self._start()
-            assert child.stdin is not None
-            assert child.stdout is not None
-            try:
-                child.stdin.write(json.dumps(order, ensure_ascii=False).encode() + b"\n")
-                await child.stdin.drain()
-                line = await asyncio.wait_for(child.stdout.readline(), ANSWER_S)
-            except (OSError, TimeoutError, asyncio.CancelledError, ValueError) as failed:
-                await self._end_child()
-                if isinstance(failed, asyncio.CancelledError):
-                    raise
-                line = b""
-        if not line:
-            raise BackendError("the take could not be checked in time; record it again, shorter or smaller")
-        answer: dict[str, Any] = parse_json(line.decode(), "the answer of the checks")
-        if "error" in answer:
-            raise KINDS.get(answer["error"], BackendError)(answer["message"])
-        return answer
-
-    async def _start(self) -> asyncio.subprocess.Process:
-        self._child = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", PROCESS, stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.DEVNULL, env=bare_environment(), limit=LARGEST_ANSWER,
-        )  # fmt: skip
-        return self._child
-
-    async def _end_child(self) -> None:
-        child, self._child = self._child, None
-        if child is not None and child.returncode is None:
-            child.kill()
-            await child.wait()
+        try:
+            return (await self._child.call(kind, order, timeout_s=ANSWER_S)).content
+        except (ChildEndedError, TimeoutError) as failed:
+            raise BackendError("the take could not be checked in time; record it again, shorter or smaller") from failed

@@ -1,6 +1,6 @@
 """A talker from the accepted takes of a recording, and its first sentence, each in a process of its own.
 
-The building is that of the service's jobs (`corpus_tools.build_process`), with its limits; the command `tts2face`
+The building is that of the service's jobs (the tool ``talker``), with its limits; the command `tts2face`
 makes the clip.
 """
 
@@ -9,14 +9,16 @@ import os
 import shutil
 import sys
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from contextlib import suppress
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
 from lexicon.errors import BackendError
 from tts2face.jobs.talker_job import BUILDER, CPU_S, CPU_S_PER_S, LIMITS, SLOWNESS
-from tts2face.limited_process import bare_environment
-from tts2face.service.uploads.tool_process import end_process, run_tool
+from tts2face.processes.limits import bare_environment
+from tts2face.processes.program import Program
+from tts2face.processes.tools import run_tool
 
 TALKER, REPORT, CLIP = "talker.talker", "report.html", "first.mp4"  # files in the folder of a recording
 MADE, CHECKED = "made.talker", "checked"  # as the builder names them
@@ -47,9 +49,9 @@ async def build_talker(folder: Path, *, name: str, consent: str, n_takes: int, o
     order = {
         "folder": str(folder), "name": name, "provenance": {"name": name}, "consent": consent,
         "with_appearance": True, "with_report": find_spec("matplotlib") is not None, "max_bytes": MAX_TALKER_BYTES,
-        "limits": asdict(replace(LIMITS, cpu_s=cpu_s)),
     }  # fmt: skip
-    result = await asyncio.wait_for(run_tool(BUILDER, order, on_message, "n_kept", "the recording"), SLOWNESS * cpu_s)
+    program = Program(BUILDER, replace(LIMITS, cpu_s=cpu_s))
+    result = await run_tool(program, BUILDER, order, on_message, what="the recording", timeout_s=SLOWNESS * cpu_s)
     os.replace(folder / MADE, folder / TALKER)
     shutil.rmtree(folder / CHECKED, ignore_errors=True)
     refused = "; ".join(f"{take}: {reason}" for take, reason in result["refused"][:N_SHOWN])
@@ -77,7 +79,10 @@ async def speak(folder: Path, text: str) -> None:
     except TimeoutError as late:
         raise BackendError("the clip took too long; give a shorter sentence") from late
     finally:
-        await end_process(child)
+        if child.returncode is None:
+            with suppress(ProcessLookupError):
+                child.kill()
+            await child.wait()
     if child.returncode:
         reason = " ".join(errors.decode(errors="replace").split())[-MAX_REASON_CHARACTERS:]
         raise BackendError(reason.removeprefix("tts2face: ") or "the clip could not be made; try again")

@@ -10,22 +10,24 @@ import secrets
 import shutil
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
 from lexicon.errors import DataError, InputError, Tts2faceError
 from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
 from tts2face.jobs.resource_check import PALETTE, TALKER
-from tts2face.limited_process import ProcessLimits
+from tts2face.processes.limits import ProcessLimits
+from tts2face.processes.program import Program
+from tts2face.processes.tools import run_tool
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
 from tts2face.service.uploads.library import Library
-from tts2face.service.uploads.tool_process import run_tool
 from tts2face.storage.files import translate_disk_errors, write_atomically
 from tts2face.studio.projects.renders import CANCELLED, DONE, FAILED, RUNNING, WAITING
 
-REPORT_PROCESS = "corpus_tools.report_process"  # by name: the tools stand above this package
+REPORT_TOOL = "report"
 LIMITS = ProcessLimits(memory_bytes=6 << 30, cpu_s=3600, file_bytes=200 << 20, n_files=256)
 REPORT_S = 5.0 * LIMITS.cpu_s  # of one report, on a machine that has other work
 MAX_OPEN = 5  # of an owner, waiting or running
@@ -161,12 +163,11 @@ class Reports:
                 self._notify()
                 with translate_disk_errors(folder):
                     folder.mkdir(parents=True)
-                order = {
-                    "kind": report.kind, "model": path, "name": report.model, "out": str(folder / PAGE),
-                    "limits": asdict(LIMITS),
-                }  # fmt: skip
-                work = run_tool(REPORT_PROCESS, order, lambda *steps: self._show(report, *steps), "is_result", "it")
-                await asyncio.wait_for(work, REPORT_S)
+                order = {"kind": report.kind, "model": path, "name": report.model, "out": str(folder / PAGE)}
+                await run_tool(
+                    Program(REPORT_TOOL, LIMITS), REPORT_TOOL, order, partial(self._show, report), what="it",
+                    timeout_s=REPORT_S,
+                )  # fmt: skip
                 entry = {name: getattr(report, name) for name in ("id", "owner", "kind", "model", "created")}
                 write_atomically(folder / ENTRY, json.dumps(entry, ensure_ascii=False).encode())
                 report.state = DONE

@@ -17,10 +17,10 @@ from tts2face.models.palette_editing import (
     remove_style,
     rename_style,
 )
+from tts2face.processes.tools import run_take_tool
 from tts2face.project import style_names
 from tts2face.project.project import Project
 from tts2face.service.access.keys import ApiKey
-from tts2face.service.uploads.tool_process import run_take_process
 from tts2face.storage.files import translate_disk_errors, write_atomically
 from tts2face.studio.host import StudioHost
 from tts2face.studio.projects.store import ProjectEntry
@@ -204,8 +204,8 @@ class Styles:
     async def _check(self, key: ApiKey, work: TakeWork) -> None:
         take = self.store.take(key.name)
         assert take is not None
-        order = {"kind": "check", "take": str(take), "cache": str(take.with_name(CACHE))}
-        found = await run_take_process(order, work.show)
+        order = {"take": str(take), "cache": str(take.with_name(CACHE))}
+        found = await run_take_tool("check", order, work.show)
         findings = found["findings"]
         work.state = GOOD if not findings else REFUSED if findings[0]["severity"] == "refusal" else WEAK
         work.advice = findings[0]["message"] if findings else f"a good take of {found['seconds']:.0f} s"
@@ -213,10 +213,10 @@ class Styles:
     async def _make(self, key: ApiKey, work: TakeWork, take: Path, name: str) -> None:
         made = take.with_name(MADE)
         order = {
-            "kind": "style", "take": str(take), "cache": str(take.with_name(CACHE)), "base": self.store.base(key.name),
+            "take": str(take), "cache": str(take.with_name(CACHE)), "base": self.store.base(key.name),
             "name": name, "out": str(made),
         }  # fmt: skip
-        built = await run_take_process(order, work.show)
+        built = await run_take_tool("style", order, work.show)
         learnt = await asyncio.to_thread(read_palette, made)
         # The palette may have changed meanwhile: only the new style is taken.
         await self._change(key, lambda palette: _with_recorded(palette, learnt, name))

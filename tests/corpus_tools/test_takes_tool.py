@@ -1,8 +1,6 @@
-"""Work on one take: its check, and what the process answers."""
+"""Work on one take: its check, and what its tool answers."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,9 +10,11 @@ from corpus_tools.decomposition.gesture_take import GOOD_S, LEAST_S, check_gestu
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tests.photo.pictures import still
+from tests.processes.answered import ordered
 from tts2face.jobs.resource_check import CONTENT, STATEMENT
 from tts2face.models.face_file import read_face
 from tts2face.models.palette import load_palette, read_palette
+from tts2face.processes.tools import TAKES
 
 HEADER = "Timecode,BlendshapeCount,JawOpen,EyeBlinkLeft,EyeBlinkRight,BrowInnerUp,HeadYaw,HeadPitch,HeadRoll"
 
@@ -50,29 +50,13 @@ def test_another_kind_of_file(tmp_path: Path) -> None:
         check_gesture_take(tmp_path / "take.csv", RunOptions(tmp_path, 1), print)
 
 
-def ordered(order: dict[str, object]) -> list[dict[str, object]]:
-    """Messages of the process about an order."""
-    child = subprocess.Popen(
-        [sys.executable, "-m", "corpus_tools.take_process"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    assert child.stdin is not None
-    assert child.stdout is not None
-    child.stdin.write(json.dumps(order) + "\n")
-    child.stdin.flush()
-    lines = [json.loads(line) for line in child.stdout]
-    child.stdin.close()
-    child.stdout.close()
-    child.wait()
-    return lines
-
-
 def test_a_table_becomes_a_style_beside_the_others(tmp_path: Path) -> None:
     take = write_table(tmp_path / "take.csv", 4)
     order = {
-        "kind": "style", "take": str(take), "cache": str(tmp_path), "base": "starter", "name": "my own",
+        "take": str(take), "cache": str(tmp_path), "base": "starter", "name": "my own",
         "out": str(tmp_path / "out.palette"),
     }  # fmt: skip
-    *progress, result = ordered(order)
+    progress, result = ordered(TAKES, "style", order)
     assert progress[0]["stage"] == "reading recordings"
     assert result["seconds"] == pytest.approx(4.0, abs=0.1)
     made = read_palette(tmp_path / "out.palette")
@@ -82,12 +66,11 @@ def test_a_table_becomes_a_style_beside_the_others(tmp_path: Path) -> None:
 
 def test_an_error_names_no_path(tmp_path: Path) -> None:
     take = write_table(tmp_path / "take.csv", 4)
-    order = {"kind": "style", "take": str(take), "cache": str(tmp_path), "base": "starter", "name": "delighted",
+    order = {"take": str(take), "cache": str(tmp_path), "base": "starter", "name": "delighted",
              "out": str(tmp_path / "out.palette")}  # fmt: skip
-    (error,) = ordered(order)[-1:]
-    assert error["error"] == "InputError"
-    assert "the palette has a style delighted already" in str(error["message"])
-    assert str(tmp_path) not in str(error["message"])
+    with pytest.raises(InputError, match="the palette has a style delighted already") as refused:
+        ordered(TAKES, "style", order)
+    assert str(tmp_path) not in str(refused.value)
 
 
 @pytest.mark.usefixtures("face_model")
@@ -95,14 +78,13 @@ def test_a_photo_becomes_the_head_of_its_person(tmp_path: Path) -> None:
     photo, out = tmp_path / "face.upload", tmp_path / "checked"
     out.mkdir()
     Image.fromarray(still("tomas", 360)).save(photo, "PNG")
-    order = {"kind": "avatar", "take": str(photo), "out": str(out), "max_bytes": 2e7, "cpu_s": 200}
+    order = {"take": str(photo), "out": str(out), "max_bytes": 2e7}
     stated = {"name": "tom", "consent": None, "max_pixels": 1_000_000}
     (tmp_path / STATEMENT).write_text(json.dumps(stated))
-    (*_, refused) = ordered(order)
-    assert refused["error"] == "InputError"
-    assert "state the consent" in str(refused["message"])
+    with pytest.raises(InputError, match="state the consent"):
+        ordered(TAKES, "avatar", order)
     (tmp_path / STATEMENT).write_text(json.dumps(stated | {"consent": "drawn"}))
-    (*_, made) = ordered(order)
+    _, made = ordered(TAKES, "avatar", order)
     assert str(made["look"]).startswith("hair: ")
     face = read_face(out / CONTENT)
     assert face.photograph is None

@@ -1,24 +1,26 @@
-"""Decoding of an uploaded file in a process of its own, with limits of memory, time and files, and without a network.
+"""Decoding of an uploaded file in a child process, with limits of memory, time and files, and without a network.
 
-``python -m tts2face.service.uploads.decode_process KIND SOURCE TARGET LIMIT``: a file becomes a plain one (sound: mono
-.wav at 48 kHz; picture: .png); a resource (talker, face, palette, dictionary) is checked and written, with its
-description and picture, into the folder TARGET; ``draw-`` and its kind draw the picture TARGET only; ``places`` finds
-lips and lids in a photo for the folder TARGET; ``subtitles-`` and an encoding check subtitles; a video is measured.
-LIMIT is the largest duration in seconds, number of pixels or cues, or size in bytes. The exit code is 0, or 2 with one
-sentence on standard error.
+A file becomes a plain one (sound: mono .wav at 48 kHz; picture: .png); a resource (talker, face, palette, dictionary)
+is checked and written, with its description and picture, into the folder ``target``; ``draw-`` and its kind draw the
+picture ``target`` only; ``places`` finds lips and lids in a photo for the folder ``target``; ``subtitles-`` and an
+encoding check subtitles; a video is measured. ``limit`` is the largest duration in seconds, number of pixels or cues,
+or size in bytes.
 """
 
 import json
-import os
 import shutil
-import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from tts2face.jobs.refused_file import RefusedFileError
 from tts2face.jobs.resource_check import RESOURCE_KINDS, check_resource, draw_resource, find_places
-from tts2face.limited_process import ProcessLimits, limit_process
+from tts2face.processes.child import Call, Handler
+from tts2face.processes.limits import ProcessLimits
+from tts2face.processes.program import Program
+from tts2face.processes.tools import LOW_PRIORITY
 
 SOUND, PICTURE, VIDEO, DRAW, SUBTITLES, PLACES = "sound", "picture", "video", "draw-", "subtitles-", "places"
 LIMITS = ProcessLimits(memory_bytes=2 << 30, cpu_s=60, file_bytes=1 << 30, n_files=64)
@@ -31,8 +33,7 @@ VIDEO_FORMATS = {
 }  # fmt: skip
 MAX_VIDEO_PIXELS, MAX_VIDEO_FPS = 4096 * 2304, 240
 PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TIFF")
-REFUSED = 2
-LOW_PRIORITY = 10
+DECODE = "decode"  # name of the call
 
 
 def decode_sound(source: Path, target: Path, max_seconds: float) -> None:
@@ -172,21 +173,17 @@ def decode(kind: str, source: Path, target: Path, limit: float) -> None:
         {SOUND: decode_sound, PICTURE: decode_picture, VIDEO: check_video}[kind](source, target, limit)
 
 
-def main() -> int:
-    """Decode one file."""
-    kind, source, target, limit = sys.argv[1:]
+def _decode(call: Call) -> dict[str, Any]:
+    asked = call.content
+    decode(asked["kind"], Path(asked["source"]), Path(asked["target"]), float(asked["limit"]))
+    return {}
+
+
+def program(kind: str) -> Program:
+    """The child that decodes a file of a kind."""
     if kind in {SOUND, PICTURE, VIDEO} or kind.startswith(SUBTITLES):
-        limit_process(LIMITS)
-    else:
-        limit_process(replace(LIMITS, cpu_s=RESOURCE_CPU_S))
-        os.nice(LOW_PRIORITY)  # streams go first
-    try:
-        decode(kind, Path(source), Path(target), float(limit))
-    except RefusedFileError as refused:
-        sys.stderr.write(str(refused))
-        return REFUSED
-    return 0
+        return Program(f"{__name__}:HANDLERS", LIMITS)
+    return Program(f"{__name__}:HANDLERS", replace(LIMITS, cpu_s=RESOURCE_CPU_S), niceness=LOW_PRIORITY)
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+HANDLERS: Mapping[str, Handler] = MappingProxyType({DECODE: _decode})

@@ -1,5 +1,6 @@
-from corpus_tools.recording_process import answer
 from corpus_tools.recordings.limits import OUT_OF_SYNC, REFUSAL, UNUSABLE, WARNING, Finding
+from corpus_tools.tools import recordings
+from tests.processes.answered import answered
 
 
 class KnownChecker:
@@ -12,19 +13,21 @@ class KnownChecker:
         return self._findings
 
 
-def asked(tmp_path, *findings):
+def asked(tmp_path, monkeypatch, *findings):
     video = tmp_path / "take-0001.webm"
     video.write_bytes(b"video")
-    order = {"kind": "check", "video": str(video), "text": "Hello there.", "cache": str(tmp_path / "cache")}
-    return answer(order, {tmp_path / "cache": KnownChecker(*findings)})
+    monkeypatch.setattr(recordings, "_checker", lambda cache: KnownChecker(*findings))
+    order = {"video": str(video), "text": "Hello there.", "cache": str(tmp_path / "cache")}
+    (answer,) = answered(recordings.HANDLERS["check"], order)
+    return answer.content
 
 
-def test_findings_say_what_a_person_in_front_of_the_camera_can_do(tmp_path):
+def test_findings_say_what_a_person_in_front_of_the_camera_can_do(tmp_path, monkeypatch):
     words = Finding(
         REFUSAL, "confidence", "the sound does not match the transcript; correct the words", -7000.0, -6500.0
     )
     broken = Finding(REFUSAL, UNUSABLE, f"{tmp_path}/take-0001.webm is empty; record it again")
-    found = asked(tmp_path, words, broken)
+    found = asked(tmp_path, monkeypatch, words, broken)
     assert [one["message"] for one in found["findings"]] == [
         "the sound does not match the prompt; read exactly what is shown",
         "take-0001.webm is empty; record it again",
@@ -32,8 +35,8 @@ def test_findings_say_what_a_person_in_front_of_the_camera_can_do(tmp_path):
     assert found["key"]
 
 
-def test_a_take_is_not_blamed_for_being_short(tmp_path):
+def test_a_take_is_not_blamed_for_being_short(tmp_path, monkeypatch):
     short = Finding(WARNING, OUT_OF_SYNC, "5.0 s are too short to tell; record 12 s or more")
-    assert asked(tmp_path, short)["findings"] == []
+    assert asked(tmp_path, monkeypatch, short)["findings"] == []
     late = Finding(REFUSAL, OUT_OF_SYNC, "sound and picture are out of sync")
-    assert len(asked(tmp_path, late, short)["findings"]) == 1
+    assert len(asked(tmp_path, monkeypatch, late, short)["findings"]) == 1

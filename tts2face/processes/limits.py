@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 NEW_USERS, NEW_NETWORK = 0x10000000, 0x40000000  # flags of unshare in Linux's sched.h
 
+# glibc returns blocks of 1 MiB and more to the system, instead of keeping those of each thread (decision 064).
+RETURNED_BLOCKS = {"MALLOC_MMAP_THRESHOLD_": "1048576", "MALLOC_TRIM_THRESHOLD_": "1048576"}
 KEPT_VARIABLES = (
     "PATH", "HOME", "LANG", "LC_", "TMPDIR", "TEMP", "SYSTEMROOT", "LOCALAPPDATA", "XDG_", "PYTHON", "VIRTUAL_ENV",
     "NUMBA_", "TTS2FACE_FACE_MODEL",
@@ -34,6 +36,12 @@ def limit_process(limits: ProcessLimits) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     if sys.platform.startswith("linux"):
         ctypes.CDLL(None).unshare(NEW_USERS | NEW_NETWORK)  # refused in some containers
+
+
+def child_environment(core: int | None) -> dict[str, str]:
+    """Variables of a child that is bound to a core, or to none."""
+    threads = {} if core is None else {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    return dict(os.environ) | RETURNED_BLOCKS | threads
 
 
 def bare_environment() -> dict[str, str]:

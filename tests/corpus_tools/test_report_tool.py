@@ -1,23 +1,22 @@
-"""The process that writes reports."""
+"""The tool that writes reports."""
 
-import io
-import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from corpus_tools.evaluation.evaluate import evaluate
 from corpus_tools.evaluation.splits import split_randomly
-from corpus_tools.report_process import ReportOrder, report, talker_observations
+from corpus_tools.tools.report import report, talker_observations
+from tests.processes.answered import answered
 from tts2face.models.landmarks import lip_opening
 from tts2face.models.talker import load_talker, write_talker
 
 
-def messages(kind: str, model: str, out: Path) -> list[dict[str, object]]:
-    written = io.StringIO()
-    report(ReportOrder(kind, model, "mine", str(out), {}), written)
-    return [json.loads(line) for line in written.getvalue().splitlines()]
+def messages(kind: str, model: str, out: Path) -> list[Mapping[str, Any]]:
+    return [one.content for one in answered(report, {"kind": kind, "model": model, "name": "mine", "out": str(out)})]
 
 
 def test_unknown_reports_and_small_talkers_are_refused(tmp_path: Path) -> None:
@@ -25,7 +24,7 @@ def test_unknown_reports_and_small_talkers_are_refused(tmp_path: Path) -> None:
     small = tmp_path / "small.talker"
     write_talker(small, replace(talker, utterances=talker.utterances[:9]))
     (wrong,) = messages("beauty", "grid_s1", tmp_path / "a.html")
-    assert (wrong["error"], "similarity, gestures, accuracy" in str(wrong["message"])) == ("InputError", True)
+    assert (wrong["errors"][0], "similarity, gestures, accuracy" in wrong["message"]) == ("InputError", True)
     last = messages("accuracy", str(small), tmp_path / "a.html")[-1]
     assert last["message"] == ("the talker mine has 9 recordings; an accuracy report holds some out and needs 10")
     missing = messages("similarity", str(tmp_path / "none.talker"), tmp_path / "a.html")[-1]

@@ -1,23 +1,15 @@
-"""Reports of a talker or a palette as one HTML page, in a process with limits and without a network.
+"""Reports of a talker or a palette as one HTML page."""
 
-``python -m corpus_tools.report_process``: standard input holds one line of JSON, fields of `ReportOrder`, and ends with
-the parent process; standard output has lines of JSON: the progress (``stage``, ``done``, ``of``), and at last
-``is_result``, or the ``error`` and its ``message``.
-"""
-
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TextIO
+from typing import Any
 
-from corpus_tools.message_lines import line_progress, write_line
 from corpus_tools.recordings.observation import Observation, Quality
-from lexicon.errors import InputError, Tts2faceError
-from tts2face.child_process import received_order
-from tts2face.limited_process import ProcessLimits, limit_process
+from lexicon.errors import InputError
 from tts2face.models.talker import Talker, load_talker
+from tts2face.processes.child import Call
 from tts2face.storage.files import write_atomically
 from tts2face.types import Progress
 
@@ -39,15 +31,12 @@ class ReportOrder:
         Name of the model in the report.
     out
         The page.
-    limits
-        Of `ProcessLimits`.
     """
 
     kind: str
     model: str
     name: str
     out: str
-    limits: Mapping[str, int]
 
 
 def similarity_report(model: str, name: str, on_progress: Progress) -> str:
@@ -119,29 +108,19 @@ REPORTS: Mapping[str, tuple[str, Callable[[str, str, Progress], str]]] = Mapping
 )
 
 
-def report(order: ReportOrder, out: TextIO) -> None:
-    """Write a report; the progress is written to `out`."""
-    try:
-        if order.kind not in REPORTS:
-            raise InputError(f"there is no report {order.kind!r}; choose one of {', '.join(REPORTS)}")
-        stage, make = REPORTS[order.kind]
-        page = make(order.model, order.name, line_progress(out, stage))
-        write_atomically(Path(order.out), page.encode())
-    except Tts2faceError as error:
-        message = " ".join(str(error).replace(order.model, order.name).split())
-        write_line(out, {"error": type(error).__name__, "message": message})
-    else:
-        write_line(out, {"is_result": True})
+def report(call: Call) -> dict[str, Any]:
+    """Write the page of a `ReportOrder`.
 
-
-def main() -> None:
-    """Write one report."""
-    received, out = received_order()
-    order = ReportOrder(**received)
-    limit_process(ProcessLimits(**order.limits))
-    report(order, out)
-    os._exit(0)  # the thread that waits for the parent does not end
-
-
-if __name__ == "__main__":
-    main()
+    Raises
+    ------
+    InputError, DataError, BackendError
+        There is no such report, or it cannot be made of this model.
+    """
+    order = ReportOrder(**call.content)
+    call.hide(order.model, order.name)
+    if order.kind not in REPORTS:
+        raise InputError(f"there is no report {order.kind!r}; choose one of {', '.join(REPORTS)}")
+    stage, make = REPORTS[order.kind]
+    page = make(order.model, order.name, call.stage(stage))
+    write_atomically(Path(order.out), page.encode())
+    return {}

@@ -1,0 +1,69 @@
+"""What a child process runs: handlers of ours, or a tool of a package above this one or of a stranger."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any
+
+from lexicon.errors import BackendError
+from lexicon.inputs import parse_json
+from tts2face.processes.limits import ProcessLimits, bare_environment, child_environment
+
+TOOLS = "tts2face.tools"  # group of entry points: handlers by their names
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """Handlers and limits of a child.
+
+    Parameters
+    ----------
+    handlers
+        ``module:NAME`` of a table of handlers; or the name of an entry point of the group `TOOLS`, one handler
+        or a table of them.
+    limits
+        For files of strangers; with them it gets no credentials of the environment. None: no limits.
+    core
+        Core to which it is bound; None: all.
+    niceness
+        Added to that of the parent; streams of a server go first.
+    """
+
+    handlers: str
+    limits: ProcessLimits | None = None
+    core: int | None = None
+    niceness: int = 0
+
+    def written(self) -> str:
+        """The argument of the child's command line."""
+        return json.dumps(asdict(self))
+
+    def environment(self) -> dict[str, str]:
+        """Variables of the child."""
+        return child_environment(self.core) if self.limits is None else bare_environment()
+
+    def load(self) -> Mapping[str, Any]:
+        """The handlers by name.
+
+        Raises
+        ------
+        BackendError
+            No installed package declares the tool.
+        """
+        module, _, name = self.handlers.partition(":")
+        if name:
+            handlers: Mapping[str, Any] = getattr(import_module(module), name)
+            return handlers
+        for found in entry_points(group=TOOLS, name=module):
+            tool = found.load()
+            return tool if isinstance(tool, Mapping) else {module: tool}
+        raise BackendError(f"no installed package declares the tool {module!r} ({TOOLS}); install tts2face again")
+
+
+def read_program(argument: str) -> Program:
+    """The program of `Program.written`."""
+    content = parse_json(argument, "the program of a child process")
+    limits = None if content["limits"] is None else ProcessLimits(**content["limits"])
+    return Program(content["handlers"], limits, content["core"], content["niceness"])

@@ -1,0 +1,48 @@
+"""Tools of other packages that work on one order: takes to styles, tables and films; photos to heads; talkers.
+
+They read files of strangers: each has limits of memory, time and files, and no network, and ends with the server.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from lexicon.errors import DataError
+from tts2face.processes.limits import ProcessLimits
+from tts2face.processes.parent import ChildEndedError, started
+from tts2face.processes.program import Program
+
+TAKES, TAKE_S = "takes", 1800.0  # the tool, and the time of one order
+TAKE_LIMITS = ProcessLimits(memory_bytes=6 << 30, cpu_s=1800, file_bytes=1 << 30, n_files=256)
+LOW_PRIORITY = 10  # streams go first
+
+
+async def run_take_tool(
+    kind: str, order: Mapping[str, Any], on_message: Callable[..., None], *, cpu_s: int = TAKE_LIMITS.cpu_s
+) -> Mapping[str, Any]:
+    """Result of an order of ``takes``; `on_message` gets the stage, and the steps done and of all.
+
+    Raises
+    ------
+    InputError, DataError, BackendError
+        The take cannot be used, or needs too much memory or time.
+    TimeoutError
+        It takes longer than `TAKE_S`.
+    """
+    program = Program(TAKES, replace(TAKE_LIMITS, cpu_s=cpu_s), niceness=LOW_PRIORITY)
+    return await run_tool(program, kind, order, on_message, what="the take", timeout_s=TAKE_S)
+
+
+async def run_tool(
+    program: Program, kind: str, order: Mapping[str, Any], on_message: Callable[..., None], *, what: str,
+    timeout_s: float,
+) -> Mapping[str, Any]:  # fmt: skip
+    """Result of one order of a tool in a child of its own; errors as `run_take_tool`."""
+    try:
+        async with started(program) as child:
+            found = await child.call(
+                kind, order, on_event=lambda event: on_message(**event.content), timeout_s=timeout_s
+            )
+    except ChildEndedError as ended:
+        raise DataError(f"{what} needs too much memory or time; record it shorter, or with smaller pictures") from ended
+    return found.content
