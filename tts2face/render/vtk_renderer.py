@@ -5,12 +5,12 @@ VTK ends the process when it finds no GL, so a child process probes it first.
 
 import math
 import os
-import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,9 @@ from numpy.typing import NDArray
 
 from lexicon.errors import BackendError
 from tts2face.compilation import kernel
+from tts2face.processes.child import Call, Handler
+from tts2face.processes.parent import Child
+from tts2face.processes.program import Program
 from tts2face.render.camera import CameraMatrices
 from tts2face.render.fragment_rows import OPACITY
 from tts2face.render.raster import HOLES
@@ -29,15 +32,7 @@ from tts2face.render.vertices import VertexLight, brighten, build_vertex_light, 
 OFF_SCREEN, ON_SCREEN = "vtkEGLRenderWindow", "vtkXOpenGLRenderWindow"  # the first falls back to OSMesa automatically
 OFF_SCREEN_CLASSES = ("vtkEGLRenderWindow", "vtkOSOpenGLRenderWindow")
 PROBE_TIMEOUT_S = 60.0
-PROBE_CODE = """
-import numpy, pyvista
-plotter = pyvista.Plotter(off_screen={off_screen}, window_size=(32, 32))
-plotter.add_mesh(pyvista.Sphere(), color="red", lighting=False)
-plotter.show(auto_close=False, interactive=False)
-seen = numpy.asarray(plotter.screenshot(return_img=True))
-opened = plotter.render_window.GetClassName()
-raise SystemExit(0 if int(seen[16, 16, 0]) > 200 and opened not in {refused} else 3)
-"""
+PROBE, PROBE_PROGRAM = "probe", Program(f"{__name__}:HANDLERS")  # name of the call, and who answers it
 HALF_COVERED = 128  # of 255: parts with holes are drawn from this coverage on
 VTK_TONE_TABLES = (linear_table(), encoding_table(8192))
 
@@ -75,16 +70,32 @@ def require_pyvista(purpose: str) -> None:
 @cache
 def can_draw_with(window: str) -> bool:
     """Whether VTK can draw in a window of the class `window`, tried once in a child process that may crash."""
-    is_off_screen = window == OFF_SCREEN  # without a display VTK falls back to an off-screen window
-    code = PROBE_CODE.format(off_screen=is_off_screen, refused=() if is_off_screen else OFF_SCREEN_CLASSES)
-    environment = os.environ | window_environment(window)
+    child = Child(PROBE_PROGRAM)
     try:
-        child = subprocess.run(
-            [sys.executable, "-c", code], env=environment, capture_output=True, timeout=PROBE_TIMEOUT_S, check=False
-        )
-    except (OSError, subprocess.TimeoutExpired):
+        return bool(child.call(PROBE, {"window": window}, timeout_s=PROBE_TIMEOUT_S).content["is_drawn"])
+    except BackendError:
         return False
-    return child.returncode == 0
+    finally:
+        child.close()
+
+
+def _probe(call: Call) -> dict[str, bool]:
+    """Whether a ball that is drawn in a window of the class ``window`` is seen in it."""
+    window = call.content["window"]
+    is_off_screen = window == OFF_SCREEN
+    os.environ.update(window_environment(window))
+    import pyvista
+
+    plotter = pyvista.Plotter(off_screen=is_off_screen, window_size=(32, 32))
+    plotter.add_mesh(pyvista.Sphere(), color="red", lighting=False)
+    plotter.show(auto_close=False, interactive=False)
+    seen = np.asarray(plotter.screenshot(return_img=True))
+    # Without a display VTK falls back to an off-screen window.
+    is_asked_for = is_off_screen or plotter.render_window.GetClassName() not in OFF_SCREEN_CLASSES
+    return {"is_drawn": int(seen[16, 16, 0]) > 200 and is_asked_for}
+
+
+HANDLERS: Mapping[str, Handler] = MappingProxyType({PROBE: _probe})
 
 
 def window_environment(window: str) -> dict[str, str]:

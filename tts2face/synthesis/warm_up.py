@@ -4,28 +4,27 @@ The kernels of motion, of gestures and of strands are compiled in child processe
 other drawing kernels, because numba compiles one kernel at a time in each process.
 """
 
-import subprocess
-import sys
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
-from types import ModuleType
+from types import MappingProxyType, ModuleType
+from typing import Any
 
 import numpy as np
 
+from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar import recorded_motion
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_parts import keep_parts
 from tts2face.models.talker import Talker
+from tts2face.processes.child import Call, Handler
+from tts2face.processes.parent import Child
+from tts2face.processes.program import Program
 from tts2face.render.picture import Picture
 
-COMPILE_CHILD_CODE = """
-import os
-from tts2face.processes.child import exit_after
-exit_after(lambda: os.read(0, 1))
-from tts2face.synthesis import warm_up
-warm_up.{}()
-"""
 COMPILE_TIMEOUT_S = 120.0
 
 
@@ -54,32 +53,28 @@ def compile_kernels(drawn: Face | None) -> None:
 
     has_strands = drawn is not None and not drawn.light
     works = ["compile_motion", "compile_gestures", *(["compile_strands"] if has_strands else [])]
-    children = [_start_child(work) for work in works]
+    children = [Child(Program(f"{__name__}:HANDLERS")) for _ in works]
+    threads = [
+        threading.Thread(target=_compile, args=(child, work), daemon=True)
+        for child, work in zip(children, works, strict=True)
+    ]
+    for thread in threads:
+        thread.start()
     try:
         if drawn is not None:
             face = keep_parts(drawn, lambda part: part.kind != STRANDS) if has_strands else drawn
             head = np.full(len(REST_HEAD), 0.01, np.float32)
             draw(face, np.zeros(len(face.shape_names), np.float32), head, picture=Picture(size="64x64"))
-        for child in children:
-            child.wait(COMPILE_TIMEOUT_S)
-    except subprocess.TimeoutExpired:
-        pass
+        for thread in threads:
+            thread.join()
     finally:
         for child in children:
-            if child.poll() is None:
-                child.kill()
-            child.wait()
-            if child.stdin is not None:
-                child.stdin.close()
+            child.close()
 
 
-def _start_child(work: str) -> "subprocess.Popen[bytes]":
-    return subprocess.Popen(
-        [sys.executable, "-c", COMPILE_CHILD_CODE.format(work)],
-        stdin=subprocess.PIPE,  # closes when this process ends, which ends the child
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
+def _compile(child: Child, work: str) -> None:
+    with suppress(BackendError):  # its kernels are compiled at their first use
+        child.call(work, {}, timeout_s=COMPILE_TIMEOUT_S)
 
 
 def _index_files(module: ModuleType, name: str) -> list[Path]:
@@ -129,3 +124,16 @@ def compile_gestures() -> None:
     sound = Waveform(np.zeros(1600), 16_000)
     gestures.next(sound, 3, Timeline())
     block_powers(sound)
+
+
+def _handler(work: Callable[[], None]) -> Handler:
+    def handle(_: Call) -> dict[str, Any]:
+        work()
+        return {}
+
+    return handle
+
+
+HANDLERS: Mapping[str, Handler] = MappingProxyType(
+    {work.__name__: _handler(work) for work in (compile_motion, compile_gestures, compile_strands)}
+)

