@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from lexicon.errors import DataError
+from lexicon.errors import BackendError, DataError
 from tts2face.request import OWN_FACE, REALISTIC_FACE
 from tts2face.storage.files import SHIPPED_FOLDER, find_file
 
@@ -109,9 +109,9 @@ class FormatEntry:
 
 def formats() -> tuple[FormatEntry, ...]:
     """The formats of `tts2face.export`."""
-    from tts2face.exports.formats import FORMATS
+    from tts2face.exports.formats import all_formats
 
-    return tuple(FormatEntry(one.name, one.suffixes, one.is_installed, one.summary) for one in FORMATS)
+    return tuple(FormatEntry(one.name, one.suffixes, one.is_installed, one.summary) for one in all_formats())
 
 
 def voices() -> tuple[VoiceEntry, ...]:
@@ -122,23 +122,11 @@ def voices() -> tuple[VoiceEntry, ...]:
     BackendError
         espeak-ng is not installed or does not start.
     """
-    from tts2face.voice.engine import ENGLISH_CODES, ENGLISH_VOICES, VOICE_PROFILES
+    from tts2face.voice.loading import voice_names
 
     codes = tuple(language.code for language in languages())
-    english = tuple(code for code in codes if code in ENGLISH_CODES)
     return (
-        *(
-            VoiceEntry(
-                name,
-                voice.engine,
-                english if name in ENGLISH_VOICES else codes,
-                _is_installed(voice.package),
-                voice.summary,
-                voice.sex,
-                voice.licence,
-            )
-            for name, voice in VOICE_PROFILES.items()
-        ),
+        *(_voice_entry(name, codes) for name in voice_names()),
         VoiceEntry(
             "FILE.onnx",
             "piper",
@@ -149,6 +137,19 @@ def voices() -> tuple[VoiceEntry, ...]:
             "see its model card",
         ),
     )
+
+
+def _voice_entry(name: str, codes: tuple[str, ...]) -> VoiceEntry:
+    """Entry of a voice; one whose package cannot be loaded says so, and is not installed."""
+    from tts2face.voice.loading import find_voice
+
+    try:
+        voice = find_voice(name)
+    except BackendError as broken:
+        return VoiceEntry(name, "-", (), False, str(broken), "-", "-")
+    spoken = tuple(code for code in codes if not voice.languages or code in voice.languages)
+    is_installed = _is_installed(voice.package)
+    return VoiceEntry(name, voice.engine, spoken, is_installed, voice.summary, voice.sex, voice.licence)
 
 
 def languages() -> tuple[LanguageEntry, ...]:

@@ -10,7 +10,7 @@ import pytest
 
 import tts2face
 from lexicon.errors import InputError
-from tts2face.synthesis.byte_stream import MEDIA_TYPES
+from tts2face.synthesis.byte_stream import media_types
 
 TEXT = (
     "<speak>Bob may move. <break time='300ms'/> We were away, loud and <prosody volume='+4dB'>clear</prosody>.</speak>"
@@ -124,7 +124,7 @@ def test_wrong_formats_are_refused(
 
 
 def test_all_formats_have_media_types() -> None:
-    assert {name: MEDIA_TYPES[name] for name in ("mp4", "wav", "mp3", "curves")} == {
+    assert {name: media_types()[name] for name in ("mp4", "wav", "mp3", "curves")} == {
         "mp4": "video/mp4",
         "wav": "audio/wav",
         "mp3": "audio/mpeg",

@@ -20,7 +20,7 @@ from lexicon.spoken_words import pronounce_marked
 from lexicon.ssml_speech import VOICES
 from lexicon.ssml_values import MAX_ATTRIBUTE_CHARACTERS
 from lexicon.writing_systems import check_readable
-from tts2face.voice.engine import VOICE_NAMES
+from tts2face.voice.loading import SHIPPED_VOICES
 
 
 def ssml(inside: str, language: str = "en-us") -> MarkedText:
@@ -246,7 +246,7 @@ def test_language_tags(tag: str, code: str) -> None:
 
 
 def test_documents_may_name_the_voices_that_need_no_file() -> None:
-    assert tuple(VOICE_NAMES) == VOICES
+    assert tuple(SHIPPED_VOICES) == VOICES
 
 
 @pytest.mark.parametrize(

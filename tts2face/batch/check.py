@@ -12,7 +12,7 @@ from tts2face.models.palette import Palette, load_palette
 from tts2face.request import NATURAL, OWN_FACE, parse_articulation
 from tts2face.session_cache import Models
 from tts2face.storage.files import present_name
-from tts2face.voice.engine import VOICE_NAMES
+from tts2face.voice.loading import voice_names
 
 
 def check_names(models: Models, request: Mapping[str, Any]) -> None:
@@ -26,8 +26,8 @@ def check_names(models: Models, request: Mapping[str, Any]) -> None:
         A model is damaged.
     """
     voice = request.get("voice")
-    if voice is not None and voice not in VOICE_NAMES and not str(voice).endswith(".onnx"):
-        raise InputError(f"there is no voice {voice!r}; give {', '.join(VOICE_NAMES)}, or a Piper voice (.onnx)")
+    if voice is not None and voice not in voice_names() and not str(voice).endswith(".onnx"):
+        raise InputError(f"there is no voice {voice!r}; give {', '.join(voice_names())}, or a Piper voice (.onnx)")
     if models.identity is not None:
         known = _identities(models.face)
         if present_name(models.identity, "identity", known) not in known:

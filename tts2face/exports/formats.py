@@ -1,5 +1,9 @@
-"""Table of the export formats; the suffix of a path selects one of them. The module imports no numeric library."""
+"""Table of the export formats; the suffix of a path selects one of them. The module imports no numeric library.
 
+Formats of other packages (docs/plugins.md) are asked for where none of the table fits.
+"""
+
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -7,7 +11,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from lexicon.errors import InputError
+from lexicon.errors import BackendError, InputError
+from tts2face.plugins import EXPORTS, declared, load_plugin
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +28,8 @@ class FormatInfo:
     summary
         What the file holds.
     writer
-        Module and class of its writer.
+        Class of its writer, a `tts2face.exports.parts.FormatWriter`; of the formats of the table its module in
+        `tts2face.exports` and its name.
     has_frames
         Whether it holds values for each frame, so that a frame rate can be chosen.
     default_fps
@@ -43,7 +49,7 @@ class FormatInfo:
     name: str
     suffixes: tuple[str, ...]
     summary: str
-    writer: tuple[str, str]
+    writer: tuple[str, str] | Callable[[Any], Any]
     has_frames: bool = False
     default_fps: float | None = None
     uses_shapes: bool = False
@@ -70,7 +76,9 @@ class FormatInfo:
         return self.package is None or find_spec(self.package) is not None
 
     def make_writer(self) -> Callable[[Any], Any]:
-        """Import the class of its writer."""
+        """The class of its writer, imported."""
+        if callable(self.writer):
+            return self.writer
         module, name = self.writer
         factory: Callable[[Any], Any] = getattr(import_module(f"tts2face.exports.{module}"), name)
         return factory
@@ -113,13 +121,45 @@ FORMATS = (
 )  # fmt: skip
 _BY_NAME = {one.name: one for one in FORMATS}
 _BY_SUFFIX = {suffix: one for one in FORMATS for suffix in one.suffixes}
+_NAME = re.compile(r"[a-z0-9][a-z0-9-]+")  # of a format before a colon; a single letter is a drive
+
+
+def all_formats() -> tuple[FormatInfo, ...]:
+    """The formats of the table and of other packages; one that cannot be loaded says so, and is not installed."""
+    return (*FORMATS, *(_listed(name) for name in declared(EXPORTS) if name not in _BY_NAME))
+
+
+def _listed(name: str) -> FormatInfo:
+    try:
+        return _by_name(name)
+    except BackendError as broken:
+        return FormatInfo(name, (), str(broken), ("", ""), package="a package that cannot be loaded")
+
+
+def _by_name(name: str) -> FormatInfo:
+    """Format of a name that exists; errors as `load_plugin`."""
+    if name in _BY_NAME:
+        return _BY_NAME[name]
+    info: FormatInfo = load_plugin(EXPORTS, name)
+    return info
+
+
+def _is_name(name: str) -> bool:
+    return name in _BY_NAME or (_NAME.fullmatch(name) is not None and name in declared(EXPORTS))
+
+
+def _by_suffix(name: str) -> dict[str, FormatInfo]:
+    """Formats by their suffixes: those of the table if one fits a name, else of other packages, too."""
+    if any(name.lower().endswith(suffix) for suffix in _BY_SUFFIX):
+        return _BY_SUFFIX
+    return {suffix: one for one in reversed(all_formats()) for suffix in one.suffixes}
 
 
 def split_format(given: str | Path) -> tuple[Path, str | None]:
     """Path and format of ``FORMAT:PATH``; None without one of the names of `FORMATS` before the colon."""
     if isinstance(given, str):
         name, colon, rest = given.partition(":")
-        if colon and name in _BY_NAME:
+        if colon and _is_name(name):
             return Path(rest), name
     return Path(given), None
 
@@ -138,17 +178,18 @@ def find_format(path: Path, name: str | None = None) -> FormatInfo:
         There is no such format, or several share the last suffix.
     """
     if name is not None:
-        if name not in _BY_NAME:
-            raise InputError(f"there is no export format {name!r}; choose one of {', '.join(_BY_NAME)}")
-        return _BY_NAME[name]
-    suffix = _longest_suffix(path.name)
+        if not _is_name(name):
+            names = ", ".join(one.name for one in all_formats())
+            raise InputError(f"there is no export format {name!r}; choose one of {names}")
+        return _by_name(name)
+    known, suffix = _by_suffix(path.name), _longest_suffix(path.name)
     if suffix is not None:
-        return _BY_SUFFIX[suffix]
-    last = path.suffix.lower()
-    several = [ending for ending in _BY_SUFFIX if last and ending.endswith(last)]
+        return known[suffix]
+    endings, last = [ending for one in all_formats() for ending in one.suffixes], path.suffix.lower()
+    several = [ending for ending in endings if last and ending.endswith(last)]
     if several:
         raise InputError(f"{path.name} may have several formats; end its name in {_choices(several)}")
-    raise InputError(f"{path.name} has no suffix of an export format; end its name in {_choices(list(_BY_SUFFIX))}")
+    raise InputError(f"{path.name} has no suffix of an export format; end its name in {_choices(endings)}")
 
 
 def batch_format(name: str) -> tuple[str, FormatInfo]:
@@ -160,12 +201,13 @@ def batch_format(name: str) -> tuple[str, FormatInfo]:
         There is no such format.
     """
     suffix = f".{name.lower().removeprefix('.')}"
-    if suffix in _BY_SUFFIX:
-        return suffix, _BY_SUFFIX[suffix]
-    if name in _BY_NAME:
-        return _BY_NAME[name].suffixes[0], _BY_NAME[name]
+    known = _by_suffix(suffix)
+    if suffix in known:
+        return suffix, known[suffix]
+    if _is_name(name):
+        return _by_name(name).suffixes[0], _by_name(name)
     raise InputError(
-        f"there is no export format {name!r}; give an ending ({_choices([one[1:] for one in _BY_SUFFIX])}) or a name "
+        f"there is no export format {name!r}; give an ending ({_choices([one[1:] for one in known])}) or a name "
         "that `tts2face formats` lists"
     )
 
@@ -181,5 +223,5 @@ def _choices(suffixes: Sequence[str]) -> str:
 
 
 def _longest_suffix(name: str) -> str | None:
-    fitting = [suffix for suffix in _BY_SUFFIX if name.lower().endswith(suffix)]
+    fitting = [suffix for suffix in _by_suffix(name) if name.lower().endswith(suffix)]
     return max(fitting, key=len, default=None)

@@ -6,7 +6,7 @@ from lexicon.errors import DataError
 from tts2face.batch.segment import FILE_PREFIX, Segment, input_hashes
 from tts2face.jobs.job_kinds import JobTask, Product, Products
 from tts2face.session_cache import Models
-from tts2face.synthesis.byte_stream import LINE_FORMATS, MEDIA_TYPES
+from tts2face.synthesis.byte_stream import line_formats, media_types
 
 FILES = {"audio": "audio.wav", "timeline": "timeline.json"}  # fields of a request: names of the job's files
 BACKGROUND = "background.png"
@@ -26,9 +26,9 @@ def run_clip(task: JobTask) -> Products:
     for rendered in task.engine.render(missing, task.store):
         if rendered.result is None:
             raise DataError(rendered.reason)
-    suffix = LINE_FORMATS[format].suffixes[0] if format in LINE_FORMATS else f".{format}"
+    suffix = line_formats()[format].suffixes[0] if format in line_formats() else f".{format}"
     path = task.store.fetch(segment.address, task.folder)
-    return Products((Product(path, f"clip{suffix}", MEDIA_TYPES[format]),))
+    return Products((Product(path, f"clip{suffix}", media_types()[format]),))
 
 
 def clip_segment(task: JobTask) -> Segment:

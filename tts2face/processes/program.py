@@ -4,14 +4,12 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib import import_module
-from importlib.metadata import entry_points
 from typing import Any
 
 from lexicon.errors import BackendError
 from lexicon.inputs import parse_json
+from tts2face.plugins import TOOLS, declared, load_plugin
 from tts2face.processes.limits import ProcessLimits, bare_environment, child_environment
-
-TOOLS = "tts2face.tools"  # group of entry points: handlers by their names
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,16 +48,16 @@ class Program:
         Raises
         ------
         BackendError
-            No installed package declares the tool.
+            No installed package declares the tool, or it cannot be loaded.
         """
         module, _, name = self.handlers.partition(":")
         if name:
             handlers: Mapping[str, Any] = getattr(import_module(module), name)
             return handlers
-        for found in entry_points(group=TOOLS, name=module):
-            tool = found.load()
-            return tool if isinstance(tool, Mapping) else {module: tool}
-        raise BackendError(f"no installed package declares the tool {module!r} ({TOOLS}); install tts2face again")
+        if module not in declared(TOOLS):
+            raise BackendError(f"no installed package declares the tool {module!r} ({TOOLS}); install tts2face again")
+        tool = load_plugin(TOOLS, module)
+        return tool if isinstance(tool, Mapping) else {module: tool}
 
 
 def read_program(argument: str) -> Program:

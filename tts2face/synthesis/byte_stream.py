@@ -2,12 +2,14 @@
 
 import io
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 
 from lexicon.errors import InputError
-from tts2face.exports.formats import FORMATS
+from tts2face.exports.formats import FormatInfo, all_formats
 from tts2face.exports.parts import FormatWriter, FrameGrid
 from tts2face.exports.writer import ExportFile, ExportWriter, make_target, plan_exports
 from tts2face.models.face import Face
@@ -20,19 +22,29 @@ from tts2face.synthesis.speech_stream import Piece, sounds
 from tts2face.types import Chunk
 
 BLOCK_BYTES = 1 << 18  # of a file that is read when it is complete
-LINE_FORMATS = {one.name: one for one in FORMATS if one.has_lines}
-MEDIA_TYPES = {
-    **{name: kind.media_type for name, kind in MOVIE_KINDS.items()},
-    **{name: kind.media_type for name, kind in SOUND_KINDS.items()},
-    **dict.fromkeys(LINE_FORMATS, "application/jsonl"),
-    "livelink": "text/csv",
-    "glb": "model/gltf-binary",
-}  # of the formats of `Session.stream_file`
+
+
+@cache
+def line_formats() -> Mapping[str, FormatInfo]:
+    """Formats of lines by name, of other packages, too."""
+    return MappingProxyType({one.name: one for one in all_formats() if one.has_lines})
+
+
+@cache
+def media_types() -> Mapping[str, str]:
+    """Media types of the formats of `Session.stream_file`."""
+    return MappingProxyType({
+        **{name: kind.media_type for name, kind in MOVIE_KINDS.items()},
+        **{name: kind.media_type for name, kind in SOUND_KINDS.items()},
+        **dict.fromkeys(line_formats(), "application/jsonl"),
+        "livelink": "text/csv",
+        "glb": "model/gltf-binary",
+    })  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class StreamFormat:
-    """Format of streamed bytes, one of `MEDIA_TYPES`, and the drawing options of movies.
+    """Format of streamed bytes, one of `media_types`, and the drawing options of movies.
 
     Parameters
     ----------
@@ -51,8 +63,8 @@ class StreamFormat:
 
     def __post_init__(self) -> None:
         """Check the format."""
-        if self.name not in MEDIA_TYPES:
-            raise InputError(f"there is no streamed format {self.name!r}; the formats are {', '.join(MEDIA_TYPES)}")
+        if self.name not in media_types():
+            raise InputError(f"there is no streamed format {self.name!r}; the formats are {', '.join(media_types())}")
         if self.name in MOVIE_KINDS:
             find_movie_kind(self.name, self.picture)
 
@@ -68,9 +80,9 @@ def encode_stream(prepared: PreparedRequest, models: SessionModels, format: Stre
         if request.audio is None:
             return encode_sound(sounds(prepared, models.for_request(prepared).speech), name)
         return encode_sound((piece.clip.speech.waveform for piece in models.pieces(prepared)), name)
-    if name not in LINE_FORMATS:
+    if name not in line_formats():
         return encode_whole(models.pieces(prepared), name, models.face(has_gestures=request.has_gestures).mesh)
-    face = models.face(has_gestures=request.has_gestures) if LINE_FORMATS[name].uses_face else None
+    face = models.face(has_gestures=request.has_gestures) if line_formats()[name].uses_face else None
     return encode_lines(models.pieces(prepared), name, None if face is None else face.mesh)
 
 
@@ -113,7 +125,7 @@ def encode_lines(pieces: Iterable[Piece], format: str, face: Face | None) -> Ite
     Parameters
     ----------
     format
-        One of `LINE_FORMATS`.
+        One of `line_formats`.
     face
         Mesh whose shapes the clips' channels are, for formats of ARKit shapes.
 
@@ -122,7 +134,7 @@ def encode_lines(pieces: Iterable[Piece], format: str, face: Face | None) -> Ite
     InputError
         As `ExportWriter`.
     """
-    info = LINE_FORMATS[format]
+    info = line_formats()[format]
     file, buffer = ExportFile(Path(f"clip{info.suffixes[0]}"), info), LineBuffer()
     grid: FrameGrid | None = None
     writer: FormatWriter | None = None

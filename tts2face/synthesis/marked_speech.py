@@ -24,16 +24,9 @@ from tts2face.synthesis.speech_joining import join_utterances, resampled_speech,
 from tts2face.synthesis.style_voice import delivery_of
 from tts2face.synthesis.word_times import LetterTimes, SentenceTimes, WordTimes
 from tts2face.types import GiveWay, Speech, Waveform, concatenate_speech, frame_count, keep_on
-from tts2face.voice.engine import (
-    ENGLISH_CODES,
-    ENGLISH_VOICES,
-    VOICE_NAMES,
-    SpeechInput,
-    SpokenWord,
-    Voice,
-    apply_volume,
-)
+from tts2face.voice.engine import SpeechInput, SpokenWord, Voice, apply_volume
 from tts2face.voice.level import level_speech
+from tts2face.voice.loading import speaks, voice_names
 
 MIN_UTTERANCE_GAP_S = 0.02  # between utterances of a sentence; less would cut into speech (edges are exact to 16 ms)
 SPEED_CHANGE_PAUSE_S = 0.06  # between utterances that differ in speed only
@@ -166,7 +159,7 @@ def speaker_of(part: Phrase, voice: Voice, request: Request, voices: Voices | No
 
 def voice_in(name: str | None, language: str | None) -> str | None:
     """`name` if that voice speaks `language` (None: the language of the text), else None for the default voice."""
-    if language is None or (name in VOICE_NAMES and (name not in ENGLISH_VOICES or language in ENGLISH_CODES)):
+    if language is None or (name in voice_names() and speaks(name, language)):
         return name
     return None
 

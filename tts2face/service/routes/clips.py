@@ -14,7 +14,7 @@ from tts2face.service.errors import RefusedError
 from tts2face.service.orders.clip_options import ClipRequest, divide_options
 from tts2face.service.routes.answers import service_state, stream_work
 from tts2face.service.uploads.upload_folder import MAX_TEXT_BYTES, UploadFolder, upload_folder
-from tts2face.synthesis.byte_stream import MEDIA_TYPES
+from tts2face.synthesis.byte_stream import media_types
 
 router = APIRouter(prefix="/v1", tags=["clips"])
 
@@ -97,4 +97,4 @@ async def _answer(
     picture = fields.picture | {name: files[name] for name in ("background",) if name in files}
     spoken = fields.request | {name: files[name] for name in ("audio", "timeline") if name in files}
     work = state.work(models=fields.models, request=spoken, picture=picture, format=format)
-    return await stream_work(request, work, MEDIA_TYPES[format], resources=resources)
+    return await stream_work(request, work, media_types()[format], resources=resources)

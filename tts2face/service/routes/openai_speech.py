@@ -17,7 +17,7 @@ from tts2face.service.routes.answers import data_bytes, service_state, stream_wo
 from tts2face.service.synthesis.messages import Message
 from tts2face.service.uploads.library import OPENAI_MODELS, shipped_names
 from tts2face.service.uploads.names import check_voice, resolve_dictionary, resolve_models
-from tts2face.synthesis.byte_stream import MEDIA_TYPES
+from tts2face.synthesis.byte_stream import media_types
 
 router = APIRouter(prefix="/v1", tags=["speech"])
 
@@ -79,7 +79,7 @@ async def speak(request: HttpRequest, speech: Speech) -> StreamingResponse:
     work = state.work(models=models, request=fields, format=format)
     if speech.stream_format == "sse" and format in SOUND_KINDS:
         return await stream_work(request, work, "text/event-stream", convert=_sse)
-    return await stream_work(request, work, MEDIA_TYPES[format])
+    return await stream_work(request, work, media_types()[format])
 
 
 async def _sse(messages: AsyncIterator[Message]) -> AsyncIterator[bytes]:

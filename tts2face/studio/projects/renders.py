@@ -15,7 +15,7 @@ from typing import Any
 
 from lexicon.errors import DataError, InputError, Tts2faceError
 from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
-from tts2face.exports.formats import FORMATS, find_format
+from tts2face.exports.formats import all_formats, find_format
 from tts2face.project.project_file import parse_project, project_json
 from tts2face.render.movie_stream import MOVIE_KINDS
 from tts2face.render.sound_stream import SOUND_KINDS
@@ -251,7 +251,7 @@ def formats() -> dict[str, str]:
     """Formats of files with what they hold."""
     films = dict.fromkeys(MOVIE_KINDS, "film")
     sounds = {name: "the sound" for name in SOUND_KINDS if name not in {"pcm", "wav"}}
-    return {**films, **sounds, **{one.suffixes[0][1:]: one.summary for one in FORMATS if one.is_installed}}
+    return {**films, **sounds, **{one.suffixes[0][1:]: one.summary for one in all_formats() if one.is_installed}}
 
 
 def _plan(title: str, form: str) -> tuple[str, str, dict[str, str]]:
