@@ -216,7 +216,7 @@ def _before_person(patch: EyePatch, picture: Photograph) -> Ints:
     if picture.alpha is None:
         return patch.triangles
     across, down = np.rint(patch.places).astype(int).T
-    return patch.triangles[(picture.alpha[down, across] == OPAQUE)[patch.triangles].all(axis=1)]
+    return np.asarray(patch.triangles[(picture.alpha[down, across] == OPAQUE)[patch.triangles].all(axis=1)])
 
 
 def _eye_vertices(patch: EyePatch, eye: int, photo: Floats, camera: PhotoCamera, model: _Model) -> Vertices:
