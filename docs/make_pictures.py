@@ -1,14 +1,19 @@
-"""The pictures of the README and the docs: ``python docs/make_pictures.py [--own-face me.talker]``."""
+"""The pictures of the README and the docs: ``python docs/make_pictures.py [SHEET...] [--own-face me.talker]``.
+
+``python docs/make_pictures.py --photos me.jpg you.png --out sheet.jpg`` makes that of photographs of others.
+"""
 
 import argparse
 import tempfile
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from corpus_tools.dense.photo_avatar import build_avatar
 from corpus_tools.gesture_study.analysis import Options as GestureOptions
 from corpus_tools.gesture_study.write import write_gestures
 from corpus_tools.similarity.analysis import Options
@@ -21,7 +26,7 @@ from tts2face.models.face_loading import load_face
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
 from tts2face.photo.face_from_photo import face_from_photo
-from tts2face.render.draw import draw, mesh_renderer
+from tts2face.render.draw import MeshRenderer, draw, mesh_renderer
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.session import Session
@@ -52,7 +57,6 @@ HAIR_VIEWS = ("front", "three-quarter")
 CAST_VIEWS, CAST_COLUMNS = ("front", "three-quarter", "profile", "close"), 9
 CAST_TEXT, CAST_PHONES = "My father, thin as he was, saw you leave the room.", ("m", "f", "ɑ", "θ", "u", "i")
 SMILE = {"mouthSmile": 0.9, "cheekSquint": 0.5, "eyeSquint": 0.2}
-PHOTOGRAPHED = ("ada", "tomas", "noor")
 PHOTO_POSES: Sequence[tuple[str, dict[str, float], tuple[int, int, int]]] = (
     ("a", {"jawOpen": 0.55}, (0, 0, 0)),
     ("i", {"jawOpen": 0.15, "mouthStretchLeft": 0.5, "mouthStretchRight": 0.5}, (0, 0, 0)),
@@ -60,16 +64,27 @@ PHOTO_POSES: Sequence[tuple[str, dict[str, float], tuple[int, int, int]]] = (
     ("blink", {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0}, (0, 0, 0)),
     ("turned", {"eyeLookOutLeft": 0.3, "eyeLookInRight": 0.3}, (4, 14, 3)),
 )  # shapes, and pitch, yaw and roll in degrees
+PHOTO_SIDE, PHOTO_CELL, PHOTO_WORD_PIXELS = 640, 128, 34  # px; words are reduced with the cells
+PHOTO_KINDS: Sequence[tuple[str, str, str]] = (
+    ("realistic head", "head", "studio"),
+    ("drawn face", "ada", "studio"),
+    ("grey picture", "tomas", "studio"),
+    ("cut out, on teal", "zuri", "teal"),
+    ("opaque, blurred", "ben", "blur"),
+)  # kinds of pictures, the face that is photographed, and the background of the clip
+AVATAR_OF = "noor"
+BOOKS = ("#7a3b2e", "#c9b48a", "#3f5a6b", "#52683f", "#8f7a55", "#d8d2c4", "#6b4a63")
 SIDE = 320
+PHOTO_PICTURE = Picture(size=f"{SIDE}x{SIDE}", camera="0,0,760")
 WORD_PIXELS = 18
 JPEG_QUALITY = 88
 
 
-def labelled(pixels: NDArray[np.uint8], text: str) -> Image.Image:
-    """A picture with a word in its corner."""
+def labelled(pixels: NDArray[np.uint8], text: str, size: int = WORD_PIXELS) -> Image.Image:
+    """A picture with words in its corner."""
     picture = Image.fromarray(pixels)
     pen = ImageDraw.Draw(picture)
-    pen.text((8, 6), text, fill="white", font=ImageFont.load_default(WORD_PIXELS))
+    pen.text((8, 6), text, fill="white", font=ImageFont.load_default(size))
     return picture
 
 
@@ -195,20 +210,81 @@ def moods_sheet() -> Image.Image:
 
 
 def photo_sheet() -> Image.Image:
-    """Pictures of shipped people, each as it is and as it speaks, blinks and turns."""
-    cells = []
+    """Pictures of shipped people by kind, each as it is and as it speaks, blinks and turns, and the head of one."""
     with tempfile.TemporaryDirectory() as folder:
-        for name in PHOTOGRAPHED:
-            path = Path(folder) / f"{name}.png"
-            Image.fromarray(draw(load_face(name), picture=Picture(size="640x640"))).save(path)
-            face = face_from_photo(path, consent="drawn")
-            renderer = mesh_renderer(face, Picture(size=f"{SIDE}x{SIDE}", camera="0,0,760"))
-            cells.append(labelled(renderer.draw(np.zeros(len(face.shape_names), np.float32)), name))
-            for label, weights, head in PHOTO_POSES:
-                values = np.array([weights.get(shape, 0.0) for shape in face.shape_names], np.float32)
-                pose = np.array([*np.radians(head), 0, 0, 0], np.float32)
-                cells.append(labelled(renderer.draw(values, pose), label))
-    return sheet(cells, 1 + len(PHOTO_POSES))
+        rows = [
+            photo_row(write_still(kind, name, background, Path(folder)), kind, background)
+            for kind, name, background in PHOTO_KINDS
+        ]
+        rows.append(avatar_row(write_still("picture", AVATAR_OF, "studio", Path(folder))))
+    return photo_cells(rows)
+
+
+def sheet_of_photos(photos: Sequence[Path]) -> Image.Image:
+    """Pictures, each as it is and as it speaks, blinks and turns, and then as a head."""
+    return photo_cells([row for photo in photos for row in (photo_row(photo, photo.stem, "studio"), avatar_row(photo))])
+
+
+def photo_cells(rows: Sequence[list[Image.Image]]) -> Image.Image:
+    """Rows of cells, small."""
+    whole = sheet([cell for row in rows for cell in row], 1 + len(PHOTO_POSES))
+    return whole.resize([side * PHOTO_CELL // SIDE for side in whole.size], Image.Resampling.LANCZOS)
+
+
+def write_still(kind: str, name: str, background: str, folder: Path) -> Path:
+    """Picture file of a shipped face: grey, cut out, or before shelves that a clip blurs, by its kind."""
+    path = folder / f"{name}.png"
+    size = f"{PHOTO_SIDE}x{PHOTO_SIDE}"
+    shown = Picture(size=size, background="studio" if background == "studio" else "transparent")
+    picture = Image.fromarray(draw(load_face(name), picture=shown))
+    if background == "blur":
+        behind = shelves(PHOTO_SIDE)
+        behind.paste(picture, mask=picture.getchannel("A"))
+        picture = behind
+    (picture.convert("L") if "grey" in kind else picture).save(path)
+    return path
+
+
+def shelves(side: int) -> Image.Image:
+    """Books in four rows."""
+    rng, picture = np.random.default_rng(0), Image.new("RGB", (side, side), "#5d4532")
+    pen, height = ImageDraw.Draw(picture), side // 4
+    for bottom in range(height - 8, side, height):
+        left = 0
+        while left < side:
+            wide, high = (int(rng.integers(*span)) for span in ((side // 40, side // 16), (height // 2, height - 16)))
+            pen.rectangle((left, bottom - high, left + wide, bottom), BOOKS[int(rng.integers(len(BOOKS)))])
+            left += wide + 2
+    return picture
+
+
+def photo_row(photo: Path, label: str, background: str) -> list[Image.Image]:
+    """A picture as it is, then its face in each pose before a background."""
+    face, shown = face_from_photo(photo, consent="drawn"), replace(PHOTO_PICTURE, background=background)
+    return [photo_still(face, label), *posed(mesh_renderer(face, shown))]
+
+
+def avatar_row(photo: Path) -> list[Image.Image]:
+    """A picture as it is, then its head in each pose, turned twice as far."""
+    with tempfile.TemporaryDirectory() as folder:
+        build_avatar([photo], Path(folder) / "head.face", consent="drawn")
+        head = load_face(str(Path(folder) / "head.face"))
+    picture = photo_still(face_from_photo(photo, consent="drawn"), "picture and head")
+    return [picture, *posed(mesh_renderer(head, PHOTO_PICTURE), 2)]
+
+
+def photo_still(face: Face, label: str) -> Image.Image:
+    """A face of a picture at rest, which is the picture."""
+    weights = np.zeros(len(face.shape_names), np.float32)
+    return labelled(draw(face, weights, picture=PHOTO_PICTURE), label, PHOTO_WORD_PIXELS)
+
+
+def posed(renderer: MeshRenderer, turn: float = 1.0) -> Iterator[Image.Image]:
+    """A face in each pose of photographs, its head turned by so many times the degrees."""
+    for label, weights, head in PHOTO_POSES:
+        values = np.array([weights.get(shape, 0.0) for shape in renderer.scene.face.shape_names], np.float32)
+        pose = np.array([*(turn * np.radians(head)), 0, 0, 0], np.float32)
+        yield labelled(renderer.draw(values, pose), label, PHOTO_WORD_PIXELS)
 
 
 def own_face_sheet(talker: Path) -> Image.Image:
@@ -226,28 +302,39 @@ def own_face_sheet(talker: Path) -> Image.Image:
     return sheet(pictures, 6)
 
 
+SHEETS = {
+    "cast": cast_sheet,
+    "photo": photo_sheet,
+    "drawn-hair": drawn_hair_sheet,
+    "clip": clip_sheet,
+    "faces": faces_sheet,
+    "hair": hair_sheet,
+    "moods": moods_sheet,
+    "shapes": shapes_sheet,
+}
+
+
 def main() -> None:
     """Write the sheets."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sheets", nargs="*", metavar="SHEET", help=f"{', '.join(SHEETS)}; all and the plots if omitted")
     parser.add_argument("--own-face", type=Path, help="a talker with an appearance, for own_face.jpg")
-    talker = parser.parse_args().own_face
+    parser.add_argument("--photos", type=Path, nargs="+", help="pictures of people, for the sheet --out alone")
+    parser.add_argument("--out", type=Path, default=Path("photos.jpg"), help="sheet of --photos")
+    given = parser.parse_args()
+    if unknown := set(given.sheets) - set(SHEETS):
+        parser.error(f"there is no sheet {', '.join(sorted(unknown))}; choose {', '.join(SHEETS)}")
+    if given.photos:
+        sheet_of_photos(given.photos).save(given.out, quality=JPEG_QUALITY)
+        return
     HERE.mkdir(exist_ok=True)
-    if talker is not None:
-        own_face_sheet(talker).save(HERE / "own_face.jpg", quality=85)
-    write_similarity("grid_s1", HERE / "similarity.png", Options())
-    write_gestures("starter", HERE / "gestures.png", GestureOptions())
-    sheets = {
-        "cast": cast_sheet,
-        "photo": photo_sheet,
-        "drawn-hair": drawn_hair_sheet,
-        "clip": clip_sheet,
-        "faces": faces_sheet,
-        "hair": hair_sheet,
-        "moods": moods_sheet,
-        "shapes": shapes_sheet,
-    }
-    for name, draw_sheet in sheets.items():
-        draw_sheet().save(HERE / f"{name}.jpg", quality=JPEG_QUALITY)
+    if given.own_face is not None:
+        own_face_sheet(given.own_face).save(HERE / "own_face.jpg", quality=85)
+    if not given.sheets:
+        write_similarity("grid_s1", HERE / "similarity.png", Options())
+        write_gestures("starter", HERE / "gestures.png", GestureOptions())
+    for name in given.sheets or SHEETS:
+        SHEETS[name]().save(HERE / f"{name}.jpg", quality=JPEG_QUALITY, optimize=True)
 
 
 if __name__ == "__main__":

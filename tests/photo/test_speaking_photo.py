@@ -206,9 +206,9 @@ def parted(layers: Photograph) -> Face:
     return cut_out(layers)
 
 
-def cut_out(picture: Photograph) -> Face:
+def cut_out(picture: Photograph, name: str = NAME) -> Face:
     head = load_face("head", hair="bald")
-    return speaking_photo(photographed(picture, found_in(NAME, SIDE)), head, {"name": "Ada"})
+    return speaking_photo(photographed(picture, found_in(name, SIDE)), head, {"name": "Ada"})
 
 
 @pytest.fixture(scope="module")
@@ -300,6 +300,13 @@ def test_a_cut_out_person_moves_before_any_background() -> None:
     mixed = alpha * free[..., :3] + (1 - alpha) * np.array([255, 0, 0])
     assert np.abs(mixed - red).mean() < 0.5
     np.testing.assert_array_equal(red[:20, :20], np.full((20, 20, 3), (255, 0, 0)))
+
+
+def test_large_eyes_do_not_show_beside_the_cheeks() -> None:
+    shown = draw(load_face("zuri"), picture=Picture(size=f"{SIDE}x{SIDE}", background="transparent"))
+    cut = cut_out(Photograph(shown[..., :3].copy(), shown[..., 3].copy(), 1.0).filled(), "zuri")
+    free = drawn(mesh_renderer(cut, Picture(background="transparent")))
+    assert np.abs(free[..., 3].astype(int) - shown[..., 3]).max() < 64
 
 
 def test_the_head_moves_within_what_the_picture_bears(face: Face) -> None:

@@ -34,7 +34,7 @@ from tts2face.photo.photo_shapes import (
     head_follow,
 )
 from tts2face.photo.photo_surface import EYES, SKIN, PhotoPages, PhotoSurface, Vertices, lay_pages, moves
-from tts2face.photo.photograph import Photograph
+from tts2face.photo.photograph import OPAQUE, Photograph
 from tts2face.photo.spreading import Spreading
 from tts2face.photo.wrinkles import SMILING, wrinkles
 
@@ -119,7 +119,7 @@ def speaking_photo(
             rows = surface.add(
                 _eye_vertices(patch, eye, photo, camera, model), uv=pages.uv(patch.places, next(corners_of))
             )
-            surface.parts.append((EYES, rows[patch.triangles]))
+            surface.parts.append((EYES, rows[_before_person(patch, picture)]))
             eyes += [(patch, rows)] if patch is parts[0] else []
     corners, weights = place_landmarks(mesh, landmarks, eyes)
     light = mouth_light(pixels, landmarks, np.mean([parts[0].white for parts in patches], axis=0))
@@ -209,6 +209,14 @@ def _shown_places(mesh: PhotoMesh, person: PhotoPerson) -> Floats:
         places[mesh.upper_lip] -= ways
         places[mesh.lower_lip] += ways
     return places
+
+
+def _before_person(patch: EyePatch, picture: Photograph) -> Ints:
+    """Triangles (M, 3) of an eye that lie within the person of a picture: large eyes reach beyond the cheeks."""
+    if picture.alpha is None:
+        return patch.triangles
+    across, down = np.rint(patch.places).astype(int).T
+    return np.asarray(patch.triangles[(picture.alpha[down, across] == OPAQUE)[patch.triangles].all(axis=1)])
 
 
 def _eye_vertices(patch: EyePatch, eye: int, photo: Floats, camera: PhotoCamera, model: _Model) -> Vertices:
