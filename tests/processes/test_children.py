@@ -17,6 +17,7 @@ import pytest
 from lexicon.errors import BackendError, InputError
 from tests.processes.handlers import NarrowError
 from tests.running import eventually
+from tests.started import running_processes
 from tts2face.processes.limits import ProcessLimits
 from tts2face.processes.message import Message
 from tts2face.processes.parent import AsyncChild, Child, ChildEndedError, raised, started
@@ -34,10 +35,7 @@ def child() -> Iterator[Child]:
 
 
 def is_running(process: int) -> bool:
-    try:
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
+    return process in running_processes()
 
 
 def test_one_child_answers_call_after_call(child: Child) -> None:

@@ -12,7 +12,7 @@ from tts2face.models.palette import Palette, load_palette
 from tts2face.request import NATURAL, OWN_FACE, parse_articulation
 from tts2face.session_cache import Models
 from tts2face.storage.files import present_name
-from tts2face.voice.loading import voice_names
+from tts2face.voice.loading import has_voice, voice_names
 
 
 def check_names(models: Models, request: Mapping[str, Any]) -> None:
@@ -26,7 +26,7 @@ def check_names(models: Models, request: Mapping[str, Any]) -> None:
         A model is damaged.
     """
     voice = request.get("voice")
-    if voice is not None and voice not in voice_names() and not str(voice).endswith(".onnx"):
+    if voice is not None and not has_voice(voice) and not str(voice).endswith(".onnx"):
         raise InputError(f"there is no voice {voice!r}; give {', '.join(voice_names())}, or a Piper voice (.onnx)")
     if models.identity is not None:
         known = _identities(models.face)

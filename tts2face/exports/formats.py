@@ -13,6 +13,7 @@ from typing import Any
 
 from lexicon.errors import BackendError, InputError
 from tts2face.plugins import EXPORTS, declared, load_plugin
+from tts2face.storage.output_names import MOVIE_SUFFIXES
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,8 +150,8 @@ def _is_name(name: str) -> bool:
 
 
 def _by_suffix(name: str) -> dict[str, FormatInfo]:
-    """Formats by their suffixes: those of the table if one fits a name, else of other packages, too."""
-    if any(name.lower().endswith(suffix) for suffix in _BY_SUFFIX):
+    """Formats by their suffixes: those of other packages, too, for a name with an ending that is none of ours."""
+    if "." not in name or name.lower().endswith((*_BY_SUFFIX, *MOVIE_SUFFIXES)):
         return _BY_SUFFIX
     return {suffix: one for one in reversed(all_formats()) for suffix in one.suffixes}
 

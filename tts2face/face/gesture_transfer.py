@@ -21,12 +21,9 @@ from tts2face.face.mouth_model import SPEECH_SHAPE_PREFIXES
 from tts2face.face.shape_transfer import SCALE_LIMITS, append_shapes, spread_landmark_motion
 from tts2face.models.face import Face
 from tts2face.models.landmarks import (
-    INNER_LIP_LOWER,
-    INNER_LIP_UPPER,
     LID_RINGS,
+    LIP_LANDMARKS,
     N_MESH_LANDMARKS,
-    OUTER_LIP_LOWER,
-    OUTER_LIP_UPPER,
 )
 from tts2face.models.palette import FEATURES, FIXED_CHANNELS, REGION_FEATURES, FaceRegion, Palette
 from tts2face.numeric import ordered_product
@@ -40,7 +37,6 @@ GAIN_NAMES = (*FEATURES, *SPEECH_GAINS)  # whose motion has a gain
 MAX_MODE_MM = 10.0  # largest displacement of a landmark by one mode: brows rise up to 10 mm
 # Landmarks that stay still while a region moves: rims of the lids, and lips, which have features of their own.
 LID_LANDMARKS = (*LID_RINGS[0], *LID_RINGS[1])
-LIP_LANDMARKS = (*OUTER_LIP_UPPER, *OUTER_LIP_LOWER, *INNER_LIP_UPPER, *INNER_LIP_LOWER)
 # Landmarks added to a region for the fit of its size: corners of the eyes, root and base of the nose.
 FIT_LANDMARKS = (33, 133, 362, 263, 168, 6, 2)
 DEFAULT_GAZE_TURN = 0.4  # rad per weight of a gaze shape on a face whose eyes are part of its shapes

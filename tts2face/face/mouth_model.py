@@ -10,6 +10,7 @@ from tts2face.models.face import Face
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
+    LIP_LANDMARKS,
     OUTER_LIP_LOWER,
     OUTER_LIP_UPPER,
     UPPER_LIP_INNER_MID,
@@ -78,7 +79,6 @@ def require_lips(face: Face, moving: NDArray[np.int64]) -> None:
 
 def landmark_weights(common: list[int]) -> FloatArray:
     """Weights (L, 3) of the coordinates of the landmarks `common`."""
-    lips = {*INNER_LIP_UPPER, *INNER_LIP_LOWER, *OUTER_LIP_UPPER, *OUTER_LIP_LOWER}
-    per_landmark = np.array([LIP_WEIGHT if landmark in lips else 1.0 for landmark in common])
+    per_landmark = np.array([LIP_WEIGHT if landmark in LIP_LANDMARKS else 1.0 for landmark in common])
     weights: FloatArray = per_landmark[:, None] * np.array([1.0, 1.0, DEPTH_WEIGHT])
     return weights

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from tts2face.face.compact_spline import fit_local_interpolant
 from tts2face.face.expressions import expression_landmarks
-from tts2face.face.gesture_transfer import LID_LANDMARKS, LIP_LANDMARKS, NO_GAINS, check_gestures, fit_modes
+from tts2face.face.gesture_transfer import LID_LANDMARKS, NO_GAINS, check_gestures, fit_modes
 from tts2face.face.landmark_fit import axis_scales, landmark_positions, procrustes_rotation, scatter_landmarks
 from tts2face.face.shape_transfer import SCALE_LIMITS, SUPPORT, default_head
 from tts2face.models.appearance import Appearance
-from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LID_RINGS
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LID_RINGS, LIP_LANDMARKS
 from tts2face.models.palette import EXPRESSIONS, REGION_FEATURES, Palette
 from tts2face.models.talker import ShapeModel, Talker, require_appearance
 from tts2face.numeric import ordered_product, smoothstep

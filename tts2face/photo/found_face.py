@@ -12,12 +12,9 @@ from tts2face.models.landmarks import (
     EYE_OUTER_LEFT,
     EYE_OUTER_RIGHT,
     FACE_OVAL,
-    INNER_LIP_LOWER,
-    INNER_LIP_UPPER,
+    LIP_LANDMARKS,
     MOUTH_REGION,
     N_MESH_LANDMARKS,
-    OUTER_LIP_LOWER,
-    OUTER_LIP_UPPER,
 )
 from tts2face.photo.photograph import Photograph, read_photograph, split_number
 from tts2face.retargeting.performer import eye_aperture
@@ -25,7 +22,7 @@ from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.pose import head_angles, rigid_points, similarity_transforms
 from tts2face.video.track import MIN_CONTRAST, MIN_SCORE, Crop, FaceTracker, crop_around
 
-LIPS = sorted({*INNER_LIP_UPPER, *INNER_LIP_LOWER, *OUTER_LIP_UPPER, *OUTER_LIP_LOWER})
+LIPS = sorted(set(LIP_LANDMARKS))
 ABOVE_MOUTH = sorted(set(range(N_MESH_LANDMARKS)) - set(MOUTH_REGION))
 CROP_STEP = 0.02  # between the nine crops from which landmarks are read, of the side of the crop
 MAX_YAW_DEG, DOUBTFUL_YAW_DEG = 40.0, 25.0

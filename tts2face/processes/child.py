@@ -48,12 +48,9 @@ class Call:
         self.event({"stage": name, "done": 0, "of": 0})
         return report
 
-    def more(self, *, newest: bool = False) -> Message:
-        """The next further input, for which is waited; the newest one drops those before it."""
-        message = self._inputs.get()
-        while newest and not self._inputs.empty():
-            message = self._inputs.get()
-        return message
+    def more(self) -> Message:
+        """The next further input, for which is waited."""
+        return self._inputs.get()
 
     def hide(self, path: str | Path, name: str = "") -> None:
         """Show a name in messages in place of a path; without one, paths below it are shown from there."""

@@ -6,11 +6,11 @@ from pathlib import Path
 from lexicon.errors import InputError
 from tts2face.render.png_folder import is_png_folder
 from tts2face.storage.files import translate_disk_errors
-from tts2face.storage.output_names import check_name
+from tts2face.storage.output_names import MOVIE_SUFFIXES, check_name
 from tts2face.storage.temporary import Temporary
 
-MP4, WEBM, MOV, GIF, FOLDER = ".mp4", ".webm", ".mov", ".gif", ""
-FILE_SUFFIXES = (MP4, WEBM, MOV, GIF)
+FILE_SUFFIXES = MP4, WEBM, MOV, GIF = MOVIE_SUFFIXES
+FOLDER = ""
 
 
 def output_kind(path: Path | str) -> str:

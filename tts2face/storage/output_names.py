@@ -7,6 +7,7 @@ from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
 
+MOVIE_SUFFIXES = (".mp4", ".webm", ".mov", ".gif")
 LONGEST_NAME = 255  # bytes; used if the file system does not report a limit
 HIDDEN_EXTRA = 16  # bytes that the name of the temporary file adds: dots and random letters
 _SUFFIX_ALONE = re.compile(r"\.\w{2,7}")

@@ -26,7 +26,7 @@ from tts2face.synthesis.word_times import LetterTimes, SentenceTimes, WordTimes
 from tts2face.types import GiveWay, Speech, Waveform, concatenate_speech, frame_count, keep_on
 from tts2face.voice.engine import SpeechInput, SpokenWord, Voice, apply_volume
 from tts2face.voice.level import level_speech
-from tts2face.voice.loading import speaks, voice_names
+from tts2face.voice.loading import has_voice, speaks
 
 MIN_UTTERANCE_GAP_S = 0.02  # between utterances of a sentence; less would cut into speech (edges are exact to 16 ms)
 SPEED_CHANGE_PAUSE_S = 0.06  # between utterances that differ in speed only
@@ -159,7 +159,7 @@ def speaker_of(part: Phrase, voice: Voice, request: Request, voices: Voices | No
 
 def voice_in(name: str | None, language: str | None) -> str | None:
     """`name` if that voice speaks `language` (None: the language of the text), else None for the default voice."""
-    if language is None or (name in voice_names() and speaks(name, language)):
+    if language is None or name is None or (has_voice(name) and speaks(name, language)):
         return name
     return None
 

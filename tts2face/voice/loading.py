@@ -67,6 +67,11 @@ def voice_names() -> tuple[str, ...]:
     return (*SHIPPED_VOICES, *(name for name in declared(VOICES) if name not in SHIPPED_VOICES))
 
 
+def has_voice(name: str | None) -> bool:
+    """Whether a name is one of `voice_names`; other packages are asked only where it is not shipped."""
+    return name in SHIPPED_VOICES or name in declared(VOICES)
+
+
 def find_voice(name: str) -> VoiceInfo:
     """What is known of a voice.
 
@@ -79,7 +84,7 @@ def find_voice(name: str) -> VoiceInfo:
     """
     if name in SHIPPED_VOICES:
         return SHIPPED_VOICES[name]
-    if name in declared(VOICES):
+    if has_voice(name):
         info: VoiceInfo = load_plugin(VOICES, name)
         return info
     raise InputError(

@@ -18,7 +18,7 @@ from tts2face.face.gesture_transfer import gesture_face
 from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
-from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LIP_LOWER, OUTER_LIP_UPPER
+from tts2face.models.landmarks import LIP_LANDMARKS
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
 from tts2face.retargeting.to_face import build_retargeter
@@ -27,7 +27,7 @@ from tts2face.types import Trajectory
 PLACE_MM = 0.02  # of a landmark after its table with 7 digits; quantised files have steps of 0.015 mm
 ORIGIN_MM = 0.7  # between the centre of the eyeball that built the head and that of the sphere fitted to it
 QUANTISED_MM = 0.03
-LIPS = sorted({*INNER_LIP_UPPER, *INNER_LIP_LOWER, *OUTER_LIP_UPPER, *OUTER_LIP_LOWER})
+LIPS = sorted(set(LIP_LANDMARKS))
 MERGED = {"mouthSmile": ("mouthSmileLeft", "mouthSmileRight"), "eyesClosed": ("eyeBlinkLeft", "eyeBlinkRight")}
 MISSING = frozenset({"cheekPuff", "noseSneerLeft", "browInnerUp", "mouthFunnel"})
 VARIANTS = {
