@@ -1,7 +1,7 @@
 """The error of a decoding process that refuses its file."""
 
-from lexicon.errors import Tts2faceError
+from lexicon.errors import DataError
 
 
-class RefusedFileError(Tts2faceError):
+class RefusedFileError(DataError):
     """The file is not what it should be."""

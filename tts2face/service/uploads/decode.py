@@ -9,7 +9,8 @@ or size in bytes.
 
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -36,6 +37,17 @@ PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TIFF")
 DECODE = "decode"  # name of the call
 
 
+@contextmanager
+def _decoding(kind: str, *errors: type[Exception]) -> Iterator[None]:
+    """Refuse a file whose decoding ends in one of these errors."""
+    try:
+        yield
+    except RefusedFileError:
+        raise
+    except errors as error:
+        raise RefusedFileError(f"it is no {kind} that can be decoded") from error
+
+
 def decode_sound(source: Path, target: Path, max_seconds: float) -> None:
     """Write the first sound stream of a file as mono 16-bit .wav at `SOUND_RATE`.
 
@@ -50,22 +62,23 @@ def decode_sound(source: Path, target: Path, max_seconds: float) -> None:
 
     # A playlist could name other files: only formats without references, and no protocol to open them.
     options = {"format_whitelist": SOUND_FORMATS, "protocol_whitelist": "none"}
-    try:
-        with source.open("rb") as file, av.open(file, "r", options=options) as container:
-            if not container.streams.audio:
-                raise RefusedFileError("it has no sound")
-            resampler = av.AudioResampler(format="s16", layout="mono", rate=SOUND_RATE)
-            n_left = int(max_seconds * SOUND_RATE)
-            with wave.open(str(target), "wb") as out:
-                out.setparams((1, 2, SOUND_RATE, 0, "NONE", "not compressed"))
-                for frame in container.decode(audio=0):
-                    for part in resampler.resample(frame):
-                        n_left -= part.samples
-                        if n_left < 0:
-                            raise RefusedFileError(f"it is longer than {max_seconds:g} s")
-                        out.writeframesraw(bytes(part.planes[0])[: 2 * part.samples])
-    except (av.FFmpegError, ValueError, EOFError) as error:
-        raise RefusedFileError("it is no sound that can be decoded") from error
+    with (
+        _decoding("sound", av.FFmpegError, ValueError, EOFError),
+        source.open("rb") as file,
+        av.open(file, "r", options=options) as container,
+    ):
+        if not container.streams.audio:
+            raise RefusedFileError("it has no sound")
+        resampler = av.AudioResampler(format="s16", layout="mono", rate=SOUND_RATE)
+        n_left = int(max_seconds * SOUND_RATE)
+        with wave.open(str(target), "wb") as out:
+            out.setparams((1, 2, SOUND_RATE, 0, "NONE", "not compressed"))
+            for frame in container.decode(audio=0):
+                for part in resampler.resample(frame):
+                    n_left -= part.samples
+                    if n_left < 0:
+                        raise RefusedFileError(f"it is longer than {max_seconds:g} s")
+                    out.writeframesraw(bytes(part.planes[0])[: 2 * part.samples])
     if n_left == int(max_seconds * SOUND_RATE):
         raise RefusedFileError("its sound is empty")
 
@@ -81,13 +94,13 @@ def decode_picture(source: Path, target: Path, max_pixels: float) -> None:
     from PIL import Image
 
     Image.MAX_IMAGE_PIXELS = None  # the size is checked here, before anything is decoded
-    try:
-        with Image.open(source, formats=PICTURE_FORMATS) as picture:
-            if picture.width * picture.height > max_pixels:
-                raise RefusedFileError(f"it has {picture.width} x {picture.height} pixels, more than {max_pixels:g}")
-            picture.convert("RGB").save(target, "PNG", compress_level=1)
-    except (OSError, ValueError, SyntaxError, MemoryError) as error:
-        raise RefusedFileError("it is no picture that can be decoded") from error
+    with (
+        _decoding("picture", OSError, ValueError, SyntaxError, MemoryError),
+        Image.open(source, formats=PICTURE_FORMATS) as picture,
+    ):
+        if picture.width * picture.height > max_pixels:
+            raise RefusedFileError(f"it has {picture.width} x {picture.height} pixels, more than {max_pixels:g}")
+        picture.convert("RGB").save(target, "PNG", compress_level=1)
 
 
 def check_video(source: Path, target: Path, max_seconds: float) -> None:
@@ -101,17 +114,18 @@ def check_video(source: Path, target: Path, max_seconds: float) -> None:
     import av
 
     options = {"format_whitelist": ",".join(VIDEO_FORMATS), "protocol_whitelist": "none"}
-    try:
-        with source.open("rb") as file, av.open(file, "r", options=options) as container:
-            stream = next((one for one in container.streams.video if one.codec_context is not None), None)
-            if stream is None:
-                raise RefusedFileError("it holds no video")
-            if stream.width * stream.height > MAX_VIDEO_PIXELS:
-                raise RefusedFileError(f"it has {stream.width} x {stream.height} pixels, more than 4096 x 2304")
-            suffix = next(VIDEO_FORMATS[name] for name in container.format.name.split(",") if name in VIDEO_FORMATS)
-            seconds = _measure_video(container, stream, max_seconds)
-    except (av.FFmpegError, ValueError, EOFError, StopIteration) as error:
-        raise RefusedFileError("it is no video that can be decoded") from error
+    with (
+        _decoding("video", av.FFmpegError, ValueError, EOFError, StopIteration),
+        source.open("rb") as file,
+        av.open(file, "r", options=options) as container,
+    ):
+        stream = next((one for one in container.streams.video if one.codec_context is not None), None)
+        if stream is None:
+            raise RefusedFileError("it holds no video")
+        if stream.width * stream.height > MAX_VIDEO_PIXELS:
+            raise RefusedFileError(f"it has {stream.width} x {stream.height} pixels, more than 4096 x 2304")
+        suffix = next(VIDEO_FORMATS[name] for name in container.format.name.split(",") if name in VIDEO_FORMATS)
+        seconds = _measure_video(container, stream, max_seconds)
     target.write_text(json.dumps({"suffix": suffix, "seconds": seconds}))
 
 

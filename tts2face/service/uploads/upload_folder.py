@@ -14,7 +14,6 @@ from starlette.datastructures import UploadFile
 from lexicon.errors import DataError, InputError, Tts2faceError
 from lexicon.inputs import parse_json
 from tts2face.jobs import resource_check
-from tts2face.jobs.refused_file import RefusedFileError
 from tts2face.jobs.resource_check import STATEMENT
 from tts2face.processes.parent import ChildEndedError, started
 from tts2face.processes.tools import run_take_tool
@@ -168,7 +167,7 @@ async def decode_file(arguments: tuple[str, Path, Path, float], name: str, timeo
         raise RefusedError(
             422, "invalid_data", f"{name} took more than {timeout_s:g} s to decode; send a simpler file"
         ) from late
-    except (RefusedFileError, InputError, DataError) as refused:
+    except (InputError, DataError) as refused:
         raise _refused(name, str(refused)) from refused
     except ChildEndedError as ended:
         raise _refused(name, "it needs too much memory or time") from ended
