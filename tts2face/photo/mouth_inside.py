@@ -16,7 +16,7 @@ Ints = NDArray[np.int64]
 
 PICTURED = "teeth_pictured"  # part of upper teeth that a picture shows
 TEETH, OTHERS = ("teeth_upper", "teeth_lower"), ("gums_upper", "gums_lower", "tongue")
-UPPER_JAW = (TEETH[0], OTHERS[0])
+UPPER_JAW, LOWER_JAW = (TEETH[0], OTHERS[0]), (TEETH[1], OTHERS[1])
 WIDTH_LIMITS = (0.88, 1.1)  # of the mouth over the head's
 PARTED_WIDTH = 0.85  # of a mouth that is open in the picture, and wider for it
 BEHIND_MM = 1.0  # further back than in the head: lips are thinner than the head's
@@ -24,6 +24,9 @@ OPEN_TOOTH = 70  # percentile of the head's colours of teeth
 GUM_SHARE = np.array([0.8, 0.66, 0.66])  # of the light of teeth that falls on gums and tongue
 GAP_SHARE = 0.45  # of the darkness of gaps between teeth
 DEPTH_MM, TONGUE_DEPTH_MM = 13.0, 17.0  # over which light falls to 1/e
+LOWER_SHARE, ROOT_SHARE = 0.7, 0.4  # of the light of upper teeth on the edges of lower ones, and at the height below:
+LOWER_MM = 7.0  # light comes from above, and the lower lip stands before them
+DARK_SHARE = np.array([0.24, 0.16, 0.13])  # of open light, behind lips that hardly part: from lips and cheeks
 DEEP_TINT = np.array([1.0, 0.62, 0.55])  # of light that has gone deep
 AMBIENT = 0.30  # of the light of a tooth that faces the viewer
 LIGHT_FROM = np.array([0.1, 0.35, 0.93])
@@ -127,6 +130,12 @@ class MouthLight:
     teeth: Floats
     lips: Floats
 
+    @property
+    def dark(self) -> Floats:
+        """(3,) displayed colours behind lips that hardly part, of those in open light."""
+        share: Floats = np.divide(*self.displayed(np.stack([self.teeth * DARK_SHARE, self.teeth])))
+        return share
+
     def displayed(self, linear: Floats) -> Floats:
         """Colours (N, 3), 0..255, of linear light (N, 3), in grey where the lips are grey."""
         hue = min(1.0, float(np.ptp(self.lips) / self.lips.max()) / LEAST_HUE)
@@ -173,6 +182,10 @@ def _colours(head: Face, used: Ints, parts: dict[str, Ints], vertices: Floats, l
     reach = np.full(len(used), DEPTH_MM)
     reach[np.unique(parts["tongue"])] = TONGUE_DEPTH_MM
     share = np.exp(-np.clip(front - vertices[:, 2], 0, None) / reach)
+    lower = np.unique(np.concatenate([parts[name] for name in LOWER_JAW]))
+    edge = vertices[np.unique(parts[TEETH[1]]), 1].max()
+    below = np.clip((edge - vertices[lower, 1]) / LOWER_MM, 0, 1)
+    share[lower] *= LOWER_SHARE + (ROOT_SHARE - LOWER_SHARE) * below
     facing = np.clip(
         vertex_normals(vertices, np.concatenate(list(parts.values()))) @ (LIGHT_FROM / np.linalg.norm(LIGHT_FROM)), 0, 1
     )

@@ -42,7 +42,7 @@ LIT_FADE = (-0.015, 0.08)  # of the width outside the oval, over which the light
 GAMMA = 2.2  # of a display
 LEAST_SHADE = 0.25  # of the median, of skin in the shade
 MOST_TURNED = 30.0  # of 255, change of the skin's light
-MOUTH_BASE, MOUTH_BY_OPENING = 0.5, 0.6  # of the colour in open light: in the dark, and times the curve of the opening
+MOUTH_OPEN = 1.1  # of the colour in open light, where the lips are wide open
 SHADE_TINT = np.array([0.8, 1.05, 1.1])  # of what wrinkles darken: light between them is redder
 NO_EYES = np.array([0.2, 0.4], np.float32)  # edges of pupil and iris, of which a photographed face has none
 TURN_TERMS, MOVE_TERMS = slice(1, 4), slice(4, 7)  # of `tts2face.render.film.response.write_terms`
@@ -54,24 +54,27 @@ CURVE_TERM = 2  # of `tts2face.render.film.response.write_mouth_terms`
 class MouthRows:
     """Parts behind lips, each its vertices (N,) and their colours (N, 3) in open light.
 
-    Those that a picture shows and those that are lit come from the dark as the lips open; the walls do not.
+    Those that a picture shows and those that are lit come from the dark, a share (3,) of the colours, as the lips open;
+    the walls do not.
     """
 
     pictured: Sequence[tuple[Ints, Floats]]
     lit: Sequence[tuple[Ints, Floats]]
     walls: Sequence[tuple[Ints, Floats]]
+    dark: Floats
 
     def light(self) -> tuple[Ints, Floats, Floats]:
         """Vertices (M,), their base (M, 3), which is added to that of a picture, and responses (6, 3, M)."""
         rows, bases, responses = [], [], []
+        none, full = np.zeros(3), np.ones(3)
         for parts, base, dark, opened in (
-            (self.pictured, 0.0, MOUTH_BASE - 1, MOUTH_BY_OPENING),
-            (self.lit, MOUTH_BASE, 0.0, MOUTH_BY_OPENING),
-            (self.walls, 1.0, 0.0, 0.0),
+            (self.pictured, none, self.dark - 1, MOUTH_OPEN - self.dark),
+            (self.lit, self.dark, none, MOUTH_OPEN - self.dark),
+            (self.walls, full, none, none),
         ):
             for numbers, colours in parts:
                 answer = np.zeros((N_MOUTH_TERMS, 3, len(numbers)))
-                answer[0], answer[CURVE_TERM] = dark * colours.T, opened * colours.T
+                answer[0], answer[CURVE_TERM] = (dark * colours).T, (opened * colours).T
                 rows.append(numbers)
                 bases.append(base * colours)
                 responses.append(answer)

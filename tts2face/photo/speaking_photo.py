@@ -133,6 +133,7 @@ def speaking_photo(
         pictured=[_add_inside(surface, one, pages) for one in inside if one.texels is not None],
         lit=[_add_inside(surface, one, pages) for one in inside if one.texels is None],
         walls=[_add_inside(surface, walls, pages)],
+        dark=light.dark,
     )
     every = surface.every()
     triangles = np.concatenate([part for _, part in surface.parts])
