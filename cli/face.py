@@ -125,6 +125,13 @@ def photo(  # noqa: PLR0913 - one parameter a flag
     out: Annotated[Path, Parameter(help="Output face (.face).", alias="-o")],
     consent: Consent = None,
     name: Annotated[str | None, Parameter(help="The person's name; by default the first file's name.")] = None,
+    eye_color: Annotated[
+        str | None,
+        Parameter(
+            help="Eye colour: dark-brown, brown, hazel, green, grey, blue or #rrggbb; by default as in the picture."
+        ),
+    ] = None,
+    age_keep: Annotated[bool, switch("Keep the wrinkles of the skin, which are softened otherwise.")] = False,
     preview: Annotated[Path | None, Parameter(help="Write a picture of the head with its landmarks (.png).")] = None,
     model: Model = None,
     yes: Yes = False,
@@ -140,7 +147,10 @@ def photo(  # noqa: PLR0913 - one parameter a flag
     from tts2face.models.face_loading import load_face
 
     consent = agreed(photos[0], consent, name)
-    result = build_avatar(photos, out, consent=consent, name=name, model=model, on_warning=warner(quiet=quiet))
+    result = build_avatar(
+        photos, out, consent=consent, name=name, eye_color=eye_color, age_keep=age_keep, model=model,
+        on_warning=warner(quiet=quiet),
+    )  # fmt: skip
     if preview is not None:
         _write_preview(preview, load_face(str(out)))
     if not quiet:

@@ -19,7 +19,7 @@ from corpus_tools.dense.mesh_fit import (
     select_consistent_landmarks,
 )
 from corpus_tools.dense.modes import MOST_MODES, DenseModel, add_modes, dense_model, mode_fitter
-from corpus_tools.dense.person_look import LookSampler, PersonLook, dress_head
+from corpus_tools.dense.person_look import AS_SEEN, LookChoices, LookSampler, PersonLook, dress_head
 from corpus_tools.dense.skin_colour import average_skin_colours, build_picture_fitter
 from corpus_tools.dense.texture_painting import paint_skin
 from corpus_tools.dense.video_landmarks import TrackedPictures, find_videos, resting_landmarks, track_videos
@@ -38,6 +38,7 @@ from tts2face.video.landmark_models import find_bundle
 
 Floats = NDArray[np.float64]
 
+AROUND_GLOSS = 30.0  # texels, Gaussian, about 5 mm, whose colours lie under gloss
 SOURCE_FACE = "head"  # the shipped face that is adapted
 CONTENT = "a head with the shape and, with the stated consent, the skin of a real person"
 
@@ -144,8 +145,10 @@ def fit_person(head: Face, person: Floats) -> FittedHead:
     return FittedHead(adapt_head(head, person), person, np.flatnonzero(select_consistent_landmarks(rest, target)))
 
 
-def paint_person(fitted: FittedHead, seen: Sequence[TrackedPictures], on_progress: Progress) -> tuple[Face, PersonLook]:
-    """The head with the skin, eyes, hair and shirt that frames show, and what was found.
+def paint_person(
+    fitted: FittedHead, seen: Sequence[TrackedPictures], on_progress: Progress, choices: LookChoices = AS_SEEN
+) -> tuple[Face, PersonLook]:
+    """The head with the skin, eyes, hair and shirt that frames show, and what was found or chosen.
 
     Raises
     ------
@@ -157,6 +160,9 @@ def paint_person(fitted: FittedHead, seen: Sequence[TrackedPictures], on_progres
     fit = build_picture_fitter(fitted.shaped, canvas.opened, fitted.used, seen_vertices)
     sampler = LookSampler(fit)
     skin = average_skin_colours(fitted.shaped, canvas, fit, seen, on_frame=sampler.add, on_progress=on_progress)
-    look = sampler.look()
-    skin = replace(skin, colour=skin_texture(remove_cast(skin.colour, look.cast, look.skin)))
-    return dress_head(paint_skin(fitted.shaped, canvas, skin), look), look
+    look = choices.applied(sampler.look())
+    shown, side = canvas.texels.at(skin.rows), len(canvas.texture)
+    clean = remove_cast(skin.colour, look.cast, look.skin)
+    skin = replace(skin, colour=skin_texture(clean, lambda values: shown.blurred(values, side, AROUND_GLOSS)))
+    painted = paint_skin(fitted.shaped, canvas, skin, keeps_lines=choices.keeps_lines)
+    return dress_head(painted, look), look

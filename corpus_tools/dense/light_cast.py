@@ -1,5 +1,6 @@
 """Colour of the light in videos, estimated from skin and eyes, and colours without it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +33,8 @@ MIN_PIXELS = 6
 # Skin of cheeks and forehead in the renderer's studio light is gain * texture ** power in linear light, by channel:
 # least squares of logarithms over the head's eight identities, residuals .1. The tone curve compresses red.
 STUDIO_GAIN, STUDIO_POWER = np.array([1.02, 1.36, 1.51]), np.array([0.70, 0.96, 1.04])
-GLOSSY = (1.1, 1.4)  # of the skin's luminance, between which gloss begins to be removed
+GLOSSY = (1.1, 1.25)  # of the skin's luminance, between which gloss begins to be removed
+FEW_PLAIN = 0.02  # share of places without gloss, around a place, that counts as much as the usual skin
 SKIN_SHARE = (0.2, 0.7)  # of the skin's luminance: hair and shadow up to the first, skin from the second
 EYE_GRID = (41, 25)  # samples across and down an eye
 
@@ -151,14 +153,18 @@ def remove_cast(srgb: Floats, cast: Floats, skin: Floats) -> Floats:
     return 255.0 * encode_light(decode_srgb(np.clip(srgb, 0.0, 255.0) / 255.0) * gains)
 
 
-def skin_texture(srgb: Floats) -> Floats:
+def skin_texture(srgb: Floats, blurred: Callable[[Floats], Floats]) -> Floats:
     """Colours (N, 3) of a texture, sRGB 0..255, of a face whose skin looks so in the renderer's studio light.
 
-    Hair, brows and shadows, which are darker than skin, keep their hue.
+    `blurred` gives means (N, D) of values (N, D) around each place: under gloss lies what lies around it. Hair,
+    brows and shadows, which are darker than skin, keep their hue.
     """
     light = decode_srgb(np.clip(srgb, 0.0, 255.0) / 255.0)
     usual = np.median(light, axis=0)
-    light = without_gloss(light, usual)
+    plain = 1.0 - smoothstep(light @ LUMINANCE / (usual @ LUMINANCE), *GLOSSY)[:, None]
+    sums = blurred(np.column_stack([plain, plain * light]))
+    around = (sums[:, 1:] + FEW_PLAIN * usual) / (sums[:, :1] + FEW_PLAIN)
+    light = without_gloss(light, around)
     gains = (usual / STUDIO_GAIN) ** (1.0 / STUDIO_POWER) / usual
     grey = (gains * usual) @ LUMINANCE / (usual @ LUMINANCE)
     is_skin = smoothstep(light @ LUMINANCE / (usual @ LUMINANCE), *SKIN_SHARE)
@@ -166,12 +172,12 @@ def skin_texture(srgb: Floats) -> Floats:
 
 
 def without_gloss(light: Floats, usual: Floats) -> Floats:
-    """Linear light (N, 3) of skin without what is white in places lighter than the usual (3,) skin.
+    """Linear light (N, 3) of skin without what is white in places lighter than the usual (3,) or (N, 3) skin.
 
     Shafer 1985, the dichromatic reflection model: light is a multiple of the skin's colour and a share of the lamp's,
     which is white here. Wrinkles and shadows, which are darker, stay.
     """
-    skin = np.maximum((light[:, 0] - light[:, 2]) / max(usual[0] - usual[2], DARKEST), 1.0)
+    skin = np.maximum((light[:, 0] - light[:, 2]) / np.maximum(usual[..., 0] - usual[..., 2], DARKEST), GLOSSY[0])
     share = smoothstep(light @ LUMINANCE / (usual @ LUMINANCE), *GLOSSY)[:, None]
     found: Floats = light + share * (np.minimum(light, skin[:, None] * usual) - light)
     return found

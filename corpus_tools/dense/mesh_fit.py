@@ -23,6 +23,7 @@ FULL_EYE_DISTANCE_MM, FREE_SKIN_DISTANCE_MM = (
 N_NEIGHBOURS = 10  # neighbouring landmarks with whose motion a landmark's is compared
 # Maximum deviation from the neighbours' motion; larger ones are errors of correspondence at the face's rim.
 MAX_STRAY_MM = 4.0
+JOIN_MM = 2.0  # up to which vertices count as neighbours, in lips and across them
 N_ROUNDS = 3  # landmarks lie inside triangles, so that residuals are fitted again
 
 
@@ -50,7 +51,8 @@ class EyeSocket:
 class HeadWarp:
     """Warp of positions on the default head to the talker.
 
-    ``opened`` (V, 3) is the displacement of each vertex by a slightly open jaw, at which the field is evaluated.
+    ``opened`` (V, 3) is the displacement of each vertex by a slightly open jaw, at which the field is evaluated; lips
+    that touch share it, so that they touch in the talker's face.
     ``landmarks`` (N,) are the indices of the field's centres.
     """
 
@@ -76,12 +78,29 @@ def fit_head_warp(face: Face, talker: NDArray[np.floating]) -> HeadWarp:
     centres = (rest + face_landmarks(face, opened)[:N_MESH_LANDMARKS])[used]
     width = face_width(rest)
     missing = (target - rest)[used]
+    opened = _joined_lips(face.vertices.astype(np.float64), opened)
     warp = HeadWarp(fit_interpolant(centres, missing, width), opened, fit_eye_sockets(face, rest, target), used)
     for _ in range(N_ROUNDS - 1):
         reached = face.vertices + warp.field(face.vertices + opened)
         missing = missing + (target - face_landmarks(face, reached)[:N_MESH_LANDMARKS])[used]
         warp = HeadWarp(fit_interpolant(centres, missing, width), opened, warp.sockets, used)
     return warp
+
+
+def _joined_lips(vertices: Floats, opened: Floats) -> Floats:
+    """Displacements (V, 3) of vertices (V, 3), mm, with those of others close by."""
+    from scipy.spatial import cKDTree
+
+    moving = np.flatnonzero(np.linalg.norm(opened, axis=1) > 0.0)
+    tree = cKDTree(vertices)
+    near = np.unique(np.concatenate(tree.query_ball_point(vertices[moving], JOIN_MM)).astype(np.int64))
+    pairs = cKDTree(vertices[near]).sparse_distance_matrix(tree, JOIN_MM, output_type="coo_matrix")
+    shares = np.exp(-((2.0 * pairs.data / JOIN_MM) ** 2))
+    sums = np.zeros((len(near), 4))
+    np.add.at(sums, pairs.row, shares[:, None] * np.column_stack([np.ones(len(shares)), opened[pairs.col]]))
+    joined = opened.copy()
+    joined[near] = sums[:, 1:] / sums[:, :1]
+    return joined
 
 
 def face_landmarks(face: Face, vertices: NDArray[np.floating]) -> Floats:

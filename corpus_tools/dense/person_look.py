@@ -31,8 +31,8 @@ from corpus_tools.dense.skin_colour import PictureFitter, sample_picture
 from corpus_tools.dense.texels import find_texels
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import tint_parts
-from tts2face.models.hair import HAIR_COLOURS, parse_hair_colour
 from tts2face.models.landmarks import CHIN
+from tts2face.models.named_colours import EYE_COLOURS, HAIR_COLOURS, parse_eye_colour, parse_hair_colour
 
 Floats = NDArray[np.float64]
 
@@ -48,10 +48,7 @@ SHINE = 0.5  # logarithm by which hair in a picture is lighter than its colour; 
 # Casts of cameras and walls lead off it; what is further off than these is dyed or red.
 HAIR_LINE, NATURAL = np.array([1.0, -0.9]), (0.4, 0.7)
 GREY = 0.35  # log R/G below which hair is rather grey in yellowish light than blond
-EYE_COLOURS: Mapping[str, str] = {
-    "dark brown": "3a281f", "brown": "58402f", "hazel": "6a5a3e", "green": "67705a", "grey": "6d7274", "blue": "60788c",
-}  # fmt: skip  # sRGB
-NEUTRAL_IRIS = "58402f"
+NEUTRAL_IRIS = EYE_COLOURS["brown"]
 IRIS_LIGHT, DARK_IRIS, DARK_IRIS_HUE = 0.012, 0.02, (0.55, -0.55)  # least luminance; up to which irises are brown
 BROWN_FROM, BROWN_SLOPE, BROWN_LIGHT = -0.45, -0.8, 0.035  # log B/G of brown irises, their least R/G, usual luminance
 AMBER = -0.9  # log B/G up to which more yellow is redder; irises beyond are amber
@@ -88,8 +85,30 @@ class PersonLook:
         light = "neutral"
         if abs(warmth) > PLAIN_CAST:
             light = f"{-np.expm1(-abs(warmth)):.0%} {'warm' if warmth > 0 else 'cold'}, corrected".replace("%", " %")
-        eyes = _nearest(log_colour(self.iris.astype(np.float64)), EYE_COLOURS)
+        eyes = _nearest(log_colour(self.iris.astype(np.float64)), EYE_COLOURS).replace("-", " ")
         return "; ".join([f"hair: {hair}", f"eyes: {eyes}", f"light: {light}", *self.notes])
+
+
+@dataclass(frozen=True, slots=True)
+class LookChoices:
+    """What is chosen of a look: a name of `EYE_COLOURS` or #rrggbb, and whether fine lines of the skin stay."""
+
+    eye_color: str | None = None
+    keeps_lines: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse colours that do not exist (`InputError`)."""
+        if self.eye_color is not None:
+            parse_eye_colour(self.eye_color)
+
+    def applied(self, look: PersonLook) -> PersonLook:
+        """The look with the colour of the eyes that is chosen."""
+        if self.eye_color is None:
+            return look
+        return replace(look, iris=np.rint(255.0 * parse_eye_colour(self.eye_color)).astype(np.uint8))
+
+
+AS_SEEN = LookChoices()
 
 
 @dataclass(slots=True, eq=False)

@@ -17,6 +17,7 @@ from corpus_tools.dense.build_face import (
     paint_person,
 )
 from corpus_tools.dense.mesh_fit import align_to_head, face_landmarks
+from corpus_tools.dense.person_look import LookChoices
 from corpus_tools.dense.video_landmarks import TrackedPictures
 from tts2face.models.consent import consent_record
 from tts2face.models.face import Face
@@ -46,12 +47,14 @@ EXPRESSIONS = ("jawOpen", "mouthSmile", "mouthUpperUp", "mouthLowerDown", "mouth
                "mouthFrown", "browDown", "browInnerUp", "browOuterUp", "eyeSquint", "cheekSquint")  # fmt: skip
 
 
-def build_avatar(
+def build_avatar(  # noqa: PLR0913 - one parameter an option
     photos: Sequence[str | Path],
     out: Path,
     *,
     consent: str | None,
     name: str | None = None,
+    eye_color: str | None = None,
+    age_keep: bool = False,
     model: Path | None = None,
     on_warning: Callable[[str], None] = lambda _: None,
 ) -> BuiltFace:
@@ -64,22 +67,27 @@ def build_avatar(
         from the sides show more of the skin.
     consent, name, model, on_warning
         As for `tts2face.face_from_photo`.
+    eye_color
+        Name of `tts2face.models.named_colours.EYE_COLOURS` or #rrggbb; that of the picture if omitted.
+    age_keep
+        Keep the wrinkles of the skin, which are softened otherwise: as colours, they stay when the face moves.
 
     Raises
     ------
     InputError
-        There is no such file or face, or no consent.
+        There is no such file, face or eye colour, or no consent.
     DataError
         A picture cannot be read, or shows no face that can be used.
     BackendError
         The landmark models or a package are missing, or the file cannot be written.
     """
+    choices = LookChoices(eye_color, age_keep)
     record = consent_record(name or split_number(photos[0])[0].stem, consent)
     head = read_face(find_file(SOURCE_FACE, "face"))
     seen, neutral = _read(photos, head, model, on_warning)
     mirrored = [_mirrored(one, mirror_table(head)) for one in seen]
     fitted = fit_person(head, np.mean(neutral, axis=0))
-    face, look = paint_person(fitted, [*seen, *mirrored], lambda done, of: None)
+    face, look = paint_person(fitted, [*seen, *mirrored], lambda done, of: None, choices)
     face = replace(face, metadata=_metadata(head, record, look.summary()))
     write_face(out, bake_occlusion(face, available_cores()))
     return BuiltFace(len(seen), len(photos), fitted.error_mm(), look)

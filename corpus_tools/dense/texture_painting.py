@@ -35,10 +35,13 @@ FRINGE_LUMA = (0.78, 0.95)  # of the median skin: up to the first hair, from the
 EVEN_TEXELS, EVEN_SHARE = 50.0, 0.7  # about 8 mm, Gaussian; share of slow variations of log B/G that is removed
 TINT_BLOCK = 24  # texels along a side of the squares over which the tint of seen skin is averaged: about 4 mm
 SHARP_TEXELS, SHARP_GAIN = 4.0, 0.7  # unsharp masking, Gaussian of this deviation
+LINE_TEXELS, LINE_KEPT = 14.0, 0.35  # Gaussian of the skin around a line, about 2 mm; share of its depth that is kept
+LINE_SKIN = (0.7, 0.85)  # of the median skin's luminance: up to the first no skin, from the second skin
+LINE_DEPTHS = (0.35, 0.7)  # logarithms: up to the first lines, from the second hair, lashes and nostrils
 MIN_TEXEL_WEIGHT = 0.02  # of the largest weight: texels below it are blended
 
 
-def paint_skin(face: Face, canvas: SkinCanvas, skin: SkinColours) -> Face:
+def paint_skin(face: Face, canvas: SkinCanvas, skin: SkinColours, *, keeps_lines: bool = True) -> Face:
     """The face with the talker's texture."""
     side, seen = len(canvas.texture), canvas.texels.at(skin.rows)
     base = canvas.texture[canvas.texels.rows, canvas.texels.columns].astype(np.float64)
@@ -52,7 +55,7 @@ def paint_skin(face: Face, canvas: SkinCanvas, skin: SkinColours) -> Face:
     factors = _skin_tint(face, seen, own / np.maximum(base[skin.rows], 1.0), (share, base[skin.rows] @ LUMA))
     tint[tinted] = canvas.texels.at(tinted).interpolate(factors) * (1 - dark) + dark
     colour = base * tint
-    own = sharpen(own, share, seen, side)
+    own = sharpen(own if keeps_lines else soften_lines(own, share, seen, side), share, seen, side)
     colour[skin.rows] = share[:, None] * own + (1 - share)[:, None] * colour[skin.rows]
     return replace(face, textures=(Texture(_fill_texture(canvas.texture, canvas.texels, colour)), *face.textures[1:]))
 
@@ -133,6 +136,17 @@ def _skin_tint(face: Face, texels: Texels, ratio: Floats, share_and_luma: tuple[
     factors = np.ones((len(face.vertices), 3))
     factors[used] = np.exp(mixed)
     return factors
+
+
+def soften_lines(colour: Floats, share: Floats, texels: Texels, side: int) -> Floats:
+    """Colours (P, 3) whose skin has fainter lines: what is darker than skin around it, but not as dark as a brow."""
+    light = np.log(np.maximum(colour @ LUMA, 1.0))
+    near, sums = texels.blurred(np.column_stack([share, share * light]), side, LINE_TEXELS).T
+    around = sums / np.maximum(near, 1e-3)
+    is_skin = smoothstep(np.exp(around) / np.exp(np.median(around[share > 0.5])), *LINE_SKIN)
+    depth = np.clip(around - light, 0.0, None)
+    kept = 1.0 - (1.0 - LINE_KEPT) * is_skin * share * (1.0 - smoothstep(depth, *LINE_DEPTHS))
+    return np.asarray(colour * np.exp((1.0 - kept) * depth)[:, None])
 
 
 def sharpen(colour: Floats, share: Floats, texels: Texels, side: int) -> Floats:

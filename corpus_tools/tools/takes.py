@@ -76,7 +76,8 @@ def _avatar(order: Mapping[str, Any], call: Call) -> dict[str, Any]:
     stated, made, notes = read_statement(photo), photo.with_name("avatar.face"), list[str]()
     progress = call.stage("making the head")
     progress(0, 2)
-    built = build_avatar([photo], made, consent=stated["consent"], name=stated["name"], on_warning=notes.append)
+    given = {name: stated[name] for name in ("consent", "name", "eye_color", "age_keep")}
+    built = build_avatar([photo], made, **given, on_warning=notes.append)
     progress(1, 2)
     try:
         check_resource(FACE, made, folder, order["max_bytes"])

@@ -1,17 +1,22 @@
 """What heads of people get from pictures: drawn people whose light, hair, eyes and clothes are known."""
 
+import re
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from cli.main import run
 from corpus_tools.dense.hair_region import ACROSS_MM, UP_MM, Portrait, find_hair
 from corpus_tools.dense.light_cast import (
     EyeColours,
     estimate_cast,
     log_colour,
     remove_cast,
+    skin_texture,
     srgb_colour,
     without_gloss,
 )
@@ -33,8 +38,8 @@ from tts2face.colour import decode_srgb, encode_srgb
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import read_face
 from tts2face.models.face_loading import load_face
-from tts2face.models.hair import HAIR_COLOURS, parse_hair_colour
 from tts2face.models.landmarks import N_LANDMARKS, N_MESH_LANDMARKS
+from tts2face.models.named_colours import EYE_COLOURS, HAIR_COLOURS, parse_hair_colour
 from tts2face.render.camera import camera_matrices
 from tts2face.render.camera_views import parse_camera
 from tts2face.render.draw import draw
@@ -287,3 +292,29 @@ def test_gloss_goes_and_wrinkles_stay() -> None:
     lit = np.array([[1.6], [2.0]]) * skin
     np.testing.assert_allclose(without_gloss(lit + 0.15, skin), lit, atol=1e-12)  # what lies under gloss
     np.testing.assert_allclose(without_gloss(np.ones((1, 3)), skin)[0], skin * 1.0, atol=1e-12)  # nothing is known
+
+
+def test_gloss_on_lips_keeps_their_colour() -> None:
+    """A white spot on red places among skin becomes red; the mean around it is that of the red places."""
+    skin, red = np.array([200.0, 150.0, 120.0]), np.array([170.0, 80.0, 80.0])
+    colours = np.vstack([np.tile(skin, (60, 1)), np.tile(red, (20, 1)), [[255.0, 240.0, 240.0]]])
+    is_lip = np.arange(len(colours)) >= 60
+
+    def around(values: np.ndarray) -> np.ndarray:
+        return np.where(is_lip[:, None], values[is_lip].mean(axis=0), values[~is_lip].mean(axis=0))
+
+    found = skin_texture(colours, around)
+    np.testing.assert_allclose(found[-1], found[70], atol=6.0)
+    assert np.abs(found[-1] - found[0]).max() > 30
+
+
+def test_the_command_offers_the_eye_colours_and_refuses_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["face", "photo", "--help"]) == 0
+    shown = " ".join(re.sub("[^a-z-]", " ", capsys.readouterr().out).split())
+    assert " ".join(EYE_COLOURS) in shown
+    Image.new("RGB", (64, 64)).save(tmp_path / "me.png")
+    words = ["face", "photo", str(tmp_path / "me.png"), "--out", str(tmp_path / "me.face"), "--consent", "drawn"]
+    assert run([*words, "--eye-color", "pink"]) == 2
+    assert "there is no eye colour 'pink'; give #rrggbb or one of dark-brown" in capsys.readouterr().err

@@ -15,10 +15,10 @@ from tts2face.models.baked_light import HairLight, HairTint
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face
-from tts2face.models.hair import parse_hair_colour
 from tts2face.models.hair_file import read_hair, write_hair, write_lit_hair
 from tts2face.models.late import Late
 from tts2face.models.lit_hair import LitHair, swing_shapes, tint_hair, wear_hair
+from tts2face.models.named_colours import parse_hair_colour
 from tts2face.models.view_transform import table_levels
 from tts2face.storage.deflated import deflate, unpack_arrays
 from tts2face.storage.tensors import read_tensors, write_tensors

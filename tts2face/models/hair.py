@@ -1,6 +1,5 @@
 """Haircuts: hair cards that are fitted to a head and drawn in any colour."""
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -8,18 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import DataError, InputError
+from lexicon.errors import DataError
 from tts2face.colour import decode_srgb, encode_srgb
 from tts2face.models.face import Face, Hairdo, Part, Texture
 from tts2face.models.late import Late
+from tts2face.models.named_colours import parse_hair_colour
 
 HAIR_PART = "hair"
 BALD = "bald"  # haircut without hair
 MEAN_RELIEF = 128.0  # relief at which a strand has the colour of the hair
-HAIR_COLOURS: Mapping[str, str] = {
-    "black": "14100e", "dark-brown": "2b1d14", "brown": "463326", "light-brown": "66503d", "auburn": "5a2a1a",
-    "red": "8a3f1d", "dark-blond": "7f6950", "blond": "a69378", "grey": "8f8c89", "white": "a29e98",
-}  # fmt: skip  # sRGB
 MATERIAL = Part(HAIR_PART, 0, 0, specular=0.3, shininess=24.0, wrap=0.3, cutout=True, kind="strands")
 
 
@@ -77,20 +73,6 @@ class Hair:
     def scalp(self) -> NDArray[np.uint8] | None:
         """Third of the pictures; None where nothing is painted."""
         return self.pictures[2] if len(self.pictures) > 2 else None
-
-
-def parse_hair_colour(colour: str) -> NDArray[np.float64]:
-    """Hair colour (3,), sRGB in [0, 1], of a name of `HAIR_COLOURS` or #rrggbb.
-
-    Raises
-    ------
-    InputError
-        There is no such colour.
-    """
-    digits = HAIR_COLOURS.get(colour, colour.removeprefix("#"))
-    if not re.fullmatch(r"[0-9a-fA-F]{6}", digits):
-        raise InputError(f"there is no hair colour {colour!r}; give #rrggbb or one of {', '.join(HAIR_COLOURS)}")
-    return np.array([int(digits[at : at + 2], 16) for at in (0, 2, 4)]) / 255.0
 
 
 def attach_hair(face: Face, hair: Hair, colour: str) -> Face:

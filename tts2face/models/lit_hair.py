@@ -11,8 +11,9 @@ from lexicon.errors import DataError
 from tts2face.colour import decode_srgb
 from tts2face.models.baked_light import BakedLight, HairLight, HairTint
 from tts2face.models.face import Face, Hairdo, Texture
-from tts2face.models.hair import HAIR_PART, parse_hair_colour
+from tts2face.models.hair import HAIR_PART
 from tts2face.models.late import Late
+from tts2face.models.named_colours import parse_hair_colour
 from tts2face.models.view_transform import grey_curves
 
 DARKEST, LEAST_GLOSS = 1e-3, 0.15  # linear light, and share of the change of gloss on light hair

@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.ndimage import gaussian_filter
 
 from corpus_tools.dense.mesh_fit import face_landmarks
+from corpus_tools.dense.person_look import part_colour
 from corpus_tools.dense.photo_avatar import build_avatar, mirror_table, person_landmarks
 from lexicon.errors import InputError
 from tests.corpus_tools.build.likeness import (
@@ -30,6 +32,7 @@ from tts2face.video.media import read_frames
 from tts2face.video.track import FaceTracker
 
 SIDE = 480
+FOLDS = (206, 426, 216, 436)  # landmarks beside the folds of a smile
 PEOPLE = ("mara", "tomas", "noor")
 
 
@@ -113,6 +116,33 @@ def test_landmarks_have_partners_on_the_other_side(head: Face) -> None:
     table = mirror_table(head)
     assert table[EYE_OUTER_LEFT] == EYE_OUTER_RIGHT
     np.testing.assert_array_equal(table[table], np.arange(N_LANDMARKS))
+
+
+def test_eyes_have_the_colour_that_is_chosen_and_wrinkles_stay_on_request(
+    photos: dict[str, Path], avatars: dict[str, Path], face_model: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "noor.face"
+    built = build_avatar([photos["noor"]], path, consent="drawn", eye_color="blue", age_keep=True, model=face_model)
+    chosen, usual = load_face(str(path)), load_face(str(avatars["noor"]))
+    assert "eyes: blue" in built.look.summary()
+    assert "eyes: dark brown" in str(usual.metadata["look"])
+    shown, before = (part_colour(face, "iris") for face in (chosen, usual))
+    assert shown[2] > shown[0] + 10
+    assert before[0] > before[2]
+    assert _line_depth(chosen) > 1.1 * _line_depth(usual)
+    with pytest.raises(InputError, match="there is no eye colour 'pink'; give #rrggbb or one of dark-brown, brown"):
+        build_avatar([photos["noor"]], path, consent="drawn", eye_color="pink", model=face_model)
+
+
+def _line_depth(face: Face) -> float:
+    """Mean logarithm by which texels about the folds of the smile are darker than their surroundings."""
+    texture = np.log(np.maximum(face.textures[0].pixels @ np.array([0.299, 0.587, 0.114]), 1.0))
+    depth = gaussian_filter(texture, 14.0) - texture
+    size = np.array(texture.shape[::-1])
+    places = face.uv[face.landmark_vertices[np.isin(face.landmarks, FOLDS), 0]] * size
+    return float(np.mean([
+        np.clip(depth[y - 60 : y + 60, x - 60 : x + 60], 0.0, 0.35).mean() for x, y in places.astype(int)
+    ]))  # fmt: skip
 
 
 def test_consent_comes_first(photos: dict[str, Path], tmp_path: Path) -> None:

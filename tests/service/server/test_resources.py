@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from corpus_tools.dense.person_look import part_colour
 from lexicon.errors import BackendError
 from tests.jobs.conftest import database, postgres  # noqa: F401 - fixtures
 from tests.model_files.made import write_made_face
@@ -22,6 +23,7 @@ from tts2face.jobs.blobs import open_blobs
 from tts2face.jobs.database import database_url
 from tts2face.jobs.job_runner import RESOURCES
 from tts2face.jobs.resource_table import ResourceTable, StoredResource
+from tts2face.models.face_file import read_face
 from tts2face.service.access.keys import add_key
 from tts2face.service.app import create_app
 from tts2face.service.errors import RefusedError
@@ -118,12 +120,17 @@ def test_parts_that_belong_to_a_photo_are_checked(ask_with_photos: Ask) -> None:
     for parts, reason in (
         ({"makes": "video"}, "the part makes is picture or avatar"),
         ({"makes": "avatar", "fit": "{}"}, "a fit corrects a picture that speaks; leave out fit, or makes"),
+        ({"makes": "avatar", "age_keep": "1"}, "the part age_keep is true or false"),
+        ({"eye_color": "blue"}, "eye_color and age_keep are of a head; leave them out, or add makes"),
         ({"consent": "x" * 1001}, "the part consent has up to 1000 characters of text"),
         ({"fit": " " * 100_001}, "the part fit has up to 100000 characters of text"),
     ):
         answer = ask_with_photos("ann", "POST", "/v1/faces", **photo(plain, **parts))
         assert refusal(answer) == (422, "invalid_request")
         assert answer.json()["error"]["message"] == reason
+    pink = ask_with_photos("ann", "POST", "/v1/faces", **photo(plain, makes="avatar", eye_color="pink"))
+    assert refusal(pink) == (400, "invalid_request")
+    assert "there is no eye colour 'pink'; give #rrggbb or one of dark-brown, brown," in pink.text
     barred = ask_with_photos("eve", "POST", "/v1/faces", **photo(plain, consent="drawn"))
     assert refusal(barred) == (403, "forbidden")
     assert "the key eve may make no faces of photos" in barred.json()["error"]["message"]
@@ -137,7 +144,8 @@ def test_a_photo_becomes_a_head_and_is_not_kept(
 ) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     picture = still("tomas", 400)
-    made = ask_with_photos("ann", "POST", "/v1/faces", **photo(picture, consent="I agree to this.", makes="avatar"))
+    parts = {"consent": "I agree to this.", "makes": "avatar", "eye_color": "green", "age_keep": "true"}
+    made = ask_with_photos("ann", "POST", "/v1/faces", **photo(picture, **parts))
     assert made.status_code == 201, made.text
     assert made.json()["about"]["takes_haircuts"]
     parts = photo(still("tomas", 480), name="large", consent="drawn", makes="avatar")
@@ -148,6 +156,8 @@ def test_a_photo_becomes_a_head_and_is_not_kept(
     stored = [path for path in settings.data_folder.rglob("*") if path.is_file() and "store" in path.parts]
     assert len(stored) == 2  # the face, and a picture that is drawn of it
     assert made.json()["sha256"] in {path.name for path in stored}
+    iris = part_colour(read_face(next(path for path in stored if path.name == made.json()["sha256"])), "iris")
+    assert iris[1] == iris.max()
     assert {path.name for path in stored}.isdisjoint({hashlib.sha256(png(picture)).hexdigest()})
 
 

@@ -130,6 +130,11 @@ def test_no_picture_is_kept_when_the_dialog_or_the_page_is_left(
 def test_a_head_is_made_in_place_of_a_picture_that_speaks(dialog: Browser, service: ServeProcess) -> None:
     dialog.run("[...document.querySelectorAll('.q-radio')].find((one) => one.innerText.includes('3D head')).click()")
     dialog.wait("return !document.querySelector('.studio-photo')?.offsetParent")
+    assert dialog.run("return document.querySelector('.photo-found').innerText.includes('Keep wrinkles')")
+    dialog.run("document.querySelector('.photo-found .q-select').click()")
+    dialog.wait("return !!document.querySelector('[role=option]')")
+    dialog.run("[...document.querySelectorAll('[role=option]')].find((one) => one.innerText.includes('blue')).click()")
+    dialog.wait("return document.querySelector('.photo-found .q-select').innerText.includes('blue')")
     dialog.type("Name of the face", "tom-head")
     dialog.type("Statement of consent of the person, or: drawn", CONSENT)
     dialog.click("Make the face")

@@ -4,7 +4,7 @@ import asyncio
 import hashlib
 from collections.abc import Awaitable, Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,6 +19,7 @@ from tts2face.jobs.resource_check import CONTENT, DICTIONARY, FACE, N_MAGIC, RES
 from tts2face.jobs.resource_table import StoredResource
 from tts2face.models.face_file import FORMAT_VERSION
 from tts2face.models.face_layout import PHOTOGRAPH
+from tts2face.models.named_colours import EYE_COLOURS, parse_eye_colour
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.access.scopes import require_scope
 from tts2face.service.errors import RefusedError
@@ -41,7 +42,6 @@ router = APIRouter(prefix="/v1", tags=["resources"])
 
 MAX_NAME, MAX_CONSENT, MAX_FIT = 40, 1000, 100_000
 SPEAKING_PICTURE, AVATAR = "picture", "avatar"  # what is made of a photo
-PHOTO_PARTS = ("consent", "fit", "makes")  # of the form of a face
 NO_PHOTOS = "this service has no faces of photos; its operator allows them with the setting photos"
 Name = Annotated[str, InPath(description="Its name.", max_length=MAX_NAME, examples=["head"])]
 Owner = Annotated[
@@ -111,7 +111,7 @@ def _add_picture(kind: str) -> None:
 
 
 def _form(kind: str) -> dict[str, Any]:
-    fields: dict[str, dict[str, Any]] = {
+    parts: dict[str, dict[str, Any]] = {
         "file": {"type": "string", "format": "binary", "description": CONTENTS[kind]},
         "name": {
             "type": "string", "pattern": "^[a-z0-9][a-z0-9-]{0,39}$", "example": "anna",
@@ -119,22 +119,29 @@ def _form(kind: str) -> dict[str, Any]:
         },
     }  # fmt: skip
     if kind == FACE:
-        fields["consent"] = {
+        parts["consent"] = {
             "type": "string",
             "example": "I agree that my face speaks what this service is asked for.",
             "description": "With a photo: the person's statement, kept in the face; drawn if it is nobody's.",
         }
-        fields["makes"] = {
+        parts["makes"] = {
             "type": "string",
             "enum": [SPEAKING_PICTURE, AVATAR],
             "default": SPEAKING_PICTURE,
             "description": "With a photo: a face that speaks in the picture, or a head of the person, which turns.",
         }
-        fields["fit"] = {
+        parts["fit"] = {
             "type": "string", "maxLength": MAX_FIT, "example": '{"teeth": [397, 544]}',
             "description": "With a photo that speaks: corrections of what is found in it, JSON (docs/photo.md).",
         }  # fmt: skip
-    schema = {"type": "object", "properties": fields, "required": ["file", "name"]}
+        parts["eye_color"] = {
+            "type": "string", "maxLength": MAX_NAME, "example": "green",
+            "description": f"With a head: {', '.join(EYE_COLOURS)} or #rrggbb; that of the photo if left out.",
+        }  # fmt: skip
+        parts["age_keep"] = {
+            "type": "boolean", "default": False, "description": "With a head: keep the wrinkles of the skin."
+        }  # fmt: skip
+    schema = {"type": "object", "properties": parts, "required": ["file", "name"]}
     return {"required": True, "content": {"multipart/form-data": {"schema": schema}}}
 
 
@@ -184,24 +191,39 @@ async def _store(request: HttpRequest, kind: str) -> StoredResource:
     state = service_state(request)
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         raise RefusedError(422, "invalid_request", "send a form (multipart/form-data) with the parts file and name")
-    async with request.form(max_files=1, max_fields=2 + len(PHOTO_PARTS)) as form:
+    async with request.form(max_files=1, max_fields=2 + len(fields(SentPhoto))) as form:
         return await store_resource(state, key, _read_form(form, kind))
+
+
+@dataclass(frozen=True, slots=True)
+class SentPhoto:
+    """What comes with a photo: the statement of the person shown, what it makes, and the choices of each.
+
+    A picture that speaks takes the JSON of a ``fit``, a head the colour of its eyes and whether wrinkles stay.
+    """
+
+    consent: str | None = None
+    makes: str = SPEAKING_PICTURE
+    fit: str | None = None
+    eye_color: str | None = None
+    age_keep: bool = False
+
+
+NO_CHOICES = SentPhoto()
 
 
 @dataclass(frozen=True, slots=True)
 class Sent:
     """A file that a client sends to be kept under a name: its kind, its size in bytes, and how it is saved to a path.
 
-    With a photo come ``consent``, the statement of the person shown, the JSON of a ``fit``, and what it ``makes``.
+    With a photo comes what is said of it.
     """
 
     kind: str
     name: str
     size: int
     save: Callable[[Path], Awaitable[None]]
-    consent: str | None = None
-    fit: str | None = None
-    makes: str = SPEAKING_PICTURE
+    photo: SentPhoto = NO_CHOICES
 
 
 async def store_resource(state: ServiceState, key: ApiKey, sent: Sent) -> StoredResource:
@@ -226,11 +248,11 @@ async def _checked(state: ServiceState, key: ApiKey, sent: Sent, folder: UploadF
     n_bytes = state.library.limits(key).n_bytes
     if sent.kind == FACE and await asyncio.to_thread(_is_photo, given):
         with _photo_turn(state, key):
-            folder.state(given, sent.name, sent.consent, sent.fit)
-            if sent.makes == AVATAR:
+            folder.state(given, {"name": sent.name, **asdict(sent.photo)})
+            if sent.photo.makes == AVATAR:
                 return await folder.avatar(given, n_bytes)
             return await folder.resource(FACE, given, n_bytes)
-    if sent.makes == AVATAR:
+    if sent.photo.makes == AVATAR:
         raise RefusedError(422, "invalid_request", "a head is made of a picture; send one, or leave out makes")
     checked = await folder.resource(sent.kind, given, n_bytes)
     if sent.kind == FACE and not state.settings.photos:
@@ -250,7 +272,7 @@ async def find_photo_places(
     """
     async with state.checks:
         with _photo_turn(state, key, counts=False):
-            folder.state(photo, photo.name, None, None)
+            folder.state(photo, {"name": photo.name})
             return await folder.places(photo)
 
 
@@ -262,19 +284,32 @@ def _photo_turn(state: ServiceState, key: ApiKey, *, counts: bool = True) -> Abs
 
 
 def _read_form(form: FormData, kind: str) -> Sent:
-    more = PHOTO_PARTS if kind == FACE else ()
+    more = [one.name for one in fields(SentPhoto)] if kind == FACE else []
     unknown = set(form) - {"file", "name", *more}
-    name, file, makes = form.get("name"), form.get("file"), form.get("makes", SPEAKING_PICTURE)
+    name, file = form.get("name"), form.get("file")
     if unknown:
         raise RefusedError(422, "invalid_request", f"there is no part {min(unknown)[:40]!r}; send file and name")
     if not isinstance(name, str) or not isinstance(file, UploadFile):
         raise RefusedError(422, "invalid_request", "the form needs a part file, with a file name, and a part name")
+    return Sent(kind, name, file.size or 0, partial(save_upload, file), _read_choices(form))
+
+
+def _read_choices(form: FormData) -> SentPhoto:
+    makes, age_keep = form.get("makes", SPEAKING_PICTURE), form.get("age_keep", "false")
     if makes not in (SPEAKING_PICTURE, AVATAR):
         raise RefusedError(422, "invalid_request", f"the part makes is {SPEAKING_PICTURE} or {AVATAR}")
-    consent, fit = (_text(form, part, most) for part, most in (("consent", MAX_CONSENT), ("fit", MAX_FIT)))
+    if age_keep not in ("true", "false"):
+        raise RefusedError(422, "invalid_request", "the part age_keep is true or false")
+    consent, fit, eye_color = (
+        _text(form, part, most) for part, most in (("consent", MAX_CONSENT), ("fit", MAX_FIT), ("eye_color", MAX_NAME))
+    )
     if fit is not None and makes == AVATAR:
         raise RefusedError(422, "invalid_request", "a fit corrects a picture that speaks; leave out fit, or makes")
-    return Sent(kind, name, file.size or 0, partial(save_upload, file), consent, fit, str(makes))
+    if makes == SPEAKING_PICTURE and (eye_color is not None or age_keep == "true"):
+        raise RefusedError(422, "invalid_request", "eye_color and age_keep are of a head; leave them out, or add makes")
+    if eye_color is not None:
+        parse_eye_colour(eye_color)
+    return SentPhoto(consent, str(makes), fit, eye_color, age_keep == "true")
 
 
 def _text(form: FormData, part: str, most: int) -> str | None:

@@ -5,11 +5,10 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from lexicon.errors import InputError
 from tts2face import catalogue
 from tts2face.jobs.resource_check import DICTIONARY, FACE
 from tts2face.models.face_loading import default_face
-from tts2face.models.hair import parse_hair_colour
+from tts2face.models.named_colours import parse_hair_colour
 from tts2face.render.picture import BLUR, COLOURS, STUDIO, TRANSPARENT
 from tts2face.request import OWN_FACE
 from tts2face.service.access.keys import ApiKey
@@ -61,10 +60,7 @@ def _check_hair(models: Mapping[str, Any]) -> None:
                 400, "invalid_request", f"there is no haircut {haircut[:60]!r}; the haircuts are {', '.join(known)}"
             )
     if colour is not None:
-        try:
-            parse_hair_colour(colour[:60])
-        except InputError as wrong:
-            raise RefusedError(400, "invalid_request", str(wrong)) from wrong
+        parse_hair_colour(colour[:60])
 
 
 async def resolve_dictionary(library: Library, key: ApiKey, fields: Mapping[str, Any]) -> dict[str, Any]:

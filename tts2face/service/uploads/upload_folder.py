@@ -3,7 +3,7 @@
 import asyncio
 import json
 import tempfile
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -126,10 +126,9 @@ class UploadFolder:
         found: dict[str, Any] = parse_json((self.path / resource_check.PLACES).read_text(), "the photo")
         return self.path / resource_check.SHOWN, found
 
-    def state(self, photo: Path, name: str, consent: str | None, fit: str | None) -> None:
-        """Write what is stated of a photo beside it."""
-        stated = {"name": name, "consent": consent, "fit": fit, "max_pixels": self.settings.upload_pixels}
-        photo.with_name(STATEMENT).write_text(json.dumps(stated))
+    def state(self, photo: Path, stated: Mapping[str, Any]) -> None:
+        """Write what is stated of a photo beside it, with the most pixels that it may have."""
+        photo.with_name(STATEMENT).write_text(json.dumps({**stated, "max_pixels": self.settings.upload_pixels}))
 
     async def _decode(self, kind: str, name: str, upload: UploadFile, suffix: str, limit: float) -> Path:
         given, decoded = await self._save(name, upload), self.path / f"{name}{suffix}"

@@ -13,12 +13,14 @@ from typing import Any
 from nicegui import events, ui
 
 from tts2face.jobs.resource_check import FACE
+from tts2face.models.named_colours import EYE_COLOURS
 from tts2face.service.routes.resources import (
     AVATAR,
     MAX_CONSENT,
     MAX_NAME,
     SPEAKING_PICTURE,
     Sent,
+    SentPhoto,
     find_photo_places,
     store_resource,
 )
@@ -31,10 +33,11 @@ PICTURES = ".jpg,.jpeg,.png,.webp,.heic,.heif,.tif,.tiff,.bmp,.gif"
 MB = 1_000_000
 TITLE = "A face from a photo"
 MAKES = {SPEAKING_PICTURE: "Speaks in the picture", AVATAR: "3D head of the person"}
+EYES = {"": "as in the photo"} | {name: name.replace("-", " ") for name in EYE_COLOURS}
 ABOUT = {
     SPEAKING_PICTURE: "Drag lips, lids, the edge of the upper teeth and the pivot where they were found wrongly.",
     AVATAR: "The head has the person's shape, skin, eyes, hair and clothes, and turns; haircut and hair colour can be "
-    "chosen afterwards. Making it takes half a minute.",
+    "chosen afterwards. Making it takes some 15 seconds.",
 }
 Made = Callable[[str], Awaitable[None]]
 
@@ -71,6 +74,9 @@ class PhotoDialog:
             with ui.element("div").classes("photo-found") as self._shown:
                 self._makes = ui.radio(MAKES, value=SPEAKING_PICTURE, on_change=self._show_choice).props("inline dense")
                 self._about = ui.label().classes("quiet")
+                with ui.row().classes("items-center") as self._choices:
+                    self._eyes = ui.select(EYES, label="Eyes", value="").props("dense outlined").style("width: 180px")
+                    self._age_keep = ui.checkbox("Keep wrinkles")
                 self._places = PhotoPlaces(self._change)
                 self._name = ui.input("Name of the face").props(f"dense outlined maxlength={MAX_NAME}")
                 self._consent = ui.textarea("Statement of consent of the person, or: drawn").props(
@@ -115,6 +121,7 @@ class PhotoDialog:
 
     def _show_choice(self) -> None:
         self._places.set_visibility(self._makes.value == SPEAKING_PICTURE)
+        self._choices.set_visibility(self._makes.value == AVATAR)
         self._about.text = ABOUT[self._makes.value]
 
     async def _store(self) -> None:
@@ -125,10 +132,14 @@ class PhotoDialog:
         async def save(path: Path) -> None:
             await asyncio.to_thread(shutil.copyfile, photo, path)
 
-        is_corrected = self._makes.value == SPEAKING_PICTURE and self._fit != self._found["fit"]
+        consent = self._consent.value or None
+        made = SentPhoto(consent)
+        if self._makes.value == AVATAR:
+            made = SentPhoto(consent, AVATAR, eye_color=self._eyes.value or None, age_keep=self._age_keep.value)
+        elif self._fit != self._found["fit"]:
+            made = SentPhoto(consent, fit=json.dumps(self._fit))
         with shown_errors(), self._busy("The face is made."):
-            fit = json.dumps(self._fit) if is_corrected else None
-            sent = Sent(FACE, name, photo.stat().st_size, save, self._consent.value or None, fit, self._makes.value)
+            sent = Sent(FACE, name, photo.stat().st_size, save, made)
             await store_resource(state, key, sent)
             self._dialog.close()
             await self._made(name)
@@ -156,7 +167,7 @@ class PhotoDialog:
         self._places.hide()
         self._show_found(False)
         self._name.value, self._consent.value, self._status.text = "", "", ""
-        self._makes.value = SPEAKING_PICTURE
+        self._makes.value, self._eyes.value, self._age_keep.value = SPEAKING_PICTURE, "", False
         self._show_choice()
 
     def _delete_picture(self) -> None:
