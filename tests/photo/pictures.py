@@ -1,5 +1,7 @@
 """Pictures of shipped faces, and where their landmarks lie in them."""
 
+from functools import cache
+
 import numpy as np
 
 from tts2face.face.face_motion import moved_landmarks
@@ -23,13 +25,24 @@ SMILE = {
 
 def still(name: str, side: int, *, head: tuple[float, ...] = (0, 0, 0), **weights: float) -> np.ndarray:
     """Picture (S, S, 3) of a shipped face, with a head turned by pitch, yaw and roll in degrees."""
+    return _drawn(name, side, head, tuple(weights.items())).copy()
+
+
+@cache
+def _drawn(name: str, side: int, head: tuple[float, ...], weights: tuple[tuple[str, float], ...]) -> np.ndarray:
     face = load_face(name)
     pose = np.array([*np.radians(head), 0, 0, 0], np.float32)
-    return draw(face, _weights(face, weights)[0], pose, picture=Picture(size=f"{side}x{side}"))
+    return draw(face, _weights(face, dict(weights))[0], pose, picture=Picture(size=f"{side}x{side}"))
 
 
 def projected(name: str, side: int, **weights: float) -> np.ndarray:
     """Places (478, 3) of the landmarks of a shipped face in its picture: pixels, and depths away from the camera."""
+    return _projected(name, side, tuple(weights.items())).copy()
+
+
+@cache
+def _projected(name: str, side: int, shapes: tuple[tuple[str, float], ...]) -> np.ndarray:
+    weights = dict(shapes)
     face = load_face(name)
     camera = camera_matrices(Picture().view, face, (side, side))
     motion = Trajectory(face.shape_names, _weights(face, weights), 30.0)

@@ -12,23 +12,53 @@ from tts2face.photo.speaking_photo import speaking_photo
 SIDE, NAME = 320, "head"
 
 
-def inside(pixels: np.ndarray, part_name: str) -> np.ndarray:
-    """Colours (N, 3) of a part of the face in a picture."""
-    seen = photographed(Photograph(pixels, None, 1.0), found_in(NAME, SIDE))
-    face: Face = speaking_photo(seen, load_face("head", hair="bald"), {"name": "Ada"})
+@pytest.fixture(scope="module")
+def faces() -> dict[str, Face]:
+    """The face of a picture, of a grey one and of a dark one."""
+    coloured = still(NAME, SIDE)
+    grey = np.repeat(coloured.mean(axis=2, keepdims=True), 3, axis=2).astype(np.uint8)
+    pictures = {"coloured": coloured, "grey": grey, "dark": (coloured * 0.6).astype(np.uint8)}
+    return {
+        name: speaking_photo(
+            photographed(Photograph(pixels, None, 1.0), found_in(NAME, SIDE)),
+            load_face("head", hair="bald"),
+            {"name": "Ada"},
+        )
+        for name, pixels in pictures.items()
+    }
+
+
+def inside(face: Face, part_name: str) -> np.ndarray:
+    """Colours (N, 3) of a part of a face."""
+    return face.colours[_rows(face, part_name)].astype(float)
+
+
+def _rows(face: Face, part_name: str) -> np.ndarray:
     part = next(part for part in face.parts if part.name == part_name)
-    return face.colours[np.unique(face.triangles[part.first : part.first + part.count])].astype(float)
+    return np.unique(face.triangles[part.first : part.first + part.count])
 
 
 @pytest.mark.parametrize("part", ["tongue", "gums_upper", "teeth_upper", "walls"])
-def test_a_grey_picture_has_a_grey_mouth(part: str) -> None:
-    coloured = still(NAME, SIDE)
-    grey = np.repeat(coloured.mean(axis=2, keepdims=True), 3, axis=2).astype(np.uint8)
-    assert np.ptp(inside(grey, part), axis=1).max() <= 1
-    assert np.ptp(inside(coloured, part), axis=1).max() > 8
+def test_a_grey_picture_has_a_grey_mouth(part: str, faces: dict[str, Face]) -> None:
+    assert np.ptp(inside(faces["grey"], part), axis=1).max() <= 1
+    assert np.ptp(inside(faces["coloured"], part), axis=1).max() > 8
 
 
-def test_a_darker_picture_has_a_darker_mouth() -> None:
-    pixels = still(NAME, SIDE)
-    light, dark = (inside(part, "teeth_upper").mean() for part in (pixels, (pixels * 0.6).astype(np.uint8)))
+def test_a_darker_picture_has_a_darker_mouth(faces: dict[str, Face]) -> None:
+    light, dark = (inside(faces[name], "teeth_upper").mean() for name in ("coloured", "dark"))
     assert 0.5 < dark / light < 0.75
+
+
+def test_the_dark_of_a_mouth_is_warm_and_lower_teeth_lie_in_the_shade(faces: dict[str, Face]) -> None:
+    """What lips hardly part before is redder than in open light; in grey pictures it is grey."""
+    for name in ("coloured", "grey"):
+        (light,) = faces[name].light
+        teeth = np.isin(light.mouth_rows, _rows(faces[name], "teeth_upper"))
+        base, opened = light.mouth_base[teeth].astype(float), inside(faces[name], "teeth_upper")
+        dark = base.mean(axis=0) / opened.mean(axis=0)
+        assert dark[0] > 1.1 * dark[2] if name == "coloured" else np.ptp(dark) < 0.02
+        assert 0.3 < dark.mean() < 0.6
+    upper, lower = (
+        np.percentile(inside(faces["coloured"], f"teeth_{row}").mean(axis=1), 90) for row in ("upper", "lower")
+    )
+    assert 0.6 < lower / upper < 0.95
