@@ -5,8 +5,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from lexicon.errors import DataError
-from tts2face.models.palette import FIXED_CHANNELS, REGION_FEATURES, Derivation, FeatureChange
+from tts2face.models.palette import FIXED_CHANNELS, PLAIN, REGION_FEATURES, Delivery, Derivation, FeatureChange
 
+VOICE = "voice"  # in place of a feature, on the line of a style's delivery
 DERIVED_STYLE_TABLE = Path(__file__).with_name("derived_styles.tsv")
 
 
@@ -20,9 +21,13 @@ def read_derived_styles(source: str, table: Path = DERIVED_STYLE_TABLE) -> dict[
     """
     changes: dict[str, dict[str, FeatureChange]] = {}
     reasons: dict[str, list[str]] = {}
+    deliveries: dict[str, Delivery] = {}
     lines = [line for line in table.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     for row in csv.DictReader(lines, delimiter="\t"):
         style, feature = row["style"], row["feature"]
+        if feature == VOICE:
+            deliveries[style] = _parse_delivery(row["offsets"] or "", table.name, style)
+            continue
         if feature not in FIXED_CHANNELS and feature not in REGION_FEATURES:
             raise DataError(f"{table.name}: {style} changes {feature!r}, which is not a feature; correct the table")
         try:
@@ -32,9 +37,18 @@ def read_derived_styles(source: str, table: Path = DERIVED_STYLE_TABLE) -> dict[
             raise DataError(f"{table.name}: {feature} of {style} cannot be read ({broken}); correct it") from broken
         reasons.setdefault(style, []).extend([row["why"]] if row["why"] else [])
     return {
-        style: Derivation(source, changed, f"derived from {source}: {'; '.join(reasons[style])}")
+        style: Derivation(
+            source, changed, f"derived from {source}: {'; '.join(reasons[style])}", deliveries.get(style, PLAIN)
+        )
         for style, changed in changes.items()
     }
+
+
+def _parse_delivery(written: str, table: str, style: str) -> Delivery:
+    try:
+        return Delivery(**{name: float(value) for name, _, value in (part.partition("=") for part in written.split())})
+    except (TypeError, ValueError) as broken:
+        raise DataError(f"{table}: the voice of {style} cannot be read ({broken}); correct it") from broken
 
 
 def _parse_offsets(written: str, feature: str) -> Mapping[str, float]:

@@ -4,11 +4,15 @@ import pytest
 
 from lexicon.mark_parser import parse_marks
 from lexicon.sentences import Sentence, split_sentences
+from tts2face.models.palette import PLAIN, Delivery, load_palette
+from tts2face.models.palette_editing import StyleMix, add_derivation, mix_styles
 from tts2face.request import Request
+from tts2face.session import Session
 from tts2face.synthesis.marked_speech import sentence_sound, speak_sentence
-from tts2face.synthesis.style_voice import DELIVERIES, PLAIN, Delivery, delivery_of
+from tts2face.synthesis.style_voice import delivery_of
 from tts2face.voice.loading import load_voice
 
+DELIVERIES = load_palette("starter").deliveries
 TEXT = "We were away a year ago."
 
 
@@ -18,7 +22,8 @@ def sentence(text: str) -> Sentence:
 
 def delivery(text: str = TEXT, **options: object) -> Delivery:
     one = sentence(text)
-    return delivery_of(one.utterances[0], one.runs, Request(text=text, **options))  # type: ignore[arg-type]
+    request = Request(text=text, **options)  # type: ignore[arg-type]
+    return delivery_of(one.utterances[0], one.runs, request, DELIVERIES)
 
 
 @pytest.mark.parametrize("style", [None, "neutral", "measured", "grid_s1", "brows=annoyed"])
@@ -42,12 +47,28 @@ def test_what_the_user_sets_replaces_the_style() -> None:
 def test_the_sound_is_slower_and_softer_and_the_motion_is_not_softer() -> None:
     voice = load_voice("heart", "en-us")
     plain, sad = (
-        speak_sentence(voice, sentence(TEXT), Request(text=TEXT, style=style)) for style in (None, "depressed")
+        speak_sentence(voice, sentence(TEXT), Request(text=TEXT, style=style), deliveries=DELIVERIES)
+        for style in (None, "depressed")
     )
     assert sad.speech.waveform.duration > 1.02 * plain.speech.waveform.duration
     level = [float((spoken.sound.samples**2).mean() ** 0.5) for spoken in (plain, sad)]
     assert level[1] < 0.9 * level[0]
     peak = [float(abs(spoken.speech.waveform.samples).max()) for spoken in (plain, sad)]
     assert peak[1] == pytest.approx(peak[0], rel=0.15)
-    alone = sentence_sound(voice, sentence(TEXT), Request(text=TEXT, style="depressed"))
+    alone = sentence_sound(voice, sentence(TEXT), Request(text=TEXT, style="depressed"), deliveries=DELIVERIES)
     assert alone.samples.tobytes() == sad.sound.samples.tobytes()
+
+
+def test_a_style_of_ones_own_speaks_as_those_that_it_is_mixed_of() -> None:
+    palette = load_palette("starter")
+    half = mix_styles(palette, StyleMix("grid_s1", {"depressed": 0.5}))
+    assert half.delivery.rate == pytest.approx(0.9**0.5)
+    assert half.delivery.level_db == pytest.approx(-1.0)
+    assert mix_styles(palette, StyleMix("grid_s1", tempo=2.0)).delivery == PLAIN
+    seconds = []
+    for name in ("sombre", "depressed", "neutral"):
+        own = add_derivation(palette, "sombre", mix_styles(palette, StyleMix("grid_s1", {"depressed": 1.0})))
+        speech = Session(palette=own).clip(TEXT, style=name, voice="espeak", fps=10).speech
+        seconds.append(speech.phones.edges[-2] - speech.phones.edges[1])
+    assert seconds[0] == pytest.approx(seconds[1], abs=1e-6)
+    assert seconds[0] > 1.05 * seconds[2]

@@ -4,8 +4,9 @@ After Ju and Lee 2008: a style holds one speaker's recorded gestures without the
 are motion of one common face, so that styles of different speakers can be mixed.
 """
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -112,12 +113,29 @@ class FeatureChange:
 
 
 @dataclass(frozen=True, slots=True)
+class Delivery:
+    """How a voice speaks under a style: factor of the speaking rate, and gain of the sound in dB."""
+
+    rate: float = 1.0
+    level_db: float = 0.0
+
+    @property
+    def volume(self) -> float:
+        """The gain as a factor."""
+        return math.pow(10.0, self.level_db / 20.0)
+
+
+PLAIN = Delivery()
+
+
+@dataclass(frozen=True, slots=True)
 class Derivation:
-    """Derived style: the recorded style ``source`` with changes by feature."""
+    """Derived style: the recorded style ``source`` with changes by feature, and its delivery."""
 
     source: str
     changes: Mapping[str, FeatureChange]
     summary: str
+    delivery: Delivery = PLAIN
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,6 +191,11 @@ class Palette:
         first = next(iter(self.derivations.values()), None)
         return next(iter(self.styles)) if first is None else first.source
 
+    @property
+    def deliveries(self) -> Mapping[str, Delivery]:
+        """Deliveries of the styles by name; recorded styles have none."""
+        return {name: derived.delivery for name, derived in self.derivations.items()}
+
     def channels(self, feature: str) -> tuple[str, ...]:
         """Names of a feature's channels."""
         if feature in REGION_FEATURES:
@@ -221,6 +244,7 @@ def write_palette(path: Path, palette: Palette) -> None:
                     feature: {"gain": change.gain, "offset": dict(change.offset), "tempo": change.tempo}
                     for feature, change in derived.changes.items()
                 },
+                **({"delivery": asdict(derived.delivery)} if derived.delivery != PLAIN else {}),
             }
             for name, derived in palette.derivations.items()
         },
@@ -263,6 +287,7 @@ def _palette_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str
                 derived["source"],
                 {feature: FeatureChange(**change) for feature, change in derived["changes"].items()},
                 derived["summary"],
+                Delivery(**derived.get("delivery", {})),
             )
             for name, derived in header["derivations"].items()
         },

@@ -3,8 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from lexicon.errors import InputError
-from tts2face.models.palette import EXPRESSIONS, FEATURES, Derivation, FeatureChange, Palette
+from tts2face.models.palette import EXPRESSIONS, FEATURES, Delivery, Derivation, FeatureChange, Palette
+from tts2face.models.palette_layout import LEVEL_DB, RATE_FACTORS
 
 MAX_NAME = 40
 FORBIDDEN = frozenset(",=@;:#[]<>\"'/\\")  # have a meaning in marks, flags, timelines or paths
@@ -61,7 +64,7 @@ def mix_styles(palette: Palette, mix: StyleMix) -> Derivation:
     """The derived style of a mix.
 
     Offsets are sums of those of the mixed styles times their shares; gains and tempos are products of theirs to the
-    power of their shares, so that each is changed by the same ratio whatever the others do.
+    power of their shares, so that each is changed by the same ratio whatever the others do. So is the delivery.
 
     Raises
     ------
@@ -78,7 +81,16 @@ def mix_styles(palette: Palette, mix: StyleMix) -> Derivation:
                 f"there is no derived style {name[:40]!r} in the palette; it has {', '.join(palette.derivations)}"
             )
     changes = {feature: _mixed_change(palette, mix, feature) for feature in FEATURES}
-    return Derivation(mix.source, {name: one for name, one in changes.items() if one != FeatureChange()}, _summary(mix))
+    kept = {name: one for name, one in changes.items() if one != FeatureChange()}
+    return Derivation(mix.source, kept, _summary(mix), _mixed_delivery(palette, mix))
+
+
+def _mixed_delivery(palette: Palette, mix: StyleMix) -> Delivery:
+    rate, level = 1.0, 0.0
+    for name, share in mix.shares.items():
+        delivery = palette.derivations[name].delivery
+        rate, level = rate * delivery.rate**share, level + share * delivery.level_db
+    return Delivery(float(np.clip(rate, *RATE_FACTORS)), float(np.clip(level, -LEVEL_DB, LEVEL_DB)))
 
 
 def _mixed_change(palette: Palette, mix: StyleMix, feature: str) -> FeatureChange:

@@ -18,6 +18,8 @@ MAX_GAIN = 100.0
 # A tempo of 0.05 stretches 30 frames to 20 s; one of 20 gives 600 frames/s, the most that a clip can use.
 SLOWEST, FASTEST = 0.05, 20.0
 
+RATE_FACTORS, LEVEL_DB = (0.5, 2.0), 12.0  # of the voice; level of either sign
+
 _CHANGE = record(
     {},
     {
@@ -26,11 +28,12 @@ _CHANGE = record(
         "tempo": number(SLOWEST, FASTEST),
     },
 )
+_DELIVERY = record({}, {"rate": number(*RATE_FACTORS), "level_db": number(-LEVEL_DB, LEVEL_DB)})
 METADATA: Mapping[str, Check] = {
     "metadata": free,
     "fps": number(1.0, 1000.0),
     "styles": table(free),
-    "derivations": table(record({"source": text, "summary": text, "changes": table(_CHANGE)})),
+    "derivations": table(record({"source": text, "summary": text, "changes": table(_CHANGE)}, {"delivery": _DELIVERY})),
 }
 
 

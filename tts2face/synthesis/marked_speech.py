@@ -21,7 +21,7 @@ from tts2face.gesture.timeline import Timeline
 from tts2face.request import Request
 from tts2face.synthesis.mark_styles import innermost_styles
 from tts2face.synthesis.speech_joining import join_utterances, resampled_speech, silent_speech, trim_end
-from tts2face.synthesis.style_voice import delivery_of
+from tts2face.synthesis.style_voice import NO_DELIVERIES, Deliveries, delivery_of
 from tts2face.synthesis.word_times import LetterTimes, SentenceTimes, WordTimes
 from tts2face.types import GiveWay, Speech, Waveform, concatenate_speech, frame_count, keep_on
 from tts2face.voice.engine import SpeechInput, SpokenWord, Voice, apply_volume
@@ -69,7 +69,13 @@ class SpokenSentence:
 
 
 def speak_sentence(
-    voice: Voice, sentence: Sentence, request: Request, voices: Voices | None = None, give_way: GiveWay = keep_on
+    voice: Voice,
+    sentence: Sentence,
+    request: Request,
+    voices: Voices | None = None,
+    give_way: GiveWay = keep_on,
+    *,
+    deliveries: Deliveries = NO_DELIVERIES,
 ) -> SpokenSentence:
     """Synthesise a sentence with its pauses, speeds and loudness, and compute the times of its marks.
 
@@ -84,6 +90,8 @@ def speak_sentence(
     voices
         Returns the voice of a name and a language, for spans in another voice or language; their sound is resampled to
         the sample rate of `voice`.
+    deliveries
+        Of the styles of the palette.
 
     Raises
     ------
@@ -96,7 +104,7 @@ def speak_sentence(
     volumes: list[float] = []  # of the sound; motion follows the voice's own loudness
     for part in sentence.utterances:
         speaker = speaker_of(part, voice, request, voices)
-        delivery = delivery_of(part, sentence.runs, request)
+        delivery = delivery_of(part, sentence.runs, request, deliveries)
         rate = request.rate * part.rate * delivery.rate
         speech = speaker.speak(phrase_content(part), rate=rate, seed=request.seed)
         speech = _ended(resampled_speech(speech, voice.sample_rate), sentence, part)
@@ -117,13 +125,20 @@ def speak_sentence(
     )
 
 
-def sentence_sound(voice: Voice, sentence: Sentence, request: Request, voices: Voices | None = None) -> Waveform:
+def sentence_sound(
+    voice: Voice,
+    sentence: Sentence,
+    request: Request,
+    voices: Voices | None = None,
+    *,
+    deliveries: Deliveries = NO_DELIVERIES,
+) -> Waveform:
     """Sound of `speak_sentence`, byte for byte, without aligning the phones of a sentence that needs no edges."""
     part = sentence.utterances[0]
     if len(sentence.utterances) > 1 or any(run.volume != 1.0 for run in sentence.runs):
-        return speak_sentence(voice, sentence, request, voices).sound
+        return speak_sentence(voice, sentence, request, voices, deliveries=deliveries).sound
     speaker = speaker_of(part, voice, request, voices)
-    delivery = delivery_of(part, sentence.runs, request)
+    delivery = delivery_of(part, sentence.runs, request, deliveries)
     rate = request.rate * part.rate * delivery.rate
     sound = speaker.sound(phrase_content(part), rate=rate, seed=request.seed)
     whole = Speech(sound, PhoneSequence([SILENCE], [0.0, sound.duration]), ())

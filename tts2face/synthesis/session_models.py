@@ -29,6 +29,7 @@ from tts2face.synthesis.mesh_face import mesh_face
 from tts2face.synthesis.prepared_request import PreparedRequest
 from tts2face.synthesis.sentence_memory import NO_MEMORY, SentenceMemory
 from tts2face.synthesis.speech_stream import Piece, SpeechModels
+from tts2face.synthesis.style_voice import NO_DELIVERIES
 from tts2face.synthesis.voice_preload import preload_voice
 from tts2face.voice.engine import Voice
 from tts2face.voice.pool import VoicePool
@@ -184,7 +185,9 @@ class SessionModels:
         exemplars = self._exemplars if not prepared.excluded else self._exemplars_without(prepared.excluded)
         face = self.face(has_gestures=request.has_gestures)
         face.check_articulation(request.articulation_factor)
-        speech = SpeechModels(load_voice, self._voices.give_way, self._memory)
+        palette = self.palette if request.has_gestures else None
+        deliveries = NO_DELIVERIES if palette is None else palette.deliveries
+        speech = SpeechModels(load_voice, self._voices.give_way, self._memory, deliveries)
         return SynthesisModels(self.talker, exemplars, face, speech)
 
     def preload_voice(self, prepared: PreparedRequest) -> None:

@@ -27,6 +27,7 @@ from tts2face.synthesis.marked_speech import (
 from tts2face.synthesis.phone_edges import correct_phones
 from tts2face.synthesis.prepared_request import IDLE_STEPS, PreparedRequest
 from tts2face.synthesis.sentence_memory import NO_MEMORY, SentenceMemory
+from tts2face.synthesis.style_voice import NO_DELIVERIES, Deliveries
 from tts2face.types import Clip, GiveWay, Speech, Trajectory, Waveform, frame_count, keep_on, resting_head
 from tts2face.voice.engine import Voice
 
@@ -80,12 +81,14 @@ class Piece:
 class SpeechModels:
     """What speaks: ``voice`` returns the voice of a name and a language.
 
-    ``give_way`` is called between the steps of a piece; ``memory`` keeps the speech and the lip motion of sentences.
+    ``give_way`` is called between the steps of a piece; ``memory`` keeps the speech and the lip motion of sentences;
+    ``deliveries`` are those of the styles of a palette.
     """
 
     voice: Voices
     give_way: GiveWay = keep_on
     memory: SentenceMemory = NO_MEMORY
+    deliveries: Deliveries = field(default_factory=lambda: NO_DELIVERIES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +160,8 @@ def _sounds(prepared: PreparedRequest, models: SpeechModels) -> Iterator[TimedSp
     fps, first_frame = prepared.fps, 0
 
     def speak(voice: Voice, sentence: Sentence, request: Request, voices: Voices) -> tuple[Waveform, int]:
-        return sentence_sound(voice, sentence, request, voices), sentence.n_characters
+        sound = sentence_sound(voice, sentence, request, voices, deliveries=models.deliveries)
+        return sound, sentence.n_characters
 
     found: Iterator[tuple[Waveform, int]] = _spoken(prepared, models, speak)
     if prepared.request.idle is not None:
@@ -213,7 +217,7 @@ def speak_sentences(prepared: PreparedRequest, models: SpeechModels) -> Iterator
         text = " ".join(phrase.source for phrase in sentence.utterances)
         spoken = models.memory.recall(
             lambda: ("speech", sentence.relative(), spoken_with()),
-            lambda: speak_sentence(voice, sentence, request, voices, models.give_way),
+            lambda: speak_sentence(voice, sentence, request, voices, models.give_way, deliveries=models.deliveries),
             lambda made: made.sound.samples.nbytes + made.speech.waveform.samples.nbytes,
         )
         speech = spoken.speech

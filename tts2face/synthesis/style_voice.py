@@ -1,51 +1,27 @@
 """Speaking rate and level of a voice under a style of gestures."""
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
 
 from lexicon.marked_text import StyleRun
 from lexicon.sentences import Phrase
 from tts2face.gesture.notation import parse_style
-from tts2face.models.palette import FEATURES
+from tts2face.models.palette import FEATURES, PLAIN, Delivery
 from tts2face.request import Request
 
-
-@dataclass(frozen=True, slots=True)
-class Delivery:
-    """Factor of the speaking rate, and gain of the sound in dB."""
-
-    rate: float = 1.0
-    level_db: float = 0.0
-
-    @property
-    def volume(self) -> float:
-        """The gain as a factor."""
-        return math.pow(10.0, self.level_db / 20.0)
+Deliveries = Mapping[str, Delivery]  # of a palette's styles, by name
+NO_DELIVERIES: Deliveries = MappingProxyType({})
 
 
-# About a third of the differences that actors make (Banse and Scherer 1996; Burkhardt and Sendlmeier 2000: sadness is
-# slow and soft, joy and irritation are fast and loud), since the face says the rest. Other styles change nothing.
-DELIVERIES: Mapping[str, Delivery] = MappingProxyType({
-    "depressed": Delivery(0.90, -2.0),
-    "delighted": Delivery(1.05, 0.5),
-    "annoyed": Delivery(1.06, 1.0),
-    "exaggerated": Delivery(0.97, 1.0),
-    "exasperated": Delivery(0.92, 0.0),
-})  # fmt: skip
-PLAIN = Delivery()
-
-
-def delivery_of(part: Phrase, runs: Sequence[StyleRun], request: Request) -> Delivery:
+def delivery_of(part: Phrase, runs: Sequence[StyleRun], request: Request, deliveries: Deliveries) -> Delivery:
     """Delivery of a phrase: that of the style of most of its letters, if the style is one of the whole face.
 
     A rate or volume that the request or a mark sets replaces that of the style.
     """
     if request.plain_delivery:
         return PLAIN
-    found = DELIVERIES.get(_whole_style(request.style, _longest_run(part, runs).styles), PLAIN)
+    found = deliveries.get(_whole_style(request.style, _longest_run(part, runs).styles), PLAIN)
     has_volume = request.volume != 1.0 or any(run.volume != 1.0 for run in runs)
     return Delivery(
         1.0 if request.rate != 1.0 or part.rate != 1.0 else found.rate, 0.0 if has_volume else found.level_db

@@ -26,7 +26,7 @@ from tts2face.face.face_motion import moved_landmarks, rest_landmarks
 from tts2face.face.landmark_fit import axis_ratios
 from tts2face.models.face import Face
 from tts2face.models.landmarks import MOUTH_REGION
-from tts2face.models.palette import EXPRESSIONS, REGION_FEATURES
+from tts2face.models.palette import EXPRESSIONS, PLAIN, REGION_FEATURES, Delivery
 from tts2face.retargeting.performer import EYELID_LANDMARKS
 from tts2face.types import Trajectory, Waveform
 
@@ -204,6 +204,8 @@ def test_the_paper_s_six_moods_are_derived() -> None:
     assert list(made) == ["neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperated"]
     assert all(derived.source == "someone" and derived.summary for derived in made.values())
     assert made["depressed"].changes["expression"].offset == {"sad": 0.9}
+    assert made["depressed"].delivery == Delivery(0.9, -2.0)
+    assert made["neutral"].delivery == PLAIN
 
 
 @pytest.mark.parametrize(
@@ -211,6 +213,7 @@ def test_the_paper_s_six_moods_are_derived() -> None:
     [
         ("odd\tears\t1\t1\t\t", "odd changes 'ears', which is not a feature"),
         ("odd\thead\tfast\t1\t\t", "head of odd cannot be read"),
+        ("odd\tvoice\t\t\tpitch=1\t", "the voice of odd cannot be read"),
         ("odd\thead\t1\t1\tsmile=1\t", "head of odd cannot be read .*no channel 'smile'"),
     ],
 )
