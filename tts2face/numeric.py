@@ -1,6 +1,6 @@
 """Numerical functions shared by several packages."""
 
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,3 +78,37 @@ def points_in_polygon(places: NDArray[np.floating], polygon: NDArray[np.floating
     inside = np.zeros(len(places), bool)
     inside[near] = (spans & (x < crossing)).sum(axis=1) % 2 == 1
     return inside
+
+
+def interpolate_rows(values: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(N, D) values at N fractional row indices of (T, D) values, linear between rows; the last row is held."""
+    low = np.clip(at.astype(int), 0, len(values) - 1)
+    share = (at - low)[:, None].astype(np.float32)
+    return np.asarray((1 - share) * values[low] + share * values[np.minimum(low + 1, len(values) - 1)], np.float32)
+
+
+def interpolate_cubic(values: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(N, D) values at N fractional row indices of (T, D) values, by Catmull-Rom cubics (Catmull and Rom 1974)."""
+    low = np.minimum(at, len(values) - 1).astype(int)
+    part = (at - low)[:, None].astype(np.float32)
+    before, here, after, beyond = (values[np.clip(low + k, 0, len(values) - 1)] for k in (-1, 0, 1, 2))
+    slope_here, slope_after = (after - before) / 2, (beyond - here) / 2
+    bend, twist = 3 * (after - here) - 2 * slope_here - slope_after, 2 * (here - after) + slope_here + slope_after
+    return np.asarray(here + part * (slope_here + part * (bend + part * twist)), np.float32)
+
+
+def interpolate_linear(
+    values: NDArray[np.float32], times: NDArray[np.float64], at: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """Values (N, ...) at N instants from (T, ...) at increasing times (T,); constant before and after."""
+    if len(times) == 1:
+        return np.repeat(values, len(at), axis=0)
+    after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
+    share = np.clip((at - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)
+    share = share.reshape(-1, *[1] * (values.ndim - 1)).astype(np.float32)
+    return np.asarray(values[after - 1] * (1 - share) + values[after] * share, np.float32)
+
+
+def interpolate_columns(values: NDArray[np.floating], times: NDArray[Any], at: NDArray[Any]) -> NDArray[np.float64]:
+    """(N, D) values at N instants from (T, D) at increasing times (T,), as float64; constant before and after."""
+    return np.stack([np.interp(at, times, column) for column in values.T], axis=1)

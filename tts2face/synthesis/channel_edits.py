@@ -1,7 +1,7 @@
 """Corrections of finished motion by hand: offsets of single channels through key points."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,7 +43,7 @@ class ChannelEdits:
         edited = [face.channels.index(edit.channel) for edit in self.edits if edit.channel in face.channels]
         values = face.values.copy()
         values[:, edited] = clipped[:, edited]
-        return FaceMotion(Trajectory(face.channels, values, face.fps), _offset(motion.head, self.edits, times))
+        return FaceMotion(replace(face, values=values), _offset(motion.head, self.edits, times))
 
 
 def _offset(motion: Trajectory, edits: Sequence[ChannelEdit], times: np.ndarray) -> Trajectory:
@@ -51,4 +51,4 @@ def _offset(motion: Trajectory, edits: Sequence[ChannelEdit], times: np.ndarray)
     for edit in edits:
         if edit.channel in motion.channels:
             values[:, motion.channels.index(edit.channel)] += interpolate_keys(times, edit.keys).astype(np.float32)
-    return Trajectory(motion.channels, values, motion.fps)
+    return replace(motion, values=values)

@@ -99,7 +99,7 @@ class GestureLayer:
         recent = self._marked.restrict(self._seconds - 1.0, np.inf)  # a nod of the last piece lasts half a second
         marked = recent.merge(marks)
         timeline = self._requested.merge(marked)
-        times = self._seconds + np.arange(len(lips)) / lips.fps
+        times = self._seconds + lips.times
         if self._memory.is_used:
             self._history = _digest(self._history, times, speech.waveform, timeline)
         gestures, stream = self._memory.recall(
@@ -113,7 +113,7 @@ class GestureLayer:
             lambda made: made.face.values.nbytes + lips.values.nbytes,
         )
         moved = self._edits.apply(moved, round(self._seconds * lips.fps))
-        self._stream, self._marked, self._seconds = stream, marked, self._seconds + len(lips) / lips.fps
+        self._stream, self._marked, self._seconds = stream, marked, self._seconds + lips.duration
         return Clip(self._body.move(moved.face, moved.head, speech.phones), moved.head, speech)
 
     def _next(

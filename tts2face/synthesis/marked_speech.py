@@ -13,7 +13,7 @@ from lexicon.errors import InputError
 from lexicon.marked_text import Mark, MarkedText, NameMark, NodMark, StyleRun
 from lexicon.pronounce import PAUSES_S
 from lexicon.sentences import Phrase, Sentence, index_by_letters, n_letters
-from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.clock import first_sample
 from tts2face.gesture.easing import span_weights
 from tts2face.gesture.spans import Nod, StyleSpan
@@ -126,8 +126,7 @@ def sentence_sound(voice: Voice, sentence: Sentence, request: Request, voices: V
     delivery = delivery_of(part, sentence.runs, request)
     rate = request.rate * part.rate * delivery.rate
     sound = speaker.sound(phrase_content(part), rate=rate, seed=request.seed)
-    whole = Speech(sound, PhoneSequence([SILENCE], [0.0, sound.duration]), ())
-    whole = _ended(resampled_speech(whole, voice.sample_rate), sentence, part)
+    whole = _ended(resampled_speech(Speech.without_phones(sound), voice.sample_rate), sentence, part)
     levelled = level_speech([whole], [request.volume * delivery.volume * np.ones(1)])
     return _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
 
