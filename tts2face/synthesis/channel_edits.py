@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lexicon.errors import InputError
-from tts2face.gesture.easing import interpolate_keys
-from tts2face.gesture.key_curves import ChannelEdit
+from tts2face.gesture.elements import ChannelEdit, interpolate_keys
 from tts2face.synthesis.animated_face import AnimatedFace, FaceMotion
 from tts2face.types import HEAD_CHANNELS, Trajectory
 

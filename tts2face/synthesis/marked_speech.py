@@ -15,8 +15,7 @@ from lexicon.pronounce import PAUSES_S
 from lexicon.sentences import Phrase, Sentence, index_by_letters, n_letters
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.clock import first_sample
-from tts2face.gesture.easing import span_weights
-from tts2face.gesture.spans import Nod, StyleSpan
+from tts2face.gesture.elements import Nod, StyleSpan, span_weights
 from tts2face.gesture.timeline import Timeline
 from tts2face.request import Request
 from tts2face.synthesis.mark_styles import innermost_styles
