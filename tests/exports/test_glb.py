@@ -17,11 +17,11 @@ from tests.exports import programs
 from tests.exports.made import FACE, RATE, made_clip, made_stream, signed_clip, turned_clip, with_gesture
 from tests.render.test_cutouts import face_with_sheet
 from tests.render.tiny_face import tiny_face
-from tts2face.exports.gltf import GltfBuffer
-from tts2face.exports.skeleton import continuous_quaternions
-from tts2face.exports.spool import Spool
 from tts2face.exports.surfaces import divide_surface
 from tts2face.face.deformation import build_rig, rotation_matrix
+from tts2face.numeric import continuous_quaternions
+from tts2face.storage.gltf_writer import GltfBuffer
+from tts2face.storage.spool import Spool
 from tts2face.types import HEAD_CHANNELS, Clip, Trajectory
 
 DTYPES = {5121: "u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
