@@ -18,10 +18,10 @@ from tts2face.cloning.parameter_transfer import (
     build_parameter_transfer,
     extend_talker,
 )
-from tts2face.interpolation import sample_triangles
 from tts2face.models.appearance import Appearance, TextureModel, nearest_pixels
 from tts2face.models.talker import Talker, Utterance, load_talker, speech_channels, write_talker
 from tts2face.own_face.appearance_regression import fit_appearance_regression
+from tts2face.render.image_warp import sample_triangles
 from tts2face.types import Trajectory
 
 Floats = NDArray[np.float64]

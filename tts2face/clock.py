@@ -2,12 +2,10 @@
 
 from fractions import Fraction
 
-import numpy as np
-
 from lexicon.inputs import check_limits
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.request import FPS_LIMITS
-from tts2face.types import Speech, Waveform, frame_count
+from tts2face.types import Speech, frame_count
 
 NTSC_NOMINAL_RATES = (24, 30, 48, 60, 120)  # nominal rates whose broadcast form is 1000/1001 of them (SMPTE 12M)
 
@@ -40,14 +38,13 @@ def pad_to_frame(speech: Speech, first_frame: int, fps: Fraction) -> Speech:
     first_frame
         Index of the speech's first frame within the whole clip, from which sample positions are rounded.
     """
-    rate, samples = speech.waveform.rate, speech.waveform.samples
+    rate = speech.waveform.rate
     n_frames = frame_count(speech.waveform.duration, float(fps))
     n_samples = first_sample(first_frame + n_frames, rate, fps) - first_sample(first_frame, rate, fps)
-    padded = np.zeros(max(n_samples, len(samples)), np.float32)
-    padded[: len(samples)] = samples
+    sound = speech.waveform.padded(n_samples)
     phones, edges = list(speech.phones.phones), list(speech.phones.edges)
-    if phones[-1] != SILENCE and len(padded) > len(samples):
+    if phones[-1] != SILENCE and len(sound.samples) > len(speech.waveform.samples):
         phones.append(SILENCE)
         edges.append(edges[-1])
-    edges[-1] = len(padded) / rate
-    return Speech(Waveform(padded, rate), PhoneSequence(phones, edges), speech.words)
+    edges[-1] = sound.duration
+    return Speech(sound, PhoneSequence(phones, edges), speech.words)

@@ -1,6 +1,6 @@
 """Numerical functions shared by several packages."""
 
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,67 @@ def nearest_rotation(matrix: NDArray[np.floating]) -> FloatArray:
     return rotation
 
 
+def quaternion_matrix(turn: FloatArray) -> FloatArray:
+    """Rotation matrix (3, 3) of a quaternion (x, y, z, w), which is normalised first."""
+    length = float(np.linalg.norm(turn))
+    x, y, z, w = turn / length if length > 1e-9 else (0.0, 0.0, 0.0, 1.0)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def matrix_quaternion(matrix: FloatArray) -> FloatArray:
+    """Quaternion (4,), x y z w, of a rotation matrix (3, 3); the numerically largest component is computed first."""
+    m = matrix
+    squares = np.array(
+        [
+            1 + m[0, 0] - m[1, 1] - m[2, 2],
+            1 - m[0, 0] + m[1, 1] - m[2, 2],
+            1 - m[0, 0] - m[1, 1] + m[2, 2],
+            1 + m[0, 0] + m[1, 1] + m[2, 2],
+        ]
+    )
+    a, b, c = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
+    d, e, f = m[1, 0] + m[0, 1], m[0, 2] + m[2, 0], m[2, 1] + m[1, 2]
+    rows = np.array([[squares[0], d, e, a], [d, squares[1], f, b], [e, f, squares[2], c], [a, b, c, squares[3]]])
+    row: FloatArray = rows[int(squares.argmax())]
+    return row / np.linalg.norm(row)
+
+
+def rotation_quaternions(vectors: FloatArray) -> FloatArray:
+    """Unit quaternions (T, 4) x, y, z, w of rotation vectors (T, 3) in radians."""
+    angle = np.linalg.norm(vectors, axis=1)
+    scale = np.where(angle > 0, np.sin(angle / 2) / np.where(angle > 0, angle, 1), 0.5)
+    return np.column_stack([vectors * scale[:, None], np.cos(angle / 2)])
+
+
+def quaternion_product(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Hamilton products (T, 4) of quaternions x, y, z, w: the rotation `second`, then `first`."""
+    (ax, ay, az, aw), (bx, by, bz, bw) = first.T, second.T
+    return np.column_stack([
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    ])  # fmt: skip
+
+
+def continuous_quaternions(values: FloatArray, before: FloatArray | None) -> FloatArray:
+    """The same rotations with signs such that neighbours lie on the same side, so that interpolation is the short way.
+
+    `before` (4,) precedes the first of `values` (T, 4); None for a beginning.
+    """
+    rows = values if before is None else np.vstack([before, values])
+    turns = np.einsum("td,td->t", rows[1:], rows[:-1]) < 0
+    signs = np.concatenate([[1.0], np.where(np.cumsum(turns) % 2 == 1, -1.0, 1.0)])
+    signed: FloatArray = rows * signs[: len(rows), None]
+    return signed if before is None else signed[1:]
+
+
 def principal_axes(scatter: NDArray[np.floating], n_axes: int) -> tuple[FloatArray, FloatArray]:
     """The `n_axes` largest variances and unit axes (n_axes, D) of a scatter matrix (D, D), largest first."""
     variances, vectors = np.linalg.eigh(scatter)
@@ -78,3 +139,37 @@ def points_in_polygon(places: NDArray[np.floating], polygon: NDArray[np.floating
     inside = np.zeros(len(places), bool)
     inside[near] = (spans & (x < crossing)).sum(axis=1) % 2 == 1
     return inside
+
+
+def interpolate_rows(values: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(N, D) values at N fractional row indices of (T, D) values, linear between rows; the last row is held."""
+    low = np.clip(at.astype(int), 0, len(values) - 1)
+    share = (at - low)[:, None].astype(np.float32)
+    return np.asarray((1 - share) * values[low] + share * values[np.minimum(low + 1, len(values) - 1)], np.float32)
+
+
+def interpolate_cubic(values: NDArray[np.float32], at: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(N, D) values at N fractional row indices of (T, D) values, by Catmull-Rom cubics (Catmull and Rom 1974)."""
+    low = np.minimum(at, len(values) - 1).astype(int)
+    part = (at - low)[:, None].astype(np.float32)
+    before, here, after, beyond = (values[np.clip(low + k, 0, len(values) - 1)] for k in (-1, 0, 1, 2))
+    slope_here, slope_after = (after - before) / 2, (beyond - here) / 2
+    bend, twist = 3 * (after - here) - 2 * slope_here - slope_after, 2 * (here - after) + slope_here + slope_after
+    return np.asarray(here + part * (slope_here + part * (bend + part * twist)), np.float32)
+
+
+def interpolate_linear(
+    values: NDArray[np.float32], times: NDArray[np.float64], at: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """Values (N, ...) at N instants from (T, ...) at increasing times (T,); constant before and after."""
+    if len(times) == 1:
+        return np.repeat(values, len(at), axis=0)
+    after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
+    share = np.clip((at - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)
+    share = share.reshape(-1, *[1] * (values.ndim - 1)).astype(np.float32)
+    return np.asarray(values[after - 1] * (1 - share) + values[after] * share, np.float32)
+
+
+def interpolate_columns(values: NDArray[np.floating], times: NDArray[Any], at: NDArray[Any]) -> NDArray[np.float64]:
+    """(N, D) values at N instants from (T, D) at increasing times (T,), as float64; constant before and after."""
+    return np.stack([np.interp(at, times, column) for column in values.T], axis=1)

@@ -5,13 +5,14 @@ Units: seconds, millimetres, radians. Frame i is the instant i / fps.
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
-from lexicon.sequence import PhoneSequence, WordSpan, concatenate_phones
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, concatenate_phones
+from tts2face.numeric import interpolate_columns
 
 MAX_RATE_HZ = 1e6  # of samples or frames; the fastest converters of sound have 768 kHz
 HEAD_CHANNELS = ("pitch", "yaw", "roll", "x", "y", "z")  # radians (nod down, turn to own left, tilt) and mm
@@ -86,6 +87,27 @@ class Waveform:
         """Duration in seconds."""
         return len(self.samples) / self.rate
 
+    def part(self, first: int, last: int) -> "Waveform":
+        """Samples from index `first` up to `last`, or up to the end of the sound."""
+        return Waveform(self.samples[first:last], self.rate)
+
+    def padded(self, n_samples: int) -> "Waveform":
+        """The sound, followed by silence up to at least `n_samples` samples."""
+        samples = np.zeros(max(n_samples, len(self.samples)), np.float32)
+        samples[: len(self.samples)] = self.samples
+        return Waveform(samples, self.rate)
+
+    def resampled(self, rate: int) -> "Waveform":
+        """The sound at `rate` Hz, clipped to full scale.
+
+        Source: soxr, quality HQ (De Jong, the SoX resampler library).
+        """
+        if rate == self.rate:
+            return self
+        import soxr
+
+        return Waveform(np.clip(soxr.resample(self.samples, self.rate, rate), -1.0, 1.0), rate)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
@@ -127,6 +149,28 @@ class Trajectory:
         """Return the number of frames."""
         return len(self.values)
 
+    @property
+    def duration(self) -> float:
+        """Duration in seconds."""
+        return len(self) / self.fps
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """(T,) seconds of the frames."""
+        return np.arange(len(self)) / self.fps
+
+    def columns(self, names: Sequence[str]) -> NDArray[np.float32]:
+        """Values (T, N) of N channels."""
+        return self.values[:, [self.channels.index(name) for name in names]]
+
+    def part(self, first: int, last: int) -> "Trajectory":
+        """Frames from index `first` up to `last`, or up to the end."""
+        return Trajectory(self.channels, self.values[first:last], self.fps)
+
+    def at(self, seconds: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Values (N, D) at N seconds, linear between frames; constant before and after."""
+        return interpolate_columns(self.values, self.times, seconds).astype(np.float32)
+
 
 def resting_head(n_frames: int, fps: float) -> Trajectory:
     """Head pose (`n_frames`, 6) of a head that does not move: all zeros."""
@@ -157,6 +201,11 @@ class Speech:
             )
         if any(word.last > len(self.phones) for word in self.words):
             raise InputError("a word reaches beyond the last phone")
+
+    @classmethod
+    def without_phones(cls, sound: Waveform) -> "Speech":
+        """Sound whose phones are not known, or that has none: it is one silence."""
+        return cls(sound, PhoneSequence([SILENCE], [0.0, sound.duration]), ())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -222,7 +271,7 @@ def concatenate_clips(clips: Sequence[Clip]) -> Clip:
     motion = np.concatenate([clip.motion.values for clip in clips])
     head = np.concatenate([clip.head.values for clip in clips])
     return Clip(
-        Trajectory(first.motion.channels, motion, first.fps),
-        Trajectory(HEAD_CHANNELS, head, first.fps),
+        replace(first.motion, values=motion),
+        replace(first.head, values=head),
         concatenate_speech([clip.speech for clip in clips]),
     )

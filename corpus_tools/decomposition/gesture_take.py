@@ -55,7 +55,7 @@ def check_gesture_take(take: Path, run_options: RunOptions, on_share: Callable[[
     try:
         if suffix in CAPTURE_SUFFIXES and is_livelink(take):
             weights = read_livelink(take).weights
-            seconds, found = len(weights) / weights.fps, list[Finding]()
+            seconds, found = weights.duration, list[Finding]()
         elif suffix in VIDEO_SUFFIXES:
             seconds, found = _check_video(
                 take, CachedTracker(run_options.folder(), find_bundle(run_options.model)), on_share

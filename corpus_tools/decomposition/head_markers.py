@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.decomposition.marker_gaps import check_gap
 from lexicon.errors import DataError
-from tts2face.interpolation import interpolate_columns
+from tts2face.numeric import interpolate_columns
 from tts2face.video.pose import similarity_transforms
 
 MIN_VISIBLE_MARKERS = 3  # markers that show a pose

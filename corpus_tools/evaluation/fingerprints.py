@@ -18,8 +18,8 @@ from corpus_tools.recordings.corpus_audio import SOUND_RATE
 from corpus_tools.recordings.observation import Observation
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.interpolation import interpolate_columns
 from tts2face.models.talker import Talker, load_talker
+from tts2face.numeric import interpolate_columns
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 

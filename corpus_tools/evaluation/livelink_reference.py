@@ -15,7 +15,6 @@ from tts2face.models.face_loading import load_face
 from tts2face.retargeting.performer import match_shapes
 from tts2face.speech.loudness import intensity
 from tts2face.speech.pauses import cut_at_pauses
-from tts2face.types import Trajectory
 from tts2face.video.livelink import read_livelink
 
 LIVELINK_SUFFIX = ".csv"
@@ -44,8 +43,7 @@ def observe_livelink(path: Path, run_options: RunOptions) -> tuple[Observation, 
     found = []
     for number, span in enumerate(cut_at_pauses(aligner.sound(sound), MAX_UTTERANCE_S), start=1):
         begin, end = (round(second * motion.fps) for second in span)
-        part = Trajectory(motion.channels, motion.values[begin:end], motion.fps)
-        landmarks = moved_landmarks(face, part)
+        landmarks = moved_landmarks(face, motion.part(begin, end))
         found.append(_build_observation(f"{path.stem}-{number:02d}", (aligner, sound), span, landmarks, motion.fps))
     return tuple(found)
 

@@ -9,9 +9,9 @@ from lexicon.sequence import PhoneSequence
 from tts2face.exemplar.options import METHOD_OPTIONS, SynthesisOptions
 from tts2face.exemplar.phone_substitution import build_targets
 from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model, speech_trajectory
-from tts2face.interpolation import interpolate_columns
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker
+from tts2face.numeric import interpolate_columns
 
 NETWORK_METHOD = "sliding-window network"
 

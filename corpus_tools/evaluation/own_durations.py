@@ -18,8 +18,8 @@ from lexicon.errors import InputError
 from lexicon.normalize import normalize
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.exemplar.motion_measures import speech_frames
-from tts2face.interpolation import interpolate_columns
 from tts2face.models.talker import ShapeModel
+from tts2face.numeric import interpolate_columns
 from tts2face.types import Speech, frame_count
 from tts2face.voice.engine import Voice
 

@@ -11,8 +11,8 @@ from corpus_tools.evaluation.reference import ReferenceUtterance
 from corpus_tools.training.ridge import fit_ridge
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import parse_cell, read_table
-from tts2face.interpolation import interpolate_columns
 from tts2face.models.talker import Talker
+from tts2face.numeric import interpolate_columns
 
 UTTERANCE_COLUMN, TIME_COLUMN = "utterance", "time"
 MIN_TRAINING_UTTERANCES = 10  # sentences from which a map is fitted

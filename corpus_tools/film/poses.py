@@ -109,8 +109,7 @@ def spoken_weights(face: Face, spoken: Mapping[str, Sequence[str]] = SPOKEN) -> 
     frames = []
     for style, texts in spoken.items():
         for text in texts:
-            motion = session.clip(text, style=style).motion
-            frames.append(motion.values[:, [motion.channels.index(name) for name in face.shape_names]])
+            frames.append(session.clip(text, style=style).motion.columns(face.shape_names))
     return np.concatenate(frames).astype(np.float32)
 
 

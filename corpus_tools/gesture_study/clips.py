@@ -15,8 +15,8 @@ from tts2face.gesture.gesture_stream import GestureFields
 from tts2face.gesture.ju2008 import FIELD_OPTIONS
 from tts2face.gesture.perlin_noise import NoiseStream
 from tts2face.gesture.timeline import Timeline
-from tts2face.interpolation import interpolate_cubic
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
+from tts2face.numeric import interpolate_cubic
 from tts2face.types import Waveform
 
 Floats = NDArray[np.float32]

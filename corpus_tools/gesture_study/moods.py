@@ -15,7 +15,7 @@ from lexicon.errors import BackendError, InputError
 from tts2face.models.palette import Palette
 from tts2face.render.picture import Picture
 from tts2face.session import Session
-from tts2face.types import Clip, Progress
+from tts2face.types import Progress
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.track import FaceTracker
 
@@ -204,17 +204,14 @@ class _ClipReader:
         if not scores:
             raise BackendError(f"the tracker finds no face in a clip of {mood}; choose a larger picture")
         kept = np.linspace(0, len(pictures) - 1, 3).round().astype(int)
+        shut = clip.motion.columns(SHUT_SHAPES).astype(np.float64)
         return MoodClip(
             np.array(scores, np.float64),
-            _channels(clip, SMILE_SHAPES).mean(axis=1),
-            find_blinks(_channels(clip, SHUT_SHAPES), np.array([len(clip.motion)], np.int32), clip.fps).per_minute,
+            clip.motion.columns(SMILE_SHAPES).astype(np.float64).mean(axis=1),
+            find_blinks(shut, np.array([len(clip.motion)], np.int32), clip.fps).per_minute,
             float(np.degrees(clip.head.values[:, 1].std())),
             np.stack([pictures[at] for at in kept]),
         )
-
-
-def _channels(clip: Clip, names: Sequence[str]) -> Floats:
-    return clip.motion.values[:, [clip.motion.channels.index(name) for name in names]].astype(np.float64)
 
 
 def _confusions(

@@ -15,10 +15,9 @@ from lexicon.sequence import SILENCE
 from tts2face.cloning.lip_gaps import UNBOUNDED_MM, facing_gaps, nearest_valid_parameters
 from tts2face.cloning.parameter_transfer import face_size
 from tts2face.exemplar.synthesis import DEFAULT_OPTIONS, ExemplarModel, build_exemplar_model, speech_trajectory
-from tts2face.interpolation import interpolate_columns
 from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
 from tts2face.models.talker import ShapeModel, Talker, Utterance
-from tts2face.numeric import fix_signs, principal_axes
+from tts2face.numeric import fix_signs, interpolate_columns, principal_axes
 from tts2face.retargeting.to_face import inner_product_map
 
 PRIOR_FRAMES = 500.0  # of the base's motion that the shape model counts beside the person's own frames

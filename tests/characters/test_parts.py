@@ -8,13 +8,12 @@ import pytest
 from lexicon.errors import DataError
 from tts2face.characters.atlas import CUTOUT, build_atlas, coverage, fill_uncovered, triangle_opacity
 from tts2face.characters.character import BLEND, MASK, Material
-from tts2face.characters.glb_writer import matrix_quaternion
 from tts2face.characters.meshopt import apply_exponential_filter, decode_buffer
-from tts2face.characters.nodes import quaternion_matrix
 from tts2face.characters.shape_mapping import ShapeSource
 from tts2face.characters.shape_names import ARKIT_SHAPES, guess_mapping
 from tts2face.characters.surface_points import _barycentric, _Projection, nearest_points, points_under_pixels
 from tts2face.models.face_loading import load_face
+from tts2face.numeric import matrix_quaternion, quaternion_matrix
 from tts2face.render.camera import CameraMatrices
 
 

@@ -10,7 +10,7 @@ import pytest
 from cli.main import run
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE
-from tts2face.gesture.spans import StyleSpan
+from tts2face.gesture.elements import StyleSpan
 from tts2face.models.face_loading import load_face
 from tts2face.models.talker import load_talker
 from tts2face.render.picture import Picture

@@ -17,11 +17,11 @@ from tests.exports import programs
 from tests.exports.made import FACE, RATE, made_clip, made_stream, signed_clip, turned_clip, with_gesture
 from tests.render.test_cutouts import face_with_sheet
 from tests.render.tiny_face import tiny_face
-from tts2face.exports.gltf import GltfBuffer
-from tts2face.exports.skeleton import continuous_quaternions
-from tts2face.exports.spool import Spool
 from tts2face.exports.surfaces import divide_surface
 from tts2face.face.deformation import build_rig, rotation_matrix
+from tts2face.numeric import continuous_quaternions, quaternion_matrix
+from tts2face.storage.gltf_writer import GltfBuffer
+from tts2face.storage.spool import Spool
 from tts2face.types import HEAD_CHANNELS, Clip, Trajectory
 
 DTYPES = {5121: "u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -98,15 +98,6 @@ class GltfFile:
             return place(parents[at]) @ local if at in parents else local
 
         return np.array([place(joint) @ inverse[number] for number, joint in enumerate(skin.joints)])
-
-
-def quaternion_matrix(value):
-    x, y, z, w = map(float, value)
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
 
 
 @pytest.mark.parametrize("face", [FACE, tiny_face(), with_gesture()], ids=["textured", "coloured", "gestures"])

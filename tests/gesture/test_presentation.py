@@ -8,11 +8,11 @@ import pytest
 from corpus_tools.gesture_study.blinks import find_blinks
 from corpus_tools.gesture_study.measures import wasserstein
 from tts2face.gesture.blink_presentation import PAUSE_DB
+from tts2face.gesture.elements import Gains, StyleSpan
 from tts2face.gesture.gesture_stream import GestureFields, GestureStream
 from tts2face.gesture.head_presentation import find_accents, slow_scales
 from tts2face.gesture.presentation import LowPass, filtered_spread
 from tts2face.gesture.prosody import prosody_features
-from tts2face.gesture.spans import Gains, StyleSpan
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import FEATURES, GESTURE_FPS, Palette, load_palette
 from tts2face.types import Waveform

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.spans import ExpressionSpan, Nod
+from tts2face.gesture.elements import ExpressionSpan, Nod
 from tts2face.models.palette import FEATURES
 from tts2face.request import Request
 from tts2face.synthesis.prepared_request import build_request_timeline

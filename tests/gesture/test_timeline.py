@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.errors import DataError, InputError
+from tts2face.gesture.elements import GAIN_NAMES, ExpressionSpan, Gains, Nod, StyleSpan
 from tts2face.gesture.notation import parse_expressions, parse_gains, parse_style
-from tts2face.gesture.spans import GAIN_NAMES, ExpressionSpan, Gains, Nod, StyleSpan
 from tts2face.gesture.timeline import BLEND_S, ONSET_S, Timeline
 from tts2face.gesture.timeline_file import parse_timeline, read_timeline
 from tts2face.models.palette import EXPRESSIONS, FEATURES, Palette, Style
@@ -140,16 +140,19 @@ def test_a_timeline_can_be_moved() -> None:
             lambda: Timeline(expressions=(ExpressionSpan("sad", 1, 0, 3), ExpressionSpan("sad", 1, 2, 4))),
             "two spans of sad overlap",
         ),
-        (lambda: Timeline({"head": "cross"}).check(palette(), 9), "no style 'cross' in the palette; it has neutral"),
         (
-            lambda: Timeline(spans=(StyleSpan("head", "neutral", 1, 9.2),)).check(palette(), 9),
+            lambda: Timeline({"head": "cross"}).check_styles(palette()),
+            "no style 'cross' in the palette; it has neutral",
+        ),
+        (
+            lambda: Timeline(spans=(StyleSpan("head", "neutral", 1, 9.2),)).check_duration(9),
             r"span of head from 1 to 9\.2 s lies beyond the clip, which lasts 9\.00 s",
         ),
         (
-            lambda: Timeline(expressions=(ExpressionSpan("sad", 1, 9.0, math.inf),)).check(palette(), 9),
+            lambda: Timeline(expressions=(ExpressionSpan("sad", 1, 9.0, math.inf),)).check_duration(9),
             "span of sad from 9 to inf s lies beyond",
         ),
-        (lambda: Timeline(nods=(Nod(9.5),)).check(palette(), 9), r"the nod at 9\.5 s lies beyond"),
+        (lambda: Timeline(nods=(Nod(9.5),)).check_duration(9), r"the nod at 9\.5 s lies beyond"),
     ],
 )
 def test_what_cannot_be_painted_is_refused(make, reason: str) -> None:
@@ -158,8 +161,8 @@ def test_what_cannot_be_painted_is_refused(make, reason: str) -> None:
 
 
 def test_spans_to_the_end_fit_every_clip() -> None:
-    Timeline({"head": "neutral"}, (StyleSpan("head", "neutral", 1, 2.04),), nods=(Nod(1.9),)).check(palette(), 2.0)
-    Timeline(spans=(StyleSpan("head", "neutral", 1, math.inf),)).check(palette(), 2.0)
+    Timeline({"head": "neutral"}, (StyleSpan("head", "neutral", 1, 2.04),), nods=(Nod(1.9),)).check_duration(2.0)
+    Timeline(spans=(StyleSpan("head", "neutral", 1, math.inf),)).check_duration(2.0)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 
 from lexicon.errors import InputError
 from tts2face.exemplar.options import ExcludedToken
-from tts2face.gesture.key_curves import ChannelEdit
+from tts2face.gesture.elements import ChannelEdit
 from tts2face.gesture.timeline import Timeline
 from tts2face.project.project import Project
 from tts2face.project.project_file import load_project, save_project

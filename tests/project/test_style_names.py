@@ -1,6 +1,6 @@
 """Styles that a project names: found, renamed and removed everywhere."""
 
-from tts2face.gesture.spans import StyleSpan
+from tts2face.gesture.elements import StyleSpan
 from tts2face.gesture.timeline import Timeline
 from tts2face.project.project import Project
 from tts2face.project.style_names import drop_style, rename_style, used_styles

@@ -10,7 +10,7 @@ import pytest
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence
 from tts2face.exemplar.options import ExcludedToken
-from tts2face.gesture.spans import GazeTarget, Nod, StyleSpan
+from tts2face.gesture.elements import KINDS, GazeTarget, Nod, StyleSpan
 from tts2face.models.palette import FEATURES
 from tts2face.project.project import Project
 from tts2face.request import Request
@@ -55,17 +55,18 @@ def test_erase_cuts_a_hole() -> None:
 
 
 @pytest.mark.parametrize(
-    ("edit", "part", "lane"),
+    ("edit", "part"),
     [
-        ({"kind": "curve", "expression": "happy"}, "curves", "happy"),
-        ({"kind": "strength", "feature": "head"}, "strengths", "head"),
-        ({"kind": "channel", "channel": "jawOpen"}, "edits", "jawOpen"),
+        ({"kind": "curve", "expression": "happy"}, "curves"),
+        ({"kind": "strength", "feature": "head"}, "strengths"),
+        ({"kind": "channel", "channel": "jawOpen"}, "edits"),
     ],
 )
-def test_a_curve_is_replaced_and_removed(edit: dict[str, Any], part: str, lane: str) -> None:
+def test_a_curve_is_replaced_and_removed(edit: dict[str, Any], part: str) -> None:
     first = edited(PROJECT, edit | {"keys": [[0, 0.5], [1, 1]]})
     second = edited(first, edit | {"keys": [[0.5, 0.25]]})
-    assert [(one.lane, one.keys) for one in getattr(second.timeline, part)] == [(lane, ((0.5, 0.25),))]
+    (curve,) = getattr(second.timeline, part)
+    assert curve == KINDS[part].record(edit[KINDS[part].owner], ((0.5, 0.25),))
     assert getattr(edited(second, edit | {"keys": []}).timeline, part) == ()
 
 

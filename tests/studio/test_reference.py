@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.spans import StyleSpan
+from tts2face.gesture.elements import StyleSpan
 from tts2face.gesture.timeline import Timeline
 from tts2face.project.project import Project
 from tts2face.request import Request

@@ -17,7 +17,7 @@ def own() -> Session:
 
 
 def expressions(clip: Clip) -> np.ndarray:
-    return clip.motion.values[:, [clip.motion.channels.index(name) for name in EXPRESSIONS]]
+    return clip.motion.columns(EXPRESSIONS)
 
 
 def test_an_own_face_is_not_turned_out_of_its_video(own: Session) -> None:
@@ -38,11 +38,8 @@ def test_an_own_face_keeps_its_expression_at_rest_unless_a_style_is_requested(ow
 def test_a_head_is_friendly_at_rest_with_closed_lips() -> None:
     session = Session("grid_s1", "head")
     clips = [session.clip("", idle=4.0, style=style) for style in (None, "measured")]
-    smiles = [
-        clip.motion.values[:, [clip.motion.channels.index(f"mouthSmile{side}") for side in ("Left", "Right")]]
-        for clip in clips
-    ]
+    smiles = [clip.motion.columns(["mouthSmileLeft", "mouthSmileRight"]) for clip in clips]
     assert 0.08 < smiles[0][-1].min() < 0.3
     assert smiles[1].max() < 0.05
-    brows = clips[0].motion.values[:, [clips[0].motion.channels.index(f"browDown{side}") for side in ("Left", "Right")]]
+    brows = clips[0].motion.columns(["browDownLeft", "browDownRight"])
     assert brows.mean() < 0.02

@@ -14,7 +14,7 @@ from lexicon.marked_text import NodMark
 from lexicon.sentences import Sentence, index_by_letters, split_sentences
 from lexicon.sequence import SILENCE
 from tests.synthesis.fake_voice import LEAD, LETTER, LEVEL, RATE, TRAIL, FakeVoice
-from tts2face.gesture.spans import Nod, StyleSpan
+from tts2face.gesture.elements import Nod, StyleSpan
 from tts2face.request import Request
 from tts2face.synthesis.mark_styles import check_marks, marked_styles
 from tts2face.synthesis.marked_speech import (

@@ -7,7 +7,7 @@ from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.session import Session
 from tts2face.synthesis.animated_face import AnimatedFace
-from tts2face.synthesis.motion_comparison import MotionComparison, MotionPart, compare_motion, map_channels, values_at
+from tts2face.synthesis.motion_comparison import MotionComparison, MotionPart, compare_motion, map_channels
 from tts2face.types import Trajectory
 
 FPS = 30.0
@@ -83,4 +83,3 @@ def test_channels_are_mapped_by_name() -> None:
     assert map_channels(given, ("a", "b")).tolist() == [[0.0, 1.0], [0.0, 3.0]]
     with pytest.raises(InputError, match="no channel in common"):
         map_channels(given, ("a",))
-    assert values_at(given, np.array([-1.0, 0.25, 9.0]))[:, 0].tolist() == [1.0, 2.0, 3.0]

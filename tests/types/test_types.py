@@ -1,4 +1,4 @@
-"""Waveform, Trajectory, Speech and Clip: validation, and joining of clips."""
+"""Waveform, Trajectory, Speech and Clip: validation, parts, padding and resampling, and joining of clips."""
 
 import numpy as np
 import pytest
@@ -91,3 +91,27 @@ def test_joined_clips_are_one_clip() -> None:
     assert joined.speech.phones.phones == (SILENCE, "p", SILENCE, "p", SILENCE)
     assert [joined.speech.phones.phones[word.first] for word in joined.speech.words] == ["p", "p"]
     assert joined.speech.waveform.duration == pytest.approx(0.6)
+
+
+def test_sound_is_cut_padded_and_resampled() -> None:
+    sound = Waveform([0.0, 0.5, -0.5, 1.0], 4)
+    assert sound.part(1, 3).samples.tolist() == [0.5, -0.5]
+    assert sound.part(2, 9).padded(4).samples.tolist() == [-0.5, 1.0, 0.0, 0.0]
+    assert sound.padded(2).samples.tolist() == sound.samples.tolist()
+    assert sound.resampled(4) is sound
+    whole = Waveform(np.sin(2 * np.pi * 100 * np.arange(RATE) / RATE), RATE)
+    there = whole.resampled(2 * RATE)
+    assert there.rate == 2 * RATE
+    expected = np.sin(2 * np.pi * 100 * np.arange(2 * RATE) / there.rate)
+    np.testing.assert_allclose(there.samples[1000:-1000], expected[1000:-1000], atol=1e-3)  # the ends ring
+    speech = Speech.without_phones(sound)
+    assert (speech.phones.phones, speech.phones.edges.tolist(), speech.words) == ((SILENCE,), [0.0, 1.0], ())
+
+
+def test_trajectories_are_read_by_channel_frame_and_second() -> None:
+    motion = Trajectory(("a", "b"), [[1.0, 2.0], [3.0, 4.0], [5.0, 8.0]], 2.0)
+    assert (motion.duration, motion.times.tolist()) == (1.5, [0.0, 0.5, 1.0])
+    assert motion.columns(["b", "a"]).tolist() == [[2.0, 1.0], [4.0, 3.0], [8.0, 5.0]]
+    part = motion.part(1, 9)
+    assert (part.channels, part.values.tolist(), part.fps) == (("a", "b"), [[3.0, 4.0], [5.0, 8.0]], 2.0)
+    assert motion.at(np.array([-1.0, 0.25, 9.0])).tolist() == [[1.0, 2.0], [2.0, 3.0], [5.0, 8.0]]

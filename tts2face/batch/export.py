@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence
@@ -101,34 +100,23 @@ def joined_clips(tracks: Sequence[Path], fps: float, sounds: Sequence[Sound | No
             at += len(piece.clip.motion)
             end = first_sample(at, SOUND_RATE, rate)
             if sound is None:
-                samples = _resampled(piece.clip.speech.waveform, end - begin)
+                made = piece.clip.speech.waveform.resampled(SOUND_RATE).part(0, end - begin).padded(end - begin)
             else:
                 origin = first_sample(sound.offset, SOUND_RATE, rate)
                 found = open_track(Path(sound.path)).read(origin + begin, origin + end)
-                samples = (found / 32767.0).astype(np.float32)
-            yield _with_samples(piece.clip, samples)
+                made = Waveform(found / 32767.0, SOUND_RATE)
+            yield _with_sound(piece.clip, made)
 
 
-def _resampled(sound: Waveform, n_samples: int) -> NDArray[np.float32]:
-    """(n_samples,) samples at `SOUND_RATE`."""
-    import soxr
-
-    samples = sound.samples if sound.rate == SOUND_RATE else soxr.resample(sound.samples, sound.rate, SOUND_RATE)
-    exact = np.zeros(n_samples, np.float32)
-    n_kept = min(n_samples, len(samples))
-    exact[:n_kept] = np.clip(samples[:n_kept], -1.0, 1.0)
-    return exact
-
-
-def _with_samples(clip: Clip, samples: NDArray[np.float32]) -> Clip:
-    """A clip with other samples, whose phones end with them; they last as long to half a sample of the former rate."""
+def _with_sound(clip: Clip, sound: Waveform) -> Clip:
+    """A clip with other sound, whose phones end with them; they last as long to half a sample of the former rate."""
     phones = clip.speech.phones
-    seconds = len(samples) / SOUND_RATE
+    seconds = sound.duration
     edges = np.minimum(phones.edges, seconds)
     edges[-1] = seconds
     if (np.diff(edges) <= 0).any():
         edges = phones.edges * (seconds / phones.end)
-    speech = Speech(Waveform(samples, SOUND_RATE), PhoneSequence(phones.phones, edges), clip.speech.words)
+    speech = Speech(sound, PhoneSequence(phones.phones, edges), clip.speech.words)
     return replace(clip, speech=speech)
 
 

@@ -107,7 +107,7 @@ def animate_character(
     turned = [*bones.eye_tracks(motion), *bones.head_tracks(head, file)]
     driven = mapped_targets(source, binding.mapping)
     tracks = [*_weight_tracks(file, tree, (weights, driven), len(motion)), *turned]
-    writer.add_animation(ANIMATION, np.arange(len(motion)) / motion.fps, tracks)
+    writer.add_animation(ANIMATION, motion.times, tracks)
     names = dict.fromkeys(bones.name_of(node) for node, _, _ in turned)
     return AnimatedCharacter(writer.content(), len(weights), tuple(names))
 
@@ -132,7 +132,7 @@ def _own_values(motion: Trajectory, face: Face, own: list[str]) -> FloatArray:
     """Weights (T, k) of the shapes `own`, which also carry the motion of the shapes that the character lacks."""
     channels = motion.channels
     values = motion.values.astype(np.float64)
-    kept = values[:, [channels.index(name) for name in own]]
+    kept = motion.columns(own).astype(np.float64)
     turned = {name for eye in face.eyes for name in eye.turns}
     others = [k for k, name in enumerate(channels) if name not in own and name not in turned and values[:, k].any()]
     for is_mouth in (True, False):

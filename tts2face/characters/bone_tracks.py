@@ -5,11 +5,12 @@ from numpy.typing import NDArray
 
 from tts2face.characters.binding import CharacterBinding
 from tts2face.characters.character import Character
-from tts2face.characters.glb_writer import GlbWriter, matrix_quaternion
+from tts2face.characters.glb_writer import GlbWriter
 from tts2face.characters.gltf import GltfFile
 from tts2face.characters.nodes import NodeTree
 from tts2face.face.deformation import head_rotation, rotation_matrix
 from tts2face.models.face import Face
+from tts2face.numeric import continuous_quaternions, matrix_quaternion
 from tts2face.types import Trajectory
 
 HEAD_NODE = "tts2face_head"
@@ -127,10 +128,7 @@ def share_of_rotation(rotation: FloatArray, share: float) -> FloatArray:
 
 def _quaternions(rotations: FloatArray) -> FloatArray:
     """Quaternions (T, 4) of rotation matrices (T, 3, 3), each with the sign nearest to the one before."""
-    rows = np.stack([matrix_quaternion(rotation) for rotation in rotations])
-    signs = np.where((rows[1:] * rows[:-1]).sum(axis=1) < 0, -1.0, 1.0)
-    rows[1:] *= np.cumprod(signs)[:, None]
-    return rows
+    return continuous_quaternions(np.stack([matrix_quaternion(rotation) for rotation in rotations]), None)
 
 
 def _orthonormal(matrix: FloatArray) -> FloatArray:

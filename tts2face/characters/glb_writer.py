@@ -8,10 +8,8 @@ from numpy.typing import NDArray
 
 from tts2face.characters.gltf import MESHOPT, GltfFile
 from tts2face.characters.nodes import local_matrix
-from tts2face.storage.glb_container import ALIGNMENT, glb_header
-
-FLOAT = 5126
-TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+from tts2face.numeric import matrix_quaternion
+from tts2face.storage.gltf_writer import COMPONENTS, TYPES, GltfBuffer
 
 FloatArray = NDArray[np.float64]
 
@@ -28,16 +26,16 @@ class GlbWriter:
     def __init__(self, file: GltfFile) -> None:
         self._file = file
         self.root: dict[str, Any] = copy.deepcopy(dict(file.root.content))
-        self._binary = bytearray()
+        self._buffer = GltfBuffer(self.root.setdefault("bufferViews", []), self.root.setdefault("accessors", []))
         self._join_buffers()
         self._embed_images()
 
     def add_accessor(self, values: FloatArray) -> int:
         """Add an accessor of float32 rows (N, width), with the limits that times need; its index."""
         rows = np.ascontiguousarray(values, "<f4")
-        view = self._add_view(rows.tobytes())
+        view = self._buffer.add_view(rows.tobytes())
         accessor: dict[str, Any] = {
-            "bufferView": view, "componentType": FLOAT, "count": len(rows), "type": TYPES[rows.shape[1]],
+            "bufferView": view, "componentType": COMPONENTS["<f4"], "count": len(rows), "type": TYPES[rows.shape[1]],
         }  # fmt: skip
         if rows.shape[1] == 1:
             accessor |= {"min": [float(rows.min())], "max": [float(rows.max())]}
@@ -79,20 +77,12 @@ class GlbWriter:
 
     def content(self) -> bytes:
         """Bytes of the .glb file."""
-        self.root["buffers"][0] = {"byteLength": len(self._binary)}
-        binary = bytes(self._binary) + b"\0" * (-len(self._binary) % ALIGNMENT)
-        return glb_header(self.root, len(binary), self._file.path.name) + binary
+        return self._buffer.content(self.root, self._file.path.name)
 
     def _append(self, kind: str, entry: dict[str, Any]) -> int:
         entries = self.root.setdefault(kind, [])
         entries.append(entry)
         return len(entries) - 1
-
-    def _add_view(self, content: bytes) -> int:
-        self._binary += b"\0" * (-len(self._binary) % ALIGNMENT)
-        view = {"buffer": 0, "byteOffset": len(self._binary), "byteLength": len(content)}
-        self._binary += content
-        return self._append("bufferViews", view)
 
     def _join_buffers(self) -> None:
         """Move the content of all buffers into the first one; buffers without content stay as fallbacks."""
@@ -104,11 +94,9 @@ class GlbWriter:
                 kept.append(dict(fields.content))
                 places[number] = (len(kept), 0)
                 continue
-            self._binary += b"\0" * (-len(self._binary) % ALIGNMENT)
-            places[number] = (0, len(self._binary))
-            self._binary += self._file.buffer(number).tobytes()
+            places[number] = (0, self._buffer.add_content(self._file.buffer(number).tobytes()))
         self.root["buffers"] = [{"byteLength": 0}, *kept]
-        for view in self.root.get("bufferViews", []):
+        for view in self.root["bufferViews"]:
             extensions = view.get("extensions", {})
             for holder in (view, *(extensions[name] for name in MESHOPT if name in extensions)):
                 number, shift = places[holder["buffer"]]
@@ -120,24 +108,6 @@ class GlbWriter:
             uri = image.get("uri", "")
             if uri and not uri.startswith("data:"):
                 content = self._file.uri(uri, self._file.entries("images")[number])
-                is_png = content[:4] == b"\x89PNG"
+                kind = "image/png" if content[:4] == b"\x89PNG" else "image/jpeg"
                 image.pop("uri")
-                image |= {"bufferView": self._add_view(content), "mimeType": "image/png" if is_png else "image/jpeg"}
-
-
-def matrix_quaternion(matrix: FloatArray) -> FloatArray:
-    """Quaternion (4,), x y z w, of a rotation matrix (3, 3); the numerically largest component is computed first."""
-    m = matrix
-    squares = np.array(
-        [
-            1 + m[0, 0] - m[1, 1] - m[2, 2],
-            1 - m[0, 0] + m[1, 1] - m[2, 2],
-            1 - m[0, 0] - m[1, 1] + m[2, 2],
-            1 + m[0, 0] + m[1, 1] + m[2, 2],
-        ]
-    )
-    a, b, c = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
-    d, e, f = m[1, 0] + m[0, 1], m[0, 2] + m[2, 0], m[2, 1] + m[1, 2]
-    rows = np.array([[squares[0], d, e, a], [d, squares[1], f, b], [e, f, squares[2], c], [a, b, c, squares[3]]])
-    row: FloatArray = rows[int(squares.argmax())]
-    return row / np.linalg.norm(row)
+                image |= {"bufferView": self._buffer.add_view(content), "mimeType": kind}

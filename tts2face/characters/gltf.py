@@ -19,7 +19,7 @@ from lexicon.errors import DataError
 from lexicon.inputs import check_regular_file, decode_utf8, parse_json
 from tts2face.characters.json_fields import Fields
 from tts2face.characters.meshopt import EXPONENTIAL, NO_FILTER, apply_exponential_filter, decode_buffer
-from tts2face.storage.glb_container import ALIGNMENT, BINARY_CHUNK, JSON_CHUNK, MAGIC
+from tts2face.storage.gltf_writer import ALIGNMENT, BINARY_CHUNK, JSON_CHUNK, MAGIC
 
 MAX_FILE_BYTES = 512_000_000  # a film character with 4k textures has about 100 MB
 MAX_DECODED_BYTES = 1_000_000_000  # of all compressed or sparse arrays of a file

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.characters.json_fields import Fields
+from tts2face.numeric import quaternion_matrix
 
 MAX_NODES = 100_000
 BONES = ("head", "neck", "leftEye", "rightEye")
@@ -83,19 +84,6 @@ def local_matrix(node: Fields) -> FloatArray:
     placed[:3, :3] = quaternion_matrix(np.array(turn)) * np.array(scale)
     placed[:3, 3] = shift
     return placed
-
-
-def quaternion_matrix(turn: FloatArray) -> FloatArray:
-    """Rotation matrix (3, 3) of a quaternion (x, y, z, w), which is normalised first."""
-    length = float(np.linalg.norm(turn))
-    x, y, z, w = turn / length if length > 1e-9 else (0.0, 0.0, 0.0, 1.0)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def find_bones(root: Fields, tree: NodeTree) -> dict[str, int]:

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.exemplar.explanation import UsedToken
-from tts2face.interpolation import interpolate_columns
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LIP_LOWER, OUTER_LIP_UPPER
 from tts2face.models.talker import Talker
+from tts2face.numeric import interpolate_columns
 
 OUTER = (*OUTER_LIP_UPPER, *reversed(OUTER_LIP_LOWER[1:-1]))  # from the person's right corner over the upper lip
 INNER = (*INNER_LIP_UPPER, *reversed(INNER_LIP_LOWER[1:-1]))

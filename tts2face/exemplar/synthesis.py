@@ -22,11 +22,10 @@ from tts2face.exemplar.token_search import (
     log_durations,
 )
 from tts2face.exemplar.tokens import Tokens, collect_tokens, phone_contexts
-from tts2face.interpolation import interpolate_columns
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.phone_network import PhoneNetwork
 from tts2face.models.talker import Talker, speech_channels
-from tts2face.numeric import smoothstep
+from tts2face.numeric import interpolate_columns, smoothstep
 from tts2face.types import GiveWay, Trajectory, keep_on
 
 RELEASE_FROM_S = 0.08  # distance from speech at which the transition to rest begins

@@ -7,8 +7,8 @@ from tts2face.characters.animation import animate_character
 from tts2face.characters.binding import character_file, has_binding, read_binding
 from tts2face.exports.glb import GlbWriter
 from tts2face.exports.parts import FormatWriter, Part, Target
-from tts2face.exports.spool import Spool
 from tts2face.storage.overwrite import refuse_overwriting
+from tts2face.storage.spool import Spool
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
 

@@ -10,10 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.exports.gltf import INDICES, VERTICES, GltfBuffer
 from tts2face.exports.parts import Part, Target
-from tts2face.exports.skeleton import HEAD, Skeleton, build_skeleton, continuous_quaternions
-from tts2face.exports.spool import Spool
+from tts2face.exports.skeleton import HEAD, Skeleton, build_skeleton
 from tts2face.exports.surfaces import (
     MM_PER_M,
     ExportSurface,
@@ -27,6 +25,9 @@ from tts2face.exports.surfaces import (
     vertex_normals,
 )
 from tts2face.models.face import Face
+from tts2face.numeric import continuous_quaternions
+from tts2face.storage.gltf_writer import INDICES, VERTICES, GltfBuffer
+from tts2face.storage.spool import Spool
 
 MESH_NODE, FIRST_JOINT = 0, 1
 GENERATOR = "tts2face"

@@ -9,7 +9,7 @@ import numpy as np
 
 from tts2face.exports.labels import AllLabels
 from tts2face.exports.parts import Part, Target
-from tts2face.exports.spool import Spool
+from tts2face.storage.spool import Spool
 from tts2face.types import HEAD_CHANNELS
 
 

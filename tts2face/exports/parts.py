@@ -13,6 +13,7 @@ from lexicon.errors import InputError
 from tts2face.clock import exact_rate, first_sample
 from tts2face.exports.formats import sound_name
 from tts2face.models.face import Face
+from tts2face.numeric import interpolate_rows
 from tts2face.types import HEAD_CHANNELS, Clip, frame_count
 
 Float32Array = NDArray[np.float32]
@@ -147,9 +148,7 @@ class FrameGrid:
         ratio = self.source_fps / self.fps
         until = int((self._n_source + len(values) - 1) / ratio) + 1
         at = np.arange(self._n_frames, until, dtype=np.float64) * float(ratio) - first
-        low = np.clip(at.astype(np.int64), 0, len(rows) - 1)
-        share = (at - low)[:, None].astype(np.float32)
-        return np.asarray((1 - share) * rows[low] + share * rows[np.minimum(low + 1, len(rows) - 1)], np.float32)
+        return interpolate_rows(rows, at)
 
     def _part(self, rows: Float32Array, clip: Clip | None = None, begin: int = 0, text: str = "") -> Part:
         k = len(self._channels)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tts2face.exports.parts import Float32Array
 from tts2face.face.deformation import head_share
 from tts2face.models.face import Face
+from tts2face.numeric import quaternion_product, rotation_quaternions
 from tts2face.types import HEAD_CHANNELS
 
 ROOT, HEAD = 0, 1  # the first two joints; the eyes follow
@@ -78,33 +79,3 @@ def build_skeleton(face: Face, n_channels: int) -> Skeleton:
 def _eye_names(face: Face) -> list[str]:
     sides = ["leftEye" if eye.centre[0] > 0 else "rightEye" for eye in face.eyes]
     return sides if len(set(sides)) == len(sides) else [f"eye{number}" for number in range(len(sides))]
-
-
-def rotation_quaternions(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit quaternions (T, 4) x, y, z, w of rotation vectors (T, 3) in radians."""
-    angle = np.linalg.norm(vectors, axis=1)
-    scale = np.where(angle > 0, np.sin(angle / 2) / np.where(angle > 0, angle, 1), 0.5)
-    return np.column_stack([vectors * scale[:, None], np.cos(angle / 2)])
-
-
-def quaternion_product(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Hamilton products (T, 4) of quaternions x, y, z, w: the rotation `second`, then `first`."""
-    (ax, ay, az, aw), (bx, by, bz, bw) = first.T, second.T
-    return np.column_stack([
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz,
-    ])  # fmt: skip
-
-
-def continuous_quaternions(values: NDArray[np.float64], before: NDArray[np.float64] | None) -> NDArray[np.float64]:
-    """The same rotations with signs such that neighbours lie on the same side, so that interpolation is the short way.
-
-    `before` (4,) precedes the first of `values` (T, 4); None for a beginning.
-    """
-    rows = values if before is None else np.vstack([before, values])
-    turns = np.einsum("td,td->t", rows[1:], rows[:-1]) < 0
-    signs = np.concatenate([[1.0], np.where(np.cumsum(turns) % 2 == 1, -1.0, 1.0)])
-    signed: NDArray[np.float64] = rows * signs[: len(rows), None]
-    return signed if before is None else signed[1:]

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.exports.gltf import INDICES, VERTICES, GltfBuffer
 from tts2face.exports.rest_light import in_rest_light
 from tts2face.exports.skeleton import HEAD, Skeleton, build_skeleton
 from tts2face.exports.stage_surfaces import stage_surfaces
@@ -30,7 +29,7 @@ from tts2face.render.scene import STUDIO_BRIGHT, STUDIO_CENTRE, STUDIO_DARK, ava
 from tts2face.render.soft_shadows import lip_opening
 from tts2face.render.strand_cards import SKULL_CENTRE_MM
 from tts2face.render.surface import Surface, build_surface
-from tts2face.storage.glb_container import glb_header
+from tts2face.storage.gltf_writer import INDICES, VERTICES, GltfBuffer
 from tts2face.types import HEAD_CHANNELS
 
 MAX_TEXTURE_PX = 1024  # along a side: more than a preview of 1000 pixels shows
@@ -87,7 +86,7 @@ def stage_glb(face: Face, channels: tuple[str, ...]) -> bytes:
         ],
         **_textures(face, buffer),
     }
-    return _container(content, buffer)
+    return buffer.content(content, "the face")
 
 
 def _as_seen(face: Face) -> Face:
@@ -290,8 +289,3 @@ def _lids(surface: Surface, eye: int) -> list[list[list[float]]]:
     corners = surface.rig.rest[surface.eyes.corners[rows]] / MM_PER_M
     places: list[list[list[float]]] = np.einsum("slcx,slc->slx", corners, surface.eyes.weights[rows]).tolist()
     return places
-
-
-def _container(content: dict[str, Any], buffer: GltfBuffer) -> bytes:
-    root = buffer.described(content)
-    return b"".join([glb_header(root, buffer.n_bytes, "the face"), *buffer.chunks()])

@@ -15,9 +15,9 @@ from lexicon.errors import BackendError, InputError
 from tts2face.colour import decode_srgb
 from tts2face.exports.parts import Part, Target
 from tts2face.exports.skeleton import HEAD, Skeleton, build_skeleton
-from tts2face.exports.spool import Spool
 from tts2face.exports.surfaces import ExportSurface, divide_surface, linear_colours, morph_targets, vertex_normals
 from tts2face.models.face import Face
+from tts2face.storage.spool import Spool
 
 METRES_PER_UNIT = 0.001
 ROOT_PATH = "/Face"

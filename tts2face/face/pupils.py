@@ -44,7 +44,7 @@ class Pupils:
     ) -> tuple[Trajectory, Dilation]:
         """Motion (T, K) with pupils that follow the phones of its piece, after `before`."""
         now = before or Dilation()
-        times = np.arange(len(face)) / face.fps
+        times = face.times
         at = np.clip(np.searchsorted(phones.edges, times, side="right") - 1, 0, len(phones.phones) - 1)
         speaks = np.array([phone != SILENCE for phone in phones.phones])[at]
         follow, effort, efforts = 1 - math.exp(-1 / (FOLLOW_S * face.fps)), now.effort, np.zeros(len(face))
@@ -55,4 +55,4 @@ class Pupils:
         turns = 2 * np.pi * WAVES_HZ * (now.clock_s + times)[:, None] + phases
         weights = face.values.copy()
         weights[:, self.column] = efforts + np.sin(turns) @ WAVE_SIZES
-        return replace(face, values=weights), Dilation(now.clock_s + len(face) / face.fps, effort)
+        return replace(face, values=weights), Dilation(now.clock_s + face.duration, effort)

@@ -17,8 +17,8 @@ from tts2face.gesture.head_presentation import HeadPresentation, find_accents, s
 from tts2face.gesture.presentation import Emphasis, FrameContext, Presentation
 from tts2face.gesture.prosody import prosody_features
 from tts2face.gesture.timeline import Timeline
-from tts2face.interpolation import interpolate_cubic
 from tts2face.models.palette import FEATURES, GESTURE_FPS, FeatureChange, Palette, Style
+from tts2face.numeric import interpolate_cubic
 from tts2face.types import GiveWay, Waveform, keep_on
 
 N_LOOKAHEAD_FRAMES = 2  # frames after a time that cubic interpolation needs

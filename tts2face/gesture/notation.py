@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 from lexicon.errors import InputError
-from tts2face.gesture.spans import GAIN_NAMES, ExpressionSpan, Gains, check_feature
+from tts2face.gesture.elements import GAIN_NAMES, ExpressionSpan, Gains, check_feature
 from tts2face.models.palette import FEATURES
 
 ALL_FEATURES = "all"  # every feature

@@ -4,35 +4,31 @@ Times are seconds on the clock of the whole clip; spans are half open.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
-from tts2face.gesture.easing import FloatArray, interpolate_keys, span_weights
-from tts2face.gesture.key_curves import (
+from tts2face.gesture.elements import (
+    KINDS,
     ChannelEdit,
+    ElementKind,
     ExpressionCurve,
-    StrengthCurve,
-    check_lanes,
-    override_curves,
-    shift_keys,
-)
-from tts2face.gesture.spans import (
     ExpressionSpan,
+    FloatArray,
     Gains,
     GazeTarget,
     Nod,
+    StrengthCurve,
     StyleSpan,
     check_feature,
     check_style,
-    cut_spans,
-    overlay_spans,
-    shift_span,
-    sort_spans,
+    interpolate_keys,
+    span_weights,
 )
 from tts2face.models.palette import EXPRESSIONS, Palette
 
@@ -45,7 +41,6 @@ ONSET_S = 0.6
 NOD_KEYS = ((0.0, 0.0), (0.18, 1.0), (0.42, -0.1), (0.55, 0.0))
 NOD_RAD = math.radians(6.0)  # of a nod of size 1; radians, as a head moves with a stressed word
 SACCADE_S = 0.06  # transition to a gaze target; saccades of 10 degrees take 50 ms (Bahill et al. 1975)
-MAX_OVERRUN_S = 0.05  # tolerance for spans that end after the clip: times are often rounded to tenths of a second
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,33 +89,18 @@ class Timeline:
             check_feature(feature)
             check_style(style)
         object.__setattr__(self, "style", MappingProxyType(dict(self.style)))
-        object.__setattr__(self, "spans", sort_spans(self.spans))
-        object.__setattr__(self, "expressions", sort_spans(self.expressions))
-        object.__setattr__(self, "nods", tuple(sorted(self.nods, key=lambda nod: nod.time)))
-        object.__setattr__(self, "gaze", sort_spans(self.gaze))
+        for name, kind in KINDS.items():
+            object.__setattr__(self, name, kind.ordered(getattr(self, name)))
         for feature, seed in self.seeds.items():
             check_feature(feature)
             if seed < 0:
                 raise InputError(f"the seed of {feature} must be 0 or more, not {seed}")
         object.__setattr__(self, "seeds", MappingProxyType(dict(self.seeds)))
-        check_lanes(self.strengths)
-        check_lanes(self.curves)
-        check_lanes(self.edits)
 
     @property
     def style_names(self) -> tuple[str, ...]:
         """Names of all requested styles in order of first use."""
         return tuple(dict.fromkeys([*self.style.values(), *(span.style for span in self.spans)]))
-
-    @property
-    def end(self) -> float:
-        """Latest time in seconds of any element; spans without an end count by their start."""
-        ends = [span.start if math.isinf(span.end) else span.end for span in self._all_spans]
-        return max([0.0, *ends, *(nod.time for nod in self.nods)])
-
-    @property
-    def _all_spans(self) -> tuple[StyleSpan | ExpressionSpan | GazeTarget, ...]:
-        return (*self.spans, *self.expressions, *self.gaze)
 
     def style_at(self, feature: str, times: ArrayLike, *, default: str) -> tuple[str, ...]:
         """Style of a feature at each of T times, without blending; `default` if none is requested."""
@@ -187,68 +167,43 @@ class Timeline:
     def merge(self, later: "Timeline") -> "Timeline":
         """Merge with another timeline, which takes precedence where both overlap."""
         return Timeline(
-            {**self.style, **later.style},
-            overlay_spans(self.spans, later.spans),
-            overlay_spans(self.expressions, later.expressions),
-            self.nods + later.nods,
-            Gains({**self.gains.factors, **later.gains.factors}),
-            overlay_spans(self.gaze, later.gaze),
-            override_curves(self.strengths, later.strengths),
-            override_curves(self.curves, later.curves),
-            override_curves(self.edits, later.edits),
-            {**self.seeds, **later.seeds},
+            style={**self.style, **later.style},
+            gains=Gains({**self.gains.factors, **later.gains.factors}),
+            seeds={**self.seeds, **later.seeds},
+            **{name: kind.merged(getattr(self, name), getattr(later, name)) for name, kind in KINDS.items()},
         )
 
     def shift(self, seconds: float) -> "Timeline":
         """The same timeline, delayed by `seconds`."""
-        return replace(
-            self,
-            spans=tuple(shift_span(span, seconds) for span in self.spans),
-            expressions=tuple(shift_span(span, seconds) for span in self.expressions),
-            nods=tuple(replace(nod, time=nod.time + seconds) for nod in self.nods),
-            gaze=tuple(shift_span(span, seconds) for span in self.gaze),
-            strengths=tuple(shift_keys(curve, seconds) for curve in self.strengths),
-            curves=tuple(shift_keys(curve, seconds) for curve in self.curves),
-            edits=tuple(shift_keys(curve, seconds) for curve in self.edits),
-        )
+        return self._changed(lambda kind, elements: kind.shifted(elements, seconds))
 
     def restrict(self, start: float, end: float) -> "Timeline":
         """The elements within [start, end), with spans cut to this range and whole curves; times are unchanged."""
-        return replace(
-            self,
-            spans=cut_spans(self.spans, start, end),
-            expressions=cut_spans(self.expressions, start, end),
-            gaze=cut_spans(self.gaze, start, end),
-            nods=tuple(nod for nod in self.nods if start <= nod.time < end),
-        )
+        return self._changed(lambda kind, elements: kind.restricted(elements, start, end))
 
-    def check(self, palette: Palette, duration: float) -> None:
-        """Refuse styles that a palette lacks and times beyond the end of a clip.
+    def _changed(self, change: Callable[[ElementKind, Sequence[Any]], tuple[Any, ...]]) -> "Timeline":
+        """The same timeline with other elements of each kind."""
+        elements: dict[str, Any] = {name: change(kind, getattr(self, name)) for name, kind in KINDS.items()}
+        return replace(self, **elements)
+
+    def check_styles(self, palette: Palette) -> None:
+        """Refuse styles that a palette lacks.
 
         Raises
         ------
         InputError
-            A style is unknown, or a time lies behind the end.
+            A style is unknown.
         """
-        self.check_styles(palette)
-        self.check_duration(duration)
-
-    def check_styles(self, palette: Palette) -> None:
-        """Refuse styles that a palette lacks; as `check`."""
         for name in self.style_names:
             palette.require(name)
 
     def check_duration(self, duration: float) -> None:
-        """Refuse times beyond a clip; as `check`."""
-        for span in self._all_spans:
-            last = span.start if math.isinf(span.end) else span.end - MAX_OVERRUN_S
-            if max(last, span.start) >= duration:
-                raise InputError(
-                    f"the span of {span.lane} from {span.start:g} to {span.end:g} s lies beyond the clip, which lasts "
-                    f"{duration:.2f} s; shorten it"
-                )
-        for nod in self.nods:
-            if nod.time >= duration:
-                raise InputError(
-                    f"the nod at {nod.time:g} s lies beyond the clip, which lasts {duration:.2f} s; move it"
-                )
+        """Refuse times beyond the end of a clip.
+
+        Raises
+        ------
+        InputError
+            A span or nod lies behind the end.
+        """
+        for name, kind in KINDS.items():
+            kind.check_duration(getattr(self, name), duration)

@@ -96,8 +96,8 @@ def logistic(logits: FloatArray) -> FloatArray:
 
 def mouth_scores(scores: Trajectory) -> FloatArray:
     """Scores (T, S) of `SCORE_SHAPES` among blendshape scores (T, B) by name."""
-    columns = [[scores.channels.index(name) for name in names] for names in SCORE_SHAPES.values()]
-    return np.stack([scores.values[:, at].mean(axis=1, dtype=np.float64) for at in columns], axis=1)
+    means = [scores.columns(names).mean(axis=1, dtype=np.float64) for names in SCORE_SHAPES.values()]
+    return np.stack(means, axis=1)
 
 
 def score_map_arrays(score_map: ScoreMap | None) -> dict[str, NDArray[Any]]:

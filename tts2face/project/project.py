@@ -9,7 +9,7 @@ from lexicon.errors import InputError
 from lexicon.ipa import Segment
 from lexicon.json_values import check_type
 from tts2face.exemplar.options import ExcludedToken
-from tts2face.gesture.spans import Gains, check_feature
+from tts2face.gesture.elements import Gains, check_feature
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import FEATURES
 from tts2face.render.picture import Picture

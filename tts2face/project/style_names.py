@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+from tts2face.gesture.elements import StyleSpan
 from tts2face.gesture.notation import parse_style
-from tts2face.gesture.spans import StyleSpan
 from tts2face.project.project import Project
 
 

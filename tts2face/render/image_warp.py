@@ -10,11 +10,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.compilation import inlined_kernel, kernel
-from tts2face.interpolation import interpolate_bilinear
 
 Array = NDArray[Any]
 
 EDGE_TOLERANCE = -1e-6  # least barycentric coordinate inside a triangle: leaves no gap between neighbours
+
+
+@kernel
+def interpolate_bilinear(picture: Array, x: float, y: float, c: int) -> float:
+    """Value of channel `c` of an (H, W, C) picture at (x, y) in pixels; positions outside are clamped to the edge."""
+    height, width = picture.shape[0], picture.shape[1]
+    x = min(max(x, 0.0), width - 1.0)
+    y = min(max(y, 0.0), height - 1.0)
+    left, top = int(x), int(y)
+    right, below = min(left + 1, width - 1), min(top + 1, height - 1)
+    across, along = x - left, y - top
+    upper = picture[top, left, c] * (1.0 - across) + picture[top, right, c] * across
+    lower = picture[below, left, c] * (1.0 - across) + picture[below, right, c] * across
+    return float(upper * (1.0 - along) + lower * along)
+
+
+@kernel
+def sample_triangles(picture: Array, points: Array, corners: Array, weights: Array, out: Array) -> None:
+    """Sample an (H, W, C) picture at P positions inside triangles of (N, 2) points, into (P, C) `out`.
+
+    Position i is the sum of ``weights[i, k] * points[corners[i, k]]``, k = 0..2 (piecewise-affine warping).
+    """
+    for i in range(len(corners)):
+        x = y = 0.0
+        for k in range(3):
+            x += weights[i, k] * points[corners[i, k], 0]
+            y += weights[i, k] * points[corners[i, k], 1]
+        for c in range(out.shape[1]):
+            out[i, c] = interpolate_bilinear(picture, x, y, c)
 
 
 @inlined_kernel

@@ -77,7 +77,7 @@ def encode_sound(sounds: Iterator[Waveform], format: str) -> Iterator[Chunk]:
 def _blocks(sound: Waveform) -> Iterator[Waveform]:
     size = round(BLOCK_S * sound.rate)
     for begin in range(0, len(sound.samples), size):
-        yield Waveform(sound.samples[begin : begin + size], sound.rate)
+        yield sound.part(begin, begin + size)
 
 
 def wav_header(rate: int, n_bytes: int | None) -> bytes:

@@ -5,7 +5,7 @@ own geometry, so that they are the same for every talker and language.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +94,7 @@ class Articulator:
         factor
             Of rounding, spreading and opening, `NATURAL` for the talker's own.
         """
-        times = np.arange(len(weights)) / weights.fps
+        times = weights.times
         tracks = articulation_tracks(phones, times)
         values = weights.values.astype(np.float64)
         if factor > NATURAL:
@@ -111,7 +111,7 @@ class Articulator:
         values = self.tongue.move(values, gap, tracks)
         tongue = np.setdiff1d(np.arange(values.shape[1]), self.mouth.moving)
         values[:, tongue] = limit_speed(values[:, tongue], weights.fps)
-        return Trajectory(weights.channels, values.astype(np.float32), weights.fps)
+        return replace(weights, values=values.astype(np.float32))
 
     def _add_by_class(self, speech: FloatArray, tracks: Mapping[str, FloatArray], strength: float) -> FloatArray:
         """Speech (T, K) with rounding, spreading and opening added, up to the targets of the phone classes."""

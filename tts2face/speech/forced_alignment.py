@@ -180,7 +180,7 @@ def _trim_to_audible(sound: Waveform) -> tuple[Waveform, float]:
     margin = round(MARGIN_S * sound.rate)
     first = max(0, int(loud[0]) * window - margin)
     last = min(len(sound.samples), (int(loud[-1]) + 1) * window + margin)
-    return Waveform(sound.samples[first:last], sound.rate), first / sound.rate
+    return sound.part(first, last), first / sound.rate
 
 
 def _pcm_bytes(sound: Waveform) -> bytes:

@@ -71,8 +71,7 @@ def _window_levels(sound: Waveform) -> NDArray[np.float64]:
 
 def cut_sound(sound: Waveform, span: tuple[float, float]) -> Waveform:
     """The sound in a span of seconds."""
-    first, last = (round(second * sound.rate) for second in span)
-    return Waveform(sound.samples[first:last], sound.rate)
+    return sound.part(*(round(second * sound.rate) for second in span))
 
 
 def sound_windows(sound: Waveform, window_s: float) -> NDArray[np.float32]:

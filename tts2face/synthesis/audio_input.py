@@ -17,15 +17,15 @@ from lexicon.errors import DataError, InputError
 from lexicon.ipa import Segment
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.clock import exact_rate, first_sample
-from tts2face.interpolation import interpolate_cubic
 from tts2face.models.audio_map import AudioMap
 from tts2face.models.talker import Talker, speech_channels
+from tts2face.numeric import interpolate_cubic
 from tts2face.request import Request
 from tts2face.speech.features import FEATURE_RATE, speech_level
 from tts2face.speech.streaming_listener import StreamingFeatures
 from tts2face.speech.text_fit import TextMismatch
 from tts2face.speech.transcript_alignment import align_recording, pronounce_transcript
-from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, frame_count
+from tts2face.types import Clip, Speech, Trajectory, Waveform, frame_count, resting_head
 from tts2face.video.media import sound_blocks
 
 CLIP_RATE = 48_000  # Hz, sample rate of the clips
@@ -126,10 +126,9 @@ def recording_clips(path: Path, transcript: TimedTranscript, motion: Trajectory,
         samples = np.clip(volume * sound.next(end - begin), -1.0, 1.0)
         seconds = (float(Fraction(first) / fps), len(samples) / CLIP_RATE)
         phones, words = _phones_within(transcript, *seconds)
-        head = np.zeros((last - first, len(HEAD_CHANNELS)), np.float32)
         yield Clip(
-            Trajectory(motion.channels, motion.values[first:last], motion.fps),
-            Trajectory(HEAD_CHANNELS, head, motion.fps),
+            motion.part(first, last),
+            resting_head(last - first, motion.fps),
             Speech(Waveform(samples, CLIP_RATE), phones, words),
         )
 

@@ -1,13 +1,12 @@
 """Corrections of finished motion by hand: offsets of single channels through key points."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lexicon.errors import InputError
-from tts2face.gesture.easing import interpolate_keys
-from tts2face.gesture.key_curves import ChannelEdit
+from tts2face.gesture.elements import ChannelEdit, interpolate_keys
 from tts2face.synthesis.animated_face import AnimatedFace, FaceMotion
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
@@ -43,7 +42,7 @@ class ChannelEdits:
         edited = [face.channels.index(edit.channel) for edit in self.edits if edit.channel in face.channels]
         values = face.values.copy()
         values[:, edited] = clipped[:, edited]
-        return FaceMotion(Trajectory(face.channels, values, face.fps), _offset(motion.head, self.edits, times))
+        return FaceMotion(replace(face, values=values), _offset(motion.head, self.edits, times))
 
 
 def _offset(motion: Trajectory, edits: Sequence[ChannelEdit], times: np.ndarray) -> Trajectory:
@@ -51,4 +50,4 @@ def _offset(motion: Trajectory, edits: Sequence[ChannelEdit], times: np.ndarray)
     for edit in edits:
         if edit.channel in motion.channels:
             values[:, motion.channels.index(edit.channel)] += interpolate_keys(times, edit.keys).astype(np.float32)
-    return Trajectory(motion.channels, values, motion.fps)
+    return replace(motion, values=values)

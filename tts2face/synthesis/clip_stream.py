@@ -26,7 +26,6 @@ from tts2face.synthesis.speech_stream import (
     Piece,
     SpeechModels,
     dictionary_entries,
-    padded,
     shifted,
     speak_sentences,
 )
@@ -166,7 +165,7 @@ def _with_gestures(speech: Speech, lips: Trajectory, timeline: Timeline, layer: 
 def _with_sound(clip: Clip, sound: Waveform) -> Clip:
     """Replace the sound of a clip by its final sound, padded with silence to the same length."""
     speech = clip.speech
-    return replace(clip, speech=replace(speech, waveform=padded(sound, len(speech.waveform.samples))))
+    return replace(clip, speech=replace(speech, waveform=sound.padded(len(speech.waveform.samples))))
 
 
 def _explanation(

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.marked_text import MAX_PAUSE_S, PauseMark
-from lexicon.sequence import SILENCE, PhoneSequence
+from lexicon.sequence import PhoneSequence
 from tts2face.clock import first_sample
 from tts2face.numeric import smoothstep
 from tts2face.request import IDLE_LIMITS_S, Request
 from tts2face.synthesis.prepared_request import PreparedRequest, prepare
 from tts2face.synthesis.speech_stream import Piece
-from tts2face.types import Clip, Speech, Trajectory, Waveform
+from tts2face.types import Clip, Speech, Waveform
 
 EASE_S = 0.25  # from and to rest; a head turns back within a quarter of a second
 MARGIN_FRAMES = 0.25  # by which a padded sound ends before its last frame does, so that rounding adds no frame
@@ -78,15 +78,11 @@ def first_frames(clip: Clip, n_frames: int) -> Clip:
     n_phones = max(int(np.searchsorted(phones.edges[:-1], seconds - MIN_PHONE_S)), 1)
     labels = [*phones.phones[:n_phones]]
     speech = Speech(
-        Waveform(sound.samples[:n_samples], sound.rate),
+        sound.part(0, n_samples),
         PhoneSequence(labels, [*phones.edges[:n_phones], seconds]),
         tuple(word for word in clip.speech.words if word.last <= n_phones),
     )
-    return Clip(
-        Trajectory(clip.motion.channels, clip.motion.values[:n_frames], fps),
-        Trajectory(clip.head.channels, clip.head.values[:n_frames], fps),
-        speech,
-    )
+    return Clip(clip.motion.part(0, n_frames), clip.head.part(0, n_frames), speech)
 
 
 def ease_weights(n_frames: int, fps: float) -> NDArray[np.float32]:
@@ -107,13 +103,12 @@ def _eased(clips: Iterator[Clip], n_frames: int, first_channel: int) -> Iterator
         weights = ease_weights(n_frames, clip.fps) if weights is None else weights
         part = weights[at : at + len(clip.motion), None]
         at += len(clip.motion)
-        motion, head = clip.motion, clip.head
-        values = motion.values.copy()
+        values = clip.motion.values.copy()
         values[:, first_channel:] *= part
         yield replace(
             clip,
-            motion=Trajectory(motion.channels, values, motion.fps),
-            head=Trajectory(head.channels, head.values * part, head.fps),
+            motion=replace(clip.motion, values=values),
+            head=replace(clip.head, values=clip.head.values * part),
         )
 
 
@@ -150,14 +145,12 @@ def _with_silence(clip: Clip, rate: int, first: int, fps: Fraction) -> Clip:
 def _resting(like: Clip, n_frames: int, first: int, fps: Fraction) -> Clip:
     """Some frames in which the face keeps its last position."""
     return Clip(
-        Trajectory(like.motion.channels, np.repeat(like.motion.values[-1:], n_frames, axis=0), like.fps),
-        Trajectory(like.head.channels, np.repeat(like.head.values[-1:], n_frames, axis=0), like.fps),
+        replace(like.motion, values=np.repeat(like.motion.values[-1:], n_frames, axis=0)),
+        replace(like.head, values=np.repeat(like.head.values[-1:], n_frames, axis=0)),
         _silence(n_frames, like.speech.waveform.rate, first, fps),
     )
 
 
 def _silence(n_frames: int, rate: int, first: int, fps: Fraction) -> Speech:
     n_samples = first_sample(first + n_frames, rate, fps) - first_sample(first, rate, fps)
-    return Speech(
-        Waveform(np.zeros(n_samples, np.float32), rate), PhoneSequence([SILENCE], [0.0, n_samples / rate]), ()
-    )
+    return Speech.without_phones(Waveform(np.zeros(n_samples, np.float32), rate))

@@ -2,6 +2,7 @@
 
 from collections.abc import Hashable
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from hashlib import blake2b
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from tts2face.face.body import Body
 from tts2face.face.gesture_transfer import SPEECH_GAINS
-from tts2face.gesture.easing import interpolate_keys
+from tts2face.gesture.elements import KINDS, interpolate_keys
 from tts2face.gesture.gesture_stream import GestureFields, GestureStream, GestureValues
 from tts2face.gesture.microsaccades import microsaccades
 from tts2face.gesture.perlin_noise import NoiseStream
@@ -99,7 +100,7 @@ class GestureLayer:
         recent = self._marked.restrict(self._seconds - 1.0, np.inf)  # a nod of the last piece lasts half a second
         marked = recent.merge(marks)
         timeline = self._requested.merge(marked)
-        times = self._seconds + np.arange(len(lips)) / lips.fps
+        times = self._seconds + lips.times
         if self._memory.is_used:
             self._history = _digest(self._history, times, speech.waveform, timeline)
         gestures, stream = self._memory.recall(
@@ -113,7 +114,7 @@ class GestureLayer:
             lambda made: made.face.values.nbytes + lips.values.nbytes,
         )
         moved = self._edits.apply(moved, round(self._seconds * lips.fps))
-        self._stream, self._marked, self._seconds = stream, marked, self._seconds + len(lips) / lips.fps
+        self._stream, self._marked, self._seconds = stream, marked, self._seconds + lips.duration
         return Clip(self._body.move(moved.face, moved.head, speech.phones), moved.head, speech)
 
     def _next(
@@ -140,11 +141,14 @@ class GestureLayer:
 
 def _digest(history: Hashable, times: NDArray[np.float64], sound: Waveform, timeline: Timeline) -> bytes:
     """Digest of everything on which the gestures of a piece, after those before it, depend."""
-    here = timeline.restrict(times[0] - REACH_S, times[-1] + REACH_S)
-    curves = [(one.feature, interpolate_keys(times, one.keys).tobytes()) for one in here.strengths]
-    curves += [(one.expression, interpolate_keys(times, one.keys).tobytes()) for one in here.curves]
-    elements = (dict(here.style), here.spans, here.expressions, here.nods, here.gaze, dict(here.gains.factors))
-    found = blake2b(repr((history, elements, curves, sorted(here.seeds.items()))).encode())
+    here = replace(timeline.restrict(times[0] - REACH_S, times[-1] + REACH_S), edits=())  # which are added to gestures
+    elements = [
+        (name, kind.lane(one), interpolate_keys(times, one.keys).tobytes()) if kind.shape == "curve" else one
+        for name, kind in KINDS.items()
+        for one in getattr(here, name)
+    ]
+    maps = (dict(here.style), dict(here.gains.factors), sorted(here.seeds.items()))
+    found = blake2b(repr((history, elements, maps)).encode())
     found.update(times.tobytes())
     found.update(sound.samples.tobytes())
     return found.digest()

@@ -13,10 +13,9 @@ from lexicon.errors import InputError
 from lexicon.marked_text import Mark, MarkedText, NameMark, NodMark, StyleRun
 from lexicon.pronounce import PAUSES_S
 from lexicon.sentences import Phrase, Sentence, index_by_letters, n_letters
-from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.clock import first_sample
-from tts2face.gesture.easing import span_weights
-from tts2face.gesture.spans import Nod, StyleSpan
+from tts2face.gesture.elements import Nod, StyleSpan, span_weights
 from tts2face.gesture.timeline import Timeline
 from tts2face.request import Request
 from tts2face.synthesis.mark_styles import innermost_styles
@@ -141,8 +140,7 @@ def sentence_sound(
     delivery = delivery_of(part, sentence.runs, request, deliveries)
     rate = request.rate * part.rate * delivery.rate
     sound = speaker.sound(phrase_content(part), rate=rate, seed=request.seed)
-    whole = Speech(sound, PhoneSequence([SILENCE], [0.0, sound.duration]), ())
-    whole = _ended(resampled_speech(whole, voice.sample_rate), sentence, part)
+    whole = _ended(resampled_speech(Speech.without_phones(sound), voice.sample_rate), sentence, part)
     levelled = level_speech([whole], [request.volume * delivery.volume * np.ones(1)])
     return _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
 

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.exemplar.motion_measures import DTW_BAND_S, pearson, speech_frames, warping_cost
-from tts2face.interpolation import interpolate_columns
 from tts2face.models.landmarks import lip_opening, lip_width
 from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.types import Trajectory
@@ -120,11 +119,6 @@ def map_channels(motion: Trajectory, channels: Sequence[str]) -> NDArray[np.floa
     for name in common:
         values[:, list(channels).index(name)] = motion.values[:, motion.channels.index(name)]
     return values
-
-
-def values_at(motion: Trajectory, times: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Values (N, K) of a motion at N seconds, linear between its frames; constant before and after."""
-    return interpolate_columns(motion.values, np.arange(len(motion)) / motion.fps, times).astype(np.float32)
 
 
 def _lips(face: AnimatedFace, names: tuple[str, ...], motion: Values, fps: float) -> NDArray[np.float64]:

@@ -1,18 +1,18 @@
 """Transfer of a performer's video or an ARKit capture to a face; the original sound is retained."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from lexicon.errors import InputError
 from lexicon.inputs import check_limits
-from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.clock import exact_rate, first_sample
 from tts2face.face.body import Body
+from tts2face.numeric import interpolate_rows
 from tts2face.synthesis.animated_face import AnimatedFace, FaceMotion
-from tts2face.types import Clip, Speech, Trajectory, Waveform
+from tts2face.types import Clip, Speech, Waveform
 from tts2face.video.blendshapes import BlendshapeReader
 from tts2face.video.livelink import read_livelink
 from tts2face.video.media import read_media_info, read_sound
@@ -76,7 +76,7 @@ class PerformedTake:
     @property
     def seconds(self) -> float:
         """Duration of the motion."""
-        return len(self.motion.face) / self.motion.face.fps
+        return self.motion.face.duration
 
 
 def perform(
@@ -159,15 +159,9 @@ def resample_take(motion: FaceMotion, fps: float) -> FaceMotion:
     n_frames = max(1, int(np.floor((len(motion.face) - 1) / old * fps + 1e-6)) + 1)
     at = np.minimum(np.arange(n_frames) / fps * old, len(motion.face) - 1)
 
-    def read(trajectory: Trajectory) -> Trajectory:
-        low = at.astype(int)
-        high = np.minimum(low + 1, len(trajectory) - 1)
-        share = (at - low)[:, None].astype(np.float32)
-        return Trajectory(
-            trajectory.channels, (1 - share) * trajectory.values[low] + share * trajectory.values[high], fps
-        )
-
-    return FaceMotion(read(motion.face), read(motion.head))
+    return FaceMotion(
+        *(replace(one, values=interpolate_rows(one.values, at), fps=fps) for one in (motion.face, motion.head))
+    )
 
 
 def take_clips(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
@@ -176,13 +170,6 @@ def take_clips(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
     for first in range(0, len(motion.face), MAX_CLIP_FRAMES):
         last = min(first + MAX_CLIP_FRAMES, len(motion.face))
         begin, end = (first_sample(frame, sound.rate, fps) for frame in (first, last))
-        samples = np.zeros(end - begin, np.float32)
-        available = sound.samples[begin:end]
-        samples[: len(available)] = available
-        speech = Speech(Waveform(samples, sound.rate), PhoneSequence([SILENCE], [0.0, len(samples) / sound.rate]), ())
-        face, head = (_cut_trajectory(one, slice(first, last)) for one in (motion.face, motion.head))
+        speech = Speech.without_phones(sound.part(begin, end).padded(end - begin))
+        face, head = motion.face.part(first, last), motion.head.part(first, last)
         yield Clip(body.move(face, head, speech.phones), head, speech)
-
-
-def _cut_trajectory(trajectory: Trajectory, frames: slice) -> Trajectory:
-    return Trajectory(trajectory.channels, trajectory.values[frames], trajectory.fps)

@@ -15,8 +15,8 @@ from lexicon.sentences import Sentence, split_sentences
 from lexicon.writing_systems import check_readable
 from tts2face.clock import exact_rate
 from tts2face.exemplar.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
+from tts2face.gesture.elements import Gains
 from tts2face.gesture.notation import parse_expressions, parse_gains, parse_style
-from tts2face.gesture.spans import Gains
 from tts2face.gesture.timeline import Timeline
 from tts2face.gesture.timeline_file import read_timeline
 from tts2face.render.picture import Picture

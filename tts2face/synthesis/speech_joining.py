@@ -88,24 +88,17 @@ def trim_end(speech: Speech) -> Speech:
 def silent_speech(seconds: float, rate: int) -> Speech:
     """Speech that consists of silence, of at least one sample."""
     n_samples = max(round(seconds * rate), 1)
-    phones = PhoneSequence([SILENCE], [0.0, n_samples / rate])
-    return Speech(Waveform(np.zeros(n_samples, np.float32), rate), phones, ())
+    return Speech.without_phones(Waveform(np.zeros(n_samples, np.float32), rate))
 
 
 def resampled_speech(speech: Speech, rate: int) -> Speech:
-    """Resample speech to `rate` Hz; all phone edges but the last, the duration of the sound, are unchanged.
-
-    The sound is clipped to full scale. Source: soxr, quality HQ (De Jong, the SoX resampler library).
-    """
-    sound = speech.waveform
-    if sound.rate == rate:
+    """Resample speech to `rate` Hz; all phone edges but the last, the duration of the sound, are unchanged."""
+    if speech.waveform.rate == rate:
         return speech
-    import soxr
-
-    samples = np.clip(soxr.resample(sound.samples, sound.rate, rate, quality="HQ"), -1.0, 1.0)
+    sound = speech.waveform.resampled(rate)
     edges = speech.phones.edges.copy()
-    edges[-1] = len(samples) / rate
-    return Speech(Waveform(samples, rate), PhoneSequence(speech.phones.phones, edges), speech.words)
+    edges[-1] = sound.duration
+    return Speech(sound, PhoneSequence(speech.phones.phones, edges), speech.words)
 
 
 def _silence_at_ends(speech: Speech) -> tuple[float, float]:

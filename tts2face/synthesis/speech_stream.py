@@ -145,7 +145,7 @@ def _timed_sentences(prepared: PreparedRequest, models: SpeechModels) -> Iterato
     fps, first_frame = prepared.fps, 0
     for spoken, n_steps, text in speak_sentences(prepared, models):
         speech, begin = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
-        sound = padded(spoken.sound, len(speech.waveform.samples))
+        sound = spoken.sound.padded(len(speech.waveform.samples))
         yield TimedSpeech(replace(speech, waveform=sound), begin, shifted(spoken.marks, begin), n_steps, text)
         first_frame += frame_count(speech.waveform.duration, float(fps))
 
@@ -169,8 +169,7 @@ def _sounds(prepared: PreparedRequest, models: SpeechModels) -> Iterator[TimedSp
     for sound, n_steps in found:
         last_frame = first_frame + frame_count(sound.duration, float(fps))
         n_samples = first_sample(last_frame, sound.rate, fps) - first_sample(first_frame, sound.rate, fps)
-        whole = padded(sound, max(n_samples, len(sound.samples)))
-        speech = Speech(whole, PhoneSequence([SILENCE], [0.0, whole.duration]), ())
+        speech = Speech.without_phones(sound.padded(n_samples))
         yield TimedSpeech(speech, float(first_frame / fps), n_steps=n_steps)
         first_frame = last_frame
 
@@ -236,10 +235,3 @@ def dictionary_entries(prepared: PreparedRequest) -> Hashable:
 def shifted(marks: tuple[MarkTime, ...], seconds: float) -> tuple[MarkTime, ...]:
     """Marks with later times."""
     return tuple(replace(mark, seconds=mark.seconds + seconds) for mark in marks)
-
-
-def padded(sound: Waveform, n_samples: int) -> Waveform:
-    """Sound followed by silence up to a number of samples."""
-    samples = np.zeros(n_samples, np.float32)
-    samples[: len(sound.samples)] = sound.samples
-    return Waveform(samples, sound.rate)

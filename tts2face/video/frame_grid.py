@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.interpolation import interpolate_linear
+from tts2face.numeric import interpolate_linear
 
 MAX_FILLED_GAP_S = 0.12  # longest gap that is interpolated; lips make no complete movement in less
 SAME_INSTANT_S = 0.001  # times in a file are rounded to milliseconds

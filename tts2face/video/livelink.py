@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_table
-from tts2face.interpolation import interpolate_columns
+from tts2face.numeric import interpolate_columns
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
 HEAD_COLUMNS = ("HeadPitch", "HeadYaw", "HeadRoll")

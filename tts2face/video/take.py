@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.interpolation import interpolate_linear
+from tts2face.numeric import interpolate_linear
 from tts2face.types import HEAD_CHANNELS, Progress, Trajectory
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.frame_grid import resample_to_grid

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ from tts2face.service.synthesis.messages import Event
 from tts2face.service.synthesis.project_tasks import DIGEST_BYTES, read_project
 from tts2face.service.synthesis.work import Inputs, Work
 from tts2face.synthesis.animated_face import AnimatedFace, FaceMotion
-from tts2face.synthesis.motion_comparison import MotionPart, compare_motion, map_channels, values_at
+from tts2face.synthesis.motion_comparison import MotionPart, compare_motion, map_channels
 from tts2face.types import HEAD_CHANNELS, Chunk, Trajectory
 from tts2face.video.livelink import read_livelink
 
@@ -52,7 +52,7 @@ def recorded_motion(session: "Session", work: Work, _: Inputs) -> Iterator[Event
     yield Event({"type": "begin", "fps": float(project.request.fps)})
     yield Event({
         "type": "piece", "number": 0, "text": "", "occurrence": 0, "begin": 0.0,
-        "seconds": len(values) / motion.face.fps, "rate": SILENT_RATE, "n_frames": len(values), "n_samples": 0,
+        "seconds": motion.face.duration, "rate": SILENT_RATE, "n_frames": len(values), "n_samples": 0,
         "digest": digest, "phones": [], "edges": [0.0], "words": [], "notes": [],
         "channels": list(motion.face.channels),
     })  # fmt: skip
@@ -74,8 +74,7 @@ def _recorded(session: "Session", options: Mapping[str, Any], project: Project) 
     if n_frames < 1:
         raise InputError(f"the recording ends before its second {offset:g}; give a smaller offset")
     times = offset + np.arange(n_frames) / fps
-    shown, head = (Trajectory(one.channels, values_at(one, times), fps) for one in (found.face, found.head))
-    return FaceMotion(shown, head)
+    return FaceMotion(*(replace(one, values=one.at(times), fps=fps) for one in (found.face, found.head)))
 
 
 def _utterance_motion(talker: Talker, name: str, face: AnimatedFace) -> FaceMotion:
@@ -148,8 +147,8 @@ def _is_same_time(made: Sequence[_Made], sentences: Sequence[Any]) -> bool:
 
 def _part_of_same_time(one: _Made, reference: Trajectory, fps: float) -> MotionPart:
     times = one.begin + np.arange(len(one.motion)) / fps
-    n = int((times < len(reference) / reference.fps).sum())
-    return MotionPart(values_at(reference, times[:n]), one.motion[:n], one.phones)
+    n = int((times < reference.duration).sum())
+    return MotionPart(reference.at(times[:n]), one.motion[:n], one.phones)
 
 
 def _parts_of_equal_sentences(
@@ -162,5 +161,5 @@ def _parts_of_equal_sentences(
         if same is not None:
             sentences.remove(same)
             times = np.arange(same[2], same[3], 1 / fps)
-            found.append(MotionPart(values_at(reference, times), one.motion, one.phones, is_same_time=False))
+            found.append(MotionPart(reference.at(times), one.motion, one.phones, is_same_time=False))
     return found

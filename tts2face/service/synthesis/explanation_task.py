@@ -1,7 +1,7 @@
 """Task of the studio that explains a phone: the recorded examples that made it, and outlines of their lips."""
 
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,13 +9,12 @@ import numpy as np
 from lexicon.errors import DataError, InputError
 from tts2face.exemplar.explanation import PhoneExplanation
 from tts2face.exemplar.lip_outlines import N_INSTANTS, LipOutline, lip_outlines, token_outlines
-from tts2face.interpolation import interpolate_columns
 from tts2face.models.talker import Talker
 from tts2face.service.synthesis.messages import Event
 from tts2face.service.synthesis.project_tasks import read_project
 from tts2face.service.synthesis.work import Inputs, Work
 from tts2face.synthesis.animated_face import AnimatedFace
-from tts2face.types import Chunk, Trajectory
+from tts2face.types import Chunk
 
 if TYPE_CHECKING:
     from tts2face.session import Session
@@ -57,10 +56,10 @@ def _made_outlines(face: AnimatedFace, piece: "Piece", phone: PhoneExplanation) 
     """Outlines of the lips of a piece from the beginning of a phone to its end; empty if the face cannot tell."""
     motion = piece.clip.motion
     times = np.linspace(phone.start, phone.end, N_INSTANTS) - piece.begin
-    shown = interpolate_columns(motion.values, np.arange(len(motion)) / motion.fps, times).astype(np.float32)
+    shown = motion.at(times)
     still = np.zeros_like(shown[:1])
     try:
-        moved, rest = (face.landmarks(Trajectory(motion.channels, values, motion.fps)) for values in (shown, still))
+        moved, rest = (face.landmarks(replace(motion, values=values)) for values in (shown, still))
     except (DataError, InputError):
         return []
     return _json(lip_outlines(moved, rest[0]))

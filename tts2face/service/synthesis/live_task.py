@@ -156,7 +156,7 @@ class _Curves:
         content["weights"] = _rounded(self._projection.weights(motion.values))
         if head is not None:
             content["head"] = _rounded(head.values)
-        return Event(content, 0.0 if head is not None else len(motion) / motion.fps)
+        return Event(content, 0.0 if head is not None else motion.duration)
 
 
 def _rounded(values: NDArray[np.floating]) -> list[list[float]]:

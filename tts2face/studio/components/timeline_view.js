@@ -100,7 +100,7 @@ export function firstAfter(items, time, end) {
   return low;
 }
 
-/** Value at a time of the curve through keys, as tts2face/gesture/key_curves.py; `empty` without keys. */
+/** Value at a time of the curve through keys, as tts2face/gesture/elements.py; `empty` without keys. */
 export function curveValue(keys, time, empty = 0) {
   if (!keys.length) return empty;
   if (time <= keys[0][0]) return keys[0][1];

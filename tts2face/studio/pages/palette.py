@@ -12,7 +12,7 @@ from fastapi import Request as HttpRequest
 from nicegui import events, ui
 
 from tts2face import catalogue
-from tts2face.gesture.spans import StyleSpan
+from tts2face.gesture.elements import StyleSpan
 from tts2face.gesture.timeline import Timeline
 from tts2face.models.palette import FEATURES
 from tts2face.project.project import Project

@@ -6,15 +6,15 @@ An edit is a JSON object with a ``kind`` and the fields of `EDITS`.
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any
 
 from lexicon.errors import InputError
 from lexicon.json_values import check_type, is_number
 from lexicon.sequence import PhoneSequence
 from tts2face.exemplar.options import ExcludedToken
-from tts2face.gesture.key_curves import ChannelEdit, ExpressionCurve, StrengthCurve
+from tts2face.gesture.elements import KINDS, ElementKind, GazeTarget, Nod, StyleSpan, check_feature
 from tts2face.gesture.notation import expand_feature
-from tts2face.gesture.spans import GazeTarget, Nod, StyleSpan, check_feature, cut_spans, overlay_spans
 from tts2face.gesture.timeline import Timeline
 from tts2face.project.project import Project
 from tts2face.render.picture import Picture
@@ -64,7 +64,7 @@ def _paint(project: Project, given: Edit, _: Sentences) -> Project:
         StyleSpan(feature, given["style"], max(0.0, given["start"]), given["end"])
         for feature in expand_feature(given["feature"])
     )
-    return _timed(project, spans=overlay_spans(project.timeline.spans, spans))
+    return _timed(project, spans=KINDS["spans"].merged(project.timeline.spans, spans))
 
 
 def _erase(project: Project, given: Edit, _: Sentences) -> Project:
@@ -72,29 +72,19 @@ def _erase(project: Project, given: Edit, _: Sentences) -> Project:
     kept = [span for span in project.timeline.spans if span.feature not in features]
     for feature in features:
         own = [span for span in project.timeline.spans if span.feature == feature]
-        kept += [*cut_spans(own, -1.0, given["start"]), *cut_spans(own, given["end"], math.inf)]
+        for start, end in ((-1.0, given["start"]), (given["end"], math.inf)):
+            kept += KINDS["spans"].restricted(own, start, end)
     return _timed(project, spans=tuple(kept))
 
 
-def _curve(project: Project, given: Edit, _: Sentences) -> Project:
-    return _timed(project, curves=_replaced(project.timeline.curves, given["expression"], ExpressionCurve, given))
-
-
-def _strength(project: Project, given: Edit, _: Sentences) -> Project:
-    return _timed(project, strengths=_replaced(project.timeline.strengths, given["feature"], StrengthCurve, given))
-
-
-def _channel(project: Project, given: Edit, _: Sentences) -> Project:
-    return _timed(project, edits=_replaced(project.timeline.edits, given["channel"], ChannelEdit, given))
-
-
-def _replaced(curves: tuple[Any, ...], lane: str, make: Callable[[str, Any], Any], given: Edit) -> tuple[Any, ...]:
-    """Curves with the one of a lane replaced, or removed if there are no keys."""
+def _curve(kind: ElementKind, project: Project, given: Edit, _: Sentences) -> Project:
+    """Replace the curve of a lane, or remove it if there are no keys."""
     keys = given["keys"]
     if not all(isinstance(key, list | tuple) and len(key) == 2 and all(is_number(one) for one in key) for key in keys):
         raise InputError("keys must be a list of [seconds, value]")
-    others = tuple(curve for curve in curves if curve.lane != lane)
-    return (*others, make(lane, tuple(map(tuple, keys)))) if keys else others
+    kept = [one for one in getattr(project.timeline, kind.name) if kind.lane(one) != given[kind.owner]]
+    made = [kind.record(given[kind.owner], tuple(map(tuple, keys)))] if keys else []
+    return _timed(project, **{kind.name: (*kept, *made)})
 
 
 def _nod(project: Project, given: Edit, _: Sentences) -> Project:
@@ -112,7 +102,7 @@ def _remove_nod(project: Project, given: Edit, _: Sentences) -> Project:
 
 def _gaze(project: Project, given: Edit, _: Sentences) -> Project:
     target = GazeTarget(given["down_deg"], given["left_deg"], max(0.0, given["start"]), given["end"])
-    return _timed(project, gaze=overlay_spans(project.timeline.gaze, (target,)))
+    return _timed(project, gaze=KINDS["gaze"].merged(project.timeline.gaze, (target,)))
 
 
 def _remove_gaze(project: Project, given: Edit, _: Sentences) -> Project:
@@ -213,9 +203,10 @@ _SPAN = {"start": float, "end": float}
 EDITS: Mapping[str, tuple[Mapping[str, type], Change]] = {
     "paint": ({"feature": str, "style": str, **_SPAN}, _paint),
     "erase": ({"feature": str, **_SPAN}, _erase),
-    "curve": ({"expression": str, "keys": list}, _curve),
-    "strength": ({"feature": str, "keys": list}, _strength),
-    "channel": ({"channel": str, "keys": list}, _channel),
+    **{
+        edit: ({KINDS[name].owner: str, "keys": list}, partial(_curve, KINDS[name]))
+        for edit, name in (("curve", "curves"), ("strength", "strengths"), ("channel", "edits"))
+    },
     "nod": ({"time": float, "size": float}, _nod),
     "remove_nod": ({"time": float}, _remove_nod),
     "gaze": ({**_SPAN, "down_deg": float, "left_deg": float}, _gaze),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from lexicon.errors import InputError
 from lexicon.inputs import parse_json
-from tts2face.gesture.spans import StyleSpan
+from tts2face.gesture.elements import StyleSpan
 from tts2face.gesture.timeline import Timeline
 from tts2face.project.project import MAX_NAME, Project
 from tts2face.request import Request
