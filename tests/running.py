@@ -100,7 +100,13 @@ class RunningService(Log):
         return {f"{PREFIX}DATA": self.data.name, f"{PREFIX}WARM_STUDIO": "false"} | dict(environment)
 
     def wait_until_ready(self) -> None:
-        eventually(lambda: httpx.get(f"{self.url}/readyz").status_code == 200, START_TIMEOUT_S)
+        eventually(self._is_ready, START_TIMEOUT_S)
+
+    def _is_ready(self) -> bool:
+        try:
+            return httpx.get(f"{self.url}/readyz").status_code == 200
+        except httpx.TimeoutException:  # the machine is busy
+            return False
 
 
 class ServeProcess(LoggedProcess, RunningService):

@@ -3,7 +3,7 @@
 The flags of the command line are generated from the fields and their help texts. The module imports no numeric library.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -26,9 +26,20 @@ OWN_FACE = "self"  # name of the talker's own face
 DRAWN_FACE, REALISTIC_FACE = "ada", "head"  # the shipped face that is shown by default, and the one with identities
 
 
-def option(default: Any, help_text: str) -> Any:
-    """Dataclass field with a default value and a help text in its metadata."""
-    return field(default=default, metadata={"help": help_text})
+def option(default: Any, help_text: str, *, limits: tuple[float, float] | None = None, choices: Any = ()) -> Any:
+    """Dataclass field with a default value, and in its metadata a help text, limits of a number and names to choose.
+
+    Flags, and fields of requests over HTTP, are made from it.
+    """
+    return field(default=default, metadata={"help": help_text, "limits": limits, "choices": tuple(choices)})
+
+
+def check_option_limits(options: Any) -> None:
+    """Refuse numbers of a dataclass of options that lie outside their limits (`InputError`)."""
+    for one in fields(options):
+        value, limits = getattr(options, one.name), one.metadata["limits"]
+        if limits is not None and value is not None:
+            check_limits(one.name, value, limits)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +66,7 @@ class Request:
         None,
         "Map from sound to lip motion for a recording without a transcript: network (default, most accurate for the "
         "talker's own voice) or linear (smaller movements, less sensitive to other voices).",
+        choices=AUDIO_MAP_NAMES,
     )
     language: str = option(
         "en-us",
@@ -64,14 +76,22 @@ class Request:
     voice: str | None = option(
         None, "Voice: heart or joe (English), espeak or espeak-female (every language), or a Piper voice (x.onnx)."
     )
-    rate: float = option(1.0, "Speaking rate as a factor, 0.5 to 2.")
+    rate: float = option(1.0, "Speaking rate as a factor, 0.5 to 2.", limits=RATE_LIMITS)
     plain_delivery: bool = option(
         False, "Keep the voice's rate and loudness under every style; --rate and --volume do so for themselves."
     )
-    volume: float = option(1.0, "Loudness as a factor, 0 to 2; 1 is -16 LUFS, or the original level of a recording.")
+    volume: float = option(
+        1.0,
+        "Loudness as a factor, 0 to 2; 1 is -16 LUFS, or the original level of a recording.",
+        limits=VOLUME_LIMITS,
+    )
     seed: int = option(0, "Seed of all random numbers; the same seed gives the same sound and motion.")
     dictionary: Path | None = option(None, "Pronunciation dictionary that takes precedence over the built-in one.")
-    synthesis: str = option("exemplar", "Method of lip synthesis: exemplar, or theobald2007 (the method as published).")
+    synthesis: str = option(
+        "exemplar",
+        "Method of lip synthesis: exemplar, or theobald2007 (the method as published).",
+        choices=SYNTHESIS_METHODS,
+    )
     context: int | None = option(
         None, "Number of phones on either side that are compared when exemplars are chosen; default: the method's."
     )
@@ -81,11 +101,12 @@ class Request:
         "Rounding, spreading and opening of the mouth: natural (as the talker; 1), clear (1.5), or a factor, 0.5 to 2; "
         "default: clear on a mesh, natural on a talker's own face.",
     )
-    fps: float = option(30.0, "Frames per second, 1 to 120.")
+    fps: float = option(30.0, "Frames per second, 1 to 120.", limits=FPS_LIMITS)
     gestures: str = option(
         "fields",
         "Method of gesture synthesis: fields, ju2008 (fields as published), noise (Perlin noise, for comparison), or "
         "none (only the lips move).",
+        choices=GESTURES,
     )
     style: str | None = option(
         None, "Style of the gestures: one name, or one for each feature (brows=annoyed,head=delighted)."
@@ -100,7 +121,7 @@ class Request:
     )
     timeline: Path | None = option(None, "JSON file with styles, expressions, nods and gains over time.")
     pitch: bool = option(False, "Gestures follow the pitch of the voice in addition to its loudness.")
-    idle: float | None = option(None, "Seconds of idle animation instead of speech.")
+    idle: float | None = option(None, "Seconds of idle animation instead of speech.", limits=IDLE_LIMITS_S)
 
     @property
     def articulation_factor(self) -> float | None:
@@ -125,9 +146,7 @@ class Request:
             object.__setattr__(self, "articulation", f"{self.articulation:g}")
         check_fields(self)
         object.__setattr__(self, "language", language_code(self.language))
-        check_limits("rate", self.rate, RATE_LIMITS)
-        check_limits("volume", self.volume, VOLUME_LIMITS)
-        check_limits("fps", self.fps, FPS_LIMITS)
+        check_option_limits(self)
         if self.synthesis not in SYNTHESIS_METHODS:
             raise InputError(f"there is no synthesis {self.synthesis!r}; choose {' or '.join(SYNTHESIS_METHODS)}")
         _check_articulation(self)
@@ -138,7 +157,6 @@ class Request:
         if self.audio is not None and (self.voice is not None or self.rate != 1.0):
             raise InputError("--voice and --rate have no effect on a recording; remove them or --audio")
         if self.idle is not None:
-            check_limits("idle", self.idle, IDLE_LIMITS_S)
             _check_idle(self)
         _check_gestures(self)
 

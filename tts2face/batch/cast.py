@@ -16,6 +16,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, fields
 from fnmatch import fnmatchcase
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from lexicon.errors import DataError, InputError
@@ -27,7 +28,11 @@ from tts2face.subtitles.cue import Cue
 
 MODEL_NAMES = ("talker", "face", "identity", "palette", "hair", "hair_color")
 PATTERN_NAMES = ("speaker", "subtitle_style", "file")
-NOT_IN_CAST = frozenset({"text", "audio", "audio_map", "idle", "fps", "timeline", "expression"})
+NOT_IN_CAST: Mapping[str, str] = MappingProxyType({  # options, with the reason
+    "text": "the cues have it", "audio": "that of the file", "audio_map": "the words are given", "idle": "cues speak",
+    "fps": "one of all clips", "timeline": "its times are those of one clip",
+    "expression": "its times are those of one clip",
+})  # fmt: skip
 REQUEST_NAMES = tuple(option.name for option in fields(Request) if option.name not in NOT_IN_CAST)
 PATH_NAMES = ("talker", "face", "palette", "voice", "dictionary")
 MAX_CAST_BYTES = 1_000_000

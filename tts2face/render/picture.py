@@ -43,12 +43,15 @@ class Picture:
     background: str = option(
         "studio", "studio, transparent, blur (of a photo's own), a colour (name or #rrggbb), or an image file."
     )
-    supersampling: int = option(2, "Samples along each side of a pixel: 1, 2 or 3.")
+    supersampling: int = option(2, "Samples along each side of a pixel: 1, 2 or 3.", limits=(1, 3))
     quality: str = option(
         "standard",
         "draft (one sample a pixel, no light under the skin), standard, or high (3 x 3 samples in every pixel).",
+        choices=QUALITIES,
     )
-    renderer: str = option("numba", "numba (any machine) or pyvista (VTK, with a GPU or software GL).")
+    renderer: str = option(
+        "numba", "numba (any machine) or pyvista (VTK, with a GPU or software GL).", choices=RENDERERS
+    )
     visible_mark: bool = option(False, "Write the word synthetic into the lower right corner of clips.")
 
     def __post_init__(self) -> None:

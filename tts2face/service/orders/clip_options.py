@@ -1,17 +1,19 @@
 """Options of clips, of a text or of subtitles."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from lexicon.errors import InputError
 from tts2face.render.picture import AUTO_SIZE, parse_size
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
+from tts2face.service.orders.request_fields import MODEL_FIELDS, PICTURE_FIELDS, options_model
 from tts2face.service.state import ServiceState
 from tts2face.service.uploads.names import (
-    MODEL_FIELDS,
     check_background,
     check_voice,
     resolve_dictionary,
@@ -19,65 +21,24 @@ from tts2face.service.uploads.names import (
 )
 from tts2face.synthesis.byte_stream import media_types
 
+# Options that a door does not take, with the reason.
+NOT_IN_CLIPS: Mapping[str, str] = MappingProxyType({
+    "audio": "a part of the form", "timeline": "a part of the form", "renderer": "the operator's machine draws",
+})  # fmt: skip
+
 if TYPE_CHECKING:
+    from tts2face.service.orders.request_fields import StrictModel as ClipFields
+
     Format = str
 else:
     Format = Literal[tuple(media_types())]
-PICTURE_FIELDS = ("size", "camera", "background", "supersampling", "quality")
+    ClipFields = options_model("ClipFields", NOT_IN_CLIPS)
 
 
-class ClipOptions(BaseModel):
-    """How it is said, how the face moves and how it is drawn; meanings as of the flags of the command line."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-    language: Annotated[str, Field(description="Language of the text.")] = "en-us"
-    voice: Annotated[str | None, Field(description="A voice of GET /v1/voices.", examples=["heart"])] = None
-    rate: Annotated[float, Field(ge=0.5, le=2.0, description="Factor of the speaking rate.")] = 1.0
-    volume: Annotated[float, Field(ge=0.0, le=2.0, description="Factor of the loudness.")] = 1.0
-    plain_delivery: Annotated[bool, Field(description="The style leaves rate and loudness of the voice unchanged.")] = (
-        False
-    )
-    seed: Annotated[int, Field(ge=0, le=2**31 - 1, description="Seed of gestures and voice.")] = 0
-    synthesis: Annotated[Literal["exemplar", "theobald2007"], Field(description="Method of lip motion.")] = "exemplar"
-    articulation: Annotated[
-        str | None, Field(description="Rounding, spreading, opening: natural, clear, or 0.5-2.", examples=["clear"])
-    ] = None
-    fps: Annotated[float, Field(ge=1, le=120, description="Frames per second.")] = 30.0
-    gestures: Annotated[Literal["fields", "ju2008", "noise", "none"], Field(description="Method of gestures.")] = (
-        "fields"
-    )
-    style: Annotated[str | None, Field(description="Style of the palette.", examples=["delighted"])] = None
-    gain: Annotated[str | None, Field(description="Gains of features.", examples=["head=1.5"])] = None
-    talker: Annotated[str | None, Field(description="A talker of GET /v1/talkers.", examples=["grid_s1"])] = None
-    face: Annotated[str | None, Field(description="A face of GET /v1/faces, or self.", examples=["ada"])] = None
-    identity: Annotated[str | None, Field(description="Identity preset of the face.", examples=["kofi"])] = None
-    hair: Annotated[str | None, Field(description="Haircut of the face, or bald.", examples=["long01"])] = None
-    hair_color: Annotated[
-        str | None, Field(description="Colour of the hair: a name or #rrggbb.", examples=["brown"])
-    ] = None
-    palette: Annotated[str | None, Field(description="A palette of GET /v1/palettes.", examples=["starter"])] = None
-    dictionary: Annotated[str | None, Field(description="A dictionary of GET /v1/dictionaries.", examples=[None])] = (
-        None
-    )
-    size: Annotated[str, Field(description="Width x height in pixels.", examples=["512x512"])] = "auto"
-    camera: Annotated[str, Field(description="front, three-quarter, profile, close, or yaw,pitch.")] = "front"
-    background: Annotated[str, Field(description="studio, transparent, blur, or a colour.", examples=["#204060"])] = (
-        "studio"
-    )
-    supersampling: Annotated[int, Field(ge=1, le=3, description="Samples along each side of a pixel.")] = 2
-    quality: Annotated[str, Field(description="draft, standard or high.", examples=["draft"])] = "standard"
-
-
-class ClipRequest(ClipOptions):
+class ClipRequest(ClipFields):
     """What is said, how the face moves and how it is drawn; meanings as of the flags of the command line."""
 
-    text: Annotated[str, Field(description="Text, with marks or SSML.", examples=["Hello there."])] = ""
     format: Annotated[Format, Field(description="Movie, sound, or lines.")] = "mp4"
-    expression: Annotated[str | None, Field(description="Expressions with times.", examples=["happy=0.6"])] = None
-    idle: Annotated[
-        float | None, Field(ge=0.1, le=30, description="Seconds of idle animation, no speech.", examples=[2.5])
-    ] = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,8 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 from starlette.datastructures import UploadFile
@@ -17,8 +18,9 @@ from tts2face.jobs.clip_job import BACKGROUND, FILES
 from tts2face.render.picture import Picture
 from tts2face.request import Request
 from tts2face.service.errors import RefusedError
-from tts2face.service.orders.clip_options import ClipOptions, ClipRequest, divide_options
+from tts2face.service.orders.clip_options import NOT_IN_CLIPS, ClipRequest, divide_options
 from tts2face.service.orders.job_orders import JobKind, JobOrder
+from tts2face.service.orders.request_fields import options_model
 from tts2face.service.orders.talker_kind import TALKER_KIND
 from tts2face.service.uploads.names import check_voice, resolve_dictionary, resolve_models
 from tts2face.subtitles.reader import SUFFIXES
@@ -27,7 +29,18 @@ BATCH_FIELDS = ("per", "overflow", "max_rate", "scene_gap", "format", "exports",
 MAX_CAST_CHARACTERS = 1_000_000
 
 
-class SubtitlesRequest(ClipOptions):
+# Options of clips that subtitles do not take, with the reason.
+NOT_IN_SUBTITLES: Mapping[str, str] = NOT_IN_CLIPS | MappingProxyType({
+    "text": "the cues have it", "idle": "cues speak", "expression": "its times are those of one clip",
+    "audio_map": "the words of recordings are given",
+})  # fmt: skip
+if TYPE_CHECKING:
+    from tts2face.service.orders.request_fields import StrictModel as SubtitleFields
+else:
+    SubtitleFields = options_model("SubtitleFields", NOT_IN_SUBTITLES)
+
+
+class SubtitlesRequest(SubtitleFields):
     """How subtitle files become clips; meanings as of the flags of `tts2face batch`."""
 
     per: Annotated[Literal["cue", "scene", "file", "film"], Field(description="What becomes one clip.")] = "cue"

@@ -3,18 +3,21 @@
 import asyncio
 import base64
 import time
+from collections.abc import Mapping
 from contextlib import aclosing, suppress
-from typing import Annotated, Any, Literal
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from lexicon.errors import DataError
 from lexicon.inputs import parse_json
 from tts2face.service.errors import RefusedError
+from tts2face.service.orders.request_fields import MODEL_FIELDS, PICTURE_FIELDS, StrictModel, options_model
 from tts2face.service.state import ServiceState
 from tts2face.service.synthesis.messages import MessageKind
-from tts2face.service.uploads.names import MODEL_FIELDS, check_voice, resolve_dictionary, resolve_models
+from tts2face.service.uploads.names import check_voice, resolve_dictionary, resolve_models
 
 router = APIRouter(tags=["live"])
 
@@ -26,34 +29,31 @@ SAMPLE_BYTES = 2
 INVALID = 1007  # WebSocket close code: a message is not what it should be
 
 
-class TextOptions(BaseModel):
-    """First message of a live stream of text."""
+# Options that live text does not take, with the reason.
+NOT_IN_LIVE_TEXT: Mapping[str, str] = MappingProxyType(
+    {"text": "it comes in parts", "audio": "live sound has options of its own", "audio_map": "there is no recording"}
+    | dict.fromkeys(("idle", "timeline", "expression"), "the end of live text is not known")
+    | dict.fromkeys(
+        ("plain_delivery", "synthesis", "context", "exemplars", "articulation", "pitch"), "live text has the defaults"
+    )
+    | dict.fromkeys(("hair", "hair_color", *PICTURE_FIELDS), "curves are sent, no pictures")
+)
+if TYPE_CHECKING:
+    from tts2face.service.orders.request_fields import StrictModel as TextFields
+else:
+    TextFields = options_model("TextFields", NOT_IN_LIVE_TEXT)
 
-    model_config = ConfigDict(extra="forbid", strict=True)
+
+class TextOptions(TextFields):
+    """First message of a live stream of text."""
 
     type: Literal["start"]
     input: Literal["text"] = "text"
-    language: Annotated[str, Field(description="Language of the text.")] = "en-us"
-    voice: Annotated[str | None, Field(description="A voice of GET /v1/voices.")] = None
-    rate: Annotated[float, Field(ge=0.5, le=2.0)] = 1.0
-    volume: Annotated[float, Field(ge=0.0, le=2.0)] = 1.0
-    seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = 0
-    fps: Annotated[float, Field(ge=1, le=120)] = 30.0
-    gestures: Literal["fields", "ju2008", "noise", "none"] = "fields"
-    style: str | None = None
-    gain: str | None = None
-    talker: str | None = None
-    face: str | None = None
-    identity: str | None = None
-    palette: str | None = None
-    dictionary: Annotated[str | None, Field(description="A dictionary of GET /v1/dictionaries.")] = None
     with_idle: Annotated[bool, Field(description="Curves of a living face between utterances.")] = True
 
 
-class AudioOptions(BaseModel):
+class AudioOptions(StrictModel):
     """First message of a live stream of sound."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
 
     type: Literal["start"]
     input: Literal["audio"]

@@ -18,12 +18,6 @@ from tts2face.storage.files import FORMER
 
 COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
 MODEL_KINDS = ("talker", "face", "palette")
-MODEL_FIELDS = (
-    *MODEL_KINDS,
-    "identity",
-    "hair",
-    "hair_color",
-)  # of a request; those of `tts2face.session_cache.Models`
 
 
 async def resolve_models(library: Library, key: ApiKey, models: Mapping[str, Any]) -> dict[str, Any]:
