@@ -9,16 +9,15 @@ import tts2face
 
 TEXT = "Hello there. [nod] [style:delighted] We were away a year ago. [/style] [pause 0.5] Good bye."
 
-session = tts2face.Session(face="ben", hair_color="red")
+session = tts2face.Session(face="mara", hair_color="red")
 written = session.write(
     TEXT,
     "hello.mp4",
     exports=["hello.csv", "hello.srt"],  # Live Link Face weights, captions
     size="384x384",
-    camera="three-quarter",
     gain="head=1.5",
 )
-print(f"{written.path}: {written.seconds:.2f} s, {written.n_frames} frames, and {', '.join(map(str, written.exports))}")
+print(f"{written.path}: {written.seconds:.2f} s, {written.n_frames} frames")
 
 speech = session.clip(TEXT).speech  # the same clip in memory
 for word in speech.words:
