@@ -1,17 +1,27 @@
-"""Hook of MkDocs: the page of options is made from the command line itself, so that it cannot differ from it."""
+"""Hook of MkDocs: options are read from the command line itself, and example programs from their files."""
 
+import re
 from collections.abc import Iterator
+from pathlib import Path
 
 from cyclopts import App
 
 from cli.main import app
 
 PLACE = "<!-- options -->"
+PROGRAM = re.compile(r"<!-- (examples/\w+\.py) -->")
 
 
 def on_page_markdown(markdown: str, **_: object) -> str:
-    """A page with the tables of options in their place."""
-    return markdown.replace(PLACE, "\n".join(command_tables())) if PLACE in markdown else markdown
+    """A page with the tables of options and the example programs in their places."""
+    if PLACE in markdown:
+        markdown = markdown.replace(PLACE, "\n".join(command_tables()))
+    return PROGRAM.sub(_program, markdown)
+
+
+def _program(place: re.Match[str]) -> str:
+    content = (Path(__file__).parent / place[1]).read_text(encoding="utf-8")
+    return f"```python\n{content}```"
 
 
 def walk_commands(command: App, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], App]]:

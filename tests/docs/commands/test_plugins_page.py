@@ -1,10 +1,7 @@
 """The tutorial of docs/plugins.md is installed as it stands, and used by every door."""
 
 import json
-import os
 import re
-import subprocess
-import sys
 import wave
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,7 +10,8 @@ import httpx
 import numpy as np
 import pytest
 
-from tests.docs.blocks import DOCS, ROOT
+from tests.docs.blocks import DOCS
+from tests.docs.programs import install, run
 from tests.running import serve_process
 
 PAGE = DOCS / "plugins.md"
@@ -42,20 +40,12 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
     ]  # fmt: skip
     for name, content in files:
         (source / name).write_text(content, encoding="utf-8")
-    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", "--no-build-isolation"]
-    subprocess.run([*pip, "--target", str(target), str(source)], check=True, timeout=120)
+    variables = install(source, target)
     about = target / "broken-1.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1\n")
     (about / "entry_points.txt").write_text(BROKEN)
-    return os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(target)])}
-
-
-def run(environment: Mapping[str, str], folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True, timeout=120,
-        check=False,
-    )  # fmt: skip
+    return variables
 
 
 def loudest(path: Path) -> float:
@@ -64,29 +54,24 @@ def loudest(path: Path) -> float:
 
 
 def test_command_line_and_python_use_the_plugins(environment: Mapping[str, str], tmp_path: Path) -> None:
-    listed = {
-        one["name"]: one for one in json.loads(run(environment, tmp_path, "-m", "tts2face", "voices", "--json").stdout)
-    }
+    voices = json.loads(run("tts2face voices --json", tmp_path, environment=environment).stdout)
+    listed = {one["name"]: one for one in voices}
     assert listed["quiet"]["summary"] == "espeak-ng at a quarter of its level"
     assert (listed["broken"]["is_installed"], "absent_module" in listed["broken"]["summary"]) == (False, True)
     assert listed["heart"]["engine"] == "hibari"  # what is shipped wins
-    formats = [
-        one["name"] for one in json.loads(run(environment, tmp_path, "-m", "tts2face", "formats", "--json").stdout)
-    ]
-    assert formats[-1] == "opening"
-    words = ["-m", "tts2face", "Hello there.", "--plain-delivery", "--face", "head"]
-    spoken = run(
-        environment, tmp_path, *words, "--voice", "quiet", "--out", "hello.wav", "--export", "hello.opening.txt",
-        "--export", "opening:other.dat",
-    )  # fmt: skip
+    formats = json.loads(run("tts2face formats --json", tmp_path, environment=environment).stdout)
+    assert formats[-1]["name"] == "opening"
+    words = 'tts2face "Hello there." --plain-delivery --face head'
+    exports = ("--out", "hello.wav", "--export", "hello.opening.txt", "--export", "opening:other.dat")
+    spoken = run(words, tmp_path, "--voice", "quiet", *exports, environment=environment)
     assert spoken.returncode == 0, spoken.stderr
     lines = (tmp_path / "hello.opening.txt").read_text().splitlines()
     assert len(lines) > 20
     assert 0.0 < max(map(float, lines)) <= 1.0
     assert (tmp_path / "other.dat").read_text().splitlines() == lines
-    found = run(environment, tmp_path, "-c", TOOL)
+    found = run("python -c", tmp_path, TOOL, environment=environment)
     assert float(found.stdout) == pytest.approx(loudest(tmp_path / "hello.wav"), abs=1e-4), found.stderr
-    refused = run(environment, tmp_path, *words, "--voice", "broken", "--out", "no.wav")
+    refused = run(words, tmp_path, "--voice", "broken", "--out", "no.wav", environment=environment)
     assert refused.returncode != 0
     assert "the voice broken of the package broken cannot be loaded (ModuleNotFoundError" in refused.stderr
 

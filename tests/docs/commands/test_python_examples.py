@@ -26,6 +26,6 @@ def test_python_examples_run(page: Path, tmp_path: Path, monkeypatch: pytest.Mon
 
 @pytest.mark.smoke
 def test_pages_with_examples_are_found() -> None:
-    assert {"python.md", "animator.md", "batch.md", "subtitles.md", "speech-science.md", "developer.md"} <= {
+    assert {"python.md", "animator.md", "subtitles.md", "speech-science.md", "developer.md"} <= {
         page.name for page in WITH_EXAMPLES
     }
