@@ -1,12 +1,35 @@
-"""Hook of MkDocs: the page of options is made from the command line itself, so that it cannot differ from it."""
+"""Hooks of MkDocs: options are listed from the command line itself, decisions in the navigation from their index."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, MutableMapping
+from pathlib import Path
+from typing import Any
 
 from cyclopts import App
 
 from cli.main import app
 
 PLACE = "<!-- options -->"
+DECISIONS = Path(__file__).with_name("decisions") / "index.md"
+
+
+def on_config(config: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
+    """The settings with the decisions as the last part of the navigation, by room."""
+    config["nav"].append({"Decisions": ["decisions/index.md", *decisions_by_room()]})
+    return config
+
+
+def decisions_by_room() -> list[dict[str, list[str]]]:
+    """Sections of the index of decisions, each with the pages that it lists."""
+    sections = re.split(r"^## ", DECISIONS.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    return [
+        {
+            section.partition("\n")[0]: [
+                f"decisions/{name}" for name in re.findall(r"^- \[\d{3}\]\((\S+)\)", section, re.M)
+            ]
+        }
+        for section in sections
+    ]
 
 
 def on_page_markdown(markdown: str, **_: object) -> str:
