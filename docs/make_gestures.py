@@ -18,9 +18,8 @@ MOODS = MoodOptions(seeds=12, first_seed=300)  # no parameter was chosen on thes
 
 def distances(found: StyleStudy) -> str:
     """Markdown table of all traits, those with a target first and in bold."""
-    heads = ("trait", "unit", "n", "recorded, mean", "field", "noise", "ju2008")
-    apart = ("W halves", "W field", "W noise", "W ju2008", "field / halves", "field / noise", "ju2008 / halves")
-    lines = _headed((*heads, *apart))
+    heads = ("trait", "unit", "recorded, mean", "field", "noise", "ju2008")
+    lines = _headed((*heads, "field / halves", "field / noise", "ju2008 / halves"))
     for one in sorted(found.trait_comparisons, key=lambda one: not one.trait.has_target):
         lines.append(_line(one))
     return "\n".join(lines)
@@ -34,9 +33,7 @@ def _line(one: TraitComparison) -> str:
     cells = (
         f"{mark}{one.trait.name}{mark}",
         one.trait.unit,
-        str(len(one.real)),
         *(f"{mean:.3g}" for mean in means),
-        *(f"{away:.3f}" for away in (one.halves, one.to_field, one.to_noise, one.to_published)),
         *(f"{mark}{share}{mark}" for share in near),
         published,
     )
@@ -56,7 +53,6 @@ def movements(found: StyleStudy) -> str:
             "ju2008",
             "diversity",
             "visited in 1 / 3 / 10 min",
-            "highest autocorrelation, speech / silence",
         )
     )
     moving = {one.feature: one for one in found.motion_comparisons}
@@ -67,8 +63,7 @@ def movements(found: StyleStudy) -> str:
             cells = [*(f"{r:.2f}" for r in one.with_intensity), f"{one.fast_power[0]:.2f}", f"{one.fast_power[2]:.2f}"]
             cells.append(f"{one.diversity[0]:.2f}")
         shares = " / ".join(f"{100 * share:.0f}" for share in visited)
-        _, speech, silence = found.long_run.repetition[feature].highest
-        lines.append(f"| {feature} | {' | '.join(cells)} | {shares} % | {speech:.2f} / {silence:.2f} |")
+        lines.append(f"| {feature} | {' | '.join(cells)} | {shares} % |")
     return "\n".join(lines)
 
 
@@ -80,7 +75,7 @@ def blinks(found: StyleStudy) -> str:
 
 
 def moods(found: MoodStudy, measured: MoodStudy) -> str:
-    """Markdown tables of the moods: what the tracker reads, and what the classifier answers."""
+    """Markdown table of the moods: what the tracker reads, and how many the classifier recognises."""
     figures = _headed(
         ("style", "recognised", "smile weight (5 to 95 %)", "blinks a minute", "yaw spread, degrees", *SHOWN_SCORES)
     )
@@ -95,13 +90,10 @@ def moods(found: MoodStudy, measured: MoodStudy) -> str:
             *(f"{row[name]:.2f}" for name in SHOWN_SCORES),
         )
         figures.append(f"| {' | '.join(cells)} |")
-    answers = _headed(("single frames of", *found.moods))
-    for mood, counts in zip(found.moods, found.frame_confusion.tolist(), strict=True):
-        answers.append(f"| {mood} | {' | '.join(str(count) for count in counts)} |")
     n_clips, n_frames = int(found.confusion.sum()), int(found.frame_confusion.sum())
     shares = f"Of {n_clips} clips {found.accuracy:.0%} are recognised, of their {n_frames} single frames"
     summary = f"{shares} {found.frame_accuracy:.0%}."
-    return "\n".join([*figures, "", summary, "", *answers])
+    return "\n".join([*figures, "", summary])
 
 
 def _headed(names: tuple[str, ...]) -> list[str]:

@@ -1,8 +1,9 @@
-"""Hook of MkDocs: options are read from the command line itself, and example programs from their files."""
+"""Hooks of MkDocs: options come from the command line, example programs from their files, decisions from their index."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, MutableMapping
 from pathlib import Path
+from typing import Any
 
 from cyclopts import App
 
@@ -10,6 +11,26 @@ from cli.main import app
 
 PLACE = "<!-- options -->"
 PROGRAM = re.compile(r"<!-- (examples/\w+\.py) -->")
+DECISIONS = Path(__file__).with_name("decisions") / "index.md"
+
+
+def on_config(config: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
+    """The settings with the decisions as the last part of the navigation, by room."""
+    config["nav"].append({"Decisions": ["decisions/index.md", *decisions_by_room()]})
+    return config
+
+
+def decisions_by_room() -> list[dict[str, list[str]]]:
+    """Sections of the index of decisions, each with the pages that it lists."""
+    sections = re.split(r"^## ", DECISIONS.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    return [
+        {
+            section.partition("\n")[0]: [
+                f"decisions/{name}" for name in re.findall(r"^- \[\d{3}\]\((\S+)\)", section, re.M)
+            ]
+        }
+        for section in sections
+    ]
 
 
 def on_page_markdown(markdown: str, **_: object) -> str:

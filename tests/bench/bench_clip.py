@@ -161,7 +161,7 @@ def long_text(folder: Path, minutes: float) -> None:
 
 
 def main() -> None:
-    """Print the figures of docs/performance.md."""
+    """Print the figures that docs/performance.md sums up."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=0.0, help="also speak a text of so many minutes")
     parser.add_argument("--start", action="store_true", help="processor time of commands in new processes only")

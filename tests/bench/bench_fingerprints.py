@@ -2,7 +2,7 @@
 
 Run: ``PYTHONPATH=. python tests/bench/bench_fingerprints.py RECORDINGS [--others FOLDER] [--cache FOLDER] [--n N]``.
 RECORDINGS is a folder of short recordings of one person, FOLDER one of several. Of ``--n`` recordings the sounds are
-damaged; of a third of them pictures are damaged and tracked again. Prints the table of decision 140: quantiles 0, 5 and
+damaged; of a third of them pictures are damaged and tracked again. Prints what decision 140 sums up: quantiles 0, 5 and
 50 % of the similarity to the same recording, the highest to another one, and how many are found.
 """
 

@@ -70,7 +70,7 @@ def measure_time(palette: Palette, name: str, prosody: np.ndarray) -> Timed:
 
 
 def main() -> None:
-    """Print the tables of docs/performance.md."""
+    """Print the figures that docs/performance.md sums up."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("palette", nargs="?", default="starter")
     palette = load_palette(parser.parse_args().palette)

@@ -53,7 +53,7 @@ def least_time(work: Callable[[], object]) -> float:
 
 
 def main() -> None:
-    """Print the tables of docs/performance.md."""
+    """Print the figures that docs/performance.md sums up."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("talker", nargs="?", type=Path, default=STARTER)
     talker = read_talker(parser.parse_args().talker)

@@ -3,7 +3,8 @@
 Run: ``PYTHONPATH=. python tests/bench/bench_recording_limits.py RECORDINGS [--others FOLDER] [--cache FOLDER]
 [--n N]``. RECORDINGS and FOLDER are folders of short recordings with transcripts, of one person and of several. Sounds
 are damaged and aligned again, landmarks stay; pictures of every eighth recording are damaged and tracked again. Prints
-the tables of decision 129. ``effect``: a talker of the damaged recordings, evaluated on every third, with true phones.
+the tables that decision 129 sums up. ``effect``: a talker of the damaged recordings, evaluated on every third, with
+true phones.
 """
 
 import argparse

@@ -1,8 +1,8 @@
 """Latency and throughput of a running `tts2face serve`: first bytes, live curves, lateness, cancelling.
 
 Run: ``python tests/bench/bench_service.py [--quick]``. It starts a server of its own on this machine, with one process
-for each core, and prints the tables of docs/performance.md. As a reference it measures the same synthesis in this
-process before and after, so that the load of the machine shows.
+for each core, and prints the figures that docs/performance.md sums up. As a reference it measures the same synthesis
+in this process before and after, so that the load of the machine shows.
 """
 
 import argparse
@@ -183,7 +183,7 @@ def reference() -> float:
 
 
 def main() -> None:
-    """Print the tables of docs/performance.md."""
+    """Print the figures that docs/performance.md sums up."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer rounds")
     rounds = 2 if parser.parse_args().quick else 5

@@ -53,7 +53,7 @@ def sounding(phones: PhoneSequence) -> PhoneSequence:
 
 
 def main() -> None:
-    """Print the table of docs/performance.md."""
+    """Print the figures that docs/performance.md sums up."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-n", type=int, default=100, help="sentences")
     n = parser.parse_args().n

@@ -35,7 +35,7 @@ Float32Array = NDArray[np.float32]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FieldOptions:
-    """Sampling options of a field; the defaults were tuned on recordings (docs/gestures.md).
+    """Sampling options of a field; the defaults were tuned on recordings (decision 175).
 
     Parameters
     ----------

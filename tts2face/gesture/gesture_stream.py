@@ -24,7 +24,7 @@ from tts2face.types import GiveWay, Waveform, keep_on
 N_LOOKAHEAD_FRAMES = 2  # frames after a time that cubic interpolation needs
 NO_CHANGE = FeatureChange()
 NO_SEEDS: Mapping[str, int] = MappingProxyType({})
-# Tuned on three quarters of the recordings of GRID s1 (docs/gestures.md); all other features use the defaults.
+# Tuned on three quarters of the recordings of GRID s1 (decision 175); all other features use the defaults.
 OPTIONS: Mapping[str, FieldOptions] = MappingProxyType(
     {
         "expression": FieldOptions(alpha=(3.0, 1.0), sigma=0.05, stride=4),

@@ -9,7 +9,7 @@ from tts2face.models.palette import FEATURES
 
 # A draw at every frame from the four nearest of all recorded frames, h = 10 preceding frames at 30 frames a second, no
 # bonus for the following frame, no memory of earlier draws, and recorded values shown as they are. The paper names
-# alpha and sigma but prints no values; both were chosen within the training recordings (docs/gestures.md). Its distance
+# alpha and sigma but prints no values; both were chosen within the training recordings (decision 066). Its distance
 # is the sum over the h frames, that of a field their mean: the draw is the same with sigma h times as large.
 JU_2008 = FieldOptions(
     history=10,
