@@ -1,4 +1,4 @@
-"""Hooks of MkDocs: options come from the command line, example programs from their files, decisions from their index."""
+"""Hooks of MkDocs: options come from the command line, programs from their files, decisions from their index."""
 
 import re
 from collections.abc import Iterator, MutableMapping
