@@ -1,12 +1,12 @@
 """Options of clips, of a text or of subtitles."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from lexicon.errors import InputError
-from tts2face.render.picture import AUTO_SIZE, parse_size
+from tts2face.render.picture import AUTO_SIZE, Picture, parse_size
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
 from tts2face.service.state import ServiceState
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Format = str
 else:
     Format = Literal[tuple(media_types())]
-PICTURE_FIELDS = ("size", "camera", "background", "supersampling", "quality")
+PICTURE_FIELDS = frozenset(option.name for option in fields(Picture))
 
 
 class ClipOptions(BaseModel):
@@ -67,6 +67,7 @@ class ClipOptions(BaseModel):
     )
     supersampling: Annotated[int, Field(ge=1, le=3, description="Samples along each side of a pixel.")] = 2
     quality: Annotated[str, Field(description="draft, standard or high.", examples=["draft"])] = "standard"
+    visible_mark: Annotated[bool, Field(description="Write the word synthetic into the lower right corner.")] = False
 
 
 class ClipRequest(ClipOptions):
