@@ -69,7 +69,7 @@ if TYPE_CHECKING:
     from tts2face.types import Trajectory as Trajectory
     from tts2face.types import Waveform as Waveform
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "AnimatedFace",

@@ -1,11 +1,25 @@
-"""Derived styles without recordings: the table of changes of a measured style."""
+"""Derived styles without recordings: the table of changes of a measured style.
+
+``python -m corpus_tools.decomposition.derived_styles`` gives the shipped palette those of the table.
+"""
 
 import csv
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from lexicon.errors import DataError
-from tts2face.models.palette import FIXED_CHANNELS, PLAIN, REGION_FEATURES, Delivery, Derivation, FeatureChange
+from tts2face.models.palette import (
+    FIXED_CHANNELS,
+    PLAIN,
+    REGION_FEATURES,
+    Delivery,
+    Derivation,
+    FeatureChange,
+    load_palette,
+    write_palette,
+)
+from tts2face.storage.files import find_file
 
 VOICE = "voice"  # in place of a feature, on the line of a style's delivery
 DERIVED_STYLE_TABLE = Path(__file__).with_name("derived_styles.tsv")
@@ -59,3 +73,14 @@ def _parse_offsets(written: str, feature: str) -> Mapping[str, float]:
             raise ValueError(f"no channel {channel!r}")
         found[channel] = float(value)
     return found
+
+
+def main() -> None:
+    """Write the shipped palette with the derived styles of the table."""
+    shipped = load_palette("starter")
+    (recorded,) = shipped.styles
+    write_palette(find_file("starter", "palette"), replace(shipped, derivations=read_derived_styles(recorded)))
+
+
+if __name__ == "__main__":
+    main()

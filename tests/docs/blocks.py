@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-PAGES = (ROOT / "README.md", *sorted(DOCS.rglob("*.md")))
+PAGES = (*(ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "SECURITY")), *sorted(DOCS.rglob("*.md")))
 README, CLI_PAGE = ROOT / "README.md", DOCS / "cli.md"
 EXECUTED_PAGES = (README, CLI_PAGE)
 PERSON, WINDOW, LONG = "needs video of a person", "opens a window", "takes over a minute"

@@ -39,6 +39,12 @@ CHANGES = {
 
 
 @pytest.fixture(scope="module")
+def session(talker: Talker, face: Face) -> Session:
+    """It keeps finished sentences: an option that the keys of `SentenceMemory` lack would change nothing."""
+    return Session(talker, face, memory_mb=100)
+
+
+@pytest.fixture(scope="module")
 def clip(session: Session) -> Clip:
     return session.clip(Request(text=TEXT))
 

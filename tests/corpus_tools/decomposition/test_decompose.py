@@ -26,7 +26,7 @@ from tts2face.face.face_motion import moved_landmarks, rest_landmarks
 from tts2face.face.landmark_fit import axis_ratios
 from tts2face.models.face import Face
 from tts2face.models.landmarks import MOUTH_REGION
-from tts2face.models.palette import EXPRESSIONS, PLAIN, REGION_FEATURES, Delivery
+from tts2face.models.palette import EXPRESSIONS, PLAIN, REGION_FEATURES, Delivery, load_palette
 from tts2face.retargeting.performer import EYELID_LANDMARKS
 from tts2face.types import Trajectory, Waveform
 
@@ -206,6 +206,14 @@ def test_the_paper_s_six_moods_are_derived() -> None:
     assert made["depressed"].changes["expression"].offset == {"sad": 0.9}
     assert made["depressed"].delivery == Delivery(0.9, -2.0)
     assert made["neutral"].delivery == PLAIN
+
+
+def test_the_shipped_palette_has_the_derived_styles_of_the_table() -> None:
+    shipped = load_palette("starter")
+    (recorded,) = shipped.styles
+    assert shipped.derivations == read_derived_styles(recorded), (
+        "run: python -m corpus_tools.decomposition.derived_styles"
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,44 @@
+"""Pages state what the lists of the code hold: numbers of the README, formats of docs/exports.md."""
+
+import re
+
+from tests.docs.blocks import DOCS, README
+from tts2face import catalogue
+from tts2face.exports.formats import FORMATS
+from tts2face.request import OWN_FACE
+
+NUMBERS = (
+    "no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "thirteen",
+)  # fmt: skip
+
+
+def test_the_readme_counts_what_is_shipped() -> None:
+    faces = [one for one in catalogue.faces() if one.name != OWN_FACE]
+    drawn = [one.name for one in faces if "drawn as for an animated film" in one.summary]
+    filmed = [one.name for one in faces if "in film light" in one.summary]
+    haircuts = [one.face for one in catalogue.haircuts() if one.name != "bald"]
+    moods = [one.name for one in catalogue.styles() if one.source is not None and one.name != "measured"]
+    (talker,) = catalogue.talkers()
+    (each,) = {haircuts.count(name) for name in drawn}
+    stated = [
+        f"{NUMBERS[len(faces)]} faces. {NUMBERS[len(drawn) + len(filmed)]} are in light",
+        f"{NUMBERS[len(drawn)]} drawn as for an animated film",
+        f"with {NUMBERS[each]} haircuts each",
+        f"{NUMBERS[len(filmed)]} people",
+        f"{NUMBERS[len(catalogue.identities())]} identity presets",
+        f"{NUMBERS[haircuts.count('head')]} haircuts in any colour",
+        f"`{talker.name}`: lip motion of {talker.n_utterances} recorded sentences",
+        f"{NUMBERS[len(moods)]} moods derived from it",
+        f"some {len(catalogue.languages()) // 10 * 10} languages",
+    ]
+    stated += [f"`{one.name}`" for one in faces]
+    text = " ".join(README.read_text(encoding="utf-8").partition("## What is shipped")[2].split()).lower()
+    assert [one for one in stated if one.lower() not in text] == []
+
+
+def test_the_page_of_exports_has_a_row_for_each_format() -> None:
+    table = re.findall(r"^\| (\S.*?) \| (`\..*?) \|", (DOCS / "exports.md").read_text(encoding="utf-8"), re.MULTILINE)
+    rows = {tuple(names.split(", ")): set(re.findall(r"`(.+?)`", endings.lower())) for names, endings in table}
+    assert sorted(name for names in rows for name in names) == sorted(one.name for one in FORMATS)
+    for names, endings in rows.items():
+        assert endings == {suffix for one in FORMATS if one.name in names for suffix in one.suffixes}, names
