@@ -4,7 +4,7 @@
 """
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -58,17 +58,23 @@ def read_derived_styles(source: str, table: Path = DERIVED_STYLE_TABLE) -> dict[
     }
 
 
+def _settings(written: str) -> Iterator[tuple[str, str]]:
+    """Names and values of a list ``name=value name=value``."""
+    for part in written.split():
+        name, _, value = part.partition("=")
+        yield name, value
+
+
 def _parse_delivery(written: str, table: str, style: str) -> Delivery:
     try:
-        return Delivery(**{name: float(value) for name, _, value in (part.partition("=") for part in written.split())})
+        return Delivery(**{name: float(value) for name, value in _settings(written)})
     except (TypeError, ValueError) as broken:
         raise DataError(f"{table}: the voice of {style} cannot be read ({broken}); correct it") from broken
 
 
 def _parse_offsets(written: str, feature: str) -> Mapping[str, float]:
     found = {}
-    for part in written.split():
-        channel, _, value = part.partition("=")
+    for channel, value in _settings(written):
         if channel not in FIXED_CHANNELS.get(feature, ()):
             raise ValueError(f"no channel {channel!r}")
         found[channel] = float(value)

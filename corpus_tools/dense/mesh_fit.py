@@ -95,11 +95,9 @@ def _joined_lips(vertices: Floats, opened: Floats) -> Floats:
     tree = cKDTree(vertices)
     near = np.unique(np.concatenate(tree.query_ball_point(vertices[moving], JOIN_MM)).astype(np.int64))
     pairs = cKDTree(vertices[near]).sparse_distance_matrix(tree, JOIN_MM, output_type="coo_matrix")
-    shares = np.exp(-((2.0 * pairs.data / JOIN_MM) ** 2))
-    sums = np.zeros((len(near), 4))
-    np.add.at(sums, pairs.row, shares[:, None] * np.column_stack([np.ones(len(shares)), opened[pairs.col]]))
+    pairs.data = np.exp(-((2.0 * pairs.data / JOIN_MM) ** 2))
     joined = opened.copy()
-    joined[near] = sums[:, 1:] / sums[:, :1]
+    joined[near] = (pairs @ opened) / (pairs @ np.ones((len(opened), 1)))
     return joined
 
 

@@ -141,8 +141,7 @@ def _skin_tint(face: Face, texels: Texels, ratio: Floats, share_and_luma: tuple[
 def soften_lines(colour: Floats, share: Floats, texels: Texels, side: int) -> Floats:
     """Colours (P, 3) whose skin has fainter lines: what is darker than skin around it, but not as dark as a brow."""
     light = np.log(np.maximum(colour @ LUMA, 1.0))
-    near, sums = texels.blurred(np.column_stack([share, share * light]), side, LINE_TEXELS).T
-    around = sums / np.maximum(near, 1e-3)
+    around = _mean_around(light[:, None], share, texels, side, LINE_TEXELS)[:, 0]
     is_skin = smoothstep(np.exp(around) / np.exp(np.median(around[share > 0.5])), *LINE_SKIN)
     depth = np.clip(around - light, 0.0, None)
     kept = 1.0 - (1.0 - LINE_KEPT) * is_skin * share * (1.0 - smoothstep(depth, *LINE_DEPTHS))
@@ -151,9 +150,15 @@ def soften_lines(colour: Floats, share: Floats, texels: Texels, side: int) -> Fl
 
 def sharpen(colour: Floats, share: Floats, texels: Texels, side: int) -> Floats:
     """Sharpened colours (P, 3), which compensate the blur of averaging over frames with tracking noise."""
-    weighted = texels.blurred(np.column_stack([share, share[:, None] * colour]), side, SHARP_TEXELS)
-    smooth = weighted[:, 1:] / np.maximum(weighted[:, :1], 1e-3)
+    smooth = _mean_around(colour, share, texels, side, SHARP_TEXELS)
     return np.asarray(colour + SHARP_GAIN * share[:, None] * (colour - smooth))
+
+
+def _mean_around(values: Floats, share: Floats, texels: Texels, side: int, spread: float) -> Floats:
+    """Means (P, D) of values (P, D) over the texels around each, weighted by a share (P,)."""
+    sums = texels.blurred(np.column_stack([share, share[:, None] * values]), side, spread)
+    mean: Floats = sums[:, 1:] / np.maximum(sums[:, :1], 1e-3)
+    return mean
 
 
 def _fill_texture(texture: NDArray[np.uint8], texels: Texels, colour: Floats) -> NDArray[np.uint8]:

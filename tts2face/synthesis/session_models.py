@@ -25,6 +25,7 @@ from tts2face.request import FIELDS, OWN_FACE, Request
 from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.clip_stream import SynthesisModels, pieces
 from tts2face.synthesis.gesture_layer import GestureLayer
+from tts2face.synthesis.mark_styles import marked_styles
 from tts2face.synthesis.mesh_face import mesh_face
 from tts2face.synthesis.prepared_request import PreparedRequest
 from tts2face.synthesis.sentence_memory import NO_MEMORY, SentenceMemory
@@ -185,7 +186,8 @@ class SessionModels:
         exemplars = self._exemplars if not prepared.excluded else self._exemplars_without(prepared.excluded)
         face = self.face(has_gestures=request.has_gestures)
         face.check_articulation(request.articulation_factor)
-        palette = self.palette if request.has_gestures else None
+        has_style = request.style is not None or marked_styles(prepared.text)  # without one, no palette is needed here
+        palette = self.palette if request.has_gestures and has_style else None
         deliveries = NO_DELIVERIES if palette is None else palette.deliveries
         speech = SpeechModels(load_voice, self._voices.give_way, self._memory, deliveries)
         return SynthesisModels(self.talker, exemplars, face, speech)

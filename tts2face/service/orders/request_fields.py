@@ -1,6 +1,7 @@
 """Fields of requests over HTTP, made from the options of clips: types, defaults, limits, choices and help texts."""
 
 from collections.abc import Mapping
+from dataclasses import Field as Option
 from dataclasses import fields
 from pathlib import Path
 from types import MappingProxyType, NoneType
@@ -46,25 +47,21 @@ class StrictModel(BaseModel):
 def options_model(name: str, left_out: Mapping[str, str]) -> type[StrictModel]:
     """Model of all options of clips but those that are left out, each with the reason."""
     taken = {
-        one.name: _definition(one.name, get_type_hints(record)[one.name], one.metadata)
-        for record in RECORDS
+        one.name: _definition(one, kinds[one.name], None if record is Models else one.default)
+        for record, kinds in ((record, get_type_hints(record)) for record in RECORDS)
         for one in fields(record)
         if one.name not in left_out
     }
     return create_model(name, __base__=StrictModel, **taken)  # type: ignore[call-overload, no-any-return]
 
 
-def _definition(name: str, kind: Any, metadata: Mapping[str, Any]) -> tuple[Any, Any]:
+def _definition(option: "Option[Any]", kind: Any, default: Any) -> tuple[Any, Any]:
     """Type and default of a field; a model that is not named is the default one."""
+    name, metadata = option.name, option.metadata
     kinds = [str if one is Path else one for one in get_args(kind) or (kind,)]
     low, high = LIMITS.get(name) or metadata.get("limits") or (None, None)
     value: Any = Literal[metadata["choices"]] if metadata.get("choices") else kinds[0]
-    default = None if name in MODEL_FIELDS else _defaults()[name]
     optional = value | None if NoneType in kinds or default is None else value
     example = [EXAMPLES.get(name)] if name in EXAMPLES or default is None else None
     described = Field(ge=low, le=high, description=DESCRIPTIONS.get(name) or metadata["help"], examples=example)
     return Annotated[optional, described], default
-
-
-def _defaults() -> Mapping[str, Any]:
-    return {one.name: one.default for record in (Request, Picture) for one in fields(record)}
