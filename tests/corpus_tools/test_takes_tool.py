@@ -79,7 +79,7 @@ def test_a_photo_becomes_the_head_of_its_person(tmp_path: Path) -> None:
     out.mkdir()
     Image.fromarray(still("tomas", 360)).save(photo, "PNG")
     order = {"take": str(photo), "out": str(out), "max_bytes": 2e7}
-    stated = {"name": "tom", "consent": None, "max_pixels": 1_000_000}
+    stated = {"name": "tom", "consent": None, "eye_color": "green", "age_keep": False, "max_pixels": 1_000_000}
     (tmp_path / STATEMENT).write_text(json.dumps(stated))
     with pytest.raises(InputError, match="state the consent"):
         ordered(TAKES, "avatar", order)
@@ -90,3 +90,4 @@ def test_a_photo_becomes_the_head_of_its_person(tmp_path: Path) -> None:
     assert face.photograph is None
     assert face.metadata["consent"]["statement"] == "drawn"
     assert face.hairdo is not None
+    assert "green" in str(made["look"])

@@ -100,7 +100,7 @@ class Worker:
         self._vanished: set[str] = set()
         self._next_all_work_s = 0.0
         self._noting = threading.Lock()
-        self._is_reached = True
+        self._is_reached, self._reached_s = True, 0.0
 
     @property
     def n_rendered(self) -> int:
@@ -180,29 +180,31 @@ class Worker:
 
         next_beat_s = time.monotonic() + BEAT_S
         while not self._stopped.wait(self._look_s if self._is_reached else BEAT_S):
+            began_s = time.monotonic()
             try:
                 if not self._pauses.is_awake and workers.has_waiting():
                     self._pauses.wake()
-                if time.monotonic() >= next_beat_s:
-                    next_beat_s = time.monotonic() + BEAT_S
+                if began_s >= next_beat_s:
+                    next_beat_s = began_s + BEAT_S
                     self._vanished = workers.beat(self.executor_id, self._place)
             except (sqlalchemy.exc.SQLAlchemyError, DatabaseAwayError) as away:
-                self._note_database(away)
+                self._note_database(away, began_s)
             else:
-                self._note_database(None)
+                self._note_database(None, began_s)
 
     def _take_over(self, workers: Workers) -> None:
         """Return the work of workers without a sign of life to the queue; called again and again."""
         import sqlalchemy
         from dbos import error as dbos_error
 
+        began_s = time.monotonic()
         try:
             dead = set(self._vanished)
             self._segments.end_cancelled(is_cancelled)
-            if time.monotonic() >= self._next_all_work_s:
+            if began_s >= self._next_all_work_s:
                 dead |= self._look_at_all_work(workers)
                 self._jobs.end_abandoned()
-                self._next_all_work_s = time.monotonic() + ALL_WORK_S * random.uniform(0.5, 1.5)
+                self._next_all_work_s = began_s + ALL_WORK_S * random.uniform(0.5, 1.5)
             dead.discard(self.executor_id)
             if dead:
                 ended = return_work(dead)
@@ -211,11 +213,18 @@ class Worker:
                 if ended:
                     self._on_message(f"took over from {len(ended)} workers without a sign of life")
         except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException, DatabaseAwayError) as away:
-            self._note_database(away)
+            self._note_database(away, began_s)
 
-    def _note_database(self, away: Exception | None) -> None:
-        """Say once that the database cannot be reached, and once that it can be reached again."""
+    def _note_database(self, away: Exception | None, began_s: float) -> None:
+        """Say once that the database cannot be reached, and once that it can be reached again.
+
+        A failure of what began before the database was last reached is older news.
+        """
         with self._noting:
+            if away is None:
+                self._reached_s = time.monotonic()
+            elif began_s < self._reached_s:
+                return
             if (away is None) != self._is_reached:
                 self._is_reached = away is None
                 self._on_message(
