@@ -1,7 +1,7 @@
 """Handlers and children as tests ask them."""
 
 import io
-import queue
+import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from tts2face.service.uploads.decode import DECODE, program
 def answered(handler: Handler, content: Mapping[str, Any]) -> list[Message]:
     """Messages of a call that is answered in this process."""
     out = io.BytesIO()
-    answer(Call(Message("asked", content), out, queue.SimpleQueue()), {"asked": handler})
+    answer(Call(Message("asked", content), out, threading.Condition()), {"asked": handler})
     out.seek(0)
     return list(iter(lambda: read_message(out), None))
 
