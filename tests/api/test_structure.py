@@ -18,9 +18,7 @@ Find = Callable[[str, str], Iterator[str]]  # of the text and the name of a modu
 
 # Places that start Python, outside the room of child processes, which is to start all of them.
 PROCESS_ROOM = "tts2face.processes"
-STARTS_PYTHON = (
-    "tts2face.jobs.engine", "tts2face.voice.espeak",
-)  # fmt: skip
+STARTS_PYTHON = ("tts2face.voice.espeak",)
 # Modules that read JSON or TOML themselves; `lexicon.inputs` does it for others.
 PARSES = (
     "corpus_tools.head.assets", "lexicon.inputs", "lexicon.part_of_speech", "tts2face.processes.message",
