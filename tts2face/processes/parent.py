@@ -422,3 +422,12 @@ async def started(program: Program) -> AsyncIterator[AsyncChild]:
         yield child
     finally:
         await child.close()
+
+
+async def call_once(
+    program: Program, kind: str, content: Mapping[str, Any], *, on_event: OnEvent | None = None,
+    timeout_s: float | None = None,
+) -> Mapping[str, Any]:  # fmt: skip
+    """Content of the result of a call of a child that works on this call only; errors as `AsyncChild.call`."""
+    async with started(program) as child:
+        return (await child.call(kind, content, on_event=on_event, timeout_s=timeout_s)).content
