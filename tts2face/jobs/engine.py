@@ -246,7 +246,7 @@ class LocalWorker:
     def __init__(self, engine: DatabaseEngine, core: int | None) -> None:
         self.began, self.reason = time.monotonic(), ""
         self._engine, self._core = engine, core
-        self._child = Child(Program(WORKER, core=core, niceness=engine.niceness, has_log=True))
+        self._child = Child(Program(WORKER, core=core, niceness=engine.niceness))
         threading.Thread(target=self._work, name="worker", daemon=True).start()
 
     def end(self) -> None:

@@ -283,10 +283,12 @@ class _Running:
     async def _read(self) -> None:
         """Distribute messages until the process ends."""
         assert self.process.stdout is not None
+        assert self.process.stdin is not None
         while (message := await receive_message(self.process.stdout)) is not None:
             call = self._calls.get(message.id)
             if call is not None:
                 self._add(call, message)
+        self.process.stdin.close()
         try:  # killing one that has just ended would take its exit status from asyncio, which warns then
             await asyncio.wait_for(self.process.wait(), END_S)
         except TimeoutError:

@@ -19,18 +19,19 @@ from tts2face import __version__
 from tts2face.processes.message import RESULT, Message, read_message
 from tts2face.service.synthesis.work import Work
 
+FORMAT = 2  # of entries; those of others are not found
 CACHED_KINDS = frozenset({"file", "speech"})
 MAX_SHARE = 0.25  # of the budget that one entry may take
 FILE_FIELDS = ("audio", "timeline", "dictionary", "background")  # whose files are read while a result is made
 
 
 def work_hash(work: Work) -> str:
-    """SHA-256 of a work with the contents of its files, and of the version of the program."""
+    """SHA-256 of a work with the contents of its files, of the version of the program, and of the format of entries."""
     described = work.as_json()
     described["request"] = _with_contents(work.request)
     described["picture"] = _with_contents(work.picture)
     described["models"] = {name: _file_state(value) for name, value in work.models.items()}
-    text = json.dumps([__version__, described], sort_keys=True, ensure_ascii=False)
+    text = json.dumps([__version__, FORMAT, described], sort_keys=True, ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -10,7 +10,7 @@ from tts2face.service.logs import configure_logs, log_event
 from tts2face.service.synthesis.remote_aligner import RemoteAligner
 from tts2face.service.synthesis.tasks import TASKS
 from tts2face.service.synthesis.turns import OneAtATime, Turns
-from tts2face.service.synthesis.work import STAY, SYNTHESISE, DefectError, Step, work_from_json
+from tts2face.service.synthesis.work import SERVE, SYNTHESISE, DefectError, Step, work_from_json
 from tts2face.session_cache import Models, SessionCache
 from tts2face.voice.pool import VoicePool
 
@@ -44,7 +44,7 @@ class Synthesis:
         return TASKS[work.kind](self._sessions.get(Models(**work.models), work.owner), work, call.inputs)
 
 
-def stay(call: Call) -> Mapping[str, Any]:
+def serve(call: Call) -> Mapping[str, Any]:
     """Send an event as soon as the process has loaded; the call lasts as long as the process."""
     call.event({})
     return call.more().content
@@ -61,4 +61,4 @@ def handlers(
         n_sessions, voices=VoicePool(aligner, OneAtATime()), max_bytes=memory_mb * 1_000_000 or None,
         memory_mb=sentences_mb,
     )  # fmt: skip
-    return {SYNTHESISE: Synthesis(sessions).synthesise, STAY: stay}
+    return {SYNTHESISE: Synthesis(sessions).synthesise, SERVE: serve}

@@ -11,7 +11,7 @@ from tts2face.processes.message import Message
 from tts2face.processes.parent import AsyncChild
 from tts2face.processes.program import Program
 from tts2face.service.logs import REQUEST_ID, log_event
-from tts2face.service.synthesis.work import STAY, SYNTHESISE, Work
+from tts2face.service.synthesis.work import SERVE, SYNTHESISE, Work
 
 PROGRAM = "tts2face.service.synthesis.synthesis_process:handlers"
 AT_ONCE = 64  # more calls than the pool gives to one process
@@ -55,7 +55,7 @@ class WarmProcess:
         """Start the process, and start it again whenever it ends, until `close`."""
         while not self.is_closed:
             try:
-                await self._stay()
+                await self._serve()
             except Tts2faceError as ended:
                 if not self.is_closed:
                     log_event("synthesis process ended", reason=str(ended))
@@ -64,10 +64,10 @@ class WarmProcess:
                 await self._child.close()
                 self._on_change()
 
-    async def _stay(self) -> None:
+    async def _serve(self) -> None:
         began = time.monotonic()
-        async with aclosing(self._child.stream(STAY, {})) as stay:
-            async for _ in stay:  # once, as soon as it has loaded
+        async with aclosing(self._child.stream(SERVE, {})) as served:
+            async for _ in served:  # once, as soon as it has loaded
                 for work in self._warm:
                     await self._child.call(SYNTHESISE, {"work": work, "priority": 0, "id": None})
                 self.is_ready = True

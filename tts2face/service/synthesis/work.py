@@ -10,7 +10,7 @@ from tts2face.processes.message import Message
 from tts2face.types import Chunk
 
 Inputs = deque[Message]  # that a task has not read yet
-SYNTHESISE, STAY = "synthesise", "stay"  # calls of a synthesis process
+SYNTHESISE, SERVE = "synthesise", "serve"  # calls of a synthesis process
 CANCELS = frozenset({"cancel", "interrupt"})  # two names of one input of live streams
 
 
