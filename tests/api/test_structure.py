@@ -18,18 +18,13 @@ Find = Callable[[str, str], Iterator[str]]  # of the text and the name of a modu
 
 # Places that start Python, outside the room of child processes, which is to start all of them.
 PROCESS_ROOM = "tts2face.processes"
-STARTS_PYTHON = (
-    "tts2face.jobs.engine", "tts2face.service.synthesis.remote_aligner", "tts2face.service.synthesis.warm_process",
-    "tts2face.voice.espeak",
-)  # fmt: skip
+STARTS_PYTHON = ("tts2face.voice.espeak",)
 # Modules that read JSON or TOML themselves; `lexicon.inputs` does it for others.
 PARSES = (
     "corpus_tools.head.assets", "lexicon.inputs", "lexicon.part_of_speech", "tts2face.processes.message",
     "tts2face.jobs.job_records", "tts2face.jobs.job_table", "tts2face.jobs.resource_table",
-    "tts2face.service.routes.answers", "tts2face.service.state", "tts2face.service.synthesis.alignment_process",
-    "tts2face.service.synthesis.remote_aligner", "tts2face.service.synthesis.synthesis_process",
-    "tts2face.service.synthesis.warm_process", "tts2face.storage.tensors", "tts2face.studio.projects.bundle",
-    "tts2face.studio.requests", "tts2face.voice.espeak", "tts2face.voice.espeak_child",
+    "tts2face.storage.tensors", "tts2face.studio.projects.bundle", "tts2face.voice.espeak",
+    "tts2face.voice.espeak_child",
 )  # fmt: skip
 # Strings that name a module of a package above their own.
 NAMES_HIGHER = ()

@@ -23,7 +23,7 @@ from tts2face.batch.segment_result import SegmentResult
 from tts2face.batch.store import open_store
 from tts2face.jobs.control import list_jobs
 from tts2face.jobs.database import BEAT_S, Workers, database_url, prepare_database
-from tts2face.jobs.engine import DatabaseEngine, enqueue, open_client, start_worker
+from tts2face.jobs.engine import DatabaseEngine, LocalWorker, enqueue, open_client
 from tts2face.jobs.takeover import poll_interval
 from tts2face.jobs.worker import Worker
 
@@ -263,14 +263,13 @@ def bench_speed(place: Path, database: str, server: Postgres | None, chosen: arg
         where = str(folder / "jobs.sqlite") if server is None else server.database()
         prepare_database(database_url(where))
         children = [
-            start_worker(DatabaseEngine(where, str(folder / "store")), cores[number]) for number in range(n_workers)
+            LocalWorker(DatabaseEngine(where, str(folder / "store")), cores[number]) for number in range(n_workers)
         ]
         try:
             run_timed(folder, plan, where, n_workers)
         finally:
             for child in children:
-                child.kill()
-                child.wait()
+                child.end()
 
 
 def run_timed(folder: Path, plan: Any, database: str, n_workers: int) -> None:

@@ -3,6 +3,7 @@
 Memory is the largest of all children so far.
 """
 
+import asyncio
 import resource
 import tempfile
 from collections.abc import Mapping
@@ -14,7 +15,7 @@ from lexicon.errors import BackendError
 from tests.characters.made import write_character_file
 from tts2face import Session
 from tts2face.jobs.talker_job import BUILDER, LIMITS, TOOL
-from tts2face.processes.parent import Child
+from tts2face.processes.parent import call_once
 from tts2face.processes.program import Program
 from tts2face.service.uploads.decode import DECODE, program
 from tts2face.storage.files import find_file
@@ -65,9 +66,7 @@ def build(folder: Path, appearance: bool) -> tuple[tuple[float, float], Path]:
 def cost(program: Program, kind: str, order: Mapping[str, Any]) -> tuple[float, float]:
     """CPU seconds and MB of a child."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    child = Child(program)
-    child.call(kind, order)
-    child.close()
+    asyncio.run(call_once(program, kind, order))
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, after.ru_maxrss / 1024
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import InputError
-from tts2face.processes.child import Call
+from tts2face.processes.child import Call, Handler, StoppedError
 from tts2face.processes.message import RESULT, Message
 
 
@@ -46,9 +46,30 @@ def _add(call: Call) -> dict[str, Any]:
     return {"total": total}
 
 
+def _count(call: Call) -> dict[str, Any]:
+    """Numbered megabytes, until the caller leaves; none while the call is paused."""
+    number = 0
+    while True:
+        with call.changed:
+            call.changed.wait_for(lambda: call.is_stopped or not call.is_paused, 0.01)
+            if call.is_stopped:
+                raise StoppedError
+            if call.is_paused:
+                continue
+        call.event({"number": number, "pid": os.getpid()}, bytes(1 << 20))
+        number += 1
+
+
 def _write(call: Call) -> dict[str, Any]:
     Path(call.content["path"]).write_bytes(bytes(call.content["n"]))
     return {"secret": os.environ.get("AWS_SECRET_ACCESS_KEY")}
 
 
-HANDLERS = {"double": _double, "refuse": _refuse, "die": _die, "sleep": _sleep, "add": _add, "write": _write}
+def named(**settings: Any) -> dict[str, Handler]:
+    """A handler that answers with the settings."""
+    return {"settings": lambda _: settings}
+
+
+HANDLERS: dict[str, Handler] = {
+    "double": _double, "refuse": _refuse, "die": _die, "sleep": _sleep, "add": _add, "count": _count, "write": _write,
+}  # fmt: skip

@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import AsyncIterator, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from lexicon.errors import BackendError, InputError
 from tests.processes.handlers import NarrowError
 from tests.running import eventually
 from tests.started import running_processes
+from tts2face.processes import parent
 from tts2face.processes.limits import ProcessLimits
 from tts2face.processes.message import Message
 from tts2face.processes.parent import AsyncChild, Child, ChildEndedError, raised, started
@@ -166,6 +168,73 @@ def test_asyncio_has_the_same_errors_and_ends() -> None:
         with pytest.raises(asyncio.CancelledError):
             await task
         assert not is_running(processes[1])
+        await child.close()
+
+    asyncio.run(use())
+
+
+def test_handlers_are_made_of_settings() -> None:
+    child = Child(Program("tests.processes.handlers:named", settings={"n_sessions": 2}))
+    assert child.call("settings", {}).content == {"n_sessions": 2}
+    child.close()
+
+
+def test_a_child_that_ended_between_two_calls_is_followed_by_another(child: Child) -> None:
+    child.call("double", {"n": 1})
+    assert child.pid is not None
+    os.kill(child.pid, signal.SIGKILL)
+    assert child._child is not None
+    child._child.wait()
+    assert child.call("double", {"n": 2}).content["pid"] == child.pid
+
+
+def test_one_child_works_on_several_calls_at_once() -> None:
+    """Each gets its own inputs; one that is left is stopped and the others go on; their end is that of the child."""
+    given: asyncio.Queue[int] = asyncio.Queue()
+    released: list[float] = []
+
+    async def numbers() -> AsyncIterator[tuple[Mapping[str, Any], bytes]]:
+        while True:
+            yield {"n": await given.get()}, b""
+
+    async def use() -> None:
+        child = AsyncChild(replace(PROGRAM, at_once=3), released.append)
+        adding, counting = child.stream("add", {}, inputs=numbers()), child.stream("count", {})
+        given.put_nowait(1)
+        assert (await anext(adding)).content == {"total": 1}
+        process = (await anext(counting)).content["pid"]
+        assert process == child.pid == (await child.call("double", {"n": 5})).content["pid"]
+        await counting.aclose()
+        while not released:
+            await asyncio.sleep(0.01)
+        given.put_nowait(5)
+        assert [answer.content["total"] async for answer in adding] == [6, 6]
+        ends = [asyncio.create_task(child.call("sleep", {})) for _ in range(2)]
+        await asyncio.sleep(0.1)
+        with pytest.raises(ChildEndedError, match="out of luck"):
+            await child.call("die", {})
+        assert [type(one) for one in await asyncio.gather(*ends, return_exceptions=True)] == [ChildEndedError] * 2
+        assert (await child.call("double", {"n": 6})).content["pid"] != process
+        await child.close()
+        assert child.pid is None
+
+    asyncio.run(use())
+
+
+def test_a_call_that_nobody_reads_is_paused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parent, "PAUSE_BYTES", 3 << 20)
+
+    async def use() -> None:
+        child = AsyncChild(replace(PROGRAM, at_once=2))
+        async with contextlib.aclosing(child.stream("count", {})) as messages:
+            await anext(messages)
+            (call,) = child._running._calls.values()  # type: ignore[union-attr]
+            before = -1
+            while before != call.n_bytes or not call.is_paused:
+                before = call.n_bytes
+                await asyncio.sleep(0.3)
+            assert call.n_bytes < 64 << 20
+            assert [(await anext(messages)).content["number"] for _ in range(100)] == list(range(1, 101))
         await child.close()
 
     asyncio.run(use())

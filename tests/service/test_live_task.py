@@ -1,25 +1,25 @@
 """The task of a live stream, without a service."""
 
-import queue
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
 import tts2face
+from tts2face.processes.message import MORE, Message
 from tts2face.service.synthesis.live_task import LiveTask
-from tts2face.service.synthesis.messages import Event
 from tts2face.service.synthesis.turns import InterruptedTaskError
-from tts2face.service.synthesis.work import Work
+from tts2face.service.synthesis.work import Event, Inputs, Work
 from tts2face.voice.pool import VoicePool
 
 
 def test_idle_motion_is_interrupted_by_cancel() -> None:
     """The stream answers and goes on."""
-    inputs: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    arriving = [{"type": "cancel", "arrived": 0.0}]  # between the steps of idle motion
+    inputs: Inputs = deque()
+    arriving = [Message(MORE, {"type": "cancel", "arrived": 0.0})]  # between the steps of idle motion
 
     def run(compute: Callable[[], Any], _: Callable[[], None]) -> Any:
         if arriving:
-            inputs.put(arriving.pop())
+            inputs.append(arriving.pop())
             raise InterruptedTaskError
         return compute()
 

@@ -10,6 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
+from tts2face.processes.message import EVENT, RESULT, Message
 from tts2face.service import logs
 from tts2face.service.access.exchange import Receive, Scope, Send
 from tts2face.service.access.guard import Guard
@@ -17,7 +18,6 @@ from tts2face.service.access.keys import LOCAL_KEY
 from tts2face.service.logs import LOG, LineFormatter, log_event
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.state import ServiceState
-from tts2face.service.synthesis.messages import Message, MessageKind
 
 
 def record(message: str, *, name: str = LOG.name, **fields: Any) -> logging.LogRecord:
@@ -98,8 +98,8 @@ class FakePool:
     """A pool whose works are done at once."""
 
     async def stream(self, work: Any, key: str, *_: Any) -> AsyncIterator[Message]:
-        yield Message(1, MessageKind.DATA, b"abc", 2.0)
-        yield Message(1, MessageKind.END, b'{"seconds": 2.5, "cpu_s": 0.1}')
+        yield Message(EVENT, {"seconds": 2.0}, b"abc")
+        yield Message(RESULT, {"seconds": 2.5, "cpu_s": 0.1})
 
 
 @pytest.mark.parametrize("log_text", [False, True])

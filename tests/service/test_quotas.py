@@ -11,12 +11,12 @@ import pytest
 
 from cli.main import run
 from lexicon.errors import DataError, InputError
+from tts2face.processes.message import EVENT, Message
 from tts2face.service.access.keys import LOCAL_KEY, ApiKey, add_key, find_key, read_keys, remove_key
 from tts2face.service.access.rate_limits import RateLimits
 from tts2face.service.errors import RefusedError
 from tts2face.service.settings import ServiceSettings
 from tts2face.service.state import ServiceState
-from tts2face.service.synthesis.messages import Message, MessageKind
 from tts2face.service.synthesis.pool import Pool, PoolSettings
 from tts2face.service.synthesis.work import Work
 
@@ -87,7 +87,7 @@ class OnePartPool:
     """A pool that makes 10 s of speech in a part, and then waits for ever."""
 
     async def stream(self, work: Work, key: str, *_: Any) -> AsyncIterator[Message]:
-        yield Message(1, MessageKind.DATA, b"abc", 10.0)
+        yield Message(EVENT, {"seconds": 10.0}, b"abc")
         await asyncio.Event().wait()
 
 

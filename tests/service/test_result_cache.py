@@ -9,16 +9,16 @@ from typing import Any
 import pytest
 
 from lexicon.errors import BackendError
-from tts2face.service.synthesis.messages import Message, MessageKind
+from tts2face.processes.message import EVENT, RESULT, Message
 from tts2face.service.synthesis.result_cache import ResultCache, work_hash
 from tts2face.service.synthesis.work import Work
 
-END = Message(7, MessageKind.END, b'{"seconds": 1.0}')
+END = Message(RESULT, {"seconds": 1.0})
 HELLO = Work(request={"text": "Hello."}, models={"talker": "grid_s1"})
 
 
 def result(size: int = 4) -> list[Message]:
-    return [Message(7, MessageKind.EVENT, b"{}", 0.5), Message(7, MessageKind.DATA, bytes(size), 0.5), END]
+    return [Message(EVENT, {"seconds": 0.5, "event": {}}), Message(EVENT, {"seconds": 0.5}, bytes(size)), END]
 
 
 class Maker:
@@ -50,22 +50,18 @@ def read(cache: ResultCache, work: Work, maker: Maker, *, most: int | None = Non
     return asyncio.run(run())
 
 
-def payloads(messages: list[Message]) -> list[tuple[MessageKind, bytes, float]]:
-    return [(message.kind, message.payload, message.seconds) for message in messages]
-
-
 def test_a_second_request_gets_the_same_messages_without_work(tmp_path: Path) -> None:
-    cache, maker = ResultCache(tmp_path, 1000), Maker(result())
+    cache, maker = ResultCache(tmp_path, 4000), Maker(result())
     first, second = read(cache, HELLO, maker), read(cache, HELLO, maker)
-    assert payloads(first) == payloads(second) == payloads(result())
+    assert first == second == result()
     assert (maker.n_made, cache.n_hits, cache.n_misses) == (1, 1, 1)
-    assert payloads(read(ResultCache(tmp_path, 1000), HELLO, maker)) == payloads(first)  # of a new server
+    assert read(ResultCache(tmp_path, 4000), HELLO, maker) == first  # of a new server
     assert maker.n_made == 1
 
 
 @pytest.mark.parametrize("how", ["left", "failed"])
 def test_a_result_that_is_not_complete_is_not_kept(tmp_path: Path, how: str) -> None:
-    cache = ResultCache(tmp_path, 1000)
+    cache = ResultCache(tmp_path, 4000)
     if how == "left":
         read(cache, HELLO, Maker(result()), most=2)
     else:
@@ -78,36 +74,36 @@ def test_a_result_that_is_not_complete_is_not_kept(tmp_path: Path, how: str) -> 
 
 
 def test_the_least_recently_used_entries_are_removed(tmp_path: Path) -> None:
-    cache = ResultCache(tmp_path, 1000)
+    cache = ResultCache(tmp_path, 4000)
     works = [Work(request={"text": f"{number}."}) for number in range(5)]
-    makers = [Maker(result(150)) for _ in works]
+    makers = [Maker(result(600)) for _ in works]
     for number in range(4):
         read(cache, works[number], makers[number])
     read(cache, works[0], makers[0])
     read(cache, works[4], makers[4])
-    assert cache.n_bytes == sum(path.stat().st_size for path in tmp_path.iterdir()) <= 1000
+    assert cache.n_bytes == sum(path.stat().st_size for path in tmp_path.iterdir()) <= 4000
     for number in (0, 4, 1):
         read(cache, works[number], makers[number])
     assert [maker.n_made for maker in makers] == [1, 2, 1, 1, 1]
 
 
 def test_a_large_result_does_not_displace_all_others(tmp_path: Path) -> None:
-    cache = ResultCache(tmp_path, 1000)
-    read(cache, HELLO, Maker(result(500)))
+    cache = ResultCache(tmp_path, 4000)
+    read(cache, HELLO, Maker(result(2000)))
     assert list(tmp_path.iterdir()) == []
 
 
 def test_remains_of_a_server_that_ended_are_removed(tmp_path: Path) -> None:
     (tmp_path / "x.part").write_bytes(b"begun")
-    assert ResultCache(tmp_path, 1000).n_bytes == 0
+    assert ResultCache(tmp_path, 4000).n_bytes == 0
     assert list(tmp_path.iterdir()) == []
 
 
 def test_an_entry_that_another_server_removed_is_made_again(tmp_path: Path) -> None:
-    cache, maker = ResultCache(tmp_path, 1000), Maker(result())
+    cache, maker = ResultCache(tmp_path, 4000), Maker(result())
     read(cache, HELLO, maker)
     next(tmp_path.iterdir()).unlink()
-    assert payloads(read(cache, HELLO, maker)) == payloads(result())
+    assert read(cache, HELLO, maker) == result()
     assert maker.n_made == 2
 
 

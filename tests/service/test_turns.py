@@ -1,18 +1,27 @@
-"""Tasks in threads that take turns, and alignment in another process."""
+"""Calls of one process take turns, and wait for other threads and processes meanwhile."""
 
+import io
 import threading
-import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
 
-from lexicon.errors import BackendError, DataError, InputError
-from tts2face.service.synthesis.messages import Wait
+from lexicon.errors import DataError, InputError
+from tests.processes.answered import answered
+from tests.running import eventually
+from tts2face.processes.child import Call, StoppedError
+from tts2face.processes.message import ERROR, GO, MORE, PAUSE, STOP, Message, read_message
+from tts2face.processes.parent import ChildEndedError
+from tts2face.service.synthesis import synthesis_process
 from tts2face.service.synthesis.remote_aligner import RemoteAligner
-from tts2face.service.synthesis.scheduler import Step
-from tts2face.service.synthesis.turns import InterruptedTaskError, OneAtATime, TurnSteps, wait_elsewhere
+from tts2face.service.synthesis.synthesis_process import Synthesis
+from tts2face.service.synthesis.turns import InterruptedTaskError, OneAtATime, Turns, wait_elsewhere
+from tts2face.service.synthesis.work import Event, Step, Wait, Work
+from tts2face.session_cache import SessionCache
 from tts2face.speech.forced_alignment import Aligner
 from tts2face.types import Chunk
 from tts2face.voice.loading import load_voice
@@ -20,108 +29,301 @@ from tts2face.voice.loading import load_voice
 WAIT_S = 60.0
 
 
-class Elsewhere:
-    """Work that another process would do: it ends when the test lets it, or when it is abandoned."""
+class Calls:
+    """Calls of one process, and what they have sent; their seconds pass only when steps let them."""
 
     def __init__(self) -> None:
-        self.end, self.woken = threading.Event(), threading.Event()
-        self.is_abandoned = False
+        self.now = 0.0
+        self.turns, self.changed = Turns(lambda: self.now), threading.Condition()
+        self.sent: list[Message] = []
+        self.results: dict[int, Any] = {}  # measures or error
+        self._calls: dict[int, Call] = {}
+        self._threads: dict[int, threading.Thread] = {}
 
-    def wait(self) -> int:
-        assert self.end.wait(WAIT_S)
-        if self.is_abandoned:
-            raise BackendError("abandoned")
-        return 7
+    def write(self, content: bytes) -> None:
+        message = read_message(io.BytesIO(content))
+        assert message is not None
+        self.sent.append(message)
 
-    def abandon(self) -> None:
-        self.is_abandoned = True
-        self.end.set()
+    def flush(self) -> None:
+        pass
+
+    def start(self, id: int, steps: Callable[[], Iterator[Step]], priority: int = 0) -> None:
+        """Begin a call; returns when it has had a turn or waits for one."""
+        call = self._calls[id] = Call(Message("make", id=id), self, self.changed)  # type: ignore[arg-type]
+
+        def run() -> None:
+            try:
+                self.results[id] = self.turns.run(call, steps, priority)
+            except (Exception, StoppedError) as error:  # noqa: BLE001
+                self.results[id] = error
+
+        before = self.sent[:]
+        thread = self._threads[id] = threading.Thread(target=run, daemon=True)
+        thread.start()
+        eventually(lambda: id in self.results or self.n_waiting(id) or self.sent != before, WAIT_S)
+
+    def n_waiting(self, id: int) -> int:
+        return sum(one.call.id == id for one in self.turns._waiting)
+
+    def control(self, id: int, kind: str, **content: Any) -> None:
+        self._calls[id].control(Message(kind, content, id=id))
+
+    def end(self, id: int) -> Any:
+        """Result of a call."""
+        self._threads[id].join(WAIT_S)
+        return self.results[id]
+
+    @property
+    def order(self) -> list[int]:
+        """Calls of all messages."""
+        return [one.id for one in self.sent]
+
+    def speech(self, n_steps: int, *, seconds: float = 1.0) -> Iterator[Step]:
+        for number in range(n_steps):
+            self.now += 0.1
+            yield Chunk(bytes([number]), seconds)
 
 
 @pytest.fixture
-def elsewhere() -> Elsewhere:
-    return Elsewhere()
+def calls() -> Calls:
+    return Calls()
 
 
-def turns(elsewhere: Elsewhere, make: Callable[[], Iterator[Step]]) -> TurnSteps:
-    return TurnSteps(make, elsewhere.woken.set)
+@pytest.fixture
+def held(calls: Calls) -> Iterator[threading.Event]:
+    """A turn that ends when the event is set, so that calls begin to wait in the order of their start."""
+    end = threading.Event()
+
+    def hold() -> Iterator[Step]:
+        begun.set()
+        end.wait(WAIT_S)
+        yield from ()
+
+    begun = threading.Event()
+    thread = threading.Thread(target=calls.start, args=(0, hold), daemon=True)
+    thread.start()
+    assert begun.wait(WAIT_S)
+    yield end
+    end.set()
+    thread.join()
 
 
-def waits(elsewhere: Elsewhere, released: list[str]) -> Iterator[Step]:
-    try:
-        yield Chunk(b"before")
+def test_the_result_of_a_call_is_sent_in_order(calls: Calls) -> None:
+    calls.start(7, lambda: calls.speech(3))
+    assert calls.end(7) == {"seconds": 3.0, "cpu_s": pytest.approx(0.3)}
+    assert [(one.id, one.content, one.payload) for one in calls.sent] == [
+        (7, {"seconds": 1.0}, bytes([number])) for number in range(3)
+    ]
+
+
+def test_a_new_call_begins_before_one_that_is_ahead_continues(calls: Calls) -> None:
+    def first() -> Iterator[Step]:
+        yield from calls.speech(4)
+        threading.Thread(target=calls.start, args=(2, lambda: calls.speech(10))).start()
+        eventually(lambda: calls.n_waiting(2), WAIT_S)
+        yield from calls.speech(6)
+
+    calls.start(1, first)
+    calls.end(1)
+    calls.end(2)
+    assert calls.order[:10] == [1] * 5 + [2] * 5  # until both are equally far ahead of their listeners
+    assert set(calls.order[10:14]) == {1, 2}
+
+
+def test_calls_of_lower_priority_run_when_no_other_can(calls: Calls, held: threading.Event) -> None:
+    calls.start(1, lambda: calls.speech(2), priority=1)
+    calls.start(2, lambda: calls.speech(2, seconds=100.0))
+    held.set()
+    calls.end(1)
+    assert calls.order == [2, 2, 1, 1]
+
+
+def test_a_paused_call_waits(calls: Calls, held: threading.Event) -> None:
+    calls.start(1, lambda: calls.speech(2))
+    calls.start(2, lambda: calls.speech(2))
+    calls.control(1, PAUSE)
+    held.set()
+    calls.end(2)
+    assert calls.order == [2, 2]
+    calls.control(1, GO)
+    calls.end(1)
+    assert calls.order == [2, 2, 1, 1]
+
+
+def test_a_call_without_input_waits_until_it_gets_some(calls: Calls) -> None:
+    def listens() -> Iterator[Step]:
+        yield Wait(0.01)
+        yield Event({"waited": 0.01})
+        yield Wait()
+        yield Event({"heard": True}, 0.5)
+
+    calls.start(1, listens)
+    eventually(lambda: calls.sent, WAIT_S)
+    calls.control(1, MORE, type="text")
+    assert calls.end(1)["seconds"] == 0.5
+    assert [one.content["event"] for one in calls.sent] == [{"waited": 0.01}, {"heard": True}]
+
+
+def test_a_call_with_an_urgent_input_runs_next(calls: Calls, held: threading.Event) -> None:
+    """Until it has read it, even if it is ahead, and of a lower priority."""
+
+    def interrupted() -> Iterator[Step]:
+        yield Chunk(b"sound", 100.0)
+        calls._calls[1].inputs.popleft()
+        yield Event({"type": "cancelled"})
+        yield Event({"type": "later"})
+
+    calls.start(1, interrupted, priority=1)
+    calls.start(2, lambda: calls.speech(2))
+    calls.control(1, MORE, type="cancel")
+    held.set()
+    calls.end(1)
+    assert calls.order == [1, 1, 2, 2, 1]
+
+
+def test_a_stopped_call_releases_what_it_holds_in_the_next_turn(calls: Calls, held: threading.Event) -> None:
+    def holds() -> Iterator[Step]:
         try:
-            number = wait_elsewhere(elsewhere.wait, elsewhere.abandon)
-        except InterruptedTaskError:
-            yield Chunk(b"interrupted")
-        else:
-            yield Chunk(b"%d" % number)
-    finally:
-        released.append("all")
+            yield Chunk(b"sound")
+            calls.control(1, STOP)
+            yield from calls.speech(9)
+        finally:
+            calls.control(2, GO)  # the other one still waits for its turn
+            released.append(calls.n_waiting(2))
+
+    released: list[int] = []
+    calls.start(1, holds, priority=-1)
+    calls.start(2, lambda: calls.speech(2))
+    calls.control(2, PAUSE)
+    held.set()
+    assert isinstance(calls.end(1), StoppedError)
+    calls.end(2)
+    assert released == [1]
+    assert calls.order == [1, 1, 2, 2]
 
 
-def test_the_steps_are_those_of_the_task(elsewhere: Elsewhere) -> None:
-    assert [step.content for step in turns(elsewhere, lambda: iter([Chunk(b"1"), Chunk(b"2")]))] == [b"1", b"2"]  # type: ignore[union-attr]
+@pytest.mark.parametrize(
+    ("error", "name", "message"),
+    [
+        (InputError("no such\nvoice"), "InputError", "no such voice"),
+        (RuntimeError("my text"), "DefectError", "internal error: RuntimeError; see the log of the service"),
+    ],
+)
+def test_an_error_ends_its_call_only(
+    monkeypatch: pytest.MonkeyPatch, error: Exception, name: str, message: str
+) -> None:
+    def fails(*_: Any) -> Iterator[Step]:
+        yield Chunk(b"a")
+        raise error
+
+    monkeypatch.setattr(synthesis_process, "TASKS", {"fails": fails, "works": lambda *_: iter([Chunk(b"a")])})
+    monkeypatch.setattr(SessionCache, "get", lambda *_: None)
+    synthesis = Synthesis(SessionCache())
+    order = {"priority": 0, "id": "id-1"}
+    failed, works = (
+        answered(synthesis.synthesise, order | {"work": Work(kind).as_json()})[-1] for kind in ("fails", "works")
+    )
+    assert (failed.kind, failed.content["errors"][0], failed.content["message"]) == (ERROR, name, message)
+    assert works.content["seconds"] == 0.0
 
 
-def test_an_error_of_the_task_is_raised(elsewhere: Elsewhere) -> None:
-    def fail() -> Iterator[Step]:
-        raise InputError("no such voice")
+class Elsewhere:
+    """What another thread or process does for a call: its end is that of the future."""
 
-    with pytest.raises(InputError, match="no such voice"):
-        next(turns(elsewhere, fail))
+    def __init__(self) -> None:
+        self.future: Future[int] = Future()
+        self.n_ends = 0
 
+    def end(self) -> None:
+        self.n_ends += 1
 
-def test_others_have_turns_while_a_task_waits(elsewhere: Elsewhere) -> None:
-    steps = turns(elsewhere, lambda: waits(elsewhere, []))
-    assert next(steps) == Chunk(b"before")
-    assert next(steps) == Wait()
-    assert next(steps) == Wait()  # a turn that comes too early does not block
-    assert not elsewhere.woken.is_set()
-    elsewhere.end.set()
-    assert elsewhere.woken.wait(WAIT_S)
-    assert next(steps) == Chunk(b"7")
-    assert list(steps) == []
-
-
-@pytest.mark.parametrize("n_steps", [0, 1, 2])
-def test_a_cancelled_task_releases_what_it_holds(elsewhere: Elsewhere, n_steps: int) -> None:
-    released: list[str] = []
-    steps = turns(elsewhere, lambda: waits(elsewhere, released))
-    for _ in range(n_steps):
-        next(steps)
-    steps.close()
-    assert released == (["all"] if n_steps else [])
-    assert elsewhere.is_abandoned == (n_steps == 2)
-    assert list(steps) == []
+    def steps(self, released: list[str]) -> Iterator[Step]:
+        try:
+            yield Chunk(b"before")
+            try:
+                number = wait_elsewhere(self.future, self.end)
+            except InterruptedTaskError:
+                yield Chunk(b"interrupted")
+            else:
+                yield Chunk(b"%d" % number)
+        finally:
+            released.append("all")
 
 
-def test_an_interrupted_task_goes_on(elsewhere: Elsewhere) -> None:
-    steps = turns(elsewhere, lambda: waits(elsewhere, []))
-    steps.interrupt()  # nothing to interrupt yet
-    assert next(steps) == Chunk(b"before")
-    assert next(steps) == Wait()
-    steps.interrupt()
-    assert elsewhere.woken.wait(WAIT_S)
-    assert next(steps) == Chunk(b"interrupted")
-    assert list(steps) == []
+def payloads(calls: Calls, id: int) -> list[bytes]:
+    return [one.payload for one in calls.sent if one.id == id]
 
 
-def test_a_task_is_interrupted_before_its_turn_after_a_wait(elsewhere: Elsewhere) -> None:
+def test_others_have_turns_while_a_call_waits(calls: Calls) -> None:
+    elsewhere = Elsewhere()
+    calls.start(1, lambda: elsewhere.steps([]))
+    calls.start(2, lambda: calls.speech(2))
+    calls.end(2)
+    assert payloads(calls, 1) == [b"before"]
+    elsewhere.future.set_result(7)
+    calls.end(1)
+    assert payloads(calls, 1) == [b"before", b"7"]
+    assert elsewhere.n_ends == 0
+
+
+@pytest.mark.parametrize("is_begun", [False, True])
+def test_a_call_that_is_stopped_while_it_waits_ends_what_it_waits_for(calls: Calls, is_begun: bool) -> None:
+    elsewhere, released = Elsewhere(), list[str]()
+    if is_begun:
+        elsewhere.future.set_running_or_notify_cancel()
+    calls.start(1, lambda: elsewhere.steps(released))
+    calls.control(1, STOP)
+    assert isinstance(calls.end(1), StoppedError)
+    assert (released, payloads(calls, 1)) == (["all"], [b"before"])
+    assert (elsewhere.n_ends, elsewhere.future.cancelled()) == (int(is_begun), not is_begun)
+
+
+def test_an_interrupted_call_goes_on(calls: Calls) -> None:
+    elsewhere = Elsewhere()
+    calls.start(1, lambda: elsewhere.steps([]))
+    calls.control(1, MORE, type="interrupt")
+    calls.end(1)
+    assert payloads(calls, 1) == [b"before", b"interrupted"]
+
+
+def test_a_call_is_interrupted_before_its_turn_after_a_wait(calls: Calls, held: threading.Event) -> None:
     """As between two steps of a piece, where the wait is over at once."""
-    steps = turns(elsewhere, lambda: waits(elsewhere, []))
-    assert next(steps) == Chunk(b"before")
-    assert next(steps) == Wait()
-    elsewhere.end.set()
-    assert elsewhere.woken.wait(WAIT_S)
-    steps.interrupt()
-    assert next(steps) == Chunk(b"interrupted")
-    assert not elsewhere.is_abandoned
+    elsewhere = Elsewhere()
+    calls.start(1, lambda: elsewhere.steps([]))
+    elsewhere.future.set_result(7)
+    calls.control(1, MORE, type="cancel")
+    held.set()
+    calls.end(1)
+    assert payloads(calls, 1) == [b"before", b"interrupted"]
+    assert elsewhere.n_ends == 0
 
 
-def test_without_turns_a_wait_is_a_wait(elsewhere: Elsewhere) -> None:
-    elsewhere.end.set()
-    assert wait_elsewhere(elsewhere.wait, elsewhere.abandon) == 7
+def test_without_turns_a_wait_is_a_wait() -> None:
+    elsewhere = Elsewhere()
+    elsewhere.future.set_result(7)
+    assert wait_elsewhere(elsewhere.future, elsewhere.end) == 7
+
+
+def test_calls_run_models_one_after_another(calls: Calls) -> None:
+    run, end = OneAtATime(), threading.Event()
+    order: list[int] = []
+
+    def task(number: int) -> Iterator[Step]:
+        yield Chunk(b"begun")
+        run(lambda: (order.append(number), end.wait(WAIT_S)), end.set)
+        yield Chunk(b"done")
+
+    for number in (1, 2, 3):
+        calls.start(number, partial(task, number))
+    eventually(lambda: order, WAIT_S)
+    calls.control(2, STOP)  # while it waits for the first one
+    assert isinstance(calls.end(2), StoppedError)
+    assert order == [1]
+    end.set()
+    calls.end(1)
+    calls.end(3)
+    assert order == [1, 3]
 
 
 @pytest.fixture
@@ -145,60 +347,31 @@ def test_another_process_aligns_as_this_one(aligner: RemoteAligner) -> None:
         aligner.align(sound, [])
 
 
-def test_a_cancelled_alignment_leaves_the_next_one_alone(aligner: RemoteAligner) -> None:
+def test_an_alignment_that_is_not_needed_leaves_the_next_one_alone(aligner: RemoteAligner, calls: Calls) -> None:
     sound = load_voice("heart", "en-us").speak("Bob may read.").waveform
     expected = aligner.align(sound, WORDS).phones.edges
-    woken = threading.Event()
-    for _ in range(3):
 
-        def align() -> Iterator[Step]:
-            yield Chunk(str(aligner.align(sound, WORDS)).encode())
+    def align(number: int) -> Iterator[Step]:
+        yield Chunk(b"begun")
+        found = aligner.align(sound, WORDS[:number])
+        yield Chunk(str(len(found.words)).encode())
 
-        steps = TurnSteps(align, woken.set)
-        assert next(steps) == Wait()
-        steps.close()
+    for number in (1, 2):  # in the process, and before it
+        calls.start(number, partial(align, number))
+    for number in (1, 2):
+        calls.control(number, STOP)
+        assert isinstance(calls.end(number), StoppedError)
     np.testing.assert_array_equal(aligner.align(sound, WORDS).phones.edges, expected)
-
-
-def test_alignments_may_be_cancelled_at_any_time(aligner: RemoteAligner) -> None:
-    """Before the process has read the sentence, in the middle, and when it is done."""
-    sound = load_voice("heart", "en-us").speak("Bob may read.").waveform
-    expected = aligner.align(sound, WORDS).phones.edges
-    begin = time.monotonic()
-    aligner.align(sound, WORDS)
-    takes_s = time.monotonic() - begin
-    for share in np.linspace(0.0, 1.3, 14):
-        steps = TurnSteps(lambda: iter([Chunk(str(aligner.align(sound, WORDS)).encode())]), lambda: None)
-        assert next(steps) == Wait()
-        time.sleep(share * takes_s)
-        steps.close()
-        np.testing.assert_array_equal(aligner.align(sound, WORDS).phones.edges, expected)
-
-
-def test_tasks_run_models_one_after_another(elsewhere: Elsewhere) -> None:
-    run = OneAtATime()
-    order: list[int] = []
-
-    def task(number: int) -> Iterator[Step]:
-        run(lambda: (order.append(number), elsewhere.end.wait(WAIT_S)), lambda: None)
-        yield Chunk(b"%d" % number)
-
-    first, second = (TurnSteps(partial(task, number), elsewhere.woken.set) for number in (1, 2))
-    assert next(first) == Wait()
-    assert next(second) == Wait()
-    second.close()  # while it waits for the first one
-    assert order == [1]
-    elsewhere.end.set()
-    assert elsewhere.woken.wait(WAIT_S)
-    while (step := next(first)) == Wait():
-        pass
-    assert step == Chunk(b"1")
 
 
 def test_a_process_that_ended_is_started_again(aligner: RemoteAligner) -> None:
     sound = load_voice("heart", "en-us").speak("Bob may read.").waveform
     expected = aligner.align(sound, WORDS).phones.edges
-    assert aligner._child is not None
+    first = aligner.pid
     aligner._child.kill()
-    aligner._child.wait()
-    np.testing.assert_array_equal(aligner.align(sound, WORDS).phones.edges, expected)
+    try:
+        again = aligner.align(sound, WORDS)
+    except ChildEndedError:  # it was about to end
+        again = aligner.align(sound, WORDS)
+    np.testing.assert_array_equal(again.phones.edges, expected)
+    assert aligner.pid != first

@@ -16,8 +16,8 @@ def test_the_end_of_a_process_is_not_taken_from_asyncio(caplog: pytest.LogCaptur
     """Asyncio warns of an unknown child process if something else has read its exit status."""
 
     async def run() -> None:
-        settings = {"core": None, "n_sessions": 1, "warm": [], "log_format": JSON_LINES, "log_text": False}
-        process = WarmProcess(settings | {"memory_mb": 0, "sentences_mb": 0}, lambda: None)
+        settings = {"n_sessions": 1, "log_format": JSON_LINES, "log_text": False, "memory_mb": 0, "sentences_mb": 0}
+        process = WarmProcess(settings, (), lambda: None)
         running = asyncio.create_task(process.run())
         async with asyncio.timeout(READY_TIMEOUT_S):
             for number in range(3):

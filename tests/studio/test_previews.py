@@ -1,14 +1,13 @@
 """Previews of a project: partial ones, cancelled ones, and those whose process ended; the works are made by hand."""
 
 import asyncio
-import json
 from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 from tests.studio.test_bundle import piece
+from tts2face.processes.message import EVENT, Message
+from tts2face.processes.parent import ChildEndedError
 from tts2face.service.errors import RefusedError
-from tts2face.service.synthesis.messages import Message, MessageKind
-from tts2face.service.synthesis.warm_process import ProcessEndedError
 from tts2face.service.synthesis.work import Work
 from tts2face.studio.projects.bundle import PieceMemory, Preview
 from tts2face.studio.projects.previews import PARTIAL_S, ProjectPreview
@@ -17,7 +16,7 @@ Stream = Callable[[Work], AsyncIterator[Message]]
 
 
 def event(content: dict[str, Any]) -> Message:
-    return Message(1, MessageKind.EVENT, json.dumps(content).encode())
+    return Message(EVENT, {"seconds": 0.0, "event": content})
 
 
 def pieces_of(text: str) -> list[tuple[dict[str, Any], bytes]]:
@@ -44,7 +43,7 @@ class Works:
         self.begun.append(text)
         try:
             if len(self.begun) <= self._n_ends:
-                raise RefusedError(503, "unavailable", "gone") from ProcessEndedError("gone")
+                raise RefusedError(503, "unavailable", "gone") from ChildEndedError("gone")
             if text == "wrong":
                 raise RefusedError(400, "invalid_request", "the text is wrong")
             yield event({"type": "begin", "fps": 30.0})
@@ -53,7 +52,7 @@ class Works:
                 yield event(made)
                 if made["digest"] not in work.request["have"]:
                     self.sent.append(made["text"])
-                    yield Message(1, MessageKind.DATA, content)
+                    yield Message(EVENT, {"seconds": 0.0}, content)
             yield event({"type": "end", "dropped": [], "cut_to": None})
         finally:
             self.ended.append(text)

@@ -1,8 +1,6 @@
 """An engine that queues segments in a database and waits for its workers."""
 
 import os
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -10,9 +8,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
-from typing import IO, Any
+from typing import Any
 
-from lexicon.errors import BackendError
+from lexicon.errors import BackendError, Tts2faceError
 from tts2face.batch.engine import Message, Rendered
 from tts2face.batch.segment import Segment
 from tts2face.batch.store import Store, wait_for_store
@@ -21,12 +19,16 @@ from tts2face.jobs.database import (
     APPLICATION,
     APPLICATION_VERSION,
     QUEUE,
+    WORK,
     WORKFLOW,
     Workers,
     database_url,
     prepare_database,
 )
+from tts2face.processes.parent import Child
+from tts2face.processes.program import Program
 
+WORKER = "tts2face.jobs.worker:HANDLERS"
 POLL_S = 0.5  # between two looks at the jobs that have ended
 OVERLAP_S = 5.0  # of the times of two looks: a transaction ends some time after the time that it notes
 ALL_JOBS_S = 60.0  # between two looks at all jobs that are awaited
@@ -49,12 +51,12 @@ class DatabaseEngine:
         Store as the local workers open it.
     priority
         Jobs with smaller numbers are taken first; from 1.
+    on_message
+        Called with lines for people; in other threads with those of the local workers.
     on_wait
         Called at each look at the jobs; what it raises ends the waiting.
     niceness
         What is added to the niceness of the local workers: 10 gives way to other processes.
-    on_line
-        Called, in other threads, with what the local workers write; None: they write to standard error.
     """
 
     database: str
@@ -64,7 +66,6 @@ class DatabaseEngine:
     on_message: Message = lambda _: None
     on_wait: Callable[[], None] = lambda: None
     niceness: int = 0
-    on_line: Message | None = None
 
     def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
         """Yield each segment as soon as it is stored or has failed."""
@@ -231,13 +232,42 @@ def local_workers(engine: DatabaseEngine) -> Iterator[Callable[[], None]]:
         workers.end()
 
 
+class LocalWorker:
+    """A worker as a child process, which ends with this one: a call that lasts as long as the worker.
+
+    Attributes
+    ----------
+    began
+        Second of the clock.
+    reason
+        Why it ended; empty while it works.
+    """
+
+    def __init__(self, engine: DatabaseEngine, core: int | None) -> None:
+        self.began, self.reason = time.monotonic(), ""
+        self._engine, self._core = engine, core
+        self._child = Child(Program(WORKER, core=core, niceness=engine.niceness))
+        threading.Thread(target=self._work, name="worker", daemon=True).start()
+
+    def end(self) -> None:
+        """End the worker at once."""
+        self._child.close()
+
+    def _work(self) -> None:
+        order = {"database": self._engine.database, "store": self._engine.store_url, "core": self._core}
+        try:
+            self._child.call(WORK, order, on_event=lambda event: self._engine.on_message(event.content["line"]))
+        except Tts2faceError as ended:
+            self.reason = str(ended)
+
+
 class _LocalWorkers:
-    """Child processes that are started again when they end."""
+    """Workers that are started again when they end."""
 
     def __init__(self, engine: DatabaseEngine) -> None:
         self._engine = engine
         self._cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
-        self._children: dict[int, tuple[subprocess.Popen[bytes], float]] = {}
+        self._workers: dict[int, LocalWorker] = {}
         self._n_quick = 0
 
     def supervise(self) -> None:
@@ -249,47 +279,24 @@ class _LocalWorkers:
             They end as soon as they start.
         """
         for number in range(self._engine.n_workers):
-            child, began = self._children.get(number, (None, -RESTART_S))
-            if (child is not None and child.poll() is None) or time.monotonic() - began < RESTART_S:
-                continue
-            if child is not None:
-                self._note_end(number, child, time.monotonic() - began)
+            worker = self._workers.get(number)
+            if worker is not None:
+                lived_s = time.monotonic() - worker.began
+                if not worker.reason or lived_s < RESTART_S:
+                    continue
+                self._note_end(number, worker, lived_s)
             is_bound = self._engine.n_workers > 1 and len(self._cores) > 0
             core = self._cores[number % len(self._cores)] if is_bound else None
-            self._children[number] = start_worker(self._engine, core), time.monotonic()
+            self._workers[number] = LocalWorker(self._engine, core)
 
     def end(self) -> None:
         """End all workers."""
-        for child, _ in self._children.values():
-            child.kill()
-            child.wait()
-            if child.stdin is not None:
-                child.stdin.close()
+        for worker in self._workers.values():
+            worker.end()
 
-    def _note_end(self, number: int, child: "subprocess.Popen[bytes]", lived_s: float) -> None:
-        self._engine.on_message(f"worker {number + 1} ended with code {child.returncode}; it is started again")
-        if child.stdin is not None:
-            child.stdin.close()
+    def _note_end(self, number: int, worker: LocalWorker, lived_s: float) -> None:
+        worker.end()
+        self._engine.on_message(f"worker {number + 1}: {worker.reason}; it is started again")
         self._n_quick = self._n_quick + 1 if lived_s < QUICK_END_S else 0
         if self._n_quick >= MAX_QUICK_ENDS:
             raise BackendError("the workers end as soon as they start; see their messages above")
-
-
-def start_worker(engine: DatabaseEngine, core: int | None) -> "subprocess.Popen[bytes]":
-    """A worker as a child process, which ends with this one."""
-    bound = "all" if core is None else str(core)
-    child = subprocess.Popen(
-        [sys.executable, "-m", "tts2face.jobs.worker", engine.database, engine.store_url, bound, str(engine.niceness)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=None if engine.on_line is None else subprocess.PIPE,
-    )
-    if engine.on_line is not None and child.stderr is not None:
-        threading.Thread(target=_pass_lines, args=(child.stderr, engine.on_line), daemon=True).start()
-    return child
-
-
-def _pass_lines(file: IO[bytes], on_line: Message) -> None:
-    with file:
-        for line in file:
-            on_line(line.decode(errors="replace").rstrip())

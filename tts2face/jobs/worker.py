@@ -16,14 +16,14 @@ import logging
 import os
 import random
 import socket
-import sys
 import threading
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
-from lexicon.errors import BackendError, Tts2faceError
+from lexicon.errors import BackendError
 from tts2face.batch.engine import Message, Renders
 from tts2face.batch.store import Store, open_store
 from tts2face.jobs.connection import DatabaseAwayError, database_reason
@@ -35,6 +35,7 @@ from tts2face.jobs.database import (
     JOB_WORKFLOW,
     QUEUE,
     TALKER_QUEUE,
+    WORK,
     WORKFLOW,
     Workers,
     database_url,
@@ -45,13 +46,13 @@ from tts2face.jobs.job_runner import JobRunner, job_blobs
 from tts2face.jobs.pauses import EnginePauses
 from tts2face.jobs.segment_worker import SegmentWorker
 from tts2face.jobs.takeover import is_cancelled, list_running, poll_interval, return_work
+from tts2face.processes.child import Call, Handler
 
 MAX_DEATHS = 8  # of workers that had the same segment; then it counts as failed
 ALL_WORK_S = 60.0  # between two looks at all running work
 MAX_JOB_DEATHS = 30  # of workers that executed the same job of the service, which lasts longer than a segment
 N_TAKEN = 2  # segments that a worker holds: one is rendered, one waits, so that no time is lost between them
 N_JOBS = 4  # of the service, which mostly wait for their segments; they never occupy the places of segments
-START_FAILED = 4  # exit code, as of the command for BackendError
 N_TALKERS = 1  # built at a time: each takes a core and 1 GB
 # Connections of a worker to the database: two stay open, besides that of its signs of life.
 CONNECTIONS = {"pool_size": 2, "max_overflow": 3}
@@ -246,32 +247,21 @@ class Worker:
         return {str(one.executor_id) for one in list_running() if one.executor_id} - alive
 
 
-def main() -> None:
-    """Run one worker that ends with its parent: ``python -m tts2face.jobs.worker DATABASE STORE CORE NICENESS``."""
-    from tts2face.processes.child import bind_to_core, exit_after
+def work(call: Call) -> dict[str, Any]:
+    """Work on a ``database`` and a ``store`` with a renderer on a ``core``; events are lines of messages.
 
-    database, store, core, niceness = sys.argv[1:5]
-    bound = int(core) if core.isdecimal() else None
-    bind_to_core(bound)
-    if hasattr(os, "nice"):
-        os.nice(int(niceness))
+    Raises
+    ------
+    InputError, BackendError
+        As `Worker`.
+    """
+    order = call.content
 
-    def wait_for_parent() -> None:
-        while os.read(0, 1):
-            continue
+    def send(text: str) -> None:
+        call.event({"line": f"{time.strftime('%H:%M:%S')} {text}"})
 
-    exit_after(wait_for_parent)
-    write = sys.stderr.write
-    try:
-        Worker(database, store, core=bound, on_message=lambda text: _say(write, text)).run()
-    except Tts2faceError as wrong:
-        _say(write, str(wrong))
-        raise SystemExit(START_FAILED) from None
+    Worker(order["database"], order["store"], core=order["core"], on_message=send).run()
+    return {}
 
 
-def _say(write: Callable[[str], Any], text: str) -> None:
-    write(f"{time.strftime('%H:%M:%S')} {text}\n")
-
-
-if __name__ == "__main__":
-    main()
+HANDLERS: Mapping[str, Handler] = MappingProxyType({WORK: work})

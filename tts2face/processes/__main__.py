@@ -21,7 +21,7 @@ def main() -> None:
     if program.limits is not None:
         limit_process(program.limits)
     os.nice(program.niceness)
-    serve(handlers, out)
+    serve(handlers, out, program.at_once)
 
 
 if __name__ == "__main__":

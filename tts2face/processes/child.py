@@ -6,31 +6,61 @@ import signal
 import sys
 import threading
 import traceback
-from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections import defaultdict, deque
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn
 
 from lexicon.errors import Tts2faceError
-from tts2face.processes.message import ERROR, EVENT, MORE, RESULT, Message, read_message
+from tts2face.processes.message import CONTROLS, ERROR, EVENT, MORE, PAUSE, RESULT, STOP, Message, read_message
 from tts2face.types import Progress
 
 Handler = Callable[["Call"], Mapping[str, Any] | Message]
 
 
+class StoppedError(BaseException):
+    """The caller has left: the handler releases what it holds, and nobody waits for its result."""
+
+
 class Call:
     """One call as its handler sees it: the order, and the way back.
+
+    Parameters
+    ----------
+    changed
+        Notified when an input arrives, and when the call is paused, continued or stopped; shared by all calls of a
+        process.
 
     Attributes
     ----------
     content, payload
         The order.
+    inputs
+        Further inputs that nobody has read yet.
+    is_paused
+        The caller has not read what was sent; a handler may wait.
+    is_stopped
+        The caller has left.
     """
 
-    def __init__(self, message: Message, out: BinaryIO, inputs: "queue.SimpleQueue[Message]") -> None:
-        self.name, self.content, self.payload = message.kind, message.content, message.payload
-        self._id, self._out, self._inputs = message.id, out, inputs
+    def __init__(self, message: Message, out: BinaryIO, changed: threading.Condition) -> None:
+        self.name, self.content, self.payload, self.id = message.kind, message.content, message.payload, message.id
+        self.changed, self.inputs = changed, deque[Message]()
+        self.is_paused = self.is_stopped = False
+        self._out = out
         self._hidden: dict[str, str] = {}
+
+    def control(self, message: Message) -> None:
+        """Note one of `CONTROLS`."""
+        with self.changed:
+            if message.kind == MORE:
+                self.inputs.append(message)
+            elif message.kind == STOP:
+                self.is_stopped = True
+            else:
+                self.is_paused = message.kind == PAUSE
+            self.changed.notify_all()
 
     def event(self, content: Mapping[str, Any], payload: bytes = b"") -> None:
         """Tell the caller something before the result."""
@@ -49,8 +79,18 @@ class Call:
         return report
 
     def more(self) -> Message:
-        """The next further input, for which is waited."""
-        return self._inputs.get()
+        """The next further input, for which is waited.
+
+        Raises
+        ------
+        StoppedError
+            The caller has left.
+        """
+        with self.changed:
+            self.changed.wait_for(lambda: self.inputs or self.is_stopped)
+            if self.is_stopped:
+                raise StoppedError
+            return self.inputs.popleft()
 
     def hide(self, path: str | Path, name: str = "") -> None:
         """Show a name in messages in place of a path; without one, paths below it are shown from there."""
@@ -64,13 +104,13 @@ class Call:
         return " ".join(message.split())
 
     def send(self, message: Message) -> None:
-        """Write a message of this call."""
-        self._out.write(Message(message.kind, message.content, message.payload, self._id).encoded())
+        """Write a message of this call, in one piece: calls of other threads write to the same file."""
+        self._out.write(Message(message.kind, message.content, message.payload, self.id).encoded())
         self._out.flush()
 
 
-def serve(handlers: Mapping[str, Handler], out: BinaryIO) -> NoReturn:
-    """Answer calls, one after the other, until standard input ends, and this process with it.
+def serve(handlers: Mapping[str, Handler], out: BinaryIO, at_once: int = 1) -> NoReturn:
+    """Answer calls until standard input ends, and this process with it.
 
     Errors of tts2face go back by their names; others end the process.
 
@@ -80,32 +120,52 @@ def serve(handlers: Mapping[str, Handler], out: BinaryIO) -> NoReturn:
         By the names of the calls.
     out
         As of `claim_standard_output`.
+    at_once
+        1: one call after the other, in this thread; more: each in a thread of its own.
     """
-    calls: queue.SimpleQueue[Call] = queue.SimpleQueue()
+    waiting: queue.SimpleQueue[Call] = queue.SimpleQueue()
+    live: dict[int, Call] = {}
+    changed = threading.Condition()
 
     def receive() -> None:
-        inputs: queue.SimpleQueue[Message] = queue.SimpleQueue()
         while (message := read_message(sys.stdin.buffer)) is not None:
-            if message.kind == MORE:
-                inputs.put(message)
-            else:
-                inputs = queue.SimpleQueue()
-                calls.put(Call(message, out, inputs))
+            if message.kind not in CONTROLS:
+                live[message.id] = Call(message, out, changed)
+                waiting.put(live[message.id])
+            elif (call := live.get(message.id)) is not None:
+                call.control(message)
+
+    def work(call: Call) -> None:
+        with _ending_with_errors():
+            answer(call, handlers)
+        del live[call.id]
 
     exit_after(receive)
+    while True:
+        call = waiting.get()
+        if at_once == 1:
+            work(call)
+        else:
+            threading.Thread(target=work, args=(call,), name=call.name, daemon=True).start()
+
+
+@contextmanager
+def _ending_with_errors() -> Iterator[None]:
+    """End this process with any error of a ``with`` block."""
     try:
-        while True:
-            answer(calls.get(), handlers)
-    except BaseException:  # noqa: BLE001 - whatever it is, it ends this process
+        yield
+    except BaseException:  # noqa: BLE001 - whatever it is
         traceback.print_exc()
         sys.stderr.flush()
         os._exit(1)  # the thread that reads holds standard input
 
 
 def answer(call: Call, handlers: Mapping[str, Handler]) -> None:
-    """Answer one call by its handler: with its result or with its error."""
+    """Answer one call by its handler: with its result or with its error; that of a stopped call has no name."""
     try:
         found = handlers[call.name](call)
+    except StoppedError:
+        call.send(Message(ERROR, {"errors": [], "message": "the call was stopped"}))
     except Tts2faceError as error:
         names = [one.__name__ for one in type(error).__mro__ if issubclass(one, Tts2faceError)]
         call.send(Message(ERROR, {"errors": names, "message": call.shown(error)}))

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 # Kinds of messages: calls have the name of their handler.
-MORE = "more"  # to a child: a further input of a call
+MORE, PAUSE, GO, STOP = "more", "pause", "go", "stop"  # to a child, of a live call: a further input, or its control
+CONTROLS = frozenset({MORE, PAUSE, GO, STOP})
 EVENT, RESULT, ERROR = "event", "result", "error"  # from a child, of a call
 
 MAX_LINE_BYTES = 16 << 20
@@ -21,7 +22,7 @@ class Message:
     Parameters
     ----------
     kind
-        A handler's name or `MORE` to a child, `EVENT`, `RESULT` or `ERROR` from it.
+        A handler's name or one of `CONTROLS` to a child, `EVENT`, `RESULT` or `ERROR` from it.
     content
         What JSON can hold.
     id

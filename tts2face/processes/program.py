@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from importlib import import_module
 from typing import Any
 
@@ -19,20 +19,30 @@ class Program:
     Parameters
     ----------
     handlers
-        ``module:NAME`` of a table of handlers; or the name of an entry point of the group `TOOLS`, one handler
-        or a table of them.
+        ``module:NAME`` of a table of handlers, or of a function that makes one of `settings`; or the name of an entry
+        point of the group `TOOLS`, one handler or a table of them.
     limits
         For files of strangers; with them it gets no credentials of the environment. None: no limits.
     core
         Core to which it is bound; None: all.
     niceness
         Added to that of the parent; streams of a server go first.
+    at_once
+        Calls that an `AsyncChild` answers at once, each in a thread of its own; a caller who leaves one ends that
+        call and not the process.
+    settings
+        JSON values.
+    has_log
+        Its standard error is that of the parent, for a log; otherwise its last line says why the child ended.
     """
 
     handlers: str
     limits: ProcessLimits | None = None
     core: int | None = None
     niceness: int = 0
+    at_once: int = 1
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    has_log: bool = False
 
     def written(self) -> str:
         """The argument of the child's command line."""
@@ -52,8 +62,8 @@ class Program:
         """
         module, _, name = self.handlers.partition(":")
         if name:
-            handlers: Mapping[str, Any] = getattr(import_module(module), name)
-            return handlers
+            handlers: Any = getattr(import_module(module), name)
+            return handlers(**self.settings) if callable(handlers) else handlers  # type: ignore[no-any-return]
         if module not in declared(TOOLS):
             raise BackendError(f"no installed package declares the tool {module!r} ({TOOLS}); install tts2face again")
         tool = load_plugin(TOOLS, module)
@@ -64,4 +74,4 @@ def read_program(argument: str) -> Program:
     """The program of `Program.written`."""
     content = parse_json(argument, "the program of a child process")
     limits = None if content["limits"] is None else ProcessLimits(**content["limits"])
-    return Program(content["handlers"], limits, content["core"], content["niceness"])
+    return Program(**content | {"limits": limits})

@@ -9,7 +9,7 @@ from typing import Any
 
 from lexicon.errors import DataError
 from tts2face.processes.limits import ProcessLimits
-from tts2face.processes.parent import ChildEndedError, started
+from tts2face.processes.parent import ChildEndedError, call_once
 from tts2face.processes.program import Program
 
 TAKES, TAKE_S = "takes", 1800.0  # the tool, and the time of one order
@@ -39,10 +39,8 @@ async def run_tool(
 ) -> Mapping[str, Any]:  # fmt: skip
     """Result of one order of a tool in a child of its own; errors as `run_take_tool`."""
     try:
-        async with started(program) as child:
-            found = await child.call(
-                kind, order, on_event=lambda event: on_message(**event.content), timeout_s=timeout_s
-            )
+        return await call_once(
+            program, kind, order, on_event=lambda event: on_message(**event.content), timeout_s=timeout_s
+        )
     except ChildEndedError as ended:
         raise DataError(f"{what} needs too much memory or time; record it shorter, or with smaller pictures") from ended
-    return found.content

@@ -8,7 +8,7 @@ from starlette.exceptions import HTTPException
 
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from tts2face.service.synthesis.pool import BusyError
-from tts2face.service.synthesis.warm_process import DefectError
+from tts2face.service.synthesis.work import DefectError
 
 
 class RefusedError(HTTPException):

@@ -1,7 +1,5 @@
 """What all parts of a running service share."""
 
-import asyncio
-import json
 import logging
 import os
 from collections.abc import AsyncIterator
@@ -9,6 +7,7 @@ from contextlib import aclosing
 from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import Tts2faceError
+from tts2face.processes.message import RESULT, Message
 from tts2face.service.access.keys import LOCAL_KEY, ApiKey, read_keys
 from tts2face.service.access.rate_limits import RateLimits
 from tts2face.service.errors import RefusedError, as_refused
@@ -16,9 +15,9 @@ from tts2face.service.jobs.job_service import JobService
 from tts2face.service.logs import log_event
 from tts2face.service.metrics import Metrics
 from tts2face.service.settings import ServiceSettings
-from tts2face.service.synthesis.messages import Message, MessageKind
 from tts2face.service.synthesis.pool import STREAM_PRIORITY, Pool, PoolSettings
 from tts2face.service.synthesis.result_cache import CACHED_KINDS, ResultCache
+from tts2face.service.synthesis.warm_process import InputQueue
 from tts2face.service.synthesis.words import check_words
 from tts2face.service.synthesis.work import Work
 from tts2face.service.tracing import tracing_from_environment
@@ -74,7 +73,7 @@ class ServiceState:
         return LOCAL_KEY.name if self.settings.studio and self.settings.keys is None else ""
 
     async def messages(
-        self, work: Work, key: ApiKey, inputs: "asyncio.Queue[Any] | None" = None, priority: int = STREAM_PRIORITY
+        self, work: Work, key: ApiKey, inputs: InputQueue | None = None, priority: int = STREAM_PRIORITY
     ) -> AsyncIterator[Message]:
         """Messages of a work, without the last one; counted in the metrics.
 
@@ -99,15 +98,15 @@ class ServiceState:
             check_words(str(work.request.get("text", "")))
             async with aclosing(self._stream(work, key, inputs, priority)) as stream:  # type: ignore[type-var]
                 async for message in stream:
-                    made += message.seconds
-                    self.limits.add_speech(key, message.seconds)
-                    if message.kind == MessageKind.END:
-                        measures = json.loads(message.payload)
-                        self.limits.add_speech(key, measures["seconds"] - made)  # of parts without content
-                        self.metrics.speech.inc(measures["seconds"])
-                        self.metrics.cpu.inc(measures["cpu_s"])
+                    seconds = message.content["seconds"]
+                    if message.kind == RESULT:
+                        self.limits.add_speech(key, seconds - made)  # of parts without content
+                        self.metrics.speech.inc(seconds)
+                        self.metrics.cpu.inc(message.content["cpu_s"])
                         return
-                    if self.settings.log_text and work.kind == "live" and message.kind == MessageKind.EVENT:
+                    made += seconds
+                    self.limits.add_speech(key, seconds)
+                    if self.settings.log_text and work.kind == "live" and "event" in message.content:
                         _log_spoken(message)
                     yield message
         except Tts2faceError as error:
@@ -115,9 +114,7 @@ class ServiceState:
             self.metrics.failures.labels(refused.code).inc()
             raise refused from error
 
-    def _stream(
-        self, work: Work, key: ApiKey, inputs: "asyncio.Queue[Any] | None", priority: int
-    ) -> AsyncIterator[Message]:
+    def _stream(self, work: Work, key: ApiKey, inputs: InputQueue | None, priority: int) -> AsyncIterator[Message]:
         """Messages of a work from the cache, or from a process."""
         made = self.pool.stream(work, key.name, priority, inputs)
         if self.cache is None or work.kind not in CACHED_KINDS:
@@ -141,6 +138,5 @@ class ServiceState:
 
 
 def _log_spoken(message: Message) -> None:
-    content = json.loads(message.payload)
-    if content.get("text"):
-        log_event("text", text=content["text"])
+    if text := message.content["event"].get("text"):
+        log_event("text", text=text)

@@ -3,7 +3,6 @@
 A client names models, voices and assets; no path of a client reaches the file system.
 """
 
-import json
 import os
 from collections.abc import AsyncIterator, Mapping
 from contextlib import aclosing
@@ -12,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
+from tts2face.processes.message import Message
 from tts2face.project.project import Project
 from tts2face.project.project_file import parse_project, project_json
 from tts2face.render.picture import parse_size
 from tts2face.service.access.keys import ApiKey
 from tts2face.service.errors import RefusedError
 from tts2face.service.state import ServiceState
-from tts2face.service.synthesis.messages import Message, MessageKind
 from tts2face.service.synthesis.work import Work
 from tts2face.service.uploads.names import check_background, check_voice, resolve_models
 from tts2face.session_cache import Models
@@ -123,8 +122,7 @@ async def data_of(state: ServiceState, key: ApiKey, work: Work) -> bytes:
     content = bytearray()
     async with aclosing(state.messages(work, key)) as messages:  # type: ignore[type-var]
         async for message in messages:
-            if message.kind == MessageKind.DATA:
-                content += message.payload
+            content += message.payload
     return bytes(content)
 
 
@@ -133,12 +131,11 @@ async def events_of(messages: AsyncIterator[Message]) -> AsyncIterator[tuple[dic
     event: dict[str, Any] | None = None
     content = bytearray()
     async for message in messages:
-        if message.kind == MessageKind.DATA:
-            content += message.payload
-            continue
-        if event is not None:
-            yield event, bytes(content)
-        event, content = json.loads(message.payload), bytearray()
+        if "event" in message.content:
+            if event is not None:
+                yield event, bytes(content)
+            event, content = message.content["event"], bytearray()
+        content += message.payload
     if event is not None:
         yield event, bytes(content)
 

@@ -22,7 +22,7 @@ from tts2face.batch.segment import Segment
 from tts2face.batch.store import open_store
 from tts2face.jobs.control import cancel_jobs, list_jobs, prune_jobs, retry_jobs, show_job
 from tts2face.jobs.database import APPLICATION_VERSION, DEAD_AFTER_S, Workers, database_url, prepare_database, shown_url
-from tts2face.jobs.engine import DatabaseEngine, enqueue, open_client
+from tts2face.jobs.engine import DatabaseEngine, LocalWorker, enqueue, open_client
 
 Segments = Callable[..., dict[str, Segment]]
 Rendered = Callable[[], list[tuple[str, int]]]
@@ -303,3 +303,14 @@ def test_the_batch_command_works_with_a_database(tmp_path: Path, capsys: pytest.
     entries = json.loads((tmp_path / "out" / "manifest.json").read_text())["outputs"]
     assert [one["status"] for one in entries] == ["done", "done"]
     assert [one["n_frames"] for one in entries] == [5, 5]
+
+
+def test_a_worker_that_cannot_start_says_why(tmp_path: Path) -> None:
+    pytest.importorskip("psycopg", reason="needs the extra [postgres]")
+    engine = DatabaseEngine("postgresql://nobody@127.0.0.1:1/jobs", str(tmp_path / "store"))
+    worker = LocalWorker(engine, None)
+    try:
+        eventually(lambda: worker.reason, 60.0)
+    finally:
+        worker.end()
+    assert worker.reason.startswith("cannot use the database postgresql://nobody@127.0.0.1:1/jobs")

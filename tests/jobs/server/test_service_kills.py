@@ -5,8 +5,6 @@
 
 import os
 import signal
-import subprocess
-import sys
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -25,7 +23,7 @@ from tests.started import running_processes
 from tts2face.jobs.connection import JobDatabase
 from tts2face.jobs.control import list_jobs
 from tts2face.jobs.database import database_url
-from tts2face.jobs.engine import open_client
+from tts2face.jobs.engine import DatabaseEngine, LocalWorker, open_client
 
 N_JOBS = int(os.environ.get("TTS2FACE_KILLED_JOBS", "20"))
 TIMEOUT_S = 240.0 + 4 * N_JOBS
@@ -51,9 +49,7 @@ class Machines:
         self.api = httpx.Client(base_url=self.server.url, timeout=60.0)
 
     def start_worker(self) -> None:
-        command = [sys.executable, "-m", "tts2face.jobs.worker", self.database, str(self.folder / "store"), "all", "0"]
-        with (self.folder / "worker.log").open("ab") as log:
-            self.worker = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=log, stderr=log)
+        self.worker = LocalWorker(DatabaseEngine(self.database, str(self.folder / "store")), None)
 
     def kill_server(self) -> None:
         self.api.close()
@@ -61,10 +57,7 @@ class Machines:
         self.server.close()
 
     def kill_worker(self) -> None:
-        self.worker.kill()
-        self.worker.wait()
-        assert self.worker.stdin is not None
-        self.worker.stdin.close()
+        self.worker.end()  # by SIGKILL
 
     def kill_worker_of_server(self) -> None:
         """Kill the server's own worker; the server starts another one."""

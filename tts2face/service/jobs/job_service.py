@@ -162,7 +162,7 @@ class JobService:
         settings = self._settings
         engine = DatabaseEngine(
             settings.database_place, settings.store_place, settings.workers,
-            on_message=partial(_log_worker, "workers"), niceness=NICENESS, on_line=partial(_log_worker, "worker"),
+            on_message=_log_worker, niceness=NICENESS,
         )  # fmt: skip
         while not self._stopped.is_set():
             with suppress(BackendError), local_workers(engine) as supervise:
@@ -213,8 +213,8 @@ def _unavailable() -> RefusedError:
     return RefusedError(503, "unavailable", message, {"Retry-After": str(RETRY_AFTER_S)})
 
 
-def _log_worker(event: str, message: str) -> None:
-    log_event(event, message=message)
+def _log_worker(message: str) -> None:
+    log_event("workers", message=message)
 
 
 def _log_defect(task: "asyncio.Task[None]") -> None:

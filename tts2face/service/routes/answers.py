@@ -1,6 +1,5 @@
 """Streams of results as HTTP answers."""
 
-import json
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, aclosing
 from typing import Any
@@ -9,8 +8,8 @@ from fastapi import Request as HttpRequest
 from fastapi import WebSocket
 from fastapi.responses import StreamingResponse
 
+from tts2face.processes.message import Message
 from tts2face.service.state import ServiceState
-from tts2face.service.synthesis.messages import Message, MessageKind
 from tts2face.service.synthesis.work import Work
 
 
@@ -63,7 +62,7 @@ async def stream_work(
 async def data_bytes(messages: AsyncIterator[Message]) -> AsyncIterator[bytes]:
     """Bytes of the data of a result."""
     async for message in messages:
-        if message.kind == MessageKind.DATA:
+        if message.payload:
             yield message.payload
 
 
@@ -74,8 +73,7 @@ async def timed_speech(request: HttpRequest | WebSocket, work: Work) -> tuple[li
     state = service_state(request)
     async with aclosing(state.messages(work, request.state.key)) as messages:  # type: ignore[type-var]
         async for message in messages:
-            if message.kind == MessageKind.EVENT:
-                events.append(json.loads(message.payload))
-            else:
-                sound += message.payload
+            sound += message.payload
+            if "event" in message.content:
+                events.append(message.content["event"])
     return events, bytes(sound)

@@ -1,7 +1,6 @@
 """Live streams for avatars: text or sound comes in, speech, phones and curves go out with their times."""
 
 import asyncio
-import base64
 import time
 from collections.abc import Mapping
 from contextlib import aclosing, suppress
@@ -16,7 +15,7 @@ from lexicon.inputs import parse_json
 from tts2face.service.errors import RefusedError
 from tts2face.service.orders.request_fields import MODEL_FIELDS, PICTURE_FIELDS, StrictModel, options_model
 from tts2face.service.state import ServiceState
-from tts2face.service.synthesis.messages import MessageKind
+from tts2face.service.synthesis.warm_process import InputQueue
 from tts2face.service.uploads.names import check_voice, resolve_dictionary, resolve_models
 
 router = APIRouter(tags=["live"])
@@ -81,7 +80,7 @@ async def stream(connection: WebSocket) -> None:
         return
     except (WebSocketDisconnect, KeyError):
         return
-    inputs: asyncio.Queue[Any] = asyncio.Queue(1000)
+    inputs: InputQueue = asyncio.Queue(1000)
     work = state.work(kind="live" if isinstance(options, TextOptions) else "listen", models=models, request=given)
     sending = asyncio.create_task(_send(connection, state, work, inputs))
     receiving = asyncio.create_task(_receive(connection, inputs, options))
@@ -121,22 +120,21 @@ def _read_options(message: str) -> TextOptions | AudioOptions:
     return TextOptions.model_validate_json(message)
 
 
-async def _receive(connection: WebSocket, inputs: "asyncio.Queue[Any]", options: TextOptions | AudioOptions) -> bool:
+async def _receive(connection: WebSocket, inputs: InputQueue, options: TextOptions | AudioOptions) -> bool:
     """Pass the client's messages on; True after ``end``, False when the client has left."""
     types = TEXT_TYPES if isinstance(options, TextOptions) else AUDIO_TYPES
     pace = None if isinstance(options, TextOptions) else _Pace(SAMPLE_BYTES * options.rate)
     while True:
         try:
-            content = _read_message(await connection.receive(), types, has_sound=pace is not None)
+            content, samples = _read_message(await connection.receive(), types, has_sound=pace is not None)
         except WebSocketDisconnect:
             return False
         except RefusedError as wrong:
             await connection.send_json({"type": "error", "message": wrong.message})
             continue
-        if pace is not None and "samples" in content:
-            await pace.add(len(content["samples"]))
-            content["samples"] = base64.b64encode(content["samples"]).decode()
-        await inputs.put(content)
+        if pace is not None:
+            await pace.add(len(samples))
+        await inputs.put((content | {"arrived": time.monotonic()}, samples))
         if content["type"] == "end":
             return True
 
@@ -156,8 +154,8 @@ class _Pace:
             await asyncio.sleep(ahead - MAX_AHEAD_S)
 
 
-def _read_message(message: Any, types: frozenset[str], *, has_sound: bool) -> dict[str, Any]:
-    """Content of a message; sound becomes the value ``samples``.
+def _read_message(message: Any, types: frozenset[str], *, has_sound: bool) -> tuple[dict[str, Any], bytes]:
+    """Content and sound of a message.
 
     Raises
     ------
@@ -175,7 +173,7 @@ def _read_message(message: Any, types: frozenset[str], *, has_sound: bool) -> di
                 400, "invalid_request",
                 f"a block of sound has {len(samples)} bytes; send 16-bit samples in up to {MAX_BLOCK_BYTES} bytes",
             )  # fmt: skip
-        return {"type": "audio", "samples": samples}
+        return {"type": "audio"}, samples
     content: Any = None
     with suppress(DataError):
         content = parse_json(message.get("text") or "", "the message")
@@ -185,16 +183,16 @@ def _read_message(message: Any, types: frozenset[str], *, has_sound: bool) -> di
             f"a message must be {'16-bit samples, or ' if has_sound else ''}JSON with one of the types "
             f"{', '.join(sorted(types))}",
         )  # fmt: skip
-    return content
+    return content, b""
 
 
-async def _send(connection: WebSocket, state: ServiceState, work: Any, inputs: "asyncio.Queue[Any]") -> None:
+async def _send(connection: WebSocket, state: ServiceState, work: Any, inputs: InputQueue) -> None:
     """Pass the results on: events as text, sound as binary messages."""
     try:
         async with aclosing(state.messages(work, connection.state.key, inputs)) as messages:  # type: ignore[type-var]
             async for message in messages:
-                if message.kind == MessageKind.EVENT:
-                    await connection.send_text(message.payload.decode())
+                if "event" in message.content:
+                    await connection.send_json(message.content["event"])
                 else:
                     await connection.send_bytes(message.payload)
         await connection.send_json({"type": "done"})

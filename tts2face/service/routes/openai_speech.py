@@ -12,9 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from tts2face import catalogue
 from tts2face.jobs.resource_check import TALKER
+from tts2face.processes.message import Message
 from tts2face.render.sound_stream import SOUND_KINDS
 from tts2face.service.routes.answers import data_bytes, service_state, stream_work
-from tts2face.service.synthesis.messages import Message
 from tts2face.service.uploads.library import OPENAI_MODELS, shipped_names
 from tts2face.service.uploads.names import check_voice, resolve_dictionary, resolve_models
 from tts2face.synthesis.byte_stream import media_types

@@ -14,9 +14,8 @@ from lexicon.sequence import PhoneSequence
 from tts2face.exemplar.motion_measures import DTW_BAND_S
 from tts2face.models.talker import Talker
 from tts2face.project.project import Project
-from tts2face.service.synthesis.messages import Event
 from tts2face.service.synthesis.project_tasks import DIGEST_BYTES, read_project
-from tts2face.service.synthesis.work import Inputs, Work
+from tts2face.service.synthesis.work import Event, Inputs, Work
 from tts2face.synthesis.animated_face import AnimatedFace, FaceMotion
 from tts2face.synthesis.motion_comparison import MotionPart, compare_motion, map_channels
 from tts2face.types import HEAD_CHANNELS, Chunk, Trajectory

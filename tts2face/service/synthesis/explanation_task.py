@@ -10,9 +10,8 @@ from lexicon.errors import DataError, InputError
 from tts2face.exemplar.explanation import PhoneExplanation
 from tts2face.exemplar.lip_outlines import N_INSTANTS, LipOutline, lip_outlines, token_outlines
 from tts2face.models.talker import Talker
-from tts2face.service.synthesis.messages import Event
 from tts2face.service.synthesis.project_tasks import read_project
-from tts2face.service.synthesis.work import Inputs, Work
+from tts2face.service.synthesis.work import Event, Inputs, Work
 from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.types import Chunk
 

@@ -1,6 +1,5 @@
 """Motion for avatars: of a text that arrives word by word, or of speech that arrives as sound."""
 
-import base64
 import itertools
 import time
 from collections import deque
@@ -13,10 +12,9 @@ from numpy.typing import NDArray
 
 from lexicon.errors import Tts2faceError
 from lexicon.growing_text import GrowingText
-from tts2face.service.synthesis.messages import CANCELS, Event, Wait
 from tts2face.service.synthesis.turns import InterruptedTaskError
 from tts2face.service.synthesis.words import check_words
-from tts2face.service.synthesis.work import Inputs, Work
+from tts2face.service.synthesis.work import CANCELS, Event, Inputs, Step, Wait, Work
 from tts2face.types import Chunk, Clip, Trajectory
 
 if TYPE_CHECKING:
@@ -49,7 +47,7 @@ class LiveTask:
         self._began: float | None = None  # of the stream on the clock
         self._n_cancels = 0
 
-    def steps(self) -> Iterator[Event | Chunk | Wait]:
+    def steps(self) -> Iterator[Step]:
         """Yield results until ``end`` and all its text are done."""
         while True:
             yield from self._read_inputs()
@@ -88,8 +86,8 @@ class LiveTask:
             yield Event({"type": "error", "text": sentence, "message": " ".join(str(error).split())})
 
     def _read_inputs(self) -> Iterator[Event]:
-        while not self._inputs.empty():
-            content = self._inputs.get()
+        while self._inputs:
+            content = self._inputs.popleft().content
             match content.get("type"):
                 case "text":
                     self._sentences += self._text.add(str(content.get("text", "")))
@@ -105,27 +103,27 @@ class LiveTask:
                     self._began = self._clock() - self._speech.seconds  # what follows is due now
                     after_ms = 1000 * (self._clock() - content["arrived"])
                     cancelled = {"at": round(self._speech.seconds, 4), "after_ms": round(after_ms, 1)}
-                    yield Event({"type": "cancelled", **cancelled}, is_answer=True)
+                    yield Event({"type": "cancelled", **cancelled})
 
 
-def live(session: "Session", work: Work, inputs: Inputs) -> Iterator[Event | Chunk | Wait]:
+def live(session: "Session", work: Work, inputs: Inputs) -> Iterator[Step]:
     """Events and sound of a live stream."""
     return LiveTask(session, work, inputs).steps()
 
 
 def listen(session: "Session", work: Work, inputs: Inputs) -> Iterator[Event | Wait]:
-    """Curves of sound: inputs are ``audio`` with base64 of 16-bit samples, and ``end``."""
+    """Curves of sound: inputs are ``audio``, whose payload is 16-bit samples, and ``end``."""
     lips = session.listen(int(work.request.get("rate", 16_000)))
     curves, n_frames = _Curves(session), 0
     yield Event({"type": "listening", "fps": lips.fps, "look_ahead_s": round(lips.look_ahead_s, 4)})
     is_ended = False
     while not is_ended:
-        if inputs.empty():
+        if not inputs:
             yield Wait()
             continue
-        content = inputs.get()
-        is_ended = content.get("type") == "end"
-        samples = np.frombuffer(base64.b64decode(content.get("samples", "")), "<i2").astype(np.float32) / 32768
+        given = inputs.popleft()
+        is_ended = given.content["type"] == "end"
+        samples = np.frombuffer(given.payload, "<i2").astype(np.float32) / 32768
         motion = lips.finish() if is_ended else lips.add_samples(samples)
         if motion is not None:
             yield curves.of_motion(motion, n_frames / lips.fps)

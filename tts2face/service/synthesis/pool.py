@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from lexicon.errors import BackendError
+from tts2face.processes.message import Message
+from tts2face.processes.parent import ChildEndedError
 from tts2face.render.movie_stream import MOVIE_KINDS
 from tts2face.render.sound_stream import SOUND_KINDS
 from tts2face.service.logs import JSON_LINES
-from tts2face.service.synthesis.messages import Message
 from tts2face.service.synthesis.stages import stage
-from tts2face.service.synthesis.warm_process import ProcessEndedError, WarmProcess
+from tts2face.service.synthesis.warm_process import InputQueue, WarmProcess
 from tts2face.service.synthesis.work import Work
 
 MOVIE_COST, LINES_COST, SOUND_COST = 1.0, 0.2, 0.1  # shares of a core of a stream in real time, rounded up
@@ -83,10 +84,9 @@ class Pool:
         count = settings.n_processes or len(cores) or os.cpu_count() or 1
         self.processes = [
             WarmProcess(
-                {"core": cores[number % len(cores)] if cores else None, "n_sessions": settings.n_sessions,
-                 "warm": list(settings.warm), "log_format": settings.log_format, "log_text": settings.log_text,
+                {"n_sessions": settings.n_sessions, "log_format": settings.log_format, "log_text": settings.log_text,
                  "memory_mb": settings.memory_mb, "sentences_mb": settings.sentences_mb},
-                self._wake,
+                settings.warm, self._wake, cores[number % len(cores)] if cores else None,
             )
             for number in range(count)
         ]  # fmt: skip
@@ -129,9 +129,9 @@ class Pool:
         work: Work,
         key: str = "",
         priority: int = STREAM_PRIORITY,
-        inputs: "asyncio.Queue[Any] | None" = None,
+        inputs: InputQueue | None = None,
     ) -> AsyncIterator[Message]:
-        """Messages of a work up to END; leaving the iteration cancels it. `inputs` as for `WarmProcess.stream`.
+        """Messages of a work up to its result; leaving the iteration cancels it. `inputs` as for `WarmProcess.stream`.
 
         Raises
         ------
@@ -152,7 +152,7 @@ class Pool:
                         is_begun = True
                         yield message
                 return
-            except ProcessEndedError:
+            except ChildEndedError:
                 tries += 1
                 if is_begun or tries >= MAX_TRIES:
                     raise

@@ -20,8 +20,7 @@ from lexicon.sequence import PhoneSequence
 from tts2face.project.fitting import cut_timeline, is_too_long, without_edges
 from tts2face.project.project import Project
 from tts2face.project.project_file import parse_project
-from tts2face.service.synthesis.messages import Event
-from tts2face.service.synthesis.work import Inputs, Work
+from tts2face.service.synthesis.work import Event, Inputs, Work
 from tts2face.synthesis.phone_edges import StaleEdgesError
 from tts2face.types import Chunk
 

@@ -1,131 +1,78 @@
-"""Aligner whose work another process does, so that this one serves other tasks meanwhile, and can cancel it."""
+"""Aligner whose work another process does, so that this one serves other tasks meanwhile.
 
-import json
-import subprocess
-import sys
-import threading
-from collections.abc import Sequence
+PocketSphinx holds Python's lock while it aligns a sentence and cannot be interrupted. What a task no longer needs is
+aligned to its end all the same, and dropped.
+"""
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from lexicon.errors import BackendError
-from tts2face.service.synthesis.alignment_process import CANCEL, decode_answer, encode_job
-from tts2face.service.synthesis.turns import AbandonedError, QueueLock, wait_elsewhere
-from tts2face.speech.forced_alignment import Alignment, Pronunciations
+import numpy as np
+
+from lexicon.sequence import PhoneSequence, WordSpan
+from tts2face.processes.child import Call, Handler
+from tts2face.processes.parent import Child
+from tts2face.processes.program import Program
+from tts2face.service.synthesis.turns import wait_elsewhere
+from tts2face.speech.forced_alignment import Aligner, Alignment, Pronunciations
 from tts2face.types import Waveform
+
+LOAD, ALIGN = "load", "align"  # names of the calls
 
 
 class RemoteAligner:
     """Aligner with the results of `tts2face.speech.forced_alignment.Aligner`; thread-safe, one sentence at a time."""
 
     def __init__(self) -> None:
-        self._lock = QueueLock()  # held during a job
-        self._child: subprocess.Popen[bytes] | None = None
-        self._number, self._n_cancelled = 0, 0  # jobs; signals that no answer has come to
-        self._counting = threading.Lock()
+        self._child = Child(Program(f"{__name__}:handlers"))
+        self._thread = ThreadPoolExecutor(1, "aligner")
+
+    @property
+    def pid(self) -> int | None:
+        """Number of the process; None while there is none."""
+        return self._child.pid
 
     def start(self) -> None:
-        """Start the process, which takes a second, unless it runs."""
-        if self._child is None or self._child.poll() is not None:
-            self.close()
-            command = [sys.executable, "-m", "tts2face.service.synthesis.alignment_process"]
-            self._child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        """Start the process, which takes a second; nothing waits for it."""
+        self._thread.submit(self._child.call, LOAD, {})
 
     def align(self, sound: Waveform, words: Sequence[tuple[str, Pronunciations]]) -> Alignment:
         """As `Aligner.align`.
 
         Raises
         ------
-        BackendError
+        DataError
+            As `Aligner.align`.
+        ChildEndedError
             The process ended.
         """
-        job = _Job(self, sound, list(words))
-        return decode_answer(wait_elsewhere(job.run, job.abandon))
-
-    def _count_cancelled(self, change: int) -> None:
-        with self._counting:  # signals are sent in one thread, and answers read in another
-            self._n_cancelled += change
+        content = {"rate": sound.rate, "words": list(words)}
+        payload = sound.samples.astype("<f4").tobytes()
+        found = wait_elsewhere(self._thread.submit(self._child.call, ALIGN, content, payload)).content
+        spans = tuple(WordSpan(*word) for word in found["words"])
+        phones = PhoneSequence(found["phones"], found["edges"])
+        return Alignment(phones, spans, found["confidence"], np.array(found["scores"], np.float64))
 
     def close(self) -> None:
         """End the process."""
-        child, self._child, self._n_cancelled = self._child, None, 0
-        if child is not None:
-            child.kill()
-            child.communicate()
+        self._child.close()
 
 
-class _Job:
-    """One sentence."""
+def handlers() -> Mapping[str, Handler]:
+    """Handlers of the process, with a loaded aligner."""
+    aligner = Aligner()
+    aligner.load()
 
-    def __init__(self, aligner: RemoteAligner, sound: Waveform, words: list[tuple[str, Pronunciations]]) -> None:
-        self._aligner, self._sound, self._words = aligner, sound, words
-        self._lock = threading.Lock()
-        self._child: subprocess.Popen[bytes] | None = None  # while it may be ended
-        self._is_abandoned = threading.Event()
+    def align(call: Call) -> dict[str, Any]:
+        words = [(text, [tuple(phones) for phones in alternatives]) for text, alternatives in call.content["words"]]
+        found = aligner.align(Waveform(np.frombuffer(call.payload, "<f4"), call.content["rate"]), words)
+        return {
+            "phones": list(found.phones.phones),
+            "edges": found.phones.edges.tolist(),
+            "words": [[word.text, word.first, word.last] for word in found.words],
+            "confidence": found.confidence,
+            "scores": found.scores.tolist(),
+        }
 
-    def run(self) -> dict[str, Any]:
-        """Answer of the process."""
-        with self._aligner._lock.hold(self._is_abandoned):
-            self._aligner.start()
-            self._aligner._number += 1
-            child, number = self._aligner._child, self._aligner._number
-            assert child is not None
-            with self._lock:
-                if self._is_abandoned.is_set():
-                    raise AbandonedError
-            try:
-                while self._aligner._n_cancelled:  # a worker that is about to end must not read this job
-                    self._read(child)
-                _send(child, encode_job(number, self._sound, self._words))
-                return self._receive(child, number)
-            except BackendError:
-                self._aligner.close()  # what a worker that ended has left unread
-                raise
-            finally:
-                with self._lock:
-                    self._child = None
-
-    def abandon(self) -> None:
-        """End the work, as soon as the process has read it."""
-        with self._lock:
-            self._is_abandoned.set()
-            self._end()
-
-    def _end(self) -> None:
-        if self._child is not None:
-            self._aligner._count_cancelled(1)
-            self._child.send_signal(CANCEL)
-            self._child = None
-
-    def _receive(self, child: "subprocess.Popen[bytes]", number: int) -> dict[str, Any]:
-        while True:
-            answer = self._read(child)
-            if answer is None and self._is_abandoned.is_set():
-                raise AbandonedError
-            if answer is None or answer["job"] != number:
-                continue
-            if "is_read" not in answer:
-                return answer
-            with self._lock:
-                self._child = child
-                if self._is_abandoned.is_set():
-                    self._end()
-
-    def _read(self, child: "subprocess.Popen[bytes]") -> dict[str, Any] | None:
-        """Next answer; None after the end of a cancelled worker."""
-        assert child.stdout is not None
-        line = child.stdout.readline()
-        if not line or (line == b"null\n" and not self._aligner._n_cancelled):
-            raise BackendError("the process that aligns speech ended; repeat the request")
-        answer: dict[str, Any] | None = json.loads(line)
-        if answer is None:
-            self._aligner._count_cancelled(-1)
-        return answer
-
-
-def _send(child: "subprocess.Popen[bytes]", content: bytes) -> None:
-    assert child.stdin is not None
-    try:
-        child.stdin.write(content)
-        child.stdin.flush()
-    except OSError as ended:
-        raise BackendError("the process that aligns speech ended; repeat the request") from ended
+    return {LOAD: lambda _: {}, ALIGN: align}

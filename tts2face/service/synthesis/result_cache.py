@@ -16,21 +16,22 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from tts2face import __version__
-from tts2face.service.synthesis.messages import HEADER, Message, MessageKind
+from tts2face.processes.message import RESULT, Message, read_message
 from tts2face.service.synthesis.work import Work
 
+FORMAT = 2  # of entries; those of others are not found
 CACHED_KINDS = frozenset({"file", "speech"})
 MAX_SHARE = 0.25  # of the budget that one entry may take
 FILE_FIELDS = ("audio", "timeline", "dictionary", "background")  # whose files are read while a result is made
 
 
 def work_hash(work: Work) -> str:
-    """SHA-256 of a work with the contents of its files, and of the version of the program."""
+    """SHA-256 of a work with the contents of its files, of the version of the program, and of the format of entries."""
     described = work.as_json()
     described["request"] = _with_contents(work.request)
     described["picture"] = _with_contents(work.picture)
     described["models"] = {name: _file_state(value) for name, value in work.models.items()}
-    text = json.dumps([__version__, described], sort_keys=True, ensure_ascii=False)
+    text = json.dumps([__version__, FORMAT, described], sort_keys=True, ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -84,13 +85,13 @@ class ResultCache:
         return sum(self._sizes.values())
 
     async def messages(self, work: Work, made: AsyncIterator[Message]) -> AsyncIterator[Message]:
-        """Messages of the entry of a work; without one those of `made`, which become an entry when END has come."""
+        """Messages of the entry of a work; without one those of `made`, which become an entry in the end."""
         name = await asyncio.to_thread(work_hash, work)
         entry = self._open(name)
         if entry is not None:
             with entry:
                 await made.aclose()  # type: ignore[attr-defined]
-                while message := await asyncio.to_thread(_read_message, entry):
+                while message := await asyncio.to_thread(read_message, entry):
                     yield message
             return
         draft = _Draft(self._folder, int(MAX_SHARE * self._max_bytes))
@@ -98,7 +99,7 @@ class ResultCache:
             async with aclosing(made):  # type: ignore[type-var]
                 async for message in made:
                     await asyncio.to_thread(draft.add, message)
-                    if message.kind == MessageKind.END:
+                    if message.kind == RESULT:
                         self._keep(name, draft)
                     yield message
         finally:
@@ -145,14 +146,14 @@ class _Draft:
     def add(self, message: Message) -> None:
         if self._file is None:
             return
-        content = Message(0, message.kind, message.payload, message.seconds).encode()
+        content = message.encoded()
         self.n_bytes += len(content)
         try:
             if self.n_bytes > self._max_bytes:
                 self.close()
                 return
             self._file.write(content)
-            self.is_complete = message.kind == MessageKind.END
+            self.is_complete = message.kind == RESULT
             if self.is_complete:
                 self._file.flush()
         except OSError:
@@ -167,11 +168,3 @@ class _Draft:
         if file is not None:
             file.close()
             Path(file.name).unlink(missing_ok=True)
-
-
-def _read_message(entry: BinaryIO) -> Message | None:
-    head = entry.read(HEADER.size)
-    if len(head) < HEADER.size:
-        return None
-    number, kind, length, seconds = HEADER.unpack(head)
-    return Message(number, MessageKind(kind), entry.read(length), seconds)

@@ -9,8 +9,7 @@ import numpy as np
 
 from tts2face.models.palette_editing import StyleMix, mix_styles
 from tts2face.render.picture import Picture
-from tts2face.service.synthesis.messages import Event
-from tts2face.service.synthesis.work import Inputs, Work
+from tts2face.service.synthesis.work import Event, Inputs, Work
 from tts2face.types import Chunk
 
 if TYPE_CHECKING:

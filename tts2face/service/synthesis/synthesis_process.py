@@ -1,137 +1,64 @@
-"""A process of the server that synthesises: it keeps sessions warm and runs several tasks in turn.
+"""What a synthesis process of the server does: it keeps sessions warm and makes several results in turn."""
 
-Started as ``python -m tts2face.service.synthesis.synthesis_process SETTINGS``; commands are lines of JSON on standard
-input, messages go to standard output. It ends with the server, as its standard input closes then.
-"""
+import logging
+from collections.abc import Iterator, Mapping
+from typing import Any
 
-import json
-import queue
-import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import suppress
-from typing import Any, BinaryIO
-
-from tts2face.processes.child import bind_to_core, claim_standard_output, exit_after
-from tts2face.service.logs import configure_logs
-from tts2face.service.synthesis.messages import CANCELS, Message, MessageKind
+from lexicon.errors import Tts2faceError
+from tts2face.processes.child import Call, Handler
+from tts2face.service.logs import configure_logs, log_event
 from tts2face.service.synthesis.remote_aligner import RemoteAligner
-from tts2face.service.synthesis.scheduler import Scheduler, Step
 from tts2face.service.synthesis.tasks import TASKS
-from tts2face.service.synthesis.turns import OneAtATime, TurnSteps
-from tts2face.service.synthesis.work import Work, work_from_json
+from tts2face.service.synthesis.turns import OneAtATime, Turns
+from tts2face.service.synthesis.work import SERVE, SYNTHESISE, DefectError, Step, work_from_json
 from tts2face.session_cache import Models, SessionCache
 from tts2face.voice.pool import VoicePool
 
 
-class SynthesisProcess:
-    """Executes commands: start, cancel, pause, resume, input, wake.
+class Synthesis:
+    """Handlers that share sessions and take turns."""
 
-    Parameters
-    ----------
-    wake
-        Puts a command ``wake`` of a task among the commands; called from other threads.
-    """
+    def __init__(self, sessions: SessionCache) -> None:
+        self._sessions, self._turns = sessions, Turns()
 
-    def __init__(self, send: BinaryIO, sessions: SessionCache, wake: Callable[[int], None]) -> None:
-        self._file, self._sessions, self._wake = send, sessions, wake
-        self.scheduler = Scheduler(self._send)
-        self._inputs: dict[int, queue.SimpleQueue[Any]] = {}
-        self._turns: dict[int, TurnSteps] = {}
+    def synthesise(self, call: Call) -> Mapping[str, float]:
+        """Send the parts of the result of a ``work``; its measures.
 
-    def warm_up(self, works: list[dict[str, Any]]) -> None:
-        """Load models and compile kernels by executing works, then report that the process is ready."""
-        for work in works:
-            for _ in self._steps(0, work_from_json(work)):
-                pass  # without turns: each step waits for the aligner
-        self._inputs.clear()
-        self._send(Message(0, MessageKind.READY, b"{}"))
+        Raises
+        ------
+        Tts2faceError
+            As the task of the work.
+        DefectError
+            The task raised another error.
+        """
+        try:
+            return self._turns.run(call, lambda: self._steps(call), call.content["priority"])
+        except Tts2faceError:
+            raise
+        except Exception as error:
+            log_event("defect", level=logging.ERROR, error=error, id=call.content["id"])
+            raise DefectError(f"internal error: {type(error).__name__}; see the log of the service") from error
 
-    def execute(self, command: dict[str, Any], arrived: float) -> None:
-        """Execute one command that arrived at a second of the monotonic clock."""
-        number = command["task"]
-        match command["do"]:
-            case "start":
-                work = work_from_json(command["work"])
-                self._inputs[number] = queue.SimpleQueue()
-                self._turns[number] = TurnSteps(lambda: self._steps(number, work), lambda: self._wake(number))
-                self.scheduler.start(
-                    number, lambda: self._turns[number], command["priority"], request=command.get("id")
-                )
-            case "cancel" if number in self._turns:
-                self.scheduler.cancel(number)
-                self._forget(number)
-                seconds = round(time.monotonic() - arrived, 6)
-                self._send(Message(number, MessageKind.CANCELLED, json.dumps({"seconds": seconds}).encode()))
-            case "pause" | "resume" as what:
-                self.scheduler.pause(number, is_paused=what == "pause")
-            case "input":
-                if number in self._inputs:
-                    self._inputs[number].put(command["content"] | {"arrived": arrived})
-                    is_urgent = command["content"].get("type") in CANCELS
-                    if is_urgent:
-                        self._turns[number].interrupt()
-                    self.scheduler.wake(number, is_urgent=is_urgent)
-            case "wake":
-                self.scheduler.wake(number)
-
-    def _forget(self, number: int) -> None:
-        self._inputs.pop(number, None)
-        self._turns.pop(number, None)
-
-    def _steps(self, number: int, work: Work) -> Iterator[Step]:
-        inputs = self._inputs.setdefault(number, queue.SimpleQueue())
-        session = self._sessions.get(Models(**work.models), work.owner)
-        return TASKS[work.kind](session, work, inputs)
-
-    def _send(self, message: Message) -> None:
-        if message.kind in {MessageKind.END, MessageKind.ERROR}:
-            self._forget(message.task)
-        self._file.write(message.encode())
-        self._file.flush()
+    def _steps(self, call: Call) -> Iterator[Step]:
+        work = work_from_json(call.content["work"])
+        return TASKS[work.kind](self._sessions.get(Models(**work.models), work.owner), work, call.inputs)
 
 
-def received_requests() -> "queue.Queue[tuple[Any, float]]":
-    """Lines of JSON of standard input, each with the second of the monotonic clock at which it arrived.
-
-    This process exits when the input ends.
-    """
-    requests: queue.Queue[tuple[Any, float]] = queue.Queue()
-
-    def read_lines() -> None:
-        while line := sys.stdin.buffer.readline():
-            requests.put((json.loads(line), time.monotonic()))
-
-    exit_after(read_lines)
-    return requests
+def serve(call: Call) -> Mapping[str, Any]:
+    """Send an event as soon as the process has loaded; the call lasts as long as the process."""
+    call.event({})
+    return call.more().content
 
 
-def main() -> None:
-    """Execute commands until standard input ends."""
-    settings = json.loads(sys.argv[1])
-    configure_logs(settings["log_format"], with_text=settings["log_text"])
-    bind_to_core(settings.get("core"))
-    messages, commands = claim_standard_output(), received_requests()
+def handlers(
+    *, log_format: str, log_text: bool, n_sessions: int, memory_mb: int, sentences_mb: int
+) -> Mapping[str, Handler]:
+    """Handlers of a process with the settings of the service; the aligner starts meanwhile."""
+    configure_logs(log_format, with_text=log_text)
     aligner = RemoteAligner()
     aligner.start()
-    process = SynthesisProcess(
-        messages,
-        SessionCache(
-            settings["n_sessions"],
-            voices=VoicePool(aligner, OneAtATime()),
-            max_bytes=settings["memory_mb"] * 1_000_000 or None,
-            memory_mb=settings["sentences_mb"],
-        ),
-        lambda task: commands.put(({"do": "wake", "task": task}, time.monotonic())),
-    )
-    process.warm_up(settings["warm"])
-    while True:
-        while not commands.empty():
-            process.execute(*commands.get())
-        if not process.scheduler.run_step():
-            with suppress(queue.Empty):
-                process.execute(*commands.get(timeout=process.scheduler.seconds_to_wait()))
-
-
-if __name__ == "__main__":
-    main()
+    sessions = SessionCache(
+        n_sessions, voices=VoicePool(aligner, OneAtATime()), max_bytes=memory_mb * 1_000_000 or None,
+        memory_mb=sentences_mb,
+    )  # fmt: skip
+    return {SYNTHESISE: Synthesis(sessions).synthesise, SERVE: serve}

@@ -8,8 +8,7 @@ from tts2face.request import Request
 from tts2face.service.synthesis import comparison_tasks, project_tasks, style_tasks
 from tts2face.service.synthesis.explanation_task import explain
 from tts2face.service.synthesis.live_task import listen, live
-from tts2face.service.synthesis.messages import Event, Wait
-from tts2face.service.synthesis.work import Inputs, Work
+from tts2face.service.synthesis.work import Event, Inputs, Step, Work
 from tts2face.types import Chunk
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | 
         yield Chunk(pcm_bytes(spoken.waveform.samples), spoken.waveform.duration)
 
 
-TASKS: Mapping[str, Callable[["Session", Work, Inputs], Iterator[Chunk | Event | Wait]]] = {
+TASKS: Mapping[str, Callable[["Session", Work, Inputs], Iterator[Step]]] = {
     "file": stream_file,
     "speech": timed_speech,
     "live": live,

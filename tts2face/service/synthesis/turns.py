@@ -1,202 +1,188 @@
-"""Tasks in threads that take turns: one at a time computes, and others go on while it waits for another process."""
+"""Turns of the calls of a process: one at a time computes, and others go on while it waits for something else."""
 
 import threading
-from collections import deque
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from tts2face.service.synthesis.messages import Wait
-from tts2face.service.synthesis.scheduler import Step
+from tts2face.processes.child import Call, StoppedError
+from tts2face.service.synthesis.work import CANCELS, Event, Step, Wait
+from tts2face.types import Chunk
 
 Result = TypeVar("Result")
-
-POLL_S = 0.01  # between looks whether a wait for a lock has been abandoned
-
-
-class AbandonedError(Exception):
-    """A wait that has been abandoned."""
-
-
-class CancelledTaskError(BaseException):
-    """The task has been cancelled while it waited; releases what its steps hold."""
 
 
 class InterruptedTaskError(Exception):
     """What the task waited for is no longer needed; the task goes on."""
 
 
-class TurnSteps:
-    """Steps of a task that run in a thread of their own, at the turns that the scheduler gives.
-
-    A step that waits by `wait_elsewhere` ends its turn with a `Wait`; when the wait is over, `wake` is called, and the
-    step continues at the next turn.
+@dataclass(slots=True, eq=False)
+class _Task:
+    """A call whose result is made step by step, in the thread that makes it.
 
     Parameters
     ----------
-    make
-        Makes the steps, at the first turn.
-    wake
-        Requests a turn; called from other threads.
+    begin
+        Second of the clock.
+    seconds
+        Of the clip made so far.
     """
 
-    def __init__(self, make: Callable[[], Iterator[Step]], wake: Callable[[], None]) -> None:
-        self._make, self._wake = make, wake
-        self._turn, self._back = threading.Semaphore(0), threading.Semaphore(0)
-        self._found: Step | BaseException | None = None
-        self._is_waiting = self._is_over = self._is_interrupted = self._is_closed = False
-        self._abandon: Callable[[], None] | None = None
-        self._thread: threading.Thread | None = None
+    turns: "Turns"
+    call: Call
+    priority: int
+    begin: float
+    seconds: float = 0.0
+    cpu_s: float = 0.0
 
-    def __iter__(self) -> "TurnSteps":
-        """Return the steps themselves."""
-        return self
+    @property
+    def is_urgent(self) -> bool:
+        """Whether something is to be ended by an input that the task has not read yet."""
+        with self.call.changed:
+            return any(one.content.get("type") in CANCELS for one in self.call.inputs)
 
-    def __next__(self) -> Step:
-        """Run the task until its next step is made, or until it waits for another process."""
-        if self._is_closed or isinstance(self._found, StopIteration):
-            raise StopIteration
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._run, name="task", daemon=True)
-            self._thread.start()
-        if self._is_waiting and not self._is_over:
-            return Wait()
-        self._turn.release()
-        self._back.acquire()
-        if self._is_waiting:
-            return Wait()
-        found = self._found
-        if isinstance(found, BaseException):
-            raise found
-        assert found is not None
-        return found
+    def lead(self, now: float) -> float:
+        """Seconds by which the result is ahead of a listener who began at the request."""
+        return self.seconds - (now - self.begin)
 
-    def close(self) -> None:
-        """Cancel the task; returns when it has released what it held."""
-        if self._is_closed or self._thread is None:
-            self._is_closed = True
-            return
-        self._is_closed = True
-        if self._is_waiting and self._abandon is not None:
-            self._abandon()
-        self._turn.release()
-        self._thread.join()
 
-    def interrupt(self) -> None:
-        """Continue the task with an `InterruptedTaskError` where it waits, even if that wait is over.
+class Turns:
+    """Gives turns of some hundredths of a second to calls that run at once in the threads of one process.
 
-        Does nothing if the task does not wait, that is, has made a step.
-        """
-        if not self._is_waiting:
-            return
-        self._is_interrupted = True
-        if not self._is_over and self._abandon is not None:
-            self._abandon()
+    A stopped call goes first, to release what it holds; then one with an urgent input; then by priority, a higher one
+    when no other can run; then whichever is nearest to running dry. A paused call waits.
 
-    def wait_elsewhere(self, wait: Callable[[], Result], abandon: Callable[[], None]) -> Result:
-        """Result of `wait`, during which other tasks have their turns.
+    Parameters
+    ----------
+    clock
+        Monotonic seconds.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._waiting: list[_Task] = []
+        self._holder: _Task | None = None
+        self._taken_at = 0.0
+
+    def run(self, call: Call, make: Callable[[], Iterator[Step]], priority: int = 0) -> dict[str, float]:
+        """Send the parts of a result; its seconds and those of the turns.
 
         Parameters
         ----------
-        abandon
-            Ends the wait with an exception when the task is cancelled.
+        make
+            Makes the steps, at the first turn.
 
         Raises
         ------
-        CancelledTaskError, InterruptedTaskError
-            The task has been cancelled or interrupted.
+        StoppedError
+            The caller has left.
         """
-        self._abandon, self._is_over, self._is_interrupted, self._is_waiting = abandon, False, False, True
-        self._back.release()
-        try:
-            return wait()
-        finally:
-            self._is_over = True
-            self._wake()
-            self._turn.acquire()
-            self._is_waiting, self._abandon = False, None
-            if self._is_closed:
-                raise CancelledTaskError
-            if self._is_interrupted:
-                raise InterruptedTaskError
-
-    def _run(self) -> None:
-        _CURRENT.steps = self
-        self._turn.acquire()
+        task = _CURRENT.task = _Task(self, call, priority, self._clock())
         steps: Any = None
         try:
-            steps = self._make()
-            while not self._is_closed:
-                self._found = next(steps)
-                self._back.release()
-                self._turn.acquire()
-        except CancelledTaskError:
-            pass
-        except BaseException as error:  # noqa: BLE001 - raised again in the scheduler's thread
-            self._found = error
+            self._take(task)
+            steps = make()
+            for step in steps:
+                if isinstance(step, Wait):
+                    self._wait(task, lambda: bool(call.inputs), step.seconds)
+                else:
+                    _send(task, step)
+                    self._release(task)
+                self._take(task)
         finally:
             if hasattr(steps, "close"):
                 steps.close()
-            self._back.release()
+            self._release(task)
+            del _CURRENT.task
+        return {"seconds": round(task.seconds, 4), "cpu_s": round(task.cpu_s, 4)}
+
+    def wait_elsewhere(self, task: _Task, future: Future[Result], end: Callable[[], None]) -> Result:
+        """As the function of this name, for a task."""
+        future.add_done_callback(lambda _: self._notify(task.call))
+        self._wait(task, lambda: future.done() or task.is_urgent)
+        if not future.done() and not future.cancel():
+            end()
+        self._take(task)
+        if task.is_urgent:
+            raise InterruptedTaskError
+        return future.result()
+
+    def _wait(self, task: _Task, is_over: Callable[[], bool], seconds: float | None = None) -> None:
+        """End the turn, and wait until it is over, `seconds` have passed, or the task is stopped."""
+        self._release(task)
+        with task.call.changed:
+            task.call.changed.wait_for(lambda: task.call.is_stopped or is_over(), seconds)
+
+    def _take(self, task: _Task) -> None:
+        """Wait for the turn of a task; one that is stopped gets it with a `StoppedError`."""
+        with task.call.changed:
+            self._waiting.append(task)
+            task.call.changed.wait_for(lambda: self._is_next(task))
+            self._waiting.remove(task)
+            self._holder, self._taken_at = task, self._clock()
+        if task.call.is_stopped:
+            raise StoppedError
+
+    def _is_next(self, task: _Task) -> bool:
+        if self._holder is not None:
+            return False
+        now = self._clock()
+        ready = [one for one in self._waiting if one.call.is_stopped or not one.call.is_paused]
+        first = min(
+            ready, key=lambda one: (not one.call.is_stopped, not one.is_urgent, one.priority, one.lead(now)),
+            default=None,
+        )  # fmt: skip
+        return first is task
+
+    def _release(self, task: _Task) -> None:
+        """End the turn of a task, if it has one."""
+        if self._holder is task:
+            task.cpu_s += self._clock() - self._taken_at
+            self._holder = None
+            self._notify(task.call)
+
+    @staticmethod
+    def _notify(call: Call) -> None:
+        with call.changed:
+            call.changed.notify_all()
 
 
-class QueueLock:
-    """A lock that threads get in the order in which they ask for it, and for which they need not wait to the end."""
-
-    def __init__(self) -> None:
-        self._changed = threading.Condition()
-        self._queue: deque[object] = deque()  # who holds it, then who waits
-
-    @contextmanager
-    def hold(self, is_abandoned: threading.Event) -> Iterator[None]:
-        """The lock for a ``with`` block.
-
-        Raises
-        ------
-        AbandonedError
-            `is_abandoned` is set before the lock is free.
-        """
-        place = object()
-        with self._changed:
-            self._queue.append(place)
-        try:
-            with self._changed:
-                while self._queue[0] is not place and not is_abandoned.is_set():
-                    self._changed.wait(POLL_S)
-            if is_abandoned.is_set():
-                raise AbandonedError
-            yield
-        finally:
-            with self._changed:
-                self._queue.remove(place)
-                self._changed.notify_all()
+def _send(task: _Task, step: Chunk | Event) -> None:
+    task.seconds += step.seconds
+    if isinstance(step, Event):
+        task.call.event({"seconds": step.seconds, "event": step.content})
+    elif step.content:
+        task.call.event({"seconds": step.seconds}, step.content)
 
 
 class OneAtATime:
     """Runs computations of native code one after another while other tasks have their turns."""
 
     def __init__(self) -> None:
-        self._lock = QueueLock()
+        self._thread = ThreadPoolExecutor(1, "native")
 
     def __call__(self, compute: Callable[[], Result], end: Callable[[], None]) -> Result:
         """Result of `compute`, which `end` ends early; both are called from different threads."""
-        is_abandoned = threading.Event()
-
-        def run() -> Result:
-            with self._lock.hold(is_abandoned):
-                return compute()
-
-        def abandon() -> None:
-            is_abandoned.set()
-            end()
-
-        return wait_elsewhere(run, abandon)
+        return wait_elsewhere(self._thread.submit(compute), end)
 
 
 _CURRENT = threading.local()
 
 
-def wait_elsewhere(wait: Callable[[], Result], abandon: Callable[[], None]) -> Result:
-    """As `TurnSteps.wait_elsewhere` of the task whose thread calls it; in other threads `wait` alone."""
-    steps: TurnSteps | None = getattr(_CURRENT, "steps", None)
-    return wait() if steps is None else steps.wait_elsewhere(wait, abandon)
+def wait_elsewhere(future: Future[Result], end: Callable[[], None] = lambda: None) -> Result:
+    """Result of what another thread or process does, during which other tasks have their turns.
+
+    Parameters
+    ----------
+    end
+        Ends it early, when it runs and the task is stopped or interrupted; nobody waits for its end.
+
+    Raises
+    ------
+    StoppedError, InterruptedTaskError
+        The task has been stopped or interrupted.
+    """
+    task: _Task | None = getattr(_CURRENT, "task", None)
+    return future.result() if task is None else task.turns.wait_elsewhere(task, future, end)

@@ -1,11 +1,21 @@
-"""What a synthesis process is asked to make."""
+"""What a synthesis process is asked to make, and the parts of its results."""
 
-import queue
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-Inputs = queue.SimpleQueue[Any]
+from lexicon.errors import BackendError
+from tts2face.processes.message import Message
+from tts2face.types import Chunk
+
+Inputs = deque[Message]  # that a task has not read yet
+SYNTHESISE, SERVE = "synthesise", "serve"  # calls of a synthesis process
+CANCELS = frozenset({"cancel", "interrupt"})  # two names of one input of live streams
+
+
+class DefectError(BackendError):
+    """A defect of the synthesis; the log has its traceback."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,3 +54,23 @@ class Work:
 def work_from_json(content: Mapping[str, Any]) -> Work:
     """The work of `Work.as_json`."""
     return Work(**content)
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """A task has nothing to do until it gets input, or until the given seconds have passed."""
+
+    seconds: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A JSON object as a part of a result, and the seconds of speech that it adds."""
+
+    content: dict[str, Any]
+    seconds: float = 0.0
+
+
+# A part of a result, or a wait. The messages of a part have its ``seconds`` of speech and either bytes as their
+# payload or an ``event``; the last message has ``seconds`` and ``cpu_s`` of the whole.
+Step = Chunk | Event | Wait

@@ -15,7 +15,7 @@ from lexicon.errors import DataError, InputError, Tts2faceError
 from lexicon.inputs import parse_json
 from tts2face.jobs import resource_check
 from tts2face.jobs.resource_check import STATEMENT
-from tts2face.processes.parent import ChildEndedError, started
+from tts2face.processes.parent import ChildEndedError, call_once
 from tts2face.processes.tools import run_take_tool
 from tts2face.service.errors import RefusedError
 from tts2face.service.settings import ServiceSettings
@@ -160,8 +160,7 @@ async def decode_file(arguments: tuple[str, Path, Path, float], name: str, timeo
     kind, source, target, limit = arguments
     order = {"kind": kind, "source": str(source), "target": str(target), "limit": limit}
     try:
-        async with started(program(kind)) as child:
-            await child.call(DECODE, order, timeout_s=timeout_s)
+        await call_once(program(kind), DECODE, order, timeout_s=timeout_s)
     except TimeoutError as late:
         raise RefusedError(
             422, "invalid_data", f"{name} took more than {timeout_s:g} s to decode; send a simpler file"

@@ -7,9 +7,9 @@ from contextlib import aclosing, suppress
 from typing import Any
 
 from lexicon.errors import Tts2faceError
+from tts2face.processes.message import Message
+from tts2face.processes.parent import ChildEndedError
 from tts2face.service.errors import RefusedError
-from tts2face.service.synthesis.messages import Message
-from tts2face.service.synthesis.warm_process import ProcessEndedError
 from tts2face.service.synthesis.work import Work
 from tts2face.studio.projects.bundle import DIGEST_LENGTH, PieceMemory, Preview, bundle
 from tts2face.studio.requests import events_of
@@ -170,4 +170,4 @@ def _sound(piece: Mapping[str, Any]) -> str:
 
 def _has_ended(wrong: Exception) -> bool:
     """Whether the process of a work ended, which says nothing about the work."""
-    return isinstance(wrong, ProcessEndedError) or isinstance(wrong.__cause__, ProcessEndedError)
+    return isinstance(wrong, ChildEndedError) or isinstance(wrong.__cause__, ChildEndedError)

@@ -23,7 +23,6 @@ from tts2face.service.access.keys import LOCAL_KEY, ApiKey
 from tts2face.service.errors import RefusedError
 from tts2face.service.logs import log_event
 from tts2face.service.state import ServiceState
-from tts2face.service.synthesis.messages import MessageKind
 from tts2face.service.synthesis.work import Work
 from tts2face.storage.files import translate_disk_errors, write_atomically
 from tts2face.studio.projects.store import RENDERS
@@ -215,9 +214,8 @@ class RenderQueue:
             with part.open("wb") as file:
                 async with aclosing(self._state.messages(work, key, priority=PRIORITY)) as messages:  # type: ignore[type-var]
                     async for message in messages:
-                        if message.kind == MessageKind.DATA:
-                            file.write(message.payload)
-                        render.seconds += message.seconds
+                        file.write(message.payload)
+                        render.seconds += message.content["seconds"]
                         self._notify()
 
     def _notify(self) -> None:

@@ -16,7 +16,7 @@ from lexicon.errors import BackendError
 from tts2face.jobs.talker_job import BUILDER, CPU_S, CPU_S_PER_S, LIMITS, SLOWNESS
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.limits import ProcessLimits
-from tts2face.processes.parent import started
+from tts2face.processes.parent import call_once
 from tts2face.processes.program import Program
 from tts2face.processes.tools import run_tool
 
@@ -72,8 +72,7 @@ async def speak(folder: Path, text: str) -> None:
     """
     order = {"talker": str(folder / TALKER), "text": text, "out": str(folder / CLIP)}
     try:
-        async with started(Program(f"{__name__}:HANDLERS", CLIP_LIMITS)) as child:
-            await child.call(SPEAK, order, timeout_s=CLIP_S)
+        await call_once(Program(f"{__name__}:HANDLERS", CLIP_LIMITS), SPEAK, order, timeout_s=CLIP_S)
     except TimeoutError as late:
         raise BackendError("the clip took too long; give a shorter sentence") from late
 
