@@ -37,7 +37,7 @@ class Message:
     def encoded(self) -> bytes:
         """The line and the bytes."""
         head = {"id": self.id, "kind": self.kind, "n_bytes": len(self.payload), "content": dict(self.content)}
-        return json.dumps(head, ensure_ascii=False).encode() + b"\n" + self.payload
+        return json.dumps(head).encode() + b"\n" + self.payload
 
 
 def read_message(file: BinaryIO) -> Message | None:

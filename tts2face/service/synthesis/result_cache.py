@@ -31,7 +31,7 @@ def work_hash(work: Work) -> str:
     described["request"] = _with_contents(work.request)
     described["picture"] = _with_contents(work.picture)
     described["models"] = {name: _file_state(value) for name, value in work.models.items()}
-    text = json.dumps([__version__, FORMAT, described], sort_keys=True, ensure_ascii=False)
+    text = json.dumps([__version__, FORMAT, described], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()
 
 
