@@ -36,9 +36,9 @@ from tts2face.face.face_motion import rest_landmarks
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
-from tts2face.models.landmarks import inner_lip_gaps
+from tts2face.models.landmarks import eye_aperture, inner_lip_gaps
 from tts2face.models.palette import Palette, write_palette
-from tts2face.retargeting.performer import CLOSED_FRAME_SHARE, eye_aperture
+from tts2face.retargeting.performer import CLOSED_FRAME_SHARE
 from tts2face.types import Progress
 
 ESTIMATORS = ("least-squares", "samples")

@@ -15,10 +15,9 @@ from corpus_tools.decomposition.basis_expressions import ExpressionBasis
 from corpus_tools.decomposition.blend_weights import Estimator, moving_average
 from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
 from tts2face.gesture.prosody import SILENT_PROSODY, prosody_features
-from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
+from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION, N_LANDMARKS, eye_aperture
 from tts2face.models.palette import FEATURES, GESTURE_FPS, REGION_FEATURES
 from tts2face.numeric import interpolate_columns
-from tts2face.retargeting.performer import EYELID_LANDMARKS, eye_aperture
 
 TREMOR_SMOOTHING_S = 0.03  # standard deviation of the Gaussian that removes tracking noise from head, brows and cheeks
 # Of tracked lids that touch; first percentile of 40 minutes of one person (docs/gestures.md).

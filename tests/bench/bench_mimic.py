@@ -10,10 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, inner_lip_gaps
+from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, eye_aperture, inner_lip_gaps
 from tts2face.render.encode import write_clips
 from tts2face.render.picture import Picture
-from tts2face.retargeting.performer import eye_aperture
 from tts2face.session import Session
 from tts2face.synthesis.performance import retarget_take, take_clips
 from tts2face.video.blendshapes import BlendshapeReader

@@ -29,6 +29,11 @@ LIP_LANDMARKS = (*OUTER_LIP_UPPER, *OUTER_LIP_LOWER, *INNER_LIP_UPPER, *INNER_LI
 # Margins of the lids (upper, lower), each from the outer corner of the eye to the inner one.
 RIGHT_LIDS = ((33, 246, 161, 160, 159, 158, 157, 173, 133), (33, 7, 163, 144, 145, 153, 154, 155, 133))
 LEFT_LIDS = ((263, 466, 388, 387, 386, 385, 384, 398, 362), (263, 249, 390, 373, 374, 380, 381, 382, 362))
+# Upper and lower lid, outer and inner corner of each eye.
+EYELID_LANDMARKS = {
+    "Left": ((386, 385, 387), (374, 380, 373), 263, 362),
+    "Right": ((159, 158, 160), (145, 153, 144), 33, 133),
+}
 # The same once around each eye from its outer corner, over the upper lid; the person's right eye, then the left.
 LID_RINGS = tuple((*upper, *lower[-2:0:-1]) for upper, lower in (RIGHT_LIDS, LEFT_LIDS))
 
@@ -70,3 +75,10 @@ def inner_lip_gaps(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
     """(..., P) vertical gaps of facing inner lip points, of (..., 478, 3) landmarks or modes."""
     gaps = landmarks[..., list(INNER_LIP_UPPER), 1] - landmarks[..., list(INNER_LIP_LOWER), 1]
     return np.asarray(gaps, np.float64)
+
+
+def eye_aperture(landmarks: NDArray[np.floating], side: str) -> NDArray[np.float64]:
+    """Lid distance (T,) over the width of an eye; `side` is ``Left`` or ``Right``."""
+    upper, lower, outer, inner = EYELID_LANDMARKS[side]
+    height = np.linalg.norm(landmarks[:, list(upper)] - landmarks[:, list(lower)], axis=2).mean(axis=1)
+    return np.asarray(height / np.linalg.norm(landmarks[:, outer] - landmarks[:, inner], axis=1), np.float64)

@@ -15,11 +15,17 @@ from tts2face.face.gesture_transfer import LID_LANDMARKS, NO_GAINS, check_gestur
 from tts2face.face.landmark_fit import axis_scales, landmark_positions, procrustes_rotation, scatter_landmarks
 from tts2face.face.shape_transfer import SCALE_LIMITS, SUPPORT, default_head
 from tts2face.models.appearance import Appearance
-from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LID_RINGS, LIP_LANDMARKS
+from tts2face.models.landmarks import (
+    EYE_OUTER_LEFT,
+    EYE_OUTER_RIGHT,
+    EYELID_LANDMARKS,
+    LID_RINGS,
+    LIP_LANDMARKS,
+    eye_aperture,
+)
 from tts2face.models.palette import EXPRESSIONS, REGION_FEATURES, Palette
 from tts2face.models.talker import ShapeModel, Talker, require_appearance
 from tts2face.numeric import ordered_product, smoothstep
-from tts2face.retargeting.performer import EYELID_LANDMARKS, eye_aperture
 from tts2face.types import Trajectory
 
 LID_CHANNEL = "lids"

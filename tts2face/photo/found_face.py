@@ -15,9 +15,9 @@ from tts2face.models.landmarks import (
     LIP_LANDMARKS,
     MOUTH_REGION,
     N_MESH_LANDMARKS,
+    eye_aperture,
 )
 from tts2face.photo.photograph import Photograph, read_photograph, split_number
-from tts2face.retargeting.performer import eye_aperture
 from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
 from tts2face.video.pose import head_angles, rigid_points, similarity_transforms
 from tts2face.video.track import MIN_CONTRAST, MIN_SCORE, Crop, FaceTracker, crop_around

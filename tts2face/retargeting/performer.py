@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.face.mouth_model import MIDDLE_PAIR
 from tts2face.models.face import Face
-from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS, inner_lip_gaps
+from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION, N_LANDMARKS, eye_aperture, inner_lip_gaps
 from tts2face.models.score_map import mouth_scores
 from tts2face.models.talker import ShapeModel, Talker, speech_channels
 from tts2face.numeric import principal_axes
@@ -22,12 +22,6 @@ MAX_CONTACT_MM = 1.5  # upper limit of the tracked gap of touching lips
 SCORE_DRIVEN_SHAPES = ("eye", "brow", "nose", "cheek")  # name prefixes of the shapes that follow scores
 SCORE_DEAD_ZONE = 0.04  # amplitude of the noise of scores
 OPEN_LID_QUANTILE, CLOSED_LID_SHARE = 0.9, 0.25  # aperture quantile of an open eye; share of it of a closed eye
-# Upper and lower lid, outer and inner corner of each eye.
-EYELID_LANDMARKS = {
-    "Left": ((386, 385, 387), (374, 380, 373), 263, 362),
-    "Right": ((159, 158, 160), (145, 153, 144), 33, 133),
-}
-
 FloatArray = NDArray[np.float64]
 
 
@@ -159,10 +153,3 @@ def lip_model(landmarks: NDArray[np.floating]) -> ShapeModel:
         n_speech=n_modes,
         rest=rest.astype(np.float32),
     )
-
-
-def eye_aperture(landmarks: NDArray[np.floating], side: str) -> FloatArray:
-    """Lid distance (T,) over the width of an eye; `side` is ``Left`` or ``Right``."""
-    upper, lower, outer, inner = EYELID_LANDMARKS[side]
-    height = np.linalg.norm(landmarks[:, list(upper)] - landmarks[:, list(lower)], axis=2).mean(axis=1)
-    return np.asarray(height / np.linalg.norm(landmarks[:, outer] - landmarks[:, inner], axis=1), np.float64)

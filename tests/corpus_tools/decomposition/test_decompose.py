@@ -25,9 +25,8 @@ from tts2face.face.expressions import expression_landmarks
 from tts2face.face.face_motion import moved_landmarks, rest_landmarks
 from tts2face.face.landmark_fit import axis_ratios
 from tts2face.models.face import Face
-from tts2face.models.landmarks import MOUTH_REGION
+from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION
 from tts2face.models.palette import EXPRESSIONS, PLAIN, REGION_FEATURES, Delivery, load_palette
-from tts2face.retargeting.performer import EYELID_LANDMARKS
 from tts2face.types import Trajectory, Waveform
 
 FPS, SECONDS = 30.0, 12.0

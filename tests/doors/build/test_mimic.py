@@ -12,7 +12,7 @@ import pytest
 from cli.main import run
 from tests.face.people import LIT
 from tests.rendered_takes import ONLY_RENDERED
-from tts2face.retargeting.performer import eye_aperture
+from tts2face.models.landmarks import eye_aperture
 from tts2face.video.media import read_frames, read_media_info
 from tts2face.video.pose import head_angles, remove_pose
 from tts2face.video.track import FaceTracker
