@@ -132,8 +132,9 @@ def test_a_head_is_made_in_place_of_a_picture_that_speaks(dialog: Browser, servi
     dialog.wait("return !document.querySelector('.studio-photo')?.offsetParent")
     assert dialog.run("return document.querySelector('.photo-found').innerText.includes('Keep wrinkles')")
     dialog.run("document.querySelector('.photo-found .q-select').click()")
-    dialog.wait("return !!document.querySelector('[role=option]')")
-    dialog.run("[...document.querySelectorAll('[role=option]')].find((one) => one.innerText.includes('blue')).click()")
+    blue = "[...document.querySelectorAll('[role=option]')].find((one) => one.innerText.includes('blue'))"
+    dialog.wait(f"return !!{blue}")
+    dialog.run(f"{blue}.click()")
     dialog.wait("return document.querySelector('.photo-found .q-select').innerText.includes('blue')")
     dialog.type("Name of the face", "tom-head")
     dialog.type("Statement of consent of the person, or: drawn", CONSENT)
