@@ -51,6 +51,8 @@ class PoolSettings:
         Works that each process executes before it is ready, as `Work.as_json`.
     log_format, log_text, memory_mb, sentences_mb
         As in the settings of the service.
+    tasks
+        ``module:NAME`` of tables of tasks that the processes have besides those of the service.
     """
 
     n_processes: int = 0
@@ -61,12 +63,11 @@ class PoolSettings:
     log_text: bool = False
     memory_mb: int = 0
     sentences_mb: int = 0
+    tasks: tuple[str, ...] = ()
 
 
 def work_cost(work: Work) -> float:
     """Share of a core that a work takes."""
-    if work.kind not in {"file", "project-file"}:
-        return LINES_COST
     if work.format in SOUND_KINDS:
         return SOUND_COST
     return MOVIE_COST if work.format in MOVIE_KINDS else LINES_COST
@@ -85,7 +86,7 @@ class Pool:
         self.processes = [
             WarmProcess(
                 {"n_sessions": settings.n_sessions, "log_format": settings.log_format, "log_text": settings.log_text,
-                 "memory_mb": settings.memory_mb, "sentences_mb": settings.sentences_mb},
+                 "memory_mb": settings.memory_mb, "sentences_mb": settings.sentences_mb, "tasks": settings.tasks},
                 settings.warm, self._wake, cores[number % len(cores)] if cores else None,
             )
             for number in range(count)
