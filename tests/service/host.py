@@ -56,7 +56,7 @@ class Host:
 
     def _shared_pool(self, settings: PoolSettings) -> SharedPool:
         if self._pool is None:
-            self._pool = SharedPool(replace(settings, tasks=TASKS))
+            self._pool = SharedPool(replace(settings, handlers={**settings.handlers, "tasks": TASKS}))
         return self._pool
 
     async def answer(self, order: dict[str, Any]) -> None:

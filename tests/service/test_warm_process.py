@@ -55,9 +55,7 @@ def test_processes_have_the_tasks_of_what_is_mounted(tmp_path: Path, monkeypatch
     last = []
     for mounts in ([], [mount]):
         settings = create_app(ServiceSettings(processes=1, data=tmp_path), mounts).state.service.pool.settings
-        handlers = synthesis_process.handlers(
-            log_format=JSON_LINES, log_text=False, n_sessions=1, memory_mb=0, sentences_mb=0, tasks=settings.tasks
-        )
+        handlers = synthesis_process.handlers(**settings.handlers)
         last.append(answered(handlers[SYNTHESISE], order | {"id": None})[-1])
     assert [one.kind for one in last] == [ERROR, RESULT]
     assert last[0].content["message"].startswith("internal error: KeyError")

@@ -11,7 +11,7 @@ from tts2face.service.logs import configure_logs, log_event
 from tts2face.service.synthesis.remote_aligner import RemoteAligner
 from tts2face.service.synthesis.tasks import TASKS
 from tts2face.service.synthesis.turns import OneAtATime, Turns
-from tts2face.service.synthesis.work import SERVE, SYNTHESISE, DefectError, Step, Task, work_from_json
+from tts2face.service.synthesis.work import SERVE, SYNTHESISE, DefectError, Step, Task, Work
 from tts2face.session_cache import Models, SessionCache
 from tts2face.voice.pool import VoicePool
 
@@ -41,7 +41,7 @@ class Synthesis:
             raise DefectError(f"internal error: {type(error).__name__}; see the log of the service") from error
 
     def _steps(self, call: Call) -> Iterator[Step]:
-        work = work_from_json(call.content["work"])
+        work = Work(**call.content["work"])
         return self._tasks[work.kind](self._sessions.get(Models(**work.models), work.owner), work, call.inputs)
 
 

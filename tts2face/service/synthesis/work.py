@@ -50,13 +50,8 @@ class Work:
     affinity: str = ""
 
     def as_json(self) -> dict[str, Any]:
-        """JSON object from which `work_from_json` makes the work again."""
+        """JSON object of the fields."""
         return asdict(self)
-
-
-def work_from_json(content: Mapping[str, Any]) -> Work:
-    """The work of `Work.as_json`."""
-    return Work(**content)
 
 
 @dataclass(frozen=True, slots=True)
