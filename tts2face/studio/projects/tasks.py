@@ -6,7 +6,6 @@ service checks as that of any request.
 
 import hashlib
 import io
-import tempfile
 import zipfile
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -36,7 +35,6 @@ if TYPE_CHECKING:
     from tts2face.synthesis.speech_stream import Piece
 
 DIGEST_BYTES = 12
-BLOCK_BYTES = 1 << 18
 MAX_EXAMPLES = 12  # of an explained phone
 N_DECIMALS = 2  # of outlines, mm
 
@@ -143,19 +141,11 @@ def project_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
 
 def project_export(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
     """Bytes of an export of a project, whose file is named by ``name``; several files come as one .zip file."""
-    from tts2face.exports.writer import ExportWriter, mesh_of, plan_exports
+    from tts2face.synthesis.byte_stream import encode_whole
 
     project = read_project(work)
-    with tempfile.TemporaryDirectory(prefix="tts2face-") as folder:
-        files = plan_exports([Path(folder, work.request["name"])])
-        face = session.animated_face(has_gestures=project.request.has_gestures)
-        with ExportWriter(files, face=mesh_of(face, files)) as writer:
-            for piece in session.stream(project.prepare()):
-                writer.add(piece.clip, piece.text)
-                yield Chunk(b"", piece.clip.speech.waveform.duration)
-        with _packed(Path(folder)).open("rb") as file:
-            while block := file.read(BLOCK_BYTES):
-                yield Chunk(block)
+    face = session.animated_face(has_gestures=project.request.has_gestures)
+    return encode_whole(session.stream(project.prepare()), work.request["name"], face, _packed)
 
 
 def _packed(folder: Path) -> Path:
