@@ -42,9 +42,9 @@ def serve(  # noqa: PLR0913 - one parameter a flag
 
     if not chosen.studio or find_spec("nicegui") is None:
         return run_server(replace(chosen, studio=False))
-    from tts2face.studio.app import mount_studio
+    from tts2face.studio.app import STUDIO
 
-    return run_server(chosen, [mount_studio])
+    return run_server(chosen, [STUDIO])
 
 
 @keys.command

@@ -5,6 +5,7 @@ Circles among files are counted by `test_import_graph.py`; there are none.
 
 import ast
 import re
+import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -26,7 +27,7 @@ PARSES = (
     "tts2face.storage.tensors", "tts2face.studio.projects.bundle", "tts2face.voice.espeak",
     "tts2face.voice.espeak_child",
 )  # fmt: skip
-# Strings that name a module of a package above their own.
+# Strings that name a module of a package above their own, or of a room of tts2face above theirs.
 NAMES_HIGHER = ()
 PARSERS = {"json": {"load", "loads", "JSONDecoder"}, "tomllib": {"load", "loads"}}
 
@@ -71,10 +72,27 @@ def parsers(text: str, name: str) -> Iterator[str]:
         yield name
 
 
+@cache
+def rooms() -> list[list[str]]:
+    """Rooms of tts2face, from top to bottom, as the import contracts have them."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    contracts = settings["tool"]["importlinter"]["contracts"]
+    layers = next(one["layers"] for one in contracts if one["name"] == "rooms of tts2face")
+    return [re.findall(r"[\w.]+", layer) for layer in layers]
+
+
+def names_above(name: str) -> list[str]:
+    """Patterns of the names of modules of higher packages, and of higher rooms of tts2face."""
+    above = rooms()
+    own = next((n for n, row in enumerate(above) for room in row if f"{name}.".startswith(f"{room}.")), 0)
+    packages = PACKAGES[PACKAGES.index(name.partition(".")[0]) + 1 :]
+    return [rf"{one}\.\w+" for one in packages] + [rf"{re.escape(one)}(?=[.:])" for row in above[:own] for one in row]
+
+
 def higher_names(text: str, name: str) -> Iterator[str]:
-    """Strings that contain the dotted name of a module of a higher package; docstrings may."""
-    higher = PACKAGES[PACKAGES.index(name.partition(".")[0]) + 1 :]
-    pattern = re.compile(rf"\b(?:{'|'.join(higher)})(?:\.\w+)+")
+    """Strings that contain the dotted name of a module of a higher package or room; docstrings may."""
+    higher = names_above(name)
+    pattern = re.compile(rf"\b(?:{'|'.join(higher)})(?:\.\w+)*")
     if not higher or not pattern.search(text):
         return
     tree = ast.parse(text)
@@ -100,7 +118,7 @@ def is_module(name: str) -> bool:
 COUNTS: dict[str, tuple[Find, tuple[str, ...], str]] = {
     "starts of Python": (starts_of_python, STARTS_PYTHON, f"start it in {PROCESS_ROOM}"),
     "readers of JSON or TOML": (parsers, PARSES, "use lexicon.inputs.parse_json or a reader that exists"),
-    "names of higher modules": (higher_names, NAMES_HIGHER, "let the higher package pass what is needed"),
+    "names of higher modules": (higher_names, NAMES_HIGHER, "let the higher package or room pass what is needed"),
 }
 
 
@@ -135,6 +153,9 @@ def test_every_way_to_write_an_exception_is_found() -> None:
     ]  # fmt: skip
     assert "lexicon.x: tts2face.api" in list(higher_names(made, "lexicon.x"))
     assert list(higher_names(made, "cli.x")) == []
+    given = 'run("tts2face.studio.x.tasks:TASKS", "tts2face.batch:run", "tts2face.studio")'
+    assert list(higher_names(given, "tts2face.service.x")) == ["tts2face.service.x: tts2face.studio.x.tasks"]
+    assert list(higher_names(given, "tts2face.studio.x")) == []
 
 
 def test_what_is_new_and_what_is_gone_is_named() -> None:

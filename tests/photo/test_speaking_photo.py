@@ -364,10 +364,11 @@ def test_pictures_do_not_depend_on_the_number_of_threads(face: Face) -> None:
 
 def test_an_export_shows_the_picture(face: Face, tmp_path: Path) -> None:
     session = Session(face=face)
-    session.export("Hi.", [str(tmp_path / "me.glb")])
-    content = (tmp_path / "me.glb").read_bytes()
+    session.export("Hi.", [str(tmp_path / "clip.glb")])
+    content = (tmp_path / "clip.glb").read_bytes()
     assert content.count(b"\xff\xd8\xff") == 2  # the picture and its eyes
     assert b"photograph of Ada" in content
+    assert b"".join(chunk.content for chunk in session.stream_file("Hi.", "glb")) == content
 
 
 def test_one_of_several_faces_is_named_after_the_file(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from tts2face.service.logs import configure_logs, log_event
 from tts2face.service.server import DrainingServer, make_server
 from tts2face.service.settings import ServiceSettings, read_settings
 from tts2face.service.synthesis.pool import Pool, PoolSettings
+from tts2face.studio.requests import TASKS
 from tts2face.telemetry import disable_telemetry
 
 
@@ -55,7 +56,7 @@ class Host:
 
     def _shared_pool(self, settings: PoolSettings) -> SharedPool:
         if self._pool is None:
-            self._pool = SharedPool(settings)
+            self._pool = SharedPool(replace(settings, handlers={**settings.handlers, "tasks": TASKS}))
         return self._pool
 
     async def answer(self, order: dict[str, Any]) -> None:
@@ -89,10 +90,10 @@ class Host:
 
     def _mounts(self) -> list[Any]:
         from tests.studio.harness import add_page
-        from tts2face.studio.app import mount_studio
+        from tts2face.studio.app import STUDIO
 
         add_page(self._folder)
-        return [mount_studio]
+        return [STUDIO]
 
 
 def _call_both(one: Callable[[float], None], other: Callable[[float], None], seconds: float) -> None:

@@ -16,7 +16,6 @@ from tests.running import eventually
 from tts2face.processes.child import Call, StoppedError
 from tts2face.processes.message import ERROR, GO, MORE, PAUSE, STOP, Message, read_message
 from tts2face.processes.parent import ChildEndedError
-from tts2face.service.synthesis import synthesis_process
 from tts2face.service.synthesis.remote_aligner import RemoteAligner
 from tts2face.service.synthesis.synthesis_process import Synthesis
 from tts2face.service.synthesis.turns import InterruptedTaskError, OneAtATime, Turns, wait_elsewhere
@@ -217,9 +216,8 @@ def test_an_error_ends_its_call_only(
         yield Chunk(b"a")
         raise error
 
-    monkeypatch.setattr(synthesis_process, "TASKS", {"fails": fails, "works": lambda *_: iter([Chunk(b"a")])})
     monkeypatch.setattr(SessionCache, "get", lambda *_: None)
-    synthesis = Synthesis(SessionCache())
+    synthesis = Synthesis(SessionCache(), {"fails": fails, "works": lambda *_: iter([Chunk(b"a")])})
     order = {"priority": 0, "id": "id-1"}
     failed, works = (
         answered(synthesis.synthesise, order | {"work": Work(kind).as_json()})[-1] for kind in ("fails", "works")

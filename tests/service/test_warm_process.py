@@ -1,15 +1,26 @@
-"""The server's side of a synthesis process."""
+"""A synthesis process: the server's side, and the tasks that it is given."""
 
 import asyncio
 import os
 import signal
+from pathlib import Path
 
 import pytest
 
+from tests.processes.answered import answered
+from tts2face.processes.message import ERROR, RESULT
+from tts2face.service.app import Mount, create_app
 from tts2face.service.logs import JSON_LINES
+from tts2face.service.settings import ServiceSettings
+from tts2face.service.synthesis import synthesis_process
+from tts2face.service.synthesis.pool import LINES_COST, MOVIE_COST, SOUND_COST, work_cost
 from tts2face.service.synthesis.warm_process import WarmProcess
+from tts2face.service.synthesis.work import SYNTHESISE, Work
+from tts2face.session_cache import SessionCache
+from tts2face.types import Chunk
 
 READY_TIMEOUT_S = 120.0
+GIVEN = {"given": lambda *_: iter([Chunk(b"a", 2.0)])}  # a table of tasks
 
 
 def test_the_end_of_a_process_is_not_taken_from_asyncio(caplog: pytest.LogCaptureFixture) -> None:
@@ -34,3 +45,23 @@ def test_the_end_of_a_process_is_not_taken_from_asyncio(caplog: pytest.LogCaptur
 
     asyncio.run(run())
     assert [one.getMessage() for one in caplog.records if one.name == "asyncio"] == []
+
+
+def test_processes_have_the_tasks_of_what_is_mounted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(SessionCache, "get", lambda *_: None)
+    monkeypatch.setattr(synthesis_process.RemoteAligner, "start", lambda _: None)
+    monkeypatch.setattr(synthesis_process, "configure_logs", lambda *_, **__: None)
+    mount, order = Mount(lambda *_: None, (f"{__name__}:GIVEN",)), {"work": Work("given").as_json(), "priority": 0}
+    last = []
+    for mounts in ([], [mount]):
+        settings = create_app(ServiceSettings(processes=1, data=tmp_path), mounts).state.service.pool.settings
+        handlers = synthesis_process.handlers(**settings.handlers)
+        last.append(answered(handlers[SYNTHESISE], order | {"id": None})[-1])
+    assert [one.kind for one in last] == [ERROR, RESULT]
+    assert last[0].content["message"].startswith("internal error: KeyError")
+    assert last[1].content["seconds"] == 2.0
+
+
+def test_a_work_costs_what_its_format_does_and_one_of_no_file_what_lines_do() -> None:
+    works = [Work(format="mp4"), Work("project-file", format="opus"), Work(format="curves"), Work("live")]
+    assert [work_cost(one) for one in works] == [MOVIE_COST, SOUND_COST, LINES_COST, LINES_COST]

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import dataclass
 
 from fastapi import FastAPI
 from fastapi import Request as HttpRequest
@@ -24,18 +25,25 @@ from tts2face.service.state import ServiceState
 NO_TELEMETRY: TelemetryConfig = {"tracing": False, "metrics": False, "logs": False, "auto_configure": False}
 
 
-Mount = Callable[[FastAPI, ServiceState], None]
-
-
-def create_app(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> FastAPI:
-    """Application with the given settings; its synthesis processes run from startup to shutdown.
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """What another room adds to a service.
 
     Parameters
     ----------
-    mounts
-        Functions that add further parts to the application, behind the same checks.
+    add
+        Adds its parts to the application, behind the same checks.
+    tasks
+        ``module:NAME`` of its tables of tasks of the synthesis processes.
     """
-    state = ServiceState(settings)
+
+    add: Callable[[FastAPI, ServiceState], None]
+    tasks: tuple[str, ...]
+
+
+def create_app(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> FastAPI:
+    """Application with the given settings; its synthesis processes run from startup to shutdown."""
+    state = ServiceState(settings, tuple(table for mount in mounts for table in mount.tasks))
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -67,7 +75,7 @@ def create_app(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> FastA
     app.add_exception_handler(RequestValidationError, _answer_invalid)
     app.add_exception_handler(HTTPException, _answer_http)
     for mount in mounts:
-        mount(app, state)
+        mount.add(app, state)
     app.add_middleware(Guard, state=state)
     return app
 

@@ -31,16 +31,17 @@ WARM_TEXT = "Hello there."
 
 
 class ServiceState:
-    """Settings, keys, pool, limits and metrics of a service."""
+    """Settings, keys, pool, limits and metrics of a service; `tasks` as `tts2face.service.app.Mount` has them."""
 
-    def __init__(self, settings: ServiceSettings) -> None:
+    def __init__(self, settings: ServiceSettings, tasks: tuple[str, ...] = ()) -> None:
         self.settings = settings
         self.keys = read_keys(settings.keys) if settings.keys is not None else ()
         self.pool = Pool(PoolSettings(
-            settings.processes, settings.sessions, settings.waiting,
+            settings.processes, settings.waiting,
             (self.work(format="mp4", request={"text": WARM_TEXT}).as_json(),
              self.work(kind="speech", request={"text": WARM_TEXT}).as_json()),
-            settings.log_format, settings.log_text, settings.memory_mb, settings.sentences_mb,
+            {"n_sessions": settings.sessions, "log_format": settings.log_format, "log_text": settings.log_text,
+             "memory_mb": settings.memory_mb, "sentences_mb": settings.sentences_mb, "tasks": tasks},
         ))  # fmt: skip
         self.library, self.checks, self.video_checks = Library(settings), Checks(), Checks()
         self.jobs = JobService(settings, self.library)

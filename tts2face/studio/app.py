@@ -12,7 +12,7 @@ from nicegui import ui
 
 from lexicon.errors import InputError
 from tts2face.service.access.page_headers import PAGES
-from tts2face.service.app import NO_TELEMETRY
+from tts2face.service.app import NO_TELEMETRY, Mount
 from tts2face.service.state import ServiceState
 from tts2face.studio.comparing import routes as comparison_routes
 from tts2face.studio.pages import animate, login, palette, projects, puppet, reports
@@ -21,6 +21,7 @@ from tts2face.studio.projects import routes as projects_routes
 from tts2face.studio.puppetry import routes as take_routes
 from tts2face.studio.recording.recordings import Recordings
 from tts2face.studio.reports import routes as report_routes
+from tts2face.studio.requests import TASKS
 from tts2face.studio.studio import Studio
 from tts2face.studio.styles import routes as style_routes
 
@@ -45,6 +46,9 @@ def mount_studio(app: FastAPI, state: ServiceState) -> None:
         show_welcome_message=False,
     )  # fmt: skip
     _run_with(app, studio, recordings)
+
+
+STUDIO = Mount(mount_studio, TASKS)
 
 
 def _recording_owner(request: HttpRequest) -> str:

@@ -25,6 +25,7 @@ from tts2face.studio.projects.store import ASSET, ASSETS
 from tts2face.studio.styles.palette_store import is_own_palette, own_palette
 
 FILE_OPTIONS = ("audio", "dictionary", "timeline")  # of a request
+TASKS = tuple(f"tts2face.studio.{room}.tasks:TASKS" for room in ("projects", "comparing", "styles"))
 OPTION_PARTS = frozenset({"request", "models", "picture"})
 
 
@@ -73,7 +74,7 @@ async def check_project(state: ServiceState, key: ApiKey, folder: Path, content:
 async def project_work(
     state: ServiceState, key: ApiKey, project: Project, folder: Path, kind: str, **more: Any
 ) -> Work:
-    """Work of a kind of `tts2face.service.synthesis.project_tasks`; errors as `check_options`.
+    """Work of a kind of the tables `TASKS`; errors as `check_options`.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ async def project_work(
         models = await _resolve(state, key, chosen)
     except RefusedError as refused:
         raise InputError(refused.message) from refused
-    form = str(more.pop("format", "mp4"))
+    form = str(more.pop("format", ""))
     request = {"text": project.request.text, "project": project_json(project, folder), "folder": str(folder), **more}
     return Work(kind, models, request, format=form, owner=key.name, affinity=folder.name)
 

@@ -2,7 +2,7 @@
 
 import io
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -11,11 +11,12 @@ from types import MappingProxyType
 from lexicon.errors import InputError
 from tts2face.exports.formats import FormatInfo, all_formats
 from tts2face.exports.parts import FormatWriter, FrameGrid
-from tts2face.exports.writer import ExportFile, ExportWriter, make_target, plan_exports
+from tts2face.exports.writer import ExportFile, ExportWriter, make_target, mesh_of, plan_exports
 from tts2face.models.face import Face
 from tts2face.render.movie_stream import MOVIE_KINDS, encode_movie, find_movie_kind
 from tts2face.render.picture import Picture
 from tts2face.render.sound_stream import SOUND_KINDS, encode_sound
+from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.prepared_request import PreparedRequest
 from tts2face.synthesis.session_models import SessionModels
 from tts2face.synthesis.speech_stream import Piece, sounds
@@ -81,26 +82,34 @@ def encode_stream(prepared: PreparedRequest, models: SessionModels, format: Stre
             return encode_sound(sounds(prepared, models.for_request(prepared).speech), name)
         return encode_sound((piece.clip.speech.waveform for piece in models.pieces(prepared)), name)
     if name not in line_formats():
-        return encode_whole(models.pieces(prepared), name, models.face(has_gestures=request.has_gestures).mesh)
-    face = models.face(has_gestures=request.has_gestures) if line_formats()[name].uses_face else None
-    return encode_lines(models.pieces(prepared), name, None if face is None else face.mesh)
+        file, face = f"clip.{name}", models.face(has_gestures=request.has_gestures)
+        return encode_whole(models.pieces(prepared), file, face, lambda folder: folder / file)
+    mesh = models.face(has_gestures=request.has_gestures).mesh if line_formats()[name].uses_face else None
+    return encode_lines(models.pieces(prepared), name, mesh)
 
 
-def encode_whole(pieces: Iterable[Piece], format: str, face: Face) -> Iterator[Chunk]:
-    """Write pieces in a format of a mesh, whose file begins with the number of frames: bytes come after the last one.
+def encode_whole(
+    pieces: Iterable[Piece], name: str, face: AnimatedFace, choose: Callable[[Path], Path]
+) -> Iterator[Chunk]:
+    """Write pieces to an export of a name, whose bytes come after the last piece.
+
+    Parameters
+    ----------
+    choose
+        Path of the file that is sent, in the folder of all files that were written.
 
     Raises
     ------
     InputError, BackendError
-        As `ExportWriter`.
+        As `plan_exports`, `mesh_of` and `ExportWriter`.
     """
     with tempfile.TemporaryDirectory(prefix="tts2face-") as folder:
-        path = Path(folder, f"clip.{format}")
-        with ExportWriter(plan_exports([path]), face=face) as writer:
+        files = plan_exports([Path(folder, name)])
+        with ExportWriter(files, face=mesh_of(face, files)) as writer:
             for piece in pieces:
                 writer.add(piece.clip, piece.text)
                 yield Chunk(b"", piece.clip.speech.waveform.duration)
-        with path.open("rb") as file:
+        with choose(Path(folder)).open("rb") as file:
             while block := file.read(BLOCK_BYTES):
                 yield Chunk(block)
 

@@ -18,8 +18,8 @@ from tests.running import eventually
 from tests.studio.server.test_projects_http import create, edit, preview
 from tts2face.models.palette import load_palette, read_palette
 from tts2face.project.project_file import load_project
-from tts2face.service.synthesis.style_tasks import N_TILES, TILE_PX
 from tts2face.session import Session
+from tts2face.studio.styles.tasks import N_TILES, TILE_PX
 
 TEXT = "Bob may move."
 TABLE = {"Content-Type": "text/csv"}

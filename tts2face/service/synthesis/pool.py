@@ -5,9 +5,9 @@ import os
 import time
 import zlib
 from collections import OrderedDict, deque
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from lexicon.errors import BackendError
@@ -15,7 +15,6 @@ from tts2face.processes.message import Message
 from tts2face.processes.parent import ChildEndedError
 from tts2face.render.movie_stream import MOVIE_KINDS
 from tts2face.render.sound_stream import SOUND_KINDS
-from tts2face.service.logs import JSON_LINES
 from tts2face.service.synthesis.stages import stage
 from tts2face.service.synthesis.warm_process import InputQueue, WarmProcess
 from tts2face.service.synthesis.work import Work
@@ -43,30 +42,22 @@ class PoolSettings:
     ----------
     n_processes
         Number of synthesis processes, each bound to a core; 0: one for each core.
-    n_sessions
-        Sessions that each process keeps.
     max_waiting
         Requests that may wait; further ones are refused.
     warm
         Works that each process executes before it is ready, as `Work.as_json`.
-    log_format, log_text, memory_mb, sentences_mb
-        As in the settings of the service.
+    handlers
+        Settings of `tts2face.service.synthesis.synthesis_process.handlers`.
     """
 
     n_processes: int = 0
-    n_sessions: int = 2
     max_waiting: int = 64
     warm: tuple[dict[str, Any], ...] = ()
-    log_format: str = JSON_LINES
-    log_text: bool = False
-    memory_mb: int = 0
-    sentences_mb: int = 0
+    handlers: Mapping[str, Any] = field(default_factory=dict)
 
 
 def work_cost(work: Work) -> float:
     """Share of a core that a work takes."""
-    if work.kind not in {"file", "project-file"}:
-        return LINES_COST
     if work.format in SOUND_KINDS:
         return SOUND_COST
     return MOVIE_COST if work.format in MOVIE_KINDS else LINES_COST
@@ -83,13 +74,9 @@ class Pool:
         cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
         count = settings.n_processes or len(cores) or os.cpu_count() or 1
         self.processes = [
-            WarmProcess(
-                {"n_sessions": settings.n_sessions, "log_format": settings.log_format, "log_text": settings.log_text,
-                 "memory_mb": settings.memory_mb, "sentences_mb": settings.sentences_mb},
-                settings.warm, self._wake, cores[number % len(cores)] if cores else None,
-            )
+            WarmProcess(settings.handlers, settings.warm, self._wake, cores[number % len(cores)] if cores else None)
             for number in range(count)
-        ]  # fmt: skip
+        ]
         self._waiting: OrderedDict[str, deque[_Waiting]] = OrderedDict()
         self._runs: list[asyncio.Task[None]] = []
 

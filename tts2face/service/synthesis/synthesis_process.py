@@ -1,25 +1,26 @@
 """What a synthesis process of the server does: it keeps sessions warm and makes several results in turn."""
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from lexicon.errors import Tts2faceError
 from tts2face.processes.child import Call, Handler
+from tts2face.processes.program import Program
 from tts2face.service.logs import configure_logs, log_event
 from tts2face.service.synthesis.remote_aligner import RemoteAligner
 from tts2face.service.synthesis.tasks import TASKS
 from tts2face.service.synthesis.turns import OneAtATime, Turns
-from tts2face.service.synthesis.work import SERVE, SYNTHESISE, DefectError, Step, work_from_json
+from tts2face.service.synthesis.work import SERVE, SYNTHESISE, DefectError, Step, Task, Work
 from tts2face.session_cache import Models, SessionCache
 from tts2face.voice.pool import VoicePool
 
 
 class Synthesis:
-    """Handlers that share sessions and take turns."""
+    """Handlers that share sessions and take turns; `tasks` by the kinds of their works."""
 
-    def __init__(self, sessions: SessionCache) -> None:
-        self._sessions, self._turns = sessions, Turns()
+    def __init__(self, sessions: SessionCache, tasks: Mapping[str, Task] = TASKS) -> None:
+        self._sessions, self._tasks, self._turns = sessions, tasks, Turns()
 
     def synthesise(self, call: Call) -> Mapping[str, float]:
         """Send the parts of the result of a ``work``; its measures.
@@ -40,8 +41,8 @@ class Synthesis:
             raise DefectError(f"internal error: {type(error).__name__}; see the log of the service") from error
 
     def _steps(self, call: Call) -> Iterator[Step]:
-        work = work_from_json(call.content["work"])
-        return TASKS[work.kind](self._sessions.get(Models(**work.models), work.owner), work, call.inputs)
+        work = Work(**call.content["work"])
+        return self._tasks[work.kind](self._sessions.get(Models(**work.models), work.owner), work, call.inputs)
 
 
 def serve(call: Call) -> Mapping[str, Any]:
@@ -51,9 +52,15 @@ def serve(call: Call) -> Mapping[str, Any]:
 
 
 def handlers(
-    *, log_format: str, log_text: bool, n_sessions: int, memory_mb: int, sentences_mb: int
+    *, log_format: str, log_text: bool, n_sessions: int, memory_mb: int, sentences_mb: int, tasks: Sequence[str] = ()
 ) -> Mapping[str, Handler]:
-    """Handlers of a process with the settings of the service; the aligner starts meanwhile."""
+    """Handlers of a process with the settings of the service; the aligner starts meanwhile.
+
+    Parameters
+    ----------
+    tasks
+        ``module:NAME`` of further tables of tasks by kind.
+    """
     configure_logs(log_format, with_text=log_text)
     aligner = RemoteAligner()
     aligner.start()
@@ -61,4 +68,7 @@ def handlers(
         n_sessions, voices=VoicePool(aligner, OneAtATime()), max_bytes=memory_mb * 1_000_000 or None,
         memory_mb=sentences_mb,
     )  # fmt: skip
-    return {SYNTHESISE: Synthesis(sessions).synthesise, SERVE: serve}
+    known = dict(TASKS)
+    for table in tasks:
+        known |= Program(table).load()
+    return {SYNTHESISE: Synthesis(sessions, known).synthesise, SERVE: serve}

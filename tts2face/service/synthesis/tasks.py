@@ -1,14 +1,13 @@
-"""Tasks of a synthesis process: each makes a result step by step with a session."""
+"""Tasks of the service: each makes a result step by step with a session."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from tts2face.render.picture import Picture
 from tts2face.request import Request
-from tts2face.service.synthesis import comparison_tasks, project_tasks, style_tasks
-from tts2face.service.synthesis.explanation_task import explain
 from tts2face.service.synthesis.live_task import listen, live
-from tts2face.service.synthesis.work import Event, Inputs, Step, Work
+from tts2face.service.synthesis.work import Event, Inputs, Task, Work
 from tts2face.types import Chunk
 
 if TYPE_CHECKING:
@@ -41,20 +40,6 @@ def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | 
         yield Chunk(pcm_bytes(spoken.waveform.samples), spoken.waveform.duration)
 
 
-TASKS: Mapping[str, Callable[["Session", Work, Inputs], Iterator[Step]]] = {
-    "file": stream_file,
-    "speech": timed_speech,
-    "live": live,
-    "listen": listen,
-    "project": project_tasks.preview,
-    "picture": project_tasks.picture,
-    "explain": explain,
-    "project-file": project_tasks.project_file,
-    "project-export": project_tasks.project_export,
-    "recordings": comparison_tasks.recordings,
-    "recorded": comparison_tasks.recorded_motion,
-    "measure": comparison_tasks.measure,
-    "face": project_tasks.face_file,
-    "swatch": style_tasks.swatch,
-    "take": style_tasks.take,
-}
+TASKS: Mapping[str, Task] = MappingProxyType({
+    "file": stream_file, "speech": timed_speech, "live": live, "listen": listen,
+})  # fmt: skip

@@ -1,13 +1,16 @@
 """What a synthesis process is asked to make, and the parts of its results."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import BackendError
 from tts2face.processes.message import Message
 from tts2face.types import Chunk
+
+if TYPE_CHECKING:
+    from tts2face.session import Session
 
 Inputs = deque[Message]  # that a task has not read yet
 SYNTHESISE, SERVE = "synthesise", "serve"  # calls of a synthesis process
@@ -25,13 +28,13 @@ class Work:
     Parameters
     ----------
     kind
-        Name of one of `TASKS`.
+        Name of a task: one of `tts2face.service.synthesis.tasks.TASKS`, or of a table given to the service.
     models
         Fields of `tts2face.session_cache.Models` that differ from their defaults.
     request, picture
         Fields of `Request` and `Picture` that differ from their defaults.
     format
-        Format of `Session.stream_file`.
+        Format of `Session.stream_file`; empty: the result is not such a file.
     owner
         For whom finished sentences are kept in memory (`SessionCache.get`); empty: none are.
     affinity
@@ -42,18 +45,13 @@ class Work:
     models: Mapping[str, Any] = field(default_factory=dict)
     request: Mapping[str, Any] = field(default_factory=dict)
     picture: Mapping[str, Any] = field(default_factory=dict)
-    format: str = "mp4"
+    format: str = ""
     owner: str = ""
     affinity: str = ""
 
     def as_json(self) -> dict[str, Any]:
-        """JSON object from which `work_from_json` makes the work again."""
+        """JSON object of the fields."""
         return asdict(self)
-
-
-def work_from_json(content: Mapping[str, Any]) -> Work:
-    """The work of `Work.as_json`."""
-    return Work(**content)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,3 +72,4 @@ class Event:
 # A part of a result, or a wait. The messages of a part have its ``seconds`` of speech and either bytes as their
 # payload or an ``event``; the last message has ``seconds`` and ``cpu_s`` of the whole.
 Step = Chunk | Event | Wait
+Task = Callable[["Session", Work, Inputs], Iterator[Step]]  # makes a result step by step

@@ -53,7 +53,7 @@ class Preview:
     Parameters
     ----------
     pieces
-        Descriptions of its pieces as `tts2face.service.synthesis.project_tasks.preview` sends them.
+        Descriptions of its pieces as `tts2face.studio.projects.tasks.preview` sends them.
     is_complete
         Whether nothing more will come for the present state of the project.
     notes

@@ -1,4 +1,4 @@
-"""Strips of lips as SVG: outlines of `tts2face.service.synthesis.explanation_task` at the instants of a phone. Pure."""
+"""Strips of lips as SVG: outlines of `tts2face.studio.projects.tasks.explain` at the instants of a phone. Pure."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -17,9 +17,9 @@ from lexicon.errors import Tts2faceError
 from tts2face.processes.parent import started
 from tts2face.processes.program import Program
 from tts2face.service.access.keys import ApiKey
-from tts2face.service.synthesis.camera_process import FOLLOW, LIMITS
+from tts2face.studio.puppetry.camera_process import FOLLOW, LIMITS
 
-PROGRAM = Program("tts2face.service.synthesis.camera_process:HANDLERS", LIMITS)
+PROGRAM = Program("tts2face.studio.puppetry.camera_process:HANDLERS", LIMITS)
 TIME = struct.Struct("<d")  # before each JPEG of a client
 MAX_PICTURE_BYTES = 1 << 20
 MAX_LIVE_S = 3600.0

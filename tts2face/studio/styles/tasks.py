@@ -1,15 +1,17 @@
 """Tasks of the pages of styles and of puppetry: moving swatches of styles, and takes as curves with their sound."""
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tts2face.models.palette_editing import StyleMix, mix_styles
 from tts2face.render.picture import Picture
-from tts2face.service.synthesis.work import Event, Inputs, Work
+from tts2face.service.synthesis.work import Event, Inputs, Task, Work
+from tts2face.storage.wave_files import pcm_bytes
 from tts2face.types import Chunk
 
 if TYPE_CHECKING:
@@ -54,10 +56,13 @@ def take(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk]:
     performance = Performance(take=Path(work.request["take"]), audio=None if sound is None else Path(sound))
     done = perform(performance, session.animated_face(has_gestures=False))
     motion, head = done.motion.face, done.motion.head
-    samples = np.rint(np.clip(done.sound.samples, -1.0, 1.0) * 32767).astype("<i2")
+    sound_bytes = pcm_bytes(np.clip(done.sound.samples, -1.0, 1.0))
     described: dict[str, Any] = {
         "type": "take", "fps": motion.fps, "channels": list(motion.channels), "n_frames": len(motion),
-        "rate": done.sound.rate, "n_samples": len(samples), "seconds": done.seconds,
+        "rate": done.sound.rate, "n_samples": len(done.sound.samples), "seconds": done.seconds,
     }  # fmt: skip
     yield Event(described)
-    yield Chunk(motion.values.astype("<f4").tobytes() + head.values.astype("<f4").tobytes() + samples.tobytes())
+    yield Chunk(motion.values.astype("<f4").tobytes() + head.values.astype("<f4").tobytes() + sound_bytes)
+
+
+TASKS: Mapping[str, Task] = MappingProxyType({"swatch": swatch, "take": take})

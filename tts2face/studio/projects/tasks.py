@@ -1,4 +1,4 @@
-"""Tasks of the studio: the curves and the sound of a project, one of its pictures, its files, its face.
+"""Tasks of a project: its curves and sound, one of its pictures, its files, its face, and how a phone of it was made.
 
 A work has the project in ``request``: ``project`` (its JSON), ``folder`` (where its files are), and ``text``, which the
 service checks as that of any request.
@@ -6,21 +6,27 @@ service checks as that of any request.
 
 import hashlib
 import io
-import tempfile
 import zipfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lexicon.errors import InputError
+from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence
+from tts2face.exemplar.explanation import PhoneExplanation
+from tts2face.exemplar.lip_outlines import N_INSTANTS, LipOutline, lip_outlines, token_outlines
+from tts2face.models.talker import Talker
 from tts2face.project.fitting import cut_timeline, is_too_long, without_edges
 from tts2face.project.project import Project
 from tts2face.project.project_file import parse_project
-from tts2face.service.synthesis.work import Event, Inputs, Work
+from tts2face.service.synthesis.work import Event, Inputs, Task, Work
+from tts2face.storage.wave_files import pcm_bytes
+from tts2face.synthesis.animated_face import AnimatedFace
 from tts2face.synthesis.phone_edges import StaleEdgesError
 from tts2face.types import Chunk
 
@@ -29,7 +35,8 @@ if TYPE_CHECKING:
     from tts2face.synthesis.speech_stream import Piece
 
 DIGEST_BYTES = 12
-BLOCK_BYTES = 1 << 18
+MAX_EXAMPLES = 12  # of an explained phone
+N_DECIMALS = 2  # of outlines, mm
 
 
 def read_project(work: Work) -> Project:
@@ -67,20 +74,24 @@ def preview(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk
     yield Event({"type": "end", "dropped": dropped, "cut_to": cut_to})
 
 
+def digest_of(parts: Iterable[bytes]) -> str:
+    """Digests of motion, head pose and sound of a piece, one after the other."""
+    return "".join(hashlib.blake2b(part, digest_size=DIGEST_BYTES).hexdigest() for part in parts)
+
+
 def _pieces(session: "Session", project: Project, have: frozenset[str]) -> Iterator[tuple[dict[str, Any], bytes]]:
     """Description and content of each piece; the content is empty if its digest is in `have`."""
     said: Counter[str] = Counter()
     for number, piece in enumerate(session.stream(project.prepare())):
         clip = piece.clip
-        motion, head = clip.motion.values.astype("<f4"), clip.head.values.astype("<f4")
-        sound = np.rint(np.clip(clip.speech.waveform.samples, -1.0, 1.0) * 32767).astype("<i2")
-        parts = [motion.tobytes(), head.tobytes(), sound.tobytes()]
-        digests = [hashlib.blake2b(part, digest_size=DIGEST_BYTES).hexdigest() for part in parts]
-        digest = "".join(digests)
+        motion, head, samples = clip.motion.values, clip.head.values, clip.speech.waveform.samples
+        sound = pcm_bytes(np.clip(samples, -1.0, 1.0))
+        parts = [motion.astype("<f4").tobytes(), head.astype("<f4").tobytes(), sound]
+        digest = digest_of(parts)
         event = {
             "type": "piece", "number": number, "text": piece.text, "occurrence": said[piece.text],
             "begin": piece.begin, "seconds": clip.speech.waveform.duration, "rate": clip.speech.waveform.rate,
-            "n_frames": len(motion), "n_samples": len(sound), "digest": digest,
+            "n_frames": len(motion), "n_samples": len(samples), "digest": digest,
             **_timing(piece), "notes": [one.sentence for one in piece.mismatches],
         }  # fmt: skip
         if number == 0:
@@ -130,19 +141,11 @@ def project_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
 
 def project_export(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
     """Bytes of an export of a project, whose file is named by ``name``; several files come as one .zip file."""
-    from tts2face.exports.writer import ExportWriter, mesh_of, plan_exports
+    from tts2face.synthesis.byte_stream import encode_whole
 
     project = read_project(work)
-    with tempfile.TemporaryDirectory(prefix="tts2face-") as folder:
-        files = plan_exports([Path(folder, work.request["name"])])
-        face = session.animated_face(has_gestures=project.request.has_gestures)
-        with ExportWriter(files, face=mesh_of(face, files)) as writer:
-            for piece in session.stream(project.prepare()):
-                writer.add(piece.clip, piece.text)
-                yield Chunk(b"", piece.clip.speech.waveform.duration)
-        with _packed(Path(folder)).open("rb") as file:
-            while block := file.read(BLOCK_BYTES):
-                yield Chunk(block)
+    face = session.animated_face(has_gestures=project.request.has_gestures)
+    return encode_whole(session.stream(project.prepare()), work.request["name"], face, _packed)
 
 
 def _packed(folder: Path) -> Path:
@@ -163,3 +166,57 @@ def face_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
 
     face = session.animated_face(has_gestures=bool(work.request.get("has_gestures", True)))
     yield Chunk(stage_glb(face.mesh, face.channels))
+
+
+def explain(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk]:
+    """The phone at ``time`` seconds with the recorded examples that made it; no phone where none is used.
+
+    Each example has ``outlines`` of its lips, the phone those of the lips that were ``made``; empty if there are none.
+    """
+    project, time = read_project(work), float(work.request["time"])
+    phone: PhoneExplanation | None = None
+    made: list[dict[str, Any]] = []
+    for piece in session.stream(project.prepare()):
+        is_here = time < piece.begin + piece.clip.speech.waveform.duration
+        if phone is None and (is_here or piece.transcript is not None):
+            phone = next((one for one in piece.explain() if one.start <= time < one.end), None)
+        if is_here and phone is not None:
+            face = session.animated_face(has_gestures=project.request.has_gestures)
+            made = _made_outlines(face, piece, phone)
+        if is_here:
+            break
+        yield Chunk(b"")
+    yield Event({"type": "explanation", "phone": None if phone is None else _described(session.talker, phone, made)})
+
+
+def _described(talker: Talker, phone: PhoneExplanation, made: list[dict[str, Any]]) -> dict[str, Any]:
+    found = asdict(phone)
+    used = phone.tokens[:MAX_EXAMPLES]
+    found["tokens"] = [asdict(one) | {"outlines": _outlines_json(token_outlines(talker, one))} for one in used]
+    return found | {"made": made}
+
+
+def _made_outlines(face: AnimatedFace, piece: "Piece", phone: PhoneExplanation) -> list[dict[str, Any]]:
+    """Outlines of the lips of a piece from the beginning of a phone to its end; empty if the face cannot tell."""
+    motion = piece.clip.motion
+    times = np.linspace(phone.start, phone.end, N_INSTANTS) - piece.begin
+    shown = motion.at(times)
+    still = np.zeros_like(shown[:1])
+    try:
+        moved, rest = (face.landmarks(replace(motion, values=values)) for values in (shown, still))
+    except (DataError, InputError):
+        return []
+    return _outlines_json(lip_outlines(moved, rest[0]))
+
+
+def _outlines_json(outlines: tuple[LipOutline, ...]) -> list[dict[str, Any]]:
+    return [
+        {name: getattr(one, name).astype(float).round(N_DECIMALS).tolist() for name in ("outer", "inner")}
+        for one in outlines
+    ]
+
+
+TASKS: Mapping[str, Task] = MappingProxyType({
+    "project": preview, "picture": picture, "project-file": project_file, "project-export": project_export,
+    "face": face_file, "explain": explain,
+})  # fmt: skip

@@ -1,9 +1,9 @@
-"""Tasks of the studio that compare: recorded motion on the face of a project, and measures of two motions."""
+"""Tasks that compare: recorded motion on the face of a project, and measures of two motions."""
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,8 +14,8 @@ from lexicon.sequence import PhoneSequence
 from tts2face.exemplar.motion_measures import DTW_BAND_S
 from tts2face.models.talker import Talker
 from tts2face.project.project import Project
-from tts2face.service.synthesis.project_tasks import DIGEST_BYTES, read_project
-from tts2face.service.synthesis.work import Event, Inputs, Work
+from tts2face.service.synthesis.work import Event, Inputs, Task, Work
+from tts2face.studio.projects.tasks import digest_of, read_project
 from tts2face.synthesis.animated_face import AnimatedFace, FaceMotion
 from tts2face.synthesis.motion_comparison import MotionPart, compare_motion, map_channels
 from tts2face.types import HEAD_CHANNELS, Chunk, Trajectory
@@ -34,7 +34,7 @@ def recordings(session: "Session", work: Work, _: Inputs) -> Iterator[Event]:
 
 
 def recorded_motion(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk]:
-    """Recorded motion on the face of a project, in events as those of `project_tasks.preview`, without sound.
+    """Recorded motion on the face of a project, in events as those of a preview (`projects.tasks`), without sound.
 
     ``recording`` of the request names a recording of the talker, or ``take`` a Live Link file; its second ``offset`` is
     the beginning of the project's sound.
@@ -47,7 +47,7 @@ def recorded_motion(session: "Session", work: Work, _: Inputs) -> Iterator[Event
     motion = _recorded(session, work.request, project)
     values, head = motion.face.values.astype("<f4"), motion.head.values.astype("<f4")
     parts = [values.tobytes(), head.tobytes(), b""]
-    digest = "".join(hashlib.blake2b(part, digest_size=DIGEST_BYTES).hexdigest() for part in parts)
+    digest = digest_of(parts)
     yield Event({"type": "begin", "fps": float(project.request.fps)})
     yield Event({
         "type": "piece", "number": 0, "text": "", "occurrence": 0, "begin": 0.0,
@@ -162,3 +162,8 @@ def _parts_of_equal_sentences(
             times = np.arange(same[2], same[3], 1 / fps)
             found.append(MotionPart(reference.at(times), one.motion, one.phones, is_same_time=False))
     return found
+
+
+TASKS: Mapping[str, Task] = MappingProxyType({
+    "recordings": recordings, "recorded": recorded_motion, "measure": measure,
+})  # fmt: skip
