@@ -8,7 +8,7 @@ from pathlib import Path
 
 from corpus_tools.gesture_study.analysis import Options, StyleStudy, TraitComparison, study_gestures
 from corpus_tools.gesture_study.moods import MoodOptions, MoodStudy, study_moods
-from corpus_tools.gesture_study.write_moods import SHOWN_SCORES, mood_rows
+from corpus_tools.gesture_study.write_moods import mood_rows
 from tts2face.models.palette import MEASURED_STYLE, load_palette
 from tts2face.session import Session
 
@@ -18,7 +18,7 @@ MOODS = MoodOptions(seeds=12, first_seed=300)  # no parameter was chosen on thes
 
 def distances(found: StyleStudy) -> str:
     """Markdown table of all traits, those with a target first and in bold."""
-    heads = ("trait", "unit", "recorded, mean", "field", "noise", "ju2008")
+    heads = ("trait", "unit", "recorded, mean", "field")
     lines = _headed((*heads, "field / halves", "field / noise", "ju2008 / halves"))
     for one in sorted(found.trait_comparisons, key=lambda one: not one.trait.has_target):
         lines.append(_line(one))
@@ -26,7 +26,7 @@ def distances(found: StyleStudy) -> str:
 
 
 def _line(one: TraitComparison) -> str:
-    means = (float(values.mean()) for values in (one.real, one.field, one.noise, one.published))
+    means = (float(values.mean()) for values in (one.real, one.field))
     near = [f"{one.to_field / one.halves:.2f}", f"{one.to_field / one.to_noise:.2f}"]
     published = f"{one.to_published / one.halves:.2f}"
     mark = "**" if one.trait.has_target else ""
@@ -75,10 +75,8 @@ def blinks(found: StyleStudy) -> str:
 
 
 def moods(found: MoodStudy, measured: MoodStudy) -> str:
-    """Markdown table of the moods: what the tracker reads, and how many the classifier recognises."""
-    figures = _headed(
-        ("style", "recognised", "smile weight (5 to 95 %)", "blinks a minute", "yaw spread, degrees", *SHOWN_SCORES)
-    )
+    """Markdown table of the moods: smile, blinks and turns of each, and how many the classifier recognises."""
+    figures = _headed(("style", "recognised", "smile weight (5 to 95 %)", "blinks a minute", "yaw spread, degrees"))
     for row in [*mood_rows(found), *(row for row in mood_rows(measured) if row["mood"] == MEASURED_STYLE)]:
         is_mood = row["mood"] in found.moods
         cells = (
@@ -87,7 +85,6 @@ def moods(found: MoodStudy, measured: MoodStudy) -> str:
             f"{row['smile weight']:.2f} ({row['smile weight, 5 %']:.2f} to {row['smile weight, 95 %']:.2f})",
             f"{row['blinks a minute']:.0f}",
             f"{row['yaw spread, deg']:.1f}",
-            *(f"{row[name]:.2f}" for name in SHOWN_SCORES),
         )
         figures.append(f"| {' | '.join(cells)} |")
     n_clips, n_frames = int(found.confusion.sum()), int(found.frame_confusion.sum())
