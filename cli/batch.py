@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from cli.flags import Face, Hair, HairColor, add_option_flags, options_from_flags, switch, whole_number
-from cli.process import write_message
-from cli.progress import progress_bar
+from cli.process import progress_bar, write_message
 from lexicon.errors import DataError, InputError
-from tts2face.batch.options import BatchOptions
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
 from tts2face.request import Request
+from tts2face.serving.batch.options import BatchOptions
 
 if TYPE_CHECKING:
-    from tts2face.batch.engine import Engine
-    from tts2face.batch.output import Plan
-    from tts2face.batch.run import BatchResult
-    from tts2face.batch.store import Store
+    from tts2face.serving.batch.engine import Engine
+    from tts2face.serving.batch.output import Plan
+    from tts2face.serving.batch.run import BatchResult
+    from tts2face.serving.batch.store import Store
+
 
 NOT_IN_BATCH = frozenset({"text", "exports", "audio", "audio_map", "idle", "timeline", "expression"})
 MAX_WARNINGS = 40  # on the terminal; all are in the manifest
@@ -79,9 +79,9 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         raise InputError(f"--out must be a folder of this machine, not {out}; give a bucket by --store")
     if priority < 1:
         raise InputError(f"--priority must be 1 or more, not {priority}")
-    from tts2face.batch.cast import Cast, read_cast
-    from tts2face.batch.plan import plan_batch
-    from tts2face.session_cache import Models
+    from tts2face.serving.batch.cast import Cast, read_cast
+    from tts2face.serving.batch.plan import plan_batch
+    from tts2face.session.named_models import Models
 
     plan = plan_batch(
         subtitles,
@@ -97,8 +97,8 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         raise InputError("no cue can be spoken, so there is nothing to make; the warnings say why")
     if dry_run:
         return _print_plan(plan, out, store)
-    from tts2face.batch.run import SEGMENT_FOLDER
-    from tts2face.batch.store import open_store
+    from tts2face.serving.batch.run import SEGMENT_FOLDER
+    from tts2face.serving.batch.store import open_store
 
     place = store if store is not None else str((out / SEGMENT_FOLDER).resolve())
     opened = open_store(place)
@@ -115,16 +115,16 @@ def batch(  # noqa: PLR0913 - one parameter a flag
 def _open_engine(database: str | None, place: str, jobs: int, priority: int) -> "Engine":
     """Processes of this machine, or the workers of a database."""
     if database is None:
-        from tts2face.batch.engine import LocalEngine
+        from tts2face.serving.batch.engine import LocalEngine
 
         return LocalEngine(jobs, write_message)
-    from tts2face.jobs.engine import DatabaseEngine
+    from tts2face.serving.work.engine import DatabaseEngine
 
     return DatabaseEngine(database, place, jobs, priority, write_message)
 
 
 def _run(plan: "Plan", out: Path, parts: "tuple[Store, Engine]", *, is_json: bool, quiet: bool) -> "BatchResult":
-    from tts2face.batch.run import run_batch
+    from tts2face.serving.batch.run import run_batch
 
     store, engine = parts
     if is_json:
@@ -179,9 +179,9 @@ def _print_warnings(plan: "Plan") -> None:
 
 
 def _print_plan(plan: "Plan", out: Path, store: str | None) -> None:
-    from tts2face.batch.estimate import estimate_batch
-    from tts2face.batch.run import SEGMENT_FOLDER
-    from tts2face.batch.store import open_store
+    from tts2face.serving.batch.run import SEGMENT_FOLDER
+    from tts2face.serving.batch.store import open_store
+    from tts2face.serving.batch.windows import estimate_batch
 
     place = store if store is not None else str(out / SEGMENT_FOLDER)
     is_there = "://" in place or Path(place).is_dir()

@@ -1,4 +1,9 @@
-"""``tts2face corpus``: build talkers from recordings, show them and evaluate them."""
+"""``tts2face corpus``: build talkers from recordings, show them and evaluate them.
+
+``tts2face corpus prompts``: sentences to read aloud for a talker of one's own.
+
+``tts2face corpus check``: what is wrong or weak about recordings, before anything is built.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,14 +12,62 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from cli.flags import Cache, Jobs, Model, switch, whole_number
-from cli.landmark_model import Yes
-from cli.process import ask, write_message
-from cli.progress import progress_bar, stage_bar
-from cli.prompts import prompts
-from cli.recording_check import check
+from cli.photo import Yes
+from cli.process import ask, progress_bar, stage_bar, write_message
 from lexicon.errors import InputError
-from tts2face.storage.output_names import check_file_name
-from tts2face.storage.overwrite import refuse_overwriting
+from tts2face.storage.files import check_file_name, refuse_overwriting, write_atomically
+
+
+def prompts(
+    *,
+    out: Annotated[Path, Parameter(help="Output text, one prompt a line (.txt).", alias="-o")],
+    minutes: Annotated[float, Parameter(help="Minutes of recording: 2, 5 and 10 are 25, 60 and 120 prompts.")] = 5.0,
+    language: Annotated[str, Parameter(help="Language of the prompts: an espeak-ng code.")] = "en-us",
+    text: Annotated[
+        Path | None, Parameter(help="Text of that language to select sentences from; by default the shipped prompts.")
+    ] = None,
+) -> None:
+    """Select sentences to read aloud that cover the phones of a language in their visible contexts."""
+    check_file_name(out, "a list of prompts", (".txt",))
+    refuse_overwriting({"--out": out}, {"--text": text})
+    from corpus_tools.prompts.prompts import choose_prompts
+
+    chosen = choose_prompts(minutes, language=language, text=text)
+    write_atomically(out, "".join(f"{prompt}\n" for prompt in chosen.texts).encode())
+    write_message("minute  prompts  phones  triphone classes  share of running text")
+    for minute, n_prompts, cover in chosen.coverage_by_minute():
+        write_message(
+            f"{minute:6}  {n_prompts:7}  {cover.n_phones:2}/{cover.of_phones:2}   "
+            f"{cover.n_triphones:8}/{cover.of_triphones:4}     {cover.share:.1%}"
+        )
+    write_message(f"wrote {out}: {len(chosen.texts)} prompts")
+
+
+def check(
+    recordings: Annotated[Path, Parameter(help="Folder of videos, or one video, with transcripts beside them.")],
+    /,
+    *,
+    text: Annotated[str | None, Parameter(help="What is said in one video, in place of a transcript.")] = None,
+    cache: Cache = None,
+    model: Model = None,
+    yes: Yes = False,
+) -> None:
+    """Check recordings for `corpus build`, one by one: light, sharpness, sound, words, and what to do better."""
+    del yes  # read where the model is missing
+    if text is not None and recordings.is_dir():
+        raise InputError("--text belongs to one video, not to a folder; write transcripts beside the videos")
+    from corpus_tools.recordings.observe import RecordingChecker, recordings_to_check
+    from corpus_tools.run_options import RunOptions
+
+    found = recordings_to_check(recordings, text)
+    checker = RecordingChecker(RunOptions(cache, None, model))
+    for recording in found:
+        findings = checker.check(recording)
+        for finding in findings:
+            print(f"{recording.name}: {finding.severity}: {finding.message}")  # noqa: T201 - the result
+        if not findings:
+            print(f"{recording.name}: good")  # noqa: T201 - the result
+
 
 corpus = App(name="corpus", help="Build, show and evaluate talkers.")
 corpus.command(check)
@@ -226,7 +279,7 @@ def audio_maps(  # noqa: PLR0913 - one parameter a flag
 @corpus.command
 def show(talker: TalkerName, /) -> None:
     """Print the contents of a talker: utterances, phones, modes, provenance."""
-    from corpus_tools.show_talker import describe
+    from corpus_tools.build_talker import describe
     from tts2face.models.talker import load_talker
 
     print(describe(load_talker(talker)).text())  # noqa: T201 - the result
@@ -244,7 +297,7 @@ def pool(
     """Train a talker's networks again, together with lip tracks of another speaker of free speech."""
     check_suffix(out, "talker")
     refuse_overwriting({"--out": out}, {"TRACKS": tracks})
-    from corpus_tools.pool_talker import pool_talker
+    from corpus_tools.clone_talker import pool_talker
     from corpus_tools.run_options import ignore_stage
 
     with stage_bar() as stages:
@@ -314,9 +367,14 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Compare synthesised lip motion with held-out recordings."""
     del yes  # read where the model is missing
-    from cli.evaluation import ComparisonFlags, SplitFlags, run_evaluation
-    from cli.learning_curve import run_learning_curve
-    from cli.people import DEFAULT_TALKER, run_people_evaluation
+    from cli.evaluate import (
+        DEFAULT_TALKER,
+        ComparisonFlags,
+        SplitFlags,
+        run_evaluation,
+        run_learning_curve,
+        run_people_evaluation,
+    )
 
     folders = {"--recordings": recordings, "--train": train, "--test": test}
     refuse_overwriting({"--out": out}, folders | {"--cross-talker": cross_talker, "--tracks": tracks, "--model": model})

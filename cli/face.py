@@ -7,18 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import App, Parameter
 
 from cli.flags import Hair, HairColor, Model, add_option_flags, options_from_flags, switch
-from cli.landmark_model import Yes
-from cli.photo import Consent, Fit, Smile, agreed, make_face, warner
-from cli.process import write_message
-from cli.progress import progress_bar
+from cli.photo import Consent, Fit, Smile, Yes, agreed, make_face, warner
+from cli.process import progress_bar, write_message
 from lexicon.errors import InputError
-from tts2face.render.picture import Picture
-from tts2face.storage.output_names import check_file_name
-from tts2face.storage.overwrite import refuse_overwriting
+from tts2face.picture.options import Picture
+from tts2face.storage.files import check_file_name, refuse_overwriting
 
 if TYPE_CHECKING:
-    from tts2face.characters.importing import ImportReport
+    from tts2face.interchange.characters.importing import ImportReport
     from tts2face.models.face import Face
+
 
 OUTPUTS = {
     "--out": ("a face", (".face",)),
@@ -61,10 +59,9 @@ def import_character(  # noqa: PLR0913 - one parameter a flag
         {"--out": out, "--preview": preview, "--write-landmarks": write_landmarks, "--write-mapping": write_mapping},
         {"the character": character, "--mapping": mapping, "--landmarks": landmarks, "--model": model},
     )
-    from tts2face.characters.importing import import_face
-    from tts2face.characters.landmark_table import landmark_table
-    from tts2face.characters.saving import save_face
-    from tts2face.characters.shape_mapping import mapping_table
+    from tts2face.interchange.characters.importing import import_face, save_face
+    from tts2face.interchange.characters.landmarks import landmark_table
+    from tts2face.interchange.characters.shapes import mapping_table
     from tts2face.storage.files import write_atomically
 
     imported = import_face(character, mapping=mapping, landmarks=landmarks, front=front, model=model)
@@ -103,8 +100,8 @@ def picture(  # noqa: PLR0913 - one parameter a flag
         {"--out": out, "--preview": preview, "--write-fit": write_fit},
         {"the photo": split_number(photo)[0], "--fit": fit, "--smile": smile, "--model": model},
     )
-    from tts2face.characters.saving import save_face
-    from tts2face.photo.photo_fit import write_fit as write_fit_file
+    from tts2face.interchange.characters.importing import save_face
+    from tts2face.photo.fit import write_fit as write_fit_file
 
     made = make_face(photo, consent, name=name, fit=fit, smile=smile, model=model, quiet=quiet)
     _write_preview(preview, made)
@@ -143,7 +140,7 @@ def photo(  # noqa: PLR0913 - one parameter a flag
 
     inputs = {f"the photo {one}": split_number(one)[0] for one in photos}
     _check_outputs({"--out": out, "--preview": preview}, inputs | {"--model": model})
-    from corpus_tools.dense.photo_avatar import build_avatar
+    from corpus_tools.dense.avatar import build_avatar
     from tts2face.models.face_loading import load_face
 
     consent = agreed(photos[0], consent, name)
@@ -172,7 +169,7 @@ def calibrate(
     del yes  # read where the model is missing
     check_file_name(out, "a face", (".face",))
     refuse_overwriting({"--out": out}, {"--talker": talker, "--model": model})
-    from corpus_tools.training.score_files import calibrate_face_file
+    from corpus_tools.training.calibrate_face import calibrate_face_file
 
     with progress_bar("rendering poses") as on_progress:
         calibrate_face_file(name, out, source=talker, model=model, on_progress=on_progress)
@@ -189,7 +186,7 @@ def relink(
 ) -> None:
     """Write the new place of a moved character into the face that was imported from it, for exports to its file."""
     check_file_name(name, "a face", (".face",))
-    from tts2face.characters.saving import relink_face
+    from tts2face.interchange.characters.importing import relink_face
 
     place = relink_face(name, character)
     if not quiet:
@@ -208,7 +205,7 @@ def show(
     """Draw a contact sheet of all shapes of a face."""
     check_file_name(out, "a picture", (".png",))
     refuse_overwriting({"--out": out}, {"the face": name})
-    from tts2face.characters.pictures import draw_contact_sheet, draw_preview, png_bytes
+    from tts2face.interchange.characters.landmarks import draw_contact_sheet, draw_preview, png_bytes
     from tts2face.models.face_loading import load_face
     from tts2face.storage.files import write_atomically
 
@@ -236,9 +233,9 @@ def still(
     """Draw one picture of a face at rest, which needs nobody's consent if the face is a shipped one."""
     check_file_name(out, "a picture", (".png",))
     refuse_overwriting({"--out": out}, {"the face": name, "--hair": hair})
-    from tts2face.characters.pictures import png_bytes
-    from tts2face.render.draw import draw
-    from tts2face.session_cache import Models
+    from tts2face.interchange.characters.landmarks import png_bytes
+    from tts2face.picture.renderer import draw
+    from tts2face.session.named_models import Models
     from tts2face.storage.files import write_atomically
 
     options = options_from_flags(Picture, picture)
@@ -260,7 +257,7 @@ def _check_outputs(outputs: Mapping[str, Path | None], inputs: Mapping[str, str 
 
 
 def _write_preview(preview: Path | None, made: "Face") -> None:
-    from tts2face.characters.pictures import draw_preview, png_bytes
+    from tts2face.interchange.characters.landmarks import draw_preview, png_bytes
     from tts2face.storage.files import write_atomically
 
     if preview is not None:
@@ -269,7 +266,7 @@ def _write_preview(preview: Path | None, made: "Face") -> None:
 
 def _report_text(report: "ImportReport") -> str:
     """Report of an import: mapping, missing shapes, landmarks, notes."""
-    from tts2face.characters.shape_mapping import mapping_table
+    from tts2face.interchange.characters.shapes import mapping_table
 
     score = "read from the table" if report.score is None else f"tracked, score {report.score:.2f}"
     lines = [mapping_table(report.mapping).rstrip()]

@@ -15,6 +15,7 @@ from lexicon.errors import InputError
 if TYPE_CHECKING:
     from cyclopts import Token
 
+
 END_OF_OPTIONS = "--"  # everything after it is text or a path
 Out = Annotated[
     Path | None,

@@ -1,9 +1,14 @@
-"""``tts2face worker`` and ``tts2face jobs``: workers of a database, and control of their jobs."""
+"""``tts2face worker`` and ``tts2face jobs``: workers of a database, and control of their jobs.
+
+``tts2face serve`` and ``tts2face keys``: the HTTP service.
+"""
 
 import json
 import os
+import sys
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,11 +16,14 @@ from cyclopts import App, Parameter
 
 from cli.flags import switch, whole_number
 from cli.lists import AsJson
+from cli.photo import YES, Yes, sets_up_model
 from cli.process import write_message
 from lexicon.errors import InputError
+from tts2face.serving.service.settings import read_settings
 
 if TYPE_CHECKING:
-    from tts2face.jobs.control import Job
+    from tts2face.serving.work.client import Job
+
 
 DEFAULT_DATABASE = "tts2face-jobs.sqlite"
 Database = Annotated[
@@ -37,9 +45,9 @@ def worker(
     """Render segments and execute jobs of the service until interrupted; start one on each machine."""
     if jobs < 1:
         raise InputError(f"--jobs must be 1 or more, not {jobs}")
-    from tts2face.batch.store import open_store
-    from tts2face.jobs.database import database_url, prepare_database
-    from tts2face.jobs.engine import DatabaseEngine, local_workers
+    from tts2face.serving.batch.store import open_store
+    from tts2face.serving.work.database import database_url, prepare_database
+    from tts2face.serving.work.engine import DatabaseEngine, local_workers
 
     open_store(store).check()
     prepare_database(database_url(database))
@@ -66,7 +74,7 @@ def list_jobs(
     as_json: AsJson = False,
 ) -> None:
     """List jobs with their states, workers and reasons."""
-    from tts2face.jobs.control import list_jobs
+    from tts2face.serving.work.client import list_jobs
 
     found = list_jobs(_existing(database), (state,) if state else (), limit)
     if as_json:
@@ -88,7 +96,7 @@ def show(
     database: Database = DEFAULT_DATABASE,
 ) -> None:
     """Print a job and its segment as JSON."""
-    from tts2face.jobs.control import show_job
+    from tts2face.serving.work.client import show_job
 
     job, segment = show_job(_existing(database), name)
     print(json.dumps({**asdict(job), "segment": segment}, ensure_ascii=False, indent=2))  # noqa: T201 - the result
@@ -97,7 +105,7 @@ def show(
 @jobs.command
 def cancel(*names: Names, database: Database = DEFAULT_DATABASE) -> None:
     """Cancel waiting and running jobs."""
-    from tts2face.jobs.control import cancel_jobs
+    from tts2face.serving.work.client import cancel_jobs
 
     print(f"cancelled {cancel_jobs(_existing(database), names)} jobs")  # noqa: T201 - the result
 
@@ -109,7 +117,7 @@ def retry(
     priority: Annotated[int | None, whole_number("New priority; smaller numbers are taken first.")] = None,
 ) -> None:
     """Queue failed and cancelled jobs again."""
-    from tts2face.jobs.control import retry_jobs
+    from tts2face.serving.work.client import retry_jobs
 
     print(f"queued {retry_jobs(_existing(database), names, priority)} jobs again")  # noqa: T201 - the result
 
@@ -139,21 +147,21 @@ def prune(
     if store is not None:
         print(f"{would} {_prune_store(store, place, outputs, days, dry_run=dry_run)}")  # noqa: T201 - the result
     if place is not None:
-        from tts2face.jobs.control import prune_jobs
+        from tts2face.serving.work.client import prune_jobs
 
         print(f"{would} {prune_jobs(place, days * 86_400.0, dry_run=dry_run)} jobs")  # noqa: T201 - the result
 
 
 def _prune_store(store: str, database: str | None, outputs: tuple[Path, ...], days: float, *, dry_run: bool) -> str:
     """What was removed from a store."""
-    from tts2face.batch.prune import prune_segments
-    from tts2face.batch.store import open_store
+    from tts2face.serving.batch.run import prune_segments
+    from tts2face.serving.batch.store import open_store
 
     if "://" not in store and not Path(store).is_dir():
         raise InputError(f"there is no store {store}; give --store as for `tts2face batch`, or its folder .segments")
     unfinished: frozenset[str] = frozenset()
     if database is not None:
-        from tts2face.jobs.control import unfinished_segments
+        from tts2face.serving.work.client import unfinished_segments
 
         unfinished = unfinished_segments(database)
     pruned = prune_segments(open_store(store), outputs, unfinished, days * 86_400.0, dry_run=dry_run)
@@ -178,3 +186,86 @@ def _row(one: "Job") -> tuple[str, ...]:
     took = "" if one.took_s is None else f"{one.took_s:.1f} s"
     text = one.text if len(one.text) <= SHOWN_CHARACTERS else f"{one.text[:SHOWN_CHARACTERS]}..."
     return one.name[:12], one.state.ljust(9), str(one.priority).rjust(4), took.rjust(8), text, one.reason
+
+
+keys = App(name="keys", help="API keys of the service.")
+
+
+def serve(  # noqa: PLR0913 - one parameter a flag
+    *,
+    settings: Annotated[Path | None, Parameter(help="TOML file of settings.")] = None,
+    host: Annotated[str | None, Parameter(help="Address to listen on (127.0.0.1).")] = None,
+    port: Annotated[int | None, whole_number("Port (8880); 0: a free one.")] = None,
+    keys: Annotated[Path | None, Parameter(help="File of API keys.")] = None,
+    processes: Annotated[int | None, whole_number("Synthesis processes; by default one for each core.")] = None,
+    data: Annotated[Path | None, Parameter(help="Folder of jobs, uploads and the studio's projects.")] = None,
+    no_studio: Annotated[bool, switch("Leave the studio out, which is at /studio if NiceGUI is installed.")] = False,
+    show_config: Annotated[bool, switch("Print the settings and exit.")] = False,
+    yes: Yes = False,
+) -> None:
+    """Serve speech, clips and curves over HTTP (docs/http.md)."""
+    flags = {
+        "host": host, "port": port, "keys": keys, "processes": processes, "data": data,
+        "studio": False if no_studio else None,
+    }  # fmt: skip
+    chosen = read_settings(settings, flags)
+    if show_config:
+        sys.stdout.write(chosen.as_toml())
+        return
+    if yes:
+        sets_up_model([YES])  # cameras, recordings and photos are read in processes without a network
+    from tts2face.serving.service.server import serve as run_server
+
+    if not chosen.studio or find_spec("nicegui") is None:
+        return run_server(replace(chosen, studio=False))
+    from tts2face.serving.studio.app import STUDIO
+
+    return run_server(chosen, [STUDIO])
+
+
+@keys.command
+def add(  # noqa: PLR0913 - one parameter a flag
+    name: Annotated[str, Parameter(help="Name of the key, in the log and the metrics.")],
+    /,
+    *,
+    file: Annotated[Path, Parameter(help="File of keys (TOML); created if needed.")],
+    scope: Annotated[list[str] | None, Parameter(help="speak, build, admin; several possible.")] = None,
+    requests_per_minute: Annotated[int | None, whole_number("Requests a minute.")] = None,
+    concurrent: Annotated[int | None, whole_number("Requests at the same time.")] = None,
+    resources: Annotated[int | None, whole_number("Uploads that it may have.")] = None,
+    resources_mb: Annotated[float | None, Parameter(help="MB of its uploads.")] = None,
+    photos_per_day: Annotated[int | None, Parameter(help="Faces that it may make of photos in a day; 0: none.")] = None,
+    speech_s_per_day: Annotated[int | None, whole_number("Seconds of speech a day.")] = None,
+) -> None:
+    """Create a key and print it; the file holds only its hash."""
+    from tts2face.serving.service.keys import add_key
+
+    limits = {
+        "requests_per_minute": requests_per_minute, "concurrent": concurrent, "speech_s_per_day": speech_s_per_day,
+        "resources": resources, "resources_mb": resources_mb, "photos_per_day": photos_per_day,
+    }  # fmt: skip
+    print(add_key(file, name, scope or ["speak"], **limits))  # noqa: T201 - the result
+
+
+@keys.command(name="list")
+def list_keys(*, file: Annotated[Path, Parameter(help="File of keys (TOML).")]) -> None:
+    """List the keys of a file with their scopes and limits."""
+    from tts2face.serving.service.keys import LIMITS, read_keys
+
+    for key in read_keys(file):
+        limits = [f"{limit}={value}" for limit in LIMITS if (value := getattr(key, limit)) is not None]
+        print("  ".join([key.name, ",".join(key.scopes), *limits]))  # noqa: T201 - the result
+
+
+@keys.command
+def remove(
+    name: Annotated[str, Parameter(help="Name of the key.")],
+    /,
+    *,
+    file: Annotated[Path, Parameter(help="File of keys (TOML).")],
+) -> None:
+    """Remove a key; a running service drops it on SIGHUP."""
+    from tts2face.serving.service.keys import remove_key
+
+    remove_key(file, name)
+    print(f"removed {name}")  # noqa: T201 - the result

@@ -10,13 +10,14 @@ from cyclopts import Parameter
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+
 AsJson = Annotated[bool, Parameter(help="Print JSON instead of a table.", name="--json", negative="")]
 EMPTY_CELL = "-"
 
 
 def voices(*, as_json: AsJson = False) -> None:
     """List the voices (`--voice`): sex, engine, languages, whether they are installed, and licence."""
-    from tts2face.catalogue import voices
+    from tts2face.session.catalogue import voices
 
     entries = voices()
     rows = (
@@ -37,7 +38,7 @@ def voices(*, as_json: AsJson = False) -> None:
 
 def languages(*, as_json: AsJson = False) -> None:
     """List the languages (`--language`): codes and English names; `--language` accepts both."""
-    from tts2face.catalogue import languages
+    from tts2face.session.catalogue import languages
 
     entries = languages()
     _print(entries, ("code", "name"), ((one.code, one.name) for one in entries), as_json)
@@ -45,7 +46,7 @@ def languages(*, as_json: AsJson = False) -> None:
 
 def faces(*, as_json: AsJson = False) -> None:
     """List the faces (`--face`)."""
-    from tts2face.catalogue import faces
+    from tts2face.session.catalogue import faces
 
     entries = faces()
     rows = ((one.name, str(len(one.identities)), one.summary) for one in entries)
@@ -56,7 +57,7 @@ def identities(
     *, face: Annotated[str, Parameter(help="Shipped face or .face file.")] = "head", as_json: AsJson = False
 ) -> None:
     """List the identities (`--identity`) of a face: presets of age, sex and ancestry."""
-    from tts2face.catalogue import identities
+    from tts2face.session.catalogue import identities
 
     entries = identities(face)
     _print(entries, ("identity", "summary"), ((one.name, one.summary) for one in entries), as_json)
@@ -64,7 +65,7 @@ def identities(
 
 def haircuts(*, as_json: AsJson = False) -> None:
     """List the haircuts (`--hair`)."""
-    from tts2face.catalogue import haircuts
+    from tts2face.session.catalogue import haircuts
 
     entries = haircuts()
     _print(entries, ("haircut", "face", "summary"), ((one.name, one.face, one.summary) for one in entries), as_json)
@@ -72,7 +73,7 @@ def haircuts(*, as_json: AsJson = False) -> None:
 
 def hair_colors(*, as_json: AsJson = False) -> None:
     """List the hair colours (`--hair-color`) that have a name."""
-    from tts2face.catalogue import hair_colors
+    from tts2face.session.catalogue import hair_colors
 
     entries = hair_colors()
     _print(entries, ("color", "sRGB"), ((one.name, one.color) for one in entries), as_json)
@@ -84,7 +85,7 @@ def styles(
     as_json: AsJson = False,
 ) -> None:
     """List the styles (`--style`) of a palette."""
-    from tts2face.catalogue import styles
+    from tts2face.session.catalogue import styles
 
     entries = styles(palette)
     rows = ((one.name, one.source or EMPTY_CELL, one.summary) for one in entries)
@@ -93,7 +94,7 @@ def styles(
 
 def talkers(*, as_json: AsJson = False) -> None:
     """List the shipped talkers (`--talker`)."""
-    from tts2face.catalogue import talkers
+    from tts2face.session.catalogue import talkers
 
     entries = talkers()
     rows = (
@@ -112,7 +113,7 @@ def talkers(*, as_json: AsJson = False) -> None:
 
 def formats(*, as_json: AsJson = False) -> None:
     """List the export formats (`--export`) and the suffixes that select them."""
-    from tts2face.catalogue import formats
+    from tts2face.session.catalogue import formats
 
     entries = formats()
     rows = ((one.name, " ".join(one.suffixes), "yes" if one.is_installed else "no", one.summary) for one in entries)

@@ -8,17 +8,26 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-import cli.gestures  # noqa: F401 - adds its command to `corpus`
+import cli.build  # noqa: F401 - adds its command to `corpus`
 from cli.batch import batch
-from cli.convert import convert
 from cli.corpus import corpus
 from cli.face import face as face_commands
 from cli.flags import Exports, Face, Hair, HairColor, Out, add_option_flags, check_options, options_from_flags, switch
-from cli.jobs import jobs, worker
-from cli.landmark_model import Yes, is_missing_model, sets_up_model
+from cli.jobs import jobs, keys, serve, worker
 from cli.lists import LISTS
 from cli.mimic import mimic
-from cli.photo import Consent, Fit, Photo, Smile, check_photo, face_of_photo, refuse_others
+from cli.photo import (
+    Consent,
+    Fit,
+    Photo,
+    Smile,
+    Yes,
+    check_photo,
+    face_of_photo,
+    is_missing_model,
+    refuse_others,
+    sets_up_model,
+)
 from cli.process import (
     BROKEN_PIPE_CODE,
     INTERRUPTED,
@@ -32,15 +41,14 @@ from cli.process import (
     signal_exit_code,
     write_message,
 )
-from cli.render import render
 from cli.report import report
-from cli.serve import keys, serve
+from cli.speak import convert, render
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from lexicon.inputs import LARGEST_TEXT_BYTES, decode_utf8, read_bounded, read_text
 from tts2face import __version__
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
 from tts2face.request import GESTURES, Request
-from tts2face.session_cache import Models
+from tts2face.session.named_models import Models
 from tts2face.storage.temporary import remove_held
 
 Shell = Literal["bash", "zsh", "fish", "powershell"]
@@ -83,9 +91,9 @@ def phones(
 ) -> None:
     """Print the words of a text and their phones, in ARPABET and IPA, with stress and syllables."""
     from lexicon.dictionary import read_dictionary
-    from lexicon.mark_parser import parse_marks
     from lexicon.spoken_words import pronounce_marked
-    from tts2face.exports.text import FORMATS
+    from lexicon.ssml import parse_marks
+    from tts2face.interchange.exports.annotations import FORMATS
 
     pronunciation = pronounce_marked(
         parse_marks(text, language), language, read_dictionary(dictionary) if dictionary else None

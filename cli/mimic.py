@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from cli.flags import Exports, Face, Hair, HairColor, Model, Out, switch
-from cli.landmark_model import Yes
-from cli.process import write_message
-from cli.progress import stage_bar
+from cli.photo import Yes
+from cli.process import stage_bar, write_message
 from lexicon.errors import InputError
-from tts2face.exports.formats import is_export, split_format
+from tts2face.interchange.exports.table import is_export, split_format
 from tts2face.request import OWN_FACE
-from tts2face.storage.overwrite import refuse_overwriting
+from tts2face.storage.files import refuse_overwriting
 
 if TYPE_CHECKING:
-    from tts2face.render.picture import Picture
-    from tts2face.session_cache import Models
+    from tts2face.picture.options import Picture
+    from tts2face.session.named_models import Models
 
 
 def mimic(  # noqa: PLR0913 - one parameter a flag
@@ -54,8 +53,8 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
     """Transfer recorded motion of lips, eyes, brows and head to a face; the sound is copied."""
     del yes  # read where the model is missing
     began = time.perf_counter()
-    from tts2face.render.picture import Picture
-    from tts2face.session_cache import Models
+    from tts2face.picture.options import Picture
+    from tts2face.session.named_models import Models
 
     models = Models(str(talker or "grid_s1"), face or "", identity, None, hair, hair_color)
     if camera is not None:
@@ -72,7 +71,7 @@ def mimic(  # noqa: PLR0913 - one parameter a flag
         raise InputError("--face self and --talker need each other; add the missing one, or remove both")
     if append_missing and talker is None:
         raise InputError("--append-missing needs --face self: a mesh face has a fixed set of shapes; remove it")
-    from tts2face.synthesis.performance import Performance
+    from tts2face.session.performance import Performance
 
     performance = Performance(take=take, gain=gain, fps=fps, audio=audio, append_missing=append_missing, model=model)
     session = models.open_session()
@@ -99,9 +98,9 @@ def _divide_outputs(out: Path | None, export: list[str] | None) -> tuple[Path | 
 def _run_live_window(source: str, models: "Models", picture: "Picture", model: Path | None) -> None:
     """Show a head that follows the person in front of a camera, until the window is closed."""
     from tts2face.models.face_loading import load_face
-    from tts2face.render.window import LiveWindow, require_display
-    from tts2face.synthesis.live_capture import CALIBRATION_S, LiveCapture
-    from tts2face.video.camera import CaptureDevice
+    from tts2face.picture.window import LiveWindow, require_display
+    from tts2face.session.live import CALIBRATION_S, LiveCapture
+    from tts2face.video.streaming import CaptureDevice
 
     require_display("--camera")
     head = load_face(models.face, models.identity, hair=models.hair, hair_color=models.hair_color)

@@ -1,18 +1,24 @@
-"""``--photo``: the face of a photograph, asked for once and kept."""
+"""``--photo``: the face of a photograph, asked for once and kept.
+
+The face landmark model is set up at its first use, after one yes.
+"""
 
 import functools
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from cli.flags import END_OF_OPTIONS, switch
 from cli.process import ask, write_message
-from lexicon.errors import InputError
+from lexicon.errors import BackendError, InputError
 from tts2face.models.consent import consent_record
 
 if TYPE_CHECKING:
     from tts2face.models.face import Face
+
 
 Photo = Annotated[
     str | None,
@@ -44,7 +50,7 @@ def face_of_photo(
     BackendError
         The landmark model or a package is not installed.
     """
-    from tts2face.photo.kept_faces import find_kept, keep_face, kept_path
+    from tts2face.photo.face_from_photo import find_kept, keep_face, kept_path
 
     kept = kept_path(photo, fit, smile)
     if not find_kept(kept, consent):
@@ -103,9 +109,37 @@ def refuse_others(
 def check_photo(photo: str, others: Mapping[str, str | Path | None], outputs: Mapping[str, str | Path | None]) -> None:
     """Refuse a photo that does not exist, no output, and outputs that would overwrite it or other files, by flags."""
     from tts2face.photo.photograph import split_number
-    from tts2face.storage.overwrite import refuse_overwriting
+    from tts2face.storage.files import refuse_overwriting
 
     path, _ = split_number(photo)
     if all(output is None for output in outputs.values()):
         raise InputError("there is no output; add --out clip.mp4 (or .webm, .gif, or a folder for .png files)")
     refuse_overwriting(outputs, {"--photo": path} | dict(others))
+
+
+YES, AGREED = "--yes", ("y", "yes")
+Yes = Annotated[bool, switch("Download the face landmark model without asking, if it is not installed.")]
+
+
+def is_missing_model(error: BackendError) -> bool:
+    """Whether an error is that the landmark model is not installed; its module is imported where it was raised."""
+    module = sys.modules.get("tts2face.video.tracking")
+    return module is not None and isinstance(error, module.MissingModelError)
+
+
+def sets_up_model(arguments: Sequence[str]) -> bool:
+    """Set up the landmark model that a command line lacks, if it has --yes or its user agrees; whether it is there now.
+
+    Raises
+    ------
+    BackendError
+        It cannot be downloaded.
+    """
+    from tts2face.video.setup_models import SOURCE, set_up_model
+
+    options = arguments[: arguments.index(END_OF_OPTIONS)] if END_OF_OPTIONS in arguments else arguments
+    question = f"Faces are found with {SOURCE}. Download it now? [y/N]"
+    if YES not in options and ask(question).lower() not in AGREED:
+        return False
+    write_message(f"face landmark model: {set_up_model()}")
+    return True

@@ -6,11 +6,10 @@ from typing import Annotated
 from cyclopts import App, Parameter
 
 from cli.flags import Cache, Face, Jobs, Model, whole_number
-from cli.landmark_model import Yes
-from cli.process import write_message
-from cli.progress import progress_bar, stage_bar
+from cli.photo import Yes
+from cli.process import progress_bar, stage_bar, write_message
 from lexicon.errors import InputError
-from tts2face.storage.overwrite import refuse_overwriting
+from tts2face.storage.files import refuse_overwriting
 
 report = App(
     name="report",
@@ -37,8 +36,8 @@ def similarity(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Analyse the visual similarity of phones: matrix, neighbours, viseme classes, reliability, articulation."""
     refuse_overwriting({"--out": out}, {"the talker": talker, "--compare": compare})
-    from corpus_tools.similarity.analysis import Options
-    from corpus_tools.similarity.write import write_similarity
+    from corpus_tools.studies.similarity.analysis import Options
+    from corpus_tools.studies.similarity.write import write_similarity
 
     options = Options(_parse_numbers(classes), halves, seed)
     with progress_bar("comparing halves") as on_progress:
@@ -62,8 +61,8 @@ def gestures(
 ) -> None:
     """Compare each style's gestures with motion from its fields, noise and published fields for the same sound."""
     refuse_overwriting({"--out": out}, {"the palette": palette})
-    from corpus_tools.gesture_study.analysis import Options
-    from corpus_tools.gesture_study.write import write_gestures
+    from corpus_tools.studies.gestures.analysis import Options
+    from corpus_tools.studies.gestures.write import write_gestures
 
     options = Options(held_out, halves, clips, seed)
     with progress_bar("analysing styles") as on_progress:
@@ -87,9 +86,8 @@ def moods(  # noqa: PLR0913 - one parameter a flag
     """Render the derived styles of a palette and tell them apart by the face tracker's scores."""
     del yes  # read where the model is missing
     refuse_overwriting({"--out": out}, {"the palette": palette, "--face": face})
-    from corpus_tools.gesture_study.moods import MoodOptions
-    from corpus_tools.gesture_study.write_moods import write_moods
-    from tts2face.session import Session
+    from corpus_tools.studies.gestures.moods import MoodOptions, write_moods
+    from tts2face.session.session import Session
 
     options = MoodOptions(seeds=seeds, first_seed=seed, size=size)
     with progress_bar("rendering moods") as on_progress:
@@ -116,8 +114,8 @@ def retarget(  # noqa: PLR0913 - one parameter a flag
     """Compare what the face tracker reads in recordings and in a face that mimics them, phone by phone."""
     del yes  # read where the model is missing
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--face": face, "--model": model})
-    from corpus_tools.retargeting_study.write import write_retargeting
     from corpus_tools.run_options import RunOptions, ignore_stage
+    from corpus_tools.studies.retargeting.page import write_retargeting
     from tts2face.models.face_loading import default_face
 
     with stage_bar() as stages:

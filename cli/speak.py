@@ -1,30 +1,37 @@
-"""``tts2face "text"``: write, explain or show a clip from the parsed flags."""
+"""``tts2face "text"``: write, explain or show a clip from the parsed flags.
+
+``tts2face render``: the clip of a project.
+
+``tts2face convert``: write a lossless track to files of other formats.
+"""
 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from json import dumps
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any
 
-from cli.process import write_message
-from cli.progress import compilation_messages, progress_bar
+from cyclopts import Parameter
+
+from cli.flags import Exports, Face, Hair, HairColor, Out, switch
+from cli.process import compilation_messages, progress_bar, write_message
 from lexicon.errors import InputError
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
 from tts2face.request import OWN_FACE, Request
-from tts2face.session_cache import Models
-from tts2face.storage.files import write_atomically
-from tts2face.storage.output_names import check_file_name
+from tts2face.session.named_models import Models
+from tts2face.storage.files import check_file_name, write_atomically
 
 if TYPE_CHECKING:
-    from tts2face.exemplar.explanation import PhoneExplanation
-    from tts2face.session import Session
-    from tts2face.speech.text_fit import TextMismatch
-    from tts2face.synthesis.prepared_request import PreparedRequest
-    from tts2face.synthesis.speech_stream import Piece
-    from tts2face.synthesis.written_clip import WrittenClip
+    from tts2face.lips.explanation import PhoneExplanation
+    from tts2face.session.outputs import WrittenClip
+    from tts2face.session.prepared import PreparedRequest
+    from tts2face.session.session import Session
+    from tts2face.session.speech_stream import Piece
+    from tts2face.sound.transcript import TextMismatch
+    from tts2face.sound.voice_pool import VoicePool
     from tts2face.types import Progress
-    from tts2face.voice.pool import VoicePool
+
 
 EXPLANATION_SUFFIXES = (".json", ".txt")
 
@@ -44,7 +51,7 @@ class SpeakOptions:
 
     def with_export_of_out(self) -> "SpeakOptions":
         """The same options, with an output in an export format as an export."""
-        from tts2face.exports.formats import is_export
+        from tts2face.interchange.exports.table import is_export
 
         if self.out is None or not is_export(self.out):
             return self
@@ -54,7 +61,7 @@ class SpeakOptions:
 def run_request(request: Request, picture: Picture, options: SpeakOptions) -> None:
     """Write, explain or show a clip of a request."""
     _check_options(request, picture, options)
-    from tts2face.synthesis.prepared_request import prepare
+    from tts2face.session.prepared import prepare
 
     run_prepared(prepare(request), picture, options)  # a wrong request is refused before anything is loaded
 
@@ -67,8 +74,8 @@ def run_prepared(prepared: "PreparedRequest", picture: Picture, options: SpeakOp
 
 
 def _make(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions) -> None:
-    from tts2face.synthesis.voice_preload import preload_voice
-    from tts2face.voice.pool import VoicePool
+    from tts2face.session.warm_up import preload_voice
+    from tts2face.sound.voice_pool import VoicePool
 
     voices = VoicePool()
     preload_voice(voices, prepared)  # beside the imports of the session, and loading of talker and face
@@ -93,7 +100,7 @@ def _write_clip(prepared: "PreparedRequest", picture: Picture, options: SpeakOpt
     if options.explain is not None:
         _write_explanation(tuple(explanations), options.explain)
     if options.view:
-        from tts2face.render.window import show_clip
+        from tts2face.picture.window import show_clip
 
         show_clip(session.clip(prepared), session.mesh, picture)
 
@@ -112,18 +119,18 @@ def _check_options(request: Request, picture: Picture, options: SpeakOptions) ->
     if options.view:
         if options.models.face == OWN_FACE:
             raise InputError("--view cannot show the talker's own face; remove it, or use --face head")
-        from tts2face.render.window import require_display
+        from tts2face.picture.window import require_display
 
         require_display("--view")
 
 
 def _check_overwriting(request: Request, picture: Picture, options: SpeakOptions) -> None:
-    from tts2face.storage.overwrite import refuse_overwriting
-    from tts2face.synthesis.prepared_request import input_paths
+    from tts2face.session.prepared import input_paths
+    from tts2face.storage.files import refuse_overwriting
 
     inputs = {f"--{name}": path for name, path in input_paths(request, picture).items()}
     models = {"--talker": options.models.talker, "--face": options.models.face, "--palette": options.models.palette}
-    from tts2face.exports.formats import split_format
+    from tts2face.interchange.exports.table import split_format
 
     outputs = {"--out": options.out, "--explain": options.explain}
     for number, given in enumerate(options.exports):
@@ -134,7 +141,7 @@ def _check_overwriting(request: Request, picture: Picture, options: SpeakOptions
 
 def _check_exports(options: SpeakOptions) -> None:
     if options.exports:
-        from tts2face.exports.writer import plan_exports
+        from tts2face.interchange.exports.writer import plan_exports
 
         plan_exports(options.exports)
 
@@ -169,9 +176,8 @@ def _write_speech(prepared: "PreparedRequest", picture: Picture, options: SpeakO
         return False
     if options.models != Models():  # others are checked while they are loaded
         return False
-    from tts2face.synthesis.output_files import plan_outputs
-    from tts2face.synthesis.prepared_request import input_paths
-    from tts2face.synthesis.speech_output import is_speech_only, write_speech
+    from tts2face.session.outputs import is_speech_only, plan_outputs, write_speech
+    from tts2face.session.prepared import input_paths
 
     outputs = plan_outputs(None, options.exports, input_paths(prepared.request, picture))
     if not is_speech_only(prepared, outputs):
@@ -204,8 +210,8 @@ def _warn_mismatches(mismatches: "Sequence[TextMismatch]") -> None:
 
 
 def _open_session(options: SpeakOptions, voices: "VoicePool") -> "Session":
-    from tts2face.render.output_path import check_output
-    from tts2face.synthesis.warm_up import compile_kernels, kernels_are_compiled
+    from tts2face.picture.film import check_output
+    from tts2face.session.warm_up import compile_kernels, kernels_are_compiled
 
     if options.out is not None:
         check_output(options.out)
@@ -220,8 +226,63 @@ def _open_session(options: SpeakOptions, voices: "VoicePool") -> "Session":
 
 
 def _write_explanation(explanations: "tuple[PhoneExplanation, ...]", path: Path) -> None:
-    from tts2face.exemplar.explanation import explanation_json, explanation_text
+    from tts2face.lips.explanation import explanation_json, explanation_text
 
     is_json = path.suffix == ".json"
     text = dumps(explanation_json(explanations), ensure_ascii=False) if is_json else explanation_text(explanations)
     write_atomically(path, text.encode())
+
+
+def render(  # noqa: PLR0913 - one parameter a flag
+    project: Annotated[Path, Parameter(help="Project (.json), as the studio and tts2face.save_project write it.")],
+    /,
+    *,
+    out: Out = None,
+    export: Exports = None,
+    size: Annotated[str | None, Parameter(help="Width x height in pixels in place of the project's.")] = None,
+    quality: Annotated[str | None, Parameter(help="draft, standard or high in place of the project's.")] = None,
+    explain: Annotated[
+        Path | None, Parameter(help="File (.json or .txt) that lists the recorded tokens used for each phone.")
+    ] = None,
+    quiet: Annotated[bool, switch("Print neither progress nor summary.")] = False,
+) -> None:
+    """Render a project: the same motion as the studio shows."""
+    from tts2face.session.project_file import load_project
+
+    content = load_project(project)
+    chosen: dict[str, Any] = {
+        name: value for name, value in (("size", size), ("quality", quality)) if value is not None
+    }
+    options = SpeakOptions(
+        out, content.models, explain, view=False, quiet=quiet, file=project, exports=tuple(export or ())
+    )
+    run_prepared(content.prepare(), replace(content.picture, **chosen), options.with_export_of_out())
+
+
+def convert(  # noqa: PLR0913 - one parameter a flag
+    track: Annotated[Path, Parameter(help="Track written by --export clip.track.json.")],
+    outs: Annotated[
+        list[str], Parameter(help="Outputs; the suffix selects the format (`tts2face formats`), or FORMAT:PATH.")
+    ],
+    /,
+    *,
+    face: Face = None,
+    identity: Annotated[str | None, Parameter(help="Preset of the face's age, sex and ancestry.")] = None,
+    hair: Hair = None,
+    hair_color: HairColor = None,
+    palette: Annotated[str, Parameter(help="Palette of the track: a shipped palette or a .palette file.")] = "starter",
+    fps: Annotated[
+        float | None, Parameter(help="Frames per second of formats with frames; by default those of the track.")
+    ] = None,
+    quiet: Annotated[bool, switch("Print no summary.")] = False,
+) -> None:
+    """Write a track to files of other programs."""
+    from tts2face.session.functions import convert as convert_track
+
+    began = time.perf_counter()
+    written = convert_track(
+        track, outs, face=face, identity=identity, hair=hair, hair_color=hair_color, palette=palette, fps=fps
+    )
+    if not quiet:
+        names = ", ".join(str(path) for path in written)
+        write_message(f"wrote {names} in {time.perf_counter() - began:.1f} s")

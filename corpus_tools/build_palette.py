@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.build_talker import NOT_STATED, PROVENANCE, PROVENANCE_FIELDS, read_provenance
-from corpus_tools.decomposition.basis_expressions import ExpressionBasis, basis_from_stills, transfer_basis
+from corpus_tools.decomposition.basis import (
+    NEUTRAL,
+    ExpressionBasis,
+    PictureReader,
+    Still,
+    basis_from_stills,
+    build_marker_reader,
+    transfer_basis,
+)
 from corpus_tools.decomposition.blend_weights import (
     MAX_SLACK,
     Estimator,
@@ -19,26 +27,27 @@ from corpus_tools.decomposition.blend_weights import (
     build_nearest_samples_estimator,
 )
 from corpus_tools.decomposition.capture import FaceRecording
-from corpus_tools.decomposition.capture_files import MarkerOptions
-from corpus_tools.decomposition.decompose import Decomposition, decompose, weight_displacements
-from corpus_tools.decomposition.derived_styles import read_derived_styles
-from corpus_tools.decomposition.marker_set import read_marker_set
-from corpus_tools.decomposition.markers import read_marker_face
-from corpus_tools.decomposition.recording_files import read_recordings
-from corpus_tools.decomposition.stills import NEUTRAL, PictureReader, Still, build_marker_reader
-from corpus_tools.decomposition.style import add_style
+from corpus_tools.decomposition.decompose import (
+    Decomposition,
+    add_style,
+    decompose,
+    read_derived_styles,
+    weight_displacements,
+)
+from corpus_tools.decomposition.markers import read_marker_face, read_marker_set
+from corpus_tools.decomposition.recordings import MarkerOptions, read_recordings
 from corpus_tools.recordings.observe import Refusal
 from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
-from corpus_tools.training.pose_correction import fit_pose_correction
+from corpus_tools.training.train_talker import fit_pose_correction
 from lexicon.errors import DataError, InputError
+from tts2face.face.deformation import rest_landmarks
 from tts2face.face.expressions import expression_landmarks
-from tts2face.face.face_motion import rest_landmarks
-from tts2face.face.mouth_model import MIDDLE_PAIR
+from tts2face.face.mouth import MIDDLE_PAIR
+from tts2face.lips.performer import CLOSED_FRAME_SHARE
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import eye_aperture, inner_lip_gaps
 from tts2face.models.palette import Palette, write_palette
-from tts2face.retargeting.performer import CLOSED_FRAME_SHARE
 from tts2face.types import Progress
 
 ESTIMATORS = ("least-squares", "samples")

@@ -1,22 +1,26 @@
-"""Build a talker file from a folder of recordings."""
+"""Build a talker file from a folder of recordings.
+
+Summary of a talker's contents.
+"""
 
 import shlex
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from corpus_tools.clone_talker import appearance_from_lips
-from corpus_tools.pooling.base_phrases import base_speech
-from corpus_tools.recordings.corpus_video import CachedTracker
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import QualityWarning, Refusal, check_any_kept, observe
-from corpus_tools.report.drawing import load_matplotlib
-from corpus_tools.report.recordings import recordings_page
+from corpus_tools.recordings.video import CachedTracker
 from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
-from corpus_tools.training.pose_correction import correct_pose
-from corpus_tools.training.short_talker import (
+from corpus_tools.studies.plots import load_matplotlib
+from corpus_tools.studies.recordings_page import recordings_page
+from corpus_tools.training.choose_adaptation import (
     NO_BASE,
     ShortTalker,
     learn_short_talker,
@@ -24,17 +28,19 @@ from corpus_tools.training.short_talker import (
     recording_advice,
     statements_of_both,
 )
-from corpus_tools.training.train_audio_map import learn_audio_maps
-from corpus_tools.training.train_phone_network import add_phone_network
-from corpus_tools.training.train_score_map import add_score_map
-from corpus_tools.training.train_talker import learn_talker
+from corpus_tools.training.network_audio_map import learn_audio_maps
+from corpus_tools.training.phone_network import add_phone_network
+from corpus_tools.training.pooling.speech import base_speech
+from corpus_tools.training.score_map import add_score_map
+from corpus_tools.training.train_talker import correct_pose, learn_talker
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_json
+from lexicon.sequence import SILENCE
 from tts2face.models.talker import Talker, load_talker, write_talker
 from tts2face.storage.files import write_atomically
 from tts2face.types import Progress
-from tts2face.video.blendshapes import BlendshapeReader
-from tts2face.video.landmark_models import find_bundle
+from tts2face.video.take import BlendshapeReader
+from tts2face.video.tracking import find_bundle
 
 PROVENANCE = "provenance.json"  # in the folder of recordings: their sources and licence
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
@@ -183,8 +189,8 @@ def add_appearance(
     BackendError
         A package or the landmark models are missing.
     """
-    from corpus_tools.aam.source_videos import build_appearance_recording
-    from corpus_tools.aam.train_appearance import learn_appearance
+    from corpus_tools.appearance.train import learn_appearance
+    from corpus_tools.appearance.videos import build_appearance_recording
 
     tracker = CachedTracker(run_options.folder(), find_bundle(run_options.model))
     own, carried = talker.utterances[: len(observations)], talker.utterances[len(observations) :]
@@ -267,3 +273,77 @@ def _command_line(recordings: Path, out: Path, name: str | None, provenance: Pat
     words += ["--name", name] if name else []
     words += ["--provenance", provenance.name] if provenance else []
     return shlex.join([*words, "--out", out.name])
+
+
+PHONES_PER_LINE = 10  # phones on a line
+COUNTED_KEYS = frozenset({"refused", "phones_recognised"})  # in the metadata; shown as counts
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """Summary of a talker.
+
+    ``phones`` are phones with their counts, most frequent first; ``n_triphones`` the number of different triphones;
+    ``variances`` those of the modes in mm^2, of which the first ``n_speech`` belong to the mouth.
+    """
+
+    n_utterances: int
+    minutes: float
+    fps: float
+    phones: tuple[tuple[str, int], ...]
+    n_triphones: int
+    n_speech: int
+    variances: tuple[float, ...]
+    metadata: Mapping[str, Any]
+
+    def text(self) -> str:
+        """The summary as text."""
+        about = [f"{key + ':':<13}{self.metadata[key]}" for key in self.metadata if key not in COUNTED_KEYS]
+        recognised = self.metadata.get("phones_recognised", [])
+        counts = [f"{phone} {count}" for phone, count in self.phones]
+        rows = ["  " + "  ".join(counts[at : at + PHONES_PER_LINE]) for at in range(0, len(counts), PHONES_PER_LINE)]
+        refused = self.metadata.get("refused", [])
+        return "\n".join(
+            [
+                *about,
+                f"utterances:  {self.n_utterances} ({self.minutes:.1f} minutes at {self.fps:g} frames/s)",
+                *([f"recognised:  {len(recognised)} utterances without a transcript"] if recognised else []),
+                f"refused:     {len(refused)}",
+                *(f"  {name}: {reason}" for name, reason in refused),
+                f"triphones:   {self.n_triphones}",
+                f"phones:      {len(self.phones)} different, {sum(count for _, count in self.phones)} spoken",
+                *rows,
+                f"mouth modes: {_variance_text(self.variances[: self.n_speech])}",
+                f"other modes: {_variance_text(self.variances[self.n_speech :])}",
+            ]
+        )
+
+
+def describe(talker: Talker) -> Description:
+    """Summarise a talker."""
+    phones: Counter[str] = Counter()
+    triphones: set[tuple[str, ...]] = set()
+    for utterance in talker.utterances:
+        labels = (SILENCE, *utterance.phones.phones, SILENCE)
+        phones.update(label for label in labels if label != SILENCE)
+        triphones.update(triple for triple in zip(labels, labels[1:], labels[2:], strict=False) if triple[1] != SILENCE)
+    n_frames = sum(len(utterance.shape) for utterance in talker.utterances)
+    return Description(
+        len(talker.utterances),
+        n_frames / talker.fps / 60.0,
+        talker.fps,
+        tuple(sorted(phones.items(), key=lambda item: (-item[1], item[0]))),
+        len(triphones),
+        talker.model.n_speech,
+        tuple(float(variance) for variance in np.asarray(talker.model.spread, np.float64) ** 2),
+        dict(talker.metadata),
+    )
+
+
+def _variance_text(variances: tuple[float, ...]) -> str:
+    """Number of modes and the cumulative share of their variance."""
+    if not variances:
+        return "0"
+    total = np.cumsum(variances) / (sum(variances) or 1.0)
+    marks = [n for n in (1, 2, 4, 8, 16) if n < len(variances)]
+    return f"{len(variances)}; of their variance " + ", ".join(f"{total[n - 1]:.1%} in the first {n}" for n in marks)

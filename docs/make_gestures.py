@@ -6,11 +6,10 @@ Run: python docs/make_gestures.py
 from dataclasses import replace
 from pathlib import Path
 
-from corpus_tools.gesture_study.analysis import Options, StyleStudy, TraitComparison, study_gestures
-from corpus_tools.gesture_study.moods import MoodOptions, MoodStudy, study_moods
-from corpus_tools.gesture_study.write_moods import mood_rows
+from corpus_tools.studies.gestures.analysis import Options, StyleStudy, TraitComparison, study_gestures
+from corpus_tools.studies.gestures.moods import MoodOptions, MoodStudy, mood_rows, study_moods
 from tts2face.models.palette import MEASURED_STYLE, load_palette
-from tts2face.session import Session
+from tts2face.session.session import Session
 
 PAGE = Path(__file__).with_name("gestures.md")
 MOODS = MoodOptions(seeds=12, first_seed=300)  # no parameter was chosen on these seeds

@@ -13,23 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from corpus_tools.dense.photo_avatar import build_avatar
-from corpus_tools.gesture_study.analysis import Options as GestureOptions
-from corpus_tools.gesture_study.write import write_gestures
-from corpus_tools.similarity.analysis import Options
-from corpus_tools.similarity.write import write_similarity
+from corpus_tools.dense.avatar import build_avatar
+from corpus_tools.studies.gestures.analysis import Options as GestureOptions
+from corpus_tools.studies.gestures.write import write_gestures
+from corpus_tools.studies.similarity.analysis import Options
+from corpus_tools.studies.similarity.write import write_similarity
 from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE
-from tts2face.catalogue import haircuts, identities
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
 from tts2face.photo.face_from_photo import face_from_photo
-from tts2face.render.draw import MeshRenderer, draw, mesh_renderer
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import MeshRenderer, draw, mesh_renderer
 from tts2face.request import Request
-from tts2face.session import Session
+from tts2face.session.catalogue import haircuts, identities
+from tts2face.session.session import Session
 
 HERE = Path(__file__).parent / "pictures"
 SENTENCE = "We were away a year ago, but Bob may move five big maps."

@@ -30,8 +30,8 @@ from tests.running import ServeProcess, serve_process
 from tests.studio.chromium import Browser, open_browser
 from tests.studio.fake_camera import write_fake_media
 from tests.studio.served import Page
-from tts2face.service.access.keys import LOCAL_KEY
-from tts2face.studio.recording.store import GOOD, REFUSED, WEAK, RecordingStore
+from tts2face.serving.service.keys import LOCAL_KEY
+from tts2face.serving.studio.recordings import GOOD, REFUSED, WEAK, RecordingStore
 
 HERE = Path(__file__).parent / "pictures"
 SIZE = (1280, 720)

@@ -5,10 +5,9 @@ import unicodedata
 from collections.abc import Callable
 
 from lexicon import written_forms as readings
-from lexicon.letter_names import letter_name
-from lexicon.numbers import cardinal_words, digit_words, number_words, ordinal_words, roman_value, year_words
+from lexicon.languages import language_scripts, letter_name, letter_script
 from lexicon.sentence_ends import is_abbreviated, starts_sentence
-from lexicon.writing_systems import language_scripts, letter_script
+from lexicon.written_forms import cardinal_words, digit_words, number_words, ordinal_words, roman_value, year_words
 
 
 def _word_set(written: str) -> frozenset[str]:

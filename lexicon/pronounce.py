@@ -1,4 +1,7 @@
-"""Pronounce text: words with phones, stress and syllables."""
+"""Pronounce text: words with phones, stress and syllables.
+
+Spoken form of a text, the input of a voice, in every language.
+"""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -6,18 +9,45 @@ from dataclasses import dataclass
 from itertools import pairwise
 from types import MappingProxyType
 
-from lexicon.cleaning import canonical_text
 from lexicon.dictionary import Dictionary
 from lexicon.english import fold_to_arpabet
 from lexicon.english_text import english_segments
 from lexicon.errors import InputError
-from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize, segments_by_rules
+from lexicon.g2p import DEFAULT_LANGUAGE, has_kanji, parse_espeak_word, phonemize, segments_by_rules, to_kana
 from lexicon.ipa import Segment
-from lexicon.languages import language_code
-from lexicon.normalize import MARKS, split_tokens
+from lexicon.languages import check_script, language_code, name_foreign_letters
+from lexicon.normalize import MARKS, canonical_text, normalize, split_tokens
 from lexicon.phones import PHONES, ipa_to_arpabet
-from lexicon.spoken_form import spoken_form
-from lexicon.writing_systems import check_script
+from lexicon.say_as import read_german_dates
+from lexicon.written_forms import MAX_CARDINAL_DIGITS
+
+# espeak-ng omits what follows the first 160 letters of a word; the longest in use have 85. From U+0900 on, scripts
+# without spaces between words begin.
+_LONG_WORD = re.compile(r"[^\W\d_\u0900-\U0010ffff]{100}(?=[^\W\d_\u0900-\U0010ffff])")
+_LONG_NUMBER = re.compile(rf"[0-9]{{{MAX_CARDINAL_DIGITS + 1},}}")
+
+
+def spoken_form(text: str, language: str) -> str:
+    """Spoken form of a text.
+
+    English is normalised, days of German dates are written as words, Japanese with Chinese characters is converted to
+    kana, and single letters of other writing systems are replaced by their names. A word of more than 100 letters is
+    divided, and the digits of a longer number than English names are separated.
+
+    Raises
+    ------
+    BackendError
+        The text is Japanese with Chinese characters, and the library that reads them is not installed.
+    """
+    if language.startswith("en"):
+        return _LONG_WORD.sub(r"\g<0> ", normalize(text))
+    if language == "ja" and has_kanji(text):
+        text = to_kana(text)
+    if language.partition("-")[0] == "de":
+        text = read_german_dates(text)
+    text = _LONG_NUMBER.sub(lambda number: " ".join(number.group()), name_foreign_letters(text, language))
+    return _LONG_WORD.sub(r"\g<0> ", text)
+
 
 PAUSES_S = MappingProxyType({"": 0.0, ",": 0.2, ";": 0.3, ":": 0.3, ".": 0.5, "!": 0.5, "?": 0.5})  # s, nominal
 _MARKS_BY_STRENGTH = tuple(PAUSES_S)  # of two adjacent marks the later one of this order is kept

@@ -16,6 +16,10 @@
 The parser is expat; a document type declaration is refused, and without one there are no entities to expand or fetch.
 Attributes have at most `lexicon.ssml_values.MAX_ATTRIBUTE_CHARACTERS` characters, so that parsing is linear in the
 length of the document.
+
+Parse the marks in a text: ``[pause 0.4]``, ``[nod]``, ``[style:delighted] ... [/style]``, or SSML.
+
+Any other bracket is text.
 """
 
 import re
@@ -28,14 +32,15 @@ from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.languages import language_code
 from lexicon.marked_text import MAX_NESTING, MarkedText, MarkedTextBuilder, NameMark, NodMark, PauseMark, PhoneMark
 from lexicon.say_as import say_as
-from lexicon.ssml_speech import choose_voice, phoneme_words
 from lexicon.ssml_values import (
     BREAKS_S,
     check_attributes,
     check_lengths,
+    choose_voice,
     look_up_value,
     parse_rate,
     parse_volume,
+    phoneme_words,
     primary_subtag,
 )
 
@@ -268,3 +273,65 @@ class _SsmlReader:
         if not style.strip():
             raise InputError('<express-as> needs a style; write <express-as style="delighted">')
         self._builder.open("express-as", f'<express-as style="{style}">', style=style.strip())
+
+
+# A bracket, one of the three words, and the rest up to the closing bracket, which a mark must have. Each part ends
+# where the next begins, so that the scan is linear.
+MARK_PATTERN = re.compile(r"\[(?P<name>/?(?:style|nod|pause)\b)(?P<rest>[^\[\]]*)(?P<end>\]?)")
+MAX_QUOTED_CHARACTERS = 40
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
+
+
+def parse_marks(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
+    """Separate a text from its marks; a text that begins with ``<speak`` is parsed as SSML (`lexicon.ssml`).
+
+    Parameters
+    ----------
+    language
+        Language of the text, by which SSML reads numbers and selects voices.
+
+    Raises
+    ------
+    InputError
+        A mark is malformed, not closed, unmatched, nested too deep, or has a number out of range; the message names it
+        and its syntax.
+    """
+    if is_ssml(text):
+        return parse_ssml(text, language)
+    builder = MarkedTextBuilder()
+    at = 0
+    for match in MARK_PATTERN.finditer(text):
+        builder.add_text(text[at : match.start()])
+        at = match.end()
+        _read_mark(builder, match)
+    builder.add_text(text[at:])
+    return builder.build()
+
+
+def _read_mark(builder: MarkedTextBuilder, match: "re.Match[str]") -> None:
+    shown = " ".join(match.group()[:MAX_QUOTED_CHARACTERS].split())
+    name, rest = match["name"], match["rest"].strip()
+    if not match["end"]:
+        raise InputError(f"the mark {shown!r} has no closing bracket; write {_mark_syntax(name)}")
+    if name == "pause":
+        builder.add_mark(PauseMark(builder.at, _parse_number(rest.removesuffix("s").rstrip(), shown, name)))
+    elif name == "nod":
+        builder.add_mark(NodMark(builder.at, _parse_number(rest, shown, name) if rest else 1.0))
+    elif name == "style" and rest[:1] == ":" and rest[1:].strip():
+        builder.open("style", shown, style=rest[1:].strip())
+    elif name == "/style" and not rest:
+        builder.close("style", shown)
+    else:
+        raise InputError(f"cannot read the mark {shown}; write {_mark_syntax(name)}")
+
+
+def _parse_number(written: str, shown: str, name: str) -> float:
+    if not _NUMBER.fullmatch(written):
+        raise InputError(f"cannot read the mark {shown}; write {_mark_syntax(name)}")
+    return float(written)
+
+
+def _mark_syntax(name: str) -> str:
+    forms = {"pause": "[pause 0.4], in seconds", "nod": "[nod], or [nod 0.5] for a small one"}
+    syntax = forms.get(name, "[style:NAME] ... [/style]")
+    return f"{syntax}, or use round brackets around words to be spoken"

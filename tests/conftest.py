@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from tts2face.compilation import CACHE_VARIABLE, FOLDER
+from tts2face.numeric.kernels import CACHE_VARIABLE, FOLDER
 
 os.environ.setdefault(CACHE_VARIABLE, str(FOLDER))  # processes with another home compile nothing again
 
@@ -81,7 +81,7 @@ def face_model() -> Path:
     pytest.importorskip("ai_edge_litert", reason="needs `pip install 'tts2face[capture]'`")
     pytest.importorskip("cv2", reason="needs `pip install 'tts2face[capture]'`")
     from lexicon.errors import BackendError
-    from tts2face.video.landmark_models import find_bundle
+    from tts2face.video.tracking import find_bundle
 
     try:
         return find_bundle()

@@ -15,15 +15,15 @@ import pytest
 from tts2face.storage.files import SHIPPED_FOLDER
 
 SHARED = {  # module: functions that it calls
-    "tts2face.synthesis.session_models": (
+    "tts2face.session.models": (
         "load_talker",
         "load_face",
         "load_palette",
         "build_exemplar_model",
         "mesh_face",
     ),
-    "tts2face.synthesis.mesh_face": ("gesture_face",),
-    "tts2face.render.scene": ("build_surface",),
+    "tts2face.session.animated_face": ("gesture_face",),
+    "tts2face.picture.scene": ("build_surface",),
 }
 MOST = 4  # results of a function that are kept
 

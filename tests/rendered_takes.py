@@ -16,9 +16,9 @@ import av
 import numpy as np
 import pytest
 
-from tts2face.render.encode import write_clips
-from tts2face.render.picture import Picture
-from tts2face.session import Session
+from tts2face.picture.film import write_clips
+from tts2face.picture.options import Picture
+from tts2face.session.session import Session
 from tts2face.types import Clip, Waveform
 
 NAMES = (

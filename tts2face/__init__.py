@@ -17,32 +17,15 @@ if TYPE_CHECKING:
     from lexicon.errors import Tts2faceError as Tts2faceError
     from lexicon.sequence import PhoneSequence as PhoneSequence
     from lexicon.sequence import WordSpan as WordSpan
-    from tts2face.api import convert as convert
-    from tts2face.api import export as export
-    from tts2face.api import load_clip as load_clip
-    from tts2face.api import write_clip as write_clip
-    from tts2face.batch.cast import Cast as Cast
-    from tts2face.batch.cast import read_cast as read_cast
-    from tts2face.batch.options import BatchOptions as BatchOptions
-    from tts2face.batch.output import Plan as Plan
-    from tts2face.batch.plan import plan_batch as plan_batch
-    from tts2face.batch.run import BatchResult as BatchResult
-    from tts2face.batch.run import run_batch as run_batch
-    from tts2face.catalogue import faces as faces
-    from tts2face.catalogue import formats as formats
-    from tts2face.catalogue import hair_colors as hair_colors
-    from tts2face.catalogue import haircuts as haircuts
-    from tts2face.catalogue import identities as identities
-    from tts2face.catalogue import languages as languages
-    from tts2face.catalogue import styles as styles
-    from tts2face.catalogue import talkers as talkers
-    from tts2face.catalogue import voices as voices
-    from tts2face.characters.animation import WrittenCharacter as WrittenCharacter
-    from tts2face.characters.animation import write_character as write_character
-    from tts2face.characters.importing import ImportedFace as ImportedFace
-    from tts2face.characters.importing import ImportReport as ImportReport
-    from tts2face.characters.importing import import_face as import_face
-    from tts2face.characters.saving import save_face as save_face
+    from tts2face.interchange.characters.animation import WrittenCharacter as WrittenCharacter
+    from tts2face.interchange.characters.animation import write_character as write_character
+    from tts2face.interchange.characters.importing import ImportedFace as ImportedFace
+    from tts2face.interchange.characters.importing import ImportReport as ImportReport
+    from tts2face.interchange.characters.importing import import_face as import_face
+    from tts2face.interchange.characters.importing import save_face as save_face
+    from tts2face.interchange.subtitles.cues import Cue as Cue
+    from tts2face.interchange.subtitles.cues import Subtitles as Subtitles
+    from tts2face.interchange.subtitles.reader import read_subtitles as read_subtitles
     from tts2face.models.face import Face as Face
     from tts2face.models.face_loading import load_face as load_face
     from tts2face.models.palette import Palette as Palette
@@ -50,24 +33,42 @@ if TYPE_CHECKING:
     from tts2face.models.talker import Talker as Talker
     from tts2face.models.talker import load_talker as load_talker
     from tts2face.photo.face_from_photo import face_from_photo as face_from_photo
-    from tts2face.project.project import Project as Project
-    from tts2face.project.project_file import load_project as load_project
-    from tts2face.project.project_file import save_project as save_project
-    from tts2face.render.picture import Picture as Picture
+    from tts2face.picture.options import Picture as Picture
     from tts2face.request import Request as Request
-    from tts2face.session import Session as Session
-    from tts2face.subtitles.cue import Cue as Cue
-    from tts2face.subtitles.cue import Subtitles as Subtitles
-    from tts2face.subtitles.reader import read_subtitles as read_subtitles
-    from tts2face.synthesis.animated_face import AnimatedFace as AnimatedFace
-    from tts2face.synthesis.performance import Performance as Performance
-    from tts2face.synthesis.speech_stream import Piece as Piece
-    from tts2face.synthesis.written_clip import WrittenClip as WrittenClip
+    from tts2face.serving.batch.cast import Cast as Cast
+    from tts2face.serving.batch.cast import read_cast as read_cast
+    from tts2face.serving.batch.options import BatchOptions as BatchOptions
+    from tts2face.serving.batch.output import Plan as Plan
+    from tts2face.serving.batch.plan import plan_batch as plan_batch
+    from tts2face.serving.batch.run import BatchResult as BatchResult
+    from tts2face.serving.batch.run import run_batch as run_batch
+    from tts2face.session.animated_face import AnimatedFace as AnimatedFace
+    from tts2face.session.catalogue import faces as faces
+    from tts2face.session.catalogue import formats as formats
+    from tts2face.session.catalogue import hair_colors as hair_colors
+    from tts2face.session.catalogue import haircuts as haircuts
+    from tts2face.session.catalogue import identities as identities
+    from tts2face.session.catalogue import languages as languages
+    from tts2face.session.catalogue import styles as styles
+    from tts2face.session.catalogue import talkers as talkers
+    from tts2face.session.catalogue import voices as voices
+    from tts2face.session.functions import convert as convert
+    from tts2face.session.functions import export as export
+    from tts2face.session.functions import load_clip as load_clip
+    from tts2face.session.functions import write_clip as write_clip
+    from tts2face.session.outputs import WrittenClip as WrittenClip
+    from tts2face.session.performance import Performance as Performance
+    from tts2face.session.project import Project as Project
+    from tts2face.session.project_file import load_project as load_project
+    from tts2face.session.project_file import save_project as save_project
+    from tts2face.session.session import Session as Session
+    from tts2face.session.speech_stream import Piece as Piece
     from tts2face.types import Chunk as Chunk
     from tts2face.types import Clip as Clip
     from tts2face.types import Speech as Speech
     from tts2face.types import Trajectory as Trajectory
     from tts2face.types import Waveform as Waveform
+
 
 __version__ = "0.2.0"
 
@@ -134,13 +135,13 @@ __all__ = [
 _MODULES = {
     "lexicon.errors": ("BackendError", "DataError", "InputError", "Tts2faceError"),
     "lexicon.sequence": ("PhoneSequence", "WordSpan"),
-    "tts2face.api": ("convert", "export", "load_clip", "write_clip"),
-    "tts2face.batch.cast": ("Cast", "read_cast"),
-    "tts2face.batch.options": ("BatchOptions",),
-    "tts2face.batch.output": ("Plan",),
-    "tts2face.batch.plan": ("plan_batch",),
-    "tts2face.batch.run": ("BatchResult", "run_batch"),
-    "tts2face.catalogue": (
+    "tts2face.session.functions": ("convert", "export", "load_clip", "write_clip"),
+    "tts2face.serving.batch.cast": ("Cast", "read_cast"),
+    "tts2face.serving.batch.options": ("BatchOptions",),
+    "tts2face.serving.batch.output": ("Plan",),
+    "tts2face.serving.batch.plan": ("plan_batch",),
+    "tts2face.serving.batch.run": ("BatchResult", "run_batch"),
+    "tts2face.session.catalogue": (
         "faces",
         "formats",
         "hair_colors",
@@ -151,25 +152,24 @@ _MODULES = {
         "talkers",
         "voices",
     ),
-    "tts2face.characters.animation": ("WrittenCharacter", "write_character"),
-    "tts2face.characters.importing": ("ImportReport", "ImportedFace", "import_face"),
-    "tts2face.characters.saving": ("save_face",),
+    "tts2face.interchange.characters.animation": ("WrittenCharacter", "write_character"),
+    "tts2face.interchange.characters.importing": ("ImportReport", "ImportedFace", "import_face", "save_face"),
     "tts2face.models.face": ("Face",),
     "tts2face.models.face_loading": ("load_face",),
     "tts2face.models.palette": ("Palette", "load_palette"),
     "tts2face.models.talker": ("Talker", "load_talker"),
     "tts2face.photo.face_from_photo": ("face_from_photo",),
-    "tts2face.project.project": ("Project",),
-    "tts2face.project.project_file": ("load_project", "save_project"),
-    "tts2face.render.picture": ("Picture",),
+    "tts2face.session.project": ("Project",),
+    "tts2face.session.project_file": ("load_project", "save_project"),
+    "tts2face.picture.options": ("Picture",),
     "tts2face.request": ("Request",),
-    "tts2face.session": ("Session",),
-    "tts2face.synthesis.animated_face": ("AnimatedFace",),
-    "tts2face.subtitles.cue": ("Cue", "Subtitles"),
-    "tts2face.subtitles.reader": ("read_subtitles",),
-    "tts2face.synthesis.speech_stream": ("Piece",),
-    "tts2face.synthesis.performance": ("Performance",),
-    "tts2face.synthesis.written_clip": ("WrittenClip",),
+    "tts2face.session.session": ("Session",),
+    "tts2face.session.animated_face": ("AnimatedFace",),
+    "tts2face.interchange.subtitles.cues": ("Cue", "Subtitles"),
+    "tts2face.interchange.subtitles.reader": ("read_subtitles",),
+    "tts2face.session.speech_stream": ("Piece",),
+    "tts2face.session.performance": ("Performance",),
+    "tts2face.session.outputs": ("WrittenClip",),
     "tts2face.types": ("Chunk", "Clip", "Speech", "Trajectory", "Waveform"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}

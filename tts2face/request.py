@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_limits
-from lexicon.json_values import check_fields, is_number
+from lexicon.inputs import check_fields, check_limits, is_number
 
 RATE_LIMITS = (0.5, 2.0)
 VOLUME_LIMITS = (0.0, 2.0)

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.bounded_least_squares import bounded_least_squares
+from tts2face.numeric.least_squares import bounded_least_squares
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
+
 
 N_AVERAGED = 41  # frames at 30 a second, 1.36 s: speech and small gestures average out (Ju and Lee 2008, section 4.1)
 N_SAMPLES, N_NEAREST = 1000, 60  # Ju and Lee 2008, section 4.1

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.recordings.corpus_audio import SOUND_RATE
+from corpus_tools.recordings.sound import SOUND_RATE
 from lexicon.errors import DataError, InputError
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.palette import FEATURES, GESTURE_FPS

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.recordings.corpus_audio import SOUND_RATE
+from corpus_tools.recordings.sound import SOUND_RATE
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.inputs import read_table
 from tts2face.models.palette import GESTURE_FPS

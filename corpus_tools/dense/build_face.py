@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.build_talker import NOT_STATED, PROVENANCE, read_provenance
-from corpus_tools.dense.adapt_head import adapt_head
-from corpus_tools.dense.light_cast import remove_cast, skin_texture
 from corpus_tools.dense.mesh_fit import (
+    adapt_head,
     align_to_head,
     correct_lips_and_lids,
     face_landmarks,
@@ -20,21 +19,20 @@ from corpus_tools.dense.mesh_fit import (
 )
 from corpus_tools.dense.modes import MOST_MODES, DenseModel, add_modes, dense_model, mode_fitter
 from corpus_tools.dense.person_look import AS_SEEN, LookChoices, LookSampler, PersonLook, dress_head
-from corpus_tools.dense.skin_colour import average_skin_colours, build_picture_fitter
-from corpus_tools.dense.texture_painting import paint_skin
-from corpus_tools.dense.video_landmarks import TrackedPictures, find_videos, resting_landmarks, track_videos
-from corpus_tools.dense.visible_texels import build_canvas
-from corpus_tools.recordings.corpus_video import CachedTracker
+from corpus_tools.dense.skin_colour import average_skin_colours, build_picture_fitter, remove_cast, skin_texture
+from corpus_tools.dense.texels import TrackedPictures, build_canvas, find_videos, resting_landmarks, track_videos
+from corpus_tools.dense.texture import paint_skin
+from corpus_tools.recordings.video import CachedTracker
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
-from tts2face.render.occlusion import bake_occlusion
-from tts2face.render.scene import available_cores
+from tts2face.picture.occlusion import bake_occlusion
+from tts2face.picture.scene import available_cores
 from tts2face.storage.files import find_file
 from tts2face.types import Progress
-from tts2face.video.landmark_models import find_bundle
+from tts2face.video.tracking import find_bundle
 
 Floats = NDArray[np.float64]
 
@@ -71,7 +69,7 @@ def build_face(
         A folder of recordings, or one video; transcripts are not needed. A ``provenance.json`` in the folder states the
         licence of the person's likeness, which that of the mesh does not cover.
     consent
-        Consent of the person shown, from `tts2face.models.consent.consent_record`; kept in the file.
+        Consent of the person shown, from `tts2face.models.face_file.consent_record`; kept in the file.
     n_modes
         Modes of the talker's own dense shape model, added as the shapes denseMean, dense1, dense2, ...
     run_options

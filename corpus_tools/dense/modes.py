@@ -13,16 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.adapt_head import EYE_PARTS, RIGID_MOUTH_PARTS
-from corpus_tools.dense.mesh_fit import face_landmarks, part_vertices
+from corpus_tools.dense.mesh_fit import EYE_PARTS, RIGID_MOUTH_PARTS, face_landmarks, part_vertices
 from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
-from corpus_tools.dense.video_landmarks import TrackedPictures
+from corpus_tools.dense.texels import TrackedPictures
 from lexicon.errors import InputError
-from tts2face.face.mouth_model import CHIN_LANDMARKS
+from tts2face.face.mouth import CHIN_LANDMARKS
 from tts2face.face.shape_transfer import append_shapes
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
-from tts2face.numeric import principal_axes
+from tts2face.numeric.arrays import principal_axes
 from tts2face.video.pose import similarity_transforms
 
 OPEN_JAW = 0.6  # weight of jawOpen at which eq. 4 is evaluated; at 0.12 the lower lip is serrated between landmarks

@@ -15,24 +15,25 @@ from corpus_tools.dense.hair_region import (
     find_hair,
     portrait_grid,
 )
-from corpus_tools.dense.light_cast import (
+from corpus_tools.dense.mesh_fit import part_vertices
+from corpus_tools.dense.skin_colour import (
     MIN_IRIS_PX,
     SCLERA_CHROMA,
     EyeColours,
+    PictureFitter,
     clear_iris,
     estimate_cast,
     log_colour,
     median_eyes,
     sample_eyes,
+    sample_picture,
     srgb_colour,
 )
-from corpus_tools.dense.mesh_fit import part_vertices
-from corpus_tools.dense.skin_colour import PictureFitter, sample_picture
 from corpus_tools.dense.texels import find_texels
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import tint_parts
+from tts2face.models.hair import EYE_COLOURS, HAIR_COLOURS, parse_eye_colour, parse_hair_colour
 from tts2face.models.landmarks import CHIN
-from tts2face.models.named_colours import EYE_COLOURS, HAIR_COLOURS, parse_eye_colour, parse_hair_colour
 
 Floats = NDArray[np.float64]
 

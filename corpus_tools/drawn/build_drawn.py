@@ -10,43 +10,33 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.drawn.brows import brow_piece
 from corpus_tools.drawn.character import Character
-from corpus_tools.drawn.clothes import breath, stud_pieces, sweater_piece
 from corpus_tools.drawn.elder import ELDER
-from corpus_tools.drawn.expressions import close_jaw, part_lips, rest_in, round_lips, soften, thin_lips
+from corpus_tools.drawn.eyes import brow_piece, find_lining, lash_piece, shut_lids, still_lining, tuck_lining
 from corpus_tools.drawn.girl import GIRL
-from corpus_tools.drawn.glasses import glasses_piece
 from corpus_tools.drawn.hair import OtherHair, hair_cover, hair_piece, other_palettes
-from corpus_tools.drawn.lashes import lash_piece
-from corpus_tools.drawn.lids import find_lining, shut_lids, still_lining, tuck_lining
 from corpus_tools.drawn.man import MAN
 from corpus_tools.drawn.paint import paint_eye, paint_skin, vertex_masks
 from corpus_tools.drawn.people import REALISTIC_MAN, REALISTIC_WOMAN
-from corpus_tools.drawn.sculpt import drawn_cage
+from corpus_tools.drawn.sculpt import close_jaw, drawn_cage, part_lips, rest_in, round_lips, soften, thin_lips
 from corpus_tools.drawn.teeth import teeth_pieces
 from corpus_tools.drawn.woman import WOMAN
+from corpus_tools.drawn.worn import breath, glasses_piece, stud_pieces, sweater_piece
 from corpus_tools.head.build_head import METADATA, shape_names
-from corpus_tools.head.cage import Cage, build_cage
-from corpus_tools.head.cloth import shirt_piece
 from corpus_tools.head.correspondence import add_landmarks
 from corpus_tools.head.eyes import eyeball_piece, fit_eyeballs
-from corpus_tools.head.head import PIVOT, REFERENCE_PERSON, ReferenceHead, skin_piece
-from corpus_tools.head.jaw import fit_jaw
-from corpus_tools.head.lids import find_lid_edges, wet_piece
+from corpus_tools.head.head import PIVOT, REFERENCE_PERSON, ReferenceHead, shirt_piece, skin_piece
 from corpus_tools.head.lips import close_lips, lip_ring
-from corpus_tools.head.piece import Eyeball, HeadPieces, Piece, assemble_face
-from corpus_tools.head.shapes import LID_SHAPES, clear_eyeballs, correct_shapes
+from corpus_tools.head.mesh import Cage, Eyeball, HeadPieces, Piece, assemble_face, build_cage
+from corpus_tools.head.mouth import tongue_piece
+from corpus_tools.head.shapes import LID_SHAPES, clear_eyeballs, correct_shapes, find_lid_edges, fit_jaw, wet_piece
 from corpus_tools.head.skin import Skin, build_shoulders, build_skin
 from corpus_tools.head.source import SourceMesh, fetch_data, read_source
-from corpus_tools.head.tongue import tongue_piece
-from corpus_tools.training.score_files import calibrate_face_file
-from tts2face.face.breathing import BREATH_SHAPE
-from tts2face.face.hair_swing import LIMIT_RAD
-from tts2face.face.pupils import PUPIL_SHAPE
+from corpus_tools.training.calibrate_face import calibrate_face_file
+from tts2face.face.body import BREATH_SHAPE, LIMIT_RAD, PUPIL_SHAPE
 from tts2face.models.face import Face, Hairdo, Texture
 from tts2face.models.face_file import write_face
-from tts2face.models.lit_hair import SWING_SHAPES
+from tts2face.models.hair_file import SWING_SHAPES
 
 CAST: Mapping[str, Character] = {one.name: one for one in (WOMAN, MAN, ELDER, GIRL, REALISTIC_WOMAN, REALISTIC_MAN)}
 CLEAR_MM = 0.6  # between lid and eyeball: the edges of stretched lids are 6 mm long and sink between vertices

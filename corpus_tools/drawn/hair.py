@@ -8,14 +8,12 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
-from corpus_tools.drawn.atlas import hair_tiles, in_tile
 from corpus_tools.drawn.character import Curls, Hairstyle, Lock, Palette
-from corpus_tools.drawn.fields import arc_length, profile, smooth_rows, wind_outward
-from corpus_tools.head.piece import MaterialSpan, Piece
+from corpus_tools.drawn.fields import arc_length, hair_tiles, in_tile, profile, smooth_rows, wind_outward
+from corpus_tools.head.mesh import MaterialSpan, Piece, grid_triangles, triangulate
 from corpus_tools.head.skin import Skin, vertex_normals
-from corpus_tools.head.subdivide import grid_triangles, triangulate
-from tts2face.models.lit_hair import swing_shapes
-from tts2face.numeric import smoothstep, unit_vectors
+from tts2face.models.hair_file import swing_shapes
+from tts2face.numeric.arrays import smoothstep, unit_vectors
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

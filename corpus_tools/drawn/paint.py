@@ -11,15 +11,13 @@ from corpus_tools.dense.texels import Texels, find_texels
 from corpus_tools.drawn.character import Brow, Character, Colour, Palette
 from corpus_tools.drawn.fields import profile, smooth_line
 from corpus_tools.head.eyes import TEXTURE_SIDE, EyeStyle
-from corpus_tools.head.layout import layout_coordinates
-from corpus_tools.head.lids import LidEdge
-from corpus_tools.head.noise import gaussian_bump
+from corpus_tools.head.mesh import gaussian_bump, layout_coordinates, triangulate
+from corpus_tools.head.shapes import LidEdge
 from corpus_tools.head.skin import Skin
 from corpus_tools.head.source import SourceMesh
-from corpus_tools.head.subdivide import triangulate
 from corpus_tools.head.texture import INNER_LIP_Z, fill_gaps, in_mouth, line_distance, sample_mask
-from tts2face.numeric import smoothstep
-from tts2face.render.film.eyes import EDGE_RAD
+from tts2face.numeric.arrays import smoothstep
+from tts2face.picture.baked.eyes import EDGE_RAD
 
 Floats = NDArray[np.float64]
 

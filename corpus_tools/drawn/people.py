@@ -7,11 +7,11 @@ docs/decisions/170-people-in-film-light.md.
 from dataclasses import replace
 
 from corpus_tools.drawn.character import Brow, Character, Collar, Hairstyle, Lock, Proportions
-from corpus_tools.drawn.haircuts import comb, grow, lay_closer
 from corpus_tools.drawn.man import PALETTE as DRAWN_MAN
 from corpus_tools.drawn.man import SIDE
 from corpus_tools.drawn.woman import HAIRLINE, LOCKS
 from corpus_tools.drawn.woman import PALETTE as DRAWN_WOMAN
+from corpus_tools.drawn.worn import comb, grow, lay_closer
 from corpus_tools.head.eyes import EyeStyle
 
 DRAWN = 0.5  # of the smoothing and changes of drawn faces: with less, MakeHuman's planes are seen at nose and cheeks

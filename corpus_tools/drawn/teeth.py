@@ -7,15 +7,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from corpus_tools.drawn.character import Character
-from corpus_tools.head.cage import Cage
 from corpus_tools.head.head import COVERED_POSES, ReferenceHead, cover_in_pose
-from corpus_tools.head.jaw import Jaw
-from corpus_tools.head.lips import lip_front
-from corpus_tools.head.piece import MaterialSpan, Piece
-from corpus_tools.head.retreat import add_retreat
-from corpus_tools.head.skin import Skin
-from corpus_tools.head.subdivide import grid_triangles
-from corpus_tools.head.teeth import (
+from corpus_tools.head.lips import add_retreat, lip_front
+from corpus_tools.head.mesh import Cage, MaterialSpan, Piece, grid_triangles
+from corpus_tools.head.mouth import (
     COVER_MM,
     LOWER,
     UPPER,
@@ -26,7 +21,9 @@ from corpus_tools.head.teeth import (
     gum_piece,
     keep_behind,
 )
-from tts2face.numeric import smoothstep
+from corpus_tools.head.shapes import Jaw
+from corpus_tools.head.skin import Skin
+from tts2face.numeric.arrays import smoothstep
 
 Floats = NDArray[np.float64]
 

@@ -14,15 +14,14 @@ from corpus_tools.drawn.build_drawn import (
     step_reporter,
 )
 from corpus_tools.drawn.character import Character
-from corpus_tools.drawn.haircuts import HAIRCUTS, lit_haircut
-from corpus_tools.film.bake_poses import HAIRCUT, Effort, bake_poses
+from corpus_tools.drawn.worn import HAIRCUTS, lit_haircut
+from corpus_tools.film.bake import HAIRCUT, Effort, bake_poses
 from corpus_tools.film.fit_light import fit_haircut, fit_light
 from corpus_tools.film.look import look_of
-from corpus_tools.film.pose_light import PoseLight
-from corpus_tools.film.poses import lit_poses
+from corpus_tools.film.poses import PoseLight, lit_poses
 from corpus_tools.film.scene import FilmScene
 from corpus_tools.head.source import SourceMesh, fetch_data, read_source
-from corpus_tools.training.score_files import calibrate_face_file
+from corpus_tools.training.calibrate_face import calibrate_face_file
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.hair_file import OF_FACE, write_lit_hair

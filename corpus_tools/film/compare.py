@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from corpus_tools.film.poses import LitPose
 from tts2face.models.face import Face
 from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.film.scene import LitScene
-from tts2face.render.film.visibility import TRIANGLE_MASK, X, Y, nearest_triangles, project
-from tts2face.render.picture import Picture
+from tts2face.picture.baked.scene import LitScene
+from tts2face.picture.baked.surface import TRIANGLE_MASK, X, Y, nearest_triangles, project
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
 
 Pixels = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
@@ -29,7 +29,7 @@ NECK_PX = 55  # of 512 below the lower lip, where the face ends
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What is compared: a pose, seen by a camera of `tts2face.render.picture.Picture`."""
+    """What is compared: a pose, seen by a camera of `tts2face.picture.options.Picture`."""
 
     pose: LitPose
     camera: str

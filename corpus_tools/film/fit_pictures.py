@@ -18,10 +18,10 @@ from corpus_tools.film.fit_light import MOST_SHARE, neighbours, vertex_parts
 from corpus_tools.film.poses import LitPose
 from tts2face.models.baked_light import LIMIT_STEP, BakedLight, quantised
 from tts2face.models.face import Face
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.film.scene import LitScene
-from tts2face.render.film.visibility import TRIANGLE_MASK, X, Y, nearest_triangles, project
-from tts2face.render.picture import Picture
+from tts2face.picture.baked.scene import LitScene
+from tts2face.picture.baked.surface import TRIANGLE_MASK, X, Y, nearest_triangles, project
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.uint8]

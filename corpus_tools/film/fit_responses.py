@@ -1,4 +1,4 @@
-"""Fit of how the light of vertices answers to the terms of a pose (`tts2face.render.film.response`)."""
+"""Fit of how the light of vertices answers to the terms of a pose (`tts2face.picture.baked.response`)."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from corpus_tools.film.pose_light import PoseLight
-from corpus_tools.film.seen import mouth_middle
+from corpus_tools.film.poses import PoseLight, mouth_middle
 from tts2face.face.deformation import build_rig
 from tts2face.models.baked_light import LIMIT_STEP
 from tts2face.models.face import Face
-from tts2face.numeric import smoothstep
-from tts2face.render.film.response import LightTerms, still_eyes
+from tts2face.numeric.arrays import smoothstep
+from tts2face.picture.baked.response import LightTerms, still_eyes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -19,12 +19,12 @@ from corpus_tools.film.measure_film import build_scene
 from corpus_tools.film.poses import LitPose, lit_poses
 from corpus_tools.film.scene import FilmScene
 from corpus_tools.head.source import fetch_data, read_source
-from corpus_tools.training.score_files import calibrate_face_file
+from corpus_tools.training.calibrate_face import calibrate_face_file
 from tts2face.face.deformation import build_rig
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
-from tts2face.render.camera import camera_matrices
-from tts2face.render.camera_views import parse_camera
+from tts2face.picture.camera import camera_matrices
+from tts2face.picture.options import parse_camera
 
 Pixels = NDArray[np.uint8]
 

@@ -9,18 +9,16 @@ import numpy as np
 from mathutils import Matrix, Vector
 from numpy.typing import NDArray
 
-from corpus_tools.drawn.atlas import COLLAR, strand_places
+from corpus_tools.drawn.fields import COLLAR, strand_places
 from corpus_tools.film.look import Lamp, Look
-from corpus_tools.film.materials import UNIT_MM, part_materials
-from corpus_tools.film.nodes import Shader, rgba
-from tts2face.colour import decode_srgb
+from corpus_tools.film.materials import UNIT_MM, Shader, part_materials, rgba
 from tts2face.face.deformation import build_rig, eye_rotations, head_transform
 from tts2face.models.face import Face
-from tts2face.numeric import smoothstep
-from tts2face.render.camera import camera_matrices
-from tts2face.render.camera_views import CameraView
-from tts2face.render.film.scene import BLINK_SHRINK
-from tts2face.render.surface import weld_groups
+from tts2face.numeric.arrays import decode_srgb, smoothstep
+from tts2face.picture.baked.scene import BLINK_SHRINK
+from tts2face.picture.camera import camera_matrices
+from tts2face.picture.options import CameraView
+from tts2face.picture.surface import weld_groups
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from corpus_tools.head.cage import Cage, fit_sphere
 from corpus_tools.head.cards import EYE_TEXTURE
-from corpus_tools.head.piece import Eyeball, MaterialSpan, Piece
-from tts2face.numeric import smoothstep
-from tts2face.render.film.eyes import EDGE_RAD
+from corpus_tools.head.mesh import Cage, Eyeball, MaterialSpan, Piece, fit_sphere
+from tts2face.numeric.arrays import smoothstep
+from tts2face.picture.baked.eyes import EDGE_RAD
 
 Floats = NDArray[np.float64]
 

@@ -10,23 +10,26 @@ from scipy import sparse
 from scipy.spatial import cKDTree
 
 from corpus_tools.dense.texels import find_texels
-from corpus_tools.head.assets import PACKAGE, Asset, read_asset
-from corpus_tools.head.cage import Cage
-from corpus_tools.head.hairline import (
+from corpus_tools.head.cards import (
     MIDDLE,
+    Cards,
+    StrandStyle,
+    bake_strands,
     covered_share,
+    edge_graph,
     hair_share,
+    number_islands,
     paint_scalp,
     paint_stubble,
     share_levels,
+    strand_tangents,
     stubble_share,
 )
-from corpus_tools.head.noise import value_noise
+from corpus_tools.head.mesh import Cage, triangulate, value_noise
 from corpus_tools.head.skin import Skin, vertex_normals
-from corpus_tools.head.strands import Cards, StrandStyle, bake_strands, edge_graph, number_islands, strand_tangents
-from corpus_tools.head.subdivide import triangulate
+from corpus_tools.head.source import ASSETS_PACKAGE, Asset, read_asset
 from tts2face.models.hair import Hair
-from tts2face.numeric import smoothstep, unit_vectors
+from tts2face.numeric.arrays import smoothstep, unit_vectors
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -236,7 +239,7 @@ def build_hair(name: str, asset: Asset, cage: Cage, skin: Skin, head: Floats) ->
         anchors=anchors.astype(np.int32),
         anchor_places=head[anchors].astype(np.float32),
         n_face_vertices=len(head),
-        metadata=_metadata(name, cut.summary) | {"data": PACKAGE},
+        metadata=_metadata(name, cut.summary) | {"data": ASSETS_PACKAGE},
     )
 
 

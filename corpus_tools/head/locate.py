@@ -13,19 +13,17 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from corpus_tools.head.build_head import default_cage, fetch_all, head_face
-from corpus_tools.head.cage import Cage
 from corpus_tools.head.correspondence import nearest_surface_points, write_places
 from corpus_tools.head.eyes import fit_eyeballs
-from corpus_tools.head.rings import EdgeRings, find_narrowest_ring
-from corpus_tools.head.skin import Skin, build_skin
-from corpus_tools.head.subdivide import triangulate
+from corpus_tools.head.mesh import Cage, triangulate
+from corpus_tools.head.skin import EdgeRings, Skin, build_skin, find_narrowest_ring
 from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LID_RINGS, N_MESH_LANDMARKS
-from tts2face.render.camera import camera_matrices
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.picture import Picture
-from tts2face.video.track import FaceTracker
+from tts2face.picture.camera import camera_matrices
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
+from tts2face.video.tracking import FaceTracker
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -11,13 +11,11 @@ from scipy.spatial import cKDTree
 
 from corpus_tools.dense.texels import Texels, find_texels
 from corpus_tools.head.cards import BROW_COLOUR
-from corpus_tools.head.layout import SIDE, layout_coordinates
-from corpus_tools.head.lids import LidEdge
-from corpus_tools.head.noise import gaussian_bump, value_noise
+from corpus_tools.head.mesh import SIDE, gaussian_bump, layout_coordinates, triangulate, value_noise
+from corpus_tools.head.shapes import LidEdge
 from corpus_tools.head.skin import Skin
 from corpus_tools.head.source import SourceMesh
-from corpus_tools.head.subdivide import triangulate
-from tts2face.numeric import smoothstep
+from tts2face.numeric.arrays import smoothstep
 
 Floats = NDArray[np.float64]
 

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.recordings.corpus_video import NOT_COUNTED
-from corpus_tools.recordings.face_light import MEASURES
+from corpus_tools.recordings.video import MEASURES, NOT_COUNTED
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, lip_opening
-from tts2face.speech.pauses import sound_windows
-from tts2face.speech.text_fit import LEAST_CONFIDENCE
+from tts2face.sound.pauses import sound_windows
+from tts2face.sound.transcript import LEAST_CONFIDENCE
 from tts2face.types import Waveform
 
 WARNING, REFUSAL = "warning", "refusal"  # severities
@@ -229,7 +228,7 @@ def picture_measures(
     Parameters
     ----------
     n_faces, changes, times : (T,)
-        As `corpus_tools.recordings.corpus_video.TrackedVideo` has them.
+        As `corpus_tools.recordings.video.TrackedVideo` has them.
     """
     counted = n_faces[n_faces != NOT_COUNTED]
     crowded = float((counted > 1).mean()) if len(counted) else 0.0
@@ -242,12 +241,12 @@ def picture_measures(
 
 
 def light_measures(light: NDArray[np.floating], begin: float, end: float) -> dict[str, float]:
-    """Medians of `corpus_tools.recordings.face_light.MEASURES` between two times in seconds; nothing without a face.
+    """Medians of `corpus_tools.recordings.video.MEASURES` between two times in seconds; nothing without a face.
 
     Parameters
     ----------
     light : (N, 5)
-        As `corpus_tools.recordings.face_light.measure_light` returns it.
+        As `corpus_tools.recordings.video.measure_light` returns it.
     """
     here = light[(light[:, 0] >= begin) & (light[:, 0] < end)]
     if not len(here):  # shorter than the interval of the measures

@@ -1,14 +1,16 @@
-"""Observation of one recording: pose-free landmarks, head pose, phones and loudness on one time axis."""
+"""Observation of one recording: pose-free landmarks, head pose, phones and loudness on one time axis.
+
+Lip opening that a shipped talker shows for the phones of a recording, to which its tracked lips are compared.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.recordings.corpus_audio import AlignedSpeech, CachedAligner
-from corpus_tools.recordings.corpus_video import CachedTracker, TrackedVideo
 from corpus_tools.recordings.folder import Recording, pronounce_recording
 from corpus_tools.recordings.limits import (
     check_limits,
@@ -20,11 +22,15 @@ from corpus_tools.recordings.limits import (
     picture_measures,
     sound_measures,
 )
+from corpus_tools.recordings.sound import AlignedSpeech, CachedAligner
+from corpus_tools.recordings.video import CachedTracker, TrackedVideo
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.speech.loudness import intensity
-from tts2face.video.frame_grid import resample_to_grid, trim_and_fill
-from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose
+from tts2face.lips.exemplar import ExemplarModel, build_exemplar_model, speech_trajectory
+from tts2face.models.landmarks import lip_opening
+from tts2face.models.talker import ShapeModel, load_talker
+from tts2face.sound.features import intensity
+from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose, resample_to_grid, trim_and_fill
 
 TIME_TOLERANCE_S = 1e-6  # seconds
 N_NEIGHBOUR_FRAMES = 2.0  # frames around a span that are used to interpolate those in it
@@ -51,7 +57,7 @@ class Quality:
     speech, ``snr_db`` of speech over noise, share of ``crowded`` frames, ``turn_deg`` away from the camera,
     ``frozen_s`` without a change, pictures a second (``frame_rate``), median distance ``eye_px`` of the outer eye
     corners, ``jitter`` of the lip opening relative to its deviation; ``brightness``, ``glare``, ``contrast`` and
-    ``sharpness`` as `corpus_tools.recordings.face_light.face_light` returns them.
+    ``sharpness`` as `corpus_tools.recordings.video.face_light` returns them.
     """
 
     confidence: float
@@ -230,3 +236,23 @@ def head_motion(posed: PoseFreeLandmarks) -> NDArray[np.float32]:
 
 def _lowest_score(tracked: TrackedVideo, here: NDArray[np.bool_]) -> float:
     return float(tracked.tracking.scores[here & ~tracked.tracking.is_missing].min(initial=1.0))
+
+
+EXPECTED_RATE_HZ = 100.0  # of the curves below
+SHIPPED_TALKER = "grid_s1"
+
+ExpectedOpening = Callable[[PhoneSequence], NDArray[np.float64]]
+
+
+def shipped_talker_opening(phones: PhoneSequence) -> NDArray[np.float64]:
+    """Opening (T,) of the inner lips at `EXPECTED_RATE_HZ` from 0 s to the end of the phones, by the shipped talker."""
+    model, exemplars = _shipped_exemplars()
+    n_frames = int(phones.end * EXPECTED_RATE_HZ) + 2
+    lips = speech_trajectory(phones, exemplars, fps=EXPECTED_RATE_HZ, n_frames=n_frames)
+    return lip_opening(model.shapes(lips.values)).astype(np.float64)
+
+
+@lru_cache(maxsize=1)
+def _shipped_exemplars() -> tuple[ShapeModel, ExemplarModel]:
+    talker = load_talker(SHIPPED_TALKER)
+    return talker.model, build_exemplar_model(talker)

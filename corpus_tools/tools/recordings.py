@@ -15,9 +15,9 @@ from typing import Any
 
 from corpus_tools.prompts.coverage import RunningText, Units
 from corpus_tools.prompts.prompts import choose_prompts
-from corpus_tools.recordings.check_recording import RecordingChecker, recordings_to_check
-from corpus_tools.recordings.corpus_video import content_key
 from corpus_tools.recordings.limits import OUT_OF_SYNC, WARNING
+from corpus_tools.recordings.observe import RecordingChecker, recordings_to_check
+from corpus_tools.recordings.video import content_key
 from corpus_tools.run_options import RunOptions
 from tts2face.processes.child import Call, Handler
 

@@ -41,16 +41,16 @@ class ReportOrder:
 
 def similarity_report(model: str, name: str, on_progress: Progress) -> str:
     """Page of the visual similarity of a talker's phones."""
-    from corpus_tools.similarity.analysis import NamedTalker, Options, analyse
-    from corpus_tools.similarity.page import similarity_page
+    from corpus_tools.studies.similarity.analysis import NamedTalker, Options, analyse
+    from corpus_tools.studies.similarity.page import similarity_page
 
     return similarity_page(analyse(NamedTalker(name, load_talker(model)), Options(), None, on_progress), "both")
 
 
 def gesture_report(model: str, name: str, on_progress: Progress) -> str:
     """Page that compares a palette's gestures with motion from its fields, noise and published fields."""
-    from corpus_tools.gesture_study.analysis import Options, study_gestures
-    from corpus_tools.gesture_study.page import gestures_page
+    from corpus_tools.studies.gestures.analysis import Options, study_gestures
+    from corpus_tools.studies.gestures.page import gestures_page
     from tts2face.models.palette import load_palette
 
     return gestures_page(study_gestures(name, load_palette(model), Options(), on_progress))
@@ -64,9 +64,9 @@ def accuracy_report(model: str, name: str, on_progress: Progress) -> str:
     InputError
         The talker has too few recordings.
     """
-    from corpus_tools.evaluation.evaluate import evaluate
-    from corpus_tools.evaluation.splits import split_randomly
-    from corpus_tools.report.evaluation import evaluation_page
+    from corpus_tools.studies.evaluation.evaluate import evaluate
+    from corpus_tools.studies.evaluation.page import evaluation_page
+    from corpus_tools.studies.evaluation.splits import split_randomly
 
     talker = load_talker(model)
     if len(talker.utterances) < LEAST_UTTERANCES:

@@ -15,14 +15,13 @@ from types import MappingProxyType
 from typing import Any
 
 from corpus_tools.build_palette import StyleSource, build_style
-from corpus_tools.decomposition.gesture_take import check_gesture_take
-from corpus_tools.dense.photo_avatar import build_avatar
+from corpus_tools.decomposition.recordings import check_gesture_take
+from corpus_tools.dense.avatar import build_avatar
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError
-from tts2face.jobs.refused_file import RefusedFileError
-from tts2face.jobs.resource_check import FACE, check_resource, read_statement
 from tts2face.models.palette import load_palette
 from tts2face.processes.child import Call, Handler
+from tts2face.serving.work.resource_check import FACE, RefusedFileError, check_resource, read_statement
 
 NO_PROVENANCE = {"sources": "a take recorded in the studio"}
 
@@ -48,8 +47,8 @@ def _style(order: Mapping[str, Any], call: Call) -> dict[str, Any]:
 
 
 def _capture(order: Mapping[str, Any], call: Call) -> dict[str, Any]:
-    from tts2face.session import Session
-    from tts2face.synthesis.performance import Performance
+    from tts2face.session.performance import Performance
+    from tts2face.session.session import Session
 
     exports = [order["table"], order["sound"]]
     written = Session(palette=None).write_performance(
@@ -61,8 +60,8 @@ def _capture(order: Mapping[str, Any], call: Call) -> dict[str, Any]:
 
 
 def _film(order: Mapping[str, Any], call: Call) -> dict[str, Any]:
-    from tts2face.session import Session
-    from tts2face.synthesis.performance import Performance
+    from tts2face.session.performance import Performance
+    from tts2face.session.session import Session
 
     sound = None if order["sound"] is None else Path(order["sound"])
     written = Session(palette=None).write_performance(

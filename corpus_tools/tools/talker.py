@@ -9,10 +9,9 @@ from typing import Any
 from corpus_tools.build_talker import PROVENANCE, BuiltTalker, build_talker
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError
-from tts2face.jobs.refused_file import RefusedFileError
-from tts2face.jobs.resource_check import TALKER, check_resource
 from tts2face.models.consent import consent_record
 from tts2face.processes.child import Call
+from tts2face.serving.work.resource_check import TALKER, RefusedFileError, check_resource
 
 
 @dataclass(frozen=True, slots=True)

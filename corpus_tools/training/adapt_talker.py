@@ -12,13 +12,12 @@ from corpus_tools.training.base_map import N_OFFSETS, BaseMap, FrameTerms, fit_b
 from corpus_tools.training.train_talker import build_utterances, resting_parameters
 from lexicon.phones import ARPABET
 from lexicon.sequence import SILENCE
-from tts2face.cloning.lip_gaps import UNBOUNDED_MM, facing_gaps, nearest_valid_parameters
-from tts2face.cloning.parameter_transfer import face_size
-from tts2face.exemplar.synthesis import DEFAULT_OPTIONS, ExemplarModel, build_exemplar_model, speech_trajectory
+from tts2face.lips.cloning import UNBOUNDED_MM, face_size, facing_gaps, nearest_valid_parameters
+from tts2face.lips.exemplar import DEFAULT_OPTIONS, ExemplarModel, build_exemplar_model, speech_trajectory
+from tts2face.lips.retargeting import inner_product_map
 from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
 from tts2face.models.talker import ShapeModel, Talker, Utterance
-from tts2face.numeric import fix_signs, interpolate_columns, principal_axes
-from tts2face.retargeting.to_face import inner_product_map
+from tts2face.numeric.arrays import fix_signs, interpolate_columns, principal_axes
 
 PRIOR_FRAMES = 500.0  # of the base's motion that the shape model counts beside the person's own frames
 NO_CHANGE = 1e12  # penalty with which the articulation of the base does not change

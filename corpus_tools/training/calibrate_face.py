@@ -2,6 +2,8 @@
 
 A score map is trained on scores of the face's landmarks in thousands of poses, and corrected by scores that the tracker
 reads in rendered pictures of some hundred poses.
+
+Score maps added to face files; everything else in a file keeps its bytes.
 """
 
 from dataclasses import replace
@@ -10,20 +12,25 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.training.train_score_map import clipped_logits, fit_score_map, read_mouth_scores
+from corpus_tools.training.score_map import clipped_logits, fit_score_map, read_mouth_scores
 from lexicon.errors import DataError
-from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
-from tts2face.face.mouth_model import SPEECH_SHAPE_PREFIXES
+from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.mouth import SPEECH_SHAPE_PREFIXES
+from tts2face.lips.retargeting import build_retargeter
+from tts2face.models import face_file
 from tts2face.models.face import Face
+from tts2face.models.face_loading import load_face
+from tts2face.models.face_schema import SCORE_INPUTS
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.models.score_map import SCORE_SHAPES, ScoreMap, mouth_scores
-from tts2face.models.talker import Talker
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.picture import Picture
-from tts2face.retargeting.to_face import build_retargeter
+from tts2face.models.networks import SCORE_MAP_PREFIX, SCORE_SHAPES, ScoreMap, mouth_scores, score_map_arrays
+from tts2face.models.talker import Talker, load_talker
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
+from tts2face.storage.files import find_file
+from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import Progress, Trajectory
-from tts2face.video.blendshapes import BLENDSHAPES, BlendshapeReader
-from tts2face.video.track import FaceTracker
+from tts2face.video.take import BLENDSHAPES, BlendshapeReader
+from tts2face.video.tracking import FaceTracker
 
 N_UTTERANCES = 40  # of the talker whose poses the face takes
 N_POSES = 4000  # whose scores are computed from landmarks
@@ -192,3 +199,38 @@ def _read_drawn(
         raise DataError("the tracker finds no face in pictures of the face, so its scores cannot be calibrated")
     scores = np.array([reader.blendshape_scores(points) for points in tracking.points[seen]])
     return poses[seen], mouth_scores(Trajectory(BLENDSHAPES, scores, 25.0))
+
+
+def calibrate_face_file(
+    face: str, out: Path, *, source: str = "grid_s1", model: Path | None = None, on_progress: Progress | None = None
+) -> None:
+    """Write a face file with its score map, which replaces one that it has; pictures show the face's own haircut.
+
+    Parameters
+    ----------
+    face
+        Shipped face, or path of a ``.face`` file.
+    source
+        Talker with a score map, whose speech gives the poses.
+
+    Raises
+    ------
+    InputError
+        There is no such face or talker.
+    DataError
+        The face cannot be calibrated, or a file is damaged.
+    BackendError
+        The face tracker or its models are missing, or the file cannot be written.
+    """
+    path = find_file(face, face_file.KIND)
+    calibrated = calibrate_face(load_face(str(path)), load_talker(source), model=model, on_progress=on_progress)
+    if calibrated.scores is not None:
+        _replace_score_map(path, out, calibrated.scores)
+
+
+def _replace_score_map(path: Path, out: Path, scores: ScoreMap) -> None:
+    arrays, header = read_tensors(path, face_file.KIND, face_file.FORMAT_VERSION)
+    kept = {name: array for name, array in arrays.items() if not name.startswith(SCORE_MAP_PREFIX)}
+    header = header | {SCORE_INPUTS: list(scores.inputs)}
+    written = kept | score_map_arrays(scores)
+    write_tensors(out, face_file.KIND, face_file.FORMAT_VERSION, written, header, is_packed=True)

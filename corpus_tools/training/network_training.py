@@ -3,15 +3,18 @@
 Two hidden layers of rectified linear units. Every sum is accumulated in one order, in single precision, without BLAS
 and on one thread, so that the same data and seed give the same bytes on any number of threads. Several speakers share
 all weights but the biases of the first layer; each output counts only for the speakers for whom it is known.
+
+Codes of phones for networks: articulatory features, or one-hot.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.compilation import kernel
+from lexicon.phones import phone_features
+from tts2face.numeric.kernels import kernel
 
 BATCH = 128  # samples per step
 LEARNING_RATE = 1e-3  # Kingma and Ba 2015
@@ -270,3 +273,8 @@ def _adam_step(values, gradient, mean, square, decay, step):  # type: ignore[no-
         first[i] = keep_mean * first[i] + (np.float32(1.0) - keep_mean) * g
         second[i] = keep_square * second[i] + (np.float32(1.0) - keep_square) * g * g
         flat[i] -= rate * (first[i] * mean_scale) / (np.sqrt(second[i] * square_scale) + np.float32(EPSILON))
+
+
+def feature_table(inventory: Iterable[str]) -> NDArray[np.float32]:
+    """(P, K) articulatory features of P phones, for their first and their second half."""
+    return np.array([[*first, *last] for first, last in map(phone_features, inventory)], np.float32)

@@ -15,8 +15,8 @@ With this file beside it, alone in a folder:
 """
 
 from lexicon.phones import look_up_phone
-from tts2face.exports.formats import FormatInfo
-from tts2face.exports.labels import PhoneLabels
+from tts2face.interchange.exports.parts import PhoneLabels
+from tts2face.interchange.exports.table import FormatInfo
 
 SHAPES = {"silence": "rest", "lateral": "L", "bilabial": "MBP", "labiodental": "FV", "labial-velar": "WQ"}
 

@@ -21,11 +21,10 @@ import tempfile
 from pathlib import Path
 
 from lexicon.errors import BackendError
-from tts2face.speech.forced_alignment import Aligner
+from tts2face.sound.alignment import Aligner
+from tts2face.sound.voice import VoiceInfo, pronounce_content
 from tts2face.types import Speech
 from tts2face.video.media import read_sound
-from tts2face.voice.content import pronounce_content
-from tts2face.voice.engine import VoiceInfo
 
 PROGRAM = os.environ.get("VOICE_COMMAND", "espeak-ng -v en-us -s {speed} -w {out} {text}")
 

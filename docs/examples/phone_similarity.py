@@ -10,9 +10,8 @@ a page with dendrogram, reliability and agreement with articulation.
 import sys
 from pathlib import Path
 
-from corpus_tools.similarity.analysis import Options
-from corpus_tools.similarity.text import table_csv
-from corpus_tools.similarity.write import write_similarity
+from corpus_tools.studies.similarity.analysis import Options
+from corpus_tools.studies.similarity.write import table_csv, write_similarity
 
 analysis = write_similarity(sys.argv[1], Path("similarity.html"), Options(classes=(6,), halves=10))
 table = analysis.table

@@ -11,7 +11,7 @@ from PIL import Image
 import tts2face
 from lexicon.errors import InputError
 from tests.golden.requests import starter_with_pictures
-from tts2face.synthesis.performance import Performance
+from tts2face.session.performance import Performance
 from tts2face.types import concatenate_clips
 
 TEXTS = ("Bob may move.", "We were away.", "Five big maps.", "Hello there.")

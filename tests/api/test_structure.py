@@ -19,13 +19,12 @@ Find = Callable[[str, str], Iterator[str]]  # of the text and the name of a modu
 
 # Places that start Python, outside the room of child processes, which is to start all of them.
 PROCESS_ROOM = "tts2face.processes"
-STARTS_PYTHON = ("tts2face.voice.espeak",)
+STARTS_PYTHON = ("tts2face.sound.espeak",)
 # Modules that read JSON or TOML themselves; `lexicon.inputs` does it for others.
 PARSES = (
-    "corpus_tools.head.assets", "lexicon.inputs", "lexicon.part_of_speech", "tts2face.processes.message",
-    "tts2face.jobs.job_records", "tts2face.jobs.job_table", "tts2face.jobs.resource_table",
-    "tts2face.storage.tensors", "tts2face.studio.projects.bundle", "tts2face.voice.espeak",
-    "tts2face.voice.espeak_child",
+    "corpus_tools.head.source", "lexicon.inputs", "lexicon.part_of_speech", "tts2face.processes.message",
+    "tts2face.serving.studio.previews", "tts2face.serving.work.resources", "tts2face.serving.work.table",
+    "tts2face.sound.espeak", "tts2face.sound.espeak_child", "tts2face.storage.tensors",
 )  # fmt: skip
 # Strings that name a module of a package above their own, or of a room of tts2face above theirs.
 NAMES_HIGHER = ()
@@ -142,7 +141,7 @@ def test_every_way_to_write_an_exception_is_found() -> None:
     made = (
         '"""Serves corpus_tools.tools."""\n'
         "import json as j, sys\nfrom json import loads, dumps\nfrom sys import executable\nimport tomllib\n"
-        'run(sys.executable, "-m", "corpus_tools.run_options", f"cli.main {loads}", "tts2face.api", "cli.nothing")\n'
+        'run(sys.executable, "-m", "corpus_tools.run_options", f"cli.main {loads}", "tts2face.types", "cli.nothing")\n'
         "j.load(file); j.dumps({}); tomllib.loads(text)\n"
     )
     assert list(starts_of_python(made, "tts2face.x")) == ["tts2face.x"] * 2
@@ -151,11 +150,11 @@ def test_every_way_to_write_an_exception_is_found() -> None:
     assert list(higher_names(made, "tts2face.x")) == [
         "tts2face.x: corpus_tools.run_options", "tts2face.x: cli.main"
     ]  # fmt: skip
-    assert "lexicon.x: tts2face.api" in list(higher_names(made, "lexicon.x"))
+    assert "lexicon.x: tts2face.types" in list(higher_names(made, "lexicon.x"))
     assert list(higher_names(made, "cli.x")) == []
-    given = 'run("tts2face.studio.x.tasks:TASKS", "tts2face.batch:run", "tts2face.studio")'
-    assert list(higher_names(given, "tts2face.service.x")) == ["tts2face.service.x: tts2face.studio.x.tasks"]
-    assert list(higher_names(given, "tts2face.studio.x")) == []
+    given = 'run("tts2face.serving.x.tasks:TASKS", "tts2face.models:run", "tts2face.serving")'
+    assert list(higher_names(given, "tts2face.session.x")) == ["tts2face.session.x: tts2face.serving.x.tasks"]
+    assert list(higher_names(given, "tts2face.serving.x")) == []
 
 
 def test_what_is_new_and_what_is_gone_is_named() -> None:

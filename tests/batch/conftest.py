@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from tests.synthesis.fake_voice import FakeVoice
-from tts2face.batch.options import BatchOptions
-from tts2face.batch.output import Plan
-from tts2face.batch.plan import plan_batch
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
 from tts2face.request import Request
-from tts2face.voice import pool
+from tts2face.serving.batch.options import BatchOptions
+from tts2face.serving.batch.output import Plan
+from tts2face.serving.batch.plan import plan_batch
+from tts2face.sound import voice_pool
 
 FPS = 10
 SRT = (
@@ -32,7 +32,7 @@ def voices(monkeypatch: pytest.MonkeyPatch) -> list[FakeVoice]:
         loaded.append(FakeVoice())
         return loaded[-1]
 
-    monkeypatch.setattr(pool, "load_voice", load)
+    monkeypatch.setattr(voice_pool, "load_voice", load)
     return loaded
 
 

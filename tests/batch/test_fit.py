@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from tts2face.batch.fit import Limits, fit_speech
-from tts2face.synthesis.speech_stream import SpeechSpan
+from tts2face.serving.batch.windows import Limits, fit_speech
+from tts2face.session.speech_stream import SpeechSpan
 
 TEN = "abcdefghij"  # 1 s at rate 1 with 0.1 s a letter
 

@@ -8,12 +8,12 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from tests.batch.conftest import SRT, Planner
-from tts2face.batch.cast import read_cast
-from tts2face.batch.options import BatchOptions
-from tts2face.batch.plan import plan_batch
-from tts2face.batch.segment import segment_from_json
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
 from tts2face.request import Request
+from tts2face.serving.batch.cast import read_cast
+from tts2face.serving.batch.options import BatchOptions
+from tts2face.serving.batch.plan import plan_batch
+from tts2face.serving.batch.segment import segment_from_json
 from tts2face.storage.files import SHIPPED_FOLDER
 
 CAST = """

@@ -11,10 +11,9 @@ from cli.main import run
 from lexicon.errors import DataError, InputError
 from tests.batch.conftest import Planner
 from tests.synthesis.fake_voice import FakeVoice
-from tts2face.batch.prune import MIN_AGE_S, prune_segments
-from tts2face.batch.run import SEGMENT_FOLDER, run_batch
-from tts2face.batch.segment_result import SegmentResult
-from tts2face.batch.store import FolderStore, Store, open_store
+from tts2face.serving.batch.run import MIN_AGE_S, SEGMENT_FOLDER, prune_segments, run_batch
+from tts2face.serving.batch.segment import SegmentResult
+from tts2face.serving.batch.store import FolderStore, Store, open_store
 
 WEEK_S = 7 * 86_400.0
 

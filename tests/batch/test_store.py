@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.batch.segment_result import SegmentResult
-from tts2face.batch.store import open_store
+from tts2face.serving.batch.segment import SegmentResult
+from tts2face.serving.batch.store import open_store
 
 ADDRESS = "ab" * 32
 RESULT = SegmentResult(15, 10.0, 1.1, 1.4, 0.0, 0.0, ("a warning",), 2.5)

@@ -5,8 +5,8 @@ from fractions import Fraction
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tts2face.batch.windows import cue_windows, scenes
-from tts2face.subtitles.cue import Cue
+from tts2face.interchange.subtitles.cues import Cue
+from tts2face.serving.batch.windows import cue_windows, scenes
 
 
 def cue(begin: float, end: float, text: str = "abc", number: int = 1) -> Cue:

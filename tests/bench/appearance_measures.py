@@ -6,13 +6,12 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.aam.block_pca import IncrementalPca
-from corpus_tools.aam.procrustes import align_shapes, apply_similarities, fit_similarities
-from corpus_tools.aam.reference_frame import MOUTH_LANDMARKS
-from corpus_tools.aam.source_videos import AppearanceRecording
-from corpus_tools.aam.train_appearance import LearnedAppearance
-from corpus_tools.recordings.audio_video_sync import LIP_LEAD_S, estimate_sync
+from corpus_tools.appearance.frame import MOUTH_LANDMARKS, align_shapes, apply_similarities, fit_similarities
+from corpus_tools.appearance.pca import IncrementalPca
+from corpus_tools.appearance.train import LearnedAppearance
+from corpus_tools.appearance.videos import AppearanceRecording
 from corpus_tools.recordings.observation import Observation
+from corpus_tools.recordings.sync import LIP_LEAD_S, estimate_sync
 from corpus_tools.training.train_talker import CLOSED_GAP
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,

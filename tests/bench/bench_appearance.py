@@ -10,17 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.aam.source_videos import build_appearance_recording
-from corpus_tools.aam.train_appearance import learn_appearance
-from corpus_tools.recordings.corpus_video import CachedTracker
+from corpus_tools.appearance.train import learn_appearance
+from corpus_tools.appearance.videos import build_appearance_recording
 from corpus_tools.recordings.observe import observe
+from corpus_tools.recordings.video import CachedTracker
 from corpus_tools.run_options import RunOptions
 from corpus_tools.training.train_talker import learn_talker
 from tests.bench.appearance_measures import measure_appearance
 from tts2face.models.talker import write_talker
-from tts2face.render.own_face import draw_video_frame, own_face_renderer
-from tts2face.render.picture import Picture
-from tts2face.video.landmark_models import find_bundle
+from tts2face.picture.options import Picture
+from tts2face.picture.own_face import draw_video_frame, own_face_renderer
+from tts2face.video.tracking import find_bundle
 
 
 def main() -> None:

@@ -8,14 +8,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from PIL import Image
 
-from corpus_tools.dense.photo_avatar import build_avatar
+from corpus_tools.dense.avatar import build_avatar
 from corpus_tools.recordings.folder import VIDEO_SUFFIXES
 from tests.corpus_tools.build.likeness import SKIN, colours_apart, marks_apart, nearest, see_head, see_picture
 from tests.photo.pictures import still
 from tts2face.models.face_loading import load_face
 from tts2face.photo.found_face import PhotoReader
 from tts2face.video.media import read_frames
-from tts2face.video.track import FaceTracker
+from tts2face.video.tracking import FaceTracker
 
 STILLS, SIDE_PX = ("head", "mara", "tomas", "noor"), 512
 

@@ -10,13 +10,13 @@ import tempfile
 import time
 from pathlib import Path
 
-from tts2face.batch.engine import LocalEngine
-from tts2face.batch.options import BatchOptions
-from tts2face.batch.output import Plan
-from tts2face.batch.plan import plan_batch
-from tts2face.batch.run import run_batch
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
 from tts2face.request import Request
+from tts2face.serving.batch.engine import LocalEngine
+from tts2face.serving.batch.options import BatchOptions
+from tts2face.serving.batch.output import Plan
+from tts2face.serving.batch.plan import plan_batch
+from tts2face.serving.batch.run import run_batch
 
 WORDS = (
     "We were away a year ago, but Bob may move five big maps.",
@@ -88,7 +88,7 @@ class BoundEngine(LocalEngine):
     def render(self, segments, store):  # type: ignore[no-untyped-def]
         from concurrent.futures import ThreadPoolExecutor, as_completed
 
-        from tts2face.batch.engine import _processes, render_into
+        from tts2face.serving.batch.engine import _processes, render_into
 
         with _processes(self.n_jobs) as free, ThreadPoolExecutor(self.n_jobs) as pool:
 
@@ -105,8 +105,8 @@ class BoundEngine(LocalEngine):
 
 def bench_queue(folder: Path, database: str, n_workers: int = 4, n_cues: int = 400) -> None:
     """Jobs per second that workers without any rendering take from a database."""
-    from tts2face.batch.store import open_store
-    from tts2face.jobs.engine import DatabaseEngine
+    from tts2face.serving.batch.store import open_store
+    from tts2face.serving.work.engine import DatabaseEngine
 
     plan = plan_of(folder, n_cues)
     store = folder / "store"

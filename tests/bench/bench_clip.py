@@ -19,10 +19,10 @@ from sentences import sentences
 
 from tts2face.models.face_loading import load_face
 from tts2face.models.talker import load_talker
-from tts2face.render.encode import ClipWriter
-from tts2face.render.picture import Picture
+from tts2face.picture.film import ClipWriter
+from tts2face.picture.options import Picture
 from tts2face.request import Request
-from tts2face.session import Session
+from tts2face.session.session import Session
 
 COMMAND = "from cli.main import main; main()"
 SHORT = "We were away a year ago, but Bob may move five big maps."
@@ -64,7 +64,7 @@ def whole_clip(folder: Path, n_runs: int = 3) -> None:
 
 FIRST_FRAME = """
 import os, sys, time
-from tts2face.render.draw import MeshRenderer
+from tts2face.picture.renderer import MeshRenderer
 frames = MeshRenderer.frames
 def first(*arguments, **options):
     for _ in frames(*arguments, **options):
@@ -116,7 +116,7 @@ def cold_start(folder: Path) -> None:
         print(f"{what}: {np.median(spent):.2f} s ({min(spent):.2f}-{max(spent):.2f})")
     code = (
         "import sys, time; began = time.perf_counter()\n"
-        "from tts2face.render.draw import MeshRenderer as M; frames = M.frames\n"
+        "from tts2face.picture.renderer import MeshRenderer as M; frames = M.frames\n"
         "def first(*a, **k):\n"
         "    for n, x in enumerate(frames(*a, **k)):\n"
         "        if n == 0: print(time.perf_counter() - began)\n"

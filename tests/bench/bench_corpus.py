@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from corpus_tools.recordings.folder import find_recordings, pronounce_recording
-from tts2face.speech.forced_alignment import Aligner
+from tts2face.sound.alignment import Aligner
 from tts2face.video.media import read_frames, read_sound
 from tts2face.video.pose import remove_pose
-from tts2face.video.track import FaceTracker
+from tts2face.video.tracking import FaceTracker
 
 LIPS = (0, 13, 14, 17, 61, 291)
 

@@ -12,8 +12,8 @@ from PIL import Image, ImageDraw
 
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
 
 N_DRAWN = 6
 AMOUNTS = (-2.0, 0.0, 2.0)  # standard deviations

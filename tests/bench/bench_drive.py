@@ -13,27 +13,26 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
-from corpus_tools.evaluation.reference import ReferenceUtterance, Thresholds
-from corpus_tools.evaluation.scores import Scores, score_splits
-from corpus_tools.evaluation.splits import split_into_folds, split_randomly
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import observe
-from corpus_tools.training.canonical_correlation import canonical_correlation
-from corpus_tools.training.linear_audio_map import learn_linear_map
-from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_network_map
-from corpus_tools.training.pose_correction import fit_pose_correction
-from corpus_tools.training.train_audio_map import (
+from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
+from corpus_tools.studies.evaluation.reference import ReferenceUtterance, Thresholds
+from corpus_tools.studies.evaluation.scores import Scores, score_splits
+from corpus_tools.studies.evaluation.splits import split_into_folds, split_randomly
+from corpus_tools.training.linear_audio_map import canonical_correlation, learn_linear_map
+from corpus_tools.training.network_audio_map import (
     AUDIO_MAP_FEATURES,
     TALKER_NETWORK_OPTIONS,
+    NetworkMapOptions,
     build_training_utterances,
+    learn_network_map,
     sound_features,
     utterance_features,
 )
-from corpus_tools.training.train_talker import learn_talker
-from tts2face.exemplar import motion_measures
+from corpus_tools.training.train_talker import fit_pose_correction, learn_talker
+from tts2face.lips import explanation
 from tts2face.models.audio_map import AudioMap
-from tts2face.speech.features import FEATURE_RATE, speech_level
+from tts2face.sound.features import FEATURE_RATE, speech_level
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 
@@ -104,7 +103,7 @@ class Bench:
     def ties(self, trials: int, seed: int) -> dict[str, np.ndarray]:
         """First canonical correlation of randomly selected frames, mean over trials."""
         model = learn_talker(self.train, metadata=EVALUATION_METADATA).model
-        speech = [motion_measures.speech_frames(one.phones, len(one.landmarks), one.fps) for one in self.train]
+        speech = [explanation.speech_frames(one.phones, len(one.landmarks), one.fps) for one in self.train]
         seen = np.concatenate(
             [model.parameters(one.landmarks[here])[:, :20] for one, here in zip(self.train, speech, strict=True)]
         )

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 from sentences import sentences
 
-from tts2face.exemplar import motion_measures
-from tts2face.exemplar.synthesis import build_exemplar_model, speech_trajectory
+from tts2face.lips import explanation
+from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
 from tts2face.models.landmarks import lip_opening, lip_width
 from tts2face.models.talker import Talker, load_talker
-from tts2face.synthesis.audio_input import map_audio_to_motion
+from tts2face.session.recording import map_audio_to_motion
+from tts2face.sound.voice_pool import load_voice
 from tts2face.types import Speech, frame_count
-from tts2face.voice.loading import load_voice
 
 
 def main() -> None:
@@ -54,9 +54,9 @@ def lip_errors(speeches: list[Speech], talker: Talker, drive: object) -> tuple[f
     ]
     openings, widths = ([measure(one) for one in shapes] for measure in (lip_opening, lip_width))
     return (
-        motion_measures.correlation(*openings),
-        motion_measures.correlation(*widths),
-        motion_measures.range_ratio(*openings),
+        explanation.correlation(*openings),
+        explanation.correlation(*widths),
+        explanation.range_ratio(*openings),
     )
 
 

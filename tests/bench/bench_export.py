@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 import tts2face
-from tts2face.exports.arkit import ARKIT_SHAPES, build_arkit_projection
-from tts2face.exports.formats import FORMATS
-from tts2face.exports.parts import Target
+from tts2face.interchange.exports.curves import ARKIT_SHAPES, build_arkit_projection
+from tts2face.interchange.exports.parts import Target
+from tts2face.interchange.exports.table import FORMATS
 from tts2face.types import concatenate_clips
 
 SECONDS = 60.0

@@ -14,7 +14,11 @@ from pathlib import Path
 import av
 import numpy as np
 
-from corpus_tools.evaluation.fingerprints import (
+from corpus_tools.recordings.observation import Observation, head_motion
+from corpus_tools.recordings.observe import observe
+from corpus_tools.recordings.sound import SOUND_RATE
+from corpus_tools.run_options import RunOptions
+from corpus_tools.studies.evaluation.splits import (
     Fingerprint,
     face_modes,
     find_same,
@@ -23,10 +27,6 @@ from corpus_tools.evaluation.fingerprints import (
     similarities,
     sound_changes,
 )
-from corpus_tools.recordings.corpus_audio import SOUND_RATE
-from corpus_tools.recordings.observation import Observation, head_motion
-from corpus_tools.recordings.observe import observe
-from corpus_tools.run_options import RunOptions
 from tests.bench.bench_recording_limits import (
     Pictures,
     Samples,
@@ -36,13 +36,12 @@ from tests.bench.bench_recording_limits import (
     through_codec,
     through_mp3,
 )
-from tts2face.speech.loudness import intensity
+from tts2face.sound.features import intensity
 from tts2face.types import Waveform
-from tts2face.video.frame_grid import trim_and_fill
-from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import TimedFrame, read_frames, read_sound
-from tts2face.video.pose import remove_pose
-from tts2face.video.streaming_tracker import StreamingTracker
+from tts2face.video.pose import remove_pose, trim_and_fill
+from tts2face.video.streaming import StreamingTracker
+from tts2face.video.tracking import find_bundle
 
 PICTURES_OF = 3  # every third recording's pictures are tracked again
 TRIMMED_S = 0.21  # of the beginning; no whole number of steps

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from corpus_tools.gesture_study.clips import replace_style, select_recordings
-from corpus_tools.gesture_study.measures import split_recordings
-from tts2face.gesture.field import Field, FieldState, initial_state, sample_field
-from tts2face.gesture.gesture_stream import GestureFields
+from corpus_tools.studies.gestures.clips import replace_style, select_recordings
+from corpus_tools.studies.gestures.measures import split_recordings
+from tts2face.gestures.field import Field, FieldState, initial_state, sample_field
+from tts2face.gestures.stream import GestureFields
 from tts2face.models.palette import GESTURE_FPS, Palette, Style, load_palette
 
 SECONDS = 120

@@ -18,14 +18,12 @@ from typing import Any
 
 from tests.bench.bench_batch import plan_of
 from tests.jobs.conftest import Postgres
-from tts2face.batch.segment import Segment
-from tts2face.batch.segment_result import SegmentResult
-from tts2face.batch.store import open_store
-from tts2face.jobs.control import list_jobs
-from tts2face.jobs.database import BEAT_S, Workers, database_url, prepare_database
-from tts2face.jobs.engine import DatabaseEngine, LocalWorker, enqueue, open_client
-from tts2face.jobs.takeover import poll_interval
-from tts2face.jobs.worker import Worker
+from tts2face.serving.batch.segment import Segment, SegmentResult
+from tts2face.serving.batch.store import open_store
+from tts2face.serving.work.client import list_jobs
+from tts2face.serving.work.database import BEAT_S, Workers, database_url, prepare_database
+from tts2face.serving.work.engine import DatabaseEngine, LocalWorker, enqueue, open_client
+from tts2face.serving.work.worker import Worker, poll_interval
 
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 SETTINGS = "-c max_connections=1200 -c shared_preload_libraries=pg_stat_statements -c shared_buffers=512MB"
@@ -274,7 +272,7 @@ def bench_speed(place: Path, database: str, server: Postgres | None, chosen: arg
 
 def run_timed(folder: Path, plan: Any, database: str, n_workers: int) -> None:
     """Run a batch; the time between the first and the last end of a segment, and the renderings in it."""
-    from tts2face.batch.run import run_batch
+    from tts2face.serving.batch.run import run_batch
 
     engine = DatabaseEngine(database, str(folder / "store"), n_workers=0)
     store = open_store(folder / "store")

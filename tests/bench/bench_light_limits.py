@@ -12,14 +12,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from corpus_tools.recordings.face_light import MEASURES, measure_light
 from corpus_tools.recordings.limits import landmark_measures
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import observe
+from corpus_tools.recordings.video import MEASURES, measure_light
 from corpus_tools.run_options import RunOptions
 from tests.bench.bench_recording_limits import Pictures, lip_correlations, retrack
-from tts2face.video.landmark_models import find_bundle
-from tts2face.video.streaming_tracker import StreamingTracker
+from tts2face.video.streaming import StreamingTracker
+from tts2face.video.tracking import find_bundle
 
 RNG = np.random.default_rng(0)
 

@@ -20,8 +20,8 @@ import numpy as np
 from PIL import Image
 
 from tts2face.processes.parent import started
-from tts2face.studio.puppetry.camera_process import FOLLOW
-from tts2face.studio.puppetry.live_camera import PROGRAM
+from tts2face.serving.studio.camera import PROGRAM
+from tts2face.serving.studio.camera_process import FOLLOW
 from tts2face.video.media import read_frames
 
 SIZE = (480, 360)

@@ -11,12 +11,11 @@ import time
 import numpy as np
 
 from tests.render.stability import flicker, part_masks
-from tts2face.models.face import Face
+from tts2face.models.face import Face, keep_parts
 from tts2face.models.face_loading import load_face
-from tts2face.models.face_parts import keep_parts
-from tts2face.render.draw import MeshRenderer, mesh_renderer
-from tts2face.render.picture import Picture
-from tts2face.render.picture_kernels import allocate_buffers
+from tts2face.picture.kernels.picture import allocate_buffers
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import MeshRenderer, mesh_renderer
 
 N_FRAMES = 12
 

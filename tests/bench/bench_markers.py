@@ -10,15 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.decomposition.basis_expressions import transfer_basis
+from corpus_tools.decomposition.basis import transfer_basis
 from corpus_tools.decomposition.blend_weights import build_least_squares_estimator, moving_average
 from corpus_tools.decomposition.capture import resample, resample_to_gesture_rate
-from corpus_tools.decomposition.capture_files import read_livelink_recording
-from corpus_tools.decomposition.marker_set import read_marker_set
-from corpus_tools.decomposition.markers import read_marker_recording
+from corpus_tools.decomposition.markers import read_marker_recording, read_marker_set
+from corpus_tools.decomposition.recordings import read_livelink_recording
 from tests.corpus_tools.decomposition.made_markers import FPS, SIZE, made_take, write_c3d
+from tts2face.face.deformation import rest_landmarks
 from tts2face.face.expressions import expression_landmarks
-from tts2face.face.face_motion import rest_landmarks
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, N_MESH_LANDMARKS, UPPER_LIP_INNER_MID
 from tts2face.models.palette import EXPRESSIONS

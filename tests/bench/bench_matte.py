@@ -16,12 +16,11 @@ from lexicon.errors import DataError
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import CHIN
 from tts2face.photo.found_face import FoundFace, find_face
-from tts2face.photo.person_matte import HEAD_END, part_background
+from tts2face.photo.matte import HEAD_END, part_background
 from tts2face.photo.photograph import Photograph
-from tts2face.render.draw import draw
-from tts2face.render.picture import Picture
-from tts2face.video.landmark_models import LandmarkNetwork, find_segmenter
-from tts2face.video.track import FaceTracker
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import draw
+from tts2face.video.tracking import FaceTracker, LandmarkNetwork, find_segmenter
 
 SIDE, NEAR, BAD = 640, 0.25, 0.08  # px, of the eye distance, and error of a bad matte
 DRAWN = ("ada", "ben", "noor", "zuri", "mara", "tomas")

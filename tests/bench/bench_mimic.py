@@ -11,16 +11,15 @@ from pathlib import Path
 import numpy as np
 
 from tts2face.models.landmarks import MOUTH_CORNER_LEFT, MOUTH_CORNER_RIGHT, eye_aperture, inner_lip_gaps
-from tts2face.render.encode import write_clips
-from tts2face.render.picture import Picture
-from tts2face.session import Session
-from tts2face.synthesis.performance import retarget_take, take_clips
-from tts2face.video.blendshapes import BlendshapeReader
+from tts2face.picture.film import write_clips
+from tts2face.picture.options import Picture
+from tts2face.session.performance import retarget_take, take_clips
+from tts2face.session.session import Session
 from tts2face.video.media import read_frames, read_media_info, read_sound
 from tts2face.video.pose import head_angles, remove_pose
-from tts2face.video.streaming_tracker import StreamingTracker
-from tts2face.video.take import Take, read_take
-from tts2face.video.track import FaceTracker
+from tts2face.video.streaming import StreamingTracker
+from tts2face.video.take import BlendshapeReader, Take, read_take
+from tts2face.video.tracking import FaceTracker
 
 
 def track_clip(path: Path, tracker: FaceTracker) -> tuple[np.ndarray, np.ndarray]:

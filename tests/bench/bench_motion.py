@@ -13,16 +13,16 @@ from pathlib import Path
 import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.options import THEOBALD_2007
-from tts2face.exemplar.synthesis import (
+from tts2face.lips.exemplar import (
     DEFAULT_OPTIONS,
     ExemplarModel,
     build_exemplar_model,
     select_tokens,
     speech_trajectory,
 )
+from tts2face.lips.options import THEOBALD_2007
 from tts2face.models.talker import Talker, Utterance, read_talker
-from tts2face.speech.forced_alignment import enforce_increasing
+from tts2face.sound.alignment import enforce_increasing
 from tts2face.types import frame_count
 
 FPS = 30.0

@@ -7,8 +7,8 @@ import sys
 import time
 from dataclasses import replace
 
-from corpus_tools.pooling.base_phrases import base_speech
-from corpus_tools.training.train_phone_network import add_phone_network
+from corpus_tools.training.phone_network import add_phone_network
+from corpus_tools.training.pooling.speech import base_speech
 from tts2face.models.talker import load_talker
 
 

@@ -19,14 +19,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.person_tracks import read_person
-from corpus_tools.evaluation.reference import LipCurves
+from corpus_tools.studies.evaluation.reference import LipCurves
+from corpus_tools.studies.evaluation.tracks import read_person
 from lexicon.phones import ARPABET, nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.face.face_motion import moved_landmarks
+from tts2face.face.deformation import moved_landmarks
+from tts2face.lips.performer import match_shapes
 from tts2face.models.face_loading import load_face
 from tts2face.models.talker import load_talker
-from tts2face.retargeting.performer import match_shapes
 from tts2face.types import Trajectory
 
 RATE_HZ = 50.0

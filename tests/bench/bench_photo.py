@@ -17,10 +17,10 @@ from PIL import Image
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.photo.face_from_photo import face_from_photo
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
 from tts2face.request import Request
-from tts2face.session import Session
+from tts2face.session.session import Session
 
 SIDES = (512, 1024)
 N_FRAMES, N_MADE, N_STREAMED = 60, 3, 7

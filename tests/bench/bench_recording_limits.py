@@ -19,30 +19,27 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
-from corpus_tools.evaluation.methods import build_methods
-from corpus_tools.evaluation.reference import LipCurves
-from corpus_tools.recordings.audio_video_sync import LAGS_S, NEAR_S, lag_correlations
-from corpus_tools.recordings.corpus_audio import SOUND_RATE, AlignedSpeech
-from corpus_tools.recordings.expected_lips import shipped_talker_opening
 from corpus_tools.recordings.folder import Recording, find_recordings, pronounce_recording
 from corpus_tools.recordings.limits import check_limits, confidence_measure, landmark_measures, sound_measures
-from corpus_tools.recordings.noise_suppression import suppress_noise
-from corpus_tools.recordings.observation import Observation, trim_to_picture
+from corpus_tools.recordings.observation import Observation, shipped_talker_opening, trim_to_picture
 from corpus_tools.recordings.observe import observe
+from corpus_tools.recordings.sound import SOUND_RATE, AlignedSpeech, suppress_noise
+from corpus_tools.recordings.sync import LAGS_S, NEAR_S, lag_correlations
 from corpus_tools.run_options import RunOptions
+from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
+from corpus_tools.studies.evaluation.methods import build_methods
+from corpus_tools.studies.evaluation.reference import LipCurves
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence
-from tts2face.exemplar.motion_measures import correlation, speech_frames
+from tts2face.lips.explanation import correlation, speech_frames
 from tts2face.models.landmarks import lip_opening
-from tts2face.speech.forced_alignment import Aligner
+from tts2face.sound.alignment import Aligner
 from tts2face.types import Waveform
-from tts2face.video.frame_grid import trim_and_fill
-from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import TimedFrame, read_frames, read_sound
-from tts2face.video.pose import remove_pose
-from tts2face.video.streaming_tracker import StreamingTracker
+from tts2face.video.pose import remove_pose, trim_and_fill
+from tts2face.video.streaming import StreamingTracker
+from tts2face.video.tracking import find_bundle
 
 Samples = NDArray[np.float32]
 Pictures = list[NDArray[np.uint8]]

@@ -9,8 +9,8 @@ import numpy as np
 from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.face_loading import load_face
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.picture import RENDERERS, Picture
+from tts2face.picture.options import RENDERERS, Picture
+from tts2face.picture.renderer import mesh_renderer
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 FPS, RATE = 30, 24_000

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tts2face.lips.retargeting import BILABIALS, build_retargeter
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import (
@@ -24,7 +25,6 @@ from tts2face.models.landmarks import (
     UPPER_LIP_INNER_MID,
 )
 from tts2face.models.talker import Talker, Utterance, read_talker
-from tts2face.retargeting.to_face import BILABIALS, build_retargeter
 from tts2face.types import Trajectory
 
 Floats = NDArray[np.float64]

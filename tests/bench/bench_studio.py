@@ -16,7 +16,7 @@ from pathlib import Path
 from tests.studio.chromium import Browser
 from tests.studio.harness import TEXT
 from tests.studio.served import HARNESS, Page, create_project, service_with_harness
-from tts2face.studio.components.stage import COMPONENTS
+from tts2face.serving.studio.components.stage import COMPONENTS
 
 WARM_S, PLAYED_S = 2.0, 6.0  # played before and while a page is measured
 REPEATS = 3  # of the harness's sentence of 4 s in the project

@@ -11,7 +11,7 @@ from pathlib import Path
 import av
 import numpy as np
 
-from corpus_tools.recordings.check_recording import RecordingChecker, recordings_to_check
+from corpus_tools.recordings.observe import RecordingChecker, recordings_to_check
 from corpus_tools.run_options import RunOptions
 from lexicon.inputs import read_table
 from tests.corpus_tools.build.test_browser_recordings import RATE, write_browser_file

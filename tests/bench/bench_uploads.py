@@ -14,12 +14,12 @@ from typing import Any
 from lexicon.errors import BackendError
 from tests.characters.made import write_character_file
 from tts2face import Session
-from tts2face.jobs.talker_job import BUILDER, LIMITS, TOOL
 from tts2face.processes.parent import call_once
 from tts2face.processes.program import Program
-from tts2face.service.uploads.decode import DECODE, program
+from tts2face.serving.service.uploads import DECODE, program
+from tts2face.serving.work.kinds import BUILDER, LIMITS, TOOL
 from tts2face.storage.files import find_file
-from tts2face.video.landmark_models import find_bundle
+from tts2face.video.tracking import find_bundle
 
 TEXT = "We were away a year ago. Bob may move. The boy will buy a pie for you. She saw the ship near the shore."
 

@@ -16,8 +16,8 @@ from sentences import sentences
 
 from lexicon.phones import PHONES
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.sound import heart
 from tts2face.types import Waveform
-from tts2face.voice import neural
 
 SIBILANTS = frozenset({"s", "z", "ʃ", "ʒ"})
 HIGH_HZ = 4000
@@ -57,7 +57,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-n", type=int, default=100, help="sentences")
     n = parser.parse_args().n
-    voice = neural.NeuralVoice({})
+    voice = heart.NeuralVoice({})
     errors: dict[str, list[float]] = {"own": [], "own less 45 ms": [], "aligned": []}
     ends: dict[str, list[float]] = {name: [] for name in errors}
     spent = length = 0.0
@@ -70,7 +70,7 @@ def main() -> None:
         letters = "".join(token.letters + " " * token.has_space for token in tokens).strip()
         shifted = sounding(voice._predict_phones(tokens, letters, 1.0, speech.waveform)[0])
         ways = {
-            "own": PhoneSequence(shifted.phones, shifted.edges + neural.BOUNDARY_DELAY_S),
+            "own": PhoneSequence(shifted.phones, shifted.edges + heart.BOUNDARY_DELAY_S),
             "own less 45 ms": shifted,
             "aligned": sounding(speech.phones),
         }

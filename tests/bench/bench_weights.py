@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.decomposition.basis_expressions import transfer_basis
+from corpus_tools.decomposition.basis import transfer_basis
 from corpus_tools.decomposition.blend_weights import (
     N_AVERAGED,
     N_NEAREST,
@@ -23,12 +23,12 @@ from corpus_tools.decomposition.blend_weights import (
     moving_average,
 )
 from corpus_tools.decomposition.capture import resample, resample_to_gesture_rate
-from corpus_tools.decomposition.capture_files import read_livelink_recording
+from corpus_tools.decomposition.recordings import read_livelink_recording
 from corpus_tools.recordings.observe import observe
-from corpus_tools.training.pose_correction import correct_pose
+from corpus_tools.training.train_talker import correct_pose
 from tests.corpus_tools.decomposition.weight_errors import approximation_error
+from tts2face.face.deformation import rest_landmarks
 from tts2face.face.expressions import expression_landmarks
-from tts2face.face.face_motion import rest_landmarks
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.models.palette import EXPRESSIONS, GESTURE_FPS

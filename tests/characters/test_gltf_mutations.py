@@ -11,8 +11,8 @@ import pytest
 from lexicon.errors import DataError, InputError
 from tests.characters.made import Variant, glb, shipped_head, split_glb, write_character_file, write_landmarks
 from tests.fuzz.mutations import change_value
-from tts2face.characters.gltf_character import read_gltf_character
-from tts2face.characters.importing import import_face
+from tts2face.interchange.characters.importing import import_face
+from tts2face.interchange.characters.readers import read_gltf_character
 from tts2face.models.face import Face, Texture
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 
@@ -159,7 +159,7 @@ def test_a_gltf_file_with_files_beside_it(tmp_path: Path) -> None:
 
 
 def test_a_picture_of_many_pixels_is_refused(tmp_path: Path) -> None:
-    from tts2face.characters.materials import decode_image
+    from tts2face.interchange.characters.meshes import decode_image
 
     width = (100_000).to_bytes(4, "big")
     import zlib

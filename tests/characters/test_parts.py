@@ -6,15 +6,19 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError
-from tts2face.characters.atlas import CUTOUT, build_atlas, coverage, fill_uncovered, triangle_opacity
-from tts2face.characters.character import BLEND, MASK, Material
-from tts2face.characters.meshopt import apply_exponential_filter, decode_buffer
-from tts2face.characters.shape_mapping import ShapeSource
-from tts2face.characters.shape_names import ARKIT_SHAPES, guess_mapping
-from tts2face.characters.surface_points import _barycentric, _Projection, nearest_points, points_under_pixels
+from tts2face.interchange.characters.atlas import CUTOUT, build_atlas, coverage, fill_uncovered, triangle_opacity
+from tts2face.interchange.characters.character import BLEND, MASK, Material
+from tts2face.interchange.characters.shapes import ARKIT_SHAPES, ShapeSource, guess_mapping
+from tts2face.interchange.characters.surface_points import (
+    _barycentric,
+    _Projection,
+    nearest_points,
+    points_under_pixels,
+)
+from tts2face.interchange.gltf.meshopt import apply_exponential_filter, decode_buffer
 from tts2face.models.face_loading import load_face
-from tts2face.numeric import matrix_quaternion, quaternion_matrix
-from tts2face.render.camera import CameraMatrices
+from tts2face.numeric.arrays import matrix_quaternion, quaternion_matrix
+from tts2face.picture.camera import CameraMatrices
 
 
 def test_the_table_of_names_is_arkits() -> None:

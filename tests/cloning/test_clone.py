@@ -9,12 +9,8 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
 from lexicon.errors import DataError, InputError
-from tts2face.cloning.parameter_transfer import (
-    append_missing_components,
-    build_parameter_transfer,
-    face_size,
-    parameter_limits,
-)
+from tts2face.lips.cloning import append_missing_components, build_parameter_transfer, face_size, parameter_limits
+from tts2face.lips.retargeting import inner_product_map
 from tts2face.models.landmarks import (
     EYE_OUTER_LEFT,
     EYE_OUTER_RIGHT,
@@ -26,7 +22,6 @@ from tts2face.models.landmarks import (
     UPPER_LIP_INNER_MID,
 )
 from tts2face.models.talker import ShapeModel, load_talker
-from tts2face.retargeting.to_face import inner_product_map
 from tts2face.types import Trajectory
 
 INNER_UPPER_LIP, INNER_LOWER_LIP = list(INNER_LIP_UPPER[1:-1]), list(INNER_LIP_LOWER[1:-1])

@@ -3,23 +3,25 @@
 import numpy as np
 import pytest
 
-from corpus_tools.aam.block_pca import IncrementalPca
-from corpus_tools.aam.procrustes import align_shapes, apply_similarities, fit_similarities
-from corpus_tools.aam.reference_frame import (
+from corpus_tools.appearance.frame import (
     MOUTH_LANDMARKS,
+    align_shapes,
+    apply_similarities,
     barycentric_coordinates,
     build_reference_frame,
     face_ring,
     face_triangles,
+    fit_similarities,
     mouth_triangles,
     points_in_polygon,
 )
-from corpus_tools.aam.source_videos import AppearanceRecording
-from corpus_tools.aam.train_appearance import camera_axes, fit_lighting, speech_weights
+from corpus_tools.appearance.pca import IncrementalPca
+from corpus_tools.appearance.train import camera_axes, fit_lighting, speech_weights
+from corpus_tools.appearance.videos import AppearanceRecording
 from lexicon.errors import InputError
 from tts2face.models.consent import consent_record
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
-from tts2face.render.own_face import ring_triangles
+from tts2face.picture.own_face import ring_triangles
 
 
 def transform(shape, angle, size, shift):
@@ -151,7 +153,7 @@ def test_picture_axes_are_those_of_the_camera():
 def test_pictures_come_at_the_instants_of_the_frames(tmp_path, monkeypatch):
     shown = [type("Picture", (), {"time": t, "pixels": np.full((2, 2, 3), k, np.uint8)}) for k, t in
              enumerate([0.0, 0.04, 0.08, 0.2, 0.24])]  # fmt: skip
-    monkeypatch.setattr("corpus_tools.aam.source_videos.read_frames", lambda path: iter(shown))
+    monkeypatch.setattr("corpus_tools.appearance.videos.read_frames", lambda path: iter(shown))
     nothing = np.zeros((5, 478, 3), np.float32)
     film = AppearanceRecording(tmp_path / "x.mkv", 0.04, 25.0, nothing[:, :, :2], nothing, nothing[:, 0])
     assert [int(pixels[0, 0, 0]) for pixels in film.pictures()] == [1, 2, 2, 2, 3]

@@ -8,7 +8,7 @@ import pytest
 from corpus_tools.training.base_map import N_OFFSETS, BaseMap, FrameTerms, fit_base_map, frame_terms
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.audio_map import AudioMap
-from tts2face.models.phone_network import N_PHONES_SEEN, N_PLACE, PhoneNetwork
+from tts2face.models.networks import N_PHONES_SEEN, N_PLACE, PhoneNetwork
 
 INVENTORY = ("a", "b", "i", SILENCE, "ʃ")
 PHONES = PhoneSequence([SILENCE, "a", "ʃ", "i", "b", SILENCE], [0.0, 0.3, 0.5, 0.6, 0.8, 0.9, 1.2])

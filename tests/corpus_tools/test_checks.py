@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from corpus_tools.recordings.corpus_video import NOT_COUNTED
 from corpus_tools.recordings.limits import (
     LIMITS,
     check_limits,
@@ -15,6 +14,7 @@ from corpus_tools.recordings.limits import (
     picture_measures,
     sound_measures,
 )
+from corpus_tools.recordings.video import NOT_COUNTED
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.types import Waveform

@@ -6,11 +6,19 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from corpus_tools.drawn.atlas import COLLAR, MARGIN, SHIRT, cut_seam, hair_tiles, in_tile
 from corpus_tools.drawn.build_drawn import CAST
 from corpus_tools.drawn.character import Character, Hairstyle, Palette
-from corpus_tools.drawn.clothes import _roll
-from corpus_tools.drawn.fields import Front, smooth_line, wind_outward
+from corpus_tools.drawn.fields import (
+    COLLAR,
+    MARGIN,
+    SHIRT,
+    Front,
+    cut_seam,
+    hair_tiles,
+    in_tile,
+    smooth_line,
+    wind_outward,
+)
 from corpus_tools.drawn.hair import (
     LOWEST_DEG,
     MIDDLE,
@@ -23,11 +31,11 @@ from corpus_tools.drawn.hair import (
     on_volume,
     other_palettes,
 )
-from corpus_tools.drawn.haircuts import HAIRCUTS, comb, cut, grow, lay_closer
 from corpus_tools.drawn.paint import _brow_hairs, paint_eye
 from corpus_tools.drawn.sculpt import apply_proportions
+from corpus_tools.drawn.worn import HAIRCUTS, _roll, comb, cut, grow, lay_closer
+from corpus_tools.head.mesh import grid_triangles
 from corpus_tools.head.skin import Skin
-from corpus_tools.head.subdivide import grid_triangles
 from lexicon.errors import DataError
 from tests.face.people import DRAWN
 from tts2face.models.face_loading import load_face

@@ -10,9 +10,9 @@ import pytest
 from cli.main import run
 from corpus_tools.build_talker import add_audio_maps
 from corpus_tools.recordings.observe import Observations
-from corpus_tools.training.network_audio_map import NetworkMapOptions
-from corpus_tools.training.train_audio_map import (
+from corpus_tools.training.network_audio_map import (
     AUDIO_MAP_FEATURES,
+    NetworkMapOptions,
     learn_audio_maps,
     sound_features,
     utterance_features,
@@ -20,7 +20,7 @@ from corpus_tools.training.train_audio_map import (
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from tts2face.models.talker import read_talker, write_talker
-from tts2face.speech.features import FEATURE_RATE
+from tts2face.sound.features import FEATURE_RATE
 from tts2face.types import Waveform
 
 ABOUT = dict.fromkeys(("name", "language", "sources", "licence", "attribution", "command", "created"), "")

@@ -5,17 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.film.fit_light import HIDDEN_WEIGHT, RIDGE
+from corpus_tools.film.fit_light import HIDDEN_WEIGHT, RIDGE, principal_modes
 from corpus_tools.film.fit_pictures import SIDE_PX, fit_to_pictures
 from corpus_tools.film.fit_responses import find_partners, fit_responses, limits_of
-from corpus_tools.film.fit_texels import principal_modes
 from corpus_tools.film.poses import LitPose
 from tests.render.film.lit_face import lit_tiny_face
 from tts2face.models.baked_light import LIMIT_STEP, quantised
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
 
 N_POSES, N_TERMS, N_VERTICES = 30, 5, 50
 

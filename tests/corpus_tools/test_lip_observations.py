@@ -6,10 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.evaluation.curve_material import read_material
-from corpus_tools.evaluation.reference import LipCurves
-from corpus_tools.pooling.lip_observations import MIN_PART_S, lip_observations
-from corpus_tools.pooling.pooled_speech import PooledSpeech, spoken_sequence, talker_features
+from corpus_tools.studies.evaluation.learning_curve import MIN_PART_S, lip_observations, read_material
+from corpus_tools.studies.evaluation.reference import LipCurves
+from corpus_tools.training.pooling.speech import PooledSpeech, spoken_sequence, talker_features
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE
 from tests.corpus_tools.build.test_people import person, write_tracks

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.head.mouth_light import mouth_vertices, scatter_in_mouth
+from corpus_tools.head.mouth import mouth_vertices, scatter_in_mouth
 from corpus_tools.head.skin import Skin
 from tests.render.tiny_face import tiny_face
-from tts2face.render.occlusion import sphere_directions
+from tts2face.picture.occlusion import sphere_directions
 
 N_DIRECTIONS = 128
 

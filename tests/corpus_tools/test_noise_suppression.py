@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.recordings.noise_suppression import level_range_db, suppress_noise
+from corpus_tools.recordings.sound import level_range_db, suppress_noise
 from tts2face.types import Waveform
 
 RATE = 16_000

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from corpus_tools.recordings.corpus_audio import AlignedSpeech
 from corpus_tools.recordings.observation import trim_to_picture
+from corpus_tools.recordings.sound import AlignedSpeech
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.types import Waveform
-from tts2face.video.frame_grid import fill_gaps, resample_to_grid, trim_and_fill
+from tts2face.video.pose import fill_gaps, resample_to_grid, trim_and_fill
 
 FPS = 25.0
 

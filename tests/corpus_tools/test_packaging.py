@@ -51,7 +51,7 @@ def is_builder(name: str) -> bool:
 
 def test_a_wheel_has_no_builders() -> None:
     packages = shipped_packages()
-    assert {"cli", "lexicon", "tts2face", "corpus_tools", "corpus_tools.dense", "corpus_tools.report"} <= set(packages)
+    assert {"cli", "lexicon", "tts2face", "corpus_tools", "corpus_tools.dense", "corpus_tools.studies"} <= set(packages)
     assert not [name for name in packages if is_builder(name)]
 
 

@@ -11,16 +11,6 @@ from PIL import Image
 
 from cli.main import run
 from corpus_tools.dense.hair_region import ACROSS_MM, UP_MM, Portrait, find_hair
-from corpus_tools.dense.light_cast import (
-    GLOSSY,
-    EyeColours,
-    estimate_cast,
-    log_colour,
-    remove_cast,
-    skin_texture,
-    srgb_colour,
-    without_gloss,
-)
 from corpus_tools.dense.mesh_fit import face_landmarks, part_vertices
 from corpus_tools.dense.person_look import (
     LASH_LENGTH,
@@ -33,18 +23,27 @@ from corpus_tools.dense.person_look import (
     part_colour,
     shorten_lashes,
 )
-from corpus_tools.dense.skin_colour import PictureFitter
+from corpus_tools.dense.skin_colour import (
+    GLOSSY,
+    EyeColours,
+    PictureFitter,
+    estimate_cast,
+    log_colour,
+    remove_cast,
+    skin_texture,
+    srgb_colour,
+    without_gloss,
+)
 from tests.face.posing import posed_vertices
-from tts2face.colour import decode_srgb, encode_srgb
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import read_face
 from tts2face.models.face_loading import load_face
+from tts2face.models.hair import EYE_COLOURS, HAIR_COLOURS, parse_hair_colour
 from tts2face.models.landmarks import N_LANDMARKS, N_MESH_LANDMARKS
-from tts2face.models.named_colours import EYE_COLOURS, HAIR_COLOURS, parse_hair_colour
-from tts2face.render.camera import camera_matrices
-from tts2face.render.camera_views import parse_camera
-from tts2face.render.draw import draw
-from tts2face.render.picture import Picture
+from tts2face.numeric.arrays import decode_srgb, encode_srgb
+from tts2face.picture.camera import camera_matrices
+from tts2face.picture.options import Picture, parse_camera
+from tts2face.picture.renderer import draw
 from tts2face.storage.files import find_file
 
 CAMERA, SIDE_PX = "0,0,900", 448

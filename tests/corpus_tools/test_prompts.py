@@ -2,17 +2,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from corpus_tools.prompts.coverage import Units, count_units, sentence_units
+from corpus_tools.prompts.coverage import (
+    PHONES_A_PROMPT,
+    REPEATS,
+    Units,
+    count_units,
+    select_sentences,
+    sentence_units,
+    unit_weights,
+)
 from corpus_tools.prompts.prompts import (
     MAX_MINUTES,
     choose_prompts,
+    easy_sentences,
     format_counts,
     n_prompts,
     shipped_counts,
     shipped_sentences,
+    words_of,
 )
-from corpus_tools.prompts.selection import PHONES_A_PROMPT, REPEATS, select_sentences, unit_weights
-from corpus_tools.prompts.sentences import easy_sentences, words_of
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import InputError
 

@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from corpus_tools.decomposition.marker_files import read_markers
-from corpus_tools.decomposition.marker_set import read_marker_set
-from corpus_tools.evaluation.tracks import read_tracks
+from corpus_tools.decomposition.markers import read_marker_set
 from corpus_tools.recordings.folder import find_recordings
+from corpus_tools.studies.evaluation.tracks import read_tracks
 from lexicon.errors import DataError
 from lexicon.inputs import LARGEST_TABLE_BYTES
-from tts2face.video.livelink import read_livelink
+from tts2face.video.take import read_livelink
 
 
 @pytest.mark.parametrize(

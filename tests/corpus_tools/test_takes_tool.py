@@ -6,15 +6,15 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from corpus_tools.decomposition.gesture_take import GOOD_S, LEAST_S, check_gesture_take
+from corpus_tools.decomposition.recordings import GOOD_S, LEAST_S, check_gesture_take
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tests.photo.pictures import still
 from tests.processes.answered import ordered
-from tts2face.jobs.resource_check import CONTENT, STATEMENT
 from tts2face.models.face_file import read_face
 from tts2face.models.palette import load_palette, read_palette
 from tts2face.processes.tools import TAKES
+from tts2face.serving.work.resource_check import CONTENT, STATEMENT
 
 HEADER = "Timecode,BlendshapeCount,JawOpen,EyeBlinkLeft,EyeBlinkRight,BrowInnerUp,HeadYaw,HeadPitch,HeadRoll"
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from corpus_tools.dense.texels import Texels
-from corpus_tools.dense.texture_painting import soften_lines
+from corpus_tools.dense.texture import soften_lines
 
 SIDE = 160
 SKIN = np.array([200.0, 150.0, 120.0])

@@ -5,11 +5,17 @@ import contextlib
 import numpy as np
 import pytest
 
-from corpus_tools.recordings.folder import find_recordings, pronounce_recording
-from corpus_tools.recordings.subtitles import Cue, read_cues
-from corpus_tools.recordings.transcripts import READERS, find_transcript, read_transcript
+from corpus_tools.recordings.folder import (
+    READERS,
+    Cue,
+    find_recordings,
+    find_transcript,
+    pronounce_recording,
+    read_cues,
+    read_transcript,
+)
 from lexicon.errors import DataError
-from tts2face.subtitles.decode import MAX_BYTES, read_text
+from tts2face.interchange.subtitles.reader import MAX_BYTES, read_text
 
 SRT = """1
 00:00:01,000 --> 00:00:02,500

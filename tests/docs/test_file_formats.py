@@ -7,15 +7,15 @@ from pathlib import Path
 import pytest
 
 from lexicon.dictionary import read_dictionary
-from lexicon.mark_parser import parse_marks
+from lexicon.ssml import parse_marks
 from tests.docs.blocks import DOCS, code_blocks
-from tts2face.gesture.notation import parse_style
-from tts2face.gesture.timeline_file import parse_timeline
+from tts2face.gestures.timeline import parse_style
+from tts2face.gestures.timeline_file import parse_timeline
 from tts2face.models.palette import Palette, load_palette
 from tts2face.models.talker import load_talker
-from tts2face.project.project_file import load_project, project_json
 from tts2face.request import Request
-from tts2face.synthesis.prepared_request import prepare
+from tts2face.session.prepared import prepare
+from tts2face.session.project_file import load_project, project_json
 
 PAGE = DOCS / "file-formats.md"
 STYLE_MARK = re.compile(r"\[style:([a-z][^\]]*)\]")

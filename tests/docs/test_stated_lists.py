@@ -3,9 +3,9 @@
 import re
 
 from tests.docs.blocks import DOCS, README
-from tts2face import catalogue
-from tts2face.exports.formats import FORMATS
+from tts2face.interchange.exports.table import FORMATS
 from tts2face.request import OWN_FACE
+from tts2face.session import catalogue
 
 NUMBERS = (
     "no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve", "thirteen",

@@ -5,7 +5,7 @@ import pytest
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.talker import Talker, load_talker
-from tts2face.session import Session
+from tts2face.session.session import Session
 
 
 @pytest.fixture(scope="module")

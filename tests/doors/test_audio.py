@@ -14,9 +14,9 @@ from lexicon.errors import DataError, InputError
 from tests.rendered_takes import ONLY_RENDERED
 from tts2face.models.talker import Talker, load_talker, write_talker
 from tts2face.request import Request
-from tts2face.session import Session
-from tts2face.speech.features import FEATURE_RATE, speech_features
-from tts2face.synthesis.audio_input import MAX_CLIP_FRAMES, map_audio_to_motion, resample_motion
+from tts2face.session.recording import MAX_CLIP_FRAMES, map_audio_to_motion, resample_motion
+from tts2face.session.session import Session
+from tts2face.sound.features import FEATURE_RATE, speech_features
 from tts2face.types import Trajectory, concatenate_clips, frame_count
 from tts2face.video.media import read_media_info, read_sound, sound_blocks
 

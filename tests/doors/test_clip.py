@@ -11,7 +11,7 @@ from lexicon.sequence import SILENCE
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.models.talker import load_talker
-from tts2face.session import Session
+from tts2face.session.session import Session
 from tts2face.types import Clip
 
 TEXT = "Bob may move five big maps, but we were away."

@@ -15,7 +15,7 @@ from cli.main import run
 from cli.process import EXIT_CODES
 from lexicon import errors
 from tests.running import eventually
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
 from tts2face.request import Request
 
 COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]

@@ -10,13 +10,13 @@ import pytest
 import tts2face
 from cli.main import run
 from lexicon.errors import DataError, InputError
-from tts2face.exports.arkit import ARKIT_SHAPES
-from tts2face.exports.formats import FORMATS
+from tts2face.interchange.exports.curves import ARKIT_SHAPES
+from tts2face.interchange.exports.table import FORMATS
 from tts2face.models.face import Face
 from tts2face.models.talker import Talker
-from tts2face.session import Session
+from tts2face.session.session import Session
 from tts2face.types import Clip
-from tts2face.video.livelink import read_livelink
+from tts2face.video.take import read_livelink
 
 SMALL = {"size": "64x64", "fps": 5}
 ALL = [f"all{one.suffixes[0]}" for one in FORMATS if one.is_installed]

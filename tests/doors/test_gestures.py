@@ -10,13 +10,13 @@ import pytest
 
 from cli.main import run
 from lexicon.errors import InputError
-from tts2face.face.face_motion import moved_landmarks
-from tts2face.face.gesture_transfer import gesture_face
+from tts2face.face.deformation import moved_landmarks
+from tts2face.face.gestures import gesture_face
 from tts2face.models.face import Face
 from tts2face.models.palette import FEATURES, load_palette, write_palette
 from tts2face.models.talker import Talker
 from tts2face.request import Request
-from tts2face.session import Session
+from tts2face.session.session import Session
 from tts2face.storage.files import SHIPPED_FOLDER
 from tts2face.types import Clip
 

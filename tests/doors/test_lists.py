@@ -12,12 +12,13 @@ from cli.lists import LISTS
 from cli.main import run
 from lexicon.errors import InputError
 from lexicon.languages import language_code
-from tts2face import __version__, catalogue
+from tts2face import __version__
 from tts2face.models.face_loading import load_face
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
 from tts2face.request import OWN_FACE
-from tts2face.voice.loading import load_voice
+from tts2face.session import catalogue
+from tts2face.sound.voice_pool import load_voice
 
 LISTED = ["voices", "languages", "faces", "identities", "haircuts", "hair_colors", "styles", "talkers", "formats"]
 

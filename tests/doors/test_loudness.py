@@ -10,13 +10,13 @@ import pytest
 from tests.oracles.loudness_meter import measure_loudness, true_peak
 from tts2face.models.face_loading import load_face
 from tts2face.models.talker import load_talker
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
 from tts2face.request import Request
-from tts2face.session import Session
-from tts2face.speech.bs1770 import integrated_loudness
-from tts2face.synthesis.speech_stream import Piece
+from tts2face.session.session import Session
+from tts2face.session.speech_stream import Piece
+from tts2face.sound import level
+from tts2face.sound.level import integrated_loudness
 from tts2face.types import Waveform, concatenate_clips
-from tts2face.voice import level
 
 TEXTS = (
     ("heart", "en-us", "Hi."),

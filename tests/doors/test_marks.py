@@ -10,13 +10,13 @@ import pytest
 from cli.main import run
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE
-from tts2face.gesture.elements import StyleSpan
+from tts2face.gestures.elements import StyleSpan
 from tts2face.models.face_loading import load_face
 from tts2face.models.talker import load_talker
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
 from tts2face.request import Request
-from tts2face.session import Session
-from tts2face.synthesis.speech_stream import Piece
+from tts2face.session.session import Session
+from tts2face.session.speech_stream import Piece
 from tts2face.types import concatenate_clips
 from tts2face.video.media import read_media_info
 

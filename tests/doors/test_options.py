@@ -10,8 +10,8 @@ from PIL import Image
 from cli.flags import check_options
 from cli.main import app, run
 from lexicon.errors import InputError
-from tts2face.render.output_path import check_output
-from tts2face.storage.output_names import check_name
+from tts2face.picture.film import check_output
+from tts2face.storage.files import check_name
 
 
 @pytest.fixture

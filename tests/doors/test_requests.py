@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.compilation import CACHE_VARIABLE, FOLDER
 from tts2face.models.face import Face
 from tts2face.models.talker import Talker
+from tts2face.numeric.kernels import CACHE_VARIABLE, FOLDER
 from tts2face.request import GESTURES, Request
-from tts2face.session import Session
+from tts2face.session.session import Session
 from tts2face.types import Clip, concatenate_clips
 
 TEXT = "Bob may move. We were away."

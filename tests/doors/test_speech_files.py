@@ -6,15 +6,14 @@ from typing import Any
 import pytest
 
 from cli.main import run
-from tts2face.exports.formats import FORMATS
+from tts2face.interchange.exports.table import FORMATS
 from tts2face.models.face import Face
 from tts2face.models.talker import Talker
-from tts2face.session import Session
-from tts2face.session_cache import Models
-from tts2face.synthesis.output_files import plan_outputs
-from tts2face.synthesis.prepared_request import prepare_request
-from tts2face.synthesis.speech_output import is_speech_only, write_speech
-from tts2face.voice.pool import VoicePool
+from tts2face.session.named_models import Models
+from tts2face.session.outputs import is_speech_only, plan_outputs, write_speech
+from tts2face.session.prepared import prepare_request
+from tts2face.session.session import Session
+from tts2face.sound.voice_pool import VoicePool
 
 TEXT = "Hello [mark here] there, Bob. Good bye."
 NAMES = [f"a{one.suffixes[0]}" for one in FORMATS if not one.has_motion]

@@ -9,10 +9,10 @@ import pytest
 from cli.main import run
 from tts2face.models.face_loading import load_face
 from tts2face.models.talker import load_talker
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
 from tts2face.request import Request
-from tts2face.session import Session
-from tts2face.voice.loading import load_voice
+from tts2face.session.session import Session
+from tts2face.sound.voice_pool import load_voice
 
 SAID = "The young chef usually pushes five big maps before noon."
 WRONG = "Please wait for the beep, then say your name."

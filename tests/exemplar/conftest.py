@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model
+from tts2face.lips.exemplar import ExemplarModel, build_exemplar_model
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, N_LANDMARKS, UPPER_LIP_INNER_MID
 from tts2face.models.talker import ShapeModel, Talker, Utterance
 

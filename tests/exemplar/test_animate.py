@@ -8,9 +8,7 @@ from hypothesis import strategies as st
 
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.explanation import explain_selection, explanation_json, explanation_text
-from tts2face.exemplar.options import METHOD_OPTIONS, THEOBALD_2007, SynthesisOptions
-from tts2face.exemplar.synthesis import (
+from tts2face.lips.exemplar import (
     REST_FROM_S,
     ExemplarModel,
     build_exemplar_model,
@@ -18,7 +16,9 @@ from tts2face.exemplar.synthesis import (
     select_tokens,
     speech_trajectory,
 )
-from tts2face.exemplar.tokens import MAX_CONTEXT
+from tts2face.lips.explanation import explain_selection, explanation_json, explanation_text
+from tts2face.lips.options import METHOD_OPTIONS, THEOBALD_2007, SynthesisOptions
+from tts2face.lips.tokens import MAX_CONTEXT
 from tts2face.models.talker import Talker
 from tts2face.types import frame_count
 

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tts2face.exemplar.blending import AveragedTokens, average_tokens, exemplar_weights, gaussian_smooth, join_averages
-from tts2face.exemplar.contacts import (
+from tts2face.lips.blending import AveragedTokens, average_tokens, exemplar_weights, gaussian_smooth, join_averages
+from tts2face.lips.contacts import (
     CONTACT_RULES,
     ChosenExemplars,
     ContactRule,
@@ -15,10 +15,9 @@ from tts2face.exemplar.contacts import (
     find_contacts,
     shown_contact,
 )
-from tts2face.exemplar.options import THEOBALD_2007, SynthesisOptions
-from tts2face.exemplar.phone_substitution import Targets
-from tts2face.exemplar.synthesis import ExemplarModel
-from tts2face.exemplar.tokens import spans_with_reach
+from tts2face.lips.exemplar import ExemplarModel
+from tts2face.lips.options import THEOBALD_2007, SynthesisOptions
+from tts2face.lips.tokens import Targets, spans_with_reach
 
 GAP = LipGap.with_spread(np.zeros(3, np.float32), np.array([[0.0, 1.0, 0.0]], np.float32), np.ones(1))
 

@@ -6,10 +6,9 @@ import pytest
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.exemplar.conftest import made_talker
-from tts2face.exemplar.exclusion import exclude_tokens
-from tts2face.exemplar.explanation import explain_selection
-from tts2face.exemplar.options import ExcludedToken
-from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model, select_tokens
+from tts2face.lips.exemplar import ExemplarModel, build_exemplar_model, exclude_tokens, select_tokens
+from tts2face.lips.explanation import explain_selection
+from tts2face.lips.options import ExcludedToken
 
 PHONES = PhoneSequence([SILENCE, "p", "ɑ", "s", "i", SILENCE], [0.0, 0.3, 0.4, 0.5, 0.6, 0.7, 1.0])
 

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.exemplar.explanation import UsedToken, explain_selection
-from tts2face.exemplar.lip_outlines import token_outlines
-from tts2face.exemplar.synthesis import build_exemplar_model, select_tokens
+from tts2face.lips.exemplar import build_exemplar_model, select_tokens
+from tts2face.lips.explanation import UsedToken, explain_selection, token_outlines
 from tts2face.models.landmarks import lip_opening
 from tts2face.models.talker import Talker, load_talker
 

@@ -7,9 +7,7 @@ import pytest
 
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.options import SynthesisOptions
-from tts2face.exemplar.phone_substitution import Targets, target_phones
-from tts2face.exemplar.synthesis import (
+from tts2face.lips.exemplar import (
     FAR_CONTEXT,
     NEAR_CONTEXT,
     ExemplarModel,
@@ -18,8 +16,10 @@ from tts2face.exemplar.synthesis import (
     select_tokens,
     speech_trajectory,
 )
-from tts2face.exemplar.token_search import context_weights
-from tts2face.models.phone_network import PhoneNetwork, window_features
+from tts2face.lips.options import SynthesisOptions
+from tts2face.lips.token_search import context_weights
+from tts2face.lips.tokens import Targets, target_phones
+from tts2face.models.networks import PhoneNetwork, window_features
 from tts2face.models.talker import Talker, read_talker, write_talker
 
 PHONES = PhoneSequence([SILENCE, "b", "i", "p", SILENCE], [0.0, 0.3, 0.4, 0.6, 0.7, 1.0])

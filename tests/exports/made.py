@@ -4,10 +4,9 @@ import numpy as np
 
 from lexicon.sequence import PhoneSequence, WordSpan
 from tests.render.tiny_face import tiny_face
-from tts2face.clock import exact_rate, first_sample
-from tts2face.exports.arkit import ARKIT_SHAPES
 from tts2face.face.shape_transfer import append_shapes
-from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
+from tts2face.interchange.exports.curves import ARKIT_SHAPES
+from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, exact_rate, first_sample
 
 RATE = 16_000
 FACE = tiny_face(textured=True)

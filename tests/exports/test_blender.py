@@ -10,8 +10,8 @@ import pytest
 
 import tts2face
 from tests.exports.made import signed_clip, with_gesture
-from tts2face.exports.surfaces import divide_surface
 from tts2face.face.deformation import build_rig
+from tts2face.interchange.exports.surfaces import divide_surface
 
 FRAME = 12
 SCRIPT = """

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.exports.formats import FORMATS, find_format, is_export, split_format
-from tts2face.exports.writer import plan_exports, sound_path
+from tts2face.interchange.exports.table import FORMATS, find_format, is_export, split_format
+from tts2face.interchange.exports.writer import plan_exports, sound_path
 
 
 @pytest.mark.parametrize("one", FORMATS, ids=lambda one: one.name)

@@ -17,10 +17,10 @@ from tests.exports import programs
 from tests.exports.made import FACE, RATE, made_clip, made_stream, signed_clip, turned_clip, with_gesture
 from tests.render.test_cutouts import face_with_sheet
 from tests.render.tiny_face import tiny_face
-from tts2face.exports.surfaces import divide_surface
 from tts2face.face.deformation import build_rig, rotation_matrix
-from tts2face.numeric import continuous_quaternions, quaternion_matrix
-from tts2face.storage.gltf_writer import GltfBuffer
+from tts2face.interchange.exports.surfaces import divide_surface
+from tts2face.interchange.gltf.container import GltfBuffer
+from tts2face.numeric.arrays import continuous_quaternions, quaternion_matrix
 from tts2face.storage.spool import Spool
 from tts2face.types import HEAD_CHANNELS, Clip, Trajectory
 

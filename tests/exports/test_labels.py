@@ -16,8 +16,8 @@ from lexicon.phones import PHONES
 from lexicon.sequence import PhoneSequence
 from tests.exports.made import PHONES as MADE_PHONES
 from tests.exports.made import WORDS, made_clip, made_stream, silent_clip
-from tts2face.exports.labels import Label
-from tts2face.exports.visemes import INVENTORIES, OCULUS, viseme_labels, viseme_table
+from tts2face.interchange.exports.parts import Label
+from tts2face.interchange.exports.visemes import INVENTORIES, OCULUS, viseme_labels, viseme_table
 from tts2face.types import Clip, Speech, concatenate_clips
 
 

@@ -9,10 +9,9 @@ import pytest
 
 from tests.render.film.lit_face import SKIN_LIGHT, lit_tiny_face
 from tests.render.tiny_face import tiny_face
-from tts2face.exports import stage_surfaces
-from tts2face.exports.rest_light import in_rest_light
-from tts2face.exports.stage_glb import LEAST_MOVE_MM, quantised_moves, stage_glb
-from tts2face.exports.surfaces import divide_surface
+from tts2face.interchange.exports import stage_surfaces
+from tts2face.interchange.exports.stage_glb import LEAST_MOVE_MM, in_rest_light, quantised_moves, stage_glb
+from tts2face.interchange.exports.surfaces import divide_surface
 
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}

@@ -10,10 +10,9 @@ import pytest
 from parselmouth.praat import call
 
 from lexicon.errors import InputError
-from lexicon.nominal_durations import nominal_phones
 from lexicon.pronounce import pronounce
-from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.exports.text import FORMATS, NOMINAL_NOTE, textgrid
+from lexicon.sequence import PhoneSequence, WordSpan, nominal_phones
+from tts2face.interchange.exports.annotations import FORMATS, NOMINAL_NOTE, textgrid
 
 
 def _tier(grid: Any, number: int) -> list[tuple[float, float, str]]:

@@ -8,7 +8,7 @@ import pytest
 import tts2face
 from lexicon.errors import DataError, InputError
 from tests.exports.made import FACE, made_clip, made_stream, silent_clip
-from tts2face.exports.track_json import TrackPiece, read_track
+from tts2face.interchange.exports.track import TrackPiece, read_track
 from tts2face.types import Clip, Trajectory
 
 

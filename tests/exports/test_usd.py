@@ -9,9 +9,9 @@ import pytest
 import tts2face
 from lexicon.errors import BackendError
 from tests.exports.made import FACE, made_clip, signed_clip, turned_clip, with_gesture
-from tts2face.exports.surfaces import divide_surface
-from tts2face.exports.usd import _identifiers
 from tts2face.face.deformation import build_rig
+from tts2face.interchange.exports.surfaces import divide_surface
+from tts2face.interchange.exports.usd import _identifiers
 
 TOLERANCE_MM = 1e-3  # weights and offsets are 32-bit, scales of joints 16-bit
 

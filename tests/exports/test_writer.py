@@ -11,14 +11,14 @@ import pytest
 import tts2face
 from lexicon.errors import BackendError, InputError
 from tests.exports.made import FACE, RATE, made_clip, made_stream, silent_clip
-from tts2face.exports.arkit import ARKIT_SHAPES
-from tts2face.exports.formats import FORMATS
-from tts2face.exports.parts import FrameGrid
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.encode import write_clips
-from tts2face.render.movie_stream import MOVIE_KINDS, encode_movie
-from tts2face.render.picture import Picture
-from tts2face.render.sound_stream import SOUND_KINDS, encode_sound
+from tts2face.interchange.exports.curves import ARKIT_SHAPES
+from tts2face.interchange.exports.parts import FrameGrid
+from tts2face.interchange.exports.table import FORMATS
+from tts2face.picture.film import write_clips
+from tts2face.picture.movie import MOVIE_KINDS, encode_movie
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
+from tts2face.picture.sound_stream import SOUND_KINDS, encode_sound
 from tts2face.types import Speech, Trajectory, Waveform, concatenate_clips
 
 REAL_LOCALTIME, A_YEAR_S = time.localtime, 366 * 86400
@@ -138,7 +138,7 @@ def test_a_folder_that_cannot_be_written_is_reported(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("tts2face.exports.npz.NpzWriter.finish", full)
+    monkeypatch.setattr("tts2face.interchange.exports.motion.NpzWriter.finish", full)
     with pytest.raises(BackendError, match=r"a.npz: No space left on device; free some space"):
         tts2face.export(made_clip(), tmp_path / "a.npz")
     assert not list(tmp_path.iterdir())

@@ -2,9 +2,9 @@
 
 import pytest
 
-from tts2face.catalogue import identities
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
+from tts2face.session.catalogue import identities
 
 DRAWN = ("ada", "ben", "noor", "zuri")
 REALISTIC = ("mara", "tomas")

@@ -2,12 +2,9 @@
 
 import numpy as np
 
-from tts2face.face.body import Body
-from tts2face.face.breathing import BREATH_SHAPE
-from tts2face.face.hair_swing import SWING_SHAPES
-from tts2face.face.pupils import PUPIL_SHAPE
-from tts2face.synthesis import performance
-from tts2face.synthesis.animated_face import FaceMotion
+from tts2face.face.body import BREATH_SHAPE, PUPIL_SHAPE, SWING_SHAPES, Body
+from tts2face.session import performance
+from tts2face.session.animated_face import FaceMotion
 from tts2face.types import HEAD_CHANNELS, Trajectory, Waveform
 
 CHANNELS = ("jawOpen", BREATH_SHAPE, *SWING_SHAPES, PUPIL_SHAPE)

@@ -6,8 +6,8 @@ import numpy as np
 
 from tests.face.people import DRAWN
 from tts2face.models.face_loading import load_face
-from tts2face.render.draw import draw
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import draw
 
 MOST_SHARED = 0.87  # of the pixels that either outline covers
 LEAST_APART = 25.0  # of 255, mean over a picture of 64 px

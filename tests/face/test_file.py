@@ -11,11 +11,11 @@ from safetensors.numpy import load_file
 
 from lexicon.errors import DataError, InputError
 from tests.face.posing import posed_vertices
-from tts2face.catalogue import IdentityEntry, identities
 from tts2face.models import face_file
 from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Part, Texture
 from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_loading import load_face
+from tts2face.session.catalogue import IdentityEntry, identities
 from tts2face.storage import files
 from tts2face.storage.files import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors

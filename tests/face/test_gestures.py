@@ -9,10 +9,9 @@ from scipy.spatial import KDTree
 
 from lexicon.errors import DataError, InputError
 from tests.face.gestures import BROWS, CHEEKS, palette, posed_landmarks
-from tts2face.face.deformation import build_rig
+from tts2face.face.deformation import build_rig, landmark_positions
 from tts2face.face.expressions import add_expression_shapes, expression_landmarks, expression_table
-from tts2face.face.gesture_transfer import LID_LANDMARKS, GestureFace, gesture_face
-from tts2face.face.landmark_fit import landmark_positions
+from tts2face.face.gestures import LID_LANDMARKS, GestureFace, gesture_face
 from tts2face.face.shape_transfer import eye_distance
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
@@ -26,7 +25,7 @@ from tts2face.models.landmarks import (
 from tts2face.models.palette import EXPRESSIONS
 from tts2face.models.talker import load_talker
 from tts2face.request import Request
-from tts2face.session import Session
+from tts2face.session.session import Session
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
 FACES = ("head", "ada")

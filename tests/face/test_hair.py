@@ -12,12 +12,11 @@ from tests.render.tiny_face import tiny_face
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_loading import load_face
-from tts2face.models.hair import Hair, attach_hair, fit_hair
+from tts2face.models.hair import HAIR_COLOURS, Hair, attach_hair, fit_hair, parse_hair_colour
 from tts2face.models.hair_file import read_hair, write_hair
-from tts2face.models.named_colours import HAIR_COLOURS, parse_hair_colour
-from tts2face.render.camera import camera_matrices
-from tts2face.render.draw import draw
-from tts2face.render.picture import Picture
+from tts2face.picture.camera import camera_matrices
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import draw
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 GREEN = "#10c020"

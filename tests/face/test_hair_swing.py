@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tts2face.face.breathing import BREATH_SHAPE
-from tts2face.face.hair_swing import LIMIT_RAD, SWING_SHAPES, HairSwing
+from tts2face.face.body import BREATH_SHAPE, LIMIT_RAD, SWING_SHAPES, HairSwing
 from tts2face.models.face_loading import load_face
-from tts2face.session import Session
+from tts2face.session.session import Session
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
 CHANNELS = ("jawOpen", *SWING_SHAPES)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.rbf import CHUNK_SIZE, fit_interpolant
+from tts2face.numeric.splines import CHUNK_SIZE, fit_interpolant
 
 WIDTH = 150.0
 REACH = 64.0 / 200.0 * WIDTH  # mm; eq. 4's 64 on a face 200 wide

@@ -5,10 +5,9 @@ import pytest
 from scipy.interpolate import BSpline
 
 from lexicon.errors import DataError, InputError
-from tts2face.face.compact_spline import cubic_bspline, fit_local_interpolant
-from tts2face.face.landmark_fit import landmark_motion, landmark_positions
-from tts2face.face.rbf import CHUNK_SIZE
+from tts2face.face.deformation import landmark_motion, landmark_positions
 from tts2face.models.face_loading import load_face
+from tts2face.numeric.splines import CHUNK_SIZE, cubic_bspline, fit_local_interpolant
 
 SUPPORT = 30.0  # mm
 

@@ -22,19 +22,18 @@ from tests.fuzz.mutations import change_bytes, change_value, json_bytes, mutate_
 from tests.gesture.test_key_curves import WHOLE
 from tests.model_files.made import write_made_face, write_made_palette, write_made_talker
 from tests.render.tiny_face import tiny_face
-from tts2face.batch.cast import read_cast
-from tts2face.characters.shape_mapping import read_mapping
-from tts2face.gesture.timeline_file import read_timeline, timeline_json
+from tts2face.gestures.timeline_file import read_timeline, timeline_json
+from tts2face.interchange.characters.shapes import read_mapping
 from tts2face.models.face_file import Identity, read_face, write_face
-from tts2face.models.face_layout import WIDE_OPEN
+from tts2face.models.face_schema import WIDE_OPEN
 from tts2face.models.hair import attach_hair
-from tts2face.models.hair_file import read_hair, write_hair, write_lit_hair
-from tts2face.models.lit_hair import wear_hair
+from tts2face.models.hair_file import read_hair, wear_hair, write_hair, write_lit_hair
 from tts2face.models.palette import read_palette
 from tts2face.models.talker import read_talker
-from tts2face.project.project_file import load_project
-from tts2face.service.access.keys import read_keys
-from tts2face.service.settings import ServiceSettings, read_settings
+from tts2face.serving.batch.cast import read_cast
+from tts2face.serving.service.keys import read_keys
+from tts2face.serving.service.settings import ServiceSettings, read_settings
+from tts2face.session.project_file import load_project
 
 MOST_S = 5.0  # of processor time for one file; usual are milliseconds
 MOST_CHARACTERS = 4_000  # of a message, which may name all choices

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.gesture.elements import ExpressionSpan, Gains, Nod, StyleSpan
-from tts2face.gesture.field import FieldOptions
-from tts2face.gesture.gesture_stream import GestureFields, GestureStream, style_median
-from tts2face.gesture.perlin_noise import NoiseStream, blink_closure, blinks_per_second, perlin_noise
-from tts2face.gesture.timeline import Timeline
+from tts2face.gestures.elements import ExpressionSpan, Gains, Nod, StyleSpan
+from tts2face.gestures.field import FieldOptions
+from tts2face.gestures.noise import NoiseStream, blink_closure, blinks_per_second, perlin_noise
+from tts2face.gestures.stream import GestureFields, GestureStream, style_median
+from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import EXPRESSIONS, FEATURES
 from tts2face.types import Waveform
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tts2face.gesture.gesture_stream import GestureFields, GestureStream
-from tts2face.gesture.perlin_noise import NoiseStream
-from tts2face.gesture.timeline import Timeline
+from tts2face.gestures.noise import NoiseStream
+from tts2face.gestures.stream import GestureFields, GestureStream
+from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import load_palette
 from tts2face.types import Waveform
 

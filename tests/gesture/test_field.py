@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.field import (
+from tts2face.gestures.field import (
     Field,
     FieldOptions,
     FieldState,
@@ -14,8 +14,8 @@ from tts2face.gesture.field import (
     sample_field_moments,
     transfer_state,
 )
-from tts2face.gesture.field_kernels import MIN_MOMENT_GAP, SEARCH_SLACK
-from tts2face.gesture.kd_tree import build_tree
+from tts2face.gestures.field_kernels import MIN_MOMENT_GAP, SEARCH_SLACK
+from tts2face.numeric.kd_tree import build_tree
 
 OPTIONS = FieldOptions(history=5, candidates=3, future=4, alpha=(1.0,))
 

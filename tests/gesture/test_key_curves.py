@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.elements import (
+from tts2face.gestures.elements import (
     KINDS,
     ChannelEdit,
     ExpressionCurve,
@@ -19,9 +19,9 @@ from tts2face.gesture.elements import (
     StyleSpan,
     interpolate_keys,
 )
-from tts2face.gesture.gesture_stream import GestureFields, GestureStream
-from tts2face.gesture.timeline import Timeline
-from tts2face.gesture.timeline_file import parse_timeline, timeline_json
+from tts2face.gestures.stream import GestureFields, GestureStream
+from tts2face.gestures.timeline import Timeline
+from tts2face.gestures.timeline_file import parse_timeline, timeline_json
 from tts2face.models.palette import FEATURES, Palette
 from tts2face.types import Waveform
 

@@ -5,15 +5,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from corpus_tools.gesture_study.blinks import find_blinks
-from corpus_tools.gesture_study.measures import wasserstein
-from tts2face.gesture.blink_presentation import PAUSE_DB
-from tts2face.gesture.elements import Gains, StyleSpan
-from tts2face.gesture.gesture_stream import GestureFields, GestureStream
-from tts2face.gesture.head_presentation import find_accents, slow_scales
-from tts2face.gesture.presentation import LowPass, filtered_spread
-from tts2face.gesture.prosody import prosody_features
-from tts2face.gesture.timeline import Timeline
+from corpus_tools.studies.gestures.measures import find_blinks, wasserstein
+from tts2face.gestures.blinks import PAUSE_DB
+from tts2face.gestures.elements import Gains, StyleSpan
+from tts2face.gestures.presentation import LowPass, filtered_spread, find_accents, prosody_features, slow_scales
+from tts2face.gestures.stream import GestureFields, GestureStream
+from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import FEATURES, GESTURE_FPS, Palette, load_palette
 from tts2face.types import Waveform
 

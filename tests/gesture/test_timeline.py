@@ -11,10 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.elements import GAIN_NAMES, ExpressionSpan, Gains, Nod, StyleSpan
-from tts2face.gesture.notation import parse_expressions, parse_gains, parse_style
-from tts2face.gesture.timeline import BLEND_S, ONSET_S, Timeline
-from tts2face.gesture.timeline_file import parse_timeline, read_timeline
+from tts2face.gestures.elements import GAIN_NAMES, ExpressionSpan, Gains, Nod, StyleSpan
+from tts2face.gestures.timeline import BLEND_S, ONSET_S, Timeline, parse_expressions, parse_gains, parse_style
+from tts2face.gestures.timeline_file import parse_timeline, read_timeline
 from tts2face.models.palette import EXPRESSIONS, FEATURES, Palette, Style
 
 TIMES = np.linspace(0, 12, 1201)

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from tests.golden.fingerprints import Fingerprint, hashed, of_clips, of_files, of_pictures
-from tts2face.api import load_clip, write_clip
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
 from tts2face.request import Request
-from tts2face.session import Session
-from tts2face.session_cache import Models, SessionCache
+from tts2face.session.functions import SessionCache, load_clip, write_clip
+from tts2face.session.named_models import Models
+from tts2face.session.session import Session
 
 SESSIONS = SessionCache()  # of the shipped models, one at a time; what was made before does not change a result
 SMALL = {"size": "64x64", "supersampling": 1}
@@ -48,10 +48,10 @@ VOLATILE = {"program", "segments", "address", "took_s", "sha256", "bytes"}
 
 def batch(folder: Path) -> Fingerprint:
     """Two cues of subtitles with a cast: films, tracks, captions and the manifest."""
-    from tts2face.batch.cast import read_cast
-    from tts2face.batch.options import BatchOptions
-    from tts2face.batch.plan import plan_batch
-    from tts2face.batch.run import run_batch
+    from tts2face.serving.batch.cast import read_cast
+    from tts2face.serving.batch.options import BatchOptions
+    from tts2face.serving.batch.plan import plan_batch
+    from tts2face.serving.batch.run import run_batch
 
     (folder / "one.srt").write_text(SRT, encoding="utf-8")
     (folder / "cast.toml").write_text(CAST, encoding="utf-8")
@@ -87,7 +87,7 @@ def without(content: Any, folder: Path) -> Any:
 
 def project(folder: Path) -> Fingerprint:
     """A project file with a painted style, a pronunciation and a muted feature; all exports that are text or sound."""
-    from tts2face.project.project_file import load_project
+    from tts2face.session.project_file import load_project
 
     (folder / "scene.json").write_text(json.dumps(PROJECT), encoding="utf-8")
     loaded = load_project(folder / "scene.json")
@@ -106,9 +106,8 @@ def project(folder: Path) -> Fingerprint:
 def character(folder: Path) -> Fingerprint:
     """A character of another program: imported, saved, drawn, and animated in its own file."""
     from tests.characters.made import Variant, head_without_mouth, write_character_file, write_landmarks
-    from tts2face.characters.animation import write_character
-    from tts2face.characters.importing import import_face
-    from tts2face.characters.saving import save_face
+    from tts2face.interchange.characters.animation import write_character
+    from tts2face.interchange.characters.importing import import_face, save_face
 
     variant = Variant(is_skinned=True, is_dense=True, dropped=DROPPED)
     made = write_character_file(folder / "made.glb", variant, head_without_mouth())
@@ -153,8 +152,8 @@ def live(folder: Path) -> Fingerprint:
 
 def similarity(folder: Path) -> Fingerprint:
     """The report of the similarity of a made talker's phones, compared with another one's: page, figures and table."""
-    from corpus_tools.similarity.analysis import NamedTalker, Options, analyse
-    from corpus_tools.similarity.write import WRITERS
+    from corpus_tools.studies.similarity.analysis import NamedTalker, Options, analyse
+    from corpus_tools.studies.similarity.write import WRITERS
     from tests.corpus_tools.similarity.steady_talker import made_talker
 
     made, other = NamedTalker("made", made_talker(20)), NamedTalker("other", made_talker(20, seed=9, gain=20.0))
@@ -169,7 +168,7 @@ def similarity(folder: Path) -> Fingerprint:
 def http_clip(folder: Path) -> Fingerprint:
     """A clip over HTTP as a film, as curves and as sound: the bodies of the answers."""
     from tests.service.in_process import service_client
-    from tts2face.service.settings import ServiceSettings
+    from tts2face.serving.service.settings import ServiceSettings
 
     options = {"text": "Bob may move.", "style": "delighted", **SMALL, **CHEAP}
     paths = [folder / f"clip.{name}" for name in ("mp4", "curves", "wav")]
@@ -192,9 +191,9 @@ def http_job(folder: Path) -> Fingerprint:
     """A job of subtitles over HTTP, with a SQLite database and a worker in this process: its results."""
     from tests.service.in_process import service_client
     from tests.service.job_requests import finished
-    from tts2face.batch.render_segment import SegmentRenderer
-    from tts2face.jobs.worker import Worker
-    from tts2face.service.settings import ServiceSettings
+    from tts2face.serving.batch.render import SegmentRenderer
+    from tts2face.serving.service.settings import ServiceSettings
+    from tts2face.serving.work.worker import Worker
 
     settings = ServiceSettings(data=folder / "data", workers=0, studio=False)
     request = {**SMALL, **CHEAP, "exports": ["track.json", "words.srt"]}

@@ -17,10 +17,10 @@ from tests.golden.doors import DOORS, SESSIONS
 from tests.golden.fingerprints import Fingerprint, of_clips, of_pictures, read_machines, renewed, write_machines
 from tests.render.tiny_talker import own_talker
 from tts2face.models.talker import Talker, load_talker
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
 from tts2face.request import Request
-from tts2face.session import Session
-from tts2face.session_cache import Models
+from tts2face.session.named_models import Models
+from tts2face.session.session import Session
 from tts2face.types import Clip
 
 SSML = """<speak version="1.0"><p><s>We were <emphasis level="strong">away</emphasis>.</s>

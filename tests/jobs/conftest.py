@@ -17,8 +17,8 @@ pytest.importorskip("dbos", reason="needs the extra [batch]")
 
 from tests.running import eventually
 from tests.started import children
-from tts2face.batch.segment import Segment, input_hashes
-from tts2face.session_cache import Models
+from tts2face.serving.batch.segment import Segment, input_hashes
+from tts2face.session.named_models import Models
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)

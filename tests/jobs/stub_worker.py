@@ -9,10 +9,9 @@ import time
 from pathlib import Path
 
 from lexicon.errors import InputError
-from tts2face.batch.segment import Segment
-from tts2face.batch.segment_result import SegmentResult
-from tts2face.jobs.worker import Worker
 from tts2face.processes.child import exit_after
+from tts2face.serving.batch.segment import Segment, SegmentResult
+from tts2face.serving.work.worker import Worker
 
 
 class Stub:

@@ -9,8 +9,8 @@ import pytest
 pytest.importorskip("obstore", reason="needs the extra [batch]")
 
 from lexicon.errors import BackendError
-from tts2face.batch.object_store import ObjectStore
-from tts2face.jobs.blobs import BlobStore, BucketBlobs, MissingBlobError, open_blobs
+from tts2face.serving.batch.object_store import ObjectStore
+from tts2face.serving.work.blobs import BlobStore, BucketBlobs, MissingBlobError, open_blobs
 
 CONTENT = b"some bytes"
 SHA256 = hashlib.sha256(CONTENT).hexdigest()

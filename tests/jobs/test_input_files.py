@@ -10,10 +10,16 @@ import pytest
 
 pytest.importorskip("obstore", reason="needs the extra [batch]")
 
-from tts2face.batch.segment import Segment, input_hashes
-from tts2face.jobs.blobs import BlobStore, MissingBlobError, open_blobs
-from tts2face.jobs.input_files import place_file, place_models, place_segment_files
-from tts2face.session_cache import Models
+from tts2face.serving.batch.segment import Segment, input_hashes
+from tts2face.serving.work.blobs import (
+    BlobStore,
+    MissingBlobError,
+    open_blobs,
+    place_file,
+    place_models,
+    place_segment_files,
+)
+from tts2face.session.named_models import Models
 from tts2face.storage.files import find_file
 
 

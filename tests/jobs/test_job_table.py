@@ -11,17 +11,16 @@ import pytest
 
 pytest.importorskip("dbos", reason="needs the extra [batch]")
 
-from tts2face.batch.store import open_store
-from tts2face.jobs import job_client
-from tts2face.jobs.blobs import open_blobs
-from tts2face.jobs.connection import DatabaseAwayError, JobDatabase
-from tts2face.jobs.database import database_url, prepare_database
-from tts2face.jobs.engine import _enqueue_options, open_client
-from tts2face.jobs.job_changes import Ending, JobChanges
-from tts2face.jobs.job_client import JobClient
-from tts2face.jobs.job_records import JobFile, NewJob
-from tts2face.jobs.job_runner import JobRunner, job_blobs
-from tts2face.jobs.job_table import OtherBodyError, QueueFullError
+from tts2face.serving.batch.store import open_store
+from tts2face.serving.work import client as job_client
+from tts2face.serving.work.blobs import open_blobs
+from tts2face.serving.work.changes import Ending, JobChanges
+from tts2face.serving.work.client import JobClient
+from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase
+from tts2face.serving.work.database import database_url, prepare_database
+from tts2face.serving.work.engine import _enqueue_options, open_client
+from tts2face.serving.work.run import JobRunner, job_blobs
+from tts2face.serving.work.table import JobFile, NewJob, OtherBodyError, QueueFullError
 
 
 @pytest.fixture

@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 
 from lexicon.errors import DataError
-from tts2face.jobs import talker_job
-from tts2face.jobs.blobs import open_blobs
-from tts2face.jobs.connection import DatabaseAwayError
-from tts2face.jobs.database import database_url
-from tts2face.jobs.job_kinds import JobCancelledError, JobTask, Products
-from tts2face.jobs.resource_table import ResourceTable
-from tts2face.jobs.talker_job import run_talker
+from tts2face.serving.work import kinds
+from tts2face.serving.work.blobs import open_blobs
+from tts2face.serving.work.connection import DatabaseAwayError
+from tts2face.serving.work.database import database_url
+from tts2face.serving.work.kinds import run_talker
+from tts2face.serving.work.resources import ResourceTable
+from tts2face.serving.work.run import JobCancelledError, JobTask, Products
 
 Run = Callable[..., Products]
 
@@ -26,7 +26,7 @@ def events() -> list[dict[str, Any]]:
 @pytest.fixture
 def run(tmp_path: Path, events: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch) -> Run:
     """Function that executes a job."""
-    monkeypatch.setattr(talker_job, "BUILDER", "tests.jobs.stub_builder:HANDLERS")
+    monkeypatch.setattr(kinds, "BUILDER", "tests.jobs.stub_builder:HANDLERS")
     (tmp_path / "a.mp4").write_bytes(b"video")
     blobs = open_blobs(tmp_path / "store", "resources")
 

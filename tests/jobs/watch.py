@@ -3,7 +3,7 @@
 import threading
 from pathlib import Path
 
-from tts2face.batch.segment_result import SEGMENT_SUFFIX
+from tts2face.serving.batch.segment import SEGMENT_SUFFIX
 
 INTERVAL_S = 0.5
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from lexicon.chunks import split_phrase
-from lexicon.mark_parser import parse_marks
+from lexicon.sentence_ends import split_phrase
 from lexicon.sentences import FIRST_PIECE_CHARACTERS, split_sentences
+from lexicon.ssml import parse_marks
 
 HOUSE = "the garden behind the old house near the river had been green for years"
 

@@ -8,13 +8,13 @@ from xml.sax.saxutils import escape
 import pytest
 
 from lexicon.errors import InputError
-from lexicon.mark_parser import parse_marks
 from lexicon.pronounce import pronounce
 from lexicon.sentences import split_sentences
 from lexicon.spoken_words import pronounce_marked
-from tts2face.synthesis.marked_speech import phrase_content
-from tts2face.voice.content import pronounce_content
-from tts2face.voice.voice_alphabet import PHONE_OF_LETTER, voice_phones, word_letters
+from lexicon.ssml import parse_marks
+from tts2face.session.speech import phrase_content
+from tts2face.sound.heart import PHONE_OF_LETTER, voice_phones, word_letters
+from tts2face.sound.voice import pronounce_content
 
 DECIDED = Path(__file__).with_name("decided_sentences.tsv")
 SENTENCES = [tuple(line.split("\t")) for line in DECIDED.read_text(encoding="utf-8").splitlines()[1:]]

@@ -1,6 +1,5 @@
 import math
 import os
-import re
 import socket
 from dataclasses import dataclass
 from fractions import Fraction
@@ -13,6 +12,7 @@ import pytest
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import (
     MAX_DEPTH,
+    check_fields,
     check_limits,
     check_regular_file,
     parse_json,
@@ -22,7 +22,6 @@ from lexicon.inputs import (
     read_table,
     read_text,
 )
-from lexicon.json_values import check_fields
 
 
 @pytest.mark.parametrize(
@@ -206,27 +205,3 @@ def test_only_ordinary_files_pass(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         ):
             with pytest.raises(DataError, match=reason):
                 check_regular_file(Path(name))
-
-
-def test_nothing_else_reads_json_from_outside() -> None:
-    root = Path(__file__).parents[2]
-    own = {
-        "inputs.py": 1,
-        "part_of_speech.py": 2,  # of a package
-        "espeak.py": 1,
-        "espeak_child.py": 1,
-        "tensors.py": 1,
-        "message.py": 1,
-        "assets.py": 1,  # of a package with a known hash
-        "job_records.py": 1,
-        "job_table.py": 1,
-        "resource_table.py": 1,
-        "bundle.py": 1,
-    }  # but for the first, of what the program wrote
-    found = {
-        path.name: count
-        for room in ("cli", "corpus_tools", "lexicon", "tts2face")
-        for path in (root / room).rglob("*.py")
-        if (count := len(re.findall(r"json\.loads?\(", path.read_text(encoding="utf-8"))))
-    }
-    assert found == own

@@ -5,16 +5,16 @@ import sys
 
 import pytest
 
-from lexicon import japanese
+from lexicon import g2p
 from lexicon.errors import BackendError
+from lexicon.languages import check_script
 from lexicon.pronounce import pronounce
-from lexicon.writing_systems import check_script
 from tests.lexicon.japanese_readings import READINGS
-from tts2face.voice.loading import load_voice
+from tts2face.sound.voice_pool import load_voice
 
 
 def reading(text: str) -> str:
-    return re.sub(r"[\s、。？！]", "", japanese.to_kana(text))
+    return re.sub(r"[\s、。？！]", "", g2p.to_kana(text))
 
 
 def test_most_sentences_are_read_as_a_person_reads_them() -> None:
@@ -25,7 +25,7 @@ def test_most_sentences_are_read_as_a_person_reads_them() -> None:
 
 
 def test_phrases_are_separated_and_punctuation_is_kept() -> None:
-    assert japanese.to_kana("今日は、東京へ行きます。") == "キョーワ、 トーキョーエ イキマス。"
+    assert g2p.to_kana("今日は、東京へ行きます。") == "キョーワ、 トーキョーエ イキマス。"
 
 
 def test_long_texts_are_read_piece_by_piece() -> None:
@@ -33,7 +33,7 @@ def test_long_texts_are_read_piece_by_piece() -> None:
 
 
 def test_texts_in_kana_are_passed_to_espeak_unchanged() -> None:
-    assert not japanese.has_kanji("こんにちは、カタカナ。 abc 3")
+    assert not g2p.has_kanji("こんにちは、カタカナ。 abc 3")
     assert pronounce("きょうは", "ja").words[0].text == "きょうは"
 
 
@@ -46,8 +46,8 @@ def test_the_voice_pronounces_the_reading() -> None:
 
 def test_without_the_library_the_message_names_the_installation_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyopenjtalk", None)
-    japanese.load_reader.cache_clear()
+    g2p.load_reader.cache_clear()
     check_script("こんにちは", "ja")
     with pytest.raises(BackendError, match=r"pip install 'tts2face\[japanese\]', or write the text in kana"):
         check_script("今日は", "ja")
-    japanese.load_reader.cache_clear()
+    g2p.load_reader.cache_clear()

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.errors import InputError
-from lexicon.mark_parser import parse_marks
 from lexicon.marked_text import MAX_NESTING, MarkedText, NameMark, NodMark, PauseMark, StyleRun
+from lexicon.ssml import parse_marks
 
 PLAIN = st.text(st.characters(blacklist_characters="[]<"))
 

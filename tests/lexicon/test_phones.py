@@ -5,8 +5,7 @@ import itertools
 import pytest
 
 from lexicon.errors import DataError, InputError
-from lexicon.phone_table import read_phones
-from lexicon.phones import (
+from lexicon.phones import (  # fmt: skip
     ARPABET,
     PHONES,
     arpabet_to_ipa,
@@ -14,8 +13,9 @@ from lexicon.phones import (
     look_up_phone,
     nearest_phones,
     phone_distance,
+    read_phones,
     vowel_symbols,
-)  # fmt: skip
+)
 from lexicon.sequence import SILENCE
 
 CMU = [

@@ -3,13 +3,12 @@
 import random
 import string
 
-from lexicon.chunks import split_chunks
 from lexicon.dictionary import parse_dictionary
 from lexicon.g2p import segments_by_rules
-from lexicon.mark_parser import parse_marks
+from lexicon.pronounce import spoken_form
+from lexicon.sentence_ends import split_chunks
 from lexicon.sentences import MAX_SPOKEN_LETTERS, Sentence, split_sentences
-from lexicon.spoken_form import spoken_form
-from lexicon.ssml import parse_ssml
+from lexicon.ssml import parse_marks, parse_ssml
 
 chance = random.Random(1)
 DIGITS = "".join(chance.choices("123456789", k=5000))

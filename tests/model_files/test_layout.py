@@ -14,14 +14,14 @@ from safetensors.numpy import save
 from lexicon.errors import DataError
 from tests.model_files.made import write_made_face, write_made_palette, write_made_talker
 from tests.render.tiny_talker import own_talker
-from tts2face.face.bounded_least_squares import bounded_least_squares
 from tts2face.models.audio_map import FEATURE_SIZES
 from tts2face.models.face_file import read_face
 from tts2face.models.palette import read_palette
 from tts2face.models.talker import read_talker
-from tts2face.render.own_face import own_face_renderer
-from tts2face.render.picture import Picture
-from tts2face.speech.features import FEATURE_RATE, speech_features
+from tts2face.numeric.least_squares import bounded_least_squares
+from tts2face.picture.options import Picture
+from tts2face.picture.own_face import own_face_renderer
+from tts2face.sound.features import FEATURE_RATE, speech_features
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import Waveform
 

@@ -16,24 +16,29 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.show_talker import describe
+from corpus_tools.build_talker import describe
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.fuzz.mutations import mutate_model
-from tts2face.catalogue import identities
-from tts2face.exemplar.appearance_trajectory import appearance_trajectory, build_appearance_exemplars
-from tts2face.exemplar.synthesis import blend_trajectory, build_exemplar_model, select_tokens
-from tts2face.gesture.gesture_stream import GestureFields, GestureStream
-from tts2face.gesture.perlin_noise import NoiseStream
-from tts2face.gesture.timeline import Timeline
+from tts2face.gestures.noise import NoiseStream
+from tts2face.gestures.stream import GestureFields, GestureStream
+from tts2face.gestures.timeline import Timeline
+from tts2face.lips.exemplar import (
+    appearance_trajectory,
+    blend_trajectory,
+    build_appearance_exemplars,
+    build_exemplar_model,
+    select_tokens,
+)
+from tts2face.lips.retargeting import build_retargeter
 from tts2face.models.face_file import read_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.palette import read_palette
 from tts2face.models.talker import load_talker, read_talker, speech_channels
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.own_face import draw_video_frame, own_face_renderer
-from tts2face.render.picture import Picture
-from tts2face.retargeting.to_face import build_retargeter
+from tts2face.picture.options import Picture
+from tts2face.picture.own_face import draw_video_frame, own_face_renderer
+from tts2face.picture.renderer import mesh_renderer
+from tts2face.session.catalogue import identities
 from tts2face.types import Trajectory, Waveform
 
 HANG_S = 60.0  # after which the process ends itself

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tts2face.gesture.blink_presentation import (
+from tts2face.gestures.blinks import (
     FULL,
     HALF_OPEN,
     MAX_EDGE,

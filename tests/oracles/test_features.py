@@ -5,8 +5,8 @@ import pytest
 from scipy.signal import lfilter
 
 from lexicon.errors import InputError
-from tts2face.speech import features
-from tts2face.speech.features import FEATURE_KINDS, FEATURE_RATE, line_spectral_frequencies, speech_features
+from tts2face.sound import features
+from tts2face.sound.features import FEATURE_KINDS, FEATURE_RATE, line_spectral_frequencies, speech_features
 from tts2face.types import Waveform
 
 VOWEL_HZ = (700.0, 1220.0, 2600.0, 3500.0, 4500.0, 5500.0, 6500.0, 7500.0)  # an open vowel

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tts2face.gesture.field import Field, FieldState, build_field, initial_state, sample_field_moments
-from tts2face.gesture.ju2008 import FIELD_OPTIONS, JU_2008
+from tts2face.gestures.field import Field, FieldState, build_field, initial_state, sample_field_moments
+from tts2face.gestures.stream import FIELD_OPTIONS, JU_2008
 from tts2face.models.palette import FEATURES
 
 N, LENGTH, N_SHOWN = 12, 60, 200

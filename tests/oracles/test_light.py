@@ -2,24 +2,7 @@
 
 import numpy as np
 
-from tts2face.render.fragment_rows import (
-    AT_ALBEDO,
-    AT_DARK_GLOSS,
-    AT_DIFFUSE,
-    AT_EXPOSURE,
-    AT_GLOSS,
-    AT_GLOW,
-    AT_NORMAL,
-    AT_OPACITY,
-    AT_RAY,
-    AT_ROUGHNESS,
-    AT_SECOND_LOBE,
-    DIFFUSE,
-    N_ROWS,
-    N_VERTEX_COLUMNS,
-    NORMAL,
-)
-from tts2face.render.shade import (
+from tts2face.picture.kernels.shade import (
     DARK_ALBEDO,
     INTERREFLECTION,
     KEPT_HUE,
@@ -34,7 +17,24 @@ from tts2face.render.shade import (
     scatter_light,
     shade_fragments,
 )
-from tts2face.render.studio_light import BRIGHTNESS
+from tts2face.picture.kernels.tables import (
+    AT_ALBEDO,
+    AT_DARK_GLOSS,
+    AT_DIFFUSE,
+    AT_EXPOSURE,
+    AT_GLOSS,
+    AT_GLOW,
+    AT_NORMAL,
+    AT_OPACITY,
+    AT_RAY,
+    AT_ROUGHNESS,
+    AT_SECOND_LOBE,
+    BRIGHTNESS,
+    DIFFUSE,
+    N_ROWS,
+    N_VERTEX_COLUMNS,
+    NORMAL,
+)
 
 N = 200
 

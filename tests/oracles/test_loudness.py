@@ -4,9 +4,9 @@ import numpy as np
 import parselmouth
 import pytest
 
-from tts2face.speech.loudness import intensity
+from tts2face.sound.espeak import EspeakVoice
+from tts2face.sound.features import intensity
 from tts2face.types import Waveform
-from tts2face.voice.espeak import EspeakVoice
 
 
 def _praat_levels(sound: Waveform) -> tuple[np.ndarray, np.ndarray]:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from tts2face.render.bands import sort_into_bands
-from tts2face.render.raster import (
+from tts2face.picture.kernels.picture import sort_into_bands
+from tts2face.picture.kernels.raster import (
     BACK_BIAS,
     FIRST,
     GRID,

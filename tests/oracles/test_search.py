@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from tts2face.exemplar import token_search as select
-from tts2face.exemplar.tokens import Tokens, phone_contexts
+from tts2face.lips import token_search as select
+from tts2face.lips.tokens import Tokens, phone_contexts
 
 PHONES = 9
 

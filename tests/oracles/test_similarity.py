@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.exemplar.similarity import PRIOR_TOKENS, SHARPNESS, phone_similarity
+from tts2face.lips.similarity import PRIOR_TOKENS, SHARPNESS, phone_similarity
 
 
 def slow_matrix(samples, phone, n_phones, spread):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.exemplar.time_warping import frame_distances, path_cost, warp_path, warp_space, warp_to_reference
+from tts2face.lips.blending import frame_distances, path_cost, warp_path, warp_space, warp_to_reference
 
 
 def every_path(n, m):

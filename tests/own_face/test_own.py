@@ -8,9 +8,9 @@ import pytest
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.test_plate import own_talker
+from tts2face.face.own_face import fit_appearance_regression
 from tts2face.models.talker import Utterance
-from tts2face.own_face.appearance_regression import fit_appearance_regression
-from tts2face.synthesis.own_appearance_face import OwnAppearanceFace
+from tts2face.session.animated_face import OwnAppearanceFace
 from tts2face.types import Trajectory
 
 

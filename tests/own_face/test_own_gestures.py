@@ -10,13 +10,13 @@ from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.face.gestures import BROWS, neutral, palette
 from tests.render.test_plate import own_talker
-from tts2face.face.gesture_transfer import LID_LANDMARKS
+from tts2face.face.gestures import LID_LANDMARKS
+from tts2face.face.own_face import OwnFaceGestures, build_own_face_gestures
 from tts2face.models.landmarks import EYELID_LANDMARKS, INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.models.palette import EXPRESSIONS
 from tts2face.models.talker import ShapeModel, Talker, Utterance
-from tts2face.own_face.gestures import OwnFaceGestures, build_own_face_gestures
-from tts2face.render.own_face import draw_video_frame, own_face_renderer
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
+from tts2face.picture.own_face import draw_video_frame, own_face_renderer
 from tts2face.types import Trajectory
 
 N_FRAMES = 400

@@ -4,16 +4,16 @@ from functools import cache
 
 import numpy as np
 
-from tts2face.face.face_motion import moved_landmarks
+from tts2face.face.deformation import moved_landmarks
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
-from tts2face.photo.eye_pictures import SIDES
+from tts2face.photo.eyes import SIDES
 from tts2face.photo.found_face import FoundFace, PhotographedFace
 from tts2face.photo.photograph import Photograph
-from tts2face.render.camera import camera_matrices
-from tts2face.render.draw import draw
-from tts2face.render.picture import Picture
+from tts2face.picture.camera import camera_matrices
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import draw
 from tts2face.types import Trajectory
 
 SMILE = {

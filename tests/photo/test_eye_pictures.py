@@ -6,13 +6,13 @@ import pytest
 from tests.photo.pictures import found_in, photographed, still
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
-from tts2face.photo.eye_pictures import IRISES
+from tts2face.photo.eyes import IRISES
 from tts2face.photo.found_face import FoundFace
-from tts2face.photo.photo_surface import EYES
 from tts2face.photo.photograph import Photograph
+from tts2face.photo.shapes import EYES
 from tts2face.photo.speaking_photo import speaking_photo
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
 
 SIDE, NAME = 800, "head"
 ASIDE = {"eyeLookOutLeft": 0.8, "eyeLookInRight": 0.8}  # to the right in the picture

@@ -7,13 +7,13 @@ import pytest
 from lexicon.errors import InputError
 from tests.model_files.made import write_made_face
 from tts2face.models.face_file import read_face
-from tts2face.photo import kept_faces
-from tts2face.photo.kept_faces import N_KEPT, find_kept, keep_face, kept_path
+from tts2face.photo import face_from_photo
+from tts2face.photo.face_from_photo import N_KEPT, find_kept, keep_face, kept_path
 
 
 @pytest.fixture
 def photo(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(kept_faces, "user_cache", lambda: tmp_path / "cache")
+    monkeypatch.setattr(face_from_photo, "user_cache", lambda: tmp_path / "cache")
     path = tmp_path / "me.jpg"
     path.write_bytes(b"a picture")
     return path
@@ -77,7 +77,7 @@ def test_the_oldest_faces_are_removed(photo: Path, monkeypatch: pytest.MonkeyPat
         photo.write_bytes(f"picture {number}".encode())
         keep(photo, "drawn")
     assert len(list(kept_path(photo).parent.iterdir())) == N_KEPT + 2  # another process may be about to read one
-    monkeypatch.setattr(kept_faces, "LEAST_AGE_S", -1.0)
+    monkeypatch.setattr(face_from_photo, "LEAST_AGE_S", -1.0)
     keep(photo, "drawn")
     assert len(list(kept_path(photo).parent.iterdir())) == N_KEPT
     assert find_kept(kept_path(photo), None)

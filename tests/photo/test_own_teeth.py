@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from tests.photo.pictures import SMILE, found_in, photographed, projected, still
-from tts2face.face.landmark_fit import landmark_positions, scatter_landmarks
+from tts2face.face.deformation import landmark_positions, scatter_landmarks
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
-from tts2face.photo.lip_line import find_lip_line
-from tts2face.photo.mouth_inside import PICTURED, cheek_light
-from tts2face.photo.own_teeth import OwnTeeth, find_teeth
-from tts2face.photo.photo_camera import find_camera
+from tts2face.photo.camera import find_camera
+from tts2face.photo.lines import find_lip_line
+from tts2face.photo.mouth import PICTURED, cheek_light
 from tts2face.photo.photograph import Photograph
 from tts2face.photo.speaking_photo import speaking_photo
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.picture import Picture
+from tts2face.photo.teeth import OwnTeeth, find_teeth
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
 
 SIDE, NAME = 640, "head"
 MARK = np.array([20, 240, 60])  # a colour that no mouth has

@@ -7,10 +7,10 @@ import pytest
 
 from tests.photo.pictures import found_in
 from tts2face.models.face_loading import load_face
-from tts2face.photo.person_matte import part_background, read_person
+from tts2face.photo.matte import part_background, read_person
 from tts2face.photo.photograph import Photograph
-from tts2face.render.draw import draw
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import draw
 
 SIDE, NAME = 400, "head"
 DOOR = (250, 240, 225), (60, 150, 70)  # colours of the wall and of the frame in it

@@ -9,11 +9,11 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from tests.photo.pictures import found_in, photographed, still
-from tts2face.face.landmark_fit import landmark_positions
+from tts2face.face.deformation import landmark_positions
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_UPPER, LEFT_LIDS, LOWER_LIP_INNER_MID, RIGHT_LIDS, UPPER_LIP_INNER_MID
-from tts2face.photo.photo_fit import NOTHING_GIVEN, PhotoFit, parse_fit, read_fit, write_fit
+from tts2face.photo.fit import NOTHING_GIVEN, PhotoFit, parse_fit, read_fit, write_fit
 from tts2face.photo.photograph import Photograph
 from tts2face.photo.speaking_photo import speaking_photo
 

@@ -11,22 +11,21 @@ from scipy.spatial import cKDTree
 from lexicon.errors import DataError, InputError
 from tests.exports.test_stage_glb import Read
 from tests.photo.pictures import found_in, photographed, still
-from tts2face.exports.stage_glb import stage_glb
-from tts2face.face.deformation import REST_HEAD
-from tts2face.face.face_motion import moved_landmarks
+from tts2face.face.deformation import REST_HEAD, moved_landmarks
+from tts2face.interchange.exports.stage_glb import stage_glb
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import inner_lip_gaps, lip_opening
 from tts2face.photo.found_face import FoundFace
-from tts2face.photo.photo_surface import EYES, LIDS, SKIN
 from tts2face.photo.photograph import Photograph, split_number
+from tts2face.photo.shapes import EYES, LIDS, SKIN
 from tts2face.photo.speaking_photo import speaking_photo
-from tts2face.render.draw import MeshRenderer, draw, mesh_renderer
-from tts2face.render.film.scene import BEHIND_SHARE
-from tts2face.render.film.visibility import NEAR, TRIANGLE_MASK, nearest_triangles, project
-from tts2face.render.picture import Picture
-from tts2face.session import Session
+from tts2face.picture.baked.scene import BEHIND_SHARE
+from tts2face.picture.baked.surface import NEAR, TRIANGLE_MASK, nearest_triangles, project
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import MeshRenderer, draw, mesh_renderer
+from tts2face.session.session import Session
 
 SIDE = 400
 NAME = "head"

@@ -10,8 +10,8 @@ from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.photo.photograph import Photograph
 from tts2face.photo.speaking_photo import speaking_photo
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
 
 SIDE, NAME = 480, "head"
 RAISED = {"browInnerUp": 0.8, "browOuterUpLeft": 0.8, "browOuterUpRight": 0.8}

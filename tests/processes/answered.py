@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from tts2face.jobs.refused_file import RefusedFileError
 from tts2face.processes.child import Call, Handler, answer
 from tts2face.processes.message import Message, read_message
 from tts2face.processes.parent import ChildEndedError, call_once
 from tts2face.processes.program import Program
-from tts2face.service.uploads.decode import DECODE, program
+from tts2face.serving.service.uploads import DECODE, program
+from tts2face.serving.work.resource_check import RefusedFileError
 
 
 def answered(handler: Handler, content: Mapping[str, Any]) -> list[Message]:

@@ -20,10 +20,9 @@ from tests.processes.handlers import NarrowError
 from tests.running import eventually
 from tests.started import running_processes
 from tts2face.processes import parent
-from tts2face.processes.limits import ProcessLimits
 from tts2face.processes.message import Message
 from tts2face.processes.parent import AsyncChild, Child, ChildEndedError, raised, started
-from tts2face.processes.program import Program
+from tts2face.processes.program import ProcessLimits, Program
 
 PROGRAM = Program("tests.processes.handlers:HANDLERS")
 PAYLOAD = bytes(range(256)) * 5000

@@ -10,14 +10,14 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from tests.gesture.test_key_curves import WHOLE
-from tts2face.exemplar.options import ExcludedToken
-from tts2face.gesture.timeline_file import timeline_json
-from tts2face.project.project import Project
-from tts2face.project.project_file import load_project, project_json, save_project
-from tts2face.render.picture import Picture
+from tts2face.gestures.timeline_file import timeline_json
+from tts2face.lips.options import ExcludedToken
+from tts2face.picture.options import Picture
 from tts2face.request import Request
-from tts2face.session_cache import Models
-from tts2face.synthesis.phone_edges import SentenceEdges
+from tts2face.session.named_models import Models
+from tts2face.session.prepared import SentenceEdges
+from tts2face.session.project import Project
+from tts2face.session.project_file import load_project, project_json, save_project
 
 VALUES = (
     None, True, False, -1, 0, 1, 2.5, -0.5, 1e308, 2**31, 10**300, "", "x", "1", "a\0b", "x" * 5000, [], [[]],

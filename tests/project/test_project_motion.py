@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.exemplar.options import ExcludedToken
-from tts2face.gesture.elements import ChannelEdit
-from tts2face.gesture.timeline import Timeline
-from tts2face.project.project import Project
-from tts2face.project.project_file import load_project, save_project
+from tts2face.gestures.elements import ChannelEdit
+from tts2face.gestures.timeline import Timeline
+from tts2face.lips.options import ExcludedToken
 from tts2face.request import Request
-from tts2face.session import Session
-from tts2face.synthesis.phone_edges import SentenceEdges
-from tts2face.synthesis.speech_stream import Piece
+from tts2face.session.prepared import SentenceEdges
+from tts2face.session.project import Project
+from tts2face.session.project_file import load_project, save_project
+from tts2face.session.session import Session
+from tts2face.session.speech_stream import Piece
 
 TEXT = "Bob may move. Five maps were there. Bob may move."
 PROJECT = Project(request=Request(text=TEXT, voice="espeak"))

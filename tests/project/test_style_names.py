@@ -1,10 +1,9 @@
 """Styles that a project names: found, renamed and removed everywhere."""
 
-from tts2face.gesture.elements import StyleSpan
-from tts2face.gesture.timeline import Timeline
-from tts2face.project.project import Project
-from tts2face.project.style_names import drop_style, rename_style, used_styles
+from tts2face.gestures.elements import StyleSpan
+from tts2face.gestures.timeline import Timeline
 from tts2face.request import Request
+from tts2face.session.project import Project, drop_style, rename_style, used_styles
 
 SPANS = (StyleSpan("head", "mine", 0.0, 1.0), StyleSpan("brows", "delighted", 0.0, 1.0))
 PROJECT = Project(request=Request(text="Hello.", style="neutral,head=mine"), timeline=Timeline(spans=SPANS))

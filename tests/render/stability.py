@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.models.face import Face
-from tts2face.render.picture_kernels import allocate_buffers, draw_samples, project_surface
-from tts2face.render.raster import NO_TRIANGLE
-from tts2face.render.scene import Scene
+from tts2face.picture.kernels.picture import allocate_buffers, draw_samples, project_surface
+from tts2face.picture.kernels.raster import NO_TRIANGLE
+from tts2face.picture.scene import Scene
 
 Masks = dict[str, NDArray[np.bool_]]
 EDGE_PX = 2  # width of the edge of skin on either side

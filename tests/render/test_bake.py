@@ -7,9 +7,9 @@ import pytest
 
 from tests.render.tiny_face import ball, tiny_face
 from tts2face.models.face import Part
-from tts2face.render.occlusion import bake_occlusion, sphere_directions
-from tts2face.render.soft_shadows import compute_exposure, lamp_weights
-from tts2face.render.surface import build_surface
+from tts2face.picture.light import compute_exposure, lamp_weights
+from tts2face.picture.occlusion import bake_occlusion, sphere_directions
+from tts2face.picture.surface import build_surface
 
 LAMPS = np.array([[0, 0, 1.0], [1.0, 0, 0], [0, 1.0, 0]])
 

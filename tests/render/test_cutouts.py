@@ -8,9 +8,9 @@ import pytest
 
 from tests.render.tiny_face import tiny_face
 from tts2face.models.face import Face
-from tts2face.render.draw import draw
-from tts2face.render.picture import Picture
-from tts2face.render.tone_tables import linear_table
+from tts2face.picture.kernels.tables import linear_table
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import draw
 
 PICTURE = Picture(size="160x160", background="#808080")
 EVERY_SAMPLE = replace(PICTURE, quality="high")

@@ -9,11 +9,11 @@ from PIL import Image
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_face import tiny_face
+from tts2face.models.face import keep_parts
 from tts2face.models.face_loading import load_face
-from tts2face.models.face_parts import keep_parts
-from tts2face.render.draw import draw, mesh_renderer
-from tts2face.render.picture import Picture
-from tts2face.render.tone_tables import linear_table
+from tts2face.picture.kernels.tables import linear_table
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import draw, mesh_renderer
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 REST = np.zeros(4)

@@ -13,13 +13,11 @@ from PIL import Image
 from lexicon.errors import BackendError, InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_face import tiny_face
-from tts2face.clock import exact_rate
-from tts2face.render import encode
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.encode import ClipWriter, write_clips
-from tts2face.render.output_path import check_output
-from tts2face.render.picture import Picture
-from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, frame_count
+from tts2face.picture import film
+from tts2face.picture.film import ClipWriter, check_output, write_clips
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
+from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, exact_rate, frame_count
 
 RATE = 24_000
 SMALL = Picture(size="64x48", background="#3050a0")
@@ -307,7 +305,7 @@ def test_an_error_of_the_encoder_reaches_the_caller(tmp_path, renderer, monkeypa
     def fail(self, pixels):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(encode.MovieWriter, "picture", fail)
+    monkeypatch.setattr(film.MovieWriter, "picture", fail)
     with pytest.raises(BackendError, match="No space left on device; free some space"):
         write_clips(tmp_path / "a.mp4", [clip_of(2.0)], renderer)
     assert list(tmp_path.iterdir()) == []

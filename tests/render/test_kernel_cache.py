@@ -13,16 +13,17 @@ import numpy as np
 import pytest
 from numba.core.dispatcher import Dispatcher
 
-from cli.progress import COMPILATION, compilation_messages, progress_bar
+from cli.process import COMPILATION, compilation_messages, progress_bar
 from tests.render.film.lit_face import lit_tiny_face
-from tts2face import compilation
-from tts2face.compilation import CACHE_VARIABLE, cache_folder
-from tts2face.exemplar import recorded_motion
-from tts2face.render import raster, shade, strand_light, strands
-from tts2face.render.film import visibility
-from tts2face.service.logs import LineFormatter
-from tts2face.speech.bs1770 import filter_biquad
-from tts2face.synthesis.warm_up import kernels_are_compiled
+from tts2face.lips import tokens
+from tts2face.numeric import kernels as compilation
+from tts2face.numeric.kernels import CACHE_VARIABLE, cache_folder
+from tts2face.picture.baked import surface
+from tts2face.picture.kernels import raster, shade, strands
+from tts2face.picture.kernels import strands as strand_light
+from tts2face.serving.service.logs import LineFormatter
+from tts2face.session.warm_up import kernels_are_compiled
+from tts2face.sound.level import filter_biquad
 
 
 @pytest.fixture
@@ -71,12 +72,12 @@ def indexes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> dict[str, Path]:
     """Index files of a kernel of motion and of one of each kind of drawing, which do not exist."""
     stats = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path)))
     monkeypatch.setattr(raster, "draw_band", stats)
-    monkeypatch.setattr(visibility, "find_nearest", stats)
-    monkeypatch.setattr(recorded_motion, "sample_tokens", stats)
+    monkeypatch.setattr(surface, "find_nearest", stats)
+    monkeypatch.setattr(tokens, "sample_tokens", stats)
     names = {
-        "motion": "recorded_motion.sample_tokens",
+        "motion": "tokens.sample_tokens",
         "lamps": "raster.draw_band",
-        "baked": "visibility.find_nearest",
+        "baked": "surface.find_nearest",
     }
     return {what: tmp_path / f"{name}-1.py311.nbi" for what, name in names.items()}
 
@@ -93,22 +94,22 @@ def test_kernels_count_as_compiled_once_they_lie_on_disk(indexes):
 
 
 CALLER = """
-from tests_made.callee import SCALE, value
-from tts2face.compilation import kernel
+from {room}.callee import SCALE, value
+from tts2face.numeric.kernels import kernel
 
 @kernel
 def twice():
     return 2 * SCALE * value()
 """
 CALLEE = """
-from tts2face.compilation import {kind}
+from tts2face.numeric.kernels import {kind}
 SCALE = {scale}
 
 @{kind}
 def value():
     return {value}
 """
-CALL = "from tests_made.caller import twice; print(twice(), sum(twice.stats.cache_hits.values()))"
+CALL = "from {room}.caller import twice; print(twice(), sum(twice.stats.cache_hits.values()))"
 ROOT = Path(__file__).parents[2]
 
 
@@ -116,16 +117,20 @@ ROOT = Path(__file__).parents[2]
 def test_installations_share_code_that_is_compiled_of_the_same(tmp_path, kind):
     """A kernel is compiled again where one that it calls, or a constant, is another; old versions are removed."""
 
-    def call(where: str, scale: int, value: int) -> str:
-        package = tmp_path / where / "tests_made"
+    def call(where: str, scale: int, value: int, room: str = "tests_made") -> str:
+        package = tmp_path / where / room
         package.mkdir(parents=True, exist_ok=True)
-        (package / "caller.py").write_text(CALLER)
+        (package / "caller.py").write_text(CALLER.format(room=room))
         (package / "callee.py").write_text(CALLEE.format(kind=kind, scale=scale, value=value))
         paths = os.pathsep.join((str(package.parent), str(ROOT)))
         environment = os.environ | {CACHE_VARIABLE: str(tmp_path / "kernels"), "PYTHONPATH": paths}
         # Python does not notice that a file of the same size was changed within a second (`-B` keeps no bytecode).
         done = subprocess.run(
-            [sys.executable, "-B", "-c", CALL], env=environment, capture_output=True, text=True, check=True
+            [sys.executable, "-B", "-c", CALL.format(room=room)],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
         )
         return done.stdout.strip()
 
@@ -133,6 +138,7 @@ def test_installations_share_code_that_is_compiled_of_the_same(tmp_path, kind):
     assert call("two", 1, 2) == "4 1"
     assert call("one", 1, 5) == "10 0"
     assert call("one", 3, 5) == "30 0"
+    assert call("one", 3, 5, "tests_moved") == "30 0"
     assert [call("one", 1, value) for value in (6, 7)] == ["12 0", "14 0"]
     assert len(list((tmp_path / "kernels").glob("caller-*"))) == compilation.N_VERSIONS
 
@@ -153,7 +159,7 @@ def test_some_kernels_may_reorder_sums():
 COMPILED_ONLY = """
 import sys
 import numpy as np
-from tts2face.speech.bs1770 import filter_biquad
+from tts2face.sound.level import filter_biquad
 filtered = filter_biquad(np.ones(3), np.ones(3), np.ones(4))
 print(filtered.tolist(), sum(filter_biquad.stats.cache_hits.values()), "numba.np.linalg" in sys.modules)
 """

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.render.tiny_face import tiny_face
-from tts2face.render.light_field import N_HARMONICS, harmonics, light_fields
-from tts2face.render.occlusion import bake_occlusion, sphere_directions
-from tts2face.render.surface import build_surface
+from tts2face.picture.light import N_HARMONICS, harmonics, light_fields
+from tts2face.picture.occlusion import bake_occlusion, sphere_directions
+from tts2face.picture.surface import build_surface
 
 
 def test_harmonics_are_independent_on_the_sphere():

@@ -3,9 +3,8 @@
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.clock import exact_rate, first_sample
-from tts2face.render.camera_views import NAMED_VIEWS, parse_camera
-from tts2face.render.picture import Picture, parse_background, parse_size
+from tts2face.picture.options import NAMED_VIEWS, Picture, parse_background, parse_camera, parse_size
+from tts2face.types import exact_rate, first_sample
 
 
 @pytest.mark.parametrize("size", ["15x16", "16x15", "4098x16", "17x32", "0x0", "14"])

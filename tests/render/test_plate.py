@@ -5,15 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.aam.reference_frame import MOUTH_LANDMARKS
+from corpus_tools.appearance.frame import MOUTH_LANDMARKS
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_talker import SIZE, face_points, own_talker
 from tts2face.models.talker import Talker
-from tts2face.render import plate
-from tts2face.render.image_warp import warp_image
-from tts2face.render.own_face import draw_video_frame, own_face_renderer
-from tts2face.render.picture import Picture
+from tts2face.picture import plate
+from tts2face.picture.options import Picture
+from tts2face.picture.own_face import draw_video_frame, own_face_renderer, warp_image
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.render.test_plate import own_talker
-from tts2face.render.plate import texture_samples
+from tts2face.picture.plate import texture_samples
 
 
 def test_a_linear_picture_is_sampled_exactly_on_an_affine_mesh() -> None:

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from tests.render.stability import visible_triangles
+from tts2face.models.face import keep_parts
 from tts2face.models.face_loading import load_face
-from tts2face.models.face_parts import keep_parts
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.picture import Picture
-from tts2face.render.tone_tables import linear_light
+from tts2face.picture.kernels.tables import linear_light
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
 
 NECK_MM, FACE_MM = -105.0, (-95.0, 30.0)  # heights on the head
 

@@ -8,8 +8,8 @@ from tests.face.test_hair import cap
 from tests.render.stability import flicker, part_masks
 from tests.render.tiny_face import tiny_face
 from tts2face.models.hair import attach_hair
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
 
 N_FRAMES = 8
 

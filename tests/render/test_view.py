@@ -8,11 +8,10 @@ import pytest
 from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.render.tiny_face import tiny_face
-from tts2face.render import vtk_renderer as vtk
-from tts2face.render import window as view
-from tts2face.render.camera import camera_matrices
-from tts2face.render.camera_views import parse_camera
-from tts2face.render.picture import Picture
+from tts2face.picture import vtk_renderer as vtk
+from tts2face.picture import window as view
+from tts2face.picture.camera import camera_matrices
+from tts2face.picture.options import Picture, parse_camera
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 

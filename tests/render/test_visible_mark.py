@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tts2face.render.picture import Picture
-from tts2face.session import Session
+from tts2face.picture.options import Picture
+from tts2face.session.session import Session
 
 
 @pytest.mark.parametrize("background", ["studio", "transparent"])

@@ -11,10 +11,10 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tests.face.people import load_plain
 from tests.render.test_cutouts import face_with_sheet, without_sheet
 from tests.render.tiny_face import tiny_face
+from tts2face.picture import vtk_renderer as vtk
+from tts2face.picture.options import NUMBA, PYVISTA, Picture
+from tts2face.picture.renderer import mesh_renderer
 from tts2face.processes.program import Program
-from tts2face.render import vtk_renderer as vtk
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.picture import NUMBA, PYVISTA, Picture
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 BOUND = 2.0  # of 255: mean difference between the renderers' pictures; VTK interpolates highlights of vertices

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from corpus_tools.aam.plate import encode_plate_video
-from corpus_tools.aam.reference_frame import (
+from corpus_tools.appearance.frame import (
     MOUTH_LANDMARKS,
     build_reference_frame,
     face_ring,
     face_triangles,
     mouth_triangles,
 )
+from corpus_tools.appearance.videos import encode_plate_video
 from tts2face.models.appearance import Appearance, Plate, TextureModel
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
 from tts2face.models.talker import ShapeModel, Talker

@@ -3,7 +3,7 @@
 import os
 import time
 
-from tts2face.render.vtk_renderer import OFF_SCREEN, PROBE
+from tts2face.picture.vtk_renderer import OFF_SCREEN, PROBE
 
 CRASHES = {PROBE: lambda call: os.abort()}
 FAILS = {PROBE: lambda call: {"is_drawn": False}}

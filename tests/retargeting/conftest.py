@@ -2,7 +2,7 @@
 
 import pytest
 
-from tts2face.exemplar.synthesis import ExemplarModel, build_exemplar_model
+from tts2face.lips.exemplar import ExemplarModel, build_exemplar_model
 from tts2face.models.talker import Talker, load_talker
 
 

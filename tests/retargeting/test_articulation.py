@@ -9,18 +9,17 @@ from numpy.typing import NDArray
 
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.face.posing import posed_vertices
-from tts2face.exemplar.options import THEOBALD_2007, SynthesisOptions
-from tts2face.exemplar.synthesis import ExemplarModel, select_tokens
-from tts2face.face.landmark_fit import landmark_positions, scatter_landmarks
-from tts2face.face.mouth_model import MIDDLE_PAIR
+from tts2face.face.deformation import landmark_positions, scatter_landmarks
+from tts2face.face.mouth import MIDDLE_PAIR
+from tts2face.lips.articulation import articulation_tracks, build_articulator, pause_closure, seconds_from_closure
+from tts2face.lips.exemplar import ExemplarModel, select_tokens
+from tts2face.lips.options import THEOBALD_2007, SynthesisOptions
+from tts2face.lips.teeth_and_tongue import incisor_edge, upper_teeth
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, inner_lip_gaps
 from tts2face.models.talker import Talker
-from tts2face.retargeting.articulation import build_articulator
-from tts2face.retargeting.incisor_contact import incisor_edge, upper_teeth
-from tts2face.retargeting.phone_tracks import articulation_tracks, pause_closure, seconds_from_closure
-from tts2face.synthesis.mesh_face import mesh_face
+from tts2face.session.animated_face import mesh_face
 from tts2face.types import Trajectory
 
 FPS = 60.0
@@ -230,7 +229,7 @@ def test_natural_changes_neither_vowels_nor_consonants_without_a_contact(
 
 
 def lips_of(selection: object, exemplars: ExemplarModel, n_frames: int) -> NDArray[np.float32]:
-    from tts2face.exemplar.synthesis import blend_trajectory
+    from tts2face.lips.exemplar import blend_trajectory
 
     return blend_trajectory(selection, exemplars, fps=FPS, n_frames=n_frames).values  # type: ignore[arg-type]
 

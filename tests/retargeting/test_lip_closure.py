@@ -5,19 +5,25 @@ import pytest
 from numpy.typing import NDArray
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.exemplar.options import SynthesisOptions
-from tts2face.exemplar.synthesis import ExemplarModel, select_tokens
-from tts2face.face.gesture_transfer import gesture_face
-from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
-from tts2face.face.lip_constraints import build_lip_constraints
+from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.gestures import gesture_face
+from tts2face.face.mouth import build_lip_constraints
+from tts2face.lips.articulation import (
+    LARGEST_SPEED_PER_S,
+    MIN_CLOSURE_S,
+    close_lips,
+    largest_gaps,
+    limit_speed,
+    seconds_from_closure,
+)
+from tts2face.lips.exemplar import ExemplarModel, select_tokens
+from tts2face.lips.options import SynthesisOptions
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import inner_lip_gaps
 from tts2face.models.palette import EXPRESSIONS, load_palette
 from tts2face.models.talker import Talker
-from tts2face.retargeting.lip_closure import LARGEST_SPEED_PER_S, close_lips, largest_gaps, limit_speed
-from tts2face.retargeting.phone_tracks import MIN_CLOSURE_S, seconds_from_closure
-from tts2face.synthesis.mesh_face import mesh_face
+from tts2face.session.animated_face import mesh_face
 from tts2face.types import Trajectory
 
 FPS = 60.0

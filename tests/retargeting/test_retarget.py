@@ -10,7 +10,7 @@ from scipy.optimize import lsq_linear
 
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.face.bounded_least_squares import bounded_least_squares
+from tts2face.lips.retargeting import build_retargeter, contact_gaps, inner_product_map
 from tts2face.models.face import Face, Part
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
@@ -23,7 +23,7 @@ from tts2face.models.landmarks import (
     UPPER_LIP_INNER_MID,
 )
 from tts2face.models.talker import ShapeModel, Talker, Utterance, speech_channels
-from tts2face.retargeting.to_face import build_retargeter, contact_gaps, inner_product_map
+from tts2face.numeric.least_squares import bounded_least_squares
 from tts2face.types import Trajectory
 
 N_MODES = 3

@@ -16,14 +16,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tts2face.service import state as service_state
-from tts2face.service.jobs import job_service
-from tts2face.service.logs import configure_logs, log_event
-from tts2face.service.server import DrainingServer, make_server
-from tts2face.service.settings import ServiceSettings, read_settings
-from tts2face.service.synthesis.pool import Pool, PoolSettings
-from tts2face.studio.requests import TASKS
-from tts2face.telemetry import disable_telemetry
+from tts2face.numeric.kernels import disable_telemetry
+from tts2face.serving.service import job_service
+from tts2face.serving.service import state as service_state
+from tts2face.serving.service.logs import configure_logs, log_event
+from tts2face.serving.service.pool import Pool, PoolSettings
+from tts2face.serving.service.server import DrainingServer, make_server
+from tts2face.serving.service.settings import ServiceSettings, read_settings
+from tts2face.serving.studio.requests import TASKS
 
 
 class SharedPool(Pool):
@@ -90,7 +90,7 @@ class Host:
 
     def _mounts(self) -> list[Any]:
         from tests.studio.harness import add_page
-        from tts2face.studio.app import STUDIO
+        from tts2face.serving.studio.app import STUDIO
 
         add_page(self._folder)
         return [STUDIO]

@@ -9,12 +9,12 @@ from starlette.testclient import TestClient
 from tests.processes.answered import answered
 from tests.running import eventually
 from tts2face.processes.message import RESULT, Message
-from tts2face.service.app import create_app
-from tts2face.service.settings import ServiceSettings
-from tts2face.service.synthesis.synthesis_process import Synthesis
-from tts2face.service.synthesis.warm_process import WarmProcess
-from tts2face.service.synthesis.work import Work
-from tts2face.session_cache import SessionCache
+from tts2face.serving.service.messages import Work
+from tts2face.serving.service.pool import WarmProcess
+from tts2face.serving.service.server import create_app
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.service.synthesis import Synthesis
+from tts2face.session.functions import SessionCache
 
 START_S = 60.0
 

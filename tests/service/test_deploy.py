@@ -17,7 +17,7 @@ import yaml
 from cli.flags import check_options
 from cli.main import app
 from tests.docs.blocks import DOCS, ROOT
-from tts2face.service.settings import PREFIX, ServiceSettings, read_settings
+from tts2face.serving.service.settings import PREFIX, ServiceSettings, read_settings
 
 FOLDER = DOCS / "deploy"
 FILES = sorted(path for path in FOLDER.iterdir() if path.is_file())

@@ -10,12 +10,12 @@ from typing import Any
 import httpx
 import pytest
 
-from tts2face.service.access.exchange import Receive, Scope, Send
-from tts2face.service.access.guard import Guard
-from tts2face.service.access.keys import add_key
-from tts2face.service.logs import LineFormatter
-from tts2face.service.settings import ServiceSettings
-from tts2face.service.state import ServiceState
+from tts2face.serving.service.exchange import Receive, Scope, Send
+from tts2face.serving.service.guard import Guard
+from tts2face.serving.service.keys import add_key
+from tts2face.serving.service.logs import LineFormatter
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.service.state import ServiceState
 
 
 async def echo(scope: Scope, receive: Receive, send: Send) -> None:

@@ -6,10 +6,10 @@ from typing import Any
 
 import tts2face
 from tts2face.processes.message import MORE, Message
-from tts2face.service.synthesis.live_task import LiveTask
-from tts2face.service.synthesis.turns import InterruptedTaskError
-from tts2face.service.synthesis.work import Event, Inputs, Work
-from tts2face.voice.pool import VoicePool
+from tts2face.serving.service.live import LiveTask
+from tts2face.serving.service.messages import Event, Inputs, Work
+from tts2face.serving.service.scheduler import InterruptedTaskError
+from tts2face.sound.voice_pool import VoicePool
 
 
 def test_idle_motion_is_interrupted_by_cancel() -> None:

@@ -11,13 +11,13 @@ import httpx
 import pytest
 
 from tts2face.processes.message import EVENT, RESULT, Message
-from tts2face.service import logs
-from tts2face.service.access.exchange import Receive, Scope, Send
-from tts2face.service.access.guard import Guard
-from tts2face.service.access.keys import LOCAL_KEY
-from tts2face.service.logs import LOG, LineFormatter, log_event
-from tts2face.service.settings import ServiceSettings
-from tts2face.service.state import ServiceState
+from tts2face.serving.service import logs
+from tts2face.serving.service.exchange import Receive, Scope, Send
+from tts2face.serving.service.guard import Guard
+from tts2face.serving.service.keys import LOCAL_KEY
+from tts2face.serving.service.logs import LOG, LineFormatter, log_event
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.service.state import ServiceState
 
 
 def record(message: str, *, name: str = LOG.name, **fields: Any) -> logging.LogRecord:

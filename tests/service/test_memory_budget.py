@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from tts2face import session_cache
-from tts2face.session_cache import Models, SessionCache
+from tts2face.session import functions
+from tts2face.session.functions import SessionCache
+from tts2face.session.named_models import Models
 
 MB = 1_000_000
 
@@ -28,8 +29,8 @@ class FakeSession:
 @pytest.fixture
 def memory(monkeypatch: pytest.MonkeyPatch) -> None:
     FakeSession.alive.clear()
-    monkeypatch.setattr("tts2face.session.Session", FakeSession)
-    monkeypatch.setattr(session_cache, "resident_bytes", lambda: 100 * MB * len(FakeSession.alive))
+    monkeypatch.setattr("tts2face.session.session.Session", FakeSession)
+    monkeypatch.setattr(functions, "resident_bytes", lambda: 100 * MB * len(FakeSession.alive))
 
 
 @pytest.mark.usefixtures("memory")
@@ -55,7 +56,7 @@ def test_the_least_recently_used_session_is_released_first() -> None:
 def test_the_memory_of_a_process_is_measured() -> None:
     """In a new process, which has no free memory to use again."""
     code = """
-from tts2face.session_cache import resident_bytes
+from tts2face.session.functions import resident_bytes
 before = resident_bytes()
 block = bytearray(b"x" * 50_000_000)
 print(before, resident_bytes() - before)

@@ -12,13 +12,12 @@ import pytest
 from cli.main import run
 from lexicon.errors import DataError, InputError
 from tts2face.processes.message import EVENT, Message
-from tts2face.service.access.keys import LOCAL_KEY, ApiKey, add_key, find_key, read_keys, remove_key
-from tts2face.service.access.rate_limits import RateLimits
-from tts2face.service.errors import RefusedError
-from tts2face.service.settings import ServiceSettings
-from tts2face.service.state import ServiceState
-from tts2face.service.synthesis.pool import Pool, PoolSettings
-from tts2face.service.synthesis.work import Work
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits, add_key, find_key, read_keys, remove_key
+from tts2face.serving.service.messages import Work
+from tts2face.serving.service.pool import Pool, PoolSettings
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.service.state import ServiceState
 
 HOUR_S = 3600.0
 

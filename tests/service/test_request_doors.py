@@ -6,14 +6,13 @@ from dataclasses import fields
 import pytest
 from pydantic import BaseModel, ValidationError
 
-from tts2face.batch.cast import MODEL_NAMES, NOT_IN_CAST, REQUEST_NAMES
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
 from tts2face.request import Request
-from tts2face.service.orders.clip_options import NOT_IN_CLIPS, ClipRequest
-from tts2face.service.orders.job_kinds import BATCH_FIELDS, NOT_IN_SUBTITLES, SubtitlesRequest
-from tts2face.service.orders.request_fields import LIMITS, RECORDS
-from tts2face.service.routes.live import NOT_IN_LIVE_TEXT, TextOptions
-from tts2face.session_cache import Models
+from tts2face.serving.batch.cast import MODEL_NAMES, NOT_IN_CAST, REQUEST_NAMES
+from tts2face.serving.service.options import BATCH_FIELDS, NOT_IN_CLIPS, NOT_IN_SUBTITLES, ClipRequest, SubtitlesRequest
+from tts2face.serving.service.request_fields import LIMITS, RECORDS
+from tts2face.serving.service.routes.live import NOT_IN_LIVE_TEXT, TextOptions
+from tts2face.session.named_models import Models
 
 OPTIONS = {one.name for record in RECORDS for one in fields(record)}
 DOORS: list[tuple[type[BaseModel], Mapping[str, str], set[str]]] = [

@@ -10,8 +10,8 @@ import pytest
 
 from lexicon.errors import BackendError
 from tts2face.processes.message import EVENT, RESULT, Message
-from tts2face.service.synthesis.result_cache import ResultCache, work_hash
-from tts2face.service.synthesis.work import Work
+from tts2face.serving.service.messages import Work
+from tts2face.serving.service.result_cache import ResultCache, work_hash
 
 END = Message(RESULT, {"seconds": 1.0})
 HELLO = Work(request={"text": "Hello."}, models={"talker": "grid_s1"})

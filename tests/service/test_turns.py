@@ -16,14 +16,14 @@ from tests.running import eventually
 from tts2face.processes.child import Call, StoppedError
 from tts2face.processes.message import ERROR, GO, MORE, PAUSE, STOP, Message, read_message
 from tts2face.processes.parent import ChildEndedError
-from tts2face.service.synthesis.remote_aligner import RemoteAligner
-from tts2face.service.synthesis.synthesis_process import Synthesis
-from tts2face.service.synthesis.turns import InterruptedTaskError, OneAtATime, Turns, wait_elsewhere
-from tts2face.service.synthesis.work import Event, Step, Wait, Work
-from tts2face.session_cache import SessionCache
-from tts2face.speech.forced_alignment import Aligner
+from tts2face.serving.service.aligner import RemoteAligner
+from tts2face.serving.service.messages import Event, Step, Wait, Work
+from tts2face.serving.service.scheduler import InterruptedTaskError, OneAtATime, Turns, wait_elsewhere
+from tts2face.serving.service.synthesis import Synthesis
+from tts2face.session.functions import SessionCache
+from tts2face.sound.alignment import Aligner
+from tts2face.sound.voice_pool import load_voice
 from tts2face.types import Chunk
-from tts2face.voice.loading import load_voice
 
 WAIT_S = 60.0
 

@@ -9,14 +9,13 @@ import pytest
 
 from tests.processes.answered import answered
 from tts2face.processes.message import ERROR, RESULT
-from tts2face.service.app import Mount, create_app
-from tts2face.service.logs import JSON_LINES
-from tts2face.service.settings import ServiceSettings
-from tts2face.service.synthesis import synthesis_process
-from tts2face.service.synthesis.pool import LINES_COST, MOVIE_COST, SOUND_COST, work_cost
-from tts2face.service.synthesis.warm_process import WarmProcess
-from tts2face.service.synthesis.work import SYNTHESISE, Work
-from tts2face.session_cache import SessionCache
+from tts2face.serving.service import synthesis
+from tts2face.serving.service.logs import JSON_LINES
+from tts2face.serving.service.messages import SYNTHESISE, Work
+from tts2face.serving.service.pool import LINES_COST, MOVIE_COST, SOUND_COST, WarmProcess, work_cost
+from tts2face.serving.service.server import Mount, create_app
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.session.functions import SessionCache
 from tts2face.types import Chunk
 
 READY_TIMEOUT_S = 120.0
@@ -49,13 +48,13 @@ def test_the_end_of_a_process_is_not_taken_from_asyncio(caplog: pytest.LogCaptur
 
 def test_processes_have_the_tasks_of_what_is_mounted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(SessionCache, "get", lambda *_: None)
-    monkeypatch.setattr(synthesis_process.RemoteAligner, "start", lambda _: None)
-    monkeypatch.setattr(synthesis_process, "configure_logs", lambda *_, **__: None)
+    monkeypatch.setattr(synthesis.RemoteAligner, "start", lambda _: None)
+    monkeypatch.setattr(synthesis, "configure_logs", lambda *_, **__: None)
     mount, order = Mount(lambda *_: None, (f"{__name__}:GIVEN",)), {"work": Work("given").as_json(), "priority": 0}
     last = []
     for mounts in ([], [mount]):
         settings = create_app(ServiceSettings(processes=1, data=tmp_path), mounts).state.service.pool.settings
-        handlers = synthesis_process.handlers(**settings.handlers)
+        handlers = synthesis.handlers(**settings.handlers)
         last.append(answered(handlers[SYNTHESISE], order | {"id": None})[-1])
     assert [one.kind for one in last] == [ERROR, RESULT]
     assert last[0].content["message"].startswith("internal error: KeyError")

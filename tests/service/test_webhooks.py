@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.service.jobs.webhooks import sign
-from tts2face.service.settings import ServiceSettings
+from tts2face.serving.service.job_service import sign
+from tts2face.serving.service.settings import ServiceSettings
 
 
 def test_the_signature_is_that_of_standard_webhooks() -> None:

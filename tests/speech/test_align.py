@@ -7,9 +7,9 @@ import pytest
 
 from lexicon.errors import DataError
 from tests.rendered_takes import manifest_rows
-from tts2face.speech.forced_alignment import Aligner, acoustic_phones, enforce_increasing
+from tts2face.sound.alignment import Aligner, acoustic_phones, enforce_increasing
+from tts2face.sound.voice_pool import load_voice
 from tts2face.types import Waveform
-from tts2face.voice.loading import load_voice
 
 WORDS = [("bob", [("b", "ɑ", "b")]), ("may", [("m", "eɪ")]), ("read", [("ɹ", "i", "d"), ("ɹ", "ɛ", "d")])]
 

@@ -8,8 +8,8 @@ from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_net
 from lexicon.errors import InputError
 from tests.oracles.test_features import babble
 from tts2face.models.audio_map import AudioMap
-from tts2face.speech.features import FEATURE_KINDS, FEATURE_RATE, speech_features
-from tts2face.speech.streaming_listener import StreamingAudioMap, StreamingFeatures
+from tts2face.sound.features import FEATURE_KINDS, FEATURE_RATE, speech_features
+from tts2face.sound.listener import StreamingAudioMap, StreamingFeatures
 from tts2face.types import frame_count
 
 SOUND = babble(2.3)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.speech.pauses import cut_at_pauses, find_pauses
+from tts2face.sound.pauses import cut_at_pauses, find_pauses
 from tts2face.types import Waveform
 
 RATE = 16_000

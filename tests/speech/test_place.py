@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.speech import transcript_placement as place
-from tts2face.speech.transcript_placement import assign_words
+from tts2face.sound import transcript as place
+from tts2face.sound.transcript import assign_words
 
 PHONES = "pbtdkgfvszmnlrwiuaeo"
 

@@ -8,8 +8,8 @@ import pytest
 from corpus_tools.recordings.folder import Recording, pronounce_recording
 from lexicon.errors import InputError
 from tests.rendered_takes import manifest_rows
-from tts2face.speech.forced_alignment import acoustic_phones
-from tts2face.speech.phone_recognition import MAX_SOUND_S, PhoneRecogniser
+from tts2face.sound.alignment import acoustic_phones
+from tts2face.sound.listener import MAX_SOUND_S, PhoneRecogniser
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 

@@ -7,8 +7,8 @@ import pytest
 
 from lexicon.dictionary import parse_dictionary
 from lexicon.errors import DataError, InputError
-from tts2face.speech import transcript_alignment as scripts
-from tts2face.speech.transcript_alignment import align_recording, pronounce_transcript
+from tts2face.sound import transcript as scripts
+from tts2face.sound.transcript import align_recording, pronounce_transcript
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 

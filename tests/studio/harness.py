@@ -18,12 +18,12 @@ from fastapi.responses import Response
 from nicegui import app, ui
 
 from cli.main import main
-from tts2face.exports.stage_glb import stage_glb
-from tts2face.gesture.timeline_file import parse_timeline_object, timeline_json
+from tts2face.gestures.timeline_file import parse_timeline_object, timeline_json
+from tts2face.interchange.exports.stage_glb import stage_glb
 from tts2face.models.palette import FEATURES
-from tts2face.session import Session
-from tts2face.studio.components.stage import Stage
-from tts2face.studio.components.timeline import Timeline as TimelineElement
+from tts2face.serving.studio.components.stage import Stage
+from tts2face.serving.studio.components.timeline import Timeline as TimelineElement
+from tts2face.session.session import Session
 from tts2face.types import Clip
 
 TEXT = "We were away a year ago, but Bob may move five big maps."

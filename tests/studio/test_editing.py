@@ -9,13 +9,13 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence
-from tts2face.exemplar.options import ExcludedToken
-from tts2face.gesture.elements import KINDS, GazeTarget, Nod, StyleSpan
+from tts2face.gestures.elements import KINDS, GazeTarget, Nod, StyleSpan
+from tts2face.lips.options import ExcludedToken
 from tts2face.models.palette import FEATURES
-from tts2face.project.project import Project
 from tts2face.request import Request
-from tts2face.session_cache import Models
-from tts2face.studio.projects.editing import EDITS, MIN_PHONE_S, apply
+from tts2face.serving.studio.editing import EDITS, MIN_PHONE_S, apply
+from tts2face.session.named_models import Models
+from tts2face.session.project import Project
 
 PROJECT = Project(request=Request(text="Bob may move."))
 SENTENCE = ("Bob may move.", 0)

@@ -1,6 +1,6 @@
 """The table of measures in the panel that compares."""
 
-from tts2face.studio.pages.compare_panel import measures_html
+from tts2face.serving.studio.pages.compare_panel import measures_html
 
 
 def test_the_table_lists_lips_and_channels_that_both_move() -> None:

@@ -7,10 +7,9 @@ from typing import Any
 from tests.studio.test_bundle import piece
 from tts2face.processes.message import EVENT, Message
 from tts2face.processes.parent import ChildEndedError
-from tts2face.service.errors import RefusedError
-from tts2face.service.synthesis.work import Work
-from tts2face.studio.projects.bundle import PieceMemory, Preview
-from tts2face.studio.projects.previews import PARTIAL_S, ProjectPreview
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.messages import Work
+from tts2face.serving.studio.previews import PARTIAL_S, PieceMemory, Preview, ProjectPreview
 
 Stream = Callable[[Work], AsyncIterator[Message]]
 

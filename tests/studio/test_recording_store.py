@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.studio.recording.store import CHECKING, GOOD, REFUSED, WEAK, RecordingStore
+from tts2face.serving.studio.recordings import CHECKING, GOOD, REFUSED, WEAK, RecordingStore
 
 PROMPTS = {
     "prompts": [{"text": f"Sentence {n}.", "phones": ["a"], "triphones": ["sil aa sil"]} for n in range(3)],

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.gesture.elements import StyleSpan
-from tts2face.gesture.timeline import Timeline
-from tts2face.project.project import Project
+from tts2face.gestures.elements import StyleSpan
+from tts2face.gestures.timeline import Timeline
 from tts2face.request import Request
-from tts2face.studio.comparing.reference import Reference, parse_reference, reference_json, reference_project
+from tts2face.serving.studio.comparison import Reference, parse_reference, reference_json, reference_project
+from tts2face.session.project import Project
 
 PROJECT = Project("One", Request(text="Hello.", style="delighted", pitch=True), timeline=Timeline(
     spans=(StyleSpan("head", "delighted", 0.0, 0.5),)))  # fmt: skip

@@ -10,13 +10,12 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import BackendError, DataError, InputError
-from tts2face.project.project import Project
-from tts2face.project.project_file import load_project
 from tts2face.request import Request
+from tts2face.serving.studio.editing import History
+from tts2face.serving.studio.store import ASSETS, HISTORY, PROJECT, ProjectStore, archive
+from tts2face.session.project import Project
+from tts2face.session.project_file import load_project
 from tts2face.storage.temporary import Temporary
-from tts2face.studio.projects.archive import archive
-from tts2face.studio.projects.history import History
-from tts2face.studio.projects.store import ASSETS, HISTORY, PROJECT, ProjectStore
 
 PROJECT_ONE = Project(name="One", request=Request(text="Hello."))
 

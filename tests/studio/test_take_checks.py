@@ -6,8 +6,8 @@ import shutil
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.studio.recording.store import CHECKING, REFUSED, RecordingStore
-from tts2face.studio.recording.take_checks import TakeChecks
+from tts2face.serving.studio.recording_work import TakeChecks
+from tts2face.serving.studio.recordings import CHECKING, REFUSED, RecordingStore
 
 
 def run(coroutine):

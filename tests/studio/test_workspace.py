@@ -6,15 +6,15 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import BackendError
-from tts2face.project.project import Project
-from tts2face.service.access.keys import LOCAL_KEY
-from tts2face.service.settings import ServiceSettings
-from tts2face.service.state import ServiceState
-from tts2face.studio.projects import workspace as opened
-from tts2face.studio.projects.bundle import PieceMemory
-from tts2face.studio.projects.history import History
-from tts2face.studio.projects.store import ProjectStore
-from tts2face.studio.projects.workspace import Workspace
+from tts2face.serving.service.keys import LOCAL_KEY
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.service.state import ServiceState
+from tts2face.serving.studio import workspace as opened
+from tts2face.serving.studio.editing import History
+from tts2face.serving.studio.previews import PieceMemory
+from tts2face.serving.studio.store import ProjectStore
+from tts2face.serving.studio.workspace import Workspace
+from tts2face.session.project import Project
 
 
 class FullDisk(ProjectStore):

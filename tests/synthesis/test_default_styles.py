@@ -5,7 +5,7 @@ import pytest
 
 from tests.golden.requests import starter_with_pictures
 from tts2face.models.palette import EXPRESSIONS
-from tts2face.session import Session
+from tts2face.session.session import Session
 from tts2face.types import Clip
 
 TEXT = "Bob may move."

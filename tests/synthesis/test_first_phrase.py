@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.session import Session
-from tts2face.synthesis.speech_joining import CUT_SILENCE_S, FADE_S, trim_end
+from tts2face.session.joining import CUT_SILENCE_S, FADE_S, trim_end
+from tts2face.session.session import Session
 from tts2face.types import Speech, Waveform
 
 LONG = "We came home and nobody knew that it was late in the evening because the garden behind the house was green."

@@ -5,15 +5,15 @@ import pytest
 
 import tts2face
 from tests.synthesis.fake_voice import LEAD, LETTER, TRAIL, FakeVoice
+from tts2face.sound import voice_pool
 from tts2face.types import concatenate_clips
-from tts2face.voice import pool
 
 FPS = 10
 
 
 @pytest.fixture
 def ready(monkeypatch: pytest.MonkeyPatch) -> tts2face.Session:
-    monkeypatch.setattr(pool, "load_voice", lambda *_: FakeVoice())
+    monkeypatch.setattr(voice_pool, "load_voice", lambda *_: FakeVoice())
     return tts2face.Session()
 
 
@@ -50,7 +50,7 @@ def test_speech_in_the_middle_is_that_of_the_clip(ready: tts2face.Session) -> No
 
 def test_an_utterance_is_spoken_once_when_it_is_measured_first(monkeypatch: pytest.MonkeyPatch) -> None:
     voice = FakeVoice()
-    monkeypatch.setattr(pool, "load_voice", lambda *_: voice)
+    monkeypatch.setattr(voice_pool, "load_voice", lambda *_: voice)
     ready = tts2face.Session()
     ready.measure_speech("Hello. Bob.", fps=FPS)
     list(ready.stream_to_length("Hello. Bob.", 50, fps=FPS))

@@ -5,7 +5,7 @@ import pytest
 
 from lexicon.errors import DataError
 from tts2face.models.landmarks import lip_opening
-from tts2face.session import Session
+from tts2face.session.session import Session
 from tts2face.types import Trajectory
 
 

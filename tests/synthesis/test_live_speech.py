@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import tts2face
-from tts2face.synthesis.live_speech import LiveSpeech
-from tts2face.synthesis.speech_stream import Piece
-from tts2face.voice.pool import VoicePool
+from tts2face.session.live import LiveSpeech
+from tts2face.session.speech_stream import Piece
+from tts2face.sound.voice_pool import VoicePool
 
 LONG = "the garden behind the old house near the river had been green for years and nobody knew it " * 3
 MAX_SHARE = 0.3  # of the time after the voice in one step; 0.48 before gestures gave way between features

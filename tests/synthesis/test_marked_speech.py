@@ -9,15 +9,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lexicon.errors import InputError
-from lexicon.mark_parser import parse_marks
 from lexicon.marked_text import NodMark
 from lexicon.sentences import Sentence, index_by_letters, split_sentences
 from lexicon.sequence import SILENCE
+from lexicon.ssml import parse_marks
 from tests.synthesis.fake_voice import LEAD, LETTER, LEVEL, RATE, TRAIL, FakeVoice
-from tts2face.gesture.elements import Nod, StyleSpan
+from tts2face.gestures.elements import Nod, StyleSpan
 from tts2face.request import Request
-from tts2face.synthesis.mark_styles import check_marks, marked_styles
-from tts2face.synthesis.marked_speech import (
+from tts2face.session.joining import join_utterances, silent_speech, trim_silence
+from tts2face.session.prepared import check_marks, marked_styles
+from tts2face.session.speech import (
     MIN_UTTERANCE_GAP_S,
     MarkTime,
     SpokenSentence,
@@ -25,8 +26,7 @@ from tts2face.synthesis.marked_speech import (
     speak_sentence,
     voice_in,
 )
-from tts2face.synthesis.speech_joining import join_utterances, silent_speech, trim_silence
-from tts2face.voice.loading import load_voice
+from tts2face.sound.voice_pool import load_voice
 
 
 def synthesise_sentences(text: str, voice: object | None = None, **options: object) -> list[SpokenSentence]:

@@ -5,9 +5,9 @@ import pytest
 
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.session import Session
-from tts2face.synthesis.animated_face import AnimatedFace
-from tts2face.synthesis.motion_comparison import MotionComparison, MotionPart, compare_motion, map_channels
+from tts2face.session.animated_face import AnimatedFace
+from tts2face.session.comparison import MotionComparison, MotionPart, compare_motion, map_channels
+from tts2face.session.session import Session
 from tts2face.types import Trajectory
 
 FPS = 30.0

@@ -2,15 +2,14 @@
 
 import pytest
 
-from lexicon.mark_parser import parse_marks
 from lexicon.sentences import Sentence, split_sentences
+from lexicon.ssml import parse_marks
 from tts2face.models.palette import PLAIN, Delivery, load_palette
 from tts2face.models.palette_editing import StyleMix, add_derivation, mix_styles
 from tts2face.request import Request
-from tts2face.session import Session
-from tts2face.synthesis.marked_speech import sentence_sound, speak_sentence
-from tts2face.synthesis.style_voice import delivery_of
-from tts2face.voice.loading import load_voice
+from tts2face.session.session import Session
+from tts2face.session.speech import delivery_of, sentence_sound, speak_sentence
+from tts2face.sound.voice_pool import load_voice
 
 DELIVERIES = load_palette("starter").deliveries
 TEXT = "We were away a year ago."

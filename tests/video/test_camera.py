@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.video.camera import CaptureDevice
+from tts2face.video.streaming import CaptureDevice
 
 pytest.importorskip("cv2", reason="needs `pip install 'tts2face[capture]'`")
 

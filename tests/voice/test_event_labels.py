@@ -4,8 +4,8 @@ import pytest
 
 from lexicon.pronounce import pronounce
 from lexicon.sequence import SILENCE
-from tts2face.voice.event_labels import given_starts, match_phones
-from tts2face.voice.loading import load_voice
+from tts2face.sound.espeak import given_starts, match_phones
+from tts2face.sound.voice_pool import load_voice
 
 
 def test_phones_are_matched_one_by_one_where_they_can_be() -> None:

@@ -8,7 +8,7 @@ import pytest
 from lexicon.errors import BackendError, InputError
 from lexicon.pronounce import pronounce
 from lexicon.sequence import SILENCE
-from tts2face.voice.loading import load_voice
+from tts2face.sound.voice_pool import load_voice
 
 TEXT = "I read about the bass player."
 

@@ -5,9 +5,17 @@ import pytest
 
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.oracles.loudness_meter import measure_loudness, true_peak
-from tts2face.speech.bs1770 import integrated_loudness, oversampled_peaks
+from tts2face.sound.level import (
+    CEILING_DB,
+    LOOK_AHEAD_S,
+    LOUDNESS_LUFS,
+    integrated_loudness,
+    level_speech,
+    limit_peaks,
+    normalise_loudness,
+    oversampled_peaks,
+)
 from tts2face.types import Speech, Waveform
-from tts2face.voice.level import CEILING_DB, LOOK_AHEAD_S, LOUDNESS_LUFS, level_speech, limit_peaks, normalise_loudness
 
 RATE = 24_000
 

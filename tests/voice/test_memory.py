@@ -8,7 +8,7 @@ import pytest
 CODE = """
 from cli.process import return_large_blocks
 assert return_large_blocks()
-from tts2face.voice.neural import NeuralVoice
+from tts2face.sound.heart import NeuralVoice
 
 def held():
     lines = dict(line.split(":", 1) for line in open("/proc/self/status"))

@@ -11,10 +11,9 @@ import pytest
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.ipa import parse_ipa
 from lexicon.phones import PHONES
-from tts2face.voice.engine import SpokenWord
-from tts2face.voice.loading import load_voice
-from tts2face.voice.piper import PiperVoice
-from tts2face.voice.piper_network import english_letters
+from tts2face.sound.piper import PiperVoice, english_letters
+from tts2face.sound.voice import SpokenWord
+from tts2face.sound.voice_pool import load_voice
 
 onnx = pytest.importorskip("onnx", reason="needs `pip install onnx`")
 

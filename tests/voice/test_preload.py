@@ -7,10 +7,10 @@ import pytest
 
 from lexicon.errors import InputError
 from tts2face.request import Request
-from tts2face.synthesis.prepared_request import prepare
-from tts2face.synthesis.voice_preload import preload_voice
-from tts2face.voice import pool
-from tts2face.voice.pool import VoicePool
+from tts2face.session.prepared import prepare
+from tts2face.session.warm_up import preload_voice
+from tts2face.sound import voice_pool
+from tts2face.sound.voice_pool import VoicePool
 
 
 class CountedLoading:
@@ -31,7 +31,7 @@ class CountedLoading:
 @pytest.fixture
 def loading(monkeypatch: pytest.MonkeyPatch) -> CountedLoading:
     counted = CountedLoading()
-    monkeypatch.setattr(pool, "load_voice", counted)
+    monkeypatch.setattr(voice_pool, "load_voice", counted)
     return counted
 
 

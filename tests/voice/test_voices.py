@@ -8,10 +8,10 @@ from lexicon.errors import BackendError, DataError, InputError
 from lexicon.ipa import Segment, parse_ipa
 from lexicon.phones import PHONES
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.synthesis.speech_joining import resampled_speech
+from tts2face.session.joining import resampled_speech
+from tts2face.sound.voice import SpokenWord, Voice, apply_volume
+from tts2face.sound.voice_pool import load_voice
 from tts2face.types import Speech, Waveform
-from tts2face.voice.engine import SpokenWord, Voice, apply_volume
-from tts2face.voice.loading import load_voice
 
 SENTENCE = "Bob may move five big maps."
 WORDS = ["Bob", "may", "move", "five", "big", "maps"]

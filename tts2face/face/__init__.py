@@ -1,1 +1,1 @@
-"""Linear face models: deformation, expressions, lip and lid constraints, and transfer of motion to them."""
+"""Linear face models: deformation, expressions, lip and lid constraints, gestures, and what moves by itself."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 
 AUDIO_MAP_PREFIX = "drive."
-# Number of values per frame of each kind of feature of `tts2face.speech.features`.
+# Number of values per frame of each kind of feature of `tts2face.sound.features`.
 FEATURE_SIZES: Mapping[str, int] = MappingProxyType({"formants": 4, "mfcc": 13, "lpc": 16, "lsf": 16, "level": 1})
 MAX_CONTEXT = 1000  # frames of context on either side
 MAX_GAIN_DB = 40.0  # fainter recordings contain more noise than speech
@@ -29,7 +29,7 @@ class AudioMap:
     Parameters
     ----------
     feature
-        Kind of feature, as in `tts2face.speech.features`.
+        Kind of feature, as in `tts2face.sound.features`.
     before, after
         Frames of context before and after each frame.
     mean, spread : (D,)

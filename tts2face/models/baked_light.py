@@ -3,6 +3,8 @@
 Colours are those of a display, 0 to 255, and are added to each other; those of eyeballs are linear light. Source:
 Theobald et al. 2007, equation 2 (an appearance is a mean and a sum of changes), with changes that each vertex finds in
 the shape of its pose.
+
+View transform: linear light to colours of a display, as a table over its logarithm.
 """
 
 from collections.abc import Mapping
@@ -21,7 +23,7 @@ LIP_RING = (
     *INNER_LIP_UPPER,
     *INNER_LIP_LOWER[::-1][1:-1],
 )  # landmarks round the opening, against the clock as the face sees it
-N_TERMS, N_MOUTH_TERMS, N_BALL_TERMS = 10, 6, 3  # of `tts2face.render.film.response`
+N_TERMS, N_MOUTH_TERMS, N_BALL_TERMS = 10, 6, 3  # of `tts2face.picture.baked.response`
 LIMIT_STEP = 2.0  # of 255
 BLACK_SHARE = 64  # of a page's height lies below both, black: the texels of parts without a page
 LEAST_SIDE = 2 * BLACK_SHARE  # of a page: two rows of black, of which one is read
@@ -126,7 +128,7 @@ class BakedLight(HairLight):
     rows : (N,)
         Vertices whose light changes with the expression.
     responses : (10, 3, N)
-        Change of their light by terms of the pose (`tts2face.render.film.response`), over ``response_sizes`` (10,).
+        Change of their light by terms of the pose (`tts2face.picture.baked.response`), over ``response_sizes`` (10,).
     limits : (2, 3, N)
         Least and most change that the baked poses showed, in steps of `LIMIT_STEP`.
     partners : (N + B,)
@@ -154,7 +156,7 @@ class BakedLight(HairLight):
     eye_edges : (2,)
         Angles from the gaze, rad, at which pupil and iris end in that texture.
     view : (33, 33, 33, 3)
-        Colours of linear light at `tts2face.models.view_transform.table_levels`.
+        Colours of linear light at `tts2face.models.baked_light.table_levels`.
     backdrop : (H, W, 3)
         The wall behind, from in front.
     """
@@ -254,3 +256,35 @@ def _make_read_only(record: Any) -> None:
     for one in fields(record):
         if isinstance(array := getattr(record, one.name), np.ndarray):
             array.setflags(write=False)
+
+
+OFFSET, MOST = 0.004, 16.0  # of the logarithm, and the range of linear light
+SPAN = float(np.log2(MOST / OFFSET + 1))
+
+
+def table_levels() -> NDArray[np.float64]:
+    """(33,) levels of linear light, evenly in the logarithm of light plus an offset."""
+    levels: NDArray[np.float64] = OFFSET * 2 ** (np.linspace(0, 1, TABLE_SIDE) * SPAN) - OFFSET
+    return levels
+
+
+def grey_curves(view: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Curves of a view transform (33, 33, 33, 3) along its greys, which undo and do it for each channel alone.
+
+    Returns
+    -------
+    light : (3, 256)
+        Linear light of each displayed level.
+    bounds : (3, 255)
+        Linear light from which the next level is displayed.
+    """
+    grey = np.arange(TABLE_SIDE)
+    at = np.arange(0.0, 255.5, 0.5)
+    found = []
+    for levels in view[grey, grey, grey].T.astype(np.float64):
+        rising = np.flatnonzero(np.diff(levels) > 0)
+        used = np.append(rising, rising[-1] + 1)  # the last entry of black and the first of white
+        place = np.interp(at, levels[used], used) / (TABLE_SIDE - 1)
+        found.append(OFFSET * 2 ** (place * SPAN) - OFFSET)
+    curves = np.array(found, np.float32)
+    return curves[:, ::2], curves[:, 1::2]

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.baked_light import BakedLight
-from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Hairdo, Part, PhotoView, Texture
-from tts2face.models.face_layout import (
+from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Hairdo, Late, Part, PhotoView, Texture
+from tts2face.models.face_schema import (
     FOLLOW,
     LIGHT,
     MAX_TEXTURES,
@@ -22,22 +22,24 @@ from tts2face.models.face_layout import (
     SCORE_INPUTS,
     WIDE_OPEN,
     check_face,
+    decode_occlusion,
+    decode_tangents,
+    decode_uv,
+    encode_occlusion,
+    encode_tangents,
+    encode_uv,
     texture_number,
 )
-from tts2face.models.late import Late
-from tts2face.models.light_coding import decode_light, encode_light
-from tts2face.models.mesh_coding import decode_tangents, decode_uv, encode_tangents, encode_uv
-from tts2face.models.occlusion_coding import decode_occlusion, encode_occlusion
-from tts2face.models.picture_coding import (
+from tts2face.models.light_coding import decode_light, encode_light, pack_shapes, quantise, unpack_shapes
+from tts2face.models.networks import score_map_arrays, score_map_from_arrays
+from tts2face.storage.files import present_name
+from tts2face.storage.media_files import (
     decode_colours,
     decode_coverage,
     encode_colours,
     encode_coverage,
     texture_tensors,
 )
-from tts2face.models.score_map import score_map_arrays, score_map_from_arrays
-from tts2face.models.shape_coding import pack_shapes, quantise, unpack_shapes
-from tts2face.storage.files import present_name
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 KIND = "face"
@@ -133,7 +135,7 @@ def read_face(path: Path, identity: str | None = None, *, checks_pictures: bool 
     InputError
         The file does not exist, or the identity neither now nor in earlier versions.
     DataError
-        The file is damaged, of another kind or version, or invalid (`tts2face.models.face_layout`).
+        The file is damaged, of another kind or version, or invalid (`tts2face.models.face_schema`).
     """
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
     check_face(path, arrays, header)

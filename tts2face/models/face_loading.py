@@ -5,10 +5,8 @@ from pathlib import Path
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import KIND, read_face
-from tts2face.models.hair import BALD, attach_hair
-from tts2face.models.hair_file import haircut_names, load_hair
-from tts2face.models.lit_hair import LitHair, tint_hair, wear_hair
-from tts2face.models.named_colours import parse_hair_colour
+from tts2face.models.hair import BALD, attach_hair, parse_hair_colour
+from tts2face.models.hair_file import LitHair, haircut_names, load_hair, tint_hair, wear_hair
 from tts2face.request import DRAWN_FACE, REALISTIC_FACE
 from tts2face.storage.files import FORMER, SHIPPED_FOLDER, find_file
 

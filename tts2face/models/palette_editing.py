@@ -6,8 +6,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from lexicon.errors import InputError
-from tts2face.models.palette import EXPRESSIONS, FEATURES, Delivery, Derivation, FeatureChange, Palette
-from tts2face.models.palette_layout import LEVEL_DB, RATE_FACTORS
+from tts2face.models.palette import (
+    EXPRESSIONS,
+    FEATURES,
+    LEVEL_DB,
+    RATE_FACTORS,
+    Delivery,
+    Derivation,
+    FeatureChange,
+    Palette,
+)
 
 MAX_NAME = 40
 FORBIDDEN = frozenset(",=@;:#[]<>\"'/\\")  # have a meaning in marks, flags, timelines or paths

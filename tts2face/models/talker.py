@@ -12,9 +12,15 @@ from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.models.appearance import STEPS_PER_PARAMETER, Appearance, appearance_arrays, appearance_from_arrays
 from tts2face.models.audio_map import AudioMap, audio_map_arrays, audio_maps_from_arrays
-from tts2face.models.phone_network import PhoneNetwork, network_arrays, network_from_arrays
-from tts2face.models.score_map import ScoreMap, score_map_arrays, score_map_from_arrays
-from tts2face.models.talker_layout import check_talker
+from tts2face.models.networks import (
+    PhoneNetwork,
+    ScoreMap,
+    network_arrays,
+    network_from_arrays,
+    score_map_arrays,
+    score_map_from_arrays,
+)
+from tts2face.models.talker_schema import check_talker
 from tts2face.storage.files import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS, Trajectory
@@ -189,7 +195,7 @@ def read_talker(path: Path) -> Talker:
     InputError
         The file does not exist.
     DataError
-        The file is damaged, of another kind or version, or invalid (`tts2face.models.talker_layout`).
+        The file is damaged, of another kind or version, or invalid (`tts2face.models.talker_schema`).
     """
     arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
     check_talker(path, arrays, header)

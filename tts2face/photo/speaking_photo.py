@@ -8,35 +8,37 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.models.face import Face, Part, PhotoView
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.photo.eye_pictures import EYE_BEHIND_MM, SIDES, EyePatch, eye_patches, gaze_shapes
+from tts2face.photo.camera import PhotoCamera, find_camera
+from tts2face.photo.eyes import EYE_BEHIND_MM, SIDES, EyePatch, eye_patches, gaze_shapes
+from tts2face.photo.fit import NOTHING_GIVEN, PhotoFit, PhotoPlaces, place_landmarks
 from tts2face.photo.found_face import PhotographedFace
-from tts2face.photo.landmark_places import place_landmarks
-from tts2face.photo.lid_lines import find_lid_lines
-from tts2face.photo.lids import add_lids
-from tts2face.photo.lip_line import LipLine, darken_lip_edges, find_lip_line
-from tts2face.photo.mouth_inside import MouthInside, MouthPlace, cheek_light, mouth_light, mouth_walls
-from tts2face.photo.own_teeth import OwnTeeth, find_teeth, teeth_and_tongue
-from tts2face.photo.photo_camera import PhotoCamera, find_camera
-from tts2face.photo.photo_fit import NOTHING_GIVEN, PhotoFit, PhotoPlaces
-from tts2face.photo.photo_light import MouthRows, picture_light
-from tts2face.photo.photo_mesh import PhotoMesh, build_mesh
-from tts2face.photo.photo_shapes import (
+from tts2face.photo.light import SMILING, MouthRows, picture_light, wrinkles
+from tts2face.photo.lines import LipLine, darken_lip_edges, find_lid_lines, find_lip_line
+from tts2face.photo.mesh import PhotoMesh, Spreading, build_mesh
+from tts2face.photo.mouth import MouthInside, MouthPlace, cheek_light, mouth_light, mouth_walls
+from tts2face.photo.photograph import OPAQUE, Photograph
+from tts2face.photo.shapes import (
+    EYES,
     GAZE_LIDS,
+    SKIN,
+    PhotoPages,
     PhotoPerson,
+    PhotoSurface,
+    Vertices,
+    add_lids,
     blink,
     breathing,
     closing,
     depths,
     face_shapes,
     head_follow,
+    lay_pages,
+    moves,
 )
-from tts2face.photo.photo_surface import EYES, SKIN, PhotoPages, PhotoSurface, Vertices, lay_pages, moves
-from tts2face.photo.photograph import OPAQUE, Photograph
-from tts2face.photo.spreading import Spreading
-from tts2face.photo.wrinkles import SMILING, wrinkles
+from tts2face.photo.teeth import OwnTeeth, find_teeth, teeth_and_tongue
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -5,8 +5,7 @@ import sys
 
 from lexicon.errors import BackendError
 from tts2face.processes.child import bind_to_core, claim_standard_output, refusing, serve
-from tts2face.processes.limits import limit_process
-from tts2face.processes.program import read_program
+from tts2face.processes.program import limit_process, read_program
 
 
 def main() -> None:

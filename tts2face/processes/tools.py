@@ -8,9 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 from lexicon.errors import DataError
-from tts2face.processes.limits import ProcessLimits
 from tts2face.processes.parent import ChildEndedError, call_once
-from tts2face.processes.program import Program
+from tts2face.processes.program import ProcessLimits, Program
 
 TAKES, TAKE_S = "takes", 1800.0  # the tool, and the time of one order
 TAKE_LIMITS = ProcessLimits(memory_bytes=6 << 30, cpu_s=1800, file_bytes=1 << 30, n_files=256)

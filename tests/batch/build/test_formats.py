@@ -15,18 +15,18 @@ from tests.batch.conftest import FPS, SMALL, SRT, Planner
 from tests.render.tiny_talker import own_talker
 from tests.synthesis.fake_voice import LEAD, LETTER, FakeVoice
 from tts2face import load_clip
-from tts2face.batch.cast import Cast, Role
-from tts2face.batch.options import BatchOptions
-from tts2face.batch.plan import plan_batch
-from tts2face.batch.render_segment import _writer
-from tts2face.batch.run import run_batch
-from tts2face.batch.segment import Segment
-from tts2face.exports import formats
-from tts2face.exports.formats import batch_format, sound_name
-from tts2face.render.own_face import OwnFaceRenderer, own_face_renderer
-from tts2face.render.picture import Picture
+from tts2face.interchange.exports import table
+from tts2face.interchange.exports.table import batch_format, sound_name
+from tts2face.picture.options import Picture
+from tts2face.picture.own_face import OwnFaceRenderer, own_face_renderer
 from tts2face.request import Request
-from tts2face.session_cache import Models
+from tts2face.serving.batch.cast import Cast, Role
+from tts2face.serving.batch.options import BatchOptions
+from tts2face.serving.batch.plan import plan_batch
+from tts2face.serving.batch.render import _writer
+from tts2face.serving.batch.run import run_batch
+from tts2face.serving.batch.segment import Segment
+from tts2face.session.named_models import Models
 
 CUES = ((0.5, "Hello there"), (2.5, "Good morning to you all"), (10.0, "Bob may move"))
 
@@ -148,7 +148,7 @@ def test_exports_with_a_mesh_need_a_face_with_one(plan_of: Planner) -> None:
 
 @pytest.mark.smoke
 def test_a_missing_package_is_named_before_anything_is_rendered(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(formats, "find_spec", lambda _: None)
+    monkeypatch.setattr(table, "find_spec", lambda _: None)
     with pytest.raises(BackendError, match=r"\.usda needs the package pxr"):
         BatchOptions(exports=("usda",))
 

@@ -17,15 +17,13 @@ from cli.main import run
 from lexicon.errors import BackendError, InputError
 from tests.batch.conftest import FPS, SRT, Planner
 from tests.synthesis.fake_voice import LEAD, LETTER, FakeVoice
-from tts2face.batch import engine as engines
-from tts2face.batch.engine import LocalEngine, Rendered
-from tts2face.batch.render_process import RenderProcess
-from tts2face.batch.render_segment import SegmentRenderer
-from tts2face.batch.run import SEGMENT_FOLDER, run_batch
-from tts2face.batch.segment import Segment
-from tts2face.batch.segment_result import SegmentResult
-from tts2face.batch.store import FolderStore, Store
 from tts2face.processes.parent import ChildEndedError
+from tts2face.serving.batch import engine as engines
+from tts2face.serving.batch.engine import LocalEngine, Rendered
+from tts2face.serving.batch.render import RenderProcess, SegmentRenderer
+from tts2face.serving.batch.run import SEGMENT_FOLDER, run_batch
+from tts2face.serving.batch.segment import Segment, SegmentResult
+from tts2face.serving.batch.store import FolderStore, Store
 
 HALF_FRAME_S = 0.5 / FPS
 AAC_SMEAR_S = 0.025  # of an onset, by the transform's length of 1024 samples

@@ -12,16 +12,15 @@ import pytest
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE
 from tests.batch.conftest import SMALL
-from tts2face.batch.options import BatchOptions
-from tts2face.batch.output import Plan
-from tts2face.batch.plan import plan_batch
-from tts2face.batch.run import run_batch
-from tts2face.batch.windows import cue_windows
-from tts2face.clock import exact_rate, first_sample
+from tts2face.interchange.subtitles.cues import Cue
 from tts2face.request import Request
-from tts2face.session import Session
-from tts2face.subtitles.cue import Cue
-from tts2face.types import Clip
+from tts2face.serving.batch.options import BatchOptions
+from tts2face.serving.batch.output import Plan
+from tts2face.serving.batch.plan import plan_batch
+from tts2face.serving.batch.run import run_batch
+from tts2face.serving.batch.windows import cue_windows
+from tts2face.session.session import Session
+from tts2face.types import Clip, exact_rate, first_sample
 
 FPS = 25
 RATE = 48_000

@@ -29,12 +29,11 @@ from tests.batch.emulators import (
 )
 from tests.running import eventually
 from tests.synthesis.fake_voice import FakeVoice
-from tts2face.batch import engine as engines
-from tts2face.batch import object_store, store
-from tts2face.batch.run import run_batch
-from tts2face.batch.segment import Segment
-from tts2face.batch.segment_result import SegmentResult
-from tts2face.batch.store import open_store
+from tts2face.serving.batch import engine as engines
+from tts2face.serving.batch import object_store, store
+from tts2face.serving.batch.run import run_batch
+from tts2face.serving.batch.segment import Segment, SegmentResult
+from tts2face.serving.batch.store import open_store
 
 ADDRESS = "ab" * 32
 RESULT = SegmentResult(15, 10.0, 1.1, 1.4, 0.0, 0.0, ("a warning",), 2.5)
@@ -192,8 +191,8 @@ def test_workers_share_a_bucket(bucket: Bucket, tmp_path: Path, capfd: pytest.Ca
 def test_a_killed_upload_leaves_nothing_visible(bucket: Bucket, tmp_path: Path) -> None:
     movie = write_movie(tmp_path, os.urandom(9_000_000))
     upload = (
-        "import sys; from pathlib import Path; from tts2face.batch.store import open_store\n"
-        "from tts2face.batch.segment_result import SegmentResult\n"
+        "import sys; from pathlib import Path; from tts2face.serving.batch.store import open_store\n"
+        "from tts2face.serving.batch.segment import SegmentResult\n"
         "open_store(sys.argv[1]).put(sys.argv[2], Path(sys.argv[3]), SegmentResult(15, 10.0))"
     )
     bucket.relay.limit = 3_000_000

@@ -5,8 +5,8 @@ from functools import partial
 
 import pytest
 
-from tts2face.characters import importing
-from tts2face.render.occlusion import bake_occlusion
+from tts2face.interchange.characters import importing
+from tts2face.picture.occlusion import bake_occlusion
 
 N_DIRECTIONS = 8
 

@@ -14,13 +14,12 @@ from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence
 from tests.characters.made import METRES, Variant, glb, shipped_head, split_glb, write_character_file, write_landmarks
 from tests.exports import programs
-from tts2face.characters.animation import write_character
-from tts2face.characters.bone_tracks import NECK_SHARE
-from tts2face.characters.importing import import_face
 from tts2face.face.deformation import build_rig
+from tts2face.interchange.characters.animation import NECK_SHARE, write_character
+from tts2face.interchange.characters.importing import import_face
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
-from tts2face.session import Session
+from tts2face.session.session import Session
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 FPS, N_FRAMES = 25.0, 10

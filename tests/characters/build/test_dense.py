@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from tests.characters.made import Variant, shipped_head, write_character_file, write_landmarks
-from tts2face.characters.importing import import_face
-from tts2face.characters.saving import save_face
-from tts2face.face.landmark_fit import landmark_motion, scatter_landmarks
+from tts2face.face.deformation import landmark_motion, scatter_landmarks
+from tts2face.interchange.characters.importing import import_face, save_face
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
 

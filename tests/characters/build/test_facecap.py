@@ -9,12 +9,12 @@ import pytest
 
 from tests.characters.build.test_animation import Played
 from tests.exports import programs
-from tts2face.characters.animation import write_character
-from tts2face.characters.gltf_character import read_gltf_character
-from tts2face.characters.importing import ImportedFace, import_face
-from tts2face.characters.shape_names import ARKIT_SHAPES, guess_mapping
-from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
-from tts2face.session import Session
+from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.interchange.characters.animation import write_character
+from tts2face.interchange.characters.importing import ImportedFace, import_face
+from tts2face.interchange.characters.readers import read_gltf_character
+from tts2face.interchange.characters.shapes import ARKIT_SHAPES, guess_mapping
+from tts2face.session.session import Session
 
 
 @pytest.fixture(scope="module")

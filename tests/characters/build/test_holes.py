@@ -8,11 +8,10 @@ import pytest
 from PIL import Image
 
 from tests.characters.made import METRES, GltfMaker, bounds, split_glb, write_character_file, write_landmarks
-from tts2face.characters.importing import import_face
-from tts2face.characters.saving import save_face
+from tts2face.interchange.characters.importing import import_face, save_face
 from tts2face.models.face_file import read_face
-from tts2face.render.draw import draw
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import draw
 
 STRIPE = 8  # pixels of the image
 RED = 200

@@ -10,18 +10,17 @@ from PIL import Image
 from cli.main import run
 from lexicon.errors import DataError, InputError
 from tests.characters.made import Variant, shipped_head, write_character_file, write_landmarks
-from tts2face.characters.importing import ImportedFace, import_face
-from tts2face.characters.landmark_table import landmark_table, read_landmark_table
-from tts2face.characters.saving import save_face
-from tts2face.characters.shape_mapping import mapping_table, read_mapping
-from tts2face.face.gesture_transfer import gesture_face
-from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.gestures import gesture_face
+from tts2face.interchange.characters.importing import ImportedFace, import_face, save_face
+from tts2face.interchange.characters.landmarks import landmark_table, read_landmark_table
+from tts2face.interchange.characters.shapes import mapping_table, read_mapping
+from tts2face.lips.retargeting import build_retargeter
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
 from tts2face.models.landmarks import LIP_LANDMARKS
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
-from tts2face.retargeting.to_face import build_retargeter
 from tts2face.types import Trajectory
 
 PLACE_MM = 0.02  # of a landmark after its table with 7 digits; quantised files have steps of 0.015 mm

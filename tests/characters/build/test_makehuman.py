@@ -7,12 +7,12 @@ import pytest
 
 from tests.characters.build.test_animation import Played, made_clip
 from tests.characters.makehuman import makehuman, write_obj_folder, write_rigged
-from tts2face.characters.animation import write_character
-from tts2face.characters.importing import ImportedFace, import_face
-from tts2face.characters.landmark_table import landmark_table
-from tts2face.characters.shape_names import ARKIT_SHAPES
-from tts2face.face.landmark_fit import landmark_motion, landmark_positions, scatter_landmarks
+from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.face.shape_transfer import eye_distance
+from tts2face.interchange.characters.animation import write_character
+from tts2face.interchange.characters.importing import ImportedFace, import_face
+from tts2face.interchange.characters.landmarks import landmark_table
+from tts2face.interchange.characters.shapes import ARKIT_SHAPES
 from tts2face.models.face import Face
 
 BONES = {

@@ -15,12 +15,11 @@ import pytest
 from tests.characters.build.test_animation import FPS, N_FRAMES, Played, made_clip
 from tests.characters.made import METRES, Variant, shipped_head, write_character_file, write_landmarks
 from tests.exports import programs
-from tts2face.characters.animation import write_character
-from tts2face.characters.bone_tracks import NECK_SHARE, share_of_rotation
-from tts2face.characters.importing import import_face
 from tts2face.face.deformation import head_rotation, rotation_matrix
+from tts2face.interchange.characters.animation import NECK_SHARE, share_of_rotation, write_character
+from tts2face.interchange.characters.importing import import_face
 from tts2face.models.face import VERTEX_COLOURS
-from tts2face.numeric import quaternion_matrix
+from tts2face.numeric.arrays import quaternion_matrix
 
 POSE = (0.25, -0.4, 0.1)  # pitch, yaw, roll of the last frame, rad
 NECK = np.array([0.0, -0.12, -0.09])  # of the made character, metres

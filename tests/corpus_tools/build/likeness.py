@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.dense.light_cast import EyeColours, estimate_cast, remove_cast, sample_eyes, srgb_colour
-from tts2face.colour import decode_srgb, encode_light
+from corpus_tools.dense.skin_colour import EyeColours, estimate_cast, remove_cast, sample_eyes, srgb_colour
 from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN, FACE_OVAL, N_MESH_LANDMARKS
+from tts2face.numeric.arrays import decode_srgb, encode_light
 from tts2face.photo.found_face import FoundFace, PhotographedFace, find_face
-from tts2face.render.draw import draw
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import draw
 from tts2face.video.pose import similarity_transforms
-from tts2face.video.track import FaceTracker
+from tts2face.video.tracking import FaceTracker
 
 Floats = NDArray[np.float64]
 

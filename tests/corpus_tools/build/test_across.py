@@ -6,17 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.evaluation.evaluate import SpeakerScale, SplitResult, evaluate_across_talkers
-from corpus_tools.evaluation.livelink_reference import observe_livelink
-from corpus_tools.evaluation.measures import midpoint_openings, min_openings
-from corpus_tools.evaluation.reference import LipCurves
-from corpus_tools.evaluation.tables import Evaluation
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.report.evaluation import evaluation_page
 from corpus_tools.run_options import RunOptions
+from corpus_tools.studies.evaluation.evaluate import SpeakerScale, SplitResult, evaluate_across_talkers
+from corpus_tools.studies.evaluation.page import evaluation_page
+from corpus_tools.studies.evaluation.reference import LipCurves, midpoint_openings, min_openings
+from corpus_tools.studies.evaluation.tables import Evaluation
+from corpus_tools.studies.evaluation.tracks import observe_livelink
 from lexicon.errors import InputError
 from tests.corpus_tools.speaking import observation
-from tts2face.face.face_motion import moved_landmarks
+from tts2face.face.deformation import moved_landmarks
 from tts2face.models.face_loading import load_face
 from tts2face.types import Trajectory
 

@@ -12,21 +12,21 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
-from corpus_tools.pooling import base_phrases
-from corpus_tools.pooling.base_phrases import (
+from corpus_tools.recordings.observation import Observation
+from corpus_tools.recordings.observe import Observations
+from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
+from corpus_tools.training.network_training import TrainingOptions
+from corpus_tools.training.phone_network import add_phone_network
+from corpus_tools.training.pooling import speech
+from corpus_tools.training.pooling.speech import (
     DURATION_SPREAD,
     EDGE_SILENCE_S,
     N_PHRASES,
     TEMPI,
+    PooledSpeech,
     base_speech,
     english_phrases,
 )
-from corpus_tools.pooling.pooled_speech import PooledSpeech
-from corpus_tools.recordings.observation import Observation
-from corpus_tools.recordings.observe import Observations
-from corpus_tools.training.network_training import TrainingOptions
-from corpus_tools.training.train_phone_network import add_phone_network
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import InputError
 from lexicon.phones import ARPABET
@@ -43,9 +43,9 @@ HIDDEN = "ɑ"  # the widest of the artificial phones; no other shares its featur
 @pytest.fixture(autouse=True)
 def few_recordings(monkeypatch: pytest.MonkeyPatch) -> None:
     """Networks from a minute, with more passes over few frames, and fewer phrases."""
-    monkeypatch.setattr("corpus_tools.training.train_phone_network.MIN_FRAMES", 100)
-    monkeypatch.setattr("corpus_tools.training.train_phone_network.TRAINING", PASSES)
-    monkeypatch.setattr(base_phrases, "N_PHRASES", 40)
+    monkeypatch.setattr("corpus_tools.training.phone_network.MIN_FRAMES", 100)
+    monkeypatch.setattr("corpus_tools.training.phone_network.TRAINING", PASSES)
+    monkeypatch.setattr(speech, "N_PHRASES", 40)
 
 
 @pytest.fixture(scope="module")
@@ -58,8 +58,8 @@ def recordings() -> list[Observation]:
 def base(recordings: list[Observation]) -> Talker:
     """A talker who says all artificial phones, with networks."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("corpus_tools.training.train_phone_network.MIN_FRAMES", 100)
-        patched.setattr("corpus_tools.training.train_phone_network.TRAINING", PASSES)
+        patched.setattr("corpus_tools.training.phone_network.MIN_FRAMES", 100)
+        patched.setattr("corpus_tools.training.phone_network.TRAINING", PASSES)
         return add_phone_network(learn_talker(recordings[:40], metadata={**EVALUATION_METADATA, "name": "Ann"}))
 
 
@@ -139,9 +139,9 @@ def test_the_build_of_a_long_talker_states_the_base_of_its_networks(
 ) -> None:  # fmt: skip
     write_talker(tmp_path / "base.talker", replace(base, metadata={**base.metadata, "pooled": "lips, CC0"}))
     own = without_hidden(recordings[40:])
-    monkeypatch.setattr("corpus_tools.training.train_phone_network.TRAINING", FEW_PASSES)
+    monkeypatch.setattr("corpus_tools.training.phone_network.TRAINING", FEW_PASSES)
     monkeypatch.setattr("corpus_tools.build_talker.observe", lambda *_, **__: Observations(tuple(own), (), ()))
-    monkeypatch.setattr("corpus_tools.training.short_talker.MIN_OWN_MINUTES", 0.2)
+    monkeypatch.setattr("corpus_tools.training.choose_adaptation.MIN_OWN_MINUTES", 0.2)
     monkeypatch.setattr("corpus_tools.build_talker.add_score_map", lambda talker, _: talker)
     command = ["corpus", "build", str(tmp_path / "recordings"), "--model", str(face_model), "--out"]
     assert run([*command, str(tmp_path / "me.talker"), "--base", str(tmp_path / "base.talker")]) == 0
@@ -181,7 +181,7 @@ def test_networks_have_the_same_bytes_on_another_processor_and_with_other_number
     base: Talker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Code without the extensions of this processor stands for another machine."""
-    monkeypatch.setattr("corpus_tools.training.train_phone_network.TRAINING", FEW_PASSES)
+    monkeypatch.setattr("corpus_tools.training.phone_network.TRAINING", FEW_PASSES)
     write_talker(tmp_path / "base.talker", base)
     other = {
         "NUMBA_CPU_NAME": "generic", "NUMBA_CACHE_DIR": str(tmp_path / "kernels"), "OPENBLAS_CORETYPE": "Nehalem",

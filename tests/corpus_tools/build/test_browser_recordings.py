@@ -7,8 +7,8 @@ import av
 import numpy as np
 import pytest
 
-from tts2face.video.frame_grid import resample_to_grid
 from tts2face.video.media import read_frames, read_media_info, read_sound
+from tts2face.video.pose import resample_to_grid
 
 RATE = 48_000
 KINDS = {
@@ -89,7 +89,7 @@ def test_flashes_and_clicks_stay_together(kind, tmp_path):
 
 @pytest.mark.parametrize("kind", ["vp8.webm", "h264.mp4"])
 def test_lips_of_a_converted_recording_are_where_they_were(kind, tmp_path, rendered_takes, face_model):
-    from corpus_tools.recordings.corpus_video import CachedTracker
+    from corpus_tools.recordings.video import CachedTracker
     from tts2face.models.landmarks import lip_opening
     from tts2face.video.pose import remove_pose
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.dense.adapt_head import EYE_PARTS
-from corpus_tools.dense.mesh_fit import face_landmarks, face_width, part_vertices
+from corpus_tools.dense.mesh_fit import EYE_PARTS, face_landmarks, face_width, part_vertices
 from corpus_tools.dense.modes import (
     LIMIT,
     MEAN,
@@ -22,7 +21,7 @@ from corpus_tools.dense.modes import (
     spread_shapes,
 )
 from corpus_tools.dense.skin_colour import PictureFitter, build_picture_fitter
-from corpus_tools.dense.video_landmarks import TrackedPictures
+from corpus_tools.dense.texels import TrackedPictures
 from lexicon.errors import InputError
 from tests.face.posing import posed_vertices
 from tests.rendered_takes import ONLY_RENDERED
@@ -30,8 +29,8 @@ from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_MESH_LANDMARKS
-from tts2face.render.draw import draw
-from tts2face.render.picture import Picture
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import draw
 from tts2face.video.media import read_frames
 
 SHOWN = {"jawOpen": 0.3, "mouthSmileLeft": 0.3, "mouthSmileRight": 0.3, "browInnerUp": 0.4, "mouthPucker": 0.3}

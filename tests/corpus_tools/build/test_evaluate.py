@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.evaluation.evaluate import CEILING_METHOD, SplitResult, evaluate
-from corpus_tools.evaluation.scores import FIGURES
-from corpus_tools.evaluation.splits import split_by_words, split_into_folds, split_randomly
-from corpus_tools.evaluation.tables import AS_TRACKED, Evaluation, figure_rows
-from corpus_tools.evaluation.tracks import ExternalTrack, read_tracks
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.report.evaluation import evaluation_page
+from corpus_tools.studies.evaluation.evaluate import CEILING_METHOD, SplitResult, evaluate
+from corpus_tools.studies.evaluation.page import evaluation_page
+from corpus_tools.studies.evaluation.scores import FIGURES
+from corpus_tools.studies.evaluation.splits import split_by_words, split_into_folds, split_randomly
+from corpus_tools.studies.evaluation.tables import AS_TRACKED, Evaluation, figure_rows
+from corpus_tools.studies.evaluation.tracks import ExternalTrack, read_tracks
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import WordSpan
 from tests.corpus_tools.speaking import FPS, observation
@@ -175,7 +175,7 @@ def test_a_network_is_trained_and_compared_with_where_there_is_enough_to_learn(
     observations: list[Observation], monkeypatch: pytest.MonkeyPatch
 ):
     pytest.importorskip("sklearn", reason="needs `pip install 'tts2face[capture]'`")
-    monkeypatch.setattr("corpus_tools.training.train_phone_network.MIN_FRAMES", 100)
+    monkeypatch.setattr("corpus_tools.training.phone_network.MIN_FRAMES", 100)
     result, _ = evaluate([split_randomly(observations, hold_out=8, seed=0)])
     scores = {one.method: one for one in result.scores}
     assert scores["sliding-window network"]["r_opening"] > 0.8  # of some 700 frames it cannot learn more

@@ -14,14 +14,13 @@ from corpus_tools.drawn.hair import OtherHair
 from corpus_tools.film.compare import View, differences, draw_view
 from corpus_tools.film.fit_light import fit_light
 from corpus_tools.film.look import LAMPS, Look
-from corpus_tools.film.pose_light import PoseLight
-from corpus_tools.film.poses import EXPRESSIONS, LitPose, expression_pose, farthest
+from corpus_tools.film.poses import EXPRESSIONS, LitPose, PoseLight, expression_pose, farthest
 from tests.characters.makehuman import makehuman
+from tts2face.models.baked_light import table_levels
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face
-from tts2face.models.lit_hair import tint_hair
-from tts2face.models.view_transform import table_levels
-from tts2face.render.camera_views import CameraView, parse_camera
+from tts2face.models.hair_file import tint_hair
+from tts2face.picture.options import CameraView, parse_camera
 
 SIDE, SAMPLES = 96, 2
 
@@ -86,7 +85,7 @@ def test_light_is_baked_into_texels_and_vertices(scene: Any) -> None:
 
 
 def test_a_character_is_drawn_in_its_baked_light(scene: Any, tmp_path: Path) -> None:
-    from corpus_tools.film.bake_poses import Effort, bake_poses
+    from corpus_tools.film.bake import Effort, bake_poses
 
     face, still = scene.face, np.zeros(6, np.float32)
     shown = {"rest": {}, **{name: EXPRESSIONS[name] for name in ("a", "smile", "blink")}}

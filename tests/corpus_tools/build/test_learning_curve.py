@@ -9,10 +9,18 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.evaluation.curve_figures import CurvePoint, LearningCurve, compare_points
-from corpus_tools.evaluation.curve_tables import curve_rows, curve_tables, monotony
-from corpus_tools.evaluation.evaluate import EVALUATION_METADATA, evaluate
-from corpus_tools.evaluation.learning_curve import (
+from corpus_tools.recordings.observation import Observation
+from corpus_tools.studies.evaluation.curve_page import WRITERS
+from corpus_tools.studies.evaluation.curve_tables import (
+    CurvePoint,
+    LearningCurve,
+    compare_points,
+    curve_rows,
+    curve_tables,
+    monotony,
+)
+from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA, evaluate
+from corpus_tools.studies.evaluation.learning_curve import (
     BASE_ALONE,
     MEAN_FACE,
     MEAN_POSE,
@@ -22,8 +30,6 @@ from corpus_tools.evaluation.learning_curve import (
     choose_material,
     measure_learning_curve,
 )
-from corpus_tools.recordings.observation import Observation
-from corpus_tools.report.learning_curve import WRITERS
 from corpus_tools.training.adapt_talker import Base
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import InputError
@@ -54,7 +60,7 @@ def curve() -> LearningCurve:
 
 def learning_curve() -> LearningCurve:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("corpus_tools.evaluation.learning_curve.N_CHOICES", 2)
+        patch.setattr("corpus_tools.studies.evaluation.learning_curve.N_CHOICES", 2)
         return measure_learning_curve(TRAIN, TEST, another_person(), amounts_s=[5.0, 10.0])
 
 
@@ -113,8 +119,8 @@ def test_the_base_alone_does_not_depend_on_the_material(curve: LearningCurve) ->
 def test_with_enough_material_the_talker_is_that_of_own_material_alone(
     base: Base, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("corpus_tools.training.short_talker.MIN_OWN_MINUTES", 8.0 / 60.0)
-    monkeypatch.setattr("corpus_tools.evaluation.learning_curve.N_CHOICES", 1)
+    monkeypatch.setattr("corpus_tools.training.choose_adaptation.MIN_OWN_MINUTES", 8.0 / 60.0)
+    monkeypatch.setattr("corpus_tools.studies.evaluation.learning_curve.N_CHOICES", 1)
     found = measure_learning_curve(TRAIN, TEST, base, amounts_s=[5.0])
     small, everything = found.points
     assert everything.figures[WITH_BASE] == everything.figures[OWN_ALONE]
@@ -196,7 +202,7 @@ def test_files_hold_the_curve(curve: LearningCurve) -> None:
 def test_the_command_measures_tracks_of_a_person(
     tmp_path: Path, base: Base, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("corpus_tools.evaluation.learning_curve.N_CHOICES", 1)
+    monkeypatch.setattr("corpus_tools.studies.evaluation.learning_curve.N_CHOICES", 1)
     write_talker(tmp_path / "base.talker", base.talker)
     tracks = write_tracks(tmp_path / "person")
     flags = ["--recordings", str(tracks), "--hold-out", "2", "--base", str(tmp_path / "base.talker")]

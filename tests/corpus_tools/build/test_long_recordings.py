@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from corpus_tools.build_talker import build_talker
-from corpus_tools.recordings.corpus_audio import MAX_UTTERANCE_S
 from corpus_tools.recordings.observe import Observations, observe
-from corpus_tools.report.recordings import recordings_page
+from corpus_tools.recordings.sound import MAX_UTTERANCE_S
 from corpus_tools.run_options import RunOptions
+from corpus_tools.studies.recordings_page import recordings_page
 from lexicon.sequence import SILENCE
 from tests.corpus_tools.films import join_clips
 from tests.rendered_takes import manifest_rows

@@ -19,7 +19,7 @@ from tests.conftest import SHARED
 from tests.rendered_takes import ONLY_RENDERED
 from tts2face.models.talker import read_talker
 from tts2face.video.media import read_frames
-from tts2face.video.streaming_tracker import StreamingTracker
+from tts2face.video.streaming import StreamingTracker
 
 CHILD = """
 import sys

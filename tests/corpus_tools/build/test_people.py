@@ -8,19 +8,25 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
-from corpus_tools.evaluation.paired_bootstrap import PairedCurves, estimate, estimate_difference
-from corpus_tools.evaluation.people import PeopleEvaluation, compare_people, evaluate_people, z_score_people
-from corpus_tools.evaluation.people_tables import difference_table, people_rows, people_table, phone_table
-from corpus_tools.evaluation.person_tracks import read_person
-from corpus_tools.evaluation.scores import IntervalEstimate
-from corpus_tools.evaluation.tracks import ExternalTrack
 from corpus_tools.recordings.observation import Observation
+from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
+from corpus_tools.studies.evaluation.people import (
+    PeopleEvaluation,
+    compare_people,
+    difference_table,
+    evaluate_people,
+    people_rows,
+    people_table,
+    phone_table,
+    z_score_people,
+)
+from corpus_tools.studies.evaluation.scores import IntervalEstimate, PairedCurves, estimate, estimate_difference
+from corpus_tools.studies.evaluation.tracks import ExternalTrack, read_person
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE
 from tests.corpus_tools.speaking import FPS, OPENINGS, observation, with_words
-from tts2face.exemplar.motion_measures import speech_frames
+from tts2face.lips.explanation import speech_frames
 from tts2face.models.talker import Talker, write_talker
 
 

@@ -7,9 +7,9 @@ import pytest
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
+from corpus_tools.dense.avatar import build_avatar, mirror_table, person_landmarks
 from corpus_tools.dense.mesh_fit import face_landmarks
 from corpus_tools.dense.person_look import part_colour
-from corpus_tools.dense.photo_avatar import build_avatar, mirror_table, person_landmarks
 from lexicon.errors import InputError
 from tests.corpus_tools.build.likeness import (
     SKIN,
@@ -25,11 +25,11 @@ from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.photo.found_face import PhotoReader
-from tts2face.render.draw import draw
-from tts2face.render.picture import Picture
-from tts2face.session import Session
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import draw
+from tts2face.session.session import Session
 from tts2face.video.media import read_frames
-from tts2face.video.track import FaceTracker
+from tts2face.video.tracking import FaceTracker
 
 SIDE = 480
 FOLDS = (206, 426, 216, 436)  # landmarks beside the folds of a smile

@@ -7,15 +7,21 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.evaluation.evaluate import EVALUATION_METADATA
-from corpus_tools.pool_talker import pool_talker
-from corpus_tools.pooling.lip_alignment import LipSpeech, align_phones, alignment_features, fit_part_model
-from corpus_tools.pooling.lip_features import FEATURES, landmark_features, parameter_features, track_features
-from corpus_tools.pooling.lip_tracks import LipTrack, SpokenPhone, read_lip_tracks
-from corpus_tools.pooling.pooled_speech import align_lip_tracks, spoken_sequence
-from corpus_tools.training.feature_table import feature_table
-from corpus_tools.training.network_training import TrainingOptions
-from corpus_tools.training.train_phone_network import FEATURE_NOISE, add_phone_network, follow_features
+from corpus_tools.clone_talker import pool_talker
+from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
+from corpus_tools.training.network_training import TrainingOptions, feature_table
+from corpus_tools.training.phone_network import FEATURE_NOISE, add_phone_network, follow_features
+from corpus_tools.training.pooling.lip_alignment import LipSpeech, align_phones, alignment_features, fit_part_model
+from corpus_tools.training.pooling.lip_tracks import (
+    FEATURES,
+    LipTrack,
+    SpokenPhone,
+    landmark_features,
+    parameter_features,
+    read_lip_tracks,
+    track_features,
+)
+from corpus_tools.training.pooling.speech import align_lip_tracks, spoken_sequence
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE
@@ -35,7 +41,7 @@ def talker() -> Talker:
 def long_training(monkeypatch: pytest.MonkeyPatch) -> None:
     """More passes over the few artificial utterances than over hours of recordings."""
     options = TrainingOptions(hidden=(24, 16), n_epochs=120, weight_decay=1e-5)
-    monkeypatch.setattr("corpus_tools.pooling.lip_alignment.TRAINING", options)
+    monkeypatch.setattr("corpus_tools.training.pooling.lip_alignment.TRAINING", options)
 
 
 def track(number: int, n_utterances: int = 4) -> tuple[LipTrack, np.ndarray]:
@@ -225,7 +231,7 @@ def test_a_track_without_phones_or_a_folder_without_tracks_is_refused(tmp_path: 
 
 
 def test_pooled_networks_know_phones_of_both_speakers(talker: Talker, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("corpus_tools.training.train_phone_network.MIN_FRAMES", 100)
+    monkeypatch.setattr("corpus_tools.training.phone_network.MIN_FRAMES", 100)
     pooled = align_lip_tracks([track(0)[0]], talker)
     trained = add_phone_network(talker, pooled)
     assert trained.network is not None
@@ -270,9 +276,9 @@ def test_parameters_follow_the_features_that_a_network_predicts() -> None:
 def test_the_command_keeps_all_of_the_talker_but_its_networks(
     tmp_path: Path, talker: Talker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("corpus_tools.training.train_phone_network.MIN_FRAMES", 100)
-    monkeypatch.setattr("corpus_tools.pool_talker.MIN_FRAMES", 100)
-    monkeypatch.setattr("corpus_tools.pool_talker.read_lip_tracks", lambda _: [track(0)[0]])
+    monkeypatch.setattr("corpus_tools.training.phone_network.MIN_FRAMES", 100)
+    monkeypatch.setattr("corpus_tools.clone_talker.MIN_FRAMES", 100)
+    monkeypatch.setattr("corpus_tools.clone_talker.read_lip_tracks", lambda _: [track(0)[0]])
     write_talker(tmp_path / "a.talker", talker)
     (tmp_path / "tracks").mkdir()
     flags = [str(tmp_path / "a.talker"), str(tmp_path / "tracks"), "--source", "artificial lips, CC0"]

@@ -8,26 +8,20 @@ import pytest
 
 from corpus_tools.training.calibrate_face import (
     calibrate_face,
+    calibrate_face_file,
     correct_score_map,
     mirrored_name,
     symmetrise_score_map,
     vary_poses,
 )
-from corpus_tools.training.score_files import calibrate_face_file
-from corpus_tools.training.train_score_map import (
-    MAX_LOGIT,
-    add_score_map,
-    clipped_logits,
-    fit_score_map,
-    read_mouth_scores,
-)
+from corpus_tools.training.score_map import MAX_LOGIT, add_score_map, clipped_logits, fit_score_map, read_mouth_scores
 from lexicon.errors import DataError
 from tts2face.models.face_file import read_face
-from tts2face.models.score_map import N_SCORES, SCORE_SHAPES, logistic
+from tts2face.models.networks import N_SCORES, SCORE_SHAPES, logistic
 from tts2face.models.talker import load_talker
 from tts2face.storage.files import find_file
 from tts2face.storage.tensors import read_tensors
-from tts2face.video.blendshapes import BlendshapeReader
+from tts2face.video.take import BlendshapeReader
 
 NAMES = ("jawOpen", "mouthClose", "mouthPucker", "mouthSmileLeft", "mouthSmileRight")
 MIRROR = [0, 1, 2, 4, 3]

@@ -11,11 +11,18 @@ from corpus_tools.clone_talker import transfer_talker
 from corpus_tools.recordings.observation import Observation, Quality
 from corpus_tools.recordings.observe import Observations, QualityWarning
 from corpus_tools.training.adapt_talker import Adaptation, Base, adapted_talker, separate_lips
-from corpus_tools.training.choose_adaptation import ADAPTATIONS, BASE_ONLY, HeldOutScore, choose_adaptation
-from corpus_tools.training.short_talker import learn_short_talker, needs_base, recording_advice
+from corpus_tools.training.choose_adaptation import (
+    ADAPTATIONS,
+    BASE_ONLY,
+    HeldOutScore,
+    choose_adaptation,
+    learn_short_talker,
+    needs_base,
+    recording_advice,
+)
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.cloning.lip_gaps import facing_gaps
-from tts2face.exemplar.synthesis import build_exemplar_model, speech_trajectory
+from tts2face.lips.cloning import facing_gaps
+from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
 from tts2face.models.landmarks import lip_opening
 from tts2face.models.talker import Talker, load_talker, read_talker, write_talker
 

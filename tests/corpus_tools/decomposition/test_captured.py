@@ -13,17 +13,16 @@ from corpus_tools.decomposition.capture import (
     resample,
     resample_to_gesture_rate,
 )
-from corpus_tools.decomposition.capture_files import read_livelink_recording
-from corpus_tools.decomposition.recording_files import read_sound_span
+from corpus_tools.decomposition.recordings import read_livelink_recording, read_sound_span
 from lexicon.errors import DataError, InputError
 from tests.face.posing import posed_vertices
 from tests.rendered_takes import write_sound
-from tts2face.face.face_motion import moved_landmarks, rest_landmarks
+from tts2face.face.deformation import moved_landmarks, rest_landmarks
+from tts2face.lips.performer import match_shapes
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.retargeting.performer import match_shapes
 from tts2face.types import Trajectory, Waveform
-from tts2face.video.livelink import read_livelink
+from tts2face.video.take import read_livelink
 
 
 def still(n_frames: int, fps: float) -> FaceRecording:
@@ -130,9 +129,7 @@ def test_sound_of_the_same_name_is_found(tmp_path: Path) -> None:
 @pytest.mark.parametrize("begin", [0.5, -0.25])
 def test_a_film_brings_its_sound_on_the_clock_of_its_frames(begin: float, monkeypatch: pytest.MonkeyPatch) -> None:
     ramp = np.arange(64_000, dtype=np.float32) / 64_000
-    monkeypatch.setattr(
-        "corpus_tools.decomposition.recording_files.read_sound", lambda path, rate: Waveform(ramp, rate)
-    )
+    monkeypatch.setattr("corpus_tools.decomposition.recordings.read_sound", lambda path, rate: Waveform(ramp, rate))
     sound = read_sound_span(Path("film.mp4"), begin, 2.0)
     assert sound.duration == 2.0
     at = np.arange(len(sound.samples)) + round(begin * 16_000)

@@ -5,25 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.decomposition.basis_expressions import ExpressionBasis, transfer_basis
+from corpus_tools.decomposition.basis import ExpressionBasis, transfer_basis
 from corpus_tools.decomposition.blend_weights import build_least_squares_estimator
 from corpus_tools.decomposition.capture import FaceRecording
-from corpus_tools.decomposition.capture_files import eye_motion
 from corpus_tools.decomposition.decompose import (
     IRIS_LANDMARKS,
     IRIS_SHIFT_PER_RAD,
     Decomposition,
+    add_style,
     decompose,
     feature_landmarks,
     gaze_angles,
+    read_derived_styles,
     weight_displacements,
 )
-from corpus_tools.decomposition.derived_styles import read_derived_styles
-from corpus_tools.decomposition.style import add_style
+from corpus_tools.decomposition.recordings import eye_motion
 from lexicon.errors import DataError, InputError
+from tts2face.face.deformation import axis_ratios, moved_landmarks, rest_landmarks
 from tts2face.face.expressions import expression_landmarks
-from tts2face.face.face_motion import moved_landmarks, rest_landmarks
-from tts2face.face.landmark_fit import axis_ratios
 from tts2face.models.face import Face
 from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION
 from tts2face.models.palette import EXPRESSIONS, PLAIN, REGION_FEATURES, Delivery, load_palette
@@ -210,9 +209,7 @@ def test_the_paper_s_six_moods_are_derived() -> None:
 def test_the_shipped_palette_has_the_derived_styles_of_the_table() -> None:
     shipped = load_palette("starter")
     (recorded,) = shipped.styles
-    assert shipped.derivations == read_derived_styles(recorded), (
-        "run: python -m corpus_tools.decomposition.derived_styles"
-    )
+    assert shipped.derivations == read_derived_styles(recorded), "run: python -m corpus_tools.decomposition.decompose"
 
 
 @pytest.mark.parametrize(

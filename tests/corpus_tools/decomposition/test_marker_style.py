@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from corpus_tools.build_palette import StyleSource, build_style
-from corpus_tools.decomposition.capture_files import MarkerOptions
-from corpus_tools.decomposition.marker_set import MarkerSet
-from corpus_tools.decomposition.stills import Still, find_stills
+from corpus_tools.decomposition.basis import Still, find_stills
+from corpus_tools.decomposition.markers import MarkerSet
+from corpus_tools.decomposition.recordings import MarkerOptions
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tests.corpus_tools.decomposition.made_markers import Made, made_take, write_c3d, write_table
+from tts2face.face.deformation import moved_landmarks
 from tts2face.face.expressions import add_expression_shapes, expression_weights
-from tts2face.face.face_motion import moved_landmarks
-from tts2face.face.lip_constraints import build_lip_constraints
+from tts2face.face.mouth import build_lip_constraints
 from tts2face.models.face import Face
 from tts2face.models.palette import EXPRESSIONS, load_palette, read_palette
 from tts2face.types import Trajectory

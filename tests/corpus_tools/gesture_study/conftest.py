@@ -2,7 +2,7 @@
 
 import pytest
 
-from corpus_tools.gesture_study.analysis import GestureStudy, Options, study_gestures
+from corpus_tools.studies.gestures.analysis import GestureStudy, Options, study_gestures
 from tests.corpus_tools.gesture_study.made_palette import made_palette
 from tests.kept import kept
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from corpus_tools.gesture_study.analysis import Options, StyleStudy, TraitComparison, study_gestures
-from corpus_tools.gesture_study.clips import (
+from corpus_tools.studies.gestures.analysis import Options, StyleStudy, TraitComparison, study_gestures
+from corpus_tools.studies.gestures.clips import (
     field_clip,
     hold_out,
     noise_clip,
@@ -12,12 +12,11 @@ from corpus_tools.gesture_study.clips import (
     replace_style,
     select_recordings,
 )
-from corpus_tools.gesture_study.measures import split_recordings, wasserstein
-from corpus_tools.gesture_study.traits import brow_lift, style_traits
+from corpus_tools.studies.gestures.measures import brow_lift, split_recordings, style_traits, wasserstein
 from lexicon.errors import InputError
 from tests.corpus_tools.gesture_study.made_palette import BLINK, N_FRAMES, made_palette, made_style
-from tts2face.gesture.gesture_stream import GestureFields, GestureStream, style_median
-from tts2face.gesture.timeline import Timeline
+from tts2face.gestures.stream import GestureFields, GestureStream, style_median
+from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.types import Waveform
 

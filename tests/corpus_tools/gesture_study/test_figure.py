@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from corpus_tools.gesture_study.figure import (
+from corpus_tools.studies.gestures.page import (
     COLUMNS,
     HEAD,
     HEIGHT,
@@ -22,7 +22,7 @@ from corpus_tools.gesture_study.figure import (
     spectrum_panel,
     summary_panels,
 )
-from corpus_tools.report.drawing import PNG_SCALE, SERIES, load_matplotlib
+from corpus_tools.studies.plots import PNG_SCALE, SERIES, load_matplotlib
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from corpus_tools.report.drawing import FIRST, PNG_SCALE, Tip, draw_png, draw_svg, load_matplotlib, open_figure
+from corpus_tools.studies.plots import FIRST, PNG_SCALE, Tip, draw_png, draw_svg, load_matplotlib, open_figure
 from lexicon.errors import BackendError
 from lexicon.phones import PHONES
 
@@ -84,11 +84,11 @@ def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch):
 
 SCRIPT = """
 import os, sys
-import corpus_tools.report.evaluation, corpus_tools.report.recordings
-import corpus_tools.similarity.write, corpus_tools.gesture_study.write
+import corpus_tools.studies.evaluation.page, corpus_tools.studies.recordings_page
+import corpus_tools.studies.similarity.write, corpus_tools.studies.gestures.write
 assert "matplotlib" not in sys.modules and "sklearn" not in sys.modules
 before = dict(os.environ)
-from corpus_tools.report.drawing import draw_png
+from corpus_tools.studies.plots import draw_png
 draw_png(lambda figure: figure.subplots() and (), 100, 100)
 assert dict(os.environ) == before and "matplotlib.pyplot" not in sys.modules
 """

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.retargeting_study.analysis import (
+from corpus_tools.studies.retargeting.analysis import (
     SCORES,
     MimickedRecording,
     MouthMotion,
@@ -19,8 +19,7 @@ from corpus_tools.retargeting_study.analysis import (
     mouth_motion,
     phone_scores,
 )
-from corpus_tools.retargeting_study.page import figure_png, retargeting_page
-from corpus_tools.retargeting_study.write import study_csv, study_json
+from corpus_tools.studies.retargeting.page import figure_png, retargeting_page, study_csv, study_json
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.corpus_tools.conftest import made_observation
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER

@@ -5,16 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.similarity.analysis import NamedTalker, Options, analyse
-from corpus_tools.similarity.compare import compare_tables
-from corpus_tools.similarity.consistency import MOVEMENTS, mode_names, movement_consistency, movement_weights
-from corpus_tools.similarity.page import similarity_page
-from corpus_tools.similarity.reliability import spearman_brown, split_half
-from corpus_tools.similarity.text import analysis_json
-from corpus_tools.similarity.tokens import NO_WORD, SimilarityTable, collect_spoken_tokens, similarity_table
+from corpus_tools.studies.similarity.analysis import NamedTalker, Options, analyse, compare_tables
+from corpus_tools.studies.similarity.page import similarity_page
+from corpus_tools.studies.similarity.statistics import (
+    MOVEMENTS,
+    mode_names,
+    movement_consistency,
+    movement_weights,
+    spearman_brown,
+    split_half,
+)
+from corpus_tools.studies.similarity.tables import NO_WORD, SimilarityTable, collect_spoken_tokens, similarity_table
+from corpus_tools.studies.similarity.write import analysis_json
 from lexicon.errors import InputError
 from tests.corpus_tools.similarity.steady_talker import BLOCKS, POSES, made_model, made_talker
-from tts2face.exemplar.synthesis import build_exemplar_model
+from tts2face.lips.exemplar import build_exemplar_model
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.similarity.classes import (
+from corpus_tools.studies.similarity.tables import (
     VisemeClasses,
     best_classes,
     cluster_tree,

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from corpus_tools.report.drawing import open_figure
-from corpus_tools.similarity.analysis import NamedTalker, Options, analyse
-from corpus_tools.similarity.classes import cluster_tree, distances
-from corpus_tools.similarity.figure import (
+from corpus_tools.studies.plots import open_figure
+from corpus_tools.studies.similarity.analysis import NamedTalker, Options, analyse
+from corpus_tools.studies.similarity.figures import (
     FREEDOM,
     LIKENESS,
     articulation_svg,
@@ -24,7 +23,7 @@ from corpus_tools.similarity.figure import (
     table_svg,
     tree_joins,
 )
-from corpus_tools.similarity.tokens import phone_label
+from corpus_tools.studies.similarity.tables import cluster_tree, distances, phone_label
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,12 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from corpus_tools.similarity.mantel import articulatory_distances, mantel, shuffled_correlations, upper_triangle
+from corpus_tools.studies.similarity.statistics import (
+    articulatory_distances,
+    mantel,
+    shuffled_correlations,
+    upper_triangle,
+)
 from lexicon.errors import InputError
 from lexicon.phones import phone_distance
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.similarity.analysis import Analysis, NamedTalker, Options, analyse
+from corpus_tools.studies.similarity.analysis import Analysis, NamedTalker, Options, analyse
 from tts2face.models.talker import load_talker
 
 DOC = Path(__file__).resolve().parents[3] / "docs" / "accuracy.md"

@@ -23,10 +23,11 @@ from tests.docs.blocks import (
     shell_lines,
 )
 from tests.photo.pictures import SMILE, still
-from tts2face import Picture, Project, Request, export, import_face, save_face, save_project, session
-from tts2face.jobs.database import prepare_database
+from tts2face import Picture, Project, Request, export, import_face, save_face, save_project
 from tts2face.models.palette import Palette, load_palette, write_palette
-from tts2face.photo import kept_faces
+from tts2face.photo import face_from_photo
+from tts2face.serving.work.database import prepare_database
+from tts2face.session import session
 from tts2face.storage.files import SHIPPED_FOLDER
 
 SMALL = {"--size": "64x64", "--fps": "5"}
@@ -115,7 +116,7 @@ def here(inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     if importlib.util.find_spec("dbos"):
         prepare_database(f"sqlite:///{tmp_path / 'jobs.sqlite'}")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(kept_faces, "user_cache", lambda: tmp_path / "cache")
+    monkeypatch.setattr(face_from_photo, "user_cache", lambda: tmp_path / "cache")
     return tmp_path
 
 

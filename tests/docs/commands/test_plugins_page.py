@@ -18,7 +18,7 @@ PAGE = DOCS / "plugins.md"
 FILE = re.compile(r"^\*\*([\w.]+\.\w+)\*\*.*?^```\w+\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 BROKEN = "[tts2face.voices]\nbroken = absent_module:VOICE\nheart = tutorial_voice:QUIET\n"
 TOOL = """
-from tts2face.processes.limits import ProcessLimits
+from tts2face.processes.program import ProcessLimits
 from tts2face.processes.parent import Child
 from tts2face.processes.program import Program
 

@@ -27,7 +27,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     found = {name: Observations(tuple(some), ()) for name, some in FOLDERS.items()}
     monkeypatch.setattr("corpus_tools.recordings.observe.observe", lambda folder, **_: found[folder.name])
-    monkeypatch.setattr("cli.evaluation._load_default_voice", lambda: OwnVoice(HERS, lambda durations: 1.2 * durations))
+    monkeypatch.setattr("cli.evaluate._load_default_voice", lambda: OwnVoice(HERS, lambda durations: 1.2 * durations))
     with (tmp_path / "curves.csv").open("w", newline="") as file:
         rows = csv.writer(file)
         rows.writerow(("utterance", "time", "opening"))

@@ -7,14 +7,13 @@ import pytest
 
 from cli.main import run
 from tests.corpus_tools.films import join_clips
+from tts2face.lips.performer import build_performer_retargeter
 from tts2face.models.face_loading import load_face
-from tts2face.retargeting.performer import build_performer_retargeter
-from tts2face.synthesis.live_capture import CALIBRATION_S, LiveCapture, LivePose, track_poses
-from tts2face.video.blendshapes import BlendshapeReader
+from tts2face.session.live import CALIBRATION_S, LiveCapture, LivePose, track_poses
 from tts2face.video.media import TimedFrame, read_frames
-from tts2face.video.streaming_tracker import StreamingTracker
-from tts2face.video.take import read_take
-from tts2face.video.track import FaceTracker
+from tts2face.video.streaming import StreamingTracker
+from tts2face.video.take import BlendshapeReader, read_take
+from tts2face.video.tracking import FaceTracker
 
 FPS = 25.0
 
@@ -90,7 +89,7 @@ def test_orders_that_make_no_sense(words: list[str], reason: str, capsys: pytest
 def test_without_a_display_the_message_names_the_cause(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("tts2face.render.window.sys.platform", "linux")
+    monkeypatch.setattr("tts2face.picture.window.sys.platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     assert run(["mimic", "--camera", "0"]) == 4

@@ -15,7 +15,7 @@ from tests.rendered_takes import ONLY_RENDERED
 from tts2face.models.landmarks import eye_aperture
 from tts2face.video.media import read_frames, read_media_info
 from tts2face.video.pose import head_angles, remove_pose
-from tts2face.video.track import FaceTracker
+from tts2face.video.tracking import FaceTracker
 
 FPS = 25.0
 

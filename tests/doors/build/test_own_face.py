@@ -12,7 +12,7 @@ from corpus_tools.clone_talker import build_appearance_transfer
 from tests.rendered_takes import ONLY_RENDERED, manifest_rows
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.talker import read_talker
-from tts2face.video.track import FaceTracker
+from tts2face.video.tracking import FaceTracker
 
 N_RECORDINGS = 10
 CONSENT = "The speakers of GRID agreed to research and publication"

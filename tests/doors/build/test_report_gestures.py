@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from cli.main import run
-from corpus_tools.report.drawing import SERIES
+from corpus_tools.studies.plots import SERIES
 from tests.corpus_tools.gesture_study.made_palette import made_palette
 from tts2face.models.palette import write_palette
 

@@ -76,7 +76,7 @@ def test_telemetry_is_switched_off_where_the_runtime_is_loaded_already() -> None
         "onnxruntime.disable_telemetry_events = lambda: calls.append(1)\n"
         "import tts2face\n"
         "assert 'ORT_DISABLE_TELEMETRY' not in os.environ\n"
-        "from tts2face.voice.neural import NeuralVoice; NeuralVoice({})\n"
+        "from tts2face.sound.heart import NeuralVoice; NeuralVoice({})\n"
         "assert calls and os.environ['ORT_DISABLE_TELEMETRY'] == '1'"
     )
     kept = {name: value for name, value in os.environ.items() if name != "ORT_DISABLE_TELEMETRY"}

@@ -12,8 +12,8 @@ import pytest
 
 from lexicon import errors
 from tests.docs.blocks import lines_that_need_a_person
-from tts2face.video.landmark_models import find_bundle
 from tts2face.video.media import read_sound
+from tts2face.video.tracking import find_bundle
 
 COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
 SMALL = ["--size", "64x64", "--fps", "5"]

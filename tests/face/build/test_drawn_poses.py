@@ -11,13 +11,12 @@ from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LID_RINGS
 from tts2face.models.palette import load_palette
-from tts2face.render.camera import camera_matrices
-from tts2face.render.camera_views import CameraView
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.film.scene import LitScene
-from tts2face.render.film.visibility import N_COLUMNS, TRIANGLE_MASK, nearest_triangles, project
-from tts2face.render.picture import Picture
-from tts2face.session import Session
+from tts2face.picture.baked.scene import LitScene
+from tts2face.picture.baked.surface import N_COLUMNS, TRIANGLE_MASK, nearest_triangles, project
+from tts2face.picture.camera import camera_matrices
+from tts2face.picture.options import CameraView, Picture
+from tts2face.picture.renderer import mesh_renderer
+from tts2face.session.session import Session
 
 N_POSES = 200
 SIDE_PX, SHARE = 700, 0.8

@@ -6,13 +6,12 @@ from scipy.spatial import cKDTree
 
 from tests.face.people import DRAWN
 from tests.face.test_mouth import part_vertices
-from tts2face.catalogue import haircuts, identities
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.hair import Hair, fit_hair
-from tts2face.models.hair_file import haircut_names, load_hair
-from tts2face.models.lit_hair import SWING_SHAPES
+from tts2face.models.hair_file import SWING_SHAPES, haircut_names, load_hair
+from tts2face.session.catalogue import haircuts, identities
 from tts2face.storage.files import SHIPPED_FOLDER, find_file
 
 PEOPLE = ("", "amara", "kofi", "mei", "ingrid", "nia")

@@ -18,11 +18,18 @@ from cli.main import run
 from lexicon.errors import BackendError, InputError
 from tests.jobs.conftest import ROOT, Postgres, StartWorker
 from tests.running import eventually
-from tts2face.batch.segment import Segment
-from tts2face.batch.store import open_store
-from tts2face.jobs.control import cancel_jobs, list_jobs, prune_jobs, retry_jobs, show_job
-from tts2face.jobs.database import APPLICATION_VERSION, DEAD_AFTER_S, Workers, database_url, prepare_database, shown_url
-from tts2face.jobs.engine import DatabaseEngine, LocalWorker, enqueue, open_client
+from tts2face.serving.batch.segment import Segment
+from tts2face.serving.batch.store import open_store
+from tts2face.serving.work.client import cancel_jobs, list_jobs, prune_jobs, retry_jobs, show_job
+from tts2face.serving.work.database import (
+    APPLICATION_VERSION,
+    DEAD_AFTER_S,
+    Workers,
+    database_url,
+    prepare_database,
+    shown_url,
+)
+from tts2face.serving.work.engine import DatabaseEngine, LocalWorker, enqueue, open_client
 
 Segments = Callable[..., dict[str, Segment]]
 Rendered = Callable[[], list[tuple[str, int]]]
@@ -274,7 +281,7 @@ def look(event, arguments):
         print("NETWORK", event, arguments[1:], file=sys.stderr)
 sys.addaudithook(look)
 from tests.jobs.stub_worker import Stub
-from tts2face.jobs.worker import Worker
+from tts2face.serving.work.worker import Worker
 from pathlib import Path
 worker = Worker(sys.argv[1], sys.argv[2], renderer=Stub(Path(sys.argv[3]), 0.0))
 worker.run(until=lambda: worker.n_rendered == 1)

@@ -12,7 +12,7 @@ from tests.jobs.series import make_series
 from tests.jobs.server.test_series import COMMAND, DRAFT, check_outputs, start_worker
 from tests.jobs.watch import StoreWatch
 from tests.running import eventually
-from tts2face.jobs.control import list_jobs
+from tts2face.serving.work.client import list_jobs
 
 N_CUES = 12
 N_WORKERS = 2

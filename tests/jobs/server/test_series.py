@@ -22,8 +22,8 @@ pytest.importorskip("dbos", reason="needs the extra [batch]")
 
 from tests.jobs.series import Episode, make_series
 from tests.jobs.watch import StoreWatch
-from tts2face.batch.store import open_store
-from tts2face.jobs.control import list_jobs
+from tts2face.serving.batch.store import open_store
+from tts2face.serving.work.client import list_jobs
 
 N_CUES = int(os.environ.get("TTS2FACE_SERIES_CUES", "12"))
 FPS = 10

@@ -20,10 +20,10 @@ from tests.running import ServeProcess, eventually
 from tests.service.job_requests import wait_for_database
 from tests.service.receiver import Receiver
 from tests.started import running_processes
-from tts2face.jobs.connection import JobDatabase
-from tts2face.jobs.control import list_jobs
-from tts2face.jobs.database import database_url
-from tts2face.jobs.engine import DatabaseEngine, LocalWorker, open_client
+from tts2face.serving.work.client import list_jobs
+from tts2face.serving.work.connection import JobDatabase
+from tts2face.serving.work.database import database_url
+from tts2face.serving.work.engine import DatabaseEngine, LocalWorker, open_client
 
 N_JOBS = int(os.environ.get("TTS2FACE_KILLED_JOBS", "20"))
 TIMEOUT_S = 240.0 + 4 * N_JOBS
@@ -63,7 +63,7 @@ class Machines:
         """Kill the server's own worker; the server starts another one."""
         parents = running_processes()
         for number in [one for one, parent in parents.items() if parent == self.server.process.pid]:
-            if b"tts2face.jobs.worker" in Path(f"/proc/{number}/cmdline").read_bytes():
+            if b"tts2face.serving.work.worker" in Path(f"/proc/{number}/cmdline").read_bytes():
                 os.kill(number, signal.SIGKILL)
 
     def jobs(self) -> list[dict[str, Any]]:

@@ -17,13 +17,12 @@ from tests.jobs.conftest import Postgres, StartWorker
 from tests.jobs.server.test_jobs import collect, queue
 from tests.jobs.stub_worker import Stub
 from tests.running import eventually
-from tts2face.batch.segment import Segment
-from tts2face.batch.store import FolderStore, open_store
-from tts2face.jobs.control import cancel_jobs, list_jobs, prune_jobs
-from tts2face.jobs.database import BEAT_S, Workers, database_url, prepare_database
-from tts2face.jobs.engine import JOBS_PER_QUERY, DatabaseEngine, enqueue, open_client
-from tts2face.jobs.takeover import MAX_LOOKS_PER_S, POLL_S, poll_interval
-from tts2face.jobs.worker import Worker
+from tts2face.serving.batch.segment import Segment
+from tts2face.serving.batch.store import FolderStore, open_store
+from tts2face.serving.work.client import cancel_jobs, list_jobs, prune_jobs
+from tts2face.serving.work.database import BEAT_S, Workers, database_url, prepare_database
+from tts2face.serving.work.engine import JOBS_PER_QUERY, DatabaseEngine, enqueue, open_client
+from tts2face.serving.work.worker import MAX_LOOKS_PER_S, POLL_S, Worker, poll_interval
 
 Segments = Callable[..., dict[str, Segment]]
 
@@ -32,8 +31,9 @@ def test_the_engine_still_returns_the_work_of_dead_executors() -> None:
     from dbos import DBOS
 
     assert callable(getattr(DBOS, "_recover_pending_workflows", None)), (
-        "this release of dbos has no DBOS._recover_pending_workflows(executor_ids); tts2face.jobs.takeover.return_work "
-        "needs another way to return the work of dead workers to the queue (decision 083)"
+        "this release of dbos has no DBOS._recover_pending_workflows(executor_ids); "
+        "tts2face.serving.work.worker.return_work needs "
+        "another way to return the work of dead workers to the queue (decision 083)"
     )
 
 
@@ -134,7 +134,7 @@ def test_a_job_that_is_removed_while_a_batch_waits_ends_the_wait(
     database: str, segments: Segments, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     work = segments("One.")
-    monkeypatch.setattr("tts2face.jobs.engine.ALL_JOBS_S", 0.5)
+    monkeypatch.setattr("tts2face.serving.work.engine.ALL_JOBS_S", 0.5)
     engine = DatabaseEngine(database, str(tmp_path / "store"), n_workers=0)
     found = engine.render(work, open_store(tmp_path / "store"))
     reasons: list[str] = []
@@ -152,7 +152,7 @@ def test_more_jobs_than_one_statement_takes_are_pruned(
     segments: Segments, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     database = str(tmp_path / "jobs.sqlite")
-    monkeypatch.setattr("tts2face.jobs.control.JOBS_PER_QUERY", 3)
+    monkeypatch.setattr("tts2face.serving.work.client.JOBS_PER_QUERY", 3)
     queue(database, segments(*(f"Words {number}." for number in range(8))))
     assert cancel_jobs(database) == 8
     assert prune_jobs(database, older_than_s=60.0) == 0

@@ -6,17 +6,17 @@ from contextlib import suppress
 
 import pytest
 
-from lexicon.chunks import split_chunks, split_phrase
 from lexicon.dictionary import parse_dictionary, word_set
 from lexicon.errors import DataError, InputError
-from lexicon.growing_text import GrowingText
 from lexicon.ipa import parse_ipa
-from lexicon.mark_parser import parse_marks
+from lexicon.languages import check_script
 from lexicon.normalize import normalize
 from lexicon.pronounce import pronounce
+from lexicon.sentence_ends import split_chunks, split_phrase
 from lexicon.sentences import split_sentences
-from lexicon.writing_systems import check_script
-from tts2face.subtitles.spoken_text import spoken_text
+from lexicon.spoken_words import GrowingText
+from lexicon.ssml import parse_marks
+from tts2face.interchange.subtitles.cues import spoken_text
 
 UNITS = (
     *word_set(". ! !? … a. ( ) ' [ < & 1 1, 1. 1: 1/ - a- — 1– ~ ^ ^1 * _ / @ a@ a@b. w. http:// $ $1 5' 1e + # #a"),

@@ -9,17 +9,17 @@ from PIL import Image
 from lexicon.errors import DataError, InputError
 from tests.face.people import LIT
 from tests.photo.pictures import SMILE, still
-from tts2face.face.face_motion import moved_landmarks
+from tts2face.face.deformation import moved_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import inner_lip_gaps, lip_opening, lip_width
 from tts2face.photo.face_from_photo import face_from_photo
-from tts2face.photo.mouth_inside import PICTURED
-from tts2face.render.picture import Picture
-from tts2face.session import Session
+from tts2face.photo.mouth import PICTURED
+from tts2face.picture.options import Picture
+from tts2face.session.session import Session
 from tts2face.types import Clip
 from tts2face.video.media import read_frames
 from tts2face.video.pose import remove_pose
-from tts2face.video.track import FaceTracker
+from tts2face.video.tracking import FaceTracker
 
 SIDE = 480
 PANGRAM = "We were away a year ago, but Bob may move five big maps."

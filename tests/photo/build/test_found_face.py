@@ -11,7 +11,7 @@ from tests.face.people import DRAWN, REALISTIC
 from tests.photo.pictures import projected, still
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_MESH_LANDMARKS, UPPER_LIP_INNER_MID
 from tts2face.photo.found_face import FoundFace, find_face
-from tts2face.video.track import FaceTracker
+from tts2face.video.tracking import FaceTracker
 
 SIDE = 480
 CHEEKS = (50, 280, 205, 425)  # landmarks

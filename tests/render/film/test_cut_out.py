@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tts2face.render.film.cut_out import compose_over, find_covers
-from tts2face.render.film.surface import COVER_SHIFT, OPAQUE, stack_pages
+from tts2face.picture.baked.cut_out import compose_over, find_covers
+from tts2face.picture.baked.surface import COVER_SHIFT, OPAQUE, stack_pages
 
 HEIGHT, WIDTH, N_SAMPLES = 6, 7, 4
 FRAGMENTS = (

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
-from tts2face.models.view_transform import table_levels
-from tts2face.render.film.eyes import LAMP_LIGHT, N_ROWS, REFRACTION, look_up, mirror_lamps
+from tts2face.models.baked_light import table_levels
+from tts2face.picture.baked.eyes import LAMP_LIGHT, N_ROWS, REFRACTION, look_up, mirror_lamps
 
 CAMERA = np.zeros(15, np.float32)
 SKY = np.array([0.1, 0.2, 0.3], np.float32)

@@ -6,7 +6,7 @@ import pytest
 from tests.render.film.lit_face import lit_tiny_face
 from tts2face.face.deformation import build_rig
 from tts2face.models.baked_light import LIP_RING, N_MOUTH_TERMS, N_TERMS
-from tts2face.render.film.response import (
+from tts2face.picture.baked.response import (
     GAP_MM,
     MOVE_MM,
     LightTerms,
@@ -15,7 +15,7 @@ from tts2face.render.film.response import (
     still_eyes,
     write_mouth_terms,
 )
-from tts2face.render.fragment_rows import NORMAL
+from tts2face.picture.kernels.tables import NORMAL
 
 FACE = lit_tiny_face()
 RIG = build_rig(FACE)

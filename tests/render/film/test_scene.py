@@ -16,16 +16,15 @@ from tests.render.film.lit_face import (
     WALL,
     lit_tiny_face,
 )
+from tts2face.face.body import DILATION, PUPIL_SHAPE
 from tts2face.face.deformation import REST_HEAD
-from tts2face.face.pupils import DILATION, PUPIL_SHAPE
-from tts2face.models.face import Texture
+from tts2face.models.face import Texture, keep_parts
 from tts2face.models.face_file import read_face, write_face
-from tts2face.models.face_parts import keep_parts
-from tts2face.render.draw import mesh_renderer
-from tts2face.render.film.eyes import EDGE_RAD
-from tts2face.render.film.scene import LitScene
-from tts2face.render.picture import Picture
-from tts2face.render.scene import Scene
+from tts2face.picture.baked.eyes import EDGE_RAD
+from tts2face.picture.baked.scene import LitScene
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import mesh_renderer
+from tts2face.picture.scene import Scene
 
 FACE = lit_tiny_face()
 REST = np.zeros(len(FACE.shape_names), np.float32)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
-from tts2face.render.film.light import LIGHT_STEP, add_modes, pack_change
-from tts2face.render.film.shading import (
+from tts2face.picture.baked.shading import (
     CHANGE_CODING,
     COLOUR_CODING,
     N_VALUES,
@@ -17,7 +16,18 @@ from tts2face.render.film.shading import (
     lay_planes,
     list_fragments,
 )
-from tts2face.render.film.visibility import BLOCK, N_COLUMNS, NEAR, U, X, Y, nearest_triangles
+from tts2face.picture.baked.surface import (
+    BLOCK,
+    LIGHT_STEP,
+    N_COLUMNS,
+    NEAR,
+    U,
+    X,
+    Y,
+    add_modes,
+    nearest_triangles,
+    pack_change,
+)
 
 SIZE = 16  # pixels
 

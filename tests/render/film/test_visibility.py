@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tts2face.render.film.visibility import (
+from tts2face.picture.baked.surface import (
     BLOCK,
     N_COLUMNS,
     NEAR,

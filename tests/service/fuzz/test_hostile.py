@@ -10,7 +10,7 @@ import pytest
 from tests.running import RunningService
 from tests.service.attacked import SPEECH, alive, attacked, say
 from tests.service.raw import ask, connect, drip, head, parse, read_all, read_answer, request
-from tts2face.service.access.connections import LINGER_S
+from tts2face.serving.service.connections import LINGER_S
 
 __all__ = ["alive", "attacked"]  # fixtures
 

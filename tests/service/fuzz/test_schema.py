@@ -10,8 +10,8 @@ import httpx
 import pytest
 
 from tests.running import HostService, RunningService
-from tts2face.service.app import create_app
-from tts2face.service.settings import ServiceSettings
+from tts2face.serving.service.server import create_app
+from tts2face.serving.service.settings import ServiceSettings
 
 # Generated texts and pictures at the limits of the schema would take minutes to make: the server under test allows
 # little. Jobs are accepted and not worked on.

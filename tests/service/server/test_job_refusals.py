@@ -10,7 +10,7 @@ import pytest
 
 from tests.running import HostService, RunningService
 from tests.service.job_requests import CLIP, SMALL, submit
-from tts2face.service.access.keys import add_key
+from tts2face.serving.service.keys import add_key
 
 LIMITS = {"job_waiting": 3, "job_cues": 3, "job_files": 2, "job_s": 60, "text_characters": 500, "workers": 0}
 

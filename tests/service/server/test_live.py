@@ -12,8 +12,8 @@ import websockets
 
 import tts2face
 from tests.running import RunningService, eventually
-from tts2face.exports.arkit import arkit_projection
-from tts2face.service.synthesis.live_task import LEAD_S
+from tts2face.interchange.exports.curves import arkit_projection
+from tts2face.serving.service.live import LEAD_S
 
 WORDS = ["Hello", "there,", "how", "are", "you?", "I", "am", "well.", "And"]
 

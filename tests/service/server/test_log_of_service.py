@@ -6,7 +6,7 @@ from pathlib import Path
 import httpx
 
 from tests.running import HostService, RunningService
-from tts2face.service.access.keys import add_key, remove_key
+from tts2face.serving.service.keys import add_key, remove_key
 
 
 def test_every_line_of_a_request_has_its_id_and_none_its_text(service: RunningService) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import httpx
 
 from tests.running import HostService
-from tts2face.service.access.keys import add_key
+from tts2face.serving.service.keys import add_key
 
 
 def test_jobs_use_the_seconds_of_speech_too(host: HostService, tmp_path: Path) -> None:

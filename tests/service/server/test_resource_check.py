@@ -17,9 +17,9 @@ from tests.characters.made import write_character_file
 from tests.model_files.made import write_made_models, write_made_talker
 from tests.photo.pictures import still
 from tests.processes.answered import refusal
-from tts2face.characters.binding import KEY
-from tts2face.jobs.resource_check import PLACES, SHOWN, STATEMENT, draw_resource, is_picture
+from tts2face.interchange.characters.character import KEY
 from tts2face.models.face_file import read_face
+from tts2face.serving.work.resource_check import PLACES, SHOWN, STATEMENT, draw_resource, is_picture
 from tts2face.storage.files import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 

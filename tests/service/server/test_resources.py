@@ -19,17 +19,17 @@ from lexicon.errors import BackendError
 from tests.jobs.conftest import database, postgres  # noqa: F401 - fixtures
 from tests.model_files.made import write_made_face
 from tests.photo.pictures import still
-from tts2face.jobs.blobs import open_blobs
-from tts2face.jobs.database import database_url
-from tts2face.jobs.job_runner import RESOURCES
-from tts2face.jobs.resource_table import ResourceTable, StoredResource
 from tts2face.models.face_file import read_face
-from tts2face.service.access.keys import add_key
-from tts2face.service.app import create_app
-from tts2face.service.errors import RefusedError
-from tts2face.service.settings import ServiceSettings
-from tts2face.service.uploads.library import Library
-from tts2face.service.uploads.upload_checks import MAX_CHECKS, MAX_WAITING, Checks
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.keys import add_key
+from tts2face.serving.service.library import Library
+from tts2face.serving.service.server import create_app
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.service.uploads import MAX_CHECKS, MAX_WAITING, Checks
+from tts2face.serving.work.blobs import open_blobs
+from tts2face.serving.work.database import database_url
+from tts2face.serving.work.resources import ResourceTable, StoredResource
+from tts2face.serving.work.run import RESOURCES
 
 WORDS = b"Siobhan  SH IH0 V AO1 N\n"
 OTHER_WORDS = b"Nguyen  N UW1 Y EH0 N\n"
@@ -370,7 +370,7 @@ def test_a_refused_addition_leaves_nothing(tmp_path: Path) -> None:
 def test_a_database_that_is_away_is_said_and_the_services_own_models_do_without(settings: ServiceSettings) -> None:
     from dataclasses import replace
 
-    from tts2face.service.access.keys import LOCAL_KEY
+    from tts2face.serving.service.keys import LOCAL_KEY
 
     away = replace(settings, keys=None, database="postgresql://nobody@127.0.0.1:9/none")
     library = Library(away)

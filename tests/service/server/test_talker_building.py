@@ -23,7 +23,7 @@ from tests.running import HostService, eventually
 from tests.service.job_requests import finished
 from tests.service.server.test_resource_check import WORDS
 from tts2face.models.talker import load_talker
-from tts2face.service.access.keys import add_key
+from tts2face.serving.service.keys import add_key
 from tts2face.video.media import read_sound
 
 TEXT = "We were away a year ago. Bob may move. The boy will buy a pie for you. She saw the ship near the shore."

@@ -39,7 +39,9 @@ def test_a_talker_is_built_after_the_death_of_its_worker(running: RunningService
         files = {"video": take.read_bytes(), "transcript": TEXT.encode()}
         job = client.post("/v1/talkers/build", data=form, files=files).json()
         eventually(lambda: client.get(f"/v1/jobs/{job['id']}").json()["progress"]["done"] > 0, 120.0)
-        workers = children(running.process.pid, "tts2face.jobs.worker")  # also those of other services of the host
+        workers = children(
+            running.process.pid, "tts2face.serving.work.worker"
+        )  # also those of other services of the host
         ((worker, builder),) = ((one, its) for one in workers for its in children(one, "tts2face.processes", "talker"))
         os.kill(worker, signal.SIGKILL)
         eventually(lambda: builder not in running_processes(), 30.0)

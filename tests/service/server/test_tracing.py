@@ -15,7 +15,7 @@ import pytest
 
 from lexicon.errors import BackendError, InputError
 from tests.running import HostService, RunningService, ServeProcess, eventually
-from tts2face.service.tracing import is_tracing_requested, tracing_from_environment
+from tts2face.serving.service.tracing import is_tracing_requested, tracing_from_environment
 
 pytest.importorskip("opentelemetry.sdk", reason="needs `pip install 'tts2face[otel]'`")
 
@@ -165,8 +165,8 @@ def test_missing_libraries_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
 # FastAPI itself imports OpenTelemetry's interface, which does nothing alone.
 IMPORTS = """
 import sys
-from tts2face.service.app import create_app
-from tts2face.service.settings import ServiceSettings
+from tts2face.serving.service.server import create_app
+from tts2face.serving.service.settings import ServiceSettings
 app = create_app(ServiceSettings(processes=1))
 assert app.state.service.tracing is None
 assert not [name for name in sys.modules if name.startswith(("opentelemetry.sdk", "opentelemetry.exporter"))]

@@ -8,19 +8,20 @@ import pytest
 
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.speech.forced_alignment import Alignment
-from tts2face.speech.text_fit import (
+from tts2face.sound.alignment import Alignment
+from tts2face.sound.transcript import (
     LEAST_FOREIGN_CONFIDENCE,
     LEAST_LOCAL_CONFIDENCE,
     TextMismatch,
+    align_recording,
     extend_range,
     find_misfits,
     mismatch_of,
+    pronounce_transcript,
 )
-from tts2face.speech.transcript_alignment import align_recording, pronounce_transcript
+from tts2face.sound.voice_pool import load_voice
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
-from tts2face.voice.loading import load_voice
 
 RIGHT = ("Please wait for the beep, then say your name.", "The young chef usually pushes five big maps before noon.")
 WRONG = (

@@ -14,7 +14,7 @@ from tests.exports.programs import node_package
 from tests.running import eventually
 from tests.studio.chromium import Browser
 from tests.studio.served import Page, create_project
-from tts2face.studio.projects.renders import formats
+from tts2face.serving.studio.renders import formats
 from tts2face.video.media import read_frames, read_sound
 
 TEXT = "Bob may move. Five maps were there."

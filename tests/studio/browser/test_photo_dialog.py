@@ -17,7 +17,7 @@ from tests.studio.browser.test_animate_page import AXE
 from tests.studio.chromium import Browser
 from tests.studio.served import Page
 from tts2face.models.face_file import read_face
-from tts2face.studio.app import RECONNECT_S
+from tts2face.serving.studio.app import RECONNECT_S
 
 SIDE = 480
 CONSENT = "I agree that my face speaks this."

@@ -10,8 +10,8 @@ from corpus_tools.prompts.coverage import count_units, sentence_units
 from corpus_tools.tools.recordings import prompts_answer
 from tests.studio.chromium import Browser
 from tts2face.models.talker import load_talker
-from tts2face.service.access.keys import LOCAL_KEY
-from tts2face.studio.recording.store import RecordingStore
+from tts2face.serving.service.keys import LOCAL_KEY
+from tts2face.serving.studio.recordings import RecordingStore
 
 SPOKEN, WRONG = "bin blue at f two now", "place green with q nine please"
 STATE = """return ['good', 'weak', 'refused'].find(

@@ -9,9 +9,9 @@ import httpx
 import pytest
 
 from tests.running import HostService, RunningService, serve_process
-from tts2face.service.access.browser import COOKIE, cookie_key, set_cookie
-from tts2face.service.access.keys import add_key
-from tts2face.service.access.page_headers import POLICY
+from tts2face.serving.service.exchange import POLICY
+from tts2face.serving.service.guard import COOKIE, cookie_key, set_cookie
+from tts2face.serving.service.keys import add_key
 
 HTML = {"Accept": "text/html"}
 
@@ -161,16 +161,16 @@ def test_a_cookie_over_https_is_sent_over_https_only() -> None:
 def test_pages_keep_no_telemetry() -> None:
     from nicegui import app
 
-    from tts2face.studio.app import _disable_telemetry
+    from tts2face.serving.studio.app import _disable_telemetry
 
     _disable_telemetry()
     assert not app._native_telemetry.enabled()
 
 
 def test_styles_and_scripts_are_in_the_package() -> None:
-    import tts2face.studio
+    import tts2face.serving.studio
 
-    folder = Path(tts2face.studio.__file__).parent
+    folder = Path(tts2face.serving.studio.__file__).parent
     assert (folder / "pages" / "studio.css").is_file()
     assert {"stage.js", "timeline.js", "clock.js", "preview.js"} <= {one.name for one in folder.glob("components/*.js")}
 

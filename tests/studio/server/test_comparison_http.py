@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from tests.studio.server.test_projects_http import create, edit, preview
-from tts2face.session import Session
-from tts2face.studio.projects.bundle import read_bundle
-from tts2face.studio.studio import MAX_IDLE
+from tts2face.serving.studio.previews import read_bundle
+from tts2face.serving.studio.studio import MAX_IDLE
+from tts2face.session.session import Session
 from tts2face.types import HEAD_CHANNELS
 
 TEXT = "Bob may move. Five maps were there."

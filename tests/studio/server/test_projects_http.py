@@ -15,10 +15,10 @@ import pytest
 from PIL import Image
 
 from tests.running import eventually, serve_process
-from tts2face.project.project_file import load_project
-from tts2face.session import Session
-from tts2face.studio.projects.bundle import read_bundle
-from tts2face.studio.projects.lip_strips import opening_mm
+from tts2face.serving.studio.pages.inspector import opening_mm
+from tts2face.serving.studio.previews import read_bundle
+from tts2face.session.project_file import load_project
+from tts2face.session.session import Session
 
 TEXT = "Bob may move. Five maps were there."
 Bundle = tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray]

@@ -15,10 +15,10 @@ from websockets.sync.client import connect
 from tests.corpus_tools.test_takes_tool import write_table
 from tests.running import RunningService, eventually
 from tests.studio.server.test_styles_http import owned, wait_for_take  # noqa: F401 - a fixture
-from tts2face.session import Session
-from tts2face.studio.projects.bundle import read_bundle
-from tts2face.studio.puppetry.store import FAILED, READY, TakeStore
-from tts2face.synthesis.performance import Performance, perform
+from tts2face.serving.studio.previews import read_bundle
+from tts2face.serving.studio.takes import FAILED, READY, TakeStore
+from tts2face.session.performance import Performance, perform
+from tts2face.session.session import Session
 from tts2face.video.media import read_frames
 
 TABLE = {"Content-Type": "text/csv"}

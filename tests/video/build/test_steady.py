@@ -3,8 +3,8 @@ from pathlib import Path
 import numpy as np
 
 from tts2face.video.media import TimedFrame, read_frames, read_media_info
-from tts2face.video.streaming_tracker import StreamingTracker
-from tts2face.video.track import FaceTracker
+from tts2face.video.streaming import StreamingTracker
+from tts2face.video.tracking import FaceTracker
 
 CLIP = "clips/bbaf2n.mkv"
 

@@ -5,13 +5,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.decomposition.basis_expressions import basis_from_stills, transfer_basis
-from corpus_tools.decomposition.marker_set import MarkerSet
-from corpus_tools.decomposition.markers import read_marker_face
-from corpus_tools.decomposition.stills import PictureReader, Still, build_marker_reader, find_stills, parse_stills
+from corpus_tools.decomposition.basis import (
+    PictureReader,
+    Still,
+    basis_from_stills,
+    build_marker_reader,
+    find_stills,
+    parse_stills,
+    transfer_basis,
+)
+from corpus_tools.decomposition.markers import MarkerSet, read_marker_face
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decomposition.made_markers import SIZE, made_take, write_table
-from tts2face.face.face_motion import moved_landmarks, rest_landmarks
+from tts2face.face.deformation import moved_landmarks, rest_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.palette import EXPRESSIONS

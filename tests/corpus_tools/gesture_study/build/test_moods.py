@@ -10,11 +10,19 @@ import pytest
 from PIL import Image
 
 from cli.main import run
-from corpus_tools.gesture_study.moods import MoodOptions, MoodStudy, confusion_matrix, study_moods
-from corpus_tools.gesture_study.write_moods import mood_rows, moods_csv, moods_json, moods_png
+from corpus_tools.studies.gestures.moods import (
+    MoodOptions,
+    MoodStudy,
+    confusion_matrix,
+    mood_rows,
+    moods_csv,
+    moods_json,
+    moods_png,
+    study_moods,
+)
 from lexicon.errors import BackendError, InputError
 from tests.kept import kept
-from tts2face.session import Session
+from tts2face.session.session import Session
 
 SIX = ("neutral", "depressed", "delighted", "annoyed", "exaggerated", "exasperated")
 
@@ -100,7 +108,7 @@ def test_one_mood_cannot_be_told_apart() -> None:
 def test_the_command_writes_a_contact_sheet(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], study: MoodStudy, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("corpus_tools.gesture_study.write_moods.study_moods", lambda *_, **__: study)  # takes 30 s
+    monkeypatch.setattr("corpus_tools.studies.gestures.moods.study_moods", lambda *_, **__: study)  # takes 30 s
     out = tmp_path / "moods.png"
     assert run(["report", "moods", "--out", str(out), "--seeds", "4"]) == 0
     with Image.open(out) as sheet:

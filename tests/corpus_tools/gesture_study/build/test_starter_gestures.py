@@ -4,7 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from corpus_tools.gesture_study.analysis import MotionComparison, Options, StyleStudy, TraitComparison, study_gestures
+from corpus_tools.studies.gestures.analysis import (
+    MotionComparison,
+    Options,
+    StyleStudy,
+    TraitComparison,
+    study_gestures,
+)
 from tests.kept import kept
 from tts2face.models.palette import load_palette
 

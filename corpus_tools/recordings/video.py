@@ -1,0 +1,239 @@
+"""Tracked landmarks of videos, stored in a cache folder.
+
+Light and sharpness of the face in pictures: whether its parts can be told apart.
+"""
+
+import hashlib
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+from lexicon.inputs import check_regular_file
+from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, FACE_OVAL
+from tts2face.storage.tensors import read_tensors, write_tensors
+from tts2face.video.media import TimedFrame, read_frames, read_media_info
+from tts2face.video.tracking import MODEL_SHA256, Tracking
+
+if TYPE_CHECKING:
+    from tts2face.video.streaming import StreamingTracker
+
+
+INTERVAL_S = 0.5  # between the pictures that are measured
+EYE_PX = 60.0  # larger faces are reduced to this distance of the outer eye corners: finer detail is not needed
+LUMA = np.array([0.299, 0.587, 0.114], np.float32)  # of red, green and blue (ITU-R BT.601)
+OVEREXPOSED = 250  # of 255
+SHRINK = 0.9  # of the oval of the face, whose border is background and hair
+DARK_QUANTILE, BRIGHT_QUANTILE = 0.05, 0.95
+FINE_PX, COARSE_PX = 1.0, 2.0  # of the two Gaussians whose difference is the detail
+MEASURES = ("brightness", "contrast", "glare", "sharpness")
+
+
+def measure_light(
+    frames: Iterable[TimedFrame], points: NDArray[np.float32], times: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """Measures (N, 5) of every `INTERVAL_S` of a video with a face: the time in seconds, then `MEASURES`.
+
+    Parameters
+    ----------
+    points : (T, 478, 3)
+        Landmarks in pixels at ``times`` (T,), NaN without a face.
+    """
+    rows, next_s = [], -np.inf
+    for frame in frames:
+        at = int(np.argmin(np.abs(times - frame.time)))
+        if frame.time >= next_s and not np.isnan(points[at, 0, 0]):
+            rows.append((frame.time, *face_light(frame.pixels, points[at])))
+            next_s = frame.time + INTERVAL_S
+    return np.array(rows, np.float32).reshape(-1, 1 + len(MEASURES))
+
+
+def face_light(pixels: NDArray[np.uint8], points: NDArray[np.floating]) -> tuple[float, float, float, float]:
+    """Brightness, contrast, glare and sharpness of a face.
+
+    Parameters
+    ----------
+    pixels : (H, W, 3)
+    points : (478, 3)
+        Landmarks in pixels.
+
+    Returns
+    -------
+    brightness
+        Mean luma of the face in 8-bit levels.
+    contrast
+        Difference of the 95 % and the 5 % quantile of the luma, in 8-bit levels.
+    glare
+        Share of the face that is overexposed.
+    sharpness
+        Deviation of the detail between 1 and 2 px, at `EYE_PX`, over the contrast.
+    """
+    import cv2
+
+    eyes = float(np.linalg.norm(points[EYE_OUTER_LEFT, :2] - points[EYE_OUTER_RIGHT, :2]))
+    scale = min(1.0, EYE_PX / max(eyes, 1.0))
+    oval = points[list(FACE_OVAL), :2]
+    low = np.maximum(np.floor(oval.min(axis=0)).astype(int), 0)
+    high = np.minimum(np.ceil(oval.max(axis=0)).astype(int) + 1, pixels.shape[1::-1])
+    if (high - low < 2 / scale).any():
+        return 0.0, 0.0, 0.0, 0.0  # outside of the picture
+    luma = pixels[low[1] : high[1], low[0] : high[0]].astype(np.float32) @ LUMA
+    size = [max(1, round(float(side) * scale)) for side in high - low]
+    small = cv2.resize(luma, size, interpolation=cv2.INTER_AREA) if scale < 1 else luma
+    outline = ((oval.mean(axis=0) + SHRINK * (oval - oval.mean(axis=0)) - low) * scale).round().astype(np.int32)
+    mask = cv2.fillConvexPoly(np.zeros(small.shape[:2], np.uint8), outline, 1).astype(bool)
+    if not mask.any():
+        return 0.0, 0.0, 0.0, 0.0
+    skin = small[mask]
+    dark, bright = np.quantile(skin, [DARK_QUANTILE, BRIGHT_QUANTILE])
+    detail = (cv2.GaussianBlur(small, (0, 0), FINE_PX) - cv2.GaussianBlur(small, (0, 0), COARSE_PX))[mask]
+    contrast = float(bright - dark)
+    return float(skin.mean()), contrast, float((skin >= OVEREXPOSED).mean()), float(detail.std() / max(contrast, 1.0))
+
+
+TRACKING_KIND = "tracking"
+LIGHT_KIND = "light"
+LIGHT_VERSION = 1  # increased when the measures of light change
+TRACKING_VERSION = 2  # increased when tracking gives other values, which invalidates cached ones
+NOT_COUNTED = -1
+
+ShareCallback = Callable[[float], None]  # called with the finished share of a video
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackedVideo:
+    """Tracking results of T frames.
+
+    Parameters
+    ----------
+    tracking
+        Landmarks and their scores.
+    times : (T,)
+        Seconds.
+    fps
+        Frame rate stated in the file.
+    n_faces : (T,)
+        Number of faces in the frame, or `NOT_COUNTED`.
+    changes : (T,)
+        Mean absolute difference from the previous frame, in 8-bit steps; infinite for the first.
+    """
+
+    tracking: Tracking
+    times: NDArray[np.float64]
+    fps: float
+    n_faces: NDArray[np.int8]
+    changes: NDArray[np.float32]
+
+
+class CachedTracker:
+    """Landmark tracker with a cache; networks are loaded on first use, and the last video's result stays in memory."""
+
+    def __init__(self, cache: Path, model: Path) -> None:
+        self._cache, self._model = cache, model
+        self._reader: StreamingTracker | None = None
+        self._last: tuple[Path, TrackedVideo] | None = None
+
+    def track(self, video: Path, on_share: ShareCallback | None = None) -> TrackedVideo:
+        """Landmarks of a video, from the cache if its content has been tracked.
+
+        Parameters
+        ----------
+        on_share
+            Called with the finished share.
+
+        Raises
+        ------
+        DataError
+            The video cannot be read or contains no frames.
+        """
+        cached = self._cache / f"{content_key(video)}-{MODEL_SHA256[:8]}-{TRACKING_VERSION}.{TRACKING_KIND}"
+        if self._last is None or self._last[0] != cached:
+            self._last = None  # frees the memory before the next video is read
+            self._last = (
+                cached,
+                _read_cached_tracking(cached) or self._track_and_cache(video, cached, on_share or (lambda share: None)),
+            )
+        return self._last[1]
+
+    def light(self, video: Path) -> NDArray[np.float32]:
+        """Light of the face (N, 5) as `measure_light` returns it, from the cache if its content has been measured.
+
+        Raises
+        ------
+        DataError
+            The video cannot be read or contains no frames.
+        """
+        cached = self._cache / f"{content_key(video)}-{MODEL_SHA256[:8]}-{LIGHT_VERSION}.{LIGHT_KIND}"
+        if cached.is_file():
+            with suppress(DataError, KeyError):
+                return np.asarray(read_tensors(cached, LIGHT_KIND, LIGHT_VERSION)[0]["light"], np.float32)
+        tracked = self.track(video)
+        found = measure_light(read_frames(video), tracked.tracking.points, tracked.times)
+        write_tensors(cached, LIGHT_KIND, LIGHT_VERSION, {"light": found}, {})
+        return found
+
+    def _track_and_cache(self, video: Path, cached: Path, on_share: ShareCallback) -> TrackedVideo:
+        from tts2face.video.streaming import StreamingTracker
+
+        self._reader = self._reader or StreamingTracker(self._model)
+        facts = read_media_info(video)
+        frames = []
+        for frame in self._reader.track(read_frames(video), facts.fps):
+            frames.append(frame)
+            on_share(min(frame.time / max(facts.duration, frame.time, 1e-3), 1.0))
+        if not frames:
+            raise DataError(f"{video} contains no frames; copy or record it again")
+        arrays = {
+            "points": np.array([frame.points for frame in frames]),
+            "scores": np.array([frame.score for frame in frames], np.float32),
+            "times": np.array([frame.time for frame in frames]),
+            "n_faces": np.array([_stored_face_count(frame.n_faces) for frame in frames], np.int8),
+            "changes": np.array([frame.change for frame in frames], np.float32),
+        }
+        write_tensors(cached, TRACKING_KIND, TRACKING_VERSION, arrays, {"fps": facts.fps})
+        return _build_tracked_video(arrays, facts.fps)
+
+
+def content_key(path: Path) -> str:
+    """Cache key of a file's content.
+
+    Raises
+    ------
+    DataError
+        The path is no ordinary file.
+    """
+    check_regular_file(path)
+    about = path.stat()
+    return _content_key(path, about.st_size, about.st_mtime_ns)
+
+
+@lru_cache(maxsize=1)
+def _content_key(path: Path, _size: int, _changed_ns: int) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:32]
+
+
+def _read_cached_tracking(path: Path) -> TrackedVideo | None:
+    """The cached tracking; None if it is missing or damaged."""
+    if not path.is_file():
+        return None
+    try:
+        arrays, header = read_tensors(path, TRACKING_KIND, TRACKING_VERSION)
+        return _build_tracked_video(arrays, float(header["fps"]))
+    except (DataError, KeyError):
+        return None
+
+
+def _build_tracked_video(arrays: Mapping[str, NDArray[Any]], fps: float) -> TrackedVideo:
+    tracking = Tracking(arrays["points"], arrays["scores"])
+    return TrackedVideo(tracking, arrays["times"], fps, arrays["n_faces"], arrays["changes"])
+
+
+def _stored_face_count(n_faces: int | None) -> int:
+    return NOT_COUNTED if n_faces is None else min(n_faces, np.iinfo(np.int8).max)

@@ -1,0 +1,1 @@
+"""Studies of models and recordings, written as tables and self-contained HTML pages."""

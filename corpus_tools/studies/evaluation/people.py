@@ -1,0 +1,346 @@
+"""Evaluation of a finished talker on other people: their phones and edges, curves z-scored per person.
+
+A talker is synthesised from the phones of each test person. Faces differ in size and range of motion, so the opening
+and the width of the lips are z-scored: real curves by that person's speech, synthesised ones by the talker's own
+recordings.
+
+Results of an evaluation on test people as Markdown tables and as rows for a CSV file.
+"""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.recordings.observation import Observation
+from corpus_tools.studies.evaluation.methods import SynthesisMethod, build_methods
+from corpus_tools.studies.evaluation.reference import LipCurves, ReferenceUtterance
+from corpus_tools.studies.evaluation.scores import IntervalEstimate, PairedCurves, estimate, estimate_difference
+from corpus_tools.studies.evaluation.splits import check_unknown
+from corpus_tools.studies.evaluation.tracks import ExternalTrack, map_tracks
+from lexicon.errors import InputError
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.lips.explanation import DTW_BAND_S, speech_frames, warping_cost
+from tts2face.models.networks import PhoneNetwork
+from tts2face.models.talker import ShapeModel, Talker
+
+FIGURE_HEADS = (("r_opening", "r opening"), ("r_width", "r width"), ("dtw_cost", "DTW cost"))
+NETWORKS_METHOD, TRACKS_METHOD = "networks alone", "tracks"
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CurveScale:
+    """Mean and standard deviation (2,) of opening and width in a person's speech."""
+
+    mean: Floats
+    spread: Floats
+
+    @classmethod
+    def of(cls, speech: Sequence[Floats]) -> "CurveScale":
+        """Statistics of curves (T, 2) in speech."""
+        frames = np.concatenate(speech)
+        return cls(frames.mean(axis=0), np.maximum(frames.std(axis=0), 1e-9))
+
+    @classmethod
+    def of_talker(cls, talker: Talker) -> "CurveScale":
+        """Statistics of a talker's recorded utterances."""
+        return cls.of(
+            [
+                _lip_curves(talker.model, one.shape[speech_frames(one.phones, len(one.shape), talker.fps)])
+                for one in talker.utterances
+            ]
+        )
+
+    def z_score(self, curves: Floats) -> Floats:
+        """z-scored curves (T, 2)."""
+        return (curves - self.mean) / self.spread
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TestUtterance:
+    """One utterance of a test person: its observation, evaluated frames, and their z-scored curves (T, 2)."""
+
+    __test__ = False  # no test class
+
+    observation: Observation
+    evaluated: slice
+    real: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class PhoneFigures:
+    """Figures of one phone: number of tokens, whether the talker's recordings hold it, mean opening and width in z.
+
+    ``made`` are the means of each method, by name.
+    """
+
+    phone: str
+    n_tokens: int
+    is_heard: bool
+    real: tuple[float, float]
+    made: Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PeopleEvaluation:
+    """Figures of methods on test people: by method, between methods, and by phone.
+
+    ``heard`` holds r of the opening for each method, in the frames of phones that the talker's recordings hold, and in
+    those of other phones (NaN if there are none). ``warnings`` are about names that the talker's recordings share.
+    """
+
+    n_people: int
+    n_utterances: int
+    figures: Mapping[str, Mapping[str, IntervalEstimate]]
+    differences: Mapping[tuple[str, str], Mapping[str, IntervalEstimate]]
+    phones: tuple[PhoneFigures, ...]
+    heard: Mapping[str, tuple[float, float]]
+    warnings: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Dictionary for JSON."""
+        return {
+            "n_people": self.n_people,
+            "n_utterances": self.n_utterances,
+            "figures": {name: _plain(values) for name, values in self.figures.items()},
+            "differences": [
+                {"method": one, "minus": other, **_plain(values)} for (one, other), values in self.differences.items()
+            ],
+            "phones": [asdict(one) for one in self.phones],
+            "heard": {name: list(values) for name, values in self.heard.items()},
+            "warnings": list(self.warnings),
+        }
+
+
+def evaluate_people(
+    talker: Talker, people: Sequence[Sequence[Observation]], tracks: Mapping[str, ExternalTrack] | None = None
+) -> PeopleEvaluation:
+    """Figures of a finished talker's methods, and of external tracks, on test people.
+
+    Tracks are mapped to the talker's parameters by a regression on those of its own utterances that they hold.
+
+    Raises
+    ------
+    InputError
+        A person has no utterance, an utterance is one of the talker's, or tracks lack a test utterance or hold too few
+        of the talker's.
+    """
+    tests = z_score_people(people)
+    warnings = check_unknown(talker, [one.observation for one in tests])
+    methods = dict(build_methods(talker))
+    if talker.network is not None:
+        methods[NETWORKS_METHOD] = _networks_method(talker.network)
+    curves = synthesise_people(talker, methods, tests)
+    if tracks is not None:
+        real = [ReferenceUtterance.of(one.observation, talker.model) for one in tests]
+        mapped = iter(map_tracks(tracks, talker, real))
+        curves |= synthesise_people(talker, {TRACKS_METHOD: lambda *_: next(mapped)}, tests)
+    heard = {label for one in talker.utterances for label in one.phones.phones}
+    return replace(compare_people(tests, curves, n_people=len(people), heard=heard), warnings=warnings)
+
+
+def _networks_method(network: PhoneNetwork) -> SynthesisMethod:
+    def motion(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.float32]:
+        return network.parameters(phones, np.arange(n_frames) / fps)
+
+    return motion
+
+
+def z_score_people(people: Sequence[Sequence[Observation]]) -> tuple[TestUtterance, ...]:
+    """Utterances of all people with curves z-scored per person.
+
+    Raises
+    ------
+    InputError
+        There is no person, or a person has no utterance.
+    """
+    if not people or not all(people):
+        raise InputError("there is no utterance to test; give folders with tracks of people")
+    found: list[TestUtterance] = []
+    for utterances in people:
+        here = [speech_frames(one.phones, len(one.landmarks), one.fps) for one in utterances]
+        curves = [LipCurves.of(one.landmarks[span]).values() for one, span in zip(utterances, here, strict=True)]
+        scale = CurveScale.of(curves)
+        found += [
+            TestUtterance(one, span, scale.z_score(values))
+            for one, span, values in zip(utterances, here, curves, strict=True)
+        ]
+    return tuple(found)
+
+
+def synthesise_people(
+    talker: Talker,
+    methods: Mapping[str, SynthesisMethod],
+    tests: Sequence[TestUtterance],
+    scale: CurveScale | None = None,
+) -> dict[str, tuple[Floats, ...]]:
+    """Curves (T, 2) of every method on the evaluated frames, z-scored by `scale`: by default its recordings."""
+    scale = scale or CurveScale.of_talker(talker)
+
+    def curves(method: SynthesisMethod, one: TestUtterance) -> Floats:
+        seen = one.observation
+        motion = method(seen.phones, len(seen.landmarks), seen.fps)
+        return scale.z_score(_lip_curves(talker.model, motion[one.evaluated]))
+
+    return {name: tuple(curves(method, one) for one in tests) for name, method in methods.items()}
+
+
+def compare_people(
+    tests: Sequence[TestUtterance],
+    curves: Mapping[str, Sequence[Floats]],
+    *,
+    n_people: int,
+    heard: Collection[str],
+    baselines: Collection[str] | None = None,
+) -> PeopleEvaluation:
+    """Figures of methods whose curves are given for each utterance.
+
+    Parameters
+    ----------
+    curves
+        z-scored curves (T, 2) of the evaluated frames of each utterance, by method.
+    heard
+        Phones of the talker's recordings.
+    baselines
+        Methods with which every other one is compared; by default all.
+    """
+    paired = {name: pair_curves(tests, values) for name, values in curves.items()}
+    others = paired.keys() if baselines is None else baselines
+    return PeopleEvaluation(
+        n_people,
+        len(tests),
+        {name: estimate(one) for name, one in paired.items()},
+        {
+            (one, other): estimate_difference(paired[one], paired[other])
+            for one in paired
+            for other in others
+            if one != other and other in paired
+        },
+        _phone_figures(tests, curves, heard),
+        {name: _heard_correlations(tests, values, heard) for name, values in curves.items()},
+    )
+
+
+def pair_curves(tests: Sequence[TestUtterance], curves: Sequence[Floats]) -> PairedCurves:
+    """Statistics of a method whose z-scored curves (T, 2) are given for each utterance."""
+    costs = [
+        warping_cost(one.real, made, np.ones(2), round(DTW_BAND_S * one.observation.fps))
+        for one, made in zip(tests, curves, strict=True)
+    ]
+    return PairedCurves.of([one.real for one in tests], curves, costs)
+
+
+def _phone_figures(
+    tests: Sequence[TestUtterance], curves: Mapping[str, Sequence[Floats]], heard: Collection[str]
+) -> tuple[PhoneFigures, ...]:
+    rows: dict[str, list[Floats]] = {}  # by phone, for each token (1 + methods, 2)
+    for at, one in enumerate(tests):
+        every = np.stack([one.real, *(values[at] for values in curves.values())])
+        labels = _frame_phones(one)
+        for number in np.unique(labels):
+            label = one.observation.phones.phones[number]
+            if label != SILENCE:
+                rows.setdefault(label, []).append(every[:, labels == number].mean(axis=1))
+    found = []
+    for label, tokens in sorted(rows.items()):
+        real, *made = np.mean(tokens, axis=0)
+        means = {name: (float(value[0]), float(value[1])) for name, value in zip(curves, made, strict=True)}
+        found.append(PhoneFigures(label, len(tokens), label in heard, (float(real[0]), float(real[1])), means))
+    return tuple(found)
+
+
+def _heard_correlations(
+    tests: Sequence[TestUtterance], curves: Sequence[Floats], heard: Collection[str]
+) -> tuple[float, float]:
+    parts = []
+    for one in tests:
+        is_heard = np.array([label in heard or label == SILENCE for label in one.observation.phones.phones])
+        parts.append(is_heard[_frame_phones(one)])
+    known = np.concatenate(parts)
+    real, made = (np.concatenate([values[:, 0] for values in some]) for some in ([t.real for t in tests], curves))
+
+    def correlation(here: NDArray[np.bool_]) -> float:
+        return float(np.corrcoef(real[here], made[here])[0, 1]) if here.sum() > 1 and made[here].std() > 0 else np.nan
+
+    return correlation(known), correlation(~known)
+
+
+def _frame_phones(one: TestUtterance) -> NDArray[np.int64]:
+    """(T,) index of the phone at each evaluated frame."""
+    phones = one.observation.phones
+    times = np.arange(one.evaluated.start, one.evaluated.start + len(one.real)) / one.observation.fps
+    return np.clip(np.searchsorted(phones.edges, times, side="right") - 1, 0, len(phones) - 1)
+
+
+def _lip_curves(model: ShapeModel, parameters: NDArray[np.floating]) -> Floats:
+    return LipCurves.of(model.shapes(parameters[:, : model.n_speech])).values()
+
+
+def _plain(values: Mapping[str, IntervalEstimate]) -> dict[str, dict[str, float]]:
+    return {name: asdict(value) for name, value in values.items()}
+
+
+CSV_HEAD = ("table", "method", "figure", "value", "low", "high")
+
+
+def people_table(found: PeopleEvaluation) -> str:
+    """Markdown table of the figures with their intervals, one method a line."""
+    rows = [("method", *(head for _, head in FIGURE_HEADS), "r opening, phones recorded", "not recorded")]
+    for method, figures in found.figures.items():
+        cells = (_interval_text(figures[name], signed=False) for name, _ in FIGURE_HEADS)
+        rows.append((method, *cells, *(_plain_text(value) for value in found.heard[method])))
+    return _markdown(rows)
+
+
+def difference_table(found: PeopleEvaluation, method: str) -> str:
+    """Markdown table of the differences of a method from the others, with paired intervals."""
+    rows = [(f"{method} minus", *(head for _, head in FIGURE_HEADS))]
+    for (one, other), values in found.differences.items():
+        if one == method:
+            rows.append((other, *(_interval_text(values[name], signed=True) for name, _ in FIGURE_HEADS)))
+    return _markdown(rows)
+
+
+def phone_table(found: PeopleEvaluation, methods: Sequence[str]) -> str:
+    """Markdown table of mean opening and width by phone in z, recorded and of some methods."""
+    rows = [("phone", "tokens", "in the talker", "recorded: opening, width", *methods)]
+    for one in found.phones:
+        cells = (_pair_text(one.made[method]) for method in methods)
+        rows.append((one.phone, str(one.n_tokens), "yes" if one.is_heard else "no", _pair_text(one.real), *cells))
+    return _markdown(rows)
+
+
+def people_rows(found: PeopleEvaluation) -> Iterator[tuple[str, ...]]:
+    """All figures and differences with their intervals; the first row names the columns."""
+    yield CSV_HEAD
+    for method, figures in found.figures.items():
+        for name, value in figures.items():
+            yield "people", method, name, *_interval_cells(value)
+    for (one, other), values in found.differences.items():
+        for name, value in values.items():
+            yield f"minus {other}", one, name, *_interval_cells(value)
+
+
+def _interval_text(value: IntervalEstimate, *, signed: bool) -> str:
+    sign = "+" if signed else ""
+    return f"{value.value:{sign}.3f} ({value.low:{sign}.3f} to {value.high:{sign}.3f})"
+
+
+def _interval_cells(value: IntervalEstimate) -> tuple[str, str, str]:
+    return f"{value.value:.6g}", f"{value.low:.6g}", f"{value.high:.6g}"
+
+
+def _plain_text(value: float) -> str:
+    return "" if value != value else f"{value:.3f}"  # noqa: PLR0124 - NaN
+
+
+def _pair_text(pair: tuple[float, float]) -> str:
+    return f"{pair[0]:+.2f}, {pair[1]:+.2f}"
+
+
+def _markdown(rows: Sequence[Sequence[str]]) -> str:
+    lines = [f"| {' | '.join(row)} |" for row in rows]
+    return "\n".join([lines[0], "| --- |" + " --- |" * (len(rows[0]) - 1), *lines[1:]])

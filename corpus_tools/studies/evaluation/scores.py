@@ -1,0 +1,387 @@
+"""Scores of a method over held-out utterances, with bootstrap intervals over utterances.
+
+Intervals of a method's figures over utterances, and of the difference of two methods on the same utterances.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.studies.evaluation import reference
+from corpus_tools.studies.evaluation.reference import (
+    OTHER_CLASS,
+    PHONE_CLASSES,
+    LipCurves,
+    ReferenceUtterance,
+    Thresholds,
+)
+from lexicon.errors import InputError
+from lexicon.sequence import PhoneSequence
+from tts2face.lips import explanation
+from tts2face.models.talker import ShapeModel
+
+N_DRAWS = 1000  # of utterances, with replacement (Efron 1979)
+CONFIDENCE = 0.95
+# In the order of tables: name, its head, digits.
+FIGURES = (
+    ("r_opening", "r opening", 3), ("r_width", "r width", 3), ("rmse_z", "RMSE z", 3), ("dtw_cost", "DTW cost", 3),
+    ("free_cost", "DTW cost, free", 3), ("range_ratio", "range ratio", 2), ("closure", "closure", 2),
+    ("false_closure", "false closure", 2),
+    ("labiodental", "labiodental", 2), ("rounding", "rounding", 2), ("peak_offset_ms", "peak offset (ms)", 0),
+)  # fmt: skip
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class IntervalEstimate:
+    """A value and the interval in which it lies with `CONFIDENCE`."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class UtteranceScore:
+    """Scores of one utterance: RMSE and warping cost in units of spread, r and range ratio of opening and width."""
+
+    name: str
+    r_opening: float
+    r_width: float
+    rmse_z: float
+    dtw_cost: float
+    range_ratio: float
+    n_frames: int
+
+
+@dataclass(frozen=True, slots=True)
+class ClassScore:
+    """Scores of the frames of one phone class: their number, RMSE in units of spread, error and bias of the opening.
+
+    Error and bias are relative to the eye distance; a negative bias is a mouth that is too closed.
+    """
+
+    phones: str
+    n_frames: int
+    rmse_z: float
+    opening_error: float
+    opening_bias: float
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """Scores of a method over all held-out utterances: r and range of pooled frames, means or shares otherwise.
+
+    ``figures`` are those of `FIGURES` by name, ``free_cost`` only with a voice's own durations;
+    ``real_time_factor`` is the synthesis time divided by the duration of the utterances.
+    """
+
+    method: str
+    figures: Mapping[str, IntervalEstimate]
+    classes: tuple[ClassScore, ...]
+    real_time_factor: float
+    utterances: tuple[UtteranceScore, ...]
+
+    def __getitem__(self, figure: str) -> float:
+        """The value of a figure."""
+        return self.figures[figure].value
+
+    def values(self) -> dict[str, float]:
+        """The figures without their intervals."""
+        return {name: figure.value for name, figure in self.figures.items()}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UtteranceStatistics:
+    """Sufficient statistics of one utterance for the scores of a method.
+
+    ``opening`` and ``width`` (6,) are moments of real and synthesised curves; ``counts`` (4, 2) numbers of events and
+    opportunities: closures, false closures, labiodental contacts, roundings; ``offsets`` seconds between peaks.
+    """
+
+    opening: Floats
+    width: Floats
+    rmse_z: float
+    dtw_cost: float
+    free_cost: float | None
+    counts: Floats
+    offsets: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OwnDurationMotion:
+    """Motion for a voice's own durations, on its time axis: phones, parameters (U, S) and lip curves.
+
+    ``evaluated`` are its speech frames.
+    """
+
+    phones: PhoneSequence
+    evaluated: slice
+    values: NDArray[np.floating]
+    curves: LipCurves
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UtteranceComparison:
+    """One real utterance and its synthesis: parameters (T, S) and lip curves on the recorded time axis.
+
+    The first ``len(spread)`` parameters are compared. With a voice's durations, events within phones are evaluated on
+    its time axis (``own``).
+    """
+
+    real: ReferenceUtterance
+    synthesised: NDArray[np.floating]
+    curves: LipCurves
+    spread: NDArray[np.floating]
+    own: OwnDurationMotion | None = None
+
+
+SplitMotion = tuple[
+    ShapeModel, Sequence[ReferenceUtterance], Sequence[NDArray[np.float32]]
+]  # of one split: (T, S) for each utterance
+
+
+def available_figures(scores: Sequence[Scores]) -> tuple[tuple[str, str, int], ...]:
+    """Those of `FIGURES` that the scores have."""
+    return tuple(figure for figure in FIGURES if all(figure[0] in one.figures for one in scores))
+
+
+def score_splits(method: str, splits: Sequence[SplitMotion], limits: Thresholds, synthesis_s: float = 0.0) -> Scores:
+    """Scores of a method over the utterances of all splits; synthesis took `synthesis_s` seconds."""
+    comparisons = [
+        UtteranceComparison(one, values, LipCurves.of(model.shapes(values)), speech_spread(model))
+        for model, real, synthesised in splits
+        for one, values in zip(real, synthesised, strict=True)
+    ]
+    return compute_scores(method, comparisons, limits, synthesis_s)
+
+
+def speech_spread(model: ShapeModel) -> NDArray[np.float32]:
+    """(D,) standard deviations of the compared parameters."""
+    return model.spread[: min(reference.N_DTW_PARAMETERS, model.n_speech)]
+
+
+def compute_scores(
+    method: str, comparisons: Sequence[UtteranceComparison], limits: Thresholds, synthesis_s: float = 0.0
+) -> Scores:
+    """Scores of a method over compared utterances; synthesis took `synthesis_s` seconds."""
+    tallies = [_utterance_statistics(one, limits) for one in comparisons]
+    return Scores(
+        method,
+        _estimate_figures(tallies),
+        tuple(_class_scores(comparisons)),
+        synthesis_s / sum(one.real.seconds for one in comparisons),
+        tuple(_utterance_score(tally, one) for tally, one in zip(tallies, comparisons, strict=True)),
+    )
+
+
+def _utterance_statistics(comparison: UtteranceComparison, limits: Thresholds) -> UtteranceStatistics:
+    one, curves, n, here = comparison.real, comparison.curves, len(comparison.spread), comparison.real.evaluated
+    phones, fps = one.observation.phones, one.observation.fps
+    real, synthesised = one.parameters[here, :n], comparison.synthesised[here, :n]
+    peaks = [reference.peak_times(curve, phones, fps) for curve in (one.curves.opening, curves.opening)]
+    offsets = peaks[1] - peaks[0]
+    return UtteranceStatistics(
+        _curve_moments(one.curves.opening[here], curves.opening[here]),
+        _curve_moments(one.curves.width[here], curves.width[here]),
+        reference.rmse_z(real, synthesised, comparison.spread),
+        explanation.warping_cost(real, synthesised, comparison.spread, round(explanation.DTW_BAND_S * fps)),
+        _free_cost(comparison),
+        _event_counts(comparison, limits),
+        np.abs(offsets[np.isfinite(offsets)]),
+    )
+
+
+def _free_cost(comparison: UtteranceComparison) -> float | None:
+    """Warping cost, without a band, of motion on the voice's time axis."""
+    if comparison.own is None:
+        return None
+    n = len(comparison.spread)
+    real = comparison.real.parameters[comparison.real.evaluated, :n]
+    return explanation.warping_cost(real, comparison.own.values[comparison.own.evaluated, :n], comparison.spread, None)
+
+
+def _event_counts(comparison: UtteranceComparison, limits: Thresholds) -> Floats:
+    """(4, 2) numbers of events and of opportunities, in the phones of the time axis of the synthesis."""
+    own, fps = comparison.own, comparison.real.observation.fps
+    phones, curves = (own.phones, own.curves) if own else (comparison.real.observation.phones, comparison.curves)
+
+    def events(curve: NDArray[np.floating], labels: str, limit: float) -> tuple[float, float]:
+        least = reference.min_openings(curve, phones, fps, PHONE_CLASSES[labels])
+        return float((least <= limit).sum()), float(len(least))
+
+    middles = reference.midpoint_openings(curves.opening, phones, fps)
+    return np.array(
+        [
+            events(curves.opening, "bilabial", limits.closed),
+            (float((middles <= limits.closed).sum()), float(len(middles))),
+            events(curves.opening, "labiodental", limits.labiodental),
+            events(curves.width, "rounded", limits.rounded),
+        ]
+    )
+
+
+def _curve_moments(a: Floats, b: Floats) -> Floats:
+    return np.array([len(a), a.sum(), b.sum(), a @ a, b @ b, a @ b])
+
+
+def _estimate_figures(tallies: Sequence[UtteranceStatistics]) -> dict[str, IntervalEstimate]:
+    draws = np.random.default_rng(0).multinomial(len(tallies), np.full(len(tallies), 1 / len(tallies)), N_DRAWS)
+    weights = np.concatenate([np.ones((1, len(tallies))), draws])  # the first row: each utterance once
+    rows = {
+        **dict(
+            zip(("r_opening", "range_ratio"), _curve_figures(weights, [one.opening for one in tallies]), strict=True)
+        ),
+        "r_width": _curve_figures(weights, [one.width for one in tallies])[0],
+        "rmse_z": weights @ [one.rmse_z for one in tallies] / weights.sum(axis=1),
+        "dtw_cost": weights @ [one.dtw_cost for one in tallies] / weights.sum(axis=1),
+        "peak_offset_ms": 1000 * _weighted_medians(weights, [one.offsets for one in tallies]),
+    }
+    free = [one.free_cost for one in tallies if one.free_cost is not None]
+    if len(free) == len(tallies):
+        rows["free_cost"] = weights @ free / weights.sum(axis=1)
+    counts = np.tensordot(weights, np.array([one.counts for one in tallies]), axes=1)
+    for at, name in enumerate(("closure", "false_closure", "labiodental", "rounding")):
+        rows[name] = counts[:, at, 0] / np.maximum(counts[:, at, 1], 1.0)
+    edges = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
+    return {
+        name: IntervalEstimate(float(rows[name][0]), *(float(value) for value in np.quantile(rows[name][1:], edges)))
+        for name, _, _ in FIGURES
+        if name in rows
+    }
+
+
+def _curve_figures(weights: Floats, moments: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Pearson's r and the ratio of spreads for each row of weights (W, U)."""
+    n, a, b, aa, bb, ab = (weights @ np.array(moments)).T
+    real, synthesised = np.maximum(aa - a * a / n, 0.0), np.maximum(bb - b * b / n, 0.0)
+    moves = np.sqrt(real * synthesised) > 1e-9 * n
+    r = np.where(moves, (ab - a * b / n) / np.where(moves, np.sqrt(real * synthesised), 1.0), 0.0)
+    return r, np.sqrt(synthesised / np.maximum(real, 1e-12))
+
+
+def _weighted_medians(weights: Floats, offsets: Sequence[Floats]) -> Floats:
+    """Weighted median of all offsets for each row of weights (W, U); 0 where there is none."""
+    values = np.concatenate(offsets)
+    if not len(values):
+        return np.zeros(len(weights))
+    order = np.argsort(values)
+    owner = np.repeat(np.arange(len(offsets)), [len(some) for some in offsets])[order]
+    total = np.cumsum(weights[:, owner], axis=1)
+    at = (total < total[:, -1:] / 2).sum(axis=1)
+    return np.asarray(values[order][np.minimum(at, len(values) - 1)])
+
+
+def _class_scores(comparisons: Sequence[UtteranceComparison]) -> list[ClassScore]:
+    classes, errors, opening = [], [], []
+    for each in comparisons:
+        one, here, n = each.real, each.real.evaluated, len(each.spread)
+        classes.append(one.classes[here])
+        errors.append((each.synthesised - one.parameters)[here, :n] / each.spread)
+        opening.append((each.curves.opening - one.curves.opening)[here])
+    return _score_classes(np.concatenate(classes), np.concatenate(errors), np.concatenate(opening))
+
+
+def _score_classes(classes: NDArray[np.str_], errors: NDArray[np.float32], opening: Floats) -> list[ClassScore]:
+    found = []
+    for name in (*PHONE_CLASSES, OTHER_CLASS):
+        here = classes == name
+        if here.any():
+            rmse = float(np.sqrt(np.square(errors[here]).mean()))
+            error, bias = float(np.abs(opening[here]).mean()), float(opening[here].mean())
+            found.append(ClassScore(name, int(here.sum()), rmse, error, bias))
+    return found
+
+
+def _utterance_score(tally: UtteranceStatistics, comparison: UtteranceComparison) -> UtteranceScore:
+    one, synthesised = comparison.real, comparison.curves
+    here, recorded = one.evaluated, one.curves
+    return UtteranceScore(
+        one.observation.name,
+        explanation.correlation(recorded.opening[here], synthesised.opening[here]),
+        explanation.correlation(recorded.width[here], synthesised.width[here]),
+        tally.rmse_z,
+        tally.dtw_cost,
+        explanation.range_ratio(recorded.opening[here], synthesised.opening[here]),
+        int(tally.opening[0]),
+    )
+
+
+N_PAIRED_DRAWS = 2000  # resamples of utterances with replacement (Efron 1979)
+ROUNDING = 1e-12  # spread of a constant curve in parts of its sum of squares: what float32 values and sums leave
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PairedCurves:
+    """Statistics of a method on U utterances: ``moments`` (U, 2, 6) of opening and width, warping ``costs`` (U,).
+
+    The moments of a real curve a and a synthesised one b are n, sum a, sum b, sum aa, sum bb and sum ab, from which
+    Pearson's r of pooled frames follows.
+    """
+
+    moments: Floats
+    costs: Floats
+
+    @classmethod
+    def of(
+        cls, real: Sequence[NDArray[np.floating]], synthesised: Sequence[NDArray[np.floating]], costs: Sequence[float]
+    ) -> "PairedCurves":
+        """Of real and synthesised curves (T, 2), one pair for each utterance, and their warping costs."""
+        moments = [
+            [_moments_of_pair(a[:, at], b[:, at]) for at in range(2)] for a, b in zip(real, synthesised, strict=True)
+        ]
+        return cls(np.array(moments), np.asarray(costs, np.float64))
+
+    def figures(self, weights: Floats) -> Mapping[str, Floats]:
+        """Correlations of opening and width and mean cost for each row of utterance weights (W, U)."""
+        opening, width = (_pooled_correlation(weights @ self.moments[:, at]) for at in range(2))
+        return {"r_opening": opening, "r_width": width, "dtw_cost": weights @ self.costs / weights.sum(axis=1)}
+
+
+def draw_weights(n_utterances: int) -> Floats:
+    """(N_DRAWS + 1, U) number of times each utterance is drawn; every utterance once in the first row."""
+    draws = np.random.default_rng(0).multinomial(n_utterances, np.full(n_utterances, 1 / n_utterances), N_PAIRED_DRAWS)
+    return np.concatenate([np.ones((1, n_utterances)), draws])
+
+
+def estimate(one: PairedCurves) -> Mapping[str, IntervalEstimate]:
+    """Each figure with its interval."""
+    figures = one.figures(draw_weights(len(one.costs)))
+    return {name: interval_of(values) for name, values in figures.items()}
+
+
+def estimate_difference(one: PairedCurves, other: PairedCurves) -> Mapping[str, IntervalEstimate]:
+    """Figures of `one` minus those of `other` on the same utterances; both are resampled together.
+
+    Raises
+    ------
+    InputError
+        The two have other numbers of utterances.
+    """
+    if len(one.costs) != len(other.costs):
+        raise InputError(f"{len(one.costs)} utterances cannot be paired with {len(other.costs)}; use the same ones")
+    weights = draw_weights(len(one.costs))
+    ours, theirs = one.figures(weights), other.figures(weights)
+    return {name: interval_of(ours[name] - theirs[name]) for name in ours}
+
+
+def interval_of(values: Floats) -> IntervalEstimate:
+    """The first of (W,) values, with the interval that holds `CONFIDENCE` of the others."""
+    low, high = np.quantile(values[1:], (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2))
+    return IntervalEstimate(float(values[0]), float(low), float(high))
+
+
+def _moments_of_pair(a: NDArray[np.floating], b: NDArray[np.floating]) -> list[float]:
+    a, b = a.astype(np.float64), b.astype(np.float64)
+    return [len(a), a.sum(), b.sum(), a @ a, b @ b, a @ b]
+
+
+def _pooled_correlation(moments: Floats) -> Floats:
+    """(W,) Pearson's r for moments (W, 6); 0 where a curve is constant but for rounding."""
+    n, a, b, aa, bb, ab = moments.T
+    spread_a, spread_b = aa - a * a / n, bb - b * b / n
+    moves = (spread_a > ROUNDING * aa) & (spread_b > ROUNDING * bb)
+    return np.where(moves, ab - a * b / n, 0.0) / np.sqrt(np.where(moves, spread_a * spread_b, 1.0))

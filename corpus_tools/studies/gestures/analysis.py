@@ -1,0 +1,306 @@
+"""Comparison of each style's held-out recordings with motion generated for their sound by fields and by noise."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.studies.gestures.clips import (
+    LongRun,
+    field_clip,
+    hold_out,
+    long_run,
+    noise_clip,
+    published_clip,
+    replace_style,
+)
+from corpus_tools.studies.gestures.measures import (
+    BodyMeasure,
+    Spectrum,
+    Trait,
+    diversity,
+    find_blinks,
+    frame_midpoints,
+    in_display_units,
+    measure_body,
+    random_halves,
+    ratio,
+    spectrum,
+    split_recordings,
+    style_traits,
+    wasserstein,
+)
+from lexicon.errors import InputError
+from tts2face.gestures.stream import GestureFields
+from tts2face.lips.explanation import pearson
+from tts2face.models.palette import GESTURE_FPS, Palette, Style
+from tts2face.types import Progress
+
+NEAR, HALF = 1.5, 0.5  # maximum distance of a field, relative to the distance between halves and to that of noise
+CORRELATION_WITHIN = 0.1
+FEWEST = 10  # recordings; with fewer, none is held out
+N_TAKES = 60  # recordings whose distances are the reference of diversity
+
+Doubles = NDArray[np.float64]
+Motion = Mapping[str, NDArray[np.floating]]
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Options of a study: one in `one_in` recordings is held out; numbers of random halvings and clips; the seed.
+
+    Raises
+    ------
+    InputError
+        A number is too small.
+    """
+
+    one_in: int = 5
+    halves: int = 50
+    clips: int = 3
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if self.one_in < 2:
+            raise InputError(f"one in {self.one_in} recordings cannot be held out; give 2 or more")
+        if self.halves < 1:
+            raise InputError(f"there must be at least 1 halving, not {self.halves}")
+        if self.clips < 2:
+            raise InputError(f"seeds are compared with at least 2 clips, not {self.clips}")
+        if self.seed < 0:
+            raise InputError(f"a seed is a whole number from 0, not {self.seed}")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TraitComparison:
+    """Values of a trait in recordings, clips of a field, of noise and of a published field, and Wasserstein distances.
+
+    `halves` is the mean distance between random halves of the recordings; the others are means from all recordings to
+    one clip.
+    Distances are in the trait's unit. Only measured styles have a clip of the published field; for derived ones
+    `published` is empty and `to_published` NaN.
+    """
+
+    trait: Trait
+    real: Doubles
+    field: Doubles
+    noise: Doubles
+    published: Doubles
+    halves: float
+    to_field: float
+    to_noise: float
+    to_published: float
+
+    @property
+    def is_met(self) -> bool:
+        """Whether the field is within the targets `NEAR` and `HALF`."""
+        return self.to_field <= NEAR * self.halves and self.to_field < HALF * self.to_noise
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionComparison:
+    """Spectra of a feature, the correlation (r) of its speed with the sound's intensity, and diversity.
+
+    Spectra and r are those of recordings, field, noise and, for measured styles, the published field; diversity is
+    that of field and noise.
+    """
+
+    feature: str
+    unit: str
+    spectra: tuple[Spectrum, ...]
+    with_intensity: tuple[float, ...]
+    diversity: tuple[float, float]
+
+    @property
+    def follows_sound(self) -> bool:
+        """Whether the correlation of the field is within `CORRELATION_WITHIN` of the recordings'."""
+        return abs(self.with_intensity[0] - self.with_intensity[1]) <= CORRELATION_WITHIN
+
+    @property
+    def fast_power(self) -> tuple[float, ...]:
+        """Power above `measures.FAST_HZ` of field, noise and published field, over that of the recordings."""
+        real, *others = (one.fast_power for one in self.spectra)
+        return tuple(ratio(one, real) for one in others)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StyleStudy:
+    """Results for one style: `real` is its recordings, or for a derived style the motion of its source's field.
+
+    Only measured styles have long clips and a clip of the published field; derived styles transform long clips.
+    `blinks_per_minute` has the order of `MotionComparison.spectra`.
+    """
+
+    name: str
+    source: str | None
+    summary: str
+    n_training: int
+    n_held_out: int
+    is_held_out: bool
+    minutes: float
+    blinks_per_minute: tuple[float, ...]
+    trait_comparisons: tuple[TraitComparison, ...]
+    motion_comparisons: tuple[MotionComparison, ...]
+    long_run: LongRun
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GestureStudy:
+    """Results for all styles of a palette, and of what the body does whatever the style."""
+
+    name: str
+    options: Options
+    styles: tuple[StyleStudy, ...]
+    body: tuple[BodyMeasure, ...]
+
+    @property
+    def targets(self) -> tuple[int, int]:
+        """Number of targets of measured styles that are met, and number of targets."""
+        measured = [style for style in self.styles if style.source is None]
+        kept = [one.is_met for style in measured for one in style.trait_comparisons if one.trait.has_target]
+        kept += [one.follows_sound for style in measured for one in style.motion_comparisons if one.feature == "head"]
+        return sum(kept), len(kept)
+
+
+def study_gestures(name: str, palette: Palette, options: Options, on_progress: Progress | None = None) -> GestureStudy:
+    """Measure every style of a palette."""
+    studies: list[StyleStudy] = []
+    prepared: dict[str, _PreparedStyle] = {}
+    for done, style in enumerate(names := (*palette.styles, *palette.derivations)):
+        if on_progress:
+            on_progress(done, len(names))
+        source = palette.derivations[style].source if style in palette.derivations else style
+        if source not in prepared:
+            prepared[source] = _prepare_style(palette, source, options)
+        studies.append(_study_style(palette, style, prepared[source], options))
+    if on_progress:
+        on_progress(len(names), len(names))
+    return GestureStudy(name, options, tuple(studies), measure_body(options.seed))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _PreparedStyle:
+    """A measured style: training and held-out recordings, fields, and the reference clip of derived styles."""
+
+    training: Style
+    held_out: Style
+    is_held_out: bool
+    fields: GestureFields
+    reference_clip: Motion
+
+
+def _prepare_style(palette: Palette, source: str, options: Options) -> _PreparedStyle:
+    whole = palette.styles[source]
+    is_held_out = len(whole.lengths) >= FEWEST
+    training, held_out = hold_out(whole, options.one_in, options.seed) if is_held_out else (whole, whole)
+    fields = GestureFields(replace_style(palette, source, training))
+    reference = _field_motion(fields, source, held_out, options.seed + options.clips) if palette.derivations else {}
+    return _PreparedStyle(training, held_out, is_held_out, fields, reference)
+
+
+def _study_style(palette: Palette, name: str, prepared: _PreparedStyle, options: Options) -> StyleStudy:
+    derived = palette.derivations.get(name)
+    source = name if derived is None else derived.source
+    training, held_out, fields = prepared.training, prepared.held_out, prepared.fields
+    clips = [_field_motion(fields, name, held_out, options.seed + k) for k in range(options.clips)]
+    noises = [noise_clip(fields, name, len(held_out.intensity), options.seed + k) for k in range(options.clips)]
+    published = [published_clip(fields.palette, name, held_out.intensity, options.seed)] if derived is None else []
+    real = held_out.motion if derived is None else prepared.reference_clip
+    kinds = [[real], clips, noises, published]
+    return StyleStudy(
+        name=name,
+        source=None if derived is None else source,
+        summary="" if derived is None else derived.summary,
+        n_training=len(training.lengths),
+        n_held_out=len(held_out.lengths),
+        is_held_out=prepared.is_held_out,
+        minutes=palette.styles[source].seconds / 60,
+        blinks_per_minute=tuple(_blink_rate(kind[0], held_out) for kind in kinds if kind),
+        trait_comparisons=tuple(
+            _compare_trait(trait, held_out, kinds, options) for trait in style_traits(palette, training)
+        ),
+        motion_comparisons=_compare_motion(palette, held_out, [kind for kind in kinds if kind]),
+        long_run=long_run(fields, name, training, held_out, options.seed) if derived is None else LongRun({}, {}),
+    )
+
+
+def _field_motion(fields: GestureFields, name: str, held_out: Style, seed: int) -> Motion:
+    return {feature: field_clip(fields, name, feature, held_out.intensity, seed).values for feature in held_out.motion}
+
+
+def _blink_rate(motion: Motion, held_out: Style) -> float:
+    return find_blinks(motion["blink"], held_out.lengths, GESTURE_FPS).per_minute if "blink" in motion else float("nan")
+
+
+def _compare_trait(trait: Trait, held_out: Style, kinds: list[list[Motion]], options: Options) -> TraitComparison:
+    def values_of(motion: Motion) -> list[Doubles]:
+        return [trait.of(part) for part in split_recordings(motion[trait.feature], held_out.lengths)]
+
+    parts = values_of(kinds[0][0])
+    clips, noises, published = ([np.concatenate(values_of(clip)) for clip in kind] for kind in kinds[1:])
+    generator = np.random.default_rng([options.seed, 2])
+    between_halves = [
+        wasserstein(np.concatenate([parts[i] for i in one]), np.concatenate([parts[i] for i in other]))
+        for one, other in random_halves(len(parts), options.halves, generator)
+        if len(parts) > 1
+    ]
+    real = np.concatenate(parts)
+    return TraitComparison(
+        trait,
+        real,
+        np.concatenate(clips),
+        np.concatenate(noises),
+        np.concatenate([np.zeros(0), *published]),
+        float(np.mean(between_halves)) if between_halves else float("nan"),
+        *(
+            float(np.mean([wasserstein(real, clip) for clip in kind])) if kind else float("nan")
+            for kind in (clips, noises, published)
+        ),
+    )
+
+
+def _compare_motion(palette: Palette, held_out: Style, kinds: list[list[Motion]]) -> tuple[MotionComparison, ...]:
+    (real,), clips, noises, *_ = kinds
+    shown = [in_display_units(palette, kind[0]) for kind in kinds]
+    intensity = frame_midpoints(held_out.intensity, held_out.lengths)
+    found = []
+    for trait in style_traits(palette, held_out):
+        if not trait.name.endswith(" speed") or trait.feature == "blink":
+            continue
+        feature = trait.feature
+        spectra = [spectrum(motion[feature], held_out.lengths, GESTURE_FPS) for motion in shown]
+        correlations = [
+            float(
+                np.mean(
+                    [
+                        pearson(trait.values_of(split_recordings(one[feature], held_out.lengths)), intensity)
+                        for one in kind
+                    ]
+                )
+            )
+            for kind in kinds
+        ]
+        diversities = [_diversity([one[feature] for one in kind], real[feature], held_out) for kind in (clips, noises)]
+        unit = trait.unit.removesuffix("/s")
+        found.append(
+            MotionComparison(
+                feature,
+                "" if unit == "1" else unit,
+                tuple(spectra),
+                tuple(correlations),
+                (diversities[0], diversities[1]),
+            )
+        )
+    return tuple(found)
+
+
+def _diversity(clips: list[NDArray[np.floating]], real: NDArray[np.floating], held_out: Style) -> float:
+    """Mean of `diversity` over the sounds of the recordings."""
+    if len(held_out.lengths) < 2:
+        return float("nan")
+    least = int(held_out.lengths.min())
+    takes = [part[:least] for part in split_recordings(real, held_out.lengths)][:N_TAKES]
+    cut = [[part[:least] for part in split_recordings(clip, held_out.lengths)] for clip in clips]
+    return float(np.mean([diversity([clip[at] for clip in cut], takes) for at in range(len(takes))]))

@@ -1,0 +1,350 @@
+"""Moods of a palette as an independent network sees them: blendshape scores of rendered clips, and a classifier.
+
+Every style speaks sentences with several seeds; the face tracker reads frames of the rendered clips. A nearest-mean
+classifier is trained on the clips of one half of the seeds and tested on the clips of the other half.
+
+Files of a study of moods: figures as .csv and .json, a contact sheet as .png.
+"""
+
+import csv
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO, StringIO
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.studies.gestures.measures import find_blinks
+from corpus_tools.studies.pages import report_writer
+from lexicon.errors import BackendError, InputError
+from tts2face.models.palette import Palette
+from tts2face.picture.options import Picture
+from tts2face.session.session import Session
+from tts2face.storage.files import write_atomically
+from tts2face.types import Progress
+from tts2face.video.take import BLENDSHAPES, BlendshapeReader
+from tts2face.video.tracking import FaceTracker
+
+SENTENCES = (
+    "Thank you for calling. Your order was sent on Tuesday, and it should reach you within three days.",
+    "When the rain finally stopped, the children ran out into the garden, and jumped into every puddle.",
+    "Photosynthesis turns light into sugar. Plants take in water, and they release the oxygen that we breathe.",
+    "No, that is simply not true. You promised to fix the roof, and now it is leaking again.",
+)
+LEAST_SPREAD = 0.01  # added to the spread of scores within a mood, so that constant scores do not decide
+SHUT_SHAPES, SMILE_SHAPES = ("eyeBlinkLeft", "eyeBlinkRight"), ("mouthSmileLeft", "mouthSmileRight")
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class MoodOptions:
+    """Options of a study of moods.
+
+    Parameters
+    ----------
+    seeds
+        Clips of each mood, an even number of 4 or more; the first half trains the classifier.
+    first_seed
+        Seed of the first clip.
+    frames
+        Frames of each clip that are rendered and read.
+    size
+        Width and height of the pictures in pixels.
+    sentences
+        Texts, one for each seed in turn.
+
+    Raises
+    ------
+    InputError
+        A number is too small, or there is no sentence.
+    """
+
+    seeds: int = 8
+    first_seed: int = 0
+    frames: int = 12
+    size: int = 256
+    sentences: tuple[str, ...] = SENTENCES
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if self.seeds < 4 or self.seeds % 2:
+            raise InputError(f"the seeds must be an even number of 4 or more, not {self.seeds}")
+        if self.first_seed < 0:
+            raise InputError(f"a seed is a whole number from 0, not {self.first_seed}")
+        if self.frames < 2 or self.size < 160:
+            raise InputError(
+                f"a clip needs at least 2 frames of 160 pixels, not {self.frames} of {self.size}; the tracker finds no "
+                "smaller face"
+            )
+        if not self.sentences:
+            raise InputError("moods are compared on at least one sentence; give one")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MoodClip:
+    """One clip of a mood.
+
+    Parameters
+    ----------
+    scores : (F, 52)
+        Blendshape scores of the frames in which a face was found.
+    smile : (T,)
+        Weight of the smile shapes, mean of both sides.
+    blinks_per_minute, yaw_spread_deg
+        Rate of blinks, and standard deviation of the head's yaw in degrees.
+    frames : (F', H, W, 3)
+        Three frames of the clip.
+    """
+
+    scores: Floats
+    smile: Floats
+    blinks_per_minute: float
+    yaw_spread_deg: float
+    frames: NDArray[np.uint8]
+
+    @property
+    def features(self) -> Floats:
+        """(104,) mean and standard deviation of each score over the clip."""
+        return np.concatenate([self.scores.mean(axis=0), self.scores.std(axis=0)])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MoodStudy:
+    """Result of `study_moods`.
+
+    Parameters
+    ----------
+    clips
+        Clips of each mood in the order of the seeds.
+    confusion, frame_confusion : (M, M)
+        Number of test clips, and of their single frames, by mood (rows) and answer of the classifier (columns).
+    """
+
+    options: MoodOptions
+    clips: Mapping[str, tuple[MoodClip, ...]]
+    confusion: NDArray[np.int64]
+    frame_confusion: NDArray[np.int64]
+
+    @property
+    def moods(self) -> tuple[str, ...]:
+        """Names of the moods."""
+        return tuple(self.clips)
+
+    @property
+    def accuracy(self) -> float:
+        """Share of the test clips whose mood is recognised."""
+        return float(np.trace(self.confusion) / self.confusion.sum())
+
+    @property
+    def frame_accuracy(self) -> float:
+        """Share of the single frames of the test clips whose mood is recognised."""
+        return float(np.trace(self.frame_confusion) / self.frame_confusion.sum())
+
+    def mean_score(self, mood: str, *names: str) -> float:
+        """Mean of some scores over all clips of a mood."""
+        columns = [BLENDSHAPES.index(name) for name in names]
+        return float(np.mean([clip.scores[:, columns].mean() for clip in self.clips[mood]]))
+
+    def smile_range(self, mood: str) -> tuple[float, float, float]:
+        """Fifth percentile, mean and 95th percentile of the smile's weight over all clips of a mood."""
+        smile = np.concatenate([clip.smile for clip in self.clips[mood]])
+        low, high = np.percentile(smile, [5, 95]).tolist()
+        return low, float(smile.mean()), high
+
+
+def study_moods(
+    session: Session,
+    options: MoodOptions,
+    moods: Sequence[str] | None = None,
+    on_progress: Progress | None = None,
+) -> MoodStudy:
+    """Render clips of the moods of a session's palette, read them with the tracker, and tell them apart.
+
+    Parameters
+    ----------
+    moods
+        Names of styles; by default the derived styles of the palette.
+
+    Raises
+    ------
+    InputError
+        There are fewer than two moods, or the palette lacks one.
+    BackendError
+        LiteRT, OpenCV or the landmark models are missing, or the tracker finds no face in a clip.
+    """
+    names = tuple(moods) if moods is not None else _derived(session.palette)
+    if len(names) < 2:
+        raise InputError(f"at least two moods can be told apart, not {len(names)}; give a palette with derived styles")
+    reader = _ClipReader(session, options)
+    clips: dict[str, tuple[MoodClip, ...]] = {}
+    for number, mood in enumerate(names):
+        if on_progress:
+            on_progress(number, len(names))
+        clips[mood] = tuple(reader.read(mood, seed) for seed in range(options.seeds))
+    if on_progress:
+        on_progress(len(names), len(names))
+    return MoodStudy(options, clips, *_confusions(clips, options.seeds // 2))
+
+
+def _derived(palette: Palette | None) -> tuple[str, ...]:
+    return () if palette is None else tuple(palette.derivations)
+
+
+class _ClipReader:
+    """Renders clips of a session and reads their frames."""
+
+    def __init__(self, session: Session, options: MoodOptions) -> None:
+        self._session, self._options = session, options
+        self._renderer = session.renderer(Picture(size=f"{options.size}x{options.size}"))
+        self._tracker, self._scores = FaceTracker(), BlendshapeReader()
+
+    def read(self, mood: str, seed: int) -> MoodClip:
+        options = self._options
+        text = options.sentences[seed % len(options.sentences)]
+        clip = self._session.clip(text, style=mood, seed=options.first_seed + seed)
+        numbers = np.linspace(0, len(clip.motion) - 1, options.frames + 2).round().astype(int)[1:-1]
+        pictures = [np.asarray(self._renderer.frame(clip, int(number)))[..., :3] for number in numbers]
+        read = [self._tracker.read(np.ascontiguousarray(picture)) for picture in pictures]
+        scores = [self._scores.blendshape_scores(points) for points, found in read if found > 0]
+        if not scores:
+            raise BackendError(f"the tracker finds no face in a clip of {mood}; choose a larger picture")
+        kept = np.linspace(0, len(pictures) - 1, 3).round().astype(int)
+        shut = clip.motion.columns(SHUT_SHAPES).astype(np.float64)
+        return MoodClip(
+            np.array(scores, np.float64),
+            clip.motion.columns(SMILE_SHAPES).astype(np.float64).mean(axis=1),
+            find_blinks(shut, np.array([len(clip.motion)], np.int32), clip.fps).per_minute,
+            float(np.degrees(clip.head.values[:, 1].std())),
+            np.stack([pictures[at] for at in kept]),
+        )
+
+
+def _confusions(
+    clips: Mapping[str, tuple[MoodClip, ...]], n_training: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Confusion of the test clips, and of their frames, whose classifier is trained on the frames of training clips."""
+    training = [np.stack([clip.features for clip in mood[:n_training]]) for mood in clips.values()]
+    testing = [np.stack([clip.features for clip in mood[n_training:]]) for mood in clips.values()]
+    training_frames = [np.concatenate([clip.scores for clip in mood[:n_training]]) for mood in clips.values()]
+    testing_frames = [np.concatenate([clip.scores for clip in mood[n_training:]]) for mood in clips.values()]
+    return confusion_matrix(training, testing), confusion_matrix(training_frames, testing_frames)
+
+
+def confusion_matrix(training: Sequence[Floats], testing: Sequence[Floats]) -> NDArray[np.int64]:
+    """Confusion (M, M) of a nearest-mean classifier of M classes.
+
+    Parameters
+    ----------
+    training, testing
+        Features (n, d) of each class. Distances are in units of the spread within the classes of `training`.
+    """
+    means = np.stack([features.mean(axis=0) for features in training])
+    within = np.concatenate([features - mean for features, mean in zip(training, means, strict=True)])
+    scaled = means / (spread := np.sqrt(np.square(within).mean(axis=0)) + LEAST_SPREAD)
+    confusion = np.zeros((len(means), len(means)), np.int64)
+    for row, features in enumerate(testing):
+        distances = np.square((features / spread)[:, None] - scaled).sum(axis=2)
+        np.add.at(confusion, (row, distances.argmin(axis=1)), 1)
+    return confusion
+
+
+# Columns of the tables: scores of the tracker, both sides averaged.
+SHOWN_SCORES: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "smile": ("mouthSmileLeft", "mouthSmileRight"),
+        "frown": ("mouthFrownLeft", "mouthFrownRight"),
+        "eyes narrowed": ("eyeSquintLeft", "eyeSquintRight"),
+        "brows down": ("browDownLeft", "browDownRight"),
+        "inner brows up": ("browInnerUp",),
+        "outer brows up": ("browOuterUpLeft", "browOuterUpRight"),
+    }
+)
+SHEET_CLIPS = 2  # of each mood on the contact sheet
+
+
+def write_moods(session: Session, out: Path, options: MoodOptions, *, on_progress: Progress | None = None) -> MoodStudy:
+    """Study the moods of a session's palette, write the file, and return the study.
+
+    ``.json`` has all figures, ``.csv`` a line for each mood, ``.png`` is a contact sheet.
+
+    Raises
+    ------
+    InputError
+        The suffix is unknown; errors as `study_moods`. Nothing is written then.
+    """
+    writer = report_writer(out, WRITERS)
+    study = study_moods(session, options, on_progress=on_progress)
+    write_atomically(out, writer(study))
+    return study
+
+
+def mood_rows(study: MoodStudy) -> list[dict[str, Any]]:
+    """Figures of each mood: recognised test clips, smile weights, blinks, yaw, and mean scores of the tracker."""
+    rows = []
+    for number, mood in enumerate(study.moods):
+        low, mean, high = study.smile_range(mood)
+        row = {
+            "mood": mood,
+            "recognised": int(study.confusion[number, number]),
+            "of": int(study.confusion[number].sum()),
+            "smile weight": round(mean, 3),
+            "smile weight, 5 %": round(low, 3),
+            "smile weight, 95 %": round(high, 3),
+            "blinks a minute": round(float(np.mean([clip.blinks_per_minute for clip in study.clips[mood]])), 1),
+            "yaw spread, deg": round(float(np.mean([clip.yaw_spread_deg for clip in study.clips[mood]])), 2),
+        }
+        rows.append(row | {name: round(study.mean_score(mood, *shapes), 3) for name, shapes in SHOWN_SCORES.items()})
+    return rows
+
+
+def moods_csv(study: MoodStudy) -> str:
+    """A line for each mood."""
+    file, rows = StringIO(), mood_rows(study)
+    writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return file.getvalue()
+
+
+def moods_json(study: MoodStudy) -> str:
+    """All figures."""
+    content = {
+        "seeds": study.options.seeds,
+        "first_seed": study.options.first_seed,
+        "frames": study.options.frames,
+        "size": study.options.size,
+        "accuracy": round(study.accuracy, 4),
+        "frame_accuracy": round(study.frame_accuracy, 4),
+        "confusion": study.confusion.tolist(),
+        "frame_confusion": study.frame_confusion.tolist(),
+        "moods": mood_rows(study),
+    }
+    return json.dumps(content, indent=1) + "\n"
+
+
+def moods_png(study: MoodStudy) -> bytes:
+    """Contact sheet with a row of frames for each mood."""
+    from PIL import Image, ImageDraw
+
+    rows = [np.concatenate([clip.frames for clip in clips[-SHEET_CLIPS:]]) for clips in study.clips.values()]
+    sheet = Image.fromarray(np.concatenate([np.concatenate(list(row), axis=1) for row in rows]))
+    pen = ImageDraw.Draw(sheet)
+    for number, mood in enumerate(study.moods):
+        pen.text((6, 4 + number * rows[0].shape[1]), mood, fill="white")
+    file = BytesIO()
+    sheet.save(file, "png")
+    return file.getvalue()
+
+
+WRITERS: Mapping[str, Callable[[MoodStudy], bytes]] = MappingProxyType(
+    {
+        ".csv": lambda study: moods_csv(study).encode(),
+        ".json": lambda study: moods_json(study).encode(),
+        ".png": moods_png,
+    }
+)

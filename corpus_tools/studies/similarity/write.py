@@ -1,0 +1,211 @@
+"""Write the analysis of a talker as HTML, JSON, CSV or PNG.
+
+Export of an analysis: the matrix as CSV, all figures as JSON.
+"""
+
+import csv
+import json
+from collections.abc import Callable, Mapping, Sequence
+from io import StringIO
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.studies.pages import report_writer
+from corpus_tools.studies.similarity.analysis import Analysis, Comparison, NamedTalker, Options, analyse
+from corpus_tools.studies.similarity.figures import difference_figure, similarity_figure, table_png
+from corpus_tools.studies.similarity.page import similarity_page
+from corpus_tools.studies.similarity.statistics import Agreement, Consistency, Reliability
+from corpus_tools.studies.similarity.tables import (
+    LEAST_TOKENS,
+    SimilarityTable,
+    VisemeClasses,
+    check_labels,
+    phone_label,
+)
+from lexicon.phones import look_up_phone
+from tts2face.models.talker import load_talker
+from tts2face.storage.files import write_atomically
+from tts2face.types import Progress
+
+
+def table_csv(table: SimilarityTable, labels: str) -> str:
+    """One line for each phone: its label, its tokens, its similarity to each phone."""
+    counts = [[str(count)] for count in table.counts]
+    return _csv_text([phone_label(phone, labels) for phone in table.phones], ["tokens"], counts, table.matrix)
+
+
+def difference_csv(compared: Comparison, labels: str) -> str:
+    """One line for each phone: its label, its similarity to each phone on the first talker minus that on the other."""
+    names = [phone_label(phone, labels) for phone in compared.phones]
+    return _csv_text(names, [], [[] for _ in names], compared.difference)
+
+
+def _csv_text(
+    names: Sequence[str], more: Sequence[str], cells: Sequence[Sequence[str]], values: NDArray[np.floating]
+) -> str:
+    file = StringIO()
+    rows = csv.writer(file, lineterminator="\n")
+    rows.writerow(["phone", *more, *names])
+    for name, own, row in zip(names, cells, values, strict=True):
+        rows.writerow([name, *own, *(f"{value:.4f}" for value in row)])
+    return file.getvalue()
+
+
+def analysis_json(analysis: Analysis) -> str:
+    """All figures; similarities in the order of ``phones``."""
+    content = {
+        "talker": analysis.name,
+        "utterances": analysis.n_utterances,
+        "seed": analysis.options.seed,
+        "phones": [{"ipa": phone, "arpabet": look_up_phone(phone).arpabet or None} for phone in analysis.table.phones],
+        "tokens": analysis.table.counts.tolist(),
+        "similarity": _round_values(analysis.table.matrix),
+        "similarity_to_silence": _round_values(analysis.table.silence),
+        "neighbours": {
+            phone: [{"phone": near, "similarity": round(value, 4)} for near, value in ranked]
+            for phone, ranked in zip(analysis.table.phones, analysis.neighbours, strict=True)
+        },
+        "dendrogram": {
+            "order": [analysis.table.phones[at] for at in analysis.tree.order],
+            "links": _round_values(analysis.tree.links),
+        },
+        "classes": {
+            "best": analysis.best.n_classes,
+            "chosen": [_classes(analysis, classes) for classes in analysis.chosen],
+            "silhouettes": {str(classes.n_classes): round(classes.silhouette, 4) for classes in analysis.curve},
+            "best_classes": _classes(analysis, analysis.best),
+        },
+        "reliability": {
+            "least_tokens": LEAST_TOKENS,
+            "utterances": _reliability(analysis.by_utterances),
+            "words": _reliability(analysis.by_words),
+            "utterances_phones_of_words": _reliability(analysis.by_utterances_same_phones),
+        },
+        "articulation": {
+            "agreement": {name: _agreement(agreement) for name, agreement in analysis.articulatory},
+            "distance": _round_values(analysis.articulation),
+        },
+        "movements": _consistency(analysis, analysis.movements),
+        "modes": _consistency(analysis, analysis.modes),
+        "comparison": None if analysis.comparison is None else _comparison(analysis.comparison),
+    }
+    return json.dumps(content, ensure_ascii=False, indent=1, allow_nan=False) + "\n"
+
+
+def _round_values(values: NDArray[np.floating]) -> Any:
+    """Lists with four decimals, None for NaN."""
+    if values.ndim > 1:
+        return [_round_values(row) for row in values]
+    return [round(float(value), 4) if np.isfinite(value) else None for value in values]
+
+
+def _classes(analysis: Analysis, classes: VisemeClasses) -> dict[str, Any]:
+    groups = [
+        [analysis.table.phones[at] for at in analysis.tree.order if classes.labels[at] == number]
+        for number in range(classes.n_classes)
+    ]
+    silhouettes = dict(zip(analysis.table.phones, _round_values(classes.silhouettes), strict=True))
+    return {
+        "n": classes.n_classes,
+        "silhouette": round(classes.silhouette, 4),
+        "classes": groups,
+        "silhouettes": silhouettes,
+    }
+
+
+def _reliability(split: Reliability | None) -> dict[str, Any] | None:
+    if split is None:
+        return None
+    return {
+        "mean": round(split.mean, 4),
+        "spearman_brown": round(split.full_length_reliability, 4),
+        "halves": _round_values(split.correlations),
+        "halves_requested": split.n_requested,
+        "phones_compared": split.n_phones.tolist(),
+        "phones": dict(zip(split.phones, _round_values(split.per_phone), strict=True)),
+        "left_out": list(split.left_out),
+    }
+
+
+def _agreement(agreement: Agreement) -> dict[str, Any]:
+    return {
+        "r": round(agreement.r, 4),
+        "p": agreement.p,
+        "permutations": agreement.n_permutations,
+        "pairs": agreement.n_pairs,
+    }
+
+
+def _consistency(analysis: Analysis, consistency: Consistency) -> dict[str, Any]:
+    return {
+        "names": list(consistency.names),
+        "spread_mm": _round_values(consistency.spread),
+        "free_share": _round_values(consistency.free_share),
+        "free": dict(zip(analysis.table.phones, _round_values(consistency.free), strict=True)),
+    }
+
+
+def _comparison(compared: Comparison) -> dict[str, Any]:
+    return {
+        "other": compared.other,
+        "phones": list(compared.phones),
+        "left_out": list(compared.left_out),
+        "agreement": _agreement(compared.agreement),
+        "difference": _round_values(compared.difference),
+        "mean_difference": dict(zip(compared.phones, _round_values(compared.per_phone), strict=True)),
+    }
+
+
+def write_similarity(
+    talker: str,
+    out: Path,
+    options: Options,
+    *,
+    other: str | None = None,
+    labels: str = "both",
+    on_progress: Progress | None = None,
+) -> Analysis:
+    """Analyse a talker (by name or path), write the file, and return the analysis.
+
+    ``.html`` is a page, ``.json`` has every figure, ``.csv`` the matrix, ``.png`` the heat map; with `other` the last
+    two hold the difference of the two talkers.
+
+    Raises
+    ------
+    InputError
+        The suffix or the labels are unknown; errors as `load_talker` and `analyse`. Nothing is written then.
+    BackendError
+        matplotlib or scikit-learn is not installed, or the file cannot be written.
+    """
+    writer = report_writer(out, WRITERS)
+    check_labels(labels)
+    against = None if other is None else NamedTalker(other, load_talker(other))
+    found = analyse(NamedTalker(talker, load_talker(talker)), options, against, on_progress)
+    write_atomically(out, writer(found, labels))
+    return found
+
+
+def _csv(found: Analysis, labels: str) -> bytes:
+    if found.comparison is not None:
+        return difference_csv(found.comparison, labels).encode()
+    return table_csv(found.table, labels).encode()
+
+
+def _png(found: Analysis, labels: str) -> bytes:
+    if found.comparison is not None:
+        return table_png(difference_figure(found, found.comparison, labels))
+    return table_png(similarity_figure(found, labels))
+
+
+WRITERS: Mapping[str, Callable[[Analysis, str], bytes]] = MappingProxyType(
+    {
+        ".html": lambda found, labels: similarity_page(found, labels).encode(),
+        ".csv": _csv,
+        ".json": lambda found, labels: analysis_json(found).encode(),
+        ".png": _png,
+    }
+)

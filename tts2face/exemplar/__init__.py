@@ -1,1 +1,0 @@
-"""Text-driven synthesis from exemplars (Theobald et al. 2007, section 3.3)."""

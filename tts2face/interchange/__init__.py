@@ -1,0 +1,1 @@
+"""Files of other programs: exports, characters, glTF and subtitles."""

@@ -1,0 +1,315 @@
+"""Animation of a clip on the file of an imported character: its own morph targets, head and eye bones.
+
+Rotations of the neck, head and eye bones of a character's file, as tracks of an animation.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from tts2face.face.deformation import head_rotation, landmark_motion, rotation_matrix
+from tts2face.face.mouth import SPEECH_SHAPE_PREFIXES
+from tts2face.interchange.characters.character import Character, CharacterBinding, Target, character_file, read_binding
+from tts2face.interchange.characters.head_mesh import mapped_targets, source_weights
+from tts2face.interchange.characters.readers import read_gltf_character
+from tts2face.interchange.characters.shapes import ShapeMapping
+from tts2face.interchange.gltf.reader import GltfFile, NodeTree, read_gltf, read_nodes
+from tts2face.interchange.gltf.writer import GlbWriter
+from tts2face.models.face import Face
+from tts2face.numeric.arrays import continuous_quaternions, matrix_quaternion
+from tts2face.numeric.least_squares import bounded_least_squares
+from tts2face.storage.files import refuse_overwriting, write_atomically
+from tts2face.storage.media_files import wave_bytes
+from tts2face.types import Clip, Trajectory
+
+HEAD_NODE = "tts2face_head"
+# Share of the head's rotation that the neck bone takes, a convention of character rigs. The spine below the second
+# vertebra takes 19 % (standard deviation 7 %) of a turn to the side, and more of a nod (In vivo primary and coupled
+# segmental motions of the healthy female head-neck complex during dynamic head axial rotation, 2021, C2 to T1).
+NECK_SHARE = 0.4
+MAX_OFFSET_MM = 2.0  # between the origin of an eye bone and the centre of its eyeball, up to which it only rotates
+
+FloatArray = NDArray[np.float64]
+Track = tuple[int, str, FloatArray]
+
+
+class BoneTracks:
+    """Tracks of the rotations of eye and head bones."""
+
+    def __init__(
+        self, face: Face, binding: CharacterBinding, character: Character, tree: NodeTree, writer: GlbWriter
+    ) -> None:
+        self._face, self._character, self._tree, self._writer = face, character, tree, writer
+        self._binding = binding
+        turn = float(np.radians(binding.yaw_deg))
+        self._turn = head_rotation(0.0, turn, 0.0)  # from the file's axes to the face's
+        self._names: dict[int, str] = {}
+
+    def name_of(self, node: int) -> str:
+        """Name of an animated bone."""
+        return self._names.get(node, HEAD_NODE)
+
+    def eye_tracks(self, motion: Trajectory) -> list[Track]:
+        """Rotations of the bones of the eyeballs, which gaze shapes turn."""
+        places = {
+            bone: self._turn @ place for bone, place in self._character.bone_places.items() if bone.endswith("Eye")
+        }
+        if len(places) < 2:
+            return []
+        left, right = sorted(places, key=lambda name: (-float(places[name][0].round(9)), name))
+        tracks = []
+        for eye in self._face.eyes:
+            vectors = np.zeros((len(motion), 3))
+            for name, turn in eye.turns.items():
+                if name in motion.channels:
+                    vectors += motion.values[:, motion.channels.index(name), None] * turn
+            rotations = np.stack([rotation_matrix(vector) for vector in vectors])
+            bone = left if eye.centre[0] > 0 else right
+            centre = self._turn.T @ (eye.centre.astype(np.float64) / self._binding.scale + self._binding.origin)
+            tracks += [self._rotation_track(bone, rotations), *self._shift_tracks(bone, rotations, centre)]
+        return tracks
+
+    def head_tracks(self, head: Trajectory, file: GltfFile) -> list[Track]:
+        """Rotations of the neck's and head's bones; without a head bone, the motion of a node above the scene.
+
+        The head's orientation is that of the pose; the neck takes `NECK_SHARE` of it where it is a parent of the head.
+        """
+        rotations = np.stack([head_rotation(*(float(x) for x in pose[:3])) for pose in head.values])
+        if "head" in self._character.bones and self._has_neck():
+            neck = np.stack([share_of_rotation(rotation, NECK_SHARE) for rotation in rotations])
+            rest = np.einsum("tji,tjk->tik", neck, rotations)
+            return [self._rotation_track("neck", neck), self._rotation_track("head", rest)]
+        if "head" in self._character.bones:
+            return [self._rotation_track("head", rotations)]
+        scenes = file.entries("scenes")
+        if not scenes:
+            return []
+        node = self._writer.add_node_above(HEAD_NODE, file.root.index("scene", len(scenes), "scenes") or 0)
+        scale = self._binding.scale
+        pivot = np.array(self._binding.origin) + self._face.pivot.astype(np.float64) / scale
+        shift = head.values[:, 3:].astype(np.float64) / scale
+        moved = (pivot - np.einsum("tij,j->ti", rotations, pivot) + shift) @ self._turn
+        turned = np.einsum("ji,tjk,kl->til", self._turn, rotations, self._turn)
+        return [(node, "rotation", _quaternions(turned)), (node, "translation", moved)]
+
+    def _has_neck(self) -> bool:
+        """Whether the neck's bone is above the head's."""
+        parents, node = self._character.parents, self._character.bones["head"]
+        while node in parents:
+            node = parents[node]
+            if node == self._character.bones.get("neck"):
+                return True
+        return False
+
+    def _shift_tracks(self, bone: str, rotations: FloatArray, centre: FloatArray) -> list[Track]:
+        """Local translation (T, 3) of a node whose origin is not the centre (3,) that it turns about, in file units."""
+        node = self._character.bones[bone]
+        place = self._tree.world[node][:3, 3]
+        if np.linalg.norm(place - centre) * self._binding.scale < MAX_OFFSET_MM:
+            return []
+        turned = np.einsum("ji,tjk,kl->til", self._turn, rotations, self._turn)
+        moved = centre + turned @ (place - centre)
+        parent = self._character.parents.get(node)
+        above = np.eye(4) if parent is None else self._tree.world[parent]
+        inverse = np.linalg.pinv(above)
+        return [(node, "translation", moved @ inverse[:3, :3].T + inverse[:3, 3])]
+
+    def _rotation_track(self, bone: str, rotations: FloatArray) -> Track:
+        """Local rotations (T, 4) of a bone turned by rotations (T, 3, 3) in the face's axes."""
+        node = self._character.bones[bone]
+        self._writer.divide_matrix(node)
+        self._names[node] = bone
+        world = _orthonormal(self._tree.world[node])
+        parent = self._character.parents.get(node)
+        above = np.eye(3) if parent is None else _orthonormal(self._tree.world[parent])
+        turned = np.einsum("ji,tjk,kl->til", self._turn, rotations, self._turn)
+        return node, "rotation", _quaternions(np.einsum("ji,tjk,kl->til", above, turned, world))
+
+
+def share_of_rotation(rotation: FloatArray, share: float) -> FloatArray:
+    """Rotation matrix (3, 3) about the axis of another one, by a share of its angle."""
+    x, y, z, w = matrix_quaternion(rotation)
+    vector = np.array([x, y, z]) * (1.0 if w >= 0 else -1.0)
+    sine = float(np.linalg.norm(vector))
+    angle = 2.0 * np.arctan2(sine, abs(w))
+    return rotation_matrix(vector * (share * angle / sine) if sine > 0 else vector)
+
+
+def _quaternions(rotations: FloatArray) -> FloatArray:
+    """Quaternions (T, 4) of rotation matrices (T, 3, 3), each with the sign nearest to the one before."""
+    return continuous_quaternions(np.stack([matrix_quaternion(rotation) for rotation in rotations]), None)
+
+
+def _orthonormal(matrix: FloatArray) -> FloatArray:
+    scaled = matrix[:3, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-12)
+    return np.asarray(scaled, np.float64)
+
+
+ANIMATION = "tts2face"
+BOTH_SIDES_SHARE = 0.5  # of each of two shapes that one morph target for both sides gets
+RIDGE = 0.02  # of the mean curvature: keeps replaced shapes from adding large opposite weights
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenCharacter:
+    """Summary of a written character: frames, animated morph targets, and animated bones by name."""
+
+    path: Path
+    n_frames: int
+    n_targets: int
+    bones: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class AnimatedCharacter:
+    """Content of a .glb file with an animation, the number of its animated morph targets, and its animated bones."""
+
+    content: bytes
+    n_targets: int
+    bones: tuple[str, ...]
+
+
+def write_character(
+    clip: Clip, face: Face, out: str | Path, *, character: str | Path | None = None
+) -> WrittenCharacter:
+    """Write the character's own file with the motion of a clip as its first animation, and the sound beside it.
+
+    Parameters
+    ----------
+    clip
+        Clip in the shapes of `face`.
+    face
+        Face that was imported from the character, with the shapes of all channels (`Session.mesh`).
+    out
+        .glb file; the sound is written beside it with the suffix .wav.
+    character
+        File of the character; by default the one that the face was imported from.
+
+    Raises
+    ------
+    InputError
+        The face was not imported from a .glb, .gltf or .vrm file, the clip is not in its shapes, or the output is the
+        character's file.
+    DataError
+        The character's file is missing, or has changed since its import.
+    BackendError
+        The file cannot be written.
+
+    Notes
+    -----
+    Motion of shapes that the character lacks is carried to its own shapes by least squares on the landmarks. A head
+    without a bone is moved by a node above the scene.
+    """
+    if clip.motion.channels != face.shape_names[: len(clip.motion.channels)]:
+        raise InputError("the clip's motion is not in the shapes of this face; make the clip with a session of it")
+    out = Path(out)
+    refuse_overwriting({"the output": out}, {"the character": character_file(read_binding(face), character)})
+    animated = animate_character(clip.motion, clip.head, face, character=character)
+    write_atomically(out.with_suffix(".wav"), wave_bytes(clip.speech.waveform.samples, clip.speech.waveform.rate))
+    write_atomically(out, animated.content)
+    return WrittenCharacter(out, len(clip.motion), animated.n_targets, animated.bones)
+
+
+def animate_character(
+    motion: Trajectory, head: Trajectory, face: Face, *, character: str | Path | None = None
+) -> AnimatedCharacter:
+    """Content of the character's file with an animation by motion (T, K) and head pose (T, 6); as `write_character`."""
+    binding = read_binding(face)
+    path = character_file(binding, character)
+    file, source = read_gltf(path), read_gltf_character(path)
+    tree = read_nodes(file.root)
+    weights = target_weights(motion, face, source, binding.mapping)
+    writer = GlbWriter(file)
+    bones = BoneTracks(face, binding, source, tree, writer)
+    turned = [*bones.eye_tracks(motion), *bones.head_tracks(head, file)]
+    driven = mapped_targets(source, binding.mapping)
+    tracks = [*_weight_tracks(file, tree, (weights, driven), len(motion)), *turned]
+    writer.add_animation(ANIMATION, motion.times, tracks)
+    names = dict.fromkeys(bones.name_of(node) for node, _, _ in turned)
+    return AnimatedCharacter(writer.content(), len(weights), tuple(names))
+
+
+def target_weights(
+    motion: Trajectory, face: Face, character: Character, mapping: ShapeMapping
+) -> dict[Target, FloatArray]:
+    """Weights (T,) of each morph target that a motion moves."""
+    channels = motion.channels
+    own = [name for name in channels if name in mapping]
+    values = dict(zip(own, _own_values(motion, face, own).T, strict=True))
+    found: dict[Target, FloatArray] = {}
+    for name, track in values.items():
+        for source in mapping[name]:
+            share = BOTH_SIDES_SHARE if source.side else 1.0
+            for target, weight in source_weights(character, source).items():
+                found[target] = found.get(target, np.zeros(len(track))) + share * weight * track
+    return found
+
+
+def _own_values(motion: Trajectory, face: Face, own: list[str]) -> FloatArray:
+    """Weights (T, k) of the shapes `own`, which also carry the motion of the shapes that the character lacks."""
+    channels = motion.channels
+    values = motion.values.astype(np.float64)
+    kept = motion.columns(own).astype(np.float64)
+    turned = {name for eye in face.eyes for name in eye.turns}
+    others = [k for k, name in enumerate(channels) if name not in own and name not in turned and values[:, k].any()]
+    for is_mouth in (True, False):
+        group = [k for k in others if channels[k].startswith(SPEECH_SHAPE_PREFIXES) == is_mouth]
+        columns = [
+            n
+            for n, name in enumerate(own)
+            if name.startswith(SPEECH_SHAPE_PREFIXES) == is_mouth and "eyeLook" not in name
+        ]
+        if group and columns:
+            shapes = np.array([channels.index(own[n]) for n in columns])
+            missing = (np.array(group), values[:, group])
+            kept[:, columns] = _with_replacement(face, shapes, kept[:, columns], missing)
+    return kept
+
+
+def _with_replacement(
+    face: Face, shapes: NDArray[np.int64], weights: FloatArray, missing: tuple[NDArray[np.int64], FloatArray]
+) -> FloatArray:
+    """Weights (T, k) of `shapes` (k,) that move the landmarks most like their `weights` and missing shapes do.
+
+    `missing` holds the indices (m,) of the missing shapes and their weights (T, m). The result is within the limits.
+    """
+    here = landmark_motion(face, shapes).reshape(-1, len(shapes))
+    there = landmark_motion(face, missing[0]).reshape(-1, len(missing[0]))
+    curvature = here.T @ here
+    curvature += (RIDGE * float(np.trace(curvature)) / len(shapes) + 1e-9) * np.eye(len(shapes))
+    limits = face.limits[shapes].astype(np.float64)
+    solved = bounded_least_squares(curvature, weights @ curvature + missing[1] @ (there.T @ here), limits)
+    is_moved = np.asarray(missing[1].any(axis=1))
+    return np.where(is_moved.reshape(-1, 1), solved, weights)
+
+
+def _weight_tracks(
+    file: GltfFile, tree: NodeTree, animated_targets: tuple[Mapping[Target, FloatArray], set[Target]], n_frames: int
+) -> list[Track]:
+    """Tracks of the morph weights (T * targets, 1) of every shown node whose mesh has animated targets.
+
+    `animated_targets` holds the weights (T,), and all targets that the face drives: those without motion are 0, and
+    other targets keep the file's default weights.
+    """
+    weights, driven = animated_targets
+    nodes, meshes = file.entries("nodes"), file.entries("meshes")
+    tracks: list[Track] = []
+    for number in sorted(tree.world):
+        mesh = nodes[number].index("mesh", len(meshes), "meshes")
+        animated = {target.number: track for target, track in weights.items() if target.mesh == mesh}
+        if mesh is None or not animated:
+            continue
+        n_targets = max(len(p.children("targets")) for p in meshes[mesh].children("primitives"))
+        holder = nodes[number] if nodes[number].has("weights") else meshes[mesh]
+        rest = holder.numbers("weights", n_targets, (0.0,) * n_targets)
+        kept = [0.0 if Target(mesh, number) in driven else weight for number, weight in enumerate(rest or ())]
+        rows = np.tile(np.array(kept), (n_frames, 1))
+        for target, track in animated.items():
+            if target < n_targets:
+                rows[:, target] += track
+        tracks.append((number, "weights", rows.reshape(-1, 1)))
+    return tracks

@@ -1,0 +1,132 @@
+"""Eyeballs of a character: by eye bones, or by connected spheres behind the lids."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from tts2face.face.expressions import GAZE_SHAPES
+from tts2face.face.shape_transfer import default_head
+from tts2face.interchange.characters.character import Character
+from tts2face.interchange.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadMesh
+
+BLINKS = {LEFT_EYE: "eyeBlinkLeft", RIGHT_EYE: "eyeBlinkRight"}
+SIDE_NAMES = {LEFT_EYE: "Left", RIGHT_EYE: "Right"}
+BONES = {LEFT_EYE: "leftEye", RIGHT_EYE: "rightEye"}
+MAX_ROUNDNESS_ERROR = 0.12  # standard deviation of the distance from the centre over the radius; a cornea has 0.05
+MIN_VERTICES = 20
+LID_REACH = 1.0  # radii between the centre of an eyeball and the middle of the vertices that its lid moves, in x and y
+MOVED_BY_SHAPES = 0.02  # of the radius: a gaze shape that moves an eyeball's vertices further turns it itself
+
+FloatArray = NDArray[np.float64]
+
+
+def mark_eyeballs(head: HeadMesh, character: Character) -> HeadMesh:
+    """Head whose vertices of eyeballs are marked and last; unchanged where shapes turn the eyes or none are found."""
+    marked = _by_bones(head, character)
+    if not marked.any():
+        marked = _by_spheres(head)
+    if not marked.any() or _moved_by_gaze(head, marked):
+        return head
+    whole = marked[head.triangles]
+    crossing = (whole.min(axis=1) != whole.max(axis=1)) & (whole.max(axis=1) > 0)
+    if crossing.any():  # a vertex that skin and eyeball share belongs to the skin
+        marked[np.unique(head.triangles[crossing])] = 0
+    return replace(head, eye_of=marked).order_eyes_last()
+
+
+def eyeball_centres(head: HeadMesh, character: Character) -> dict[int, FloatArray]:
+    """Centre (3,) of each marked eyeball: of its sphere, or its bone where it is not a sphere."""
+    places = [head.turn @ place for bone, place in character.bone_places.items() if bone in BONES.values()]
+    centres = {}
+    for eye in BONES:
+        rows = head.vertices[head.eye_of == eye]
+        if len(rows):
+            centre, radius, error = fit_sphere(rows)
+            is_round = error < MAX_ROUNDNESS_ERROR * radius
+            nearest = min(places, key=lambda place: abs(place[0] - rows[:, 0].mean()), default=centre)
+            centres[eye] = centre if is_round else nearest
+    return centres
+
+
+def gaze_turns(eye: int) -> dict[str, NDArray[np.float32]]:
+    """Rotation vector of each gaze shape of an eye, as on the default head."""
+    side = SIDE_NAMES[eye]
+    model = next(one for one in default_head().eyes if any(name.endswith(side) for name in one.turns))
+    return dict(model.turns)
+
+
+def fit_sphere(points: FloatArray) -> tuple[FloatArray, float, float]:
+    """Centre (3,), radius, and standard deviation of the distances of points (N, 3) from the centre."""
+    shift = points.mean(axis=0)
+    local = points - shift
+    table = np.column_stack([2 * local, np.ones(len(local))])
+    solution, *_ = np.linalg.lstsq(table, (local**2).sum(axis=1), rcond=None)
+    distances = np.linalg.norm(local - solution[:3], axis=1)
+    return solution[:3] + shift, float(distances.mean()), float(distances.std())
+
+
+def _by_bones(head: HeadMesh, character: Character) -> NDArray[np.int8]:
+    """Marks (V,) of the vertices that follow the bone of an eye or one of its children."""
+    marked = np.zeros(len(head.vertices), np.int8)
+    if not all(bone in character.bones for bone in BONES.values()):
+        return marked
+    nodes = {number: _ancestors(number, character.parents) for number in np.unique(head.bones).tolist()}
+    for bone in BONES.values():
+        follows = [number for number, above in nodes.items() if character.bones[bone] in above]
+        is_on = np.isin(head.bones, follows)
+        if is_on.any():  # the character's left is +x whatever the bone's name says
+            marked[is_on] = LEFT_EYE if head.vertices[is_on, 0].mean() > _middle(head) else RIGHT_EYE
+    return marked
+
+
+def _ancestors(node: int, parents: Mapping[int, int]) -> set[int]:
+    found = {node}
+    while node in parents:
+        node = parents[node]
+        found.add(node)
+    return found
+
+
+def _middle(head: HeadMesh) -> float:
+    return float((head.vertices[:, 0].min() + head.vertices[:, 0].max()) / 2)
+
+
+def _by_spheres(head: HeadMesh) -> NDArray[np.int8]:
+    """Marks (V,) of connected spheres in the place of the eyes, which the blink shapes tell."""
+    marked = np.zeros(len(head.vertices), np.int8)
+    if not all(name in head.shapes for name in BLINKS.values()):
+        return marked
+    component = _components(head)
+    sizes = np.bincount(component)
+    for eye, blink in BLINKS.items():
+        closing = np.linalg.norm(head.shapes[blink], axis=1)
+        lid = (head.vertices * closing[:, None]).sum(axis=0) / max(float(closing.sum()), 1e-12)
+        for number in np.flatnonzero(sizes >= MIN_VERTICES):
+            rows = component == number
+            centre, radius, error = fit_sphere(head.vertices[rows])
+            near = float(np.hypot(*(centre - lid)[:2])) < LID_REACH * radius
+            if near and error < MAX_ROUNDNESS_ERROR * radius and abs(centre[2] - lid[2]) < 3 * radius:
+                marked[rows] = eye
+    return marked
+
+
+def _components(head: HeadMesh) -> NDArray[np.int32]:
+    """Number (V,) of the connected part that each vertex belongs to; vertices at one place are connected."""
+    size = float(np.ptp(head.vertices, axis=0).max())
+    _, place = np.unique(np.rint(head.vertices / size * 1e5).astype(np.int64), axis=0, return_inverse=True)
+    corners = place.ravel()[head.triangles]
+    ends = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]])
+    n_places = int(place.max()) + 1
+    links = coo_matrix((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), (n_places, n_places))
+    return np.asarray(connected_components(links, directed=False)[1], np.int32)[place.ravel()]
+
+
+def _moved_by_gaze(head: HeadMesh, marked: NDArray[np.int8]) -> bool:
+    rows = marked > 0
+    radius = fit_sphere(head.vertices[marked == marked[rows][0]])[1]
+    moved = [np.linalg.norm(head.shapes[name][rows], axis=1).max() for name in GAZE_SHAPES if name in head.shapes]
+    return bool(max(moved, default=0.0) > MOVED_BY_SHAPES * radius)

@@ -1,0 +1,273 @@
+"""Head of a character as one mesh with the shapes of a face: oriented, cropped, eyeballs found.
+
+Cutting of triangles along a plane, so that the edge of a crop is straight.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+from tts2face.interchange.characters.character import Character, Piece, Target
+from tts2face.interchange.characters.shapes import ShapeMapping, ShapeSource
+from tts2face.numeric.arrays import smoothstep
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cut:
+    """Part of a mesh above a plane.
+
+    Parameters
+    ----------
+    upper, lower, share : (E,)
+        Ends of each cut edge, above and below the plane, and the share of the way from the upper to the lower end at
+        which the plane lies. The points there are the vertices from V on.
+    triangles : (F, 3)
+        Triangles above the plane in their order, then the parts of divided ones.
+    source : (F,)
+        Index of the triangle that each comes from.
+    """
+
+    upper: IntArray
+    lower: IntArray
+    share: FloatArray
+    triangles: IntArray
+    source: IntArray
+
+
+def cut_triangles(triangles: IntArray, heights: FloatArray) -> Cut:
+    """Part of triangles (F, 3) where the heights (V,) of their vertices above a plane are not negative."""
+    above = heights >= 0
+    is_above = above[triangles]
+    n_above = is_above.sum(axis=1)
+    rows = np.flatnonzero((n_above > 0) & (n_above < 3))
+    odd = np.where(n_above[rows] == 1, is_above[rows].argmax(axis=1), is_above[rows].argmin(axis=1))
+    alone, after, before = (triangles[rows, (odd + step) % 3] for step in range(3))
+    pairs = np.concatenate([np.column_stack([alone, after]), np.column_stack([alone, before])])
+    pairs = np.where(above[pairs[:, :1]], pairs, pairs[:, ::-1])
+    edges, places = np.unique(pairs, axis=0, return_inverse=True)
+    upper, lower = edges.T
+    to_after, to_before = places.reshape(2, -1) + len(heights)
+    tip, base = n_above[rows] == 1, n_above[rows] == 2
+    divided = [
+        np.column_stack([alone, to_after, to_before])[tip],
+        np.column_stack([to_after, after, before])[base],
+        np.column_stack([to_after, before, to_before])[base],
+    ]
+    kept = np.flatnonzero(n_above == 3)
+    return Cut(
+        upper,
+        lower,
+        heights[upper] / (heights[upper] - heights[lower]),
+        np.concatenate([triangles[kept], *divided]),
+        np.concatenate([kept, rows[tip], rows[base], rows[base]]),
+    )
+
+
+MOVED_SHARE = 0.1  # of a shape's largest displacement: vertices that it clearly moves
+NECK_SHARE = 0.55  # of the height of the moved face: length of neck kept below it
+WIDTH_SHARE = 1.8  # of the same height: width kept on each side of its middle
+BLEND_SHARE = 0.03  # of the same height: half width of the blend between the two halves of a divided shape
+LEFT_EYE, RIGHT_EYE = 1, 2  # values of `HeadMesh.eye_of`
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeadMesh:
+    """Mesh of a head in the units of its file: x to the character's left, y up, z out of the face.
+
+    Parameters
+    ----------
+    vertices, triangles : (V, 3), (F, 3)
+    piece_of : (F,)
+        Index of the character's piece that each triangle belongs to.
+    uv, colours : (V, 2), (V, 3)
+        NaN for vertices without texture coordinates; linear light.
+    shapes
+        Displacement (V, 3) of each shape of the face at weight 1.
+    bones, eye_of : (V,)
+        Node that each vertex follows; 0, `LEFT_EYE` or `RIGHT_EYE`.
+    turn : (3, 3)
+        Rotation from the file's axes to these.
+    """
+
+    vertices: FloatArray
+    triangles: IntArray
+    piece_of: IntArray
+    uv: FloatArray
+    colours: FloatArray
+    shapes: Mapping[str, NDArray[np.float32]]
+    bones: IntArray
+    eye_of: NDArray[np.int8]
+    turn: FloatArray
+
+    def keep(self, is_kept: NDArray[np.bool_]) -> "HeadMesh":
+        """Mesh with the triangles (F,) that are kept and the vertices that they use."""
+        triangles = self.triangles[is_kept]
+        used, corners = np.unique(triangles, return_inverse=True)
+        return replace(self, triangles=corners.reshape(-1, 3), piece_of=self.piece_of[is_kept]).take(used)
+
+    def cut(self, heights: FloatArray) -> "HeadMesh":
+        """Mesh cut along a plane: the part where the heights (V,) of its vertices above the plane are not negative."""
+        cut = cut_triangles(self.triangles, heights)
+
+        def extended(values: NDArray[Any]) -> NDArray[Any]:
+            there = values[cut.upper] + cut.share[:, None] * (values[cut.lower] - values[cut.upper])
+            return np.concatenate([values, there.astype(values.dtype)])
+
+        whole = replace(
+            self,
+            vertices=extended(self.vertices),
+            triangles=cut.triangles,
+            piece_of=self.piece_of[cut.source],
+            uv=extended(self.uv),
+            colours=extended(self.colours),
+            shapes={name: extended(shape) for name, shape in self.shapes.items()},
+            bones=np.concatenate([self.bones, self.bones[cut.upper]]),
+            eye_of=np.concatenate([self.eye_of, self.eye_of[cut.upper]]),
+        )
+        return whole.keep(np.ones(len(cut.triangles), bool))
+
+    def order_eyes_last(self) -> "HeadMesh":
+        """Mesh whose vertices of the left and then of the right eyeball are the last."""
+        order = np.argsort(self.eye_of, kind="stable")
+        rank = np.zeros(len(order), np.int64)
+        rank[order] = np.arange(len(order))
+        return replace(self, triangles=rank[self.triangles]).take(order)
+
+    def take(self, rows: IntArray) -> "HeadMesh":
+        """Mesh with these vertices; its triangles are not changed."""
+        return replace(
+            self,
+            vertices=self.vertices[rows],
+            uv=self.uv[rows],
+            colours=self.colours[rows],
+            shapes={name: shape[rows] for name, shape in self.shapes.items()},
+            bones=self.bones[rows],
+            eye_of=self.eye_of[rows],
+        )
+
+
+def build_head_mesh(character: Character, mapping: ShapeMapping, yaw_deg: float) -> HeadMesh:
+    """Head of a character, turned by `yaw_deg` about the vertical axis so that it looks along z.
+
+    Raises
+    ------
+    DataError
+        No shape of the mapping moves the character.
+    """
+    angle = np.radians(yaw_deg)
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]).round(12)
+    whole = _join(character, mapping, turn)
+    low, high = moved_box(whole)
+    height, middle = high[1] - low[1], (low[0] + high[0]) / 2
+    lowest = low[1] - NECK_SHARE * height
+    head = whole.keep((whole.vertices[:, 1] >= lowest)[whole.triangles].any(axis=1))
+    head = head.cut(head.vertices[:, 1] - lowest)
+    for side in (1, -1):
+        head = head.cut(WIDTH_SHARE * height - side * (head.vertices[:, 0] - middle))
+    return divide_sides(head, mapping, BLEND_SHARE * height)
+
+
+def moved_box(head: HeadMesh) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest corner (3,) of the vertices that the shapes of the face move.
+
+    Raises
+    ------
+    DataError
+        No vertex is moved.
+    """
+    moved = np.zeros(len(head.vertices), bool)
+    for shape in head.shapes.values():
+        length = np.linalg.norm(shape, axis=1)
+        moved |= length > max(MOVED_SHARE * float(length.max(initial=0.0)), 1e-12)
+    if moved.sum() < 3:
+        raise DataError("no shape moves the character's mesh; give the names of its shapes with --mapping")
+    places = head.vertices[moved]
+    return places.min(axis=0), places.max(axis=0)
+
+
+def mapped_targets(character: Character, mapping: ShapeMapping) -> set[Target]:
+    """Morph targets that the shapes of a mapping use; their weights are 0 at rest, whatever the file's defaults are."""
+    sources = (source for sources in mapping.values() for source in sources)
+    return {target for source in sources for target in source_weights(character, source)}
+
+
+def source_weights(character: Character, source: ShapeSource) -> Mapping[Target, float]:
+    """Weights of the morph targets that a source names: targets of this name, otherwise a VRM expression."""
+    named = {target: source.gain for target, name in character.target_names.items() if name == source.name}
+    if named:
+        return named
+    binds = character.expressions.get(source.name, {})
+    return {target: source.gain * weight for target, weight in binds.items()}
+
+
+def divide_sides(head: HeadMesh, mapping: ShapeMapping, blend: float) -> HeadMesh:
+    """Head whose shapes of one side move that half of the face only; `blend` is half the width of the transition."""
+    low, high = moved_box(head)
+    left = smoothstep(head.vertices[:, 0] - (low[0] + high[0]) / 2, -blend, blend)[:, None].astype(np.float32)
+    shapes = dict(head.shapes)
+    for name, shape in head.shapes.items():
+        side = next((source.side for source in mapping[name] if source.side), "")
+        if side:
+            shapes[name] = shape * (left if side == "Left" else 1 - left)
+    return replace(head, shapes=shapes)
+
+
+def _join(character: Character, mapping: ShapeMapping, turn: FloatArray) -> HeadMesh:
+    pieces = character.pieces
+    starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
+    weights = {shape: [source_weights(character, source) for source in sources] for shape, sources in mapping.items()}
+    shapes: dict[str, NDArray[np.float32]] = {}
+    for shape, sources in weights.items():
+        moved = [_displacement(piece, sources) for piece in pieces]
+        if any(part is not None for part in moved):
+            zeros = [np.zeros(piece.vertices.shape, np.float32) for piece in pieces]
+            parts = [zero if part is None else part for part, zero in zip(moved, zeros, strict=True)]
+            shapes[shape] = (np.concatenate(parts) @ turn.T).astype(np.float32)
+    driven = mapped_targets(character, mapping)
+    return HeadMesh(
+        vertices=np.concatenate([_at_rest(piece, driven) for piece in pieces]) @ turn.T,
+        triangles=np.concatenate([piece.triangles + start for piece, start in zip(pieces, starts, strict=False)]),
+        piece_of=np.repeat(np.arange(len(pieces)), [len(piece.triangles) for piece in pieces]),
+        uv=np.concatenate([_or_nan(piece.uv, len(piece.vertices)) for piece in pieces]),
+        colours=np.concatenate(
+            [np.ones(piece.vertices.shape) if piece.colours is None else piece.colours for piece in pieces]
+        ),
+        shapes=shapes,
+        bones=np.concatenate([piece.bones for piece in pieces]),
+        eye_of=np.zeros(int(starts[-1]), np.int8),
+        turn=turn,
+    )
+
+
+def _at_rest(piece: Piece, driven: set[Target]) -> FloatArray:
+    """Vertices (N, 3) of a piece with weights of 0 of the driven targets."""
+    vertices = piece.vertices
+    for target in driven & piece.defaults.keys() & piece.morphs.keys():
+        vertices = vertices - piece.defaults[target] * piece.morphs[target]
+    return vertices
+
+
+def _displacement(piece: Piece, sources: list[Mapping[Target, float]]) -> NDArray[np.float32] | None:
+    used = [
+        (weight, piece.morphs[target])
+        for source in sources
+        for target, weight in source.items()
+        if target in piece.morphs and weight
+    ]
+    if not used:
+        return None
+    moved = np.zeros(piece.vertices.shape, np.float32)
+    for weight, morph in used:
+        moved += np.float32(weight) * morph
+    return moved
+
+
+def _or_nan(uv: FloatArray | None, count: int) -> FloatArray:
+    return np.full((count, 2), np.nan) if uv is None else uv

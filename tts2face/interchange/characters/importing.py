@@ -1,0 +1,368 @@
+"""Import of a character of another program as a face: ``tts2face face import``.
+
+Writing of imported faces, checked before they appear.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import BackendError, DataError, InputError
+from tts2face.interchange.characters.character import KEY, Character, CharacterBinding, character_file, read_binding
+from tts2face.interchange.characters.eyeballs import mark_eyeballs
+from tts2face.interchange.characters.head_mesh import (
+    HeadMesh,
+    build_head_mesh,
+    mapped_targets,
+    moved_box,
+    source_weights,
+)
+from tts2face.interchange.characters.landmarks import (
+    SKIN,
+    CharacterViews,
+    LocatedLandmarks,
+    locate_landmarks,
+    part_triangles,
+    read_landmark_table,
+)
+from tts2face.interchange.characters.readers import read_gltf_character, read_obj_folder
+from tts2face.interchange.characters.shapes import ShapeMapping, guess_mapping, read_mapping
+from tts2face.interchange.characters.surface import (
+    Placement,
+    add_gaze_shapes,
+    build_face,
+    drop_unsuited_shapes,
+    is_plain,
+    missing_shapes,
+    place_face,
+    unwrap,
+)
+from tts2face.interchange.characters.surface_points import nearest_points
+from tts2face.interchange.gltf.reader import SUFFIXES
+from tts2face.models.face import Face
+from tts2face.models.face_file import FORMAT_VERSION, KIND, read_face, write_face
+from tts2face.models.landmarks import N_MESH_LANDMARKS
+from tts2face.picture.occlusion import bake_occlusion
+from tts2face.picture.scene import available_cores
+from tts2face.storage.temporary import Temporary
+from tts2face.storage.tensors import read_tensors, write_tensors
+from tts2face.video.tracking import MIN_SCORE
+
+FRONTS = {"+z": 0.0, "-z": 180.0, "+x": -90.0, "-x": 90.0}  # axis that a character looks along -> turn, degrees
+PROVISIONAL_HEIGHT_MM = 150.0  # of the moved part of a face, until the distance of its eyes is known
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImportReport:
+    """What an import found and did.
+
+    Parameters
+    ----------
+    mapping
+        Morph targets or expressions that each shape of the face uses.
+    unused
+        Names of the character that no shape uses.
+    missing
+        ARKit shapes that the character lacks -> what replaces them.
+    landmarks
+        Position (3,) of each landmark in the units and axes of the file.
+    score
+        Mean score of the face tracker, 0 to 1; None for landmarks of a table.
+    n_eyeballs
+        Eyeballs that gaze turns.
+    notes
+        What was changed or left out, in sentences.
+    licence
+        What the file says about its licence and author.
+    """
+
+    mapping: ShapeMapping
+    unused: tuple[str, ...]
+    missing: Mapping[str, str]
+    landmarks: Mapping[int, NDArray[np.float64]]
+    score: float | None
+    n_eyeballs: int
+    notes: tuple[str, ...]
+    licence: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImportedFace:
+    """A face made from a character, and the report of its import."""
+
+    face: Face
+    report: ImportReport
+
+
+def read_character(path: Path) -> Character:
+    """Character of a .glb, .gltf or .vrm file, or of a folder of .obj files.
+
+    Raises
+    ------
+    InputError
+        The path does not exist or has another suffix.
+    DataError
+        A file is damaged, too large or not supported.
+    """
+    if path.is_dir():
+        return read_obj_folder(path)
+    if not path.exists():
+        raise InputError(f"there is no character {path}; check the path")
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"a character is a {', '.join(SUFFIXES)} file or a folder of .obj files, not {path.name}")
+    return read_gltf_character(path)
+
+
+def propose_mapping(character: Character) -> ShapeMapping:
+    """Mapping guessed from the names of a character's morph targets and expressions."""
+    return guess_mapping([*character.target_names.values(), *character.expressions])
+
+
+def import_face(
+    path: str | Path,
+    *,
+    mapping: str | Path | ShapeMapping | None = None,
+    landmarks: str | Path | None = None,
+    front: str | None = None,
+    model: Path | None = None,
+) -> ImportedFace:
+    """Make a face of a character's file.
+
+    Parameters
+    ----------
+    path
+        .glb, .gltf or .vrm file, or a folder with ``neutral.obj`` and one .obj file for each shape.
+    mapping
+        Mapping or its file (.tsv or .toml), which replaces the guess for the shapes that it names.
+    landmarks
+        Table of landmark positions (.tsv); without it the face is tracked in rendered views (extra ``[capture]``).
+    front
+        Axis that the character looks along: ``+z``, ``-z``, ``+x`` or ``-x``; by default the one where a face is
+        recognised.
+    model
+        Path of ``face_landmarker.task``.
+
+    Raises
+    ------
+    InputError
+        A path does not exist, or an option is unknown.
+    DataError
+        A file is damaged, or the character has no shape that moves its mouth, or no face is recognised.
+    BackendError
+        The face tracker is not installed.
+
+    Examples
+    --------
+    >>> imported = import_face("character.glb")  # doctest: +SKIP
+    >>> sorted(imported.report.missing)  # doctest: +SKIP
+    ['tongueOut']
+    """
+    path = Path(path)
+    if front is not None and front not in FRONTS:
+        raise InputError(f"there is no front {front!r}; choose {', '.join(FRONTS)}")
+    character = read_character(path)
+    chosen = _complete_mapping(character, mapping)
+    table = None if landmarks is None else read_landmark_table(Path(landmarks))
+    candidates = _turned_heads(character, chosen, front)
+    if table is None:
+        head, provisional, views = _find_front(candidates, character, model)
+        drawn, located = views.face, locate_landmarks(views)
+    else:
+        head = next(candidates)
+        provisional = _provisional_placement(head)
+        drawn = build_face(head, character, provisional)
+        located = _project_table(table, head, drawn)
+    face = place_face(_with_landmarks(drawn, located), character, head, provisional)
+    face, notes = drop_unsuited_shapes(face)
+    face = replace(face, metadata=_metadata(path, character, chosen, head, face))
+    face = bake_occlusion(face, available_cores())
+    positions = located.points.places(drawn.vertices) / provisional.scale + provisional.origin
+    places = dict(zip(located.numbers.tolist(), positions @ head.turn, strict=True))
+    report = ImportReport(
+        mapping={name: sources for name, sources in chosen.items() if name in face.shape_names},
+        unused=_unused_names(character, chosen),
+        missing=missing_shapes(face),
+        landmarks=places,
+        score=None if table is not None else located.score,
+        n_eyeballs=len(face.eyes),
+        notes=(*character.notes, *_pose_notes(character, chosen), *_colour_notes(character, head), *notes),
+        licence=character.licence,
+    )
+    return ImportedFace(face, report)
+
+
+def _complete_mapping(character: Character, given: str | Path | ShapeMapping | None) -> ShapeMapping:
+    """The guessed mapping with the given rows in its place, without shapes that have no source."""
+    mapping = dict(propose_mapping(character))
+    if given is not None:
+        rows = given if isinstance(given, Mapping) else read_mapping(Path(given))
+        known = {*character.target_names.values(), *character.expressions}
+        unknown = [source.name for sources in rows.values() for source in sources if source.name not in known]
+        if unknown:
+            raise InputError(f"the character has no shape {unknown[0]!r}; it has: {_some(sorted(known))}")
+        mapping |= rows
+    mapping = {
+        name: sources
+        for name, sources in mapping.items()
+        if any(source_weights(character, source) for source in sources)
+    }
+    if not any(name.startswith(("jaw", "mouth")) for name in mapping):
+        names = sorted({*character.target_names.values(), *character.expressions})
+        raise DataError(
+            "the character has no shape of a known name that moves its mouth, so speech cannot move it; "
+            f"name its shapes in a file and give it as --mapping; it has: {_some(names)}"
+        )
+    return mapping
+
+
+def _some(names: Sequence[str]) -> str:
+    shown = [name[:40] for name in names[:12]]
+    return ", ".join(shown) + (f" and {len(names) - 12} more" if len(names) > 12 else "") if names else "no shapes"
+
+
+def _turned_heads(character: Character, mapping: ShapeMapping, front: str | None) -> Iterator[HeadMesh]:
+    """Heads turned to look along z from the given axis, or from each axis, the likely one first."""
+    likely = ["-z", "+z"] if character.faces_back else ["+z", "-z"]
+    for axis in [front] if front is not None else [*likely, "+x", "-x"]:
+        head = build_head_mesh(character, mapping, FRONTS[axis])
+        yield add_gaze_shapes(mark_eyeballs(unwrap(head, character), character))
+
+
+def _provisional_placement(head: HeadMesh) -> Placement:
+    low, high = moved_box(head)
+    return Placement((low + high) / 2, PROVISIONAL_HEIGHT_MM / float(high[1] - low[1]))
+
+
+def _find_front(
+    candidates: Iterator[HeadMesh], character: Character, model: Path | None
+) -> tuple[HeadMesh, Placement, CharacterViews]:
+    """The first head in whose frontal view the tracker sees a face, otherwise the one with the highest score."""
+    scored: list[tuple[float, tuple[HeadMesh, Placement, CharacterViews]]] = []
+    for head in candidates:
+        placement = _provisional_placement(head)
+        views = CharacterViews(build_face(head, character, placement), model)
+        scored.append((views.frontal_score(), (head, placement, views)))
+        if scored[-1][0] >= MIN_SCORE:
+            break
+    return max(scored, key=lambda found: found[0])[1]
+
+
+def _project_table(table: Mapping[int, NDArray[np.float64]], head: HeadMesh, drawn: Face) -> LocatedLandmarks:
+    numbers = np.array(sorted(table), np.int64)
+    places = np.stack([table[int(number)] for number in numbers]) @ head.turn.T
+    is_skin = numbers < N_MESH_LANDMARKS
+    skin = part_triangles(drawn, SKIN)
+    triangles = np.asarray(head.triangles if not len(skin) else skin, np.int64)
+    points = nearest_points(places, head.vertices, triangles)
+    if not is_skin.all():
+        irises = nearest_points(places[~is_skin], head.vertices, drawn.triangles.astype(np.int64))
+        points.vertices[~is_skin], points.weights[~is_skin] = irises.vertices, irises.weights
+    return LocatedLandmarks(numbers, points, 1.0)
+
+
+def _with_landmarks(face: Face, located: LocatedLandmarks) -> Face:
+    return replace(
+        face,
+        landmarks=located.numbers.astype(np.int32),
+        landmark_vertices=located.points.vertices.astype(np.int32),
+        landmark_weights=located.points.weights.astype(np.float32),
+    )
+
+
+def _unused_names(character: Character, mapping: ShapeMapping) -> tuple[str, ...]:
+    used = {source.name for sources in mapping.values() for source in sources}
+    names = dict.fromkeys([*character.target_names.values(), *character.expressions])
+    return tuple(name for name in names if name not in used)
+
+
+def _pose_notes(character: Character, mapping: ShapeMapping) -> list[str]:
+    """A note about default weights of the file, which the face at rest does not have."""
+    driven = mapped_targets(character, mapping)
+    posed = {t: weight for piece in character.pieces for t, weight in piece.defaults.items() if t in driven}
+    largest = sorted(posed, key=lambda target: -abs(posed[target]))[:3]
+    named = ", ".join(f"{character.target_names[target][:40]} {posed[target]:.2f}" for target in largest)
+    return (
+        [f"the file poses {len(posed)} of the mapped shapes ({named}); the face at rest has none of them"]
+        if posed
+        else []
+    )
+
+
+def _colour_notes(character: Character, head: HeadMesh) -> list[str]:
+    """Notes about white materials, whose colour is replaced."""
+    used = [character.pieces[number] for number in np.unique(head.piece_of).tolist()]
+    plain = {
+        piece.material for piece in used if piece.colours is None and is_plain(character.materials[piece.material])
+    }
+    names = sorted(character.materials[number].name for number in plain)
+    return [f"the material {name[:60]!r} is white without an image; plain colours replace it" for name in names]
+
+
+def _metadata(path: Path, character: Character, mapping: ShapeMapping, head: HeadMesh, face: Face) -> dict[str, Any]:
+    """Provenance of the face, and what is needed to write its animation onto the character's file."""
+    scale = float(np.ptp(face.vertices[:, 1]) / np.ptp(head.vertices[:, 1]))
+    origin = head.vertices[0] - face.vertices[0].astype(np.float64) / scale
+    digest = "" if path.is_dir() else sha256(path.read_bytes()).hexdigest()
+    yaw_deg = float(np.degrees(np.arctan2(head.turn[0, 2], head.turn[0, 0])))
+    x, y, z = (float(value) for value in origin)
+    binding = CharacterBinding(str(path.resolve()), digest, round(yaw_deg, 3), scale, (x, y, z), mapping)
+    return {
+        "name": path.stem,
+        "licence": character.licence or "not stated by the character's file",
+        "attribution": "",
+        KEY: binding.as_metadata(),
+    }
+
+
+def save_face(path: str | Path, face: Face) -> None:
+    """Write a face to a ``.face`` file, which appears when its content has been read back and checked.
+
+    Raises
+    ------
+    DataError
+        The face breaks a rule of the format, for example too many vertices times shapes.
+    BackendError
+        The file cannot be written.
+    """
+    path = Path(path)
+    try:
+        with Temporary(path) as temporary:
+            write_face(temporary.path, face)
+            _check(temporary.path, path)
+            temporary.replace(path)
+    except OSError as error:
+        raise BackendError(
+            f"cannot write {path}: {error.strerror}; free some space or choose another folder"
+        ) from error
+
+
+def relink_face(path: str | Path, character: str | Path) -> Path:
+    """Write the new place of a moved character into the ``.face`` file that was imported from it; that place.
+
+    Raises
+    ------
+    InputError
+        There is no such face, or it was not imported from a .glb, .gltf or .vrm file.
+    DataError
+        The face is damaged, the character is missing, or its content is not that of the import.
+    BackendError
+        The file cannot be written.
+    """
+    path = Path(path)
+    place = character_file(read_binding(read_face(path)), character).resolve()
+    arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
+    header["metadata"][KEY]["file"] = str(place)
+    write_tensors(path, KIND, FORMAT_VERSION, arrays, header, is_packed=True)
+    return place
+
+
+def _check(written: Path, path: Path) -> None:
+    try:
+        read_face(written)
+    except DataError as wrong:
+        raise DataError(str(wrong).replace(str(written), str(path))) from wrong

@@ -1,0 +1,302 @@
+"""Meshes of a glTF file as pieces at rest in world coordinates: skins and default morph weights applied.
+
+Materials of a glTF file: base colour, image and alpha; images are decoded within limits.
+"""
+
+import io
+import warnings
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+from tts2face.interchange.characters.character import BLEND, MASK, OPAQUE, Material, Piece, Target, affine, linear
+from tts2face.interchange.gltf.container import Fields
+from tts2face.interchange.gltf.reader import DRACO, GltfFile, NodeTree
+
+TRIANGLES, STRIP, FAN = 4, 5, 6
+MAX_VERTICES = 2_000_000  # of all meshes; a film character has 200,000
+MAX_TARGETS = 1000  # morph targets of a mesh
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+def read_pieces(file: GltfFile, tree: NodeTree) -> Iterator[Piece]:
+    """Pieces of all meshes of the shown scene; points and lines are skipped.
+
+    Raises
+    ------
+    DataError
+        A mesh or skin is damaged or too large, or is compressed with Draco.
+    """
+    nodes, meshes = file.entries("nodes"), file.entries("meshes")
+    n_vertices = 0
+    for number in sorted(tree.world):
+        mesh = nodes[number].index("mesh", len(meshes), "meshes")
+        if mesh is None:
+            continue
+        name = "/".join(filter(None, (tree.names[number], meshes[mesh].text("name"))))
+        for primitive in meshes[mesh].children("primitives"):
+            piece = _Primitive(file, primitive, number).piece(tree, mesh, name)
+            if piece is None:
+                continue
+            n_vertices += len(piece.vertices)
+            if n_vertices > MAX_VERTICES:
+                raise DataError(f"{file.path.name} has more than {MAX_VERTICES} vertices; reduce its meshes")
+            yield piece
+
+
+def target_names(mesh: Fields) -> list[str]:
+    """Names of a mesh's morph targets: ``extras.targetNames``, or ``target0`` ... without names."""
+    primitives = mesh.children("primitives")
+    n_targets = max((len(primitive.children("targets")) for primitive in primitives), default=0)
+    if n_targets > MAX_TARGETS:
+        raise DataError(f"{mesh.place}: has {n_targets} morph targets; reduce them to at most {MAX_TARGETS}")
+    holders = [mesh, *primitives]
+    for holder in holders:
+        extras = holder.content.get("extras")
+        names = extras.get("targetNames") if isinstance(extras, dict) else None
+        if isinstance(names, list) and len(names) >= n_targets and all(isinstance(name, str) for name in names):
+            return [str(name) for name in names[:n_targets]]
+    return [f"target{number}" for number in range(n_targets)]
+
+
+class _Primitive:
+    """One primitive of a mesh, shown by one node."""
+
+    def __init__(self, file: GltfFile, fields: Fields, node: int) -> None:
+        self._file, self._fields, self._node = file, fields, node
+        self._attributes = fields.child("attributes")
+        if fields.extension(DRACO) is not None:
+            raise DataError(f"{fields.place} is compressed with Draco; export the character without compression")
+
+    def piece(self, tree: NodeTree, mesh: int, name: str) -> Piece | None:
+        """The piece, or None for points, lines and empty primitives."""
+        mode = self._fields.integer("mode", TRIANGLES, high=6)
+        places = self._attribute("POSITION", (3,), None)
+        if mode < TRIANGLES or places is None:
+            return None
+        triangles = self._triangles(mode, len(places))
+        targets = [self._accessor(target, "POSITION", (3,), len(places)) for target in self._fields.children("targets")]
+        defaults = self._default_weights(mesh, len(targets))
+        for number, weight in defaults.items():
+            if (moved := targets[number]) is not None:
+                places = places + weight * moved
+        matrices, bones = self._skinning(tree, len(places))
+        if np.median(np.linalg.det(matrices[..., :3, :3])) < 0:  # a mirrored mesh
+            triangles = triangles[:, ::-1]
+        morphs = {
+            Target(mesh, number): linear(moved, matrices).astype(np.float32)
+            for number, moved in enumerate(targets)
+            if moved is not None and moved.any()
+        }
+        material = self._fields.index("material", self._file.count("materials"), "materials")
+        return Piece(
+            name=name,
+            vertices=affine(places, matrices),
+            triangles=triangles,
+            uv=self._attribute("TEXCOORD_0", (2,), len(places)),
+            colours=self._vertex_colours(len(places)),
+            material=-1 if material is None else material,
+            morphs=morphs,
+            bones=bones,
+            defaults={Target(mesh, number): weight for number, weight in defaults.items()},
+        )
+
+    def _accessor(self, fields: Fields, key: str, widths: tuple[int, ...], count: int | None) -> FloatArray | None:
+        number = fields.index(key, self._file.count("accessors"), "accessors")
+        if number is None:
+            return None
+        values = self._file.accessor(number).astype(np.float64)
+        if values.shape[1] not in widths or (count is not None and len(values) != count):
+            raise DataError(f"{fields.place}: {key} has the shape {values.shape}; export the character again")
+        return values
+
+    def _attribute(self, key: str, widths: tuple[int, ...], count: int | None) -> FloatArray | None:
+        return self._accessor(self._attributes, key, widths, count)
+
+    def _vertex_colours(self, count: int) -> FloatArray | None:
+        colours = self._attribute("COLOR_0", (3, 4), count)
+        return None if colours is None else np.clip(colours[:, :3], 0.0, 1.0)
+
+    def _triangles(self, mode: int, n_vertices: int) -> IntArray:
+        number = self._fields.index("indices", self._file.count("accessors"), "accessors")
+        corners = np.arange(n_vertices) if number is None else self._file.accessor(number)[:, 0].astype(np.int64)
+        if corners.size and not 0 <= int(corners.min()) <= int(corners.max()) < n_vertices:
+            raise DataError(f"{self._fields.place}: a triangle uses vertex {corners.max()} of {n_vertices}")
+        if mode == TRIANGLES:
+            return corners[: len(corners) // 3 * 3].reshape(-1, 3)
+        if mode == FAN:
+            rows = np.column_stack([np.full(max(len(corners) - 2, 0), corners[0]), corners[1:-1], corners[2:]])
+            return rows
+        rows = np.column_stack([corners[:-2], corners[1:-1], corners[2:]])
+        rows[1::2] = rows[1::2, [1, 0, 2]]
+        return rows
+
+    def _default_weights(self, mesh: int, n_targets: int) -> dict[int, float]:
+        """Morph weights other than 0 that node or mesh give, by the number of the target."""
+        node = self._file.entries("nodes")[self._node]
+        holder = node if node.has("weights") else self._file.entries("meshes")[mesh]
+        weights = holder.numbers("weights", n_targets, None) if holder.has("weights") else None
+        return {number: weight for number, weight in enumerate(weights or ()) if weight}
+
+    def _skinning(self, tree: NodeTree, count: int) -> tuple[FloatArray, IntArray]:
+        """Matrix (4, 4) or matrices (N, 4, 4) from mesh to world, and the node that each vertex follows most (N,)."""
+        nodes, skins = self._file.entries("nodes"), self._file.entries("skins")
+        number = nodes[self._node].index("skin", len(skins), "skins")
+        weights = [self._attribute(f"WEIGHTS_{n}", (4,), count) for n in (0, 1)]
+        joints = [self._attribute(f"JOINTS_{n}", (4,), count) for n in (0, 1)]
+        if number is None or weights[0] is None or joints[0] is None:
+            return tree.world[self._node], np.full(count, self._node)
+        bones = np.array(skins[number].indices("joints", len(nodes), "nodes"), np.int64)
+        matrices = self._joint_matrices(skins[number], bones, tree)
+        pairs = [(w, j) for w, j in zip(weights, joints, strict=True) if w is not None and j is not None]
+        share = np.concatenate([w for w, _ in pairs], axis=1)
+        which = np.concatenate([j for _, j in pairs], axis=1).astype(np.int64)
+        which = np.where(share > 0, which, 0)
+        if not len(bones) or (which < 0).any() or (which >= len(bones)).any() or (share < 0).any():
+            raise DataError(f"{self._fields.place}: a vertex follows a bone beyond the {len(bones)} of its skin")
+        share = share / np.maximum(share.sum(axis=1, keepdims=True), 1e-9)
+        blended = np.zeros((count, 4, 4))
+        for column in range(share.shape[1]):
+            blended += share[:, column, None, None] * matrices[which[:, column]]
+        return blended, bones[which[np.arange(count), share.argmax(axis=1)]]
+
+    def _joint_matrices(self, skin: Fields, bones: IntArray, tree: NodeTree) -> FloatArray:
+        number = skin.index("inverseBindMatrices", self._file.count("accessors"), "accessors")
+        inverse = np.tile(np.eye(4), (len(bones), 1, 1))
+        if number is not None:
+            values = self._file.accessor(number).astype(np.float64)
+            if values.shape[1] != 16 or len(values) < len(bones):
+                raise DataError(
+                    f"{skin.place}: has {len(values)} bind matrices for {len(bones)} bones; export it again"
+                )
+            inverse = values[: len(bones)].reshape(-1, 4, 4).transpose(0, 2, 1)
+        missing = [bone for bone in bones if int(bone) not in tree.world]
+        if missing:
+            raise DataError(f"{skin.place}: bone {missing[0]} is not part of the scene; export the character again")
+        return np.stack([tree.world[int(bone)] for bone in bones]) @ inverse if len(bones) else inverse
+
+
+MAX_IMAGE_PIXELS = 8192 * 8192
+MAX_IMAGE_SIDE = 2048  # pixels; larger images are reduced
+FORMATS = ("PNG", "JPEG", "WEBP")
+KTX2 = b"\xabKTX 20\xbb"
+
+
+class MaterialReader:
+    """Reader of the materials of a file; images that cannot be read become notes.
+
+    Parameters
+    ----------
+    file
+        The opened file.
+    notes
+        List to which sentences about skipped images are added.
+    """
+
+    def __init__(self, file: GltfFile, notes: list[str]) -> None:
+        self._file, self._notes = file, notes
+        self._images: dict[int, NDArray[np.uint8] | None] = {}
+
+    def materials(self) -> Iterator[Material]:
+        """All materials of the file in order."""
+        earlier = self._file.root.extension("VRM")
+        toon = earlier.children("materialProperties") if earlier is not None else []
+        for number, fields in enumerate(self._file.entries("materials")):
+            yield self._material(fields, toon[number] if number < len(toon) else None)
+
+    def _material(self, fields: Fields, toon: Fields | None) -> Material:
+        rough = fields.child("pbrMetallicRoughness")
+        glossy = fields.extension("KHR_materials_pbrSpecularGlossiness")
+        holder, colour_key, image_key = rough, "baseColorFactor", "baseColorTexture"
+        if glossy is not None and not rough.has(image_key):
+            holder, colour_key, image_key = glossy, "diffuseFactor", "diffuseTexture"
+        colour = holder.numbers(colour_key, 4, (1.0, 1.0, 1.0, 1.0))
+        texture = holder.child(image_key)
+        index = texture.index("index", self._file.count("textures"), "textures") if holder.has(image_key) else None
+        if index is None and toon is not None and toon.child("textureProperties").has("_MainTex"):
+            index = toon.child("textureProperties").index("_MainTex", self._file.count("textures"), "textures")
+        image = None if index is None else self._texture(index)
+        if texture.integer("texCoord", 0) != 0:
+            self._notes.append(f"{fields.place}: its image uses a second set of coordinates, which is not read")
+            image = None
+        mode = fields.text("alphaMode", OPAQUE)
+        red, green, blue, alpha = (min(max(value, 0.0), 1.0) for value in colour or ())
+        return Material(
+            name=fields.text("name") or fields.place.rpartition(".")[2],
+            colour=(red, green, blue, alpha),
+            image=image,
+            transform=_texture_transform(texture),
+            alpha_mode=mode if mode in (MASK, BLEND) else OPAQUE,
+            cutoff=fields.number("alphaCutoff", 0.5),
+            roughness=min(max(rough.number("roughnessFactor", 1.0), 0.0), 1.0),
+        )
+
+    def _texture(self, number: int) -> NDArray[np.uint8] | None:
+        fields = self._file.entries("textures")[number]
+        n_images = self._file.count("images")
+        source = fields.index("source", n_images, "images")
+        for name in ("EXT_texture_webp", "KHR_texture_basisu"):
+            extension = fields.extension(name)
+            if source is None and extension is not None:
+                source = extension.index("source", n_images, "images")
+        if source is None:
+            return None
+        if source not in self._images:
+            self._images[source] = self._image(self._file.entries("images")[source])
+        return self._images[source]
+
+    def _image(self, fields: Fields) -> NDArray[np.uint8] | None:
+        """Pixels (H, W, 4) of an image, at most `MAX_IMAGE_SIDE` on a side; None with a note if it cannot be read."""
+        view = fields.index("bufferView", self._file.count("bufferViews"), "buffer views")
+        content = self._file.uri(fields.text("uri"), fields) if view is None else self._file.view(view).tobytes()
+        if content[:8] == KTX2[:8]:
+            self._notes.append(
+                f"{fields.place} is a KTX2 image, which is not read: its material has one colour; "
+                "convert it to PNG or JPEG to keep it"
+            )
+            return None
+        return decode_image(content, fields.place)
+
+
+def decode_image(content: bytes, place: str) -> NDArray[np.uint8]:
+    """Pixels (H, W, 4) of a PNG, JPEG or WebP image, reduced to at most `MAX_IMAGE_SIDE` on a side.
+
+    Raises
+    ------
+    DataError
+        The image is damaged or has too many pixels.
+    """
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with Image.open(io.BytesIO(content), formats=FORMATS) as image:
+                if image.width * image.height > MAX_IMAGE_PIXELS:
+                    raise DataError(f"{place}: has {image.width} x {image.height} pixels; use 4096 x 4096 or less")
+                image.draft("RGB", (MAX_IMAGE_SIDE, MAX_IMAGE_SIDE))
+                pixels = image.convert("RGBA")
+                pixels.thumbnail((MAX_IMAGE_SIDE, MAX_IMAGE_SIDE))
+                return np.array(pixels)
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        if isinstance(error, DataError):
+            raise
+        raise DataError(f"{place}: the image cannot be decoded; convert it to PNG or JPEG") from error
+
+
+def _texture_transform(texture: Fields) -> NDArray[np.float64]:
+    """Affine transform (2, 3) of texture coordinates (KHR_texture_transform)."""
+    fields = texture.extension("KHR_texture_transform")
+    placed = np.eye(2, 3)
+    if fields is None:
+        return placed
+    turn = fields.number("rotation", 0.0)
+    scale = np.array(fields.numbers("scale", 2, (1.0, 1.0)))
+    cos, sin = np.cos(turn), np.sin(turn)
+    placed[:, :2] = np.array([[cos, sin], [-sin, cos]]) * scale
+    placed[:, 2] = fields.numbers("offset", 2, (0.0, 0.0))
+    return placed

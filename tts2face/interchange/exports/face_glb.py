@@ -1,0 +1,252 @@
+"""Head mesh with morph targets, skeleton and animation as binary glTF 2.0.
+
+Metres; y up, the face looks along +z, x to its own left, as glTF prescribes. The first shapes of the face are the morph
+targets, in the order of the clip's channels; head pose and gaze are rotations of joints.
+
+Animation of an imported face as the character's own .glb file.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from tts2face.interchange.characters.animation import animate_character
+from tts2face.interchange.characters.character import character_file, has_binding, read_binding
+from tts2face.interchange.exports.parts import FormatWriter, Part, Target
+from tts2face.interchange.exports.surfaces import (
+    HEAD,
+    MM_PER_M,
+    ExportSurface,
+    MorphTargets,
+    Skeleton,
+    build_skeleton,
+    divide_surface,
+    linear_colours,
+    morph_targets,
+    roughness,
+    texture_jpeg,
+    texture_png,
+    vertex_normals,
+)
+from tts2face.interchange.gltf.container import INDICES, VERTICES, GltfBuffer
+from tts2face.models.face import Face
+from tts2face.numeric.arrays import continuous_quaternions
+from tts2face.storage.files import refuse_overwriting
+from tts2face.storage.spool import Spool
+from tts2face.types import HEAD_CHANNELS, Trajectory
+
+MESH_NODE, FIRST_JOINT = 0, 1
+GENERATOR = "tts2face"
+
+
+class GlbWriter:
+    """Keeps frames in temporary files, and writes mesh and animation when their number is known."""
+
+    def __init__(self, target: Target) -> None:
+        if target.face is None:
+            raise InputError(f"{target.name} holds the mesh of the face; give the face, as in face=session.face")
+        self._target, self._face = target, target.face
+        self._skeleton = build_skeleton(target.face, len(target.channels))
+        self._targets = morph_targets(target.face, target.channels)
+        self._weights, self._shift = Spool(len(self._targets.names)), Spool(3)
+        n_eyes = len(self._skeleton.names) - HEAD - 1
+        self._turns = [Spool(4) for _ in range(1 + n_eyes)]  # of the head and the eyes
+        self._last: list[NDArray[np.float64] | None] = [None] * len(self._turns)
+
+    def add(self, part: Part) -> None:
+        """Append frames."""
+        if not len(part.motion):
+            return
+        self._weights.add(self._targets.weights(part.motion))
+        self._shift.add(self._skeleton.head_places(part.head) / MM_PER_M)
+        turns = [self._skeleton.head_rotations(part.head)]
+        turns += [self._skeleton.eye_rotations(part.motion, eye) for eye in range(len(self._turns) - 1)]
+        for number, (spool, values) in enumerate(zip(self._turns, turns, strict=True)):
+            signed = continuous_quaternions(values, self._last[number])
+            spool.add(signed)
+            self._last[number] = signed[-1]
+
+    def finish(self) -> None:
+        """Write the file."""
+        buffer = GltfBuffer()
+        content = _asset(self._target, self._face)
+        content |= _materials(self._face, buffer)
+        surfaces = divide_surface(self._face)
+        content["meshes"] = [_mesh(self._face, surfaces, self._targets, self._skeleton, buffer)]
+        content |= _nodes(self._skeleton, buffer)
+        content["animations"] = [self._animation(buffer)]
+        buffer.write(self._target.path, content)
+
+    def close(self) -> None:
+        """Remove the temporary files."""
+        for spool in (self._weights, self._shift, *self._turns):
+            spool.close()
+
+    def _animation(self, buffer: GltfBuffer) -> dict[str, Any]:
+        n_frames = self._weights.n_rows
+        times = (np.arange(n_frames) / float(self._target.fps)).astype("<f4")
+        clock = buffer.add_accessor(times, min=[float(times[0])], max=[float(times[-1])])
+        channels: list[dict[str, Any]] = []
+        samplers: list[dict[str, Any]] = []
+
+        def animate(node: int, path: str, values: Spool, width: int) -> None:
+            channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
+            samplers.append(
+                {"input": clock, "output": buffer.add_spooled_accessor(values, width), "interpolation": "LINEAR"}
+            )
+
+        animate(MESH_NODE, "weights", self._weights, 1)
+        animate(FIRST_JOINT + HEAD, "translation", self._shift, 3)
+        for number, turns in enumerate(self._turns):
+            animate(FIRST_JOINT + HEAD + number, "rotation", turns, 4)
+        return {"name": "clip", "channels": channels, "samplers": samplers}
+
+
+def _asset(target: Target, face: Face) -> dict[str, Any]:
+    extras = {"fps": float(target.fps), "sound": target.sound_name}
+    if face.synthetic_notice:
+        extras["notice"] = face.synthetic_notice
+    asset: dict[str, Any] = {"version": "2.0", "generator": GENERATOR, "extras": extras}
+    notes = [str(face.metadata[key]) for key in ("attribution", "licence") if face.metadata.get(key)]
+    if notes:
+        asset["copyright"] = ", ".join(notes)
+    return {"asset": asset, "scene": 0, "scenes": [{"nodes": [MESH_NODE, FIRST_JOINT]}]}
+
+
+def _materials(face: Face, buffer: GltfBuffer) -> dict[str, Any]:
+    """Textures and one material for each surface."""
+    content: dict[str, Any] = {"materials": []}
+    if face.textures:
+        content["images"] = [_image(face, number, buffer) for number in range(len(face.textures))]
+        content["samplers"] = [{}]
+        content["textures"] = [{"source": number, "sampler": 0} for number in range(len(face.textures))]
+    for surface in divide_surface(face):
+        part = surface.part
+        shading: dict[str, Any] = {
+            "baseColorFactor": [1, 1, 1, part.opacity],
+            "metallicFactor": 0,
+            "roughnessFactor": round(roughness(part), 4),
+        }
+        if part.is_textured:
+            shading["baseColorTexture"] = {"index": part.texture}
+        material: dict[str, Any] = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": shading}
+        if part.opacity < 1:
+            material["alphaMode"] = "BLEND"
+        elif part.cutout:
+            material["alphaMode"] = "MASK"
+        content["materials"].append(material)
+    return content
+
+
+def _image(face: Face, number: int, buffer: GltfBuffer) -> dict[str, Any]:
+    texture = face.textures[number]
+    name = next((part.name for part in face.parts if part.texture == number), f"texture{number}")
+    if texture.alpha is None:
+        return {"bufferView": buffer.add_view(texture_jpeg(texture.pixels)), "mimeType": "image/jpeg", "name": name}
+    content = texture_png(texture.pixels, texture.alpha)
+    return {"bufferView": buffer.add_view(content), "mimeType": "image/png", "name": name}
+
+
+def _mesh(
+    face: Face, surfaces: list[ExportSurface], targets: MorphTargets, skeleton: Skeleton, buffer: GltfBuffer
+) -> dict[str, Any]:
+    normals, colours = vertex_normals(face), linear_colours(face)
+    primitives = []
+    for number, surface in enumerate(surfaces):
+        own = surface.vertices
+        places = (face.vertices[own] / MM_PER_M).astype("<f4")
+        bounds = {"min": places.min(axis=0).tolist(), "max": places.max(axis=0).tolist()}
+        attributes = {
+            "POSITION": buffer.add_accessor(places, VERTICES, **bounds),
+            "NORMAL": buffer.add_accessor(normals[own].astype("<f4"), VERTICES),
+            "JOINTS_0": buffer.add_accessor(_four(skeleton.joints[own]), VERTICES),
+            "WEIGHTS_0": buffer.add_accessor(_four(skeleton.weights[own]), VERTICES),
+        }
+        if surface.part.is_textured and face.uv is not None:
+            attributes["TEXCOORD_0"] = buffer.add_accessor(face.uv[own].astype("<f4"), VERTICES)
+        else:
+            opaque = np.column_stack([colours[own], np.ones(len(own))])
+            steps = np.rint(opaque * 0xFFFF).astype("<u2")
+            attributes["COLOR_0"] = buffer.add_accessor(steps, VERTICES, normalized=True)
+        kind = "<u2" if len(own) < 0xFFFF else "<u4"
+        shapes = [(shape / MM_PER_M).astype("<f4") for shape in targets.displacements(face, own)]
+        primitives.append({
+            "attributes": attributes,
+            "indices": buffer.add_accessor(surface.triangles.ravel().astype(kind), INDICES),
+            "material": number,
+            "targets": [{"POSITION": buffer.add_sparse_accessor(shape)} for shape in shapes],
+        })  # fmt: skip
+    return {
+        "name": "face",
+        "primitives": primitives,
+        "weights": [0] * len(targets.names),
+        "extras": {"targetNames": list(targets.names)},
+    }
+
+
+def _four(values: NDArray[Any]) -> NDArray[Any]:
+    """Rows (n, 2) with two zeros appended; joints of weight 0 must be 0."""
+    rows = np.zeros((len(values), 4), values.dtype)
+    rows[:, :2] = values
+    if values.dtype == np.uint8:
+        return rows
+    return rows.astype("<f4")
+
+
+def _nodes(skeleton: Skeleton, buffer: GltfBuffer) -> dict[str, Any]:
+    """Nodes of mesh and joints, and the skin that ties them."""
+    places = skeleton.places / MM_PER_M
+    inverse = np.tile(np.eye(4, dtype="<f4").ravel(), (len(places), 1))
+    inverse[:, 12:15] = -places  # column-major
+    joints = list(range(FIRST_JOINT, FIRST_JOINT + len(places)))
+    nodes: list[dict[str, Any]] = [{"name": "face", "mesh": 0, "skin": 0}]
+    for number, name in enumerate(skeleton.names):
+        parent = np.zeros(3) if number <= HEAD else places[HEAD]
+        nodes.append({"name": name, "translation": (places[number] - parent).tolist()})
+    nodes[FIRST_JOINT]["children"] = [FIRST_JOINT + HEAD]
+    if len(joints) > HEAD + 1:
+        nodes[FIRST_JOINT + HEAD]["children"] = joints[HEAD + 1 :]
+    skin = {
+        "name": "head",
+        "joints": joints,
+        "skeleton": FIRST_JOINT,
+        "inverseBindMatrices": buffer.add_accessor(inverse),
+    }
+    return {"nodes": nodes, "skins": [skin]}
+
+
+class CharacterGlbWriter:
+    """Keeps frames in temporary files, and writes the character's file when their number is known."""
+
+    def __init__(self, target: Target) -> None:
+        if target.face is None:
+            raise InputError(f"{target.name} holds the character of the face; give the face, as in face=session.face")
+        source = character_file(read_binding(target.face))  # a missing file is reported with the first clip
+        refuse_overwriting({"the export": target.path.with_name(target.name)}, {"the character": source})
+        self._target, self._face = target, target.face
+        self._motion, self._head = Spool(len(target.channels)), Spool(len(HEAD_CHANNELS))
+
+    def add(self, part: Part) -> None:
+        """Append frames."""
+        self._motion.add(part.motion)
+        self._head.add(part.head)
+
+    def finish(self) -> None:
+        """Write the file."""
+        fps = float(self._target.fps)
+        motion = Trajectory(self._target.channels, np.array(self._motion.rows(), np.float32), fps)
+        head = Trajectory(HEAD_CHANNELS, np.array(self._head.rows(), np.float32), fps)
+        self._target.path.write_bytes(animate_character(motion, head, self._face).content)
+
+    def close(self) -> None:
+        """Remove the temporary files."""
+        self._motion.close()
+        self._head.close()
+
+
+def make_glb_writer(target: Target) -> FormatWriter:
+    """Writer of the character's own file for a face that was imported from one, otherwise of the face's mesh."""
+    is_imported = target.face is not None and has_binding(target.face)
+    return CharacterGlbWriter(target) if is_imported else GlbWriter(target)

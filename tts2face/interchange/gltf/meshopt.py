@@ -1,0 +1,217 @@
+"""Decoder of EXT_meshopt_compression: attributes, triangles and indices of compressed glTF files.
+
+Source: Khronos glTF extension EXT_meshopt_compression, bitstream of version 0 (attributes) and 1 (indices).
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+from tts2face.numeric.kernels import kernel
+
+ATTRIBUTES, TRIANGLES, INDICES = "ATTRIBUTES", "TRIANGLES", "INDICES"
+NO_FILTER, EXPONENTIAL = "NONE", "EXPONENTIAL"
+GROUP = 16  # elements whose deltas share one width
+MAX_BLOCK_BYTES, MAX_BLOCK = 8192, 256
+TAIL_BYTES = 32  # least size of the attributes' tail
+ATTRIBUTES_HEADER, TRIANGLES_HEADER, INDICES_HEADER = 0xA0, 0xE1, 0xD1
+
+Bytes = NDArray[np.uint8]
+
+
+def decode_buffer(content: Bytes, mode: str, count: int, stride: int) -> Bytes:
+    """Bytes (count * stride) of a compressed buffer view, before its filter.
+
+    Raises
+    ------
+    DataError
+        The mode or the version is unknown, or the stream is damaged.
+    """
+    if mode == ATTRIBUTES and 0 < stride <= 256 and stride % 4 == 0:
+        return _decode_attributes(content, count, stride)
+    if mode in (TRIANGLES, INDICES) and stride in (2, 4):
+        decode = _decode_triangles if mode == TRIANGLES else _decode_indices
+        indices = decode(content.tobytes(), count)
+        if max(indices, default=0) >= 1 << 8 * stride or min(indices, default=0) < 0:
+            raise _damaged()
+        return np.frombuffer(np.array(indices, np.uint32 if stride == 4 else np.uint16).tobytes(), np.uint8)
+    raise DataError(f"a meshopt stream has the mode {mode!r:.20} with elements of {stride} bytes; export it again")
+
+
+def apply_exponential_filter(content: Bytes) -> Bytes:
+    """Bytes of the 32-bit floats that pairs of exponent (8 bits) and mantissa (24 bits) stand for."""
+    packed = np.frombuffer(content.tobytes(), np.int32)
+    values = np.ldexp(((packed << 8) >> 8).astype(np.float64), packed >> 24).astype(np.float32)
+    return np.frombuffer(values.tobytes(), np.uint8)
+
+
+def _damaged() -> DataError:
+    return DataError("a meshopt stream is damaged; export the character again")
+
+
+def _decode_attributes(content: Bytes, count: int, stride: int) -> Bytes:
+    tail = max(stride, TAIL_BYTES)
+    if len(content) < 1 + tail or content[0] != ATTRIBUTES_HEADER:
+        raise _damaged()
+    block = min(MAX_BLOCK_BYTES // stride // GROUP * GROUP, MAX_BLOCK)
+    out = np.zeros((count, stride), np.uint8)
+    baseline = content[len(content) - stride :].copy()
+    if not _decode_blocks(content[1 : len(content) - tail], block, baseline, out):
+        raise _damaged()
+    return out.reshape(-1)
+
+
+@kernel
+def _decode_blocks(data: Any, block: int, last: Any, out: Any) -> bool:  # noqa: C901 - one pass over bits
+    """Decode blocks of deltas into `out` (count, stride), which begins after the element `last`; False if too short."""
+    count, stride, at = out.shape[0], out.shape[1], 0
+    for first in range(0, count, block):
+        n = min(block, count - first)
+        n_groups = (n + 15) // 16
+        for column in range(stride):
+            header = at
+            at += (n_groups + 3) // 4
+            if at > len(data):
+                return False
+            value = np.uint8(last[column])
+            for group in range(n_groups):
+                kind = (data[header + group // 4] >> (2 * (group % 4))) & 3
+                width = 0 if kind == 0 else (2 if kind == 1 else (4 if kind == 2 else 8))
+                packed, extra = at, at + 2 * width
+                if extra > len(data):
+                    return False
+                for i in range(16):
+                    delta = np.uint8(0)
+                    if width == 8:
+                        delta = data[packed + i]
+                    elif width > 0:
+                        per_byte = 8 // width
+                        shift = (per_byte - 1 - i % per_byte) * width
+                        full = (1 << width) - 1
+                        delta = np.uint8((data[packed + i // per_byte] >> shift) & full)
+                        if delta == full:
+                            if extra >= len(data):
+                                return False
+                            delta = data[extra]
+                            extra += 1
+                    row = group * 16 + i
+                    if row < n:
+                        value = np.uint8((value + ((delta >> 1) ^ (0xFF if delta & 1 else 0))) & 0xFF)
+                        out[first + row, column] = value
+                at = extra
+            last[column] = value
+    return True
+
+
+class _IndexStream:
+    """Reader of variable-length differences of indices."""
+
+    def __init__(self, content: bytes, begin: int, end: int) -> None:
+        self._content, self._at, self._end = content, begin, end
+        self.last = 0
+
+    def byte(self) -> int:
+        if self._at >= self._end:
+            raise _damaged()
+        self._at += 1
+        return self._content[self._at - 1]
+
+    def number(self) -> int:
+        value = shift = 0
+        while shift < 35:
+            byte = self.byte()
+            value |= (byte & 127) << shift
+            if byte < 128:
+                return value
+            shift += 7
+        raise _damaged()
+
+    def index(self) -> int:
+        value = self.number()
+        self.last = (self.last + ((value >> 1) ^ -(value & 1))) & 0xFFFFFFFF
+        return self.last
+
+
+class _Recent:
+    """Ring buffer of the last 16 entries; entry 1 is the newest."""
+
+    def __init__(self, empty: Any) -> None:
+        self._entries, self._next = [empty] * 16, 0
+
+    def push(self, entry: Any) -> None:
+        self._entries[self._next & 15] = entry
+        self._next += 1
+
+    def __getitem__(self, back: int) -> Any:
+        return self._entries[(self._next - back) & 15]
+
+
+class _TriangleDecoder:
+    """State of the decoder of triangles: recent edges and vertices, and the next new vertex."""
+
+    def __init__(self, stream: _IndexStream, table: bytes) -> None:
+        self._stream, self._table = stream, table
+        self._edges, self._vertices, self._next = _Recent((0, 0)), _Recent(0), 0
+
+    def triangle(self, code: int) -> tuple[int, int, int]:
+        return self._on_edge(code >> 4, code & 15) if code < 0xF0 else self._apart(code)
+
+    def _new(self) -> int:
+        self._next += 1
+        return self._next - 1
+
+    def _on_edge(self, edge: int, vertex: int) -> tuple[int, int, int]:
+        a, b = self._edges[1 + edge]
+        if vertex >= 13:
+            c = self._stream.index() if vertex == 15 else self._stream.last + (-1 if vertex == 13 else 1)
+            self._stream.last = c
+        else:
+            c = self._new() if vertex == 0 else self._vertices[1 + vertex]
+        if vertex == 0 or vertex >= 13:
+            self._vertices.push(c)
+        self._edges.push((c, b))
+        self._edges.push((a, c))
+        return a, b, c
+
+    def _apart(self, code: int) -> tuple[int, int, int]:
+        packed = self._table[code & 15] if code < 0xFE else self._stream.byte()
+        second, third = packed >> 4, packed & 15
+        first = 15 if code == 0xFF else 0
+        if code >= 0xFE and packed == 0:
+            self._next = 0
+        a = self._new() if first == 0 else 0
+        b = self._new() if second == 0 else self._vertices[second]
+        c = self._new() if third == 0 else self._vertices[third]
+        if code >= 0xFE:
+            a = self._stream.index() if first == 15 else a
+            b = self._stream.index() if second == 15 else b
+            c = self._stream.index() if third == 15 else c
+        self._vertices.push(a)
+        for kind, vertex in ((second, b), (third, c)):
+            if kind == 0 or (kind == 15 and code >= 0xFE):
+                self._vertices.push(vertex)
+        for edge in ((b, a), (c, b), (a, c)):
+            self._edges.push(edge)
+        return a, b, c
+
+
+def _decode_triangles(content: bytes, count: int) -> list[int]:
+    n_triangles, tail = count // 3, len(content) - 16
+    if count % 3 or tail < 1 + n_triangles or content[0] != TRIANGLES_HEADER:
+        raise _damaged()
+    decoder = _TriangleDecoder(_IndexStream(content, 1 + n_triangles, tail), content[tail:])
+    return [corner for code in content[1 : 1 + n_triangles] for corner in decoder.triangle(code)]
+
+
+def _decode_indices(content: bytes, count: int) -> list[int]:
+    if len(content) < 1 + 4 or content[0] != INDICES_HEADER:
+        raise _damaged()
+    stream, last, found = _IndexStream(content, 1, len(content) - 4), [0, 0], []
+    for _ in range(count):
+        value = stream.number()
+        baseline, value = value & 1, value >> 1
+        last[baseline] = (last[baseline] + ((value >> 1) ^ -(value & 1))) & 0xFFFFFFFF
+        found.append(last[baseline])
+    return found

@@ -1,0 +1,219 @@
+"""SubRip and WebVTT: blocks of lines that begin with a line of times.
+
+SubStation Alpha: ASS and SSA.
+
+Instants of subtitle files in seconds.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from tts2face.interchange.subtitles.cues import SubtitleWarning, WrittenCue
+
+# Hours may be missing; point, comma or colon before the fraction; spaces inside, as faulty converters write them.
+_CLOCK = r"(?:(-)\s*)?(?:(\d{1,6})\s*:\s*)?(\d{1,2})\s*:\s*(\d{1,2})(?:\s*[.,:;]\s*(\d{1,9}))?"
+CLOCK = re.compile(_CLOCK)
+_ARROW = r"\s*(?:-{1,3}\s*>|–+\s*>|—+\s*>|→)\s*"
+TIMING = re.compile(rf"^\s*{_CLOCK}{_ARROW}(?:{_CLOCK})?(.*)$")
+HAS_ARROW = re.compile(r"-{1,2}\s?>|[–—]>|→")
+
+
+def clock_seconds(sign: str | None, hours: str | None, minutes: str, seconds: str, fraction: str | None) -> float:
+    """Seconds of a clock reading; the fraction is decimal, whatever its number of digits."""
+    whole = int(hours or 0) * 3600 + int(minutes) * 60 + int(seconds)
+    value = whole + float(f"0.{fraction or 0}")
+    return -value if sign else value
+
+
+def parse_clock(written: str) -> float | None:
+    """Seconds of a clock reading such as ``0:01:02.50``; None if it cannot be read."""
+    match = CLOCK.fullmatch(written.strip())
+    return None if match is None else clock_seconds(*match.groups())
+
+
+_NUMBER = re.compile(r"\s*\d{1,9}\s*")
+_UNSPOKEN_BLOCK = re.compile(r"(?:NOTE|STYLE|REGION)(?:\s|$)")  # W3C WebVTT, 4.1
+_VOICE = re.compile(r"<v(?P<classes>(?:\.[^\s.>]+)*)\s+(?P<name>[^>]+)>")
+_LANGUAGE = re.compile(r"<lang\s+([A-Za-z0-9-]{2,35})\s*>")
+SHOWN_CHARACTERS = 40  # of a line in a warning
+
+
+@dataclass(slots=True)
+class _Block:
+    """Lines after a line of times; a block without times collects what is not shown."""
+
+    line: int
+    begin_s: float | None = None
+    end_s: float | None = None
+    lines: list[str] = field(default_factory=list)
+    number: int | None = None
+    starts_after_blank: bool = True
+
+
+def read_subrip(lines: Sequence[str]) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
+    """Cues of SubRip text; lines of times divide them, so that blank lines and numbers may be missing."""
+    warnings: list[SubtitleWarning] = []
+    blocks = list(_blocks(lines, warnings))
+    return [_cue(block) for block in blocks if block.begin_s is not None], warnings
+
+
+def read_webvtt(lines: Sequence[str]) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
+    """Cues of WebVTT text, without its comments, style sheets and regions; the header may be missing."""
+    warnings: list[SubtitleWarning] = []
+    kept = _without_unspoken(lines)
+    if not any(line.lstrip("\ufeff \t").startswith("WEBVTT") for line in lines[:3]):
+        warnings.append(SubtitleWarning(1, "the header WEBVTT is missing"))
+    cues = []
+    for block in _blocks(kept, warnings, are_ids_words=True):
+        if block.begin_s is None:
+            continue
+        cue = _cue(block)
+        voice, language = _VOICE.search(cue.text), _LANGUAGE.search(cue.text)
+        cues.append(
+            WrittenCue(
+                cue.begin_s,
+                cue.end_s,
+                cue.text,
+                cue.line,
+                speaker=" ".join(voice["name"].split()) if voice else "",
+                style=voice["classes"].lstrip(".") if voice else "",
+                language=language[1] if language else None,
+            )
+        )
+    return cues, warnings
+
+
+def _without_unspoken(lines: Sequence[str]) -> list[str]:
+    """Lines with those of comments, style sheets and regions emptied; the numbers of the others stay."""
+    kept, is_inside = [], False
+    for at, line in enumerate(lines):
+        if not line.strip():
+            is_inside = False
+        elif _UNSPOKEN_BLOCK.match(line) and (at == 0 or not lines[at - 1].strip()):
+            is_inside = True
+        kept.append("" if is_inside else line)
+    return kept
+
+
+def _blocks(lines: Sequence[str], warnings: list[SubtitleWarning], *, are_ids_words: bool = False) -> Iterator[_Block]:
+    """Blocks of lines with times, each without the number or identifier of the next block."""
+    block = _Block(0)
+    for number, line in enumerate(lines, start=1):
+        match = TIMING.match(line)
+        if match is None and not HAS_ARROW.search(line):
+            block.lines.append(line)
+            continue
+        following = _open_block(number, line, match, warnings)
+        _take_label(block, following, are_ids_words=are_ids_words)
+        if not following.starts_after_blank and block.begin_s is not None:
+            warnings.append(SubtitleWarning(number, "there is no blank line before this cue"))
+        yield block
+        block = following
+    yield block
+
+
+def _open_block(number: int, line: str, match: "re.Match[str] | None", warnings: list[SubtitleWarning]) -> _Block:
+    shown = " ".join(line.split())[:SHOWN_CHARACTERS]
+    if match is None:
+        warnings.append(SubtitleWarning(number, f"the times {shown!r} cannot be read; the cue is left out"))
+        return _Block(number)
+    groups = match.groups()
+    end = None if groups[7] is None else clock_seconds(*groups[5:10])
+    if end is None:
+        warnings.append(SubtitleWarning(number, f"the end in {shown!r} cannot be read; it is estimated"))
+    return _Block(number, clock_seconds(*groups[:5]), end)
+
+
+def _take_label(block: _Block, following: _Block, *, are_ids_words: bool) -> None:
+    """Move the number or identifier of the next cue from the end of a block; both are updated."""
+    lines = block.lines
+    following.starts_after_blank = not lines or not lines[-1].strip()
+    if following.starts_after_blank:
+        while lines and not lines[-1].strip():
+            lines.pop()
+        if not (lines and _NUMBER.fullmatch(lines[-1])):  # times directly after a blank line
+            return
+    has_blank_before = not lines[-2].strip() if len(lines) > 1 else block.begin_s is None
+    is_number = _NUMBER.fullmatch(lines[-1]) is not None
+    expected = None if block.number is None else block.number + 1
+    is_label = is_number and (has_blank_before or expected is None or int(lines[-1]) == expected)
+    if is_label or (are_ids_words and has_blank_before):
+        following.number = int(lines[-1]) if is_number else None
+        following.starts_after_blank = has_blank_before
+        lines.pop()
+
+
+def _cue(block: _Block) -> WrittenCue:
+    return WrittenCue(block.begin_s or 0.0, block.end_s, "\n".join(block.lines).strip(), block.line)
+
+
+ASS_FIELDS: tuple[str, ...] = (
+    "layer",
+    "start",
+    "end",
+    "style",
+    "name",
+    "marginl",
+    "marginr",
+    "marginv",
+    "effect",
+    "text",
+)
+SSA_FIELDS: tuple[str, ...] = ("marked", *ASS_FIELDS[1:])
+_SECTION = re.compile(r"\s*\[([^\]]+)\]\s*$")
+_DRAWING = re.compile(r"\\p[1-9]")  # a text in drawing mode holds coordinates, no words
+_LINE_BREAK = re.compile(r"\\[Nn]")
+
+
+def read_substation(lines: Sequence[str]) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
+    """Cues of the dialogue lines; comments, drawings and all other sections are left out."""
+    cues: list[WrittenCue] = []
+    warnings: list[SubtitleWarning] = []
+    section, fields = "", ASS_FIELDS
+    for number, line in enumerate(lines, start=1):
+        heading = _SECTION.match(line)
+        if heading:
+            section = heading[1].strip().lower()
+            if section in {"v4 styles", "v4+ styles"}:
+                fields = SSA_FIELDS if section == "v4 styles" else ASS_FIELDS
+            continue
+        kind, colon, rest = line.strip().partition(":")
+        if not colon:
+            continue
+        if kind.lower() == "format" and section == "events":
+            fields = _format_fields(rest, number, warnings) or fields
+        elif kind.lower() == "dialogue":
+            cue = _dialogue(rest, fields, number, warnings)
+            if cue is not None:
+                cues.append(cue)
+    return cues, warnings
+
+
+def _format_fields(written: str, number: int, warnings: list[SubtitleWarning]) -> tuple[str, ...] | None:
+    fields = tuple("name" if one.strip().lower() == "actor" else one.strip().lower() for one in written.split(","))
+    if {"start", "end", "text"} <= set(fields) and fields[-1] == "text":
+        return fields
+    warnings.append(SubtitleWarning(number, "this Format line lacks Start, End or Text at its end; it is not used"))
+    return None
+
+
+def _dialogue(written: str, fields: Sequence[str], number: int, warnings: list[SubtitleWarning]) -> WrittenCue | None:
+    values = written.split(",", len(fields) - 1)
+    if len(values) < len(fields):
+        warnings.append(SubtitleWarning(number, f"this line has {len(values)} of {len(fields)} fields; it is left out"))
+        return None
+    found: Mapping[str, str] = dict(zip(fields, values, strict=True))
+    begin, end = parse_clock(found["start"]), parse_clock(found["end"])
+    if begin is None:
+        warnings.append(
+            SubtitleWarning(number, f"the start {found['start'].strip()[:20]!r} cannot be read; the cue is left out")
+        )
+        return None
+    if end is None:
+        warnings.append(
+            SubtitleWarning(number, f"the end {found['end'].strip()[:20]!r} cannot be read; it is estimated")
+        )
+    text = "" if _DRAWING.search(found["text"]) else _LINE_BREAK.sub("\n", found["text"]).replace("\\h", " ")
+    style = found.get("style", "").strip().lstrip("*")
+    return WrittenCue(begin, end, text, number, speaker=found.get("name", "").strip(), style=style)

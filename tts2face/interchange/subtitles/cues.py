@@ -1,0 +1,195 @@
+"""Cues of a subtitle file, as they are written and as they are spoken.
+
+The spoken words of a cue, and its speaker's label.
+"""
+
+import html
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenCue:
+    """A cue as its file has it.
+
+    Parameters
+    ----------
+    begin_s, end_s
+        Instants in seconds; `end_s` is None if it is missing or unreadable.
+    text
+        Lines of the cue with their tags.
+    line
+        Line of the file at which the cue begins, from 1.
+    speaker, style
+        Name of the speaker and of the style, where the format has them; else empty.
+    language
+        Language tag of the cue or of the whole file; else None.
+    """
+
+    begin_s: float
+    end_s: float | None
+    text: str
+    line: int
+    speaker: str = ""
+    style: str = ""
+    language: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CuePart:
+    """Words of one speaker in a cue; the speaker is empty if the cue has no name for them."""
+
+    speaker: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Cue:
+    """Words spoken between two instants.
+
+    Parameters
+    ----------
+    number
+        Position in order of time, from 1.
+    begin_s, end_s
+        Instants in seconds; the end lies after the begin.
+    text
+        Spoken words on one line, without tags, noises, lyrics and speaker labels; empty for a silent cue.
+    line
+        Line of the file at which the cue begins, from 1.
+    shown
+        Text as it is shown, on one line, without tags.
+    speaker
+        Speaker by label (``JOHN:``), WebVTT voice tag, actor of SubStation Alpha, or TTML agent; else empty.
+    style
+        Style of SubStation Alpha or TTML, or class of the WebVTT voice tag; else empty.
+    language
+        Language tag, where the file has one.
+    has_estimated_end
+        Whether the end is estimated from the length of the text, as the file has none after the begin.
+    parts
+        Words of each speaker in a cue of several; else empty.
+    """
+
+    number: int
+    begin_s: float
+    end_s: float
+    text: str
+    line: int
+    shown: str = ""
+    speaker: str = ""
+    style: str = ""
+    language: str | None = None
+    has_estimated_end: bool = False
+    parts: tuple[CuePart, ...] = ()
+
+    @property
+    def duration_s(self) -> float:
+        """Duration in seconds."""
+        return self.end_s - self.begin_s
+
+
+@dataclass(frozen=True, slots=True)
+class SubtitleWarning:
+    """A defect of a subtitle file and how it was read."""
+
+    line: int
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Subtitles:
+    """Cues of a file in order of time, and its defects in order of their lines."""
+
+    path: Path
+    cues: tuple[Cue, ...]
+    warnings: tuple[SubtitleWarning, ...]
+
+
+_BREAK_TAG = re.compile(r"<br\s*/?\s*>", re.IGNORECASE)
+_RUBY_TEXT = re.compile(r"<rt\b[^<>]*>.*?(?:</rt\s*>|(?=</ruby)|$)", re.IGNORECASE | re.DOTALL)
+# Tags of SubRip and WebVTT, inner timestamps, and tags of known names that are not closed.
+_TAG = re.compile(
+    r"<\s*/?\s*[A-Za-z][^<>\n]*>|<\d[\d:.,]*>|<\s*/?\s*(?:i|b|u|s|c|v|em|font|ruby|lang|span)(?:[\s.=][^<>\n]*)?(?:$|(?=\n))",
+    re.IGNORECASE,
+)
+_OVERRIDE = re.compile(r"\{[^{}]*\}")  # of SubStation Alpha, also found in SubRip
+_ENTITY = re.compile(r"&(?:amp|lt|gt|nbsp|quot|apos|lrm|rlm|#\d{1,7}|#[xX][0-9a-fA-F]{1,6});")
+_INVISIBLE = re.compile(r"[\u200b-\u200f\u202a-\u202e\u2060-\u2069\ufeff\u00ad]")
+# Additions of subtitles for the deaf: noises in brackets, lyrics between notes.
+_NOISE = re.compile(
+    r"\[[^\]]*(?:\]|$)|\([^()]*\)|（[^（）]*）|【[^【】]*】|［[^［］]*］"
+    r"|[♪♫♬♩][^♪♫♬♩]*(?:[♪♫♬♩]+|$)|(?m:^[^\S\n]*#\s.*(?:\s#)?\s*$)"
+)
+_LABEL = re.compile(
+    r"^(?P<lead>\s*(?:[-–—‐]\s*|>>\s*|•\s*)?)(?P<label>[^\W\d_][^:：\n?!,;]{0,40}?)\s*(?::(?=\s|$)|：)", re.MULTILINE
+)
+_DASH = re.compile(r"^\s*(?:[-–—‐]\s*(?=\S)|>>\s*|•\s*)", re.MULTILINE)
+
+
+_VOICE = re.compile(r"<v(?:\.[^\s.<>]+)*\s([^<>]+)>")
+_VOICE_MARK = re.compile(r"^\s*\x02([^\x03]*)\x03")
+
+
+@dataclass(frozen=True, slots=True)
+class SpokenText:
+    """What of a cue is spoken, on one line, the text as shown, and its parts by speaker.
+
+    The speaker of a part is a label or WebVTT voice, or empty for a dash without a name.
+    """
+
+    spoken: str
+    shown: str
+    parts: tuple[CuePart, ...]
+
+    @property
+    def speaker(self) -> str:
+        """The first speaker that has a name; else empty."""
+        return next((part.speaker for part in self.parts if part.speaker), "")
+
+
+def spoken_text(written: str) -> SpokenText:
+    """Divide the text of a cue into words, tags, noises, lyrics and speakers.
+
+    A label is a name in capitals before a colon and a space (``JOHN:``), at the begin of a line. A part begins at a
+    label, at a tag of one of several WebVTT voices, and at each of two or more lines that begin with a dash.
+    """
+    is_dialogue = len({name.strip() for name in _VOICE.findall(written)}) > 1
+    plain = _plain(_VOICE.sub("\n\x02\\1\x03", written) if is_dialogue else written)
+    lines = _NOISE.sub(" ", plain).split("\n")
+    has_dashes = sum(_DASH.match(line) is not None for line in lines) > 1
+    parts: list[tuple[str, list[str]]] = [("", [])]
+    for line in lines:
+        speaker, rest = _speaker_of(line, has_dashes=has_dashes)
+        if speaker is not None and not (speaker and speaker == parts[-1][0]):
+            parts.append((speaker, []))
+        parts[-1][1].append(rest)
+    spoken = [CuePart(speaker, " ".join(" ".join(words).split())) for speaker, words in parts]
+    spoken = [part for part in spoken if any(character.isalnum() for character in part.text)]
+    shown = " ".join(re.sub(r"\x02[^\x02\x03]*\x03", "", plain).split())
+    return SpokenText(" ".join(part.text for part in spoken), shown, tuple(spoken))
+
+
+def _speaker_of(line: str, *, has_dashes: bool) -> tuple[str | None, str]:
+    """Speaker who begins at a line, empty if unnamed and None if the line continues, and the words of the line."""
+    voice = _VOICE_MARK.match(line)
+    if voice:
+        return " ".join(voice[1].split()), _DASH.sub("", line[voice.end() :])
+    match = _LABEL.match(line)
+    if match:
+        label = " ".join(match["label"].split())
+        if label == label.upper() and label != label.lower():
+            return label, line[match.end() :]
+    dash = _DASH.match(line)
+    if dash:
+        return ("" if has_dashes else None), line[dash.end() :]
+    return None, line
+
+
+def _plain(written: str) -> str:
+    """Text without tags, overrides, entities and invisible characters."""
+    text = _RUBY_TEXT.sub("", _BREAK_TAG.sub("\n", written))
+    text = _OVERRIDE.sub("", _TAG.sub("", text))
+    text = _ENTITY.sub(lambda match: html.unescape(match[0]), text)
+    return _INVISIBLE.sub("", text.replace("\\N", "\n").replace("\\h", " ").replace("\u00a0", " "))

@@ -1,0 +1,226 @@
+"""Reading of subtitle files: SubRip, WebVTT, SubStation Alpha and TTML, with warnings in place of refusals.
+
+Decoding of text files whose encoding is not declared.
+"""
+
+import codecs
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from lexicon.errors import DataError, InputError
+from lexicon.inputs import check_regular_file
+from tts2face.interchange.subtitles.blocks import HAS_ARROW, read_subrip, read_substation, read_webvtt
+from tts2face.interchange.subtitles.cues import Cue, Subtitles, SubtitleWarning, WrittenCue, spoken_text
+from tts2face.interchange.subtitles.ttml import read_ttml
+
+MAX_BYTES = 8 << 20  # 8 MiB; the words of a whole day of speech are below 1 MiB
+_BYTE_ORDER_MARKS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)  # in this order: the mark of UTF-32-LE begins with that of UTF-16-LE
+# UTF-16 without a mark: the high byte of digits, line ends and arrows, which every subtitle file contains, is 0.
+_ZERO_SHARE = 0.2
+
+
+def read_text(path: Path, encoding: str | None = None) -> str:
+    """Characters of a text file: by its byte order mark, else as UTF-8, UTF-16 or Windows 1252.
+
+    Parameters
+    ----------
+    encoding
+        Encoding of files without a byte order mark that are not UTF-8, such as ``cp1250``; None: Windows 1252.
+
+    Raises
+    ------
+    InputError
+        There is no such encoding.
+    DataError
+        The file cannot be read, is too large, or is not text.
+    """
+    check_regular_file(path)
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except OSError as refused:
+        raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
+    if len(content) > MAX_BYTES:
+        raise DataError(f"{path} is larger than {MAX_BYTES >> 20} MiB; give the transcript only")
+    text = _decode(content, path, encoding)
+    if "\0" in text:
+        raise DataError(f"{path} is not text (it contains zero bytes); save it as UTF-8")
+    return text
+
+
+def check_encoding(encoding: str) -> str:
+    """Name of a text encoding.
+
+    Raises
+    ------
+    InputError
+        Python has no such encoding.
+    """
+    try:
+        return codecs.lookup(encoding).name
+    except LookupError as unknown:
+        raise InputError(f"there is no encoding {encoding!r}; give one such as cp1250, utf-8 or shift_jis") from unknown
+
+
+def _decode(content: bytes, path: Path, encoding: str | None) -> str:
+    fallback = "cp1252" if encoding is None else check_encoding(encoding)
+    try:
+        for mark, name in _BYTE_ORDER_MARKS:
+            if content.startswith(mark):
+                return content[len(mark) :].decode(name)
+        if (wide := _guess_wide(content)) is not None:
+            return content.decode(wide)
+        try:
+            return content.decode("utf-8")
+        except UnicodeDecodeError:
+            return content.decode(fallback)
+    except UnicodeDecodeError as broken:
+        if encoding is not None:
+            raise DataError(f"{path} is not text in {encoding}; choose another encoding") from broken
+        raise DataError(
+            f"{path} is not text in UTF-8, UTF-16, UTF-32 or Windows 1252; save it as UTF-8 or name its encoding"
+        ) from broken
+
+
+def _guess_wide(content: bytes) -> str | None:
+    """UTF-16 without a byte order mark, by the places of its zero bytes; None for other text."""
+    if len(content) % 2:
+        return None
+    half = max(len(content) // 2, 1)
+    first, second = content[::2].count(0) / half, content[1::2].count(0) / half
+    if second > _ZERO_SHARE and first < _ZERO_SHARE / 10:
+        return "utf-16-le"
+    return "utf-16-be" if first > _ZERO_SHARE and second < _ZERO_SHARE / 10 else None
+
+
+SUBRIP, WEBVTT, SUBSTATION, TTML = "SubRip", "WebVTT", "SubStation Alpha", "TTML"
+SUFFIXES = {
+    ".srt": SUBRIP,
+    ".vtt": WEBVTT,
+    ".ass": SUBSTATION,
+    ".ssa": SUBSTATION,
+    ".ttml": TTML,
+    ".dfxp": TTML,
+    ".itt": TTML,
+    ".xml": TTML,
+}
+CHARACTERS_PER_S = 15.0  # of speech; for the end of a cue whose own end is missing
+MIN_ESTIMATED_S = 1.0
+MAX_S = 1e6  # 11 days; larger times are damaged
+_XML = re.compile(r"\s*<(?:\?xml|!DOCTYPE|!--|(?:\w+:)?tt[\s>])")
+_SECTION = re.compile(r"^\s*\[(?:Script Info|V4\+? Styles|Events)\]", re.IGNORECASE | re.MULTILINE)
+
+
+def read_subtitles(path: Path | str, encoding: str | None = None) -> Subtitles:
+    """Cues of a subtitle file in order of time, and warnings of its defects.
+
+    The content decides the format where it is unmistakable, else the suffix. Defects are read as players do and
+    reported with their lines: missing blank lines and numbers, unreadable times, cues out of order, ends before begins,
+    overlaps, duplicates, missing headers.
+
+    Parameters
+    ----------
+    encoding
+        Encoding of text that is neither UTF-8 nor marked; None: Windows 1252.
+
+    Raises
+    ------
+    InputError
+        There is no such encoding.
+    DataError
+        The file cannot be read or contains no cue.
+    """
+    path = Path(path)
+    text = read_text(path, encoding).replace("\r\n", "\n").replace("\r", "\n")
+    try:
+        written, warnings = _read(text, path)
+    except DataError as wrong:
+        raise DataError(f"{path}, {wrong}") from wrong
+    cues = _timed(_ordered(written, warnings), warnings)
+    if not cues:
+        raise DataError(f"{path} contains no subtitles; export them again")
+    return Subtitles(path, cues, tuple(sorted(warnings, key=lambda warning: warning.line)))
+
+
+def subtitle_format(text: str, suffix: str) -> str:
+    """Format of the text of a subtitle file: by its content where that is unmistakable, else by its suffix."""
+    head = text.lstrip("\ufeff \t\n")
+    if head.startswith("WEBVTT"):
+        return WEBVTT
+    if _XML.match(text):
+        return TTML
+    if _SECTION.search(text):
+        return SUBSTATION
+    named = SUFFIXES.get(suffix.lower(), SUBRIP)
+    return SUBRIP if named in (SUBSTATION, TTML) and HAS_ARROW.search(text) else named
+
+
+def _read(text: str, path: Path) -> tuple[list[WrittenCue], list[SubtitleWarning]]:
+    kind = subtitle_format(text, path.suffix)
+    if kind == TTML:
+        return read_ttml(text)
+    lines = text.split("\n")
+    if kind == SUBSTATION:
+        return read_substation(lines)
+    return read_webvtt(lines) if kind == WEBVTT else read_subrip(lines)
+
+
+def _ordered(written: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> list[WrittenCue]:
+    """Cues in order of time, without duplicates and without times that no film has."""
+    kept: list[WrittenCue] = []
+    latest, seen = 0.0, set()
+    for cue in written:
+        if cue.begin_s > MAX_S:
+            warnings.append(SubtitleWarning(cue.line, f"the begin {cue.begin_s:.0f} s is damaged; the cue is left out"))
+            continue
+        if cue.begin_s < 0:
+            warnings.append(SubtitleWarning(cue.line, "the begin is negative; the cue begins at 0 s"))
+            cue = replace(cue, begin_s=0.0)  # noqa: PLW2901 - the corrected cue
+        if cue.begin_s < latest:
+            warnings.append(SubtitleWarning(cue.line, "this cue begins before the one above it; cues are sorted"))
+        key = (round(cue.begin_s, 3), cue.text)
+        if key in seen:
+            warnings.append(SubtitleWarning(cue.line, "this cue repeats another one; it is left out"))
+            continue
+        seen.add(key)
+        latest = max(latest, cue.begin_s)
+        kept.append(cue)
+    return sorted(kept, key=lambda cue: cue.begin_s)
+
+
+def _timed(written: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> tuple[Cue, ...]:
+    cues: list[Cue] = []
+    for number, cue in enumerate(written, start=1):
+        text = spoken_text(cue.text)
+        following = written[number].begin_s if number < len(written) else None
+        end = cue.end_s
+        is_estimated = end is None or end <= cue.begin_s or end > MAX_S
+        if is_estimated:
+            if end is not None:
+                warnings.append(SubtitleWarning(cue.line, "the cue ends before it begins; its end is estimated"))
+            end = _estimated_end(cue.begin_s, following, text.spoken or text.shown)
+        elif following is not None and end is not None and end > following + 1e-6:
+            message = f"this cue overlaps the next one by {end - following:.2f} s"
+            warnings.append(SubtitleWarning(cue.line, message))
+        parts = text.parts if len(text.parts) > 1 else ()
+        if parts and not parts[0].speaker:
+            parts = (replace(parts[0], speaker=cue.speaker), *parts[1:])
+        cues.append(
+            Cue(number, cue.begin_s, end or 0.0, text.spoken, cue.line, text.shown, text.speaker or cue.speaker,
+                cue.style, cue.language, is_estimated, parts)
+        )  # fmt: skip
+    return tuple(cues)
+
+
+def _estimated_end(begin: float, following: float | None, text: str) -> float:
+    """End of a cue by the length of its text, but not after the begin of the next one."""
+    end = begin + max(MIN_ESTIMATED_S, len(text) / CHARACTERS_PER_S)
+    return min(end, following) if following is not None and following > begin else end

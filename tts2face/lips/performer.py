@@ -1,0 +1,155 @@
+"""Retargeting of a performer to a face: lips by least squares on landmarks, eyes and brows by blendshape scores."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+from tts2face.face.mouth import MIDDLE_PAIR
+from tts2face.lips.retargeting import Retargeter, build_retargeter
+from tts2face.lips.score_matching import scaled_scores
+from tts2face.models.face import Face
+from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION, N_LANDMARKS, eye_aperture, inner_lip_gaps
+from tts2face.models.networks import mouth_scores
+from tts2face.models.talker import ShapeModel, Talker, speech_channels
+from tts2face.numeric.arrays import principal_axes
+from tts2face.types import Trajectory
+
+N_MOUTH_MODES = 20
+CLOSED_FRAME_SHARE = 0.15  # share of the frames that count as having closed lips
+MAX_CONTACT_MM = 1.5  # upper limit of the tracked gap of touching lips
+SCORE_DRIVEN_SHAPES = ("eye", "brow", "nose", "cheek")  # name prefixes of the shapes that follow scores
+SCORE_DEAD_ZONE = 0.04  # amplitude of the noise of scores
+OPEN_LID_QUANTILE, CLOSED_LID_SHARE = 0.9, 0.25  # aperture quantile of an open eye; share of it of a closed eye
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PerformerRetargeter:
+    """Mapping from a performer's landmarks and scores to the weights of a face; built by `build_performer_retargeter`.
+
+    ``open_apertures`` holds the aperture of each open eye over its width, ``neutral_scores`` (B,) the median scores,
+    ``rest_scores`` (n,) those of `mouth_scores` with closed lips.
+    """
+
+    model: ShapeModel
+    lips: Retargeter
+    face: Face
+    open_apertures: dict[str, float]
+    neutral_scores: NDArray[np.float32]
+    rest_scores: FloatArray
+
+    def weights(self, landmarks: NDArray[np.floating], scores: Trajectory, *, gain: float = 1.0) -> Trajectory:
+        """Weights (T, K) of the face's shapes.
+
+        Parameters
+        ----------
+        landmarks : (T, 478, 3)
+            Millimetres, head pose removed.
+        scores : (T, B)
+            Blendshape scores by ARKit name.
+        gain
+            Factor on the motion of lips and brows; lids and gaze are not scaled.
+        """
+        speech = self.lip_motion(landmarks, scores.fps, gain=gain)
+        mouth = scaled_scores(mouth_scores(scores), self.rest_scores, gain)
+        weights = np.array(self.lips.retarget(speech, mouth).values)
+        lids = {side: self._lid_closure(landmarks, side) for side in EYELID_LANDMARKS}
+        for column, name in enumerate(self.face.shape_names):
+            if not name.startswith(SCORE_DRIVEN_SHAPES) or name not in scores.channels:
+                continue
+            at = scores.channels.index(name)
+            weight = np.maximum(scores.values[:, at] - self.neutral_scores[at] - SCORE_DEAD_ZONE, 0.0)
+            if name.startswith("eyeBlink"):
+                weight = lids[name.removeprefix("eyeBlink")]
+            elif not name.startswith("eye"):
+                weight = gain * weight
+            weights[:, column] = np.clip(weight, *self.face.limits[column])
+        return Trajectory(self.face.shape_names, weights, scores.fps)
+
+    def lip_motion(self, landmarks: NDArray[np.floating], fps: float, *, gain: float = 1.0) -> Trajectory:
+        """Speech parameters (T, S) of the performer's own shape model."""
+        rest = self.model.rest
+        values = rest + gain * (self.model.parameters(landmarks) - rest)
+        return Trajectory(speech_channels(self.model), values, fps)
+
+    def _lid_closure(self, landmarks: NDArray[np.floating], side: str) -> FloatArray:
+        opened = self.open_apertures[side]
+        return np.clip((opened - eye_aperture(landmarks, side)) / (opened * (1.0 - CLOSED_LID_SHARE)), 0.0, 1.0)
+
+
+def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajectory, face: Face) -> PerformerRetargeter:
+    """Retargeter from a performer, given some seconds of landmarks and scores, to a face.
+
+    Parameters
+    ----------
+    landmarks : (T, 478, 3)
+        Millimetres, head pose removed.
+
+    Raises
+    ------
+    DataError
+        There are fewer than 2 frames, or the face lacks landmarks of the lips or shapes that move them.
+    """
+    model = lip_model(landmarks)
+    gaps = inner_lip_gaps(landmarks)
+    closed = np.argsort(gaps[:, MIDDLE_PAIR], kind="stable")[: max(1, int(CLOSED_FRAME_SHARE * len(gaps)))]
+    contact = np.clip(np.percentile(gaps[closed], 50, axis=0), 0.0, MAX_CONTACT_MM)
+    rest_scores = np.median(mouth_scores(scores)[closed], axis=0)
+    talker = Talker(scores.fps, model, (), {"name": "performer"})
+    return PerformerRetargeter(
+        model=model,
+        lips=build_retargeter(talker, face, contact=contact, rest_scores=rest_scores),
+        face=face,
+        open_apertures={
+            side: float(np.quantile(eye_aperture(landmarks, side), OPEN_LID_QUANTILE)) for side in EYELID_LANDMARKS
+        },
+        neutral_scores=np.median(scores.values, axis=0),
+        rest_scores=rest_scores,
+    )
+
+
+def match_shapes(captured: Trajectory, face: Face, *, gain: float = 1.0) -> Trajectory:
+    """Weights (T, K) of a face's shapes from captured weights of the same names, clipped to their limits.
+
+    The gain does not apply to eye shapes; shapes that were not captured have weight 0.
+    """
+    weights = np.zeros((len(captured), len(face.shape_names)), np.float32)
+    for column, name in enumerate(face.shape_names):
+        if name in captured.channels:
+            size = 1.0 if name.startswith("eye") else gain
+            weight = captured.values[:, captured.channels.index(name)]
+            weights[:, column] = np.clip(size * weight, *face.limits[column])
+    return Trajectory(face.shape_names, weights, captured.fps)
+
+
+def lip_model(landmarks: NDArray[np.floating]) -> ShapeModel:
+    """Shape model of the mouth region of (T, 478, 3) landmarks by principal components; its rest has closed lips.
+
+    Raises
+    ------
+    DataError
+        There are fewer than 2 frames.
+    """
+    n_modes = min(N_MOUTH_MODES, len(landmarks) - 1)
+    if n_modes < 1:
+        raise DataError("a shape model needs at least 2 frames with a face; give a longer take")
+    mean = landmarks.mean(axis=0, dtype=np.float64)
+    region = np.isin(np.arange(N_LANDMARKS), MOUTH_REGION)
+    offsets = (landmarks[:, region] - mean[region]).reshape(len(landmarks), -1)
+    variances, axes = principal_axes(np.asarray(offsets.T @ offsets / len(offsets), np.float64), n_modes)
+    basis = np.zeros((n_modes, N_LANDMARKS, 3))
+    basis[:, region] = axes.reshape(n_modes, -1, 3)
+    gap = inner_lip_gaps(landmarks)[:, MIDDLE_PAIR]
+    closed = gap <= np.quantile(gap, CLOSED_FRAME_SHARE)
+    flat = np.median(landmarks[closed], axis=0) - mean
+    rest = basis.reshape(n_modes, -1) @ flat.ravel()
+    spread = np.sqrt(np.maximum(variances, 1e-12))
+    return ShapeModel(
+        mean=mean.astype(np.float32),
+        basis=basis.astype(np.float32),
+        spread=spread.astype(np.float32),
+        n_speech=n_modes,
+        rest=rest.astype(np.float32),
+    )

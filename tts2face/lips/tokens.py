@@ -1,0 +1,268 @@
+"""Phone tokens of a talker's recordings, with their positions in the recorded motion.
+
+Interpolation of recorded motion at any time.
+
+Conversion of a phone sequence to phones of the talker's recordings.
+"""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.phones import nearest_phones
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.models.talker import Talker
+from tts2face.numeric.kernels import kernel
+
+MAX_CONTEXT = 6  # stored context phones on either side
+PAUSE_REACH_S = 0.25  # part of a silence that belongs to the adjacent speech, in which lips open or come to rest
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tokens:
+    """N phone tokens over the recorded motion of all utterances.
+
+    Parameters
+    ----------
+    inventory : P labels
+        Sorted; `SILENCE` is always one of them.
+    phone, utterance : (N,), (N,)
+        Index into `inventory`, index of the talker's utterance.
+    spans : (N, 4)
+        Seconds on the utterance's clock: where the previous phone begins, this one begins, this one ends, the next one
+        ends. Silence is limited to the `PAUSE_REACH_S` next to speech, as is the overlap with a neighbour.
+    context : (N, 2 MAX_CONTEXT)
+        Labels around the token: left at distance 1, right at 1, left at 2, ...; `SILENCE` beyond the utterance.
+    frames, first_frame : (F, D), (U + 1,)
+        Speech parameters of all frames, and where each utterance begins.
+    fps
+        Frames per second of the recordings.
+    """
+
+    inventory: tuple[str, ...]
+    phone: NDArray[np.int32]
+    utterance: NDArray[np.int32]
+    spans: NDArray[np.float64]
+    context: NDArray[np.int32]
+    frames: NDArray[np.float32]
+    first_frame: NDArray[np.int64]
+    fps: float
+
+    def __len__(self) -> int:
+        """Count the tokens."""
+        return len(self.phone)
+
+
+def collect_tokens(talker: Talker) -> Tokens:
+    """Tokens of all utterances of a talker, in the talker's order."""
+    n_speech = talker.model.n_speech
+    labels = [phone for utterance in talker.utterances for phone in utterance.phones.phones]
+    inventory = tuple(sorted({*labels, SILENCE}))
+    number = {label: at for at, label in enumerate(inventory)}
+    phone = np.array([number[label] for label in labels], np.int32)
+    counts = [len(utterance.phones) for utterance in talker.utterances]
+    utterance = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
+    lengths = [len(utterance.shape) for utterance in talker.utterances]
+    return Tokens(
+        inventory,
+        phone,
+        utterance,
+        np.concatenate(
+            [spoken_spans(utterance.phones.phones, utterance.phones.edges) for utterance in talker.utterances]
+        ),
+        phone_contexts(phone, utterance, number[SILENCE]),
+        np.concatenate([utterance.shape[:, :n_speech] for utterance in talker.utterances]).astype(np.float32),
+        np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
+        talker.fps,
+    )
+
+
+def phone_contexts(phone: NDArray[np.int32], utterance: NDArray[np.int32], silence: int) -> NDArray[np.int32]:
+    """(N, 2 `MAX_CONTEXT`) labels left and right of each of N phones, nearest first; `silence` beyond an utterance."""
+    n = len(phone)
+    around = np.full((n, 2 * MAX_CONTEXT), silence, np.int32)
+    for distance in range(1, min(MAX_CONTEXT, n - 1) + 1):
+        together = utterance[distance:] == utterance[:-distance]
+        around[distance:, 2 * distance - 2][together] = phone[:-distance][together]
+        around[:-distance, 2 * distance - 1][together] = phone[distance:][together]
+    return around
+
+
+def spoken_spans(phones: tuple[str, ...], edges: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 4) seconds at which the previous phone begins, each phone begins and ends, and the next one ends.
+
+    A silence at either end of the utterance keeps only the `PAUSE_REACH_S` next to speech; the overlap with a
+    neighbour has at most that length.
+    """
+    starts, ends = edges[:-1].copy(), edges[1:].copy()
+    if len(phones) > 1:
+        if phones[0] == SILENCE:
+            starts[0] = max(starts[0], ends[0] - PAUSE_REACH_S)
+        if phones[-1] == SILENCE:
+            ends[-1] = min(ends[-1], starts[-1] + PAUSE_REACH_S)
+    return spans_with_reach(starts, ends)
+
+
+def spans_with_reach(starts: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(N, 4): starts and ends, with the reach into the neighbours before and behind them."""
+    before = np.concatenate([[starts[0] - PAUSE_REACH_S], starts[:-1]])
+    behind = np.concatenate([ends[1:], [ends[-1] + PAUSE_REACH_S]])
+    return np.stack(
+        [np.maximum(before, starts - PAUSE_REACH_S), starts, ends, np.minimum(behind, ends + PAUSE_REACH_S)], axis=1
+    )
+
+
+Float32Array = NDArray[np.float32]
+
+
+@kernel
+def read_motion(frames: Float32Array, first: int, last: int, at: float, out: Float32Array) -> None:
+    """Write into `out` (D,) the value of rows [first, last) at frame position `at`, counted from `first`.
+
+    Catmull-Rom cubic through the frames (Catmull and Rom 1974): it passes through each of them and, unlike linear
+    interpolation, preserves extrema between frames. Constant beyond the ends.
+    """
+    n = last - first
+    at = min(max(at, 0.0), n - 1.0)
+    i = min(int(at), max(n - 2, 0))
+    u = at - i
+    a, b = first + max(i - 1, 0), first + i
+    c, d = first + min(i + 1, n - 1), first + min(i + 2, n - 1)
+    wa = u * (-0.5 + u * (1.0 - 0.5 * u))
+    wb = 1.0 + u * u * (-2.5 + 1.5 * u)
+    wc = u * (0.5 + u * (2.0 - 1.5 * u))
+    wd = u * u * (-0.5 + 0.5 * u)
+    for k in range(frames.shape[1]):
+        out[k] = wa * frames[a, k] + wb * frames[b, k] + wc * frames[c, k] + wd * frames[d, k]
+
+
+@kernel
+def sample_tokens(
+    frames: Float32Array, bounds: NDArray[np.int64], positions: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """(N, S, D) recorded motion of N tokens at S frame positions each.
+
+    Parameters
+    ----------
+    frames : (F, D)
+    bounds : (N, 2)
+        First row of the token's utterance and the row behind its last.
+    positions : (N, S)
+        Frames from the utterance's first.
+    """
+    out = np.zeros((positions.shape[0], positions.shape[1], frames.shape[1]), np.float32)
+    for n in range(positions.shape[0]):
+        for s in range(positions.shape[1]):
+            read_motion(frames, bounds[n, 0], bounds[n, 1], positions[n, s], out[n, s])
+    return out
+
+
+# Glottal sounds have no lip shape: lips and tongue are already in the position of the next phone.
+TRANSPARENT_PHONES = frozenset({"h", "ɦ", "ʔ"})
+
+
+MIN_TARGET_GAP_S = 1e-6  # between targets: less is rounding
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Targets:
+    """N phones of the talker's inventory, in temporal order.
+
+    Parameters
+    ----------
+    labels : N labels
+    spans : (N, 4)
+        Seconds, as in `tts2face.lips.tokens.Tokens`; parts of silence far from speech belong to no target.
+    source : (N,)
+        Index of the requested phone that each one replaces.
+    """
+
+    labels: tuple[str, ...]
+    spans: NDArray[np.float64]
+    source: NDArray[np.int64]
+
+
+@functools.lru_cache(maxsize=4096)
+def substitute_phones(label: str, inventory: tuple[str, ...]) -> tuple[str, ...]:
+    """Phones of the inventory for a phone: itself, the nearest one, or those of its parts; none for a transparent one.
+
+    Raises
+    ------
+    InputError
+        The label is not in the phone table, or the inventory has no phone but silence.
+    """
+    if label not in inventory and label in TRANSPARENT_PHONES:
+        return ()
+    return nearest_phones(label, inventory)
+
+
+def build_targets(phones: PhoneSequence, inventory: tuple[str, ...]) -> Targets:
+    """Targets of a phone sequence.
+
+    The time of a transparent phone is assigned to the next phone, or before silence to the last one. A
+    silence between speech that is longer than two reaches becomes two targets, one after the speech and one before it.
+
+    Raises
+    ------
+    InputError
+        A label is not in the phone table, or the inventory has no phone but silence.
+    """
+    rows = _substitution_rows(phones, inventory)
+    rows = [part for at, row in enumerate(rows) for part in _cut_to_speech(row, at > 0, at + 1 < len(rows))]
+    starts, ends = np.array([row[1] for row in rows]), np.array([row[2] for row in rows])
+    return Targets(
+        tuple(row[0] for row in rows), spans_with_reach(starts, ends), np.array([row[3] for row in rows], np.int64)
+    )
+
+
+def target_phones(targets: Targets) -> PhoneSequence:
+    """The targets as phones in time from 0 s on, with silence where there is none."""
+    labels: list[str] = []
+    edges = [0.0]
+    for label, (start, end) in zip(targets.labels, targets.spans[:, 1:3], strict=True):
+        if start - edges[-1] > MIN_TARGET_GAP_S:
+            labels.append(SILENCE)
+            edges.append(float(start))
+        labels.append(label)
+        edges.append(float(end))
+    return PhoneSequence(labels, edges)
+
+
+TargetRow = tuple[str, float, float, int]  # label, start, end, index of the requested phone
+
+
+def _substitution_rows(phones: PhoneSequence, inventory: tuple[str, ...]) -> list[TargetRow]:
+    rows: list[TargetRow] = []
+    waiting: float | None = None  # onset of a transparent phone
+    for at, label in enumerate(phones.phones):
+        start, end = float(phones.edges[at]), float(phones.edges[at + 1])
+        shown = substitute_phones(label, inventory)
+        if not shown:
+            waiting = start if waiting is None else waiting
+            continue
+        if waiting is not None and label == SILENCE and rows:
+            rows[-1] = (rows[-1][0], rows[-1][1], start, rows[-1][3])
+        elif waiting is not None:
+            start = waiting
+        waiting = None
+        cuts = np.linspace(start, end, len(shown) + 1)
+        rows += [(part, float(cuts[i]), float(cuts[i + 1]), at) for i, part in enumerate(shown)]
+    if waiting is not None:
+        rows.append((SILENCE, waiting, phones.end, len(phones) - 1))
+    return rows
+
+
+def _cut_to_speech(row: TargetRow, behind_speech: bool, before_speech: bool) -> list[TargetRow]:
+    label, start, end, source = row
+    if label != SILENCE or end - start <= PAUSE_REACH_S:
+        return [row]
+    parts = []
+    if behind_speech and before_speech and end - start <= 2 * PAUSE_REACH_S:
+        return [row]
+    if behind_speech:
+        parts.append((label, start, start + PAUSE_REACH_S, source))
+    if before_speech:
+        parts.append((label, end - PAUSE_REACH_S, end, source))
+    return parts or [row]

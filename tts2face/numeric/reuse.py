@@ -1,0 +1,148 @@
+"""Computation ahead of use: items of an iterable in one thread, a function of items in several threads.
+
+Results of finished sentences, kept so that a request that is made again repeats only what has changed.
+"""
+
+import contextlib
+import queue
+import threading
+from collections import OrderedDict, deque
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from types import TracebackType
+from typing import Any, Generic, TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+ItemOrError = tuple[Any, BaseException | None]
+POLL_INTERVAL_S = 0.1  # longest time until the producer thread notices that it has been stopped
+
+
+class Prefetch(Generic[Item]):
+    """Iterator over a source whose items are produced in a background thread.
+
+    Production starts and stops with the ``with`` block. An exception of the source is raised in place of the item that
+    failed. The thread is no daemon: a process that exits while native code is running in one aborts.
+
+    Parameters
+    ----------
+    source
+        Items, produced in order.
+    n_ahead
+        Largest number of items that are produced before they are requested.
+    """
+
+    def __init__(self, source: Iterable[Item], n_ahead: int) -> None:
+        self._source = source
+        self._queue: queue.Queue[ItemOrError] = queue.Queue(n_ahead)
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._fill, name="prefetch")
+
+    def __enter__(self) -> "Prefetch[Item]":
+        """Start production; return the iterator itself."""
+        try:
+            self._thread.start()
+        except BaseException:  # an interruption, after which the thread runs or not
+            self._stopped.set()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Wait until the current item is finished."""
+        self._stopped.set()
+        self._thread.join()
+
+    def __iter__(self) -> Iterator[Item]:
+        """Yield the items in order."""
+        while True:
+            item, error = self._queue.get()
+            if isinstance(error, StopIteration):
+                return
+            if error is not None:
+                raise error
+            yield item
+
+    def _fill(self) -> None:
+        try:
+            for item in self._source:
+                self._put((item, None))
+                if self._stopped.is_set():
+                    return
+            self._put((None, StopIteration()))
+        except BaseException as error:  # noqa: BLE001 - raised again in the consuming thread
+            self._put((None, error))
+
+    def _put(self, item: ItemOrError) -> None:
+        while not self._stopped.is_set():
+            with contextlib.suppress(queue.Full):
+                return self._queue.put(item, timeout=POLL_INTERVAL_S)
+
+
+def map_in_order(function: Callable[[Item], Result], items: Iterable[Item], threads: int) -> Iterator[Result]:
+    """Yield `function` of each item in order; up to `threads` results are computed in advance."""
+    with ThreadPoolExecutor(threads, "map") as pool:
+        ahead: deque[Future[Result]] = deque()
+        try:
+            for item in items:
+                ahead.append(pool.submit(function, item))
+                if len(ahead) > threads:
+                    yield ahead.popleft().result()
+            while ahead:
+                yield ahead.popleft().result()
+        finally:
+            for pending in ahead:
+                pending.cancel()
+
+
+Value = TypeVar("Value")
+
+
+class SentenceMemory:
+    """Values by key up to a number of bytes; the least recently used ones are dropped. Thread-safe.
+
+    Parameters
+    ----------
+    max_bytes
+        Largest total of the sizes that `recall` is given; 0 keeps nothing.
+    """
+
+    def __init__(self, max_bytes: int) -> None:
+        self._max_bytes = max_bytes
+        self._lock = threading.Lock()
+        self._values: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
+        self._n_bytes = 0
+
+    @property
+    def is_used(self) -> bool:
+        """Whether anything is kept."""
+        return self._max_bytes > 0
+
+    @property
+    def n_bytes(self) -> int:
+        """Total of the sizes of the values that are kept."""
+        return self._n_bytes
+
+    def recall(self, key: Callable[[], Hashable], make: Callable[[], Value], size: Callable[[Value], int]) -> Value:
+        """The kept value of a key, or a new one, which is kept if it is small enough."""
+        if not self.is_used:
+            return make()
+        found = key()
+        with self._lock:
+            if found in self._values:
+                self._values.move_to_end(found)
+                kept: Value = self._values[found][0]
+                return kept
+        value = make()
+        n_bytes = size(value)
+        with self._lock:
+            if found not in self._values and n_bytes <= self._max_bytes:
+                self._values[found] = (value, n_bytes)
+                self._n_bytes += n_bytes
+                while self._n_bytes > self._max_bytes:
+                    self._n_bytes -= self._values.popitem(last=False)[1][1]
+        return value
+
+
+NO_MEMORY = SentenceMemory(0)  # keeps nothing

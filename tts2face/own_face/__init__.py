@@ -1,1 +1,0 @@
-"""Appearance and gestures of a talker's own face."""

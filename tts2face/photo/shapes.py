@@ -1,0 +1,416 @@
+"""Shapes of a photographed face: those of the shipped head, carried to its mesh by their common landmarks.
+
+Vertices, shapes and triangles of a photographed face, gathered part by part, and the pages of its pictures.
+
+Lids that appear between the fold above an eye and the band that moves down with the lid's margin.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.models.baked_light import LEAST_SIDE
+from tts2face.models.landmarks import (
+    CHIN,
+    FACE_OVAL,
+    INNER_LIP_LOWER,
+    INNER_LIP_UPPER,
+    MOUTH_CORNER_LEFT,
+    MOUTH_CORNER_RIGHT,
+    OUTER_LIP_LOWER,
+    OUTER_LIP_UPPER,
+)
+from tts2face.numeric.arrays import smoothstep
+from tts2face.photo.camera import PhotoCamera
+from tts2face.photo.eyes import EyePatch
+from tts2face.photo.lines import LID_MARGINS, N_LID, LipLine, spline_weights
+from tts2face.photo.lines import N_POINTS as N_LIP
+from tts2face.photo.mesh import LIP_RINGS, PhotoMesh, Spreading, grid_triangles
+from tts2face.photo.teeth import OwnTeeth
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+OWN_SHAPES = ("eyeBlink", "eyeLook", "tongue")  # prefixes of the head's shapes whose skin is moved otherwise
+# Towards landmarks of the skin, of the face's oval, of brows, the folds above the eyes, and lips and lids.
+SKIN_PULL, OVAL_PULL, BROW_PULL, FOLD_PULL, LINE_PULL = 0.05, 0.003, 0.2, 0.3, 1e3
+STILL_FROM = 0.75  # of the eye distance from the face, beyond which no shape moves it
+BROWS = (
+    ((70, 46), (63, 53), (105, 52), (66, 65), (107, 55)),
+    ((300, 276), (293, 283), (334, 282), (296, 295), (336, 285)),
+)  # upper and lower landmarks of each brow, which move as one
+LID_MEETING = 0.10  # of the opening of an eye from its lower lid, where the lids meet
+ABOVE_LIDS = (
+    (247, 30, 29, 27, 28, 56, 190),
+    (467, 260, 259, 257, 258, 286, 414),
+)  # landmarks of the fold, from the outer corner to the inner one
+BELOW_LIDS = ((25, 110, 24, 23, 22, 26, 112), (255, 339, 254, 253, 252, 256, 341))
+AROUND_EYES = ((130, 243), (359, 463))
+FOLD_FOLLOW, BELOW_FOLLOW = 0.12, 0.35  # of the way of the lid beside them, by which folds and lower lids follow
+FEATURES_STILL = 0.2  # of the eye distance outside the face, beyond which blinks and closing lips move nothing
+GAZE_LIDS = {"eyeLookDown": 0.22, "eyeLookUp": -0.10}  # of a blink, by which the lids follow the gaze
+UPPER_SHARE, SMILING_SHARE = 0.25, 0.3  # of the way on which lips meet, of the upper lip; more in a smile
+LOWER_FOLLOW = (0.97, 1.05)  # of that way, by which the red of the lower lip and its outer edge follow
+PARTED = 0.03  # of the eye distance: a gap of lips that do not touch
+MOUTH_MIDDLE = (0, 17, 13)  # landmarks of the upper edge, the lower edge and the middle of the mouth
+LIP_STILL = 0.34  # of the eye distance from the mouth, beyond which closing lips move nothing
+BREATH_MM = 3.0  # rise of the shoulders
+SHOULDERS = (0.1, 0.9)  # below the chin, of the eye distance, over which they begin
+BELOW_SHOULDERS = (2.0, 3.6)  # over which their rise fades downwards
+BESIDE_SHOULDERS = (1.2, 2.0)  # from the middle of the face, of its width, over which they end
+NECK_FADE = (-0.05, 0.95)  # below the chin, of the eye distance, over which skin stops following the head
+TOP, SIDES_OF_FACE = 10, (234, 454)  # landmarks
+HEAD_ELLIPSE = (0.66, 0.78, 0.66)  # half axes of the head: of the face's width to the side, of its height up and down
+HEAD_MIDDLE = 0.14  # of the height of the face above its middle
+HEAD_FADE = (1.0, 1.75)  # half axes over which the background stops following the head
+BESIDE_NECK = (0.35, 0.75)  # of the face's width
+EDGE_STILL_PX, EDGE_FADE = 0.5, 0.25  # at the edges of the mesh: pixels that never move; of the eye distance beyond
+AWAY, FAR = 0.05, 0.1  # half axes of the head, and eye distances from the face, from which background is
+RIM = 0.02  # of the eye distance within the face
+DEPTH_PULL, RIM_DEPTH_PULL = 0.015, 0.001  # towards known depths, and those at the oval of the face
+BACKGROUND_DEPTH, BEYOND_DEPTH = 0.12, 0.05  # of the background before the pivot, and what may lie beyond it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhotoPerson:
+    """A person in a picture: its size (width, height), landmarks (478, 3) in pixels and depths, lips, and smile."""
+
+    size: tuple[int, int]
+    landmarks: Floats
+    lips: LipLine
+    smile: float
+    scale: float
+
+    @property
+    def is_parted(self) -> bool:
+        """Whether the lips do not touch."""
+        return self.lips.gap > PARTED
+
+    @property
+    def upper_share(self) -> float:
+        """Share of the upper lip in the way on which the lips meet."""
+        return UPPER_SHARE + SMILING_SHARE * self.smile * self.is_parted
+
+
+def face_shapes(
+    mesh: PhotoMesh, spreading: Spreading, motion: Mapping[str, Floats], person: PhotoPerson
+) -> dict[str, Floats]:
+    """Displacements (V, 3) of a mesh by the motion (478, 3) of the head's landmarks in each shape, mm."""
+    names = [name for name in motion if not name.startswith(OWN_SHAPES)]
+    moved = np.stack([motion[name] for name in names], axis=1)
+    for brow in BROWS:
+        for pair in brow:
+            moved[list(pair)] = moved[list(pair)].mean(axis=0)
+    of_lip, of_lid = spline_weights(len(INNER_LIP_UPPER), N_LIP), spline_weights(len(LID_MARGINS[0][0]), N_LID)
+    lines: list[tuple[Ints, Floats, Sequence[int]]] = [
+        (mesh.upper_lip, of_lip, INNER_LIP_UPPER),
+        (mesh.lower_lip, of_lip, INNER_LIP_LOWER),
+    ]
+    for upper, lower, lids in zip(mesh.upper_lids, mesh.lower_lids, LID_MARGINS, strict=True):
+        lines += [(upper, of_lid, lids[0]), (lower, of_lid, lids[1])]
+    pull = np.full(len(mesh.landmarks), SKIN_PULL)
+    pull[np.isin(mesh.landmarks, FACE_OVAL)] = OVAL_PULL
+    pull[np.isin(mesh.landmarks, [number for brow in BROWS for pair in brow for number in pair])] = BROW_PULL
+    known, values, pulls = [mesh.landmark_vertices], [moved[mesh.landmarks]], [pull]
+    for vertices, weights, numbers in lines:
+        known.append(vertices)
+        values.append(np.einsum("ij,jkc->ikc", weights, moved[list(numbers)]))
+        pulls.append(np.full(len(vertices), LINE_PULL))
+    for fold, margin in zip(mesh.folds, (3, 5), strict=True):  # upper lids among what is known
+        known.append(fold[1:-1])
+        values.append(values[margin][1:-1])
+        pulls.append(np.full(len(fold) - 2, FOLD_PULL))
+    still = _still(mesh, STILL_FROM * person.scale, known)
+    found = spreading.near(np.concatenate(known), np.concatenate(values), np.concatenate(pulls), still)
+    for rows, upper in zip(mesh.bands, mesh.upper_lids, strict=True):
+        found[rows] = found[upper[1:-1]]
+    return {name: found[:, number] for number, name in enumerate(names)}
+
+
+def _still(mesh: PhotoMesh, way: float, others: Sequence[Ints]) -> Ints:
+    """Vertices that lie farther from the face than a way, or at the edge of the picture, without others."""
+    far = np.union1d(np.flatnonzero(mesh.outside > way), mesh.border)
+    return np.setdiff1d(far, np.concatenate(others))
+
+
+def blink(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, eye: int) -> Floats:
+    """(V, 3) displacement that shuts an eye, pixels and depths."""
+    points = np.column_stack([mesh.places, np.zeros(len(mesh.places))])
+    points[mesh.known, 2] = mesh.depths
+    upper, lower = points[mesh.upper_lids[eye]], points[mesh.lower_lids[eye]]
+    meeting = lower + LID_MEETING * (upper - lower)
+    ways = {"upper": meeting - upper, "lower": meeting - lower}
+    along = upper[-1, :2] - upper[0, :2]
+    at_line = (upper[:, :2] - upper[0, :2]) @ along / (along @ along)
+    vertex_of = mesh.vertex_of
+    found: dict[int, Floats] = dict(zip(mesh.upper_lids[eye].tolist(), ways["upper"], strict=True))
+    found |= dict(zip(mesh.lower_lids[eye].tolist(), ways["lower"], strict=True))
+    for row in mesh.bands[eye]:
+        found |= dict(zip(row.tolist(), ways["upper"][1:-1], strict=True))
+    for numbers, share, way in (
+        (ABOVE_LIDS[eye], FOLD_FOLLOW, ways["upper"]),
+        (BELOW_LIDS[eye], BELOW_FOLLOW, ways["lower"]),
+    ):
+        for number in numbers:
+            if number in vertex_of:
+                at = np.clip((person.landmarks[number, :2] - upper[0, :2]) @ along / (along @ along), 0, 1)
+                found[vertex_of[number]] = share * np.array([np.interp(at, at_line, way[:, k]) for k in range(3)])
+    free = {*AROUND_EYES[eye]}
+    zero = np.zeros(3)
+    for number, vertex in vertex_of.items():
+        if number not in free:
+            found.setdefault(vertex, zero)
+    still = [mesh.upper_lids[1 - eye], mesh.lower_lids[1 - eye], mesh.upper_lip, mesh.lower_lip]
+    for vertex in np.concatenate([*still, _still(mesh, FEATURES_STILL * person.scale, still)]).tolist():
+        found.setdefault(vertex, zero)
+    return spreading.exact(np.array(list(found)), np.array(list(found.values())))
+
+
+def closing(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson) -> Floats:
+    """(V, 3) displacement that closes the lips of the picture, pixels and depths."""
+    if person.lips.is_closed:
+        return np.zeros((len(mesh.places), 3))
+    shares = np.array([person.upper_share, person.upper_share - 1])
+    ways = person.lips.lower - person.lips.upper
+    numbers = np.arange(N_LIP)
+    follow: dict[int, Floats] = {}
+    vertex_of = mesh.vertex_of
+    at_landmark = np.linspace(0, N_LIP - 1, len(INNER_LIP_UPPER))
+    for line, outer, ring, share, near, far in (
+        (mesh.upper_lip, OUTER_LIP_UPPER, LIP_RINGS[0], shares[0], 1.0, 1.0),
+        (mesh.lower_lip, OUTER_LIP_LOWER, LIP_RINGS[1], shares[1], *LOWER_FOLLOW),
+    ):
+        follow |= {int(vertex): share * ways[k] for k, vertex in zip(numbers, line, strict=True)}
+        for row, part in ((ring, near), (outer, far)):
+            for place, number in zip(at_landmark, row, strict=True):
+                if number in vertex_of:
+                    way = [np.interp(place, numbers, ways[:, c]) for c in range(3)]
+                    follow.setdefault(vertex_of[number], share * part * np.array(way))
+    mouth = person.landmarks[[MOUTH_CORNER_RIGHT, MOUTH_CORNER_LEFT, *MOUTH_MIDDLE], :2]
+    far_off = np.linalg.norm(mesh.places[mesh.landmark_vertices][:, None] - mouth, axis=2).min(axis=1)
+    zero = np.zeros(3)
+    still = [mesh.landmark_vertices[far_off > LIP_STILL * person.scale], *mesh.upper_lids, *mesh.lower_lids]
+    for vertex in np.concatenate([*still, _still(mesh, FEATURES_STILL * person.scale, still)]).tolist():
+        follow.setdefault(vertex, zero)
+    return spreading.exact(np.array(list(follow)), np.array(list(follow.values())))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeadRegion:
+    """Where the head lies in a picture: ellipse and neck."""
+
+    across: Floats
+    down: Floats
+    middle: Floats
+    half_axes: tuple[float, float, float]
+    chin: Floats
+    width: float
+
+    @classmethod
+    def of(cls, landmarks: Floats) -> "HeadRegion":
+        """Region of landmarks (478, 2 or 3), pixels."""
+        top, chin = landmarks[TOP, :2], landmarks[CHIN, :2]
+        height = float(np.linalg.norm(chin - top))
+        width = float(np.linalg.norm(landmarks[SIDES_OF_FACE[0], :2] - landmarks[SIDES_OF_FACE[1], :2]))
+        down = (chin - top) / height
+        middle = (top + chin) / 2 - HEAD_MIDDLE * height * down
+        side, up, below = HEAD_ELLIPSE
+        return cls(
+            np.array([down[1], -down[0]]), down, middle, (side * width, up * height, below * height), chin, width
+        )
+
+    def radius(self, places: Floats) -> Floats:
+        """(N,) way of places (N, 2) from the middle of the head in its half axes."""
+        off = places - self.middle
+        side, up, below = self.half_axes
+        across, down = off @ self.across, off @ self.down
+        found: Floats = np.hypot(across / side, np.where(down < 0, down / up, down / below))
+        return found
+
+
+def head_follow(mesh: PhotoMesh, person: PhotoPerson) -> Floats:
+    """(V,) share of the head's motion that vertices follow."""
+    region, scale = HeadRegion.of(person.landmarks), person.scale
+    follow = 1 - smoothstep(region.radius(mesh.places), *HEAD_FADE)
+    below = (mesh.places - region.chin) @ region.down
+    aside = np.abs((mesh.places - region.middle) @ region.across)
+    neck = 1 - smoothstep(below / scale, *NECK_FADE)
+    beside = 1 - smoothstep(aside / region.width, *BESIDE_NECK)
+    follow = np.where(below > 0, np.maximum(follow, beside) * neck, follow)
+    return np.where(mesh.outside <= 0, 1.0, follow) * edge_share(mesh, person)
+
+
+def edge_share(mesh: PhotoMesh, person: PhotoPerson) -> Floats:
+    """(V,) 1 in what may move of the picture, falling to 0 at its edges."""
+    low, high = mesh.frame
+    inside = np.minimum(mesh.places - low, high - mesh.places).min(axis=1)
+    return smoothstep(np.maximum(inside - EDGE_STILL_PX, 0.0) / person.scale, 0.0, EDGE_FADE)
+
+
+def breathing(mesh: PhotoMesh, person: PhotoPerson, follow: Floats, px_per_mm: float) -> Floats:
+    """(V, 3) rise of the shoulders, pixels and depths."""
+    region = HeadRegion.of(person.landmarks)
+    below = (mesh.places - region.chin) @ region.down / person.scale
+    aside = np.abs((mesh.places - region.middle) @ region.across) / region.width
+    share = smoothstep(below, *SHOULDERS) * (1 - smoothstep(below, *BELOW_SHOULDERS))
+    share *= (1 - follow) * (1 - smoothstep(aside, *BESIDE_SHOULDERS))
+    rise = BREATH_MM * px_per_mm * np.append(-region.down, 0.0)
+    found: Floats = (share * edge_share(mesh, person))[:, None] * rise
+    return found
+
+
+def depths(mesh: PhotoMesh, spreading: Spreading, person: PhotoPerson, camera: PhotoCamera, pivot: Floats) -> Floats:
+    """(V,) depths of all vertices: of the background, a little before the pivot of the head."""
+    scale = person.scale
+    behind = camera.to_pixels(pivot[None])[0, 2] + BACKGROUND_DEPTH * scale
+    away = HeadRegion.of(person.landmarks).radius(mesh.places) > HEAD_FADE[0] + AWAY
+    far = np.setdiff1d(np.flatnonzero(away & (mesh.outside > FAR * scale)), mesh.known)
+    at_rim = mesh.outside[mesh.known] > -RIM * scale
+    pulls = np.concatenate([np.where(at_rim, RIM_DEPTH_PULL, DEPTH_PULL), np.full(len(far), DEPTH_PULL)])
+    values = np.concatenate([mesh.depths, np.full(len(far), behind)])
+    found = spreading.near(np.concatenate([mesh.known, far]), values, pulls)
+    bounded: Floats = np.maximum(found, behind - BEYOND_DEPTH * scale)
+    return bounded
+
+
+SKIN, LIDS, EYES = "skin", "lids", "eyes"  # parts, of which the first two show the picture itself
+PAGE_MARGIN = 1 / 64  # of a page, beyond what it shows: the places nearest to its edges are not read
+BETWEEN_PX = 4  # of patches on their page
+MOVED = 1e-3  # mm, or share of the head's motion, from which a vertex moves
+UNSEEN = 128.0  # colour of vertices whose colour is a picture's
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Vertices:
+    """Places (V, 3), mm, shapes (K, V, 3), and share of the head's motion (V,) of vertices."""
+
+    places: Floats
+    shapes: Floats
+    follow: Floats
+
+    def between(self, others: "Vertices", share: float) -> "Vertices":
+        """Vertices on the way to others (V, 3)."""
+        mixed = (
+            (1 - share) * own + share * other
+            for own, other in zip(
+                (self.places, self.shapes, self.follow), (others.places, others.shapes, others.follow), strict=True
+            )
+        )
+        return Vertices(*mixed)
+
+    def at(self, numbers: Ints) -> "Vertices":
+        """Those of some numbers (N,)."""
+        return Vertices(self.places[numbers], self.shapes[:, numbers], self.follow[numbers])
+
+
+@dataclass(slots=True, eq=False)
+class PhotoSurface:
+    """Parts that are added one after the other."""
+
+    vertices: list[Vertices] = field(default_factory=list)
+    uv: list[Floats] = field(default_factory=list)
+    colours: list[Floats] = field(default_factory=list)
+    parts: list[tuple[str, Ints]] = field(default_factory=list)
+
+    @property
+    def count(self) -> int:
+        """Number of vertices."""
+        return sum(len(one.places) for one in self.vertices)
+
+    def add(self, vertices: Vertices, *, uv: Floats | None = None, colours: Floats | None = None) -> Ints:
+        """Numbers (N,) of added vertices, with places in their page (N, 2) or colours (N, 3)."""
+        n = len(vertices.places)
+        first = self.count
+        self.vertices.append(vertices)
+        self.uv.append(np.zeros((n, 2)) if uv is None else uv)
+        self.colours.append(np.full((n, 3), UNSEEN) if colours is None else colours)
+        return first + np.arange(n)
+
+    @property
+    def places(self) -> Floats:
+        """Places (V, 3) of all vertices, mm."""
+        return np.concatenate([one.places for one in self.vertices])
+
+    def every(self) -> Vertices:
+        """All vertices."""
+        return Vertices(
+            self.places,
+            np.concatenate([one.shapes for one in self.vertices], axis=1),
+            np.concatenate([one.follow for one in self.vertices]),
+        )
+
+
+def moves(vertices: Vertices) -> NDArray[np.bool_]:
+    """(V,) whether vertices move with a shape or with the head."""
+    return np.asarray((np.abs(vertices.shapes).max(axis=(0, 2)) > MOVED) | (vertices.follow > MOVED))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhotoPages:
+    """Pages (2, H, W, 3): what moves of a picture, and patches such as its eyes without lids.
+
+    ``corner`` (2,) and ``patch_corners`` are the pixels of the picture that would lie at the left top of the pages.
+    """
+
+    pages: NDArray[np.uint8]
+    corner: Floats
+    patch_corners: Sequence[Floats]
+
+    def uv(self, places: Floats, corner: Floats | None = None) -> Floats:
+        """(N, 2) places in a page of pixels (N, 2) of the picture."""
+        size = np.array(self.pages.shape[2:0:-1], np.float64)
+        found: Floats = (places - (self.corner if corner is None else corner) + 0.5) / size
+        return found.clip(0, 1)
+
+
+def lay_pages(
+    pixels: NDArray[np.uint8], mesh: PhotoMesh, is_moving: NDArray[np.bool_], patches: Sequence[EyePatch | OwnTeeth]
+) -> PhotoPages:
+    """Pages of a picture (H, W, 3) whose vertices (V,) move, and of patches."""
+    shown = mesh.places[mesh.triangles[is_moving[mesh.triangles].any(axis=1)]].reshape(-1, 2)
+    low = np.clip(np.floor(shown.min(axis=0)).astype(int) - 2, 0, None)
+    high = np.minimum(np.ceil(shown.max(axis=0)).astype(int) + 3, pixels.shape[1::-1])
+    sizes = [np.array(patch.picture.shape[1::-1]) for patch in patches]
+    beside = (sum(int(size[0]) + BETWEEN_PX for size in sizes), max(int(size[1]) for size in sizes))
+    wide, tall = (_page_side(int(side)) for side in np.maximum(high - low, beside))
+    left, top = round(PAGE_MARGIN * wide), round(PAGE_MARGIN * tall)
+    right, below = wide - left - high[0] + low[0], tall - top - high[1] + low[1]
+    around = ((top, below), (left, right), (0, 0))
+    first = np.pad(pixels[low[1] : high[1], low[0] : high[0]], around, mode="edge")
+    second, at, corners = np.zeros_like(first), left, []
+    for patch in patches:
+        h, w = patch.picture.shape[:2]
+        second[top : top + h, at : at + w] = patch.picture
+        corners.append(np.array(patch.corner, np.float64) - (at, top))
+        at += w + BETWEEN_PX
+    return PhotoPages(np.stack([first, second]), (low - (left, top)).astype(np.float64), corners)
+
+
+def _page_side(least: int) -> int:
+    side = LEAST_SIDE
+    while side * (1 - 2 * PAGE_MARGIN) < least:
+        side *= 2
+    return side
+
+
+N_LID_ROWS = 5  # of vertices, from the fold to the band
+SHOWN_ABOVE = 0.018  # of the eye distance above the fold, whose skin a lid shows on its way there and back
+
+
+def add_lids(surface: PhotoSurface, mesh: PhotoMesh, pages: PhotoPages, scale: float) -> None:
+    """Add the lids, whose skin is that above the fold, mirrored: it fits at both ends."""
+    skin = surface.vertices[0]
+    bow = np.sin(np.linspace(0, np.pi, N_LID))[:, None] ** 0.5
+    for fold, band, margin in zip(mesh.folds, mesh.bands, mesh.upper_lids, strict=True):
+        moving = np.concatenate([fold[:1], band[-1], fold[-1:]])
+        up = mesh.places[fold] - mesh.places[margin]
+        way = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-6) * (SHOWN_ABOVE * scale) * bow
+        rows = []
+        for share in np.linspace(0, 1, N_LID_ROWS):
+            shown = mesh.places[fold] + way * (1 - abs(2 * share - 1))
+            rows.append(surface.add(skin.at(fold).between(skin.at(moving), float(share)), uv=pages.uv(shown)))
+        triangles = grid_triangles(np.stack(rows))
+        is_mirrored = mesh.places[fold[0], 0] > mesh.places[fold[-1], 0]
+        surface.parts.append((LIDS, triangles[:, ::-1] if is_mirrored else triangles))

@@ -1,0 +1,205 @@
+"""Drawing options of a clip; a module without heavy imports.
+
+Camera positions: named views, or angles and a distance.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from lexicon.errors import InputError
+from lexicon.inputs import check_fields, is_file
+from tts2face.request import option
+
+
+@dataclass(frozen=True, slots=True)
+class CameraView:
+    """Position of the camera relative to the head.
+
+    ``yaw_deg`` is positive towards the face's own left, ``pitch_deg`` positive from above; ``distance`` is in mm from
+    the centre of the head, 0 for the distance that frames it; ``share`` is the visible share of the framing box.
+    """
+
+    yaw_deg: float
+    pitch_deg: float
+    distance: float = 0.0
+    share: float = 1.0
+
+
+NAMED_VIEWS = {
+    "front": CameraView(0.0, 3.0),
+    "three-quarter": CameraView(38.0, 4.0),
+    "profile": CameraView(88.0, 2.0),
+    "close": CameraView(0.0, 2.0, share=0.62),
+}
+MAX_DISTANCE_MM = 100_000.0
+MIN_DISTANCE_MM = 50.0
+
+
+def parse_camera(text: str) -> CameraView:
+    """Camera view of a name, or of ``yaw,pitch`` or ``yaw,pitch,distance`` in degrees and mm.
+
+    Raises
+    ------
+    InputError
+        There is no such name, or the numbers are out of range.
+    """
+    if text in NAMED_VIEWS:
+        return NAMED_VIEWS[text]
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if not 2 <= len(numbers) <= 3 or not all(math.isfinite(number) for number in numbers):
+        raise InputError(
+            f"there is no camera {text!r}; choose {', '.join(NAMED_VIEWS)}, or give yaw,pitch,distance such as 20,5,900"
+        )
+    yaw, pitch = numbers[:2]
+    distance = numbers[2] if len(numbers) == 3 else 0.0
+    if abs(yaw) > 180 or abs(pitch) > 85 or (len(numbers) == 3 and not MIN_DISTANCE_MM <= distance <= MAX_DISTANCE_MM):
+        raise InputError(
+            f"camera {text!r} is out of range; yaw is -180 to 180 and pitch -85 to 85 degrees, distance 50 to 100000 mm"
+        )
+    return CameraView(yaw, pitch, distance)
+
+
+SIDE_LIMITS_PX = (16, 4096)  # px
+AUTO_SIZE, DEFAULT_SIZE = "auto", (512, 512)
+SUPERSAMPLING_FACTORS = (1, 2, 3)
+DRAFT, STANDARD, HIGH = QUALITIES = ("draft", "standard", "high")
+HIGH_SUPERSAMPLING = 3
+NUMBA, PYVISTA = RENDERERS = ("numba", "pyvista")
+STUDIO, TRANSPARENT, BLUR = "studio", "transparent", "blur"
+COLOURS = {
+    "black": "000000", "white": "ffffff", "grey": "808080", "gray": "808080", "red": "c8282d", "green": "00b140",
+    "blue": "0047bb", "navy": "14213d", "sky": "9ec9e8", "teal": "127475", "yellow": "f2c14e", "orange": "e07a1f",
+    "pink": "f4b6c2", "purple": "5f4b8b", "brown": "6b4f3a", "cream": "f6f0e2",
+}  # fmt: skip  # sRGB; green and blue are the usual chroma key colours
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Picture:
+    """Drawing options of a clip.
+
+    Raises
+    ------
+    InputError
+        An option has a value of another type, is out of range or unknown.
+    """
+
+    size: str = option(
+        "auto",
+        "Width x height in pixels, even numbers from 16 to 4096; auto: 512x512, or the size of a talker's own video.",
+    )
+    camera: str = option("front", "front, three-quarter, profile, close, or yaw,pitch[,distance] in degrees and mm.")
+    background: str = option(
+        "studio", "studio, transparent, blur (of a photo's own), a colour (name or #rrggbb), or an image file."
+    )
+    supersampling: int = option(2, "Samples along each side of a pixel: 1, 2 or 3.", limits=(1, 3))
+    quality: str = option(
+        "standard",
+        "draft (one sample a pixel, no light under the skin), standard, or high (3 x 3 samples in every pixel).",
+        choices=QUALITIES,
+    )
+    renderer: str = option(
+        "numba", "numba (any machine) or pyvista (VTK, with a GPU or software GL).", choices=RENDERERS
+    )
+    visible_mark: bool = option(False, "Write the word synthetic into the lower right corner of clips.")
+
+    def __post_init__(self) -> None:
+        """Validate every option."""
+        check_fields(self)
+        parse_size(self.size)
+        parse_camera(self.camera)
+        parse_background(self.background)
+        if self.supersampling not in SUPERSAMPLING_FACTORS:
+            raise InputError(f"supersampling must be 1, 2 or 3, not {self.supersampling}")
+        if self.quality not in QUALITIES:
+            raise InputError(f"there is no quality {self.quality!r}; choose {', '.join(QUALITIES)}")
+        if self.renderer not in RENDERERS:
+            raise InputError(f"there is no renderer {self.renderer!r}; choose numba or pyvista")
+
+    @property
+    def width(self) -> int:
+        """Pixels across."""
+        return parse_size(self.size)[0]
+
+    @property
+    def height(self) -> int:
+        """Pixels down."""
+        return parse_size(self.size)[1]
+
+    @property
+    def samples_per_side(self) -> int:
+        """Samples along each side of a pixel, by quality and supersampling."""
+        return {DRAFT: 1, HIGH: HIGH_SUPERSAMPLING}.get(self.quality, self.supersampling)
+
+    @property
+    def samples(self) -> tuple[int, int]:
+        """Samples across and down."""
+        return self.width * self.samples_per_side, self.height * self.samples_per_side
+
+    @property
+    def view(self) -> CameraView:
+        """Camera view that `camera` names."""
+        return parse_camera(self.camera)
+
+    @property
+    def is_transparent(self) -> bool:
+        """Whether pictures have a fourth channel with their coverage."""
+        return self.background == TRANSPARENT
+
+    @property
+    def channels(self) -> int:
+        """Number of channels of a picture: 3, or 4 with coverage."""
+        return 4 if self.is_transparent else 3
+
+
+def parse_size(size: str) -> tuple[int, int]:
+    """Width and height in pixels of a size such as ``640x480`` or ``512``; `DEFAULT_SIZE` for ``auto``.
+
+    Raises
+    ------
+    InputError
+        The text is not a size, or a side is odd or out of range.
+    """
+    if size.strip() == AUTO_SIZE:
+        return DEFAULT_SIZE
+    match = re.fullmatch(r"\s*(\d{1,9})\s*(?:[xX×,]\s*(\d{1,9})\s*)?", size)
+    if match is None:
+        raise InputError(f"size must be width x height such as 640x480, not {size!r}")
+    width, height = int(match[1]), int(match[2] or match[1])
+    for side in (width, height):
+        if not SIDE_LIMITS_PX[0] <= side <= SIDE_LIMITS_PX[1] or side % 2:
+            raise InputError(
+                f"size must be even numbers from {SIDE_LIMITS_PX[0]} to {SIDE_LIMITS_PX[1]}, not {width}x{height}"
+            )
+    return width, height
+
+
+def parse_background(background: str) -> tuple[int, int, int] | Path | str:
+    """Colour (sRGB, 0-255), image path, or the word ``studio``, ``transparent`` or ``blur``.
+
+    Raises
+    ------
+    InputError
+        The text is none of these, or the image does not exist.
+    """
+    if background in (STUDIO, TRANSPARENT, BLUR):
+        return background
+    digits = COLOURS.get(background.lower(), background.removeprefix("#"))
+    if re.fullmatch(r"[0-9a-fA-F]{3}", digits):
+        digits = "".join(2 * digit for digit in digits)
+    if re.fullmatch(r"[0-9a-fA-F]{6}", digits):
+        return int(digits[:2], 16), int(digits[2:4], 16), int(digits[4:], 16)
+    path = Path(background)
+    if path.suffix.lower() not in IMAGE_SUFFIXES:
+        raise InputError(
+            f"there is no background {background!r}; give studio, transparent, blur, #rrggbb, an image file, "
+            f"or one of {', '.join(COLOURS)}"
+        )
+    if not is_file(path):
+        raise InputError(f"there is no background image {background}; check the path")
+    return path

@@ -1,0 +1,265 @@
+"""Protocol of the renderers, which draw the frames of a clip as pictures.
+
+Rendering of a mesh face: the frames of a clip one by one, or a single picture.
+
+A small label in the corner of pictures, which says that they are synthetic.
+"""
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from tts2face.face.deformation import REST_HEAD
+from tts2face.models.face import Face
+from tts2face.numeric.reuse import map_in_order
+from tts2face.picture import vtk_renderer
+from tts2face.picture.baked.photo_scene import build_photo_scene
+from tts2face.picture.baked.scene import LitScene, build_lit_scene
+from tts2face.picture.camera import camera_matrices
+from tts2face.picture.options import PYVISTA, Picture
+from tts2face.picture.scene import Scene, available_cores, build_scene, draw_background
+from tts2face.types import Clip
+
+
+class FrameRenderer(Protocol):
+    """Renderer of clips of one face at one picture size; may be used from several threads.
+
+    Pictures do not depend on the number of threads.
+    """
+
+    @property
+    def picture(self) -> Picture:
+        """Drawing options of the frames."""
+
+    @property
+    def notice(self) -> str:
+        """Comment for every file with these frames; empty unless they show a real person."""
+
+    def frames(self, clip: Clip, *, threads: int | None = None, first: int = 0) -> Iterator[NDArray[np.uint8]]:
+        """Pictures (H, W, 3), or (H, W, 4) with coverage, of a clip's frames in order.
+
+        At most `threads` frames are drawn in advance; `first` is the index of the clip's first frame in a stream of
+        clips.
+
+        Raises
+        ------
+        InputError
+            The clip's motion is not in the channels of this face.
+        """
+
+    def frame(self, clip: Clip, number: int) -> NDArray[np.uint8]:
+        """Picture of one frame of a clip."""
+
+
+TEXT = "synthetic"
+HEIGHT, LEAST_PX = 0.035, 9  # of the letters, of the height of a picture
+MARGIN = 0.5  # of the height of the letters, around the label
+SHADE, PAPER, INK = 0.55, 0, 255  # opacity and brightness of the ground, and of the letters
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkedRenderer:
+    """A renderer whose pictures have the label; implements `tts2face.picture.renderer.FrameRenderer`."""
+
+    renderer: FrameRenderer
+    label: NDArray[np.float32]
+
+    @property
+    def picture(self) -> Picture:
+        """Drawing options of the frames."""
+        return self.renderer.picture
+
+    @property
+    def notice(self) -> str:
+        """Comment for every file with these frames."""
+        return self.renderer.notice
+
+    def frames(self, clip: Clip, *, threads: int | None = None, first: int = 0) -> Iterator[NDArray[np.uint8]]:
+        """Pictures (H, W, 3 or 4) of a clip's frames in order; errors as of the renderer."""
+        return map(self._marked, self.renderer.frames(clip, threads=threads, first=first))
+
+    def frame(self, clip: Clip, number: int) -> NDArray[np.uint8]:
+        """Picture of one frame of a clip."""
+        return self._marked(self.renderer.frame(clip, number))
+
+    def _marked(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        return _with_label(pixels, self.label)
+
+
+def mark_picture(pixels: NDArray[np.uint8], picture: Picture) -> NDArray[np.uint8]:
+    """A picture (H, W, 3 or 4), with the label where it shall have it."""
+    return _with_label(pixels, _label(*pixels.shape[1::-1])) if picture.visible_mark else pixels
+
+
+def _with_label(pixels: NDArray[np.uint8], label: NDArray[np.float32]) -> NDArray[np.uint8]:
+    height, width = label.shape
+    marked = pixels.copy()
+    part = marked[-height:, -width:]
+    brightness = PAPER + (INK - PAPER) * label[..., None]
+    opacity = np.maximum(label, SHADE)[..., None]
+    part[..., :3] = np.rint(part[..., :3] * (1 - opacity) + brightness * opacity).astype(np.uint8)
+    if pixels.shape[2] == 4:
+        part[..., 3] = np.maximum(part[..., 3], np.rint(255 * opacity[..., 0])).astype(np.uint8)
+    return marked
+
+
+def marked(renderer: FrameRenderer) -> FrameRenderer:
+    """The renderer, with the label in its pictures where they shall have it."""
+    picture = renderer.picture
+    return MarkedRenderer(renderer, _label(picture.width, picture.height)) if picture.visible_mark else renderer
+
+
+def _label(width: int, height: int) -> NDArray[np.float32]:
+    """(h, w) share of the ink in the pixels of the label, in the lower right corner of a picture of a size."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    size = max(LEAST_PX, round(HEIGHT * height))
+    font = ImageFont.load_default(size)
+    left, top, right, bottom = font.getbbox(TEXT)
+    margin = round(MARGIN * size)
+    drawn = Image.new("L", (int(right - left) + 2 * margin, int(bottom - top) + 2 * margin))
+    ImageDraw.Draw(drawn).text((margin - left, margin - top), TEXT, fill=255, font=font)
+    shares: NDArray[np.float32] = np.asarray(drawn, np.float32)[:height, :width] / np.float32(255)
+    return shares
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeshRenderer:
+    """Renderer of a mesh face; implements `tts2face.picture.renderer.FrameRenderer`."""
+
+    scene: Scene | LitScene
+
+    @property
+    def picture(self) -> Picture:
+        """How the frames are drawn."""
+        return self.scene.picture
+
+    @property
+    def notice(self) -> str:
+        """Comment for every written file; empty unless the face is the likeness of a real person."""
+        return self.scene.face.synthetic_notice
+
+    def frames(self, clip: Clip, *, threads: int | None = None, first: int = 0) -> Iterator[NDArray[np.uint8]]:
+        """Pictures (H, W, 3 or 4) of a clip's frames in order.
+
+        The clip's channels are the first shapes of the face; weights of further shapes are 0.
+
+        Raises
+        ------
+        InputError
+            The clip's channels are not the first shapes of the face.
+        """
+        del first  # a mesh has no background video
+        values = self._weights(clip)
+        poses = zip(values, clip.head.values, strict=True)
+        if self.picture.renderer == PYVISTA and isinstance(self.scene, Scene):
+            yield from vtk_renderer.render_frames(self.scene, poses)
+            return
+        n_threads = threads or available_cores()
+        free_buffers = deque(self.scene.allocate_buffers() for _ in range(n_threads))
+
+        def draw_one(pose: tuple[NDArray[np.float32], NDArray[np.float32]]) -> NDArray[np.uint8]:
+            buffers = free_buffers.popleft()
+            try:
+                return self._draw(*pose, buffers)
+            finally:
+                free_buffers.append(buffers)
+
+        yield from map_in_order(draw_one, poses, n_threads)
+
+    def frame(self, clip: Clip, number: int) -> NDArray[np.uint8]:
+        """Picture (H, W, 3 or 4) of one frame of a clip."""
+        return self.draw(self._weights(clip)[number], clip.head.values[number])
+
+    def draw(self, weights: NDArray[np.floating], head: NDArray[np.floating] = REST_HEAD) -> NDArray[np.uint8]:
+        """Picture (H, W, 3 or 4) of the face for shape weights (K,) and a head pose (6,).
+
+        Raises
+        ------
+        InputError
+            The number of weights is not the number of the face's shapes.
+        """
+        n_shapes = len(self.scene.face.shape_names)
+        if np.shape(weights) != (n_shapes,):
+            raise InputError(f"the face has {n_shapes} shapes, not weights of shape {np.shape(weights)}")
+        pose = np.asarray(weights, np.float32), np.asarray(head, np.float32)
+        if self.picture.renderer == PYVISTA and isinstance(self.scene, Scene):
+            (pixels,) = vtk_renderer.render_frames(self.scene, [pose])
+            return pixels
+        return self._draw(*pose, self.scene.allocate_buffers())
+
+    def _weights(self, clip: Clip) -> NDArray[np.float32]:
+        names = self.scene.face.shape_names
+        n_channels = len(clip.motion.channels)
+        if clip.motion.channels != names[:n_channels]:
+            raise InputError(
+                "the clip's motion is not in the shapes of this face; make the clip with a session of this face"
+            )
+        if n_channels == len(names):
+            return clip.motion.values
+        return np.pad(clip.motion.values, ((0, 0), (0, len(names) - n_channels)))
+
+    def _draw(self, weights: NDArray[np.float32], head: NDArray[np.float32], buffers: Any) -> NDArray[np.uint8]:
+        picture, background = self.picture, self.scene.background
+        pixels = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
+        pixels[:, :, : background.shape[2]] = background
+        self.scene.draw(weights, head, buffers, pixels)
+        return pixels
+
+
+def mesh_renderer(face: Face, picture: Picture) -> MeshRenderer:
+    """Renderer of a face; build it once and draw many frames.
+
+    Raises
+    ------
+    InputError
+        The picture asks for what a photograph does not show.
+    BackendError
+        The renderer that the picture names is not available on this machine.
+    """
+    if face.photograph is not None:
+        return MeshRenderer(build_photo_scene(face, face.photograph, picture))
+    if picture.renderer == PYVISTA:
+        vtk_renderer.require_gl()
+    elif face.light:
+        background = draw_background(picture, face.light[0].backdrop)
+        optics = camera_matrices(picture.view, face, picture.samples)
+        return MeshRenderer(build_lit_scene(face, picture, optics, background))
+    return MeshRenderer(build_scene(face, picture))
+
+
+def draw(
+    face: Face,
+    weights: NDArray[np.floating] | None = None,
+    head: NDArray[np.floating] = REST_HEAD,
+    picture: Picture | None = None,
+) -> NDArray[np.uint8]:
+    """Picture of a face for one set of shape weights.
+
+    Parameters
+    ----------
+    weights : (K,)
+        Weights of the face's shapes; at rest when None.
+    head : (6,)
+        Head pose in the order of `tts2face.types.HEAD_CHANNELS`.
+    picture
+        Drawing options; the defaults when None.
+
+    Returns
+    -------
+    (H, W, 3) or (H, W, 4)
+        sRGB, with coverage (not premultiplied) when the background is transparent.
+
+    Raises
+    ------
+    InputError
+        The number of weights is not the number of the face's shapes.
+    """
+    shown = np.zeros(len(face.shape_names), np.float32) if weights is None else weights
+    renderer = mesh_renderer(face, picture or Picture())
+    return mark_picture(renderer.draw(shown, head), renderer.picture)

@@ -1,0 +1,133 @@
+"""Encoded sound that is sent while it is made."""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from lexicon.errors import InputError
+from tts2face.picture.provenance import WriteBuffer
+from tts2face.storage.media_files import pcm_bytes
+from tts2face.types import Chunk, Waveform
+
+UNKNOWN_BYTES = 0xFFFFFFFF  # size of a WAV file that is not yet known; players read to the end of the stream
+OPUS_RATE = 48_000  # Hz
+BLOCK_S = 0.5  # of sound that a codec encodes at a time; a sentence takes up to 0.2 s
+
+
+@dataclass(frozen=True, slots=True)
+class SoundKind:
+    """Container and codec of a sound format, its media type, and its sample rate if the codec fixes it."""
+
+    media_type: str
+    container: str = ""
+    codec: str = ""
+    bits: int = 0
+    rate: int | None = None
+
+
+SOUND_KINDS = {
+    "wav": SoundKind("audio/wav"),
+    "pcm": SoundKind("audio/pcm"),
+    "mp3": SoundKind("audio/mpeg", "mp3", "libmp3lame", 64_000),
+    "opus": SoundKind("audio/ogg", "ogg", "libopus", 48_000, OPUS_RATE),
+    "aac": SoundKind("audio/aac", "adts", "aac", 96_000),
+    "flac": SoundKind("audio/flac", "flac", "flac"),
+}
+
+
+def encode_sound(sounds: Iterator[Waveform], format: str) -> Iterator[Chunk]:
+    """Encode consecutive mono sounds of one sample rate as a file; yields its chunks in order.
+
+    Parameters
+    ----------
+    format
+        One of `SOUND_KINDS`; ``wav`` and ``pcm`` have 16 bits, ``pcm`` has no header.
+
+    Raises
+    ------
+    InputError
+        The format is unknown, or the sounds differ in sample rate.
+    """
+    if format not in SOUND_KINDS:
+        raise InputError(f"there is no sound format {format!r}; the formats are {', '.join(SOUND_KINDS)}")
+    kind = SOUND_KINDS[format]
+    encoder: _PcmEncoder | _CodecEncoder | None = None
+    rate = 0
+    try:
+        for sound in sounds:
+            if encoder is None:
+                rate = sound.rate
+                encoder = _CodecEncoder(kind, rate) if kind.codec else _PcmEncoder(rate, has_header=format == "wav")
+            if sound.rate != rate:
+                raise InputError(f"sounds of one file must share the sample rate {rate} Hz; one has {sound.rate} Hz")
+            for block in _blocks(sound) if kind.codec else [sound]:
+                yield Chunk(encoder.add(block), block.duration)
+        if encoder is not None:
+            yield Chunk(encoder.finish())
+            encoder = None
+    finally:
+        if encoder is not None:
+            encoder.finish()
+
+
+def _blocks(sound: Waveform) -> Iterator[Waveform]:
+    size = round(BLOCK_S * sound.rate)
+    for begin in range(0, len(sound.samples), size):
+        yield sound.part(begin, begin + size)
+
+
+def wav_header(rate: int, n_bytes: int | None) -> bytes:
+    """Header of a mono 16-bit WAV file; `n_bytes` of samples, or None if not yet known (RIFF, Microsoft 1991)."""
+    size = UNKNOWN_BYTES if n_bytes is None else n_bytes
+    riff = UNKNOWN_BYTES if n_bytes is None else n_bytes + 36
+    return b"".join((
+        struct.pack("<4sI4s", b"RIFF", riff, b"WAVE"),
+        struct.pack("<4sIHHIIHH", b"fmt ", 16, 1, 1, rate, 2 * rate, 2, 16),
+        struct.pack("<4sI", b"data", size),
+    ))  # fmt: skip
+
+
+class _PcmEncoder:
+    """Encoder without compression."""
+
+    def __init__(self, rate: int, *, has_header: bool) -> None:
+        self._header = wav_header(rate, None) if has_header else b""
+
+    def add(self, sound: Waveform) -> bytes:
+        header, self._header = self._header, b""
+        return header + pcm_bytes(sound.samples)
+
+    def finish(self) -> bytes:
+        return b""
+
+
+class _CodecEncoder:
+    """Encoder with a codec of FFmpeg."""
+
+    def __init__(self, kind: SoundKind, rate: int) -> None:
+        import av
+
+        self._buffer, self._rate, self._n_samples = WriteBuffer(), rate, 0
+        options = {"flush_packets": "1"} | ({"fflags": "+bitexact"} if kind.container == "ogg" else {})  # no random id
+        self._container: Any = av.open(self._buffer, "w", format=kind.container, options=options)
+        self._stream: Any = self._container.add_stream(kind.codec, rate=kind.rate or rate, layout="mono")
+        if kind.bits:
+            self._stream.codec_context.bit_rate = kind.bits
+
+    def add(self, sound: Waveform) -> bytes:
+        import av
+
+        frame = av.AudioFrame.from_ndarray(np.ascontiguousarray(sound.samples[None, :]), format="fltp", layout="mono")
+        frame.sample_rate, frame.pts, frame.time_base = self._rate, self._n_samples, Fraction(1, self._rate)
+        self._n_samples += len(sound.samples)
+        self._container.mux(self._stream.encode(frame))
+        return self._buffer.take()
+
+    def finish(self) -> bytes:
+        self._container.mux(self._stream.encode(None))
+        self._container.close()
+        return self._buffer.take()

@@ -1,1 +1,0 @@
-"""Projects: everything that makes one clip, in one JSON file that is edited and rendered again and again."""

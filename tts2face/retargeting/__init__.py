@@ -1,1 +1,0 @@
-"""Motion of a talker or performer transferred to a face."""

@@ -1,1 +1,0 @@
-"""Jobs of the service: their kinds, their state, webhooks."""

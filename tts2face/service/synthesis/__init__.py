@@ -1,1 +1,0 @@
-"""Synthesis processes of the service and what runs in them."""

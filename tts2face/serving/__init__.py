@@ -1,0 +1,1 @@
+"""The server side: batches, durable work, the HTTP service and the studio."""

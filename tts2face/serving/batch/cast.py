@@ -1,0 +1,205 @@
+"""The cast file: which speaker of the subtitles has which talker, voice, face, identity, palette and gestures.
+
+::
+
+    [default]
+    face = "head"
+
+    [[role]]
+    speaker = "ANN*"         # a pattern of shells; also `subtitle_style` and `file`
+    identity = "kofi"
+    voice = "espeak-female"
+    style = "delighted"
+
+Checks of names that a renderer would refuse segment by segment: voices, identities, haircuts and styles.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, fields
+from fnmatch import fnmatchcase
+from functools import lru_cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from lexicon.errors import DataError, InputError
+from lexicon.inputs import check_type, format_value, is_file, parse_toml, read_text
+from tts2face.interchange.subtitles.cues import Cue
+from tts2face.models.face_loading import load_face
+from tts2face.models.hair import BALD
+from tts2face.models.palette import Palette, load_palette
+from tts2face.request import NATURAL, OWN_FACE, Request, parse_articulation
+from tts2face.session.catalogue import identities
+from tts2face.session.named_models import Models
+from tts2face.sound.voice_pool import has_voice, voice_names
+from tts2face.storage.files import present_name
+
+MODEL_NAMES = ("talker", "face", "identity", "palette", "hair", "hair_color")
+PATTERN_NAMES = ("speaker", "subtitle_style", "file")
+NOT_IN_CAST: Mapping[str, str] = MappingProxyType({  # options, with the reason
+    "text": "the cues have it", "audio": "that of the file", "audio_map": "the words are given", "idle": "cues speak",
+    "fps": "one of all clips", "timeline": "its times are those of one clip",
+    "expression": "its times are those of one clip",
+})  # fmt: skip
+REQUEST_NAMES = tuple(option.name for option in fields(Request) if option.name not in NOT_IN_CAST)
+PATH_NAMES = ("talker", "face", "palette", "voice", "dictionary")
+MAX_CAST_BYTES = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Role:
+    """Patterns of the cues to which a role applies, and its settings."""
+
+    patterns: Mapping[str, str]
+    settings: Mapping[str, Any]
+
+    def applies(self, cue: Cue, file: str) -> bool:
+        """Whether all patterns match a cue, in capitals and small letters alike."""
+        values = {"speaker": cue.speaker, "subtitle_style": cue.style, "file": file}
+        return all(fnmatchcase(values[name].lower(), pattern.lower()) for name, pattern in self.patterns.items())
+
+
+@dataclass(frozen=True, slots=True)
+class Cast:
+    """Settings of all cues, and roles; the first role that applies to a cue counts."""
+
+    default: Mapping[str, Any] = field(default_factory=dict)
+    roles: tuple[Role, ...] = ()
+
+    def role_of(self, cue: Cue, file: str) -> Role | None:
+        """The first role that applies to a cue."""
+        return next((role for role in self.roles if role.applies(cue, file)), None)
+
+    def unused(self, used: Collection[int]) -> list[str]:
+        """Warnings of roles that apply to no cue; `used` holds the identities of the others."""
+        return [
+            f"role {number} ({', '.join(f'{name} {pattern!r}' for name, pattern in role.patterns.items())}) applies to "
+            "no cue; check its patterns"
+            for number, role in enumerate(self.roles, start=1)
+            if id(role) not in used
+        ]
+
+    def settings(self, cue: Cue, file: str) -> dict[str, Any]:
+        """Settings of a cue by name: those of its role over the defaults."""
+        role = self.role_of(cue, file)
+        return {**self.default, **(role.settings if role else {})}
+
+
+def read_cast(path: Path) -> Cast:
+    """Cast of a TOML file; paths in it are relative to its folder.
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    DataError
+        It is not TOML, or has an unknown table, key or value; the message names it.
+    """
+    try:
+        content = read_text(path, MAX_CAST_BYTES)
+    except OSError as refused:
+        raise InputError(f"cannot read the cast {path}: {refused.strerror}; check the path") from refused
+    return cast_from_tables(parse_toml(content, str(path)), str(path), path.parent)
+
+
+def cast_from_tables(tables: Mapping[str, Any], place: str, folder: Path | None = None) -> Cast:
+    """Cast of the tables of a TOML file; its paths are relative to a folder, without one nothing is a path.
+
+    Raises
+    ------
+    DataError
+        There is an unknown table, key or value; the message names it.
+    """
+    for name in tables:
+        if name not in ("default", "role"):
+            raise DataError(f"{place}: there is no table {name!r}; use [default] and [[role]]")
+    roles, default = tables.get("role", []), tables.get("default", {})
+    if not isinstance(roles, list) or not isinstance(default, dict) or not all(isinstance(one, dict) for one in roles):
+        raise DataError(f"{place}: write the defaults as [default], and each role as [[role]]")
+    return Cast(
+        _settings(default, f"{place}, [default]", folder),
+        tuple(_role(one, f"{place}, role {number}", folder) for number, one in enumerate(roles, start=1)),
+    )
+
+
+def _role(table: Mapping[str, Any], place: str, folder: Path | None) -> Role:
+    patterns = {name: table[name] for name in PATTERN_NAMES if name in table}
+    if not patterns:
+        raise DataError(f"{place} has no pattern; give {', '.join(PATTERN_NAMES)}")
+    for name, pattern in patterns.items():
+        try:
+            check_type(name, pattern, str)
+        except InputError as wrong:
+            raise DataError(f"{place}: {wrong}") from wrong
+    rest = {name: value for name, value in table.items() if name not in PATTERN_NAMES}
+    return Role(patterns, _settings(rest, place, folder))
+
+
+def _settings(table: Mapping[str, Any], place: str, folder: Path | None) -> dict[str, Any]:
+    for name, value in table.items():
+        if name not in (*MODEL_NAMES, *REQUEST_NAMES):
+            known = ", ".join((*PATTERN_NAMES, *MODEL_NAMES, *REQUEST_NAMES))
+            raise DataError(f"{place}: there is no setting {name!r}; use {known}")
+        if value is None:
+            raise DataError(f"{place}: {name} must be a text, a number or true or false, not {format_value(value)}")
+    settings = {name: _resolve(name, value, folder) for name, value in table.items()}
+    try:
+        Request(**{name: value for name, value in settings.items() if name in REQUEST_NAMES})
+        Models(**{name: value for name, value in settings.items() if name in MODEL_NAMES})
+    except InputError as wrong:
+        raise DataError(f"{place}: {wrong}") from wrong
+    return settings
+
+
+def _resolve(name: str, value: Any, folder: Path | None) -> Any:
+    """A path relative to the folder of the cast, where there is such a file; else the value."""
+    if folder is None:
+        return value
+    if name in PATH_NAMES and isinstance(value, str) and Path(value).suffix and is_file(folder / value):
+        return str(folder / value)
+    return value
+
+
+def check_names(models: Models, request: Mapping[str, Any]) -> None:
+    """Refuse a voice, an identity, a haircut or a style that does not exist.
+
+    Raises
+    ------
+    InputError
+        There is no such voice, identity, haircut or style, or no such model.
+    DataError
+        A model is damaged.
+    """
+    voice = request.get("voice")
+    if voice is not None and not has_voice(voice) and not str(voice).endswith(".onnx"):
+        raise InputError(f"there is no voice {voice!r}; give {', '.join(voice_names())}, or a Piper voice (.onnx)")
+    if models.identity is not None:
+        known = _identities(models.face)
+        if present_name(models.identity, "identity", known) not in known:
+            offered = ", ".join(known) or "none"
+            raise InputError(f"the face {models.face} has no identity {models.identity!r}; it has {offered}")
+    if models.hair not in (None, BALD) or models.hair_color is not None:
+        _check_hair(models.face, models.hair, models.hair_color)
+    if request.get("articulation") is not None:
+        factor = parse_articulation(str(request["articulation"]))
+        if models.face == OWN_FACE and factor != NATURAL:
+            raise InputError("a talker's own face articulates as recorded; remove articulation, or choose another face")
+    if request.get("style") is not None and models.palette is not None:
+        _palette(models.palette).require(str(request["style"]))
+
+
+@lru_cache(maxsize=64)
+def _check_hair(face: str, hair: str | None, colour: str | None) -> None:
+    if face == OWN_FACE:
+        raise InputError("a talker's own face has no haircuts; remove hair and hair_color, or choose another face")
+    load_face(face, hair=hair, hair_color=colour)
+
+
+@lru_cache(maxsize=64)
+def _identities(face: str) -> tuple[str, ...]:
+    return () if face == OWN_FACE else tuple(one.name for one in identities(face))
+
+
+@lru_cache(maxsize=8)
+def _palette(name: str) -> Palette:
+    return load_palette(name)

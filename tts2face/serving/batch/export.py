@@ -1,0 +1,126 @@
+"""Exports of outputs: the tracks of their segments, one after another, in files of other programs."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lexicon.errors import InputError
+from lexicon.sequence import PhoneSequence
+from tts2face.interchange.exports.table import batch_format
+from tts2face.interchange.exports.track import read_track
+from tts2face.interchange.exports.writer import ExportWriter, mesh_of, plan_exports
+from tts2face.picture.movie import SOUND_RATE
+from tts2face.request import OWN_FACE, Request
+from tts2face.serving.batch.output import Output, Sound
+from tts2face.serving.batch.segment import Segment
+from tts2face.session.named_models import Models
+from tts2face.types import Clip, Speech, Waveform, exact_rate, first_sample
+
+if TYPE_CHECKING:
+    from tts2face.session.session import Session
+
+
+MAX_SHOWN = 3
+
+
+def check_faces(output: Output) -> None:
+    """Refuse exports of an output with several faces, whose channels differ, or of a mesh where there is none.
+
+    Raises
+    ------
+    InputError
+        It has several faces, or a talker's own face.
+    """
+    if not output.exports:
+        return
+    faces = dict.fromkeys(map(_face_of, output.segments))
+    meshes = [info.name for _, info in map(batch_format, output.exports) if info.uses_face]
+    if meshes and any(face[0] == OWN_FACE for face in faces):
+        raise InputError(f"{output.stem} shows a talker's own face, which {meshes[0]} cannot show; choose another face")
+    if len(faces) > 1:
+        shown = ", ".join(" ".join(str(part) for part in face if part) for face in list(faces)[:MAX_SHOWN])
+        raise InputError(
+            f"{output.stem} shows {len(faces)} faces ({shown}), which one export cannot hold; choose --per cue, or one "
+            "face, identity, hair and palette for all speakers"
+        )
+
+
+class Exporter:
+    """Writes the exports of outputs; the session whose face they show is kept."""
+
+    def __init__(self) -> None:
+        self._shown: Models | None = None
+        self._session: Session | None = None
+
+    def write(self, output: Output, tracks: Sequence[Path], folder: Path) -> list[Path]:
+        """Write the exports of an output from the tracks of its segments; their paths, those of sounds beside included.
+
+        Raises
+        ------
+        DataError
+            A track is damaged.
+        InputError, BackendError
+            The face has no mesh, a package is missing, or the files cannot be written.
+        """
+        files = plan_exports([folder / name for name in output.names if name != output.stem + output.suffix])
+        face = None
+        if any(file.format.uses_face for file in files):
+            session = self._session_of(output)
+            gestures = Request(gestures=output.segments[0].request.get("gestures", Request().gestures))
+            face = mesh_of(session.animated_face(has_gestures=gestures.has_gestures), files)
+        with ExportWriter(files, face=face) as writer:
+            for clip in joined_clips(tracks, output.fps, output.sounds):
+                writer.add(clip)
+        return [file.path for file in files]
+
+    def _session_of(self, output: Output) -> "Session":
+        models = output.segments[0].models
+        if self._session is None or models != self._shown:
+            self._shown, self._session = models, models.open_session()
+        return self._session
+
+
+def joined_clips(tracks: Sequence[Path], fps: float, sounds: Sequence[Sound | None] = ()) -> Iterator[Clip]:
+    """Clips of tracks in order, with their sound at `SOUND_RATE` on the samples of their frames.
+
+    Raises
+    ------
+    DataError
+        A track is damaged.
+    """
+    from tts2face.serving.batch.segment import open_track
+
+    rate, at = exact_rate(fps), 0
+    for path, sound in zip(tracks, sounds or [None] * len(tracks), strict=True):
+        for piece in read_track(path):
+            begin = first_sample(at, SOUND_RATE, rate)
+            at += len(piece.clip.motion)
+            end = first_sample(at, SOUND_RATE, rate)
+            if sound is None:
+                made = piece.clip.speech.waveform.resampled(SOUND_RATE).part(0, end - begin).padded(end - begin)
+            else:
+                origin = first_sample(sound.offset, SOUND_RATE, rate)
+                found = open_track(Path(sound.path)).read(origin + begin, origin + end)
+                made = Waveform(found / 32767.0, SOUND_RATE)
+            yield _with_sound(piece.clip, made)
+
+
+def _with_sound(clip: Clip, sound: Waveform) -> Clip:
+    """A clip with other sound, whose phones end with them; they last as long to half a sample of the former rate."""
+    phones = clip.speech.phones
+    seconds = sound.duration
+    edges = np.minimum(phones.edges, seconds)
+    edges[-1] = seconds
+    if (np.diff(edges) <= 0).any():
+        edges = phones.edges * (seconds / phones.end)
+    speech = Speech(sound, PhoneSequence(phones.phones, edges), clip.speech.words)
+    return replace(clip, speech=speech)
+
+
+def _face_of(segment: Segment) -> tuple[str, ...]:
+    models, gestures = segment.models, str(segment.request.get("gestures", ""))
+    names = (models.face, models.identity, models.palette, models.hair, models.hair_color)
+    return (*(name or "" for name in names), "without gestures" if gestures == "none" else "")

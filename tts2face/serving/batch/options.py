@@ -1,0 +1,84 @@
+"""Options of a batch besides those of speech and picture; a module without heavy imports."""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import BackendError, InputError
+from tts2face.interchange.exports.table import batch_format
+from tts2face.request import RATE_LIMITS, option
+
+MOVIE_FORMATS = ("mp4", "webm", "mov", "none")
+CLIP_UNITS = ("cue", "scene", "file", "film")
+EXTEND, CUT_PAUSES, REPORT = OVERFLOW_POLICIES = ("extend", "cut-pauses", "report")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BatchOptions:
+    """How subtitles become clips.
+
+    Raises
+    ------
+    InputError
+        An option is unknown or out of range.
+    BackendError
+        A package of an export format is missing.
+    """
+
+    per: str = option("cue", "One clip for each cue, scene or file, or one film of all files.")
+    overflow: str = option(
+        "extend",
+        "For speech that is longer than its cue at the largest rate: extend (into the silence after the cue), "
+        "cut-pauses (within the speech, then extend), or report (only say so).",
+    )
+    max_rate: float = option(1.4, "Largest speaking rate by which speech is fitted to its cue, 1 to 2.")
+    scene_gap: float = option(4.0, "Seconds without a cue that divide two scenes.")
+    audio: Path | None = option(
+        None,
+        "Folder of recordings in place of a voice: STEM-0001.wav or STEM/0001.wav for cue 1 of STEM.srt, or STEM.wav "
+        "for all of it (any sound or video file).",
+    )
+    format: str = option(
+        "mp4", "Videos: mp4, webm (also transparent), mov (uncompressed sound), or none (only the files of --export)."
+    )
+    exports: tuple[str, ...] = ()
+    encoding: str | None = option(None, "Encoding of subtitles that are not UTF-8, such as cp1250.")
+
+    def __post_init__(self) -> None:
+        """Reject unknown names and numbers out of range."""
+        if self.per not in CLIP_UNITS:
+            raise InputError(f"--per must be {', '.join(CLIP_UNITS[:-1])} or {CLIP_UNITS[-1]}, not {self.per!r}")
+        self._check_formats()
+        if self.overflow not in OVERFLOW_POLICIES:
+            raise InputError(f"--overflow must be extend, cut-pauses or report, not {self.overflow!r}")
+        if not 1.0 <= self.max_rate <= RATE_LIMITS[1]:
+            raise InputError(f"--max-rate must lie between 1 and {RATE_LIMITS[1]:g}, not {self.max_rate:g}")
+        if not 0.0 < self.scene_gap <= 3600.0:
+            raise InputError(f"--scene-gap must lie between 0 and 3600 s, not {self.scene_gap:g}")
+        if isinstance(self.audio, str):
+            object.__setattr__(self, "audio", Path(self.audio))
+        if self.audio is not None and not self.audio.is_dir():
+            raise InputError(f"there is no folder of recordings {self.audio}; check the path")
+
+    def _check_formats(self) -> None:
+        if self.format not in MOVIE_FORMATS:
+            raise InputError(f"--format must be mp4, webm, mov or none, not {self.format!r}")
+        if self.format == "none" and not self.exports:
+            raise InputError("--format none writes only exports; add --export, or choose another format")
+        named = [batch_format(name)[0] for name in self.exports]
+        if len(set(named)) < len(named):
+            raise InputError("an export format is given twice; remove one of them")
+        for suffix, info in map(batch_format, self.exports):
+            if not info.is_installed:
+                raise BackendError(f"{suffix} needs the package {info.package}; pip install 'tts2face[usd]'")
+
+
+def non_defaults(options: Any) -> dict[str, Any]:
+    """Fields of an option dataclass that differ from their defaults, as JSON values."""
+    found = {one.name: getattr(options, one.name) for one in fields(options) if one.name != "text"}
+    defaults = {one.name: one.default for one in fields(options)}
+    return {
+        name: str(value) if isinstance(value, Path) else value
+        for name, value in found.items()
+        if value != defaults[name]
+    }

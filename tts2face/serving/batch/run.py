@@ -1,0 +1,314 @@
+"""Running a plan: segments are rendered once, outputs are joined as soon as their segments are there.
+
+Removal of stored segments that no manifest and no unfinished job refers to.
+"""
+
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from lexicon.errors import BackendError, InputError, Tts2faceError
+from tts2face.serving.batch.assemble import join_segments
+from tts2face.serving.batch.engine import Engine, LocalEngine
+from tts2face.serving.batch.export import Exporter
+from tts2face.serving.batch.object_store import StoredSegment
+from tts2face.serving.batch.output import (
+    CSV_NAME,
+    JSON_NAME,
+    Output,
+    Plan,
+    done_entry,
+    failed_entry,
+    is_current,
+    read_manifest,
+    read_segments,
+    write_manifest,
+)
+from tts2face.serving.batch.segment import Segment, SegmentResult
+from tts2face.serving.batch.store import FolderStore, Store, open_store
+from tts2face.storage.files import refuse_overwriting
+from tts2face.storage.temporary import Temporary
+from tts2face.types import Progress
+
+SEGMENT_FOLDER = ".segments"  # in the folder of outputs
+MANIFEST_INTERVAL_S = 10.0  # between two writes while the batch runs
+N_LOOKS = 8  # results read at a time, as each takes some 50 ms in a bucket
+
+
+@dataclass(frozen=True, slots=True)
+class BatchResult:
+    """Summary of a batch: outputs made now, left as they were, and failed with their reasons."""
+
+    n_made: int
+    n_current: int
+    failed: tuple[tuple[str, str], ...]
+    n_rendered: int
+    seconds: float
+    took_s: float
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class _Run:
+    """State of a running batch."""
+
+    plan: Plan
+    folder: Path
+    store: Store
+    entries: dict[str, dict[str, Any]]
+    results: dict[str, SegmentResult] = field(default_factory=dict)
+    reasons: dict[str, str] = field(default_factory=dict)
+    waiting: dict[str, set[str]] = field(default_factory=dict)  # addresses that an output still needs
+    users: dict[str, list[Output]] = field(default_factory=dict)
+    n_made: int = 0
+    seconds: float = 0.0
+    warnings: list[str] = field(default_factory=list)
+    exporter: Exporter = field(default_factory=Exporter)
+
+
+def run_batch(
+    plan: Plan,
+    out: Path | str,
+    *,
+    store: Store | None = None,
+    engine: Engine | None = None,
+    on_progress: Progress | None = None,
+    on_output: Callable[[dict[str, Any]], None] | None = None,
+) -> BatchResult:
+    """Make the outputs of a plan in a folder; outputs that are current are left as they are.
+
+    Parameters
+    ----------
+    store
+        Store of the segments; None: a hidden folder in `out`.
+    engine
+        What renders the segments; None: this process.
+    on_progress
+        Called with the number of segments done and of all segments that this run needs.
+    on_output
+        Called with the entry of the manifest of each output that was made or has failed.
+
+    Raises
+    ------
+    InputError
+        An output would replace an input.
+    BackendError
+        The folder cannot be written.
+    """
+    began = time.perf_counter()
+    folder = Path(out)
+    _prepare_folder(folder)
+    check_outputs(plan, folder)
+    run = _Run(plan, folder, store or open_store(folder / SEGMENT_FOLDER), read_manifest(folder))
+    write_manifest(folder, plan, run.entries)  # its list of segments keeps them from being pruned
+    stale = [one for one in plan.outputs if not is_current(run.entries.get(one.name), one, folder)]
+    needed = {segment.address: segment for output in stale for segment in output.needed}
+    for output in stale:
+        run.waiting[output.name] = {segment.address for segment in output.needed}
+        for address in run.waiting[output.name]:
+            run.users.setdefault(address, []).append(output)
+    missing = _find_missing(run, needed, on_output)
+    done, written_at = len(needed) - len(missing), time.monotonic()
+    by_models = dict(sorted(missing.items(), key=lambda item: repr(item[1].models)))  # a worker holds one session
+    try:
+        for rendered in (engine or LocalEngine()).render(by_models, run.store):
+            _finish_segment(run, rendered.address, rendered.result, rendered.reason, on_output)
+            done += 1
+            if on_progress:
+                on_progress(done, len(needed))
+            if time.monotonic() - written_at > MANIFEST_INTERVAL_S:
+                write_manifest(folder, plan, run.entries)
+                written_at = time.monotonic()
+    finally:  # also of an interrupted batch
+        write_manifest(folder, plan, run.entries)
+    failed = tuple(
+        (one.name, str(run.entries[one.name].get("reason", "")))
+        for one in stale
+        if run.entries.get(one.name, {}).get("status") == "failed"
+    )
+    return BatchResult(
+        run.n_made,
+        len(plan.outputs) - len(stale),
+        failed,
+        len(missing) - len(run.reasons),
+        run.seconds,
+        time.perf_counter() - began,
+        tuple(run.warnings),
+    )
+
+
+def _prepare_folder(folder: Path) -> None:
+    """Create the folder of the outputs, and refuse one that cannot be written, before anything is rendered."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with Temporary(folder / JSON_NAME):
+            pass
+    except OSError as error:
+        raise BackendError(f"cannot write the folder {folder}: {error.strerror}; choose another --out") from error
+
+
+def _find_missing(
+    run: _Run, needed: Mapping[str, Segment], on_output: Callable[[dict[str, Any]], None] | None
+) -> dict[str, Segment]:
+    """Segments that are to be rendered; those that are stored are noted.
+
+    Raises
+    ------
+    BackendError
+        The store cannot be used.
+    """
+    missing = {}
+    with ThreadPoolExecutor(N_LOOKS) as pool:
+        for (address, segment), found in zip(needed.items(), pool.map(run.store.result, needed), strict=True):
+            if found is None:
+                missing[address] = segment
+            else:
+                _finish_segment(run, address, found, "", on_output)
+    if missing:
+        run.store.check()
+    return missing
+
+
+def check_outputs(plan: Plan, folder: Path) -> None:
+    """Refuse outputs that would replace subtitles or recordings.
+
+    Raises
+    ------
+    InputError
+        An output is an input.
+    """
+    sources = {path for output in plan.outputs for path in output.source}
+    sources |= {
+        str(one.request["audio"]) for output in plan.outputs for one in output.segments if "audio" in one.request
+    }
+    inputs = {Path(path).resolve() for path in sources}
+    for name in [name for output in plan.outputs for name in output.names] + [JSON_NAME, CSV_NAME]:
+        path = folder / name
+        if path.exists() and path.resolve() in inputs:
+            refuse_overwriting({name: path}, {"an input of the batch": path})
+
+
+def _finish_segment(
+    run: _Run,
+    address: str,
+    result: SegmentResult | None,
+    reason: str,
+    on_output: Callable[[dict[str, Any]], None] | None,
+) -> None:
+    """Note a segment, and make the outputs that need no other one."""
+    if result is None:
+        run.reasons[address] = reason
+    else:
+        run.results[address] = result
+    for output in run.users.get(address, ()):
+        run.waiting[output.name].discard(address)
+        if not run.waiting[output.name]:
+            _finish_output(run, output)
+            if on_output:
+                on_output(run.entries[output.name])
+
+
+def _finish_output(run: _Run, output: Output) -> None:
+    """Join the segments of an output, or note why it failed."""
+    reasons = [run.reasons[one.address] for one in output.needed if one.address in run.reasons]
+    if reasons:
+        run.entries[output.name] = failed_entry(output, reasons[0])
+        return
+    results = [run.results[one.address] for one in (output.segments if output.suffix else output.tracks)]
+    try:
+        with TemporaryDirectory(prefix="tts2face-") as copies:
+            parts = {one.address: run.store.fetch(one.address, Path(copies)) for one in output.needed}
+            written = []
+            if output.exports:
+                written = run.exporter.write(output, [parts[one.address] for one in output.tracks], run.folder)
+            if output.suffix:
+                path = run.folder / output.name
+                join_segments([parts[one.address] for one in output.segments], path, output.fps, output.sounds)
+        entry = done_entry(output, run.folder, results, written)
+    except Tts2faceError as wrong:
+        run.entries[output.name] = failed_entry(output, str(wrong))
+        return
+    run.entries[output.name] = entry
+    run.n_made += 1
+    run.seconds += entry["duration_s"]
+    run.warnings += [f"{output.name}, {warning}" for warning in entry["warnings"]]
+
+
+MIN_AGE_S = 86_400.0  # a younger segment may belong to a batch that is being planned or has just begun
+
+
+@dataclass(frozen=True, slots=True)
+class Pruned:
+    """Segments and unfinished files that were removed or, in a dry run, would be, with their bytes; segments kept."""
+
+    n_removed: int
+    n_bytes: int
+    n_kept: int
+
+
+def prune_segments(
+    store: Store, outputs: Sequence[Path], unfinished: Collection[str], older_than_s: float, *, dry_run: bool = False
+) -> Pruned:
+    """Remove the segments of a store that are old and to which nothing refers.
+
+    Parameters
+    ----------
+    outputs
+        Folders of outputs of all batches that use the store; the segments in their manifests are kept.
+    unfinished
+        Addresses of the segments of unfinished jobs; they are kept.
+    older_than_s
+        Seconds since a segment was stored; at least `MIN_AGE_S`.
+
+    Raises
+    ------
+    InputError
+        There is no folder of outputs or no manifest in one, or the age is too small.
+    DataError
+        A manifest is damaged, or does not list its segments.
+    BackendError
+        The store cannot be used.
+    """
+    if older_than_s < MIN_AGE_S:
+        raise InputError(
+            f"segments of the last day are never removed, as a batch may be about to use them; give --days 1 or more, "
+            f"not {older_than_s / 86_400.0:g}"
+        )
+    if not outputs:
+        raise InputError("give --outputs: the folders of clips of all batches that use the store, whose segments stay")
+    for folder in outputs:
+        if not (folder / JSON_NAME).is_file():
+            raise InputError(f"there is no {JSON_NAME} in {folder}; give the folders of --out of `tts2face batch`")
+    kept = set(unfinished).union(*(read_segments(folder) for folder in outputs))
+    return prune_unused(store, kept, older_than_s, dry_run=dry_run)
+
+
+def prune_unused(store: Store, kept: Collection[str], older_than_s: float, *, dry_run: bool = False) -> Pruned:
+    """Remove segments and unfinished files stored some seconds ago or earlier, except those that are kept."""
+    before = time.time() - older_than_s
+    found = list(store.entries())
+    removed = [one for one in found if one.address not in kept and one.stored_s <= before]
+    abandoned = _unfinished_files(store, before)
+    n_bytes = sum(one.n_bytes for one in removed) + sum(one.n_bytes for _, one in abandoned)
+    if not dry_run:
+        for one in removed:
+            store.remove(one.address)
+        for path, _ in abandoned:
+            path.unlink(missing_ok=True)
+    return Pruned(len(removed) + len(abandoned), n_bytes, len(found) - len(removed))
+
+
+def _unfinished_files(store: Store, before: float) -> list[tuple[Path, StoredSegment]]:
+    """Old files of renderings whose process was killed."""
+    if not isinstance(store, FolderStore):
+        return []
+    found = []
+    for path in (store.folder / "scratch").glob("*"):
+        status = path.stat()
+        if path.is_file() and status.st_mtime <= before:
+            found.append((path, StoredSegment(path.name, status.st_size, status.st_mtime)))
+    return found

@@ -1,0 +1,103 @@
+"""Errors of the service as answers."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
+
+from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
+from tts2face.serving.service.messages import DefectError
+from tts2face.serving.service.pool import BusyError
+
+
+class RefusedError(HTTPException):
+    """A request that is refused before any work.
+
+    It is Starlette's kind of exception, so that FastAPI passes it on when it is raised while a body is read.
+
+    Parameters
+    ----------
+    status
+        HTTP status.
+    code
+        Word for programs.
+    message
+        One sentence: what, which value, what to do.
+    """
+
+    def __init__(self, status: int, code: str, message: str, headers: Mapping[str, str] | None = None) -> None:
+        self.status, self.code, self.message = status, code, message
+        self.headers: dict[str, str]
+        super().__init__(status, message, dict(headers or {}))
+
+    def __str__(self) -> str:
+        """The message."""
+        return self.message
+
+
+STATUS: Mapping[type[Tts2faceError], tuple[int, str]] = {
+    BusyError: (429, "busy"),
+    DefectError: (500, "internal"),
+    InputError: (400, "invalid_request"),
+    DataError: (422, "invalid_data"),
+    BackendError: (503, "unavailable"),
+}
+
+
+def as_refused(error: Tts2faceError) -> RefusedError:
+    """Answer to an error of the synthesis."""
+    status, code = next(found for kind, found in STATUS.items() if isinstance(error, kind))
+    headers = {"Retry-After": str(BusyError.retry_after_s)} if status in {429, 503} else {}
+    return RefusedError(status, code, " ".join(str(error).split()), headers)
+
+
+class ErrorDetail(BaseModel):
+    """What is wrong."""
+
+    message: Annotated[
+        str,
+        Field(
+            description="What is wrong, which value, what to do.",
+            examples=["the rate must be from 0.5 to 2, not 3; change it"],
+        ),
+    ]
+    type: Annotated[
+        str, Field(description="invalid_request_error or server_error.", examples=["invalid_request_error"])
+    ]
+    param: Annotated[
+        str | None, Field(description="Name of the field, if the form of one is wrong.", examples=["rate"])
+    ]
+    code: Annotated[str, Field(description="Word for programs.", examples=["rate_limited"])]
+
+
+class ErrorBody(BaseModel):
+    """An error, in the form of OpenAI's API."""
+
+    error: Annotated[ErrorDetail, Field(description="The error.")]
+
+
+DOCUMENTED: dict[int | str, dict[str, Any]] = {
+    status: {"model": ErrorBody, "description": text}
+    for status, text in {
+        400: "A value is wrong.",
+        401: "The API key is missing or unknown.",
+        403: "The key lacks the scope, or the page is of another origin.",
+        404: "There is nothing of this name.",
+        408: "The body did not arrive in time.",
+        409: "The name is taken.",
+        413: "The body or text is too long, or a quota is used up.",
+        421: "The host is none of this service.",
+        422: "The body does not have the form of the schema.",
+        429: "Too many requests; Retry-After says when to repeat.",
+        431: "The head of the request is too large.",
+        500: "A defect of the service; the log says more.",
+        503: "Something is missing on the server, it is not ready, or it is shutting down.",
+    }.items()
+}
+
+
+def error_body(code: str, message: str, param: str | None = None) -> dict[str, Any]:
+    """JSON of an error, in the form of OpenAI's API."""
+    kind = "server_error" if code in {"internal", "unavailable", "draining"} else "invalid_request_error"
+    return {"error": {"message": message, "type": kind, "param": param, "code": code}}

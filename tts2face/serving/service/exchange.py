@@ -1,0 +1,185 @@
+"""A request and its answer: identity, headers, and what the log, the metrics and traces receive.
+
+Addresses of the studio's pages, and headers that keep them within this service.
+"""
+
+import asyncio
+import json
+import re
+import time
+import uuid
+from collections.abc import Awaitable, Callable, MutableMapping
+from contextlib import suppress
+from typing import Any
+
+from tts2face.serving.service.errors import RefusedError, error_body
+from tts2face.serving.service.logs import REQUEST_ID
+from tts2face.serving.service.stages import STAGES, Stage, durations
+
+PAGES = "/studio"
+RECORDINGS = f"{PAGES}/api/recordings"
+STYLES = f"{PAGES}/api/styles"
+TAKES = f"{PAGES}/api/takes"
+# NiceGUI has scripts and styles in its pages and compiles templates in the browser (Vue), hence 'unsafe-inline' and
+# 'unsafe-eval'. Nothing may come from, or go to, another host: no script, picture, font, frame, form or connection.
+POLICY = "; ".join([
+    "default-src 'self'", "script-src 'self' 'unsafe-inline' 'unsafe-eval'", "style-src 'self' 'unsafe-inline'",
+    "img-src 'self' data: blob:", "font-src 'self' data:", "media-src 'self' blob:", "connect-src 'self' blob: data:",
+    "worker-src 'self' blob:", "object-src 'none'", "base-uri 'none'", "form-action 'self'", "frame-ancestors 'none'",
+])  # fmt: skip
+PAGE_HEADERS = (
+    (b"content-security-policy", POLICY.encode()),
+    (b"referrer-policy", b"no-referrer"),
+    (b"permissions-policy", b"camera=(self), microphone=(self), geolocation=(), usb=()"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+)
+
+
+def is_page(path: str) -> bool:
+    """Whether an address belongs to the studio."""
+    return path == PAGES or path.startswith(f"{PAGES}/")
+
+
+def page_headers(path: str) -> tuple[tuple[bytes, bytes], ...]:
+    """Further headers of an answer, if its address belongs to the studio."""
+    return PAGE_HEADERS if is_page(path) else ()
+
+
+Scope = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
+Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+
+REQUEST_ID_FORM = re.compile(rb"[A-Za-z0-9._-]{1,64}")
+HEADERS = ((b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-store"))
+METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
+CLOSE_NORMAL, CLOSE_REFUSED, CLOSE_RESTART = 1000, 1008, 1012  # WebSocket: policy violation; service restart
+HTTP_FORM = "websocket.http.response"  # extension of ASGI: a refused WebSocket gets an HTTP answer
+
+
+class Exchange:
+    """A request, its identity, and what is known of its answer.
+
+    It is created in the task of the request, whose log lines have its id from then on.
+    """
+
+    def __init__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        self.scope, self._receive, self._send = scope, receive, send
+        self.headers: dict[bytes, bytes] = dict(scope["headers"])
+        given = self.headers.get(b"x-request-id", b"")
+        self.id = given.decode() if REQUEST_ID_FORM.fullmatch(given) else uuid.uuid4().hex
+        self.began = time.monotonic()
+        self.status, self.n_bytes = 0, 0
+        self.code: str | None = None  # of the error with which it was refused
+        self.first_byte_s: float | None = None
+        self.stages: list[Stage] = []
+        self.is_cut = False  # ended by the service before it was complete
+        self._is_closed = False
+        self._task: asyncio.Task[Any] | None = None
+        REQUEST_ID.set(self.id)
+        STAGES.set(self.stages)
+
+    @property
+    def age_s(self) -> float:
+        """Seconds since the request arrived."""
+        return time.monotonic() - self.began
+
+    @property
+    def method(self) -> str:
+        """Method; ``WS`` of a WebSocket, ``OTHER`` if it is none of `METHODS`."""
+        method = str(self.scope.get("method", "WS"))
+        return method if method in METHODS or self.scope["type"] == "websocket" else "OTHER"
+
+    @property
+    def route(self) -> str:
+        """Path of its route with the names of parameters in place of their values; ``other`` if there is none."""
+        return str(getattr(self.scope.get("route"), "path", "other"))
+
+    async def send(self, message: MutableMapping[str, Any]) -> None:
+        """Send a message of the answer with the headers of the service."""
+        if self._is_closed:
+            return
+        if message["type"] == "http.response.start":
+            self.status = message["status"]
+            given = {name for name, _ in message["headers"]}
+            own = (*HEADERS, *page_headers(self.scope["path"]))
+            message["headers"] = [
+                *message["headers"],
+                *(header for header in own if header[0] not in given),
+                (b"x-request-id", self.id.encode()),
+                (b"server-timing", self._server_timing().encode()),
+            ]
+        elif message["type"] == "websocket.accept":
+            self.status = 101
+        elif message["type"] == "websocket.close":
+            self._is_closed = True
+        self._count(message)
+        await self._send(message)
+
+    async def run(self, work: Awaitable[None]) -> None:
+        """Run what answers the request, until it ends or until `cut`."""
+        self._task = asyncio.current_task()
+        try:
+            await work
+        except asyncio.CancelledError:
+            if not self.is_cut:
+                raise
+            assert self._task is not None
+            self._task.uncancel()
+
+    async def refuse(self, refused: RefusedError) -> None:
+        """Answer with an error, unless an answer has begun."""
+        self.code = refused.code
+        if self.status:
+            return
+        body = json.dumps(error_body(refused.code, refused.message)).encode()
+        headers = [(name.lower().encode(), value.encode("latin-1")) for name, value in refused.headers.items()]
+        headers += [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode())]
+        if self.scope["type"] == "http":
+            await self.send({"type": "http.response.start", "status": refused.status, "headers": headers})
+            await self.send({"type": "http.response.body", "body": body})
+            return
+        self.status = refused.status
+        if HTTP_FORM not in self.scope.get("extensions", {}):
+            await self._send({"type": "websocket.close", "code": CLOSE_REFUSED, "reason": refused.message[:120]})
+            return
+        headers.append((b"x-request-id", self.id.encode()))
+        await self._send({"type": f"{HTTP_FORM}.start", "status": refused.status, "headers": headers})
+        await self._send({"type": f"{HTTP_FORM}.body", "body": body})
+
+    async def announce_end(self, message: str) -> None:
+        """Write to the client of a WebSocket that the service is about to end; pages notice its end by themselves."""
+        if self.scope["type"] == "websocket" and self.status == 101 and not is_page(self.scope["path"]):
+            with suppress(OSError, RuntimeError):  # the client has left
+                text = json.dumps({"type": "error", "code": "draining", "message": message})
+                await self.send({"type": "websocket.send", "text": text})
+
+    async def close(self, code: int = CLOSE_NORMAL, reason: str = "") -> None:
+        """Close a WebSocket that is open."""
+        if self.scope["type"] == "websocket" and self.status == 101 and not self._is_closed:
+            self._is_closed = True
+            with suppress(OSError, RuntimeError):  # the client has left
+                await self._send({"type": "websocket.close", "code": code, "reason": reason})
+
+    async def cut(self) -> None:
+        """End the request now: a WebSocket with code 1012, a stream incomplete."""
+        self.is_cut = True
+        await self.close(CLOSE_RESTART, "the service restarts")
+        if self._task is not None:
+            self._task.cancel()
+
+    def _count(self, message: MutableMapping[str, Any]) -> None:
+        if message["type"] == "http.response.body":
+            content = message.get("body", b"")
+        elif message["type"] == "websocket.send":
+            content = message.get("bytes") or message.get("text") or b""
+        else:
+            return
+        self.n_bytes += len(content)
+        if self.first_byte_s is None and content:
+            self.first_byte_s = self.age_s
+
+    def _server_timing(self) -> str:
+        now = time.monotonic()
+        stages = durations(self.stages, now) | {"total": now - self.began}
+        return ", ".join(f"{name};dur={1000 * seconds:.1f}" for name, seconds in stages.items())

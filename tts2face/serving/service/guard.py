@@ -1,0 +1,259 @@
+"""Checks of every request before any work: host, origin, key, limits; headers, log and metrics of every answer.
+
+Browsers as clients: a cookie in place of a header with the key, only for the studio's addresses.
+
+What a key may do.
+"""
+
+import asyncio
+import logging
+import time
+from collections.abc import Awaitable, Callable, Mapping, MutableMapping
+from http.cookies import CookieError, SimpleCookie
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, urlsplit
+
+from fastapi import Request as HttpRequest
+from starlette.requests import ClientDisconnect
+from starlette.websockets import WebSocketDisconnect
+
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.exchange import PAGES, RECORDINGS, STYLES, TAKES, Exchange, Receive, Scope, Send, is_page
+from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, find_key
+from tts2face.serving.service.logs import log_event
+
+if TYPE_CHECKING:
+    from tts2face.serving.service.exchange import Exchange
+    from tts2face.serving.service.state import ServiceState
+
+
+__all__ = ["COOKIE", "LOGIN_PATH", "cookie_key", "is_page", "is_static", "set_cookie", "wants_login"]
+
+COOKIE = "tts2face_key"
+LOGIN_PATH = f"{PAGES}/login"
+STATIC_PATHS = (f"{PAGES}/_nicegui/", f"{PAGES}/_nicegui_ws/")  # libraries of a page, and its connection
+UPLOADS = f"{PAGES}/_nicegui/client/"
+COOKIE_S = 30 * 86_400
+
+
+def is_static(path: str) -> bool:
+    """Whether an address is that of a page's libraries or of its connection, which no limit of a key counts.
+
+    The connection of an open page is no request that a draining service waits for.
+    """
+    return path.startswith(STATIC_PATHS) and not path.startswith(UPLOADS)
+
+
+def cookie_key(headers: Mapping[bytes, bytes]) -> str:
+    """Key in the cookie of a request; empty if there is none."""
+    cookies: SimpleCookie = SimpleCookie()
+    try:
+        cookies.load(headers.get(b"cookie", b"").decode("latin-1"))
+    except CookieError:
+        return ""
+    return cookies[COOKIE].value if COOKIE in cookies else ""
+
+
+def set_cookie(key: str, *, is_secure: bool) -> str:
+    """Header ``Set-Cookie`` that keeps a key, or removes it if it is empty.
+
+    Scripts cannot read it, and no request that another site causes has it.
+    """
+    age = COOKIE_S if key else 0
+    secure = "; Secure" if is_secure else ""
+    return f"{COOKIE}={key}; Path={PAGES}; Max-Age={age}; HttpOnly; SameSite=Strict{secure}"
+
+
+def wants_login(request: "Exchange") -> bool:
+    """Whether a request without a key is that of a person who opens a page."""
+    wants_page = b"text/html" in request.headers.get(b"accept", b"")
+    return request.scope["type"] == "http" and request.method == "GET" and is_page(request.scope["path"]) and wants_page
+
+
+App = Callable[[Scope, Receive, Send], Awaitable[None]]
+
+OPEN_PATHS = frozenset({"/healthz", "/readyz", "/docs", "/openapi.json"})
+UNCOUNTED_PATHS = frozenset({*OPEN_PATHS, "/metrics", "/v1/hello"})
+VIDEO_PATH = "/v1/talkers/build"
+VIDEO_PUTS = (f"{RECORDINGS}/", f"{STYLES}/", f"{TAKES}/")
+DRAINING_PATHS = frozenset({"/healthz", "/readyz", "/metrics"})  # that are answered until the end
+CLOSE = {"Connection": "close"}
+DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
+
+
+class Guard:
+    """ASGI middleware of the whole service."""
+
+    def __init__(self, app: App, state: "ServiceState") -> None:
+        self._app, self._state = app, state
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Check a request, pass it on, and record its answer."""
+        if scope["type"] not in {"http", "websocket"}:
+            return await self._app(scope, receive, send)
+        request = Exchange(scope, receive, send)
+        key: ApiKey | None = None
+        is_counted = scope["path"] not in UNCOUNTED_PATHS and not is_static(scope["path"])
+        try:
+            self._check_draining(scope["path"])
+            self._check_head(request)
+            self._check_host(request)
+            key = self._identify(request)
+            scope["state"] = {**scope.get("state", {}), "key": key, "exchange": request}
+            if is_counted:
+                self._state.limits.begin(key)
+        except RefusedError as refused:
+            await request.refuse(refused)
+            return self._state.record(request, key)
+        if is_counted:
+            self._state.running.add(request)
+        try:
+            await request.run(self._answer(request, receive))
+            await request.close()
+            if request.is_cut:
+                await request.refuse(_draining())
+        finally:
+            if is_counted:
+                self._state.running.discard(request)
+                self._state.limits.end(key)
+            self._state.record(request, key)
+        return None
+
+    async def _answer(self, request: Exchange, receive: Receive) -> None:
+        settings, scope = self._state.settings, request.scope
+        size = settings.video_mb if _brings_video(scope) else settings.body_mb
+        body = _BoundedBody(receive, size * 1e6, settings.body_s * max(1.0, size / settings.body_mb))
+        try:
+            body.check(request.headers)
+            await self._app(scope, body.receive if scope["type"] == "http" else receive, request.send)
+        except RefusedError as refused:
+            await request.refuse(refused)
+        except (ClientDisconnect, WebSocketDisconnect):
+            pass  # the client has left
+        except Exception as defect:  # noqa: BLE001 - the one place where a defect becomes an answer
+            log_event("defect", level=logging.ERROR, error=defect)
+            message = f"internal error: {type(defect).__name__}; the log has it under the id {request.id}"
+            await request.refuse(RefusedError(500, "internal", message))
+
+    def _check_draining(self, path: str) -> None:
+        if self._state.is_draining and path not in DRAINING_PATHS:
+            raise _draining()
+
+    def _check_head(self, request: "Exchange") -> None:
+        """Refuse heads that are too large, and bodies with two lengths, which proxies may divide differently."""
+        settings, scope, given = self._state.settings, request.scope, request.scope["headers"]
+        size = sum(len(name) + len(value) for name, value in given)
+        size += len(scope.get("raw_path") or b"") + len(scope["query_string"])
+        if len(given) > settings.headers or size > 1024 * settings.head_kb:
+            message = f"the head has more than {settings.headers} headers or {settings.head_kb} KB; send less"
+            raise RefusedError(431, "too_large", message, CLOSE)
+        if {b"transfer-encoding", b"content-length"} <= set(request.headers):
+            raise RefusedError(400, "invalid_request", "the body has two lengths; send one of them", CLOSE)
+
+    def _check_host(self, request: "Exchange") -> None:
+        """Refuse names of other hosts (DNS rebinding) and pages of other origins."""
+        host = request.headers.get(b"host", b"").decode("latin-1")
+        name = _host_name(host)
+        if name not in self._state.settings.allowed_hosts:
+            raise RefusedError(
+                421, "unknown_host", f"the host {name!r} is none of this service; add it to the setting hosts"
+            )
+        origin = request.headers.get(b"origin", b"").decode("latin-1")
+        if origin and origin not in self._state.settings.origins and origin.partition("://")[2] != host:
+            raise RefusedError(
+                403,
+                "unknown_origin",
+                f"pages of {origin[:80]!r} may not use this service; add it to the setting origins",
+            )
+
+    def _identify(self, request: "Exchange") -> ApiKey:
+        path = request.scope["path"]
+        if path in OPEN_PATHS or path == LOGIN_PATH or not self._state.keys:
+            return LOCAL_KEY
+        given = request.headers.get(b"authorization", b"").decode("latin-1").removeprefix("Bearer ").strip()
+        given = given or request.headers.get(b"x-api-key", b"").decode("latin-1")
+        if not given and request.scope["type"] == "websocket":  # a browser cannot send headers with it
+            given = parse_qs(request.scope["query_string"].decode("latin-1")).get("key", [""])[0]
+        if not given and is_page(path):
+            given = cookie_key(request.headers)
+        found = find_key(self._state.keys, given)
+        if found is None and wants_login(request):
+            raise RefusedError(303, "unauthorized", "log in with an API key first", {"Location": LOGIN_PATH})
+        if found is None:
+            what = "unknown" if given else "missing"
+            raise RefusedError(
+                401, "unauthorized", f"the API key is {what}; send it as `Authorization: Bearer KEY`",
+                {"WWW-Authenticate": "Bearer"},
+            )  # fmt: skip
+        return found
+
+
+def _brings_video(scope: Scope) -> bool:
+    """Whether a request brings a recording of a person: only such bodies may be larger than all others."""
+    if scope["type"] != "http" or "build" not in scope["state"]["key"].scopes:
+        return False
+    is_take = scope["method"] == "PUT" and scope["path"].startswith(VIDEO_PUTS)
+    return is_take or (scope["method"], scope["path"]) == ("POST", VIDEO_PATH)
+
+
+def _draining() -> RefusedError:
+    headers = {"Retry-After": str(DRAINING_RETRY_S)} | CLOSE
+    return RefusedError(503, "draining", "the service is shutting down; repeat the request", headers)
+
+
+def _host_name(host: str) -> str:
+    """Name of a Host header without its port; empty if it is none."""
+    try:
+        return urlsplit(f"//{host}").hostname or ""
+    except ValueError:
+        return ""
+
+
+class _BoundedBody:
+    """A request's body with limits of size and time."""
+
+    def __init__(self, receive: Receive, max_bytes: float, max_s: float) -> None:
+        self._receive, self._max_bytes, self._max_s = receive, max_bytes, max_s
+        self._n_bytes, self._is_complete = 0, False
+        self._deadline = time.monotonic() + max_s
+
+    def check(self, headers: dict[bytes, bytes]) -> None:
+        """Refuse a body whose stated length is too large; what has none is complete, however late it is asked for."""
+        length = headers.get(b"content-length", b"0")
+        self._is_complete = length == b"0" and b"transfer-encoding" not in headers
+        if not length.isdigit() or int(length) > self._max_bytes:
+            raise self._too_large()
+
+    async def receive(self) -> MutableMapping[str, Any]:
+        """Next message of the request."""
+        if self._is_complete:
+            return await self._receive()
+        try:
+            message = await asyncio.wait_for(self._receive(), max(0.0, self._deadline - time.monotonic()))
+        except TimeoutError as late:
+            raise RefusedError(
+                408, "too_slow", f"the body did not arrive within {self._max_s:g} s; send it faster"
+            ) from late
+        if message["type"] == "http.request":
+            self._n_bytes += len(message.get("body", b""))
+            self._is_complete = not message.get("more_body", False)
+            if self._n_bytes > self._max_bytes:
+                raise self._too_large()
+        return message
+
+    def _too_large(self) -> RefusedError:
+        return RefusedError(413, "too_large", f"the body is larger than {self._max_bytes / 1e6:g} MB; send less")
+
+
+def require_scope(request: HttpRequest, scope: str, what: str) -> ApiKey:
+    """Key of a request, which must have a scope; `what` names in the plural what needs it.
+
+    Raises
+    ------
+    RefusedError
+        The key does not have the scope.
+    """
+    key: ApiKey = request.state.key
+    if scope not in key.scopes:
+        raise RefusedError(403, "forbidden", f"{what} need a key with the scope {scope}; this one has none such")
+    return key

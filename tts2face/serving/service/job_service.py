@@ -1,0 +1,402 @@
+"""Jobs of a running server: the database, the worker processes, webhooks and the removal of what is old.
+
+Webhooks: messages about the end of jobs, signed as by the specification Standard Webhooks.
+
+Jobs as the API shows them, and the envelope of a new one.
+"""
+
+import asyncio
+import base64
+import hashlib
+import hmac
+import http.client
+import json
+import logging
+import threading
+import time
+from collections.abc import Awaitable, Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import partial
+from typing import Annotated, Any, TypeVar
+from urllib.parse import urlsplit
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from lexicon.errors import BackendError, Tts2faceError
+from tts2face import __version__
+from tts2face.serving.batch.run import prune_unused
+from tts2face.serving.batch.store import open_store
+from tts2face.serving.service.errors import RefusedError, as_refused
+from tts2face.serving.service.library import Library
+from tts2face.serving.service.logs import log_event
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.work.blobs import open_blobs
+from tts2face.serving.work.client import Delivery, JobClient, prune_jobs, unfinished_segments
+from tts2face.serving.work.connection import DatabaseAwayError, connection_errors
+from tts2face.serving.work.database import database_url, prepare_database, shown_url
+from tts2face.serving.work.engine import DatabaseEngine, local_workers
+from tts2face.serving.work.run import BLOBS
+from tts2face.serving.work.table import STATES, JobFile, JobRecord, OtherBodyError, QueueFullError
+from tts2face.storage.files import translate_disk_errors
+
+HASH = "ab3f" * 16
+EXAMPLE_ID = "0f8fad5bd9cb469fa16570867728950e"
+
+
+class NewJobBody(BaseModel):
+    """A job that is asked for; the options are those of its kind."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    kind: str
+    request: dict[str, Any] = {}
+    webhook: Annotated[str | None, Field(max_length=2000)] = None
+
+
+class Progress(BaseModel):
+    """How much is done."""
+
+    done: Annotated[int, Field(description="Parts that are done.", examples=[3])]
+    of: Annotated[int, Field(description="All parts; 0 while they are not known.", examples=[12])]
+
+
+class ResultFile(BaseModel):
+    """A file that a job has made."""
+
+    name: Annotated[str, Field(description="Name of the file.", examples=["clip.mp4"])]
+    url: Annotated[str, Field(description="Path from which it is fetched.", examples=[f"/v1/results/{HASH}"])]
+    sha256: Annotated[str, Field(description="Hash of its content.", examples=[HASH])]
+    media_type: Annotated[str, Field(description="Its media type.", examples=["video/mp4"])]
+    bytes: Annotated[int, Field(description="Its size.", examples=[123456])]
+
+
+class WebhookState(BaseModel):
+    """The message about the end of a job."""
+
+    url: Annotated[str, Field(description="Where it is sent.", examples=["https://example.org/done"])]
+    state: Annotated[str, Field(description="waiting, delivered or failed.", examples=["delivered"])]
+    tries: Annotated[int, Field(description="Number of times it was sent.", examples=[1])]
+
+
+class Job(BaseModel):
+    """A job without its options and results."""
+
+    id: Annotated[str, Field(description="Name of the job.", examples=[EXAMPLE_ID])]
+    kind: Annotated[str, Field(description="clip, subtitles, ...", examples=["clip"])]
+    state: Annotated[str, Field(description="waiting, running, done, failed or cancelled.", examples=["done"])]
+    created: Annotated[float, Field(description="Seconds since 1970.", examples=[1790000000.0])]
+    started: Annotated[float | None, Field(description="When a worker took it.", examples=[1790000001.0])]
+    finished: Annotated[float | None, Field(description="When it ended.", examples=[1790000009.0])]
+    progress: Annotated[Progress, Field(description="How many of its parts are done.")]
+    error: Annotated[str | None, Field(description="Why it failed, or why some results are missing.", examples=[None])]
+    webhook: Annotated[WebhookState | None, Field(description="The message about its end.")]
+
+
+class JobDetail(Job):
+    """A job with its results."""
+
+    results: Annotated[list[ResultFile], Field(description="Its files, when it is done.")]
+
+
+class JobPage(BaseModel):
+    """Jobs, the newest first."""
+
+    jobs: Annotated[list[Job], Field(description="Jobs of this page.")]
+    next: Annotated[
+        str | None, Field(description="Value of `before` for the next page; null: there is none.", examples=[None])
+    ]
+
+
+def job_view(record: JobRecord) -> Job:
+    """A job for the list."""
+    return Job(**_fields(record))
+
+
+def job_detail(record: JobRecord) -> JobDetail:
+    """A job with its results."""
+    return JobDetail(**_fields(record), results=[_file(one) for one in record.outputs])
+
+
+def _fields(record: JobRecord) -> Mapping[str, Any]:
+    webhook = None
+    if record.webhook is not None:
+        webhook = WebhookState(url=record.webhook, state=record.webhook_state or "", tries=record.webhook_tries)
+    return {
+        **{name: getattr(record, name) for name in ("id", "kind", "state", "created", "started", "finished", "error")},
+        "progress": Progress(done=record.n_done, of=record.n_all),
+        "webhook": webhook,
+    }
+
+
+def _file(one: JobFile) -> ResultFile:
+    return ResultFile(
+        name=one.name, url=f"/v1/results/{one.sha256}", sha256=one.sha256, media_type=one.media_type, bytes=one.n_bytes
+    )
+
+
+TIMEOUT_S = 10.0
+SECRET_PREFIX = "whsec_"  # of secrets in base64
+SCHEMES = {"https": http.client.HTTPSConnection, "http": http.client.HTTPConnection}
+
+
+def check_webhook(url: str, settings: ServiceSettings) -> None:
+    """Refuse a webhook whose host is not in the setting `webhook_hosts`.
+
+    Raises
+    ------
+    RefusedError
+        With the reason.
+    """
+    try:
+        parts = urlsplit(url)
+        place = parts.hostname if parts.port is None else f"{parts.hostname}:{parts.port}"
+    except ValueError as wrong:
+        raise RefusedError(400, "invalid_webhook", f"the webhook is no URL: {wrong}") from wrong
+    if parts.scheme not in SCHEMES or "@" in parts.netloc or not url.isascii() or not url.isprintable() or " " in url:
+        raise RefusedError(400, "invalid_webhook", "the webhook must be a URL https://HOST/PATH without a password")
+    if place not in settings.webhook_hosts:
+        raise RefusedError(
+            400,
+            "invalid_webhook",
+            f"the host {str(place)[:80]!r} gets no webhooks; add it to the setting webhook_hosts",
+        )
+
+
+def sign(secret: str, message_id: str, timestamp: int, body: bytes) -> str:
+    """Value of the header ``webhook-signature``: HMAC-SHA256 of id, time and body."""
+    key = base64.b64decode(secret.removeprefix(SECRET_PREFIX)) if secret.startswith(SECRET_PREFIX) else secret.encode()
+    content = f"{message_id}.{timestamp}.".encode() + body
+    return "v1," + base64.b64encode(hmac.digest(key, content, hashlib.sha256)).decode()
+
+
+def message_of(record: JobRecord) -> bytes:
+    """Body of the message about a job."""
+    content = {"type": f"job.{record.state}", "job": job_detail(record).model_dump(exclude={"webhook"})}
+    return json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode()
+
+
+def send_message(url: str, message_id: str, body: bytes, secret: str) -> bool:
+    """Send a message; whether the receiver has accepted it. Redirects are not followed."""
+    parts, now = urlsplit(url), int(time.time())
+    connection = SCHEMES[parts.scheme](parts.hostname or "", parts.port, timeout=TIMEOUT_S)
+    headers = {
+        "Content-Type": "application/json",
+        "User-Agent": f"tts2face/{__version__}",
+        "webhook-id": message_id,
+        "webhook-timestamp": str(now),
+        "webhook-signature": sign(secret, message_id, now, body),
+    }
+    path = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
+    try:
+        connection.request("POST", path, body, headers)
+        status: int = connection.getresponse().status
+        return 200 <= status < 300
+    except (OSError, http.client.HTTPException):
+        return False
+    finally:
+        connection.close()
+
+
+def deliver(client: JobClient, delivery: Delivery, settings: ServiceSettings) -> bool:
+    """Send the message about a job once and note the result; the id of the message is that of the job."""
+    record = client.table.get(delivery.job_id)
+    if record is None:
+        return False
+    is_delivered = send_message(delivery.url, record.id, message_of(record), settings.webhook_secret)
+    client.note_delivery(delivery, is_delivered=is_delivered)
+    return is_delivered
+
+
+Value = TypeVar("Value")
+
+NICENESS = 10  # of the workers, so that streams go first
+RETRY_S = 2.0  # between two tries to open the database
+RETRY_AFTER_S = 5  # for clients, while the database cannot be reached
+SUPERVISE_S, RESTART_S = 0.5, 10.0  # between two looks at the workers, and after they ended again and again
+WEBHOOK_S, STATISTICS_S, SWEEP_S = 1.0, 5.0, 3600.0  # between two looks
+PROBE_S = 3.0  # of the database for /readyz
+DAY_S = 86_400.0
+MIN_AGE_S = DAY_S  # of files and segments: a younger one may belong to a job that is being queued or planned
+N_SENDERS = 4  # threads that wait for receivers of webhooks
+N_THREADS = 8  # that wait for the database; the other parts of the server never do
+
+
+class JobService:
+    """Jobs of a server; while the database cannot be reached, only they are refused.
+
+    Parameters
+    ----------
+    settings
+        Settings of the service.
+    library
+        Uploaded models.
+    """
+
+    def __init__(self, settings: ServiceSettings, library: Library) -> None:
+        self._settings, self._library = settings, library
+        self._client: JobClient | None = None
+        self._reason = ""  # why the database cannot be reached
+        self._threads = ThreadPoolExecutor(N_THREADS, thread_name_prefix="jobs")
+        self._senders = ThreadPoolExecutor(N_SENDERS, thread_name_prefix="webhooks")
+        self._tasks: list[asyncio.Task[None]] = []
+        self._stopped = threading.Event()
+        self._supervisor: threading.Thread | None = None
+        self.counts, self.oldest_waiting_s = dict.fromkeys(STATES, 0), 0.0
+
+    def start(self) -> None:
+        """Open the database in the background, then start workers and loops, in the running event loop."""
+        self._tasks = [asyncio.create_task(self._run())]
+
+    async def close(self) -> None:
+        """End the workers; their jobs go on when the service is started again."""
+        self._stopped.set()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        if self._supervisor is not None:
+            await asyncio.to_thread(self._supervisor.join)
+        for threads in (self._threads, self._senders):
+            threads.shutdown(wait=False, cancel_futures=True)
+        if self._client is not None:
+            self._client.close()
+
+    @property
+    def client(self) -> JobClient:
+        """Client of the database.
+
+        Raises
+        ------
+        RefusedError
+            The database has not been opened yet.
+        """
+        if self._client is None:
+            raise _unavailable()
+        return self._client
+
+    async def call(self, function: Callable[[JobClient], Value], threads: ThreadPoolExecutor | None = None) -> Value:
+        """Value of a function of the client, in a thread of `threads` or of those of the database.
+
+        Raises
+        ------
+        RefusedError
+            The database cannot be reached (503), or the function raised an error of the project.
+        """
+        client = self.client
+        away_errors: tuple[type[Exception], ...] = (DatabaseAwayError, *connection_errors())
+        try:
+            value = await asyncio.get_running_loop().run_in_executor(threads or self._threads, function, client)
+        except away_errors as away:
+            self._note_away(str(away))
+            raise _unavailable() from away
+        except OtherBodyError as other:
+            raise RefusedError(422, "idempotency_conflict", str(other)) from other
+        except QueueFullError as full:
+            raise RefusedError(429, "queue_full", str(full), {"Retry-After": "30"}) from full
+        except Tts2faceError as error:
+            raise as_refused(error) from error
+        self._note_away("")
+        return value
+
+    def _note_away(self, reason: str) -> None:
+        """Write once to the log that the database cannot be reached, and once that it can be reached again."""
+        if bool(reason) != bool(self._reason):
+            self._reason = reason
+            if reason:
+                log_event("jobs not available", level=logging.WARNING, reason=reason)
+            else:
+                log_event("jobs available", database=shown_url(self._settings.database_place))
+
+    async def is_reachable(self) -> bool:
+        """Whether the database answers within `PROBE_S`."""
+        try:
+            return await asyncio.wait_for(self.call(JobClient.is_reachable), PROBE_S)
+        except (RefusedError, TimeoutError):
+            return False
+
+    async def _run(self) -> None:
+        while self._client is None:
+            try:
+                self._client = await asyncio.to_thread(self._open)
+            except Tts2faceError as wrong:
+                self._note_away(str(wrong))
+                await asyncio.sleep(RETRY_S)
+        self._note_away("")
+        if self._settings.workers:
+            self._supervisor = threading.Thread(target=self._supervise, name="supervisor", daemon=True)
+            self._supervisor.start()
+        for action, pause_s in ((self._send_webhooks, WEBHOOK_S), (self._count, STATISTICS_S), (self._sweep, SWEEP_S)):
+            task = asyncio.create_task(self._repeat(action, pause_s))
+            task.add_done_callback(_log_defect)
+            self._tasks.append(task)
+
+    def _open(self) -> JobClient:
+        folder, settings = self._settings.data_folder, self._settings
+        with translate_disk_errors(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+        url = database_url(settings.database_place)
+        prepare_database(url)
+        return JobClient(url, open_blobs(settings.store_place, BLOBS, cache=folder / "results-cache"))
+
+    def _supervise(self) -> None:
+        settings = self._settings
+        engine = DatabaseEngine(
+            settings.database_place, settings.store_place, settings.workers,
+            on_message=_log_worker, niceness=NICENESS,
+        )  # fmt: skip
+        while not self._stopped.is_set():
+            with suppress(BackendError), local_workers(engine) as supervise:
+                while not self._stopped.wait(SUPERVISE_S):
+                    supervise()
+            self._stopped.wait(RESTART_S)  # the workers cannot start now, such as while the database is away
+
+    async def _repeat(self, action: Callable[[], Awaitable[None]], pause_s: float) -> None:
+        while True:
+            with suppress(RefusedError):  # the database is away; the next time may succeed
+                await action()
+            await asyncio.sleep(pause_s)
+
+    async def _send_webhooks(self) -> None:
+        if not self._settings.webhook_hosts:
+            return
+        due = await self.call(JobClient.due_webhooks)
+        await asyncio.gather(
+            *(self.call(partial(deliver, delivery=one, settings=self._settings), self._senders) for one in due)
+        )
+
+    async def _count(self) -> None:
+        self.counts, self.oldest_waiting_s = await self.call(lambda client: client.table.counts())
+
+    async def _sweep(self) -> None:
+        """Remove files that nothing has, and jobs, results and segments older than the setting `results_days`."""
+        n_files = await self.call(lambda client: client.remove_unused_files(MIN_AGE_S))
+        n_files += await self.call(lambda _: self._library.remove_unused_files(MIN_AGE_S))
+        old: list[str] = []
+        n_segments, age_s = 0, self._settings.results_days * DAY_S
+        if age_s:
+            old = await self.call(lambda client: client.table.ended_before(age_s))
+            for job_id in old:
+                await self.call(lambda client, job_id=job_id: client.delete(job_id))  # type: ignore[misc]
+            n_segments = await self.call(lambda _: self._prune(max(age_s, MIN_AGE_S)))
+        if old or n_segments or n_files:
+            log_event("old jobs removed", jobs=len(old), segments=n_segments, files=n_files, days=age_s / DAY_S)
+
+    def _prune(self, age_s: float) -> int:
+        database = self._settings.database_place
+        pruned = prune_unused(open_store(self._settings.store_place), unfinished_segments(database), age_s)
+        prune_jobs(database, age_s)
+        return pruned.n_removed
+
+
+def _unavailable() -> RefusedError:
+    message = "the jobs are not available now, as their database cannot be reached; repeat the request later"
+    return RefusedError(503, "unavailable", message, {"Retry-After": str(RETRY_AFTER_S)})
+
+
+def _log_worker(message: str) -> None:
+    log_event("workers", message=message)
+
+
+def _log_defect(task: "asyncio.Task[None]") -> None:
+    if not task.cancelled() and (error := task.exception()) is not None:
+        log_event("defect", level=logging.ERROR, error=error)

@@ -1,0 +1,293 @@
+"""API keys: random, stored as hashes, with scopes and limits.
+
+Limits of each key: requests a minute and at the same time, seconds of speech a day, and faces of photos.
+"""
+
+import hashlib
+import hmac
+import re
+import secrets
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import DataError, InputError
+from lexicon.inputs import parse_toml, read_text
+from tts2face.serving.service.errors import RefusedError
+from tts2face.storage.files import write_atomically
+
+SCOPES = ("speak", "build", "admin")  # synthesis; uploads and talkers; everybody's jobs and metrics
+KEY_PREFIX = "t2f_"
+N_KEY_BYTES = 32
+MAX_FILE_BYTES = 1_000_000
+LIMITS = ("requests_per_minute", "concurrent", "speech_s_per_day", "resources", "resources_mb", "photos_per_day")
+MAY_BE_NONE = ("resources", "resources_mb", "photos_per_day")  # limits of which 0 is one, too
+MAX_LIMIT = 1e9
+NAMES = {"name", "hash", "scopes", *LIMITS}
+NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
+
+
+@dataclass(frozen=True, slots=True)
+class ApiKey:
+    """A key without its secret.
+
+    Parameters
+    ----------
+    hash
+        SHA-256 of the key, hexadecimal; a key has 256 random bits, so that no slow hash is needed.
+    requests_per_minute, concurrent, speech_s_per_day
+        Limits; None: none.
+    resources, resources_mb, photos_per_day
+        Uploads, their MB, and the faces that are made of photos in a day; None: those of the settings.
+    """
+
+    name: str
+    hash: str
+    scopes: tuple[str, ...] = ("speak",)
+    requests_per_minute: int | None = None
+    concurrent: int | None = None
+    speech_s_per_day: int | None = None
+    resources: int | None = None
+    resources_mb: float | None = None
+    photos_per_day: int | None = None
+
+
+LOCAL_KEY = ApiKey("local", "", SCOPES)  # of requests to a service without keys
+
+
+def find_key(keys: Sequence[ApiKey], given: str) -> ApiKey | None:
+    """Key of a secret; compares all hashes in constant time."""
+    digest, found = hashlib.sha256(given.encode()).hexdigest(), None
+    for key in keys:
+        if hmac.compare_digest(key.hash, digest):
+            found = key
+    return found
+
+
+def read_keys(path: Path) -> tuple[ApiKey, ...]:
+    """Keys of a file.
+
+    Raises
+    ------
+    InputError
+        The file does not exist.
+    DataError
+        It is no file of keys.
+    """
+    try:
+        content = parse_toml(read_text(path, MAX_FILE_BYTES), str(path))
+    except FileNotFoundError as missing:
+        raise InputError(
+            f"there is no file of keys {path}; create it with `tts2face keys add NAME --file {path}`"
+        ) from missing
+    if not isinstance(listed := content.get("key", []), list):
+        raise DataError(f"{path} has a key that is no table [[key]]; write it with `tts2face keys`")
+    found = tuple(_key(path, one) for one in listed)
+    if len({key.name for key in found}) < len(found) or set(content) - {"key"}:
+        raise DataError(f"{path} names a key twice, or has other tables than [[key]]; write it with `tts2face keys`")
+    return found
+
+
+def add_key(path: Path, name: str, scopes: Sequence[str], **limits: Any) -> str:
+    """Add a key to a file, which is created if needed; returns the secret, which is stored nowhere.
+
+    Raises
+    ------
+    InputError
+        The name exists already or has other characters than letters, digits and ``._-``, a scope is unknown, or a limit
+        is not positive.
+    """
+    keys = read_keys(path) if path.exists() else ()
+    if not NAME.fullmatch(name):
+        raise InputError(f"a key's name consists of letters, digits, dots, dashes and underscores, not {name[:80]!r}")
+    _check_limits(limits)
+    if any(key.name == name for key in keys):
+        raise InputError(f"{path} has a key named {name} already; choose another name, or remove it first")
+    secret = KEY_PREFIX + secrets.token_urlsafe(N_KEY_BYTES)
+    digest = hashlib.sha256(secret.encode()).hexdigest()
+    write_keys(path, (*keys, ApiKey(name, digest, tuple(scopes), **limits)))
+    return secret
+
+
+def remove_key(path: Path, name: str) -> None:
+    """Remove a key from a file.
+
+    Raises
+    ------
+    InputError
+        There is no such key.
+    """
+    keys = read_keys(path)
+    if all(key.name != name for key in keys):
+        names = ", ".join(key.name for key in keys) or "none"
+        raise InputError(f"{path} has no key named {name}; its keys are {names}")
+    write_keys(path, [key for key in keys if key.name != name])
+
+
+def write_keys(path: Path, keys: Sequence[ApiKey]) -> None:
+    """Write a file of keys that only its owner can read."""
+    parts = []
+    for key in keys:
+        _check_scopes(key.scopes)
+        lines = [f'name = "{key.name}"', f'hash = "{key.hash}"', f"scopes = {list(key.scopes)!r}".replace("'", '"')]
+        lines += [f"{limit} = {getattr(key, limit)}" for limit in LIMITS if getattr(key, limit) is not None]
+        parts.append("[[key]]\n" + "\n".join(lines) + "\n")
+    write_atomically(path, "\n".join(parts).encode())
+    path.chmod(0o600)
+
+
+def _key(path: Path, content: Any) -> ApiKey:
+    if not isinstance(content, dict) or not set(content) <= NAMES or not {"name", "hash"} <= set(content):
+        raise DataError(f"{path} has a key without name or hash, or with other names than {', '.join(sorted(NAMES))}")
+    scopes = content.get("scopes", ["speak"])
+    texts = (content["name"], content["hash"], *(scopes if isinstance(scopes, list) else [scopes]))
+    is_plain = isinstance(scopes, list) and all(isinstance(text, str) for text in texts)
+    if not is_plain or not NAME.fullmatch(content["name"]):
+        raise DataError(
+            f"{path} has a key whose name, hash or scopes are no plain texts; write it with `tts2face keys`"
+        )
+    key = ApiKey(**{**content, "scopes": tuple(scopes)})
+    try:
+        _check_scopes(key.scopes)
+        _check_limits({limit: getattr(key, limit) for limit in LIMITS})
+    except InputError as wrong:
+        raise DataError(f"{path}, key {key.name}: {wrong}") from wrong
+    return key
+
+
+def _check_limits(limits: Mapping[str, Any]) -> None:
+    for name, value in limits.items():
+        if name in MAY_BE_NONE and value is not None:
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= MAX_LIMIT:
+                raise InputError(f"{name} must be a number from 0 to {MAX_LIMIT:g}, not {value!r}")
+        elif value is not None and (type(value) is not int or value < 1):
+            raise InputError(f"{name} must be a whole number of at least 1, not {value!r}")
+
+
+def _check_scopes(scopes: Sequence[str]) -> None:
+    for scope in scopes:
+        if scope not in SCOPES:
+            raise InputError(f"there is no scope {scope!r}; the scopes are {', '.join(SCOPES)}")
+
+
+MINUTE_S, DAY_S = 60.0, 86_400.0
+PHOTOS_AT_ONCE = 1  # of a key; those that wait would take the turns of other keys
+
+
+@dataclass(slots=True)
+class _Bucket:
+    """What is left of a period's most; it comes back evenly over the period, and is full at first."""
+
+    left: float = 0.0
+    at: float | None = None
+
+    def refill(self, now: float, most: float, period_s: float) -> float:
+        """What is left now."""
+        self.left = most if self.at is None else min(most, self.left + (now - self.at) * most / period_s)
+        self.at = now
+        return self.left
+
+
+@dataclass(slots=True)
+class _Usage:
+    requests: _Bucket = field(default_factory=_Bucket)
+    speech_s: _Bucket = field(default_factory=_Bucket)
+    photos: _Bucket = field(default_factory=_Bucket)
+    n_running: int = 0
+    n_photos: int = 0
+
+
+@dataclass(slots=True)
+class RateLimits:
+    """Token buckets for each key: a minute's requests may come at once, then one each 60 / n seconds.
+
+    Speech and photos likewise: a day's seconds may be made at once, and come back evenly over the day. What is made is
+    subtracted afterwards, also of requests that were cancelled, so that the last request may use more than is left.
+    """
+
+    clock: Callable[[], float] = time.monotonic
+    _usage: dict[str, _Usage] = field(default_factory=dict)
+
+    def begin(self, key: ApiKey) -> None:
+        """Count a request.
+
+        Raises
+        ------
+        RefusedError
+            The key has no request left; with the seconds to wait.
+        """
+        per_minute, usage = key.requests_per_minute, self._of(key)
+        if key.concurrent is not None and usage.n_running >= key.concurrent:
+            raise _refused(f"the key {key.name} has {usage.n_running} requests running, its limit", 1.0)
+        if per_minute is not None:
+            left = usage.requests.refill(self.clock(), per_minute, MINUTE_S)
+            if left < 1.0:
+                wait_s = (1.0 - left) * MINUTE_S / per_minute
+                raise _refused(f"the key {key.name} has used its {per_minute} requests a minute", wait_s)
+            usage.requests.left -= 1.0
+        usage.n_running += 1
+
+    def end(self, key: ApiKey) -> None:
+        """Count the end of a request."""
+        self._usage[key.name].n_running -= 1
+
+    def check_speech(self, key: ApiKey) -> None:
+        """Check that a key may make speech.
+
+        Raises
+        ------
+        RefusedError
+            It has made its seconds of the day; with the seconds to wait.
+        """
+        if key.speech_s_per_day is not None:
+            left = self._of(key).speech_s.refill(self.clock(), key.speech_s_per_day, DAY_S)
+            if left <= 0:
+                wait_s = (1.0 - left) * DAY_S / key.speech_s_per_day
+                raise _refused(
+                    f"the key {key.name} has used its {key.speech_s_per_day} seconds of speech a day", wait_s
+                )
+
+    def add_speech(self, key: ApiKey, seconds: float) -> None:
+        """Count speech that was made for a key."""
+        if key.speech_s_per_day is not None and seconds > 0:
+            speech = self._of(key).speech_s
+            speech.refill(self.clock(), key.speech_s_per_day, DAY_S)
+            speech.left -= seconds
+
+    @contextmanager
+    def photo(self, key: ApiKey, per_day: int, *, counts: bool = True) -> Iterator[None]:
+        """Read a photo of a key; `counts`: as one of its day's, of which the key may have its own number.
+
+        Raises
+        ------
+        RefusedError
+            The key reads one already, has used its photos of the day, or may have none.
+        """
+        usage = self._of(key)
+        most = per_day if key.photos_per_day is None else key.photos_per_day
+        if most == 0:
+            raise RefusedError(403, "forbidden", f"the key {key.name} may make no faces of photos")
+        if usage.n_photos >= PHOTOS_AT_ONCE:
+            raise _refused(f"a face of a photo of the key {key.name} is being made", 5.0)
+        left = usage.photos.refill(self.clock(), most, DAY_S)
+        if left < 1.0:
+            raise _refused(f"the key {key.name} has used its {most} photos a day", (1.0 - left) * DAY_S / most)
+        usage.photos.left -= 1.0 if counts else 0.0
+        usage.n_photos += 1
+        try:
+            yield
+        finally:
+            usage.n_photos -= 1
+
+    def _of(self, key: ApiKey) -> _Usage:
+        return self._usage.setdefault(key.name, _Usage())
+
+
+def _refused(reason: str, wait_s: float) -> RefusedError:
+    seconds = max(1, int(wait_s + 0.999))
+    return RefusedError(
+        429, "rate_limited", f"{reason}; wait {seconds} s and repeat the request", {"Retry-After": str(seconds)}
+    )

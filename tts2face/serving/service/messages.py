@@ -1,0 +1,98 @@
+"""What a synthesis process is asked to make, and the parts of its results.
+
+Words that would take a process for itself.
+"""
+
+import re
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from lexicon.errors import BackendError, InputError
+from tts2face.processes.message import Message
+from tts2face.types import Chunk
+
+if TYPE_CHECKING:
+    from tts2face.session.session import Session
+
+
+Inputs = deque[Message]  # that a task has not read yet
+SYNTHESISE, SERVE = "synthesise", "serve"  # calls of a synthesis process
+CANCELS = frozenset({"cancel", "interrupt"})  # two names of one input of live streams
+
+
+class DefectError(BackendError):
+    """A defect of the synthesis; the log has its traceback."""
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What a task makes; all values are JSON.
+
+    Parameters
+    ----------
+    kind
+        Name of a task: one of `tts2face.serving.service.synthesis.TASKS`, or of a table given to the service.
+    models
+        Fields of `tts2face.session.named_models.Models` that differ from their defaults.
+    request, picture
+        Fields of `Request` and `Picture` that differ from their defaults.
+    format
+        Format of `Session.stream_file`; empty: the result is not such a file.
+    owner
+        For whom finished sentences are kept in memory (`SessionCache.get`); empty: none are.
+    affinity
+        Works of equal affinity run in the same process if it is free, which keeps their sentences; empty: any.
+    """
+
+    kind: str = "file"
+    models: Mapping[str, Any] = field(default_factory=dict)
+    request: Mapping[str, Any] = field(default_factory=dict)
+    picture: Mapping[str, Any] = field(default_factory=dict)
+    format: str = ""
+    owner: str = ""
+    affinity: str = ""
+
+    def as_json(self) -> dict[str, Any]:
+        """JSON object of the fields."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """A task has nothing to do until it gets input, or until the given seconds have passed."""
+
+    seconds: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A JSON object as a part of a result, and the seconds of speech that it adds."""
+
+    content: dict[str, Any]
+    seconds: float = 0.0
+
+
+# A part of a result, or a wait. The messages of a part have its ``seconds`` of speech and either bytes as their
+# payload or an ``event``; the last message has ``seconds`` and ``cpu_s`` of the whole.
+Step = Chunk | Event | Wait
+Task = Callable[["Session", Work, Inputs], Iterator[Step]]  # makes a result step by step
+
+
+MAX_WORD_CHARACTERS = 200  # 300 digits are 70 s of speech, made in one step of 7 s, during which all others wait
+_LONG_WORD = re.compile(rf"[!-~]{{{MAX_WORD_CHARACTERS + 1}}}|\d{{{MAX_WORD_CHARACTERS + 1}}}")
+
+
+def check_words(text: str) -> None:
+    """Refuse words and numbers of more than `MAX_WORD_CHARACTERS`; scripts without spaces are not concerned.
+
+    Raises
+    ------
+    InputError
+        There is such a word.
+    """
+    if (found := _LONG_WORD.search(text)) is not None:
+        raise InputError(
+            f"the text has a word of more than {MAX_WORD_CHARACTERS} characters, {found[0][:20]}...; put spaces into it"
+        )

@@ -1,0 +1,190 @@
+"""What clients ask for as jobs: kinds, and orders that are being checked.
+
+Jobs of kind ``talker``: what clients send, and the checks before they are queued.
+"""
+
+import asyncio
+import uuid
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.datastructures import UploadFile
+
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.keys import ApiKey
+from tts2face.serving.service.state import ServiceState
+from tts2face.serving.service.uploads import UploadFolder
+from tts2face.serving.work.client import JobClient
+from tts2face.serving.work.resource_check import TALKER
+from tts2face.serving.work.table import OPEN_STATES
+
+
+@dataclass(slots=True)
+class Upload:
+    """Files of a new job after their checks: local paths by the names that its function sees."""
+
+    folder: UploadFolder
+    files: dict[str, Path] = field(default_factory=dict)
+    n_cues: int = 0
+    seconds: float | None = None  # of the recording of a talker
+
+
+@dataclass(frozen=True, slots=True)
+class JobOrder:
+    """What a client has asked for, before it is a job."""
+
+    state: ServiceState
+    key: ApiKey
+    options: Any
+    upload: Upload
+
+
+CHARACTERS_PER_S, CUE_S = 15.0, 3.0  # of speech; what a job takes of its key's day before it is made
+
+
+def expected_speech_s(order: JobOrder) -> float:
+    """Seconds of speech that a job is expected to make."""
+    options = order.options
+    text, idle = getattr(options, "text", ""), getattr(options, "idle", None)
+    return len(text) / CHARACTERS_PER_S + (idle or 0.0) + CUE_S * order.upload.n_cues
+
+
+AddFile = Callable[[JobOrder, str, UploadFile, int], Awaitable[None]]
+
+
+@dataclass(frozen=True, slots=True)
+class JobKind:
+    """A kind of jobs.
+
+    Parameters
+    ----------
+    scope
+        Scope of the keys that may ask for it.
+    model
+        Its options.
+    parts
+        Parts of a form with its files, their descriptions, and what checks one file and notes its path: gets the
+        order, the part's name, the file and its number from 1.
+    prepare
+        Checks an order; JSON for the function that executes it.
+    """
+
+    scope: str
+    model: type[BaseModel]
+    parts: Mapping[str, tuple[str, AddFile]]
+    prepare: Callable[[JobOrder], Awaitable[dict[str, Any]]]
+
+
+MAX_OPEN, MAX_LOOKED_AT = 4, 1000  # talkers in work of a key; its newest jobs that are looked at
+RECORDING = "recording"  # of the files of the job, which differ in their endings
+SUBTITLE_SUFFIXES = (".srt", ".vtt")
+
+
+class TalkerRequest(BaseModel):
+    """How a recording becomes a talker; meanings as of the flags of `tts2face corpus build`."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    name: Annotated[
+        str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,39}$", description="Name of the talker.", examples=["anna"])
+    ]
+    language: Annotated[
+        str, Field(max_length=40, description="Language that is spoken, as the talker states it.", examples=["en-gb"])
+    ] = "en-us"
+    licence: Annotated[str, Field(max_length=200, description="Licence of the recording.", examples=["CC BY 4.0"])] = (
+        "not stated"
+    )
+    attribution: Annotated[
+        str, Field(max_length=200, description="Whom to name with the talker.", examples=["Anna Example"])
+    ] = "not stated"
+    appearance: Annotated[bool, Field(description="Also learn the person's own face, for `face: self`.")] = False
+    consent: Annotated[
+        str | None,
+        Field(
+            max_length=2000,
+            description="Statement of consent of the person shown; required with appearance, stored in the talker.",
+            examples=["I, Anna Example, agree that my face is used for this service."],
+        ),
+    ] = None
+
+
+async def add_video(order: JobOrder, part: str, file: UploadFile, number: int) -> None:
+    """Check and note the recording."""
+    if number > 1:
+        raise RefusedError(422, "invalid_request", f"{part} was sent twice; send one recording")
+    path, seconds = await order.upload.folder.video(part, file)
+    order.upload.files[f"{RECORDING}{path.suffix}"] = path
+    order.upload.seconds = seconds
+
+
+async def add_words(order: JobOrder, part: str, file: UploadFile, number: int) -> None:
+    """Check and note the transcript or the subtitles."""
+    folder, files = order.upload.folder, order.upload.files
+    if number > 1 or {f"{RECORDING}.txt", *(f"{RECORDING}{one}" for one in SUBTITLE_SUFFIXES)} & set(files):
+        raise RefusedError(422, "invalid_request", "there are words twice; send a transcript, or subtitles")
+    if part == "transcript":
+        files[f"{RECORDING}.txt"] = await folder.text(part, file, ".txt")
+        return
+    suffix = ".vtt" if (await file.read(6)).lstrip(b"\xef\xbb\xbf").startswith(b"WEB") else ".srt"
+    await file.seek(0)
+    path, _ = await folder.subtitles(part, file, suffix, None, order.state.settings.job_cues)
+    files[f"{RECORDING}{suffix}"] = path
+
+
+async def prepare_talker(order: JobOrder) -> dict[str, Any]:
+    """JSON of a job of kind ``talker``.
+
+    Raises
+    ------
+    RefusedError
+        There is no recording or no consent, the name is taken, or the quota is used up.
+    """
+    asked: TalkerRequest = order.options
+    if order.upload.seconds is None:
+        raise RefusedError(422, "invalid_request", "there is no recording; send it as the part `video` of a form")
+    if asked.appearance != bool(asked.consent and asked.consent.strip()):
+        raise RefusedError(
+            422, "consent",
+            "a talker with its own face needs the consent of the person shown; give appearance and consent, or neither",
+        )  # fmt: skip
+    library = order.state.library
+    await _check_open_jobs(order)
+    await asyncio.to_thread(library.check_room, order.key, TALKER, asked.name, 0)
+    return {
+        "owner": order.key.name, "name": asked.name, "appearance": asked.appearance, "consent": asked.consent,
+        "provenance": {
+            "name": asked.name, "language": asked.language, "licence": asked.licence,
+            "attribution": asked.attribution, "sources": "a recording sent to the service",
+        },
+        "seconds": order.upload.seconds, "limits": asdict(library.limits(order.key)), "order": uuid.uuid4().hex,
+    }  # fmt: skip
+
+
+async def _check_open_jobs(order: JobOrder) -> None:
+    """Refuse a recording of a key with many that wait: each keeps its file until it is built."""
+
+    def count(client: JobClient) -> int:
+        pages = [client.table.page(order.key.name, state, None, MAX_LOOKED_AT) for state in OPEN_STATES]
+        return sum(one.kind == TALKER for page in pages for one in page)
+
+    n_open = await order.state.jobs.call(count)
+    if n_open >= MAX_OPEN:
+        raise RefusedError(
+            429, "queue_full", f"the key {order.key.name} has {n_open} talkers in work; wait until one is built",
+            {"Retry-After": "60"},
+        )  # fmt: skip
+
+
+TALKER_KIND = JobKind(
+    "build",
+    TalkerRequest,
+    {
+        "video": ("Recording of a person who speaks, with sound.", add_video),
+        "transcript": ("Spoken words, UTF-8 text; without words, phones are recognised.", add_words),
+        "subtitles": ("Spoken words with their times: SubRip or WebVTT.", add_words),
+    },
+    prepare_talker,
+)

@@ -1,0 +1,309 @@
+"""The synthesis processes of a server, shared fairly by all keys.
+
+The server's side of one synthesis process.
+"""
+
+import asyncio
+import os
+import time
+import zlib
+from collections import OrderedDict, deque
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from contextlib import aclosing, suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from lexicon.errors import BackendError, Tts2faceError
+from tts2face.picture.movie import MOVIE_KINDS
+from tts2face.picture.sound_stream import SOUND_KINDS
+from tts2face.processes.message import Message
+from tts2face.processes.parent import AsyncChild, ChildEndedError
+from tts2face.processes.program import Program
+from tts2face.serving.service.logs import REQUEST_ID, log_event
+from tts2face.serving.service.messages import SERVE, SYNTHESISE, Work
+from tts2face.serving.service.stages import stage
+
+PROGRAM = "tts2face.serving.service.synthesis:handlers"
+AT_ONCE = 64  # more calls than the pool gives to one process
+
+InputQueue = asyncio.Queue[tuple[Mapping[str, Any], bytes]]  # contents and payloads
+
+
+class WarmProcess:
+    """A synthesis process that is started again when it ends.
+
+    Parameters
+    ----------
+    settings
+        As for `tts2face.serving.service.synthesis.handlers`.
+    warm
+        Works, as `Work.as_json`, that load models and compile kernels before the process is ready.
+    on_change
+        Called whenever the process becomes ready or ends.
+    core
+        Core to which it is bound; None: all.
+    """
+
+    def __init__(
+        self, settings: Mapping[str, Any], warm: Sequence[Mapping[str, Any]], on_change: Callable[[], None],
+        core: int | None = None,
+    ) -> None:  # fmt: skip
+        program = Program(PROGRAM, core=core, at_once=AT_ONCE, settings=settings, has_log=True)
+        self._child = AsyncChild(program, self._note_released)
+        self._warm, self._on_change = warm, on_change
+        self.is_ready = False
+        self.is_closed = False
+        self.on_cancelled: Callable[[float], None] = _ignore  # called with the seconds until a task was released
+        self.load = 0.0  # sum of the costs of its tasks
+
+    @property
+    def pid(self) -> int | None:
+        """Number of the process."""
+        return self._child.pid
+
+    async def run(self) -> None:
+        """Start the process, and start it again whenever it ends, until `close`."""
+        while not self.is_closed:
+            try:
+                await self._serve()
+            except Tts2faceError as ended:
+                if not self.is_closed:
+                    log_event("synthesis process ended", reason=str(ended))
+            finally:
+                self.is_ready = False
+                await self._child.close()
+                self._on_change()
+
+    async def _serve(self) -> None:
+        began = time.monotonic()
+        async with aclosing(self._child.stream(SERVE, {})) as served:
+            async for _ in served:  # once, as soon as it has loaded
+                for work in self._warm:
+                    await self._child.call(SYNTHESISE, {"work": work, "priority": 0, "id": None})
+                self.is_ready = True
+                log_event("synthesis process ready", process=self.pid, seconds=round(time.monotonic() - began, 3))
+                self._on_change()
+
+    async def stream(self, work: Work, priority: int, inputs: InputQueue | None = None) -> AsyncIterator[Message]:
+        """Messages of a task up to its result, which is included; leaving the iteration cancels the task.
+
+        Parameters
+        ----------
+        inputs
+            What is passed on to the task.
+
+        Raises
+        ------
+        InputError, DataError, BackendError
+            As the task.
+        ChildEndedError
+            The process ended before the task did.
+        """
+        content = {"work": work.as_json(), "priority": priority, "id": REQUEST_ID.get()}
+        given = None if inputs is None else _items(inputs)
+        async with aclosing(self._child.stream(SYNTHESISE, content, inputs=given)) as messages:
+            async for message in messages:
+                yield message
+
+    def _note_released(self, seconds: float) -> None:
+        self.on_cancelled(seconds)
+
+    async def close(self) -> None:
+        """End the process at once."""
+        self.is_closed = True
+        await self._child.close()
+
+
+async def _items(inputs: InputQueue) -> AsyncIterator[tuple[Mapping[str, Any], bytes]]:
+    while True:
+        yield await inputs.get()
+
+
+def _ignore(_: float) -> None:
+    pass
+
+
+MOVIE_COST, LINES_COST, SOUND_COST = 1.0, 0.2, 0.1  # shares of a core of a stream in real time, rounded up
+CAPACITY = 2.0  # cost of the tasks that one process takes at a time
+MAX_TRIES = 2  # of a request whose process ended before anything was sent
+STREAM_PRIORITY = 0
+
+
+_Waiting = tuple[float, float, "asyncio.Future[WarmProcess]"]  # cost, begin, the process when there is one
+
+
+class BusyError(BackendError):
+    """Too many requests wait; the request may be repeated later."""
+
+    retry_after_s = 2
+
+
+@dataclass(frozen=True, slots=True)
+class PoolSettings:
+    """Size of the pool.
+
+    Parameters
+    ----------
+    n_processes
+        Number of synthesis processes, each bound to a core; 0: one for each core.
+    max_waiting
+        Requests that may wait; further ones are refused.
+    warm
+        Works that each process executes before it is ready, as `Work.as_json`.
+    handlers
+        Settings of `tts2face.serving.service.synthesis.handlers`.
+    """
+
+    n_processes: int = 0
+    max_waiting: int = 64
+    warm: tuple[dict[str, Any], ...] = ()
+    handlers: Mapping[str, Any] = field(default_factory=dict)
+
+
+def work_cost(work: Work) -> float:
+    """Share of a core that a work takes."""
+    if work.format in SOUND_KINDS:
+        return SOUND_COST
+    return MOVIE_COST if work.format in MOVIE_KINDS else LINES_COST
+
+
+class Pool:
+    """Distributes works over synthesis processes.
+
+    While all processes are occupied, works wait in one queue for each key, and the keys take turns.
+    """
+
+    def __init__(self, settings: PoolSettings) -> None:
+        self.settings = settings
+        cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+        count = settings.n_processes or len(cores) or os.cpu_count() or 1
+        self.processes = [
+            WarmProcess(settings.handlers, settings.warm, self._wake, cores[number % len(cores)] if cores else None)
+            for number in range(count)
+        ]
+        self._waiting: OrderedDict[str, deque[_Waiting]] = OrderedDict()
+        self._runs: list[asyncio.Task[None]] = []
+
+    @property
+    def n_ready(self) -> int:
+        """Number of processes that are ready."""
+        return sum(process.is_ready for process in self.processes)
+
+    @property
+    def n_waiting(self) -> int:
+        """Number of works that wait for a process."""
+        return sum(len(queue) for queue in self._waiting.values())
+
+    @property
+    def oldest_waiting_s(self) -> float:
+        """Age of the work that waits longest."""
+        begins = [begin for queue in self._waiting.values() for _, begin, _ in queue]
+        return time.monotonic() - min(begins) if begins else 0.0
+
+    @property
+    def load(self) -> float:
+        """Cost of all running works."""
+        return sum(process.load for process in self.processes)
+
+    def start(self) -> None:
+        """Start the processes in the running event loop."""
+        self._runs = [asyncio.create_task(process.run()) for process in self.processes]
+
+    async def close(self) -> None:
+        """End all processes."""
+        for process in self.processes:
+            await process.close()
+        await asyncio.gather(*self._runs, return_exceptions=True)
+
+    async def stream(
+        self,
+        work: Work,
+        key: str = "",
+        priority: int = STREAM_PRIORITY,
+        inputs: InputQueue | None = None,
+    ) -> AsyncIterator[Message]:
+        """Messages of a work up to its result; leaving the iteration cancels it. `inputs` as for `WarmProcess.stream`.
+
+        Raises
+        ------
+        InputError, DataError, BackendError
+            As the work.
+        BusyError
+            Too many works wait.
+        """
+        cost, tries = work_cost(work), 0
+        while True:
+            with stage("queue"):
+                process = await self._take(cost, key, work.affinity)
+            is_begun = False
+            messages = process.stream(work, priority, inputs)
+            try:
+                with stage("synthesis"):
+                    async for message in messages:
+                        is_begun = True
+                        yield message
+                return
+            except ChildEndedError:
+                tries += 1
+                if is_begun or tries >= MAX_TRIES:
+                    raise
+            finally:
+                await messages.aclose()  # type: ignore[attr-defined]
+                self._release(process, cost)
+
+    async def _take(self, cost: float, key: str, affinity: str) -> WarmProcess:
+        found = None if self._waiting else self._free_process(cost, affinity)
+        if found is not None:
+            found.load += cost
+            return found
+        if self.n_waiting >= self.settings.max_waiting:
+            raise BusyError(f"{self.n_waiting} requests are waiting already; repeat the request later")
+        future: asyncio.Future[WarmProcess] = asyncio.get_running_loop().create_future()
+        self._waiting.setdefault(key, deque()).append((cost, time.monotonic(), future))
+        try:
+            return await future
+        except asyncio.CancelledError:
+            if future.done() and not future.cancelled():
+                self._release(future.result(), cost)
+            raise
+        finally:
+            self._forget(key, future)
+
+    def _release(self, process: WarmProcess, cost: float) -> None:
+        process.load = round(process.load - cost, 6)  # sums of tenths are not exact: the load of no work is zero
+        self._wake()
+
+    def _free_process(self, cost: float, affinity: str = "") -> WarmProcess | None:
+        free = [one for one in self.processes if one.is_ready and (one.load == 0 or one.load + cost <= CAPACITY)]
+        usual = self.processes[zlib.crc32(affinity.encode()) % len(self.processes)] if affinity else None
+        if usual in free:
+            return usual
+        return min(free, key=lambda one: one.load, default=None)
+
+    def _wake(self) -> None:
+        """Give free processes to waiting works, one key after the other."""
+        for key in list(self._waiting):
+            queue = self._waiting[key]
+            while queue and queue[0][2].done():
+                queue.popleft()
+            if not queue:
+                del self._waiting[key]
+                continue
+            cost, _, future = queue[0]
+            process = self._free_process(cost)
+            if process is None:
+                return
+            process.load += cost
+            queue.popleft()
+            future.set_result(process)
+            self._waiting.move_to_end(key)
+            if not queue:
+                del self._waiting[key]
+
+    def _forget(self, key: str, future: "asyncio.Future[WarmProcess]") -> None:
+        queue = self._waiting.get(key)
+        if queue is not None:
+            with suppress(StopIteration):
+                queue.remove(next(one for one in queue if one[2] is future))
+            if not queue:
+                del self._waiting[key]

@@ -1,0 +1,173 @@
+"""Clips with all options of a request and of its picture.
+
+Streams of results as HTTP answers.
+"""
+
+from collections.abc import AsyncIterator, Callable
+from contextlib import AsyncExitStack, aclosing
+from typing import Any
+
+from fastapi import APIRouter, WebSocket
+from fastapi import Request as HttpRequest
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import StreamingResponse
+from pydantic import ValidationError
+from starlette.datastructures import FormData
+
+from tts2face.processes.message import Message
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.messages import Work
+from tts2face.serving.service.options import ClipRequest, divide_options
+from tts2face.serving.service.state import ServiceState
+from tts2face.serving.service.uploads import MAX_TEXT_BYTES, UploadFolder, upload_folder
+from tts2face.session.outputs import media_types
+
+
+def service_state(request: HttpRequest | WebSocket) -> ServiceState:
+    """State of the service that received a request."""
+    state: ServiceState = request.app.state.service
+    return state
+
+
+async def stream_work(
+    request: HttpRequest,
+    work: Work,
+    media_type: str,
+    *,
+    convert: "Callable[[AsyncIterator[Message]], AsyncIterator[bytes]] | None" = None,
+    resources: AsyncExitStack | None = None,
+) -> StreamingResponse:
+    """Answer that sends a result while it is made.
+
+    It begins with the first bytes, so that errors before them have their own status. A client that leaves cancels it.
+
+    Parameters
+    ----------
+    convert
+        Converts messages to bytes; None: the bytes of all data.
+    resources
+        Closed when the answer is complete or has failed.
+    """
+    state, stack = service_state(request), resources or AsyncExitStack()
+    messages = state.messages(work, request.state.key)
+    chunks = (convert or data_bytes)(messages)
+    try:
+        first = await anext(chunks)
+    except StopAsyncIteration:
+        first = b""
+    except BaseException:
+        await messages.aclose()  # type: ignore[attr-defined]
+        await stack.aclose()
+        raise
+
+    async def body() -> AsyncIterator[bytes]:
+        async with stack, aclosing(messages):  # type: ignore[type-var]
+            yield first
+            async for chunk in chunks:
+                yield chunk
+
+    return StreamingResponse(body(), media_type=media_type)
+
+
+async def data_bytes(messages: AsyncIterator[Message]) -> AsyncIterator[bytes]:
+    """Bytes of the data of a result."""
+    async for message in messages:
+        if message.payload:
+            yield message.payload
+
+
+async def timed_speech(request: HttpRequest | WebSocket, work: Work) -> tuple[list[dict[str, Any]], bytes]:
+    """All events of a work of kind ``speech``, and its sound as 16-bit PCM."""
+    events: list[dict[str, Any]] = []
+    sound = bytearray()
+    state = service_state(request)
+    async with aclosing(state.messages(work, request.state.key)) as messages:  # type: ignore[type-var]
+        async for message in messages:
+            sound += message.payload
+            if "event" in message.content:
+                events.append(message.content["event"])
+    return events, bytes(sound)
+
+
+router = APIRouter(prefix="/v1", tags=["clips"])
+
+FILES = ("audio", "background", "timeline")
+
+MULTIPART = {
+    "description": "Options as JSON; or a form whose part `request` holds them, with files.",
+    "required": True,
+    "content": {
+        "application/json": {"schema": ClipRequest.model_json_schema()},
+        "multipart/form-data": {
+            "schema": {
+                "type": "object",
+                "properties": {
+                    "request": {
+                        "type": "string",
+                        "description": "The options as JSON.",
+                        "examples": ['{"text": "Hello there."}'],
+                    },
+                    "audio": {"type": "string", "format": "binary", "description": "Speech in place of a voice."},
+                    "background": {"type": "string", "format": "binary", "description": "Picture behind the face."},
+                    "timeline": {"type": "string", "format": "binary", "description": "Timeline of gestures, JSON."},
+                },
+            }
+        },
+    },
+}
+
+
+@router.post(
+    "/clips", response_class=StreamingResponse, summary="Make a clip", openapi_extra={"requestBody": MULTIPART}
+)
+async def make_clip(request: HttpRequest) -> StreamingResponse:
+    """The clip of a text as fragmented MP4, WebM, sound, or lines of curves, sent while it is made."""
+    if not request.headers.get("content-type", "").startswith("multipart/form-data"):
+        return await _answer(request, _parse(await request.body()), {})
+    async with AsyncExitStack() as stack:
+        form = await stack.enter_async_context(request.form(max_files=len(FILES), max_fields=4))
+        folder = await stack.enter_async_context(upload_folder(service_state(request).settings))
+        clip, files = await _read_form(form, folder)
+        return await _answer(request, clip, files, stack.pop_all())  # the files are read until the clip is complete
+
+
+def _parse(body: bytes | str) -> ClipRequest:
+    try:
+        return ClipRequest.model_validate_json(body)
+    except ValidationError as wrong:
+        raise RequestValidationError(wrong.errors()) from wrong
+
+
+async def _read_form(form: FormData, folder: UploadFolder) -> tuple[ClipRequest, dict[str, str]]:
+    """Options of a form, and the paths of its files after decoding."""
+    unknown = set(form) - {"request", *FILES}
+    if unknown:
+        raise RefusedError(422, "invalid_request", f"there is no part {min(unknown)[:40]!r}; send {', '.join(FILES)}")
+    options = form.get("request", "{}")
+    files: dict[str, str] = {}
+    for name in FILES:
+        upload = form.get(name)
+        if isinstance(upload, str):
+            raise RefusedError(422, "invalid_request", f"{name} must be a file with a file name")
+        if upload is None:
+            continue
+        if name == "audio":
+            files[name] = str(await folder.sound(name, upload))
+        elif name == "background":
+            files[name] = str(await folder.picture(name, upload))
+        else:
+            files[name] = str(await folder.text(name, upload, ".json"))
+    return _parse(options if isinstance(options, str) else await options.read(MAX_TEXT_BYTES)), files
+
+
+async def _answer(
+    request: HttpRequest, clip: ClipRequest, files: dict[str, str], resources: AsyncExitStack | None = None
+) -> StreamingResponse:
+    given: dict[str, Any] = clip.model_dump(exclude_none=True, exclude_defaults=True)
+    format = given.pop("format", "mp4")
+    state = service_state(request)
+    fields = await divide_options(state, request.state.key, given)
+    picture = fields.picture | {name: files[name] for name in ("background",) if name in files}
+    spoken = fields.request | {name: files[name] for name in ("audio", "timeline") if name in files}
+    work = state.work(models=fields.models, request=spoken, picture=picture, format=format)
+    return await stream_work(request, work, media_types()[format], resources=resources)

@@ -1,0 +1,212 @@
+"""Live streams for avatars: text or sound comes in, speech, phones and curves go out with their times."""
+
+import asyncio
+import time
+from collections.abc import Mapping
+from contextlib import aclosing, suppress
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from pydantic import Field, ValidationError
+
+from lexicon.errors import DataError
+from lexicon.inputs import parse_json
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.library import check_voice, resolve_dictionary, resolve_models
+from tts2face.serving.service.pool import InputQueue
+from tts2face.serving.service.request_fields import MODEL_FIELDS, PICTURE_FIELDS, StrictModel, options_model
+from tts2face.serving.service.state import ServiceState
+
+router = APIRouter(tags=["live"])
+
+TEXT_TYPES = frozenset({"text", "flush", "cancel", "interrupt", "end"})  # of messages of a stream of text
+AUDIO_TYPES = frozenset({"end"})  # of a stream of sound, besides the sound
+MAX_BLOCK_BYTES = 1 << 16  # of sound in one message
+MAX_AHEAD_S = 5.0  # by which a client's sound is read ahead of real time
+SAMPLE_BYTES = 2
+INVALID = 1007  # WebSocket close code: a message is not what it should be
+
+
+# Options that live text does not take, with the reason.
+NOT_IN_LIVE_TEXT: Mapping[str, str] = MappingProxyType(
+    {"text": "it comes in parts", "audio": "live sound has options of its own", "audio_map": "there is no recording"}
+    | dict.fromkeys(("idle", "timeline", "expression"), "the end of live text is not known")
+    | dict.fromkeys(
+        ("plain_delivery", "synthesis", "context", "exemplars", "articulation", "pitch"), "live text has the defaults"
+    )
+    | dict.fromkeys(("hair", "hair_color", *PICTURE_FIELDS), "curves are sent, no pictures")
+)
+if TYPE_CHECKING:
+    from tts2face.serving.service.request_fields import StrictModel as TextFields
+else:
+    TextFields = options_model("TextFields", NOT_IN_LIVE_TEXT)
+
+
+class TextOptions(TextFields):
+    """First message of a live stream of text."""
+
+    type: Literal["start"]
+    input: Literal["text"] = "text"
+    with_idle: Annotated[bool, Field(description="Curves of a living face between utterances.")] = True
+
+
+class AudioOptions(StrictModel):
+    """First message of a live stream of sound."""
+
+    type: Literal["start"]
+    input: Literal["audio"]
+    rate: Annotated[int, Field(ge=8_000, le=192_000, description="Sample rate in Hz.")] = 16_000
+    talker: str | None = None
+    face: str | None = None
+    identity: str | None = None
+
+
+@router.websocket("/v1/stream")
+async def stream(connection: WebSocket) -> None:
+    """A live stream; docs/http.md describes its messages."""
+    await connection.accept()
+    state: ServiceState = connection.app.state.service
+    try:
+        options = _read_options(await _first_message(connection, state.settings.body_s))
+        given: dict[str, Any] = options.model_dump(exclude_none=True, exclude_defaults=True, exclude={"type", "input"})
+        models = {name: given.pop(name) for name in MODEL_FIELDS if name in given}
+        key = connection.state.key
+        models = await resolve_models(state.library, key, models)
+        given = await resolve_dictionary(state.library, key, given)
+        check_voice(given.get("voice"))
+    except (ValidationError, RefusedError) as wrong:
+        await _refuse(connection, _reason(wrong))
+        return
+    except (WebSocketDisconnect, KeyError):
+        return
+    inputs: InputQueue = asyncio.Queue(1000)
+    work = state.work(kind="live" if isinstance(options, TextOptions) else "listen", models=models, request=given)
+    sending = asyncio.create_task(_send(connection, state, work, inputs))
+    receiving = asyncio.create_task(_receive(connection, inputs, options))
+    try:
+        await asyncio.wait({sending, receiving}, return_when=asyncio.FIRST_COMPLETED)
+        if receiving.done() and receiving.exception() is None and receiving.result():
+            await sending  # the client ended its input and waits for the rest
+    finally:
+        for task in (sending, receiving):
+            task.cancel()
+        await asyncio.gather(sending, receiving, return_exceptions=True)
+        with suppress(RuntimeError):
+            await connection.close()
+
+
+async def _first_message(connection: WebSocket, seconds: float) -> str:
+    """First message of a client.
+
+    Raises
+    ------
+    RefusedError
+        It did not come in time.
+    """
+    try:
+        return await asyncio.wait_for(connection.receive_text(), seconds)
+    except TimeoutError as late:
+        raise RefusedError(
+            408, "too_slow", f"the message `start` did not arrive within {seconds:g} s; send it first"
+        ) from late
+
+
+def _read_options(message: str) -> TextOptions | AudioOptions:
+    with suppress(DataError):
+        content = parse_json(message, "the message")
+        if isinstance(content, dict) and content.get("input") == "audio":
+            return AudioOptions.model_validate_json(message)
+    return TextOptions.model_validate_json(message)
+
+
+async def _receive(connection: WebSocket, inputs: InputQueue, options: TextOptions | AudioOptions) -> bool:
+    """Pass the client's messages on; True after ``end``, False when the client has left."""
+    types = TEXT_TYPES if isinstance(options, TextOptions) else AUDIO_TYPES
+    pace = None if isinstance(options, TextOptions) else _Pace(SAMPLE_BYTES * options.rate)
+    while True:
+        try:
+            content, samples = _read_message(await connection.receive(), types, has_sound=pace is not None)
+        except WebSocketDisconnect:
+            return False
+        except RefusedError as wrong:
+            await connection.send_json({"type": "error", "message": wrong.message})
+            continue
+        if pace is not None:
+            await pace.add(len(samples))
+        await inputs.put((content | {"arrived": time.monotonic()}, samples))
+        if content["type"] == "end":
+            return True
+
+
+class _Pace:
+    """Slows a sender of sound down to real time once it is `MAX_AHEAD_S` ahead."""
+
+    def __init__(self, bytes_per_s: float) -> None:
+        self._bytes_per_s, self._seconds, self._began = bytes_per_s, 0.0, time.monotonic()
+
+    async def add(self, n_bytes: int) -> None:
+        self._seconds += n_bytes / self._bytes_per_s
+        ahead = self._seconds - (time.monotonic() - self._began)
+        if ahead < 0:  # a pause of the sender is no credit
+            self._began += -ahead
+        if ahead > MAX_AHEAD_S:
+            await asyncio.sleep(ahead - MAX_AHEAD_S)
+
+
+def _read_message(message: Any, types: frozenset[str], *, has_sound: bool) -> tuple[dict[str, Any], bytes]:
+    """Content and sound of a message.
+
+    Raises
+    ------
+    RefusedError
+        It is none of the messages of the stream.
+    WebSocketDisconnect
+        The client has left.
+    """
+    if message["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect
+    samples = message.get("bytes")
+    if samples is not None and has_sound:
+        if len(samples) % SAMPLE_BYTES or len(samples) > MAX_BLOCK_BYTES:
+            raise RefusedError(
+                400, "invalid_request",
+                f"a block of sound has {len(samples)} bytes; send 16-bit samples in up to {MAX_BLOCK_BYTES} bytes",
+            )  # fmt: skip
+        return {"type": "audio"}, samples
+    content: Any = None
+    with suppress(DataError):
+        content = parse_json(message.get("text") or "", "the message")
+    if not isinstance(content, dict) or content.get("type") not in types:
+        raise RefusedError(
+            400, "invalid_request",
+            f"a message must be {'16-bit samples, or ' if has_sound else ''}JSON with one of the types "
+            f"{', '.join(sorted(types))}",
+        )  # fmt: skip
+    return content, b""
+
+
+async def _send(connection: WebSocket, state: ServiceState, work: Any, inputs: InputQueue) -> None:
+    """Pass the results on: events as text, sound as binary messages."""
+    try:
+        async with aclosing(state.messages(work, connection.state.key, inputs)) as messages:  # type: ignore[type-var]
+            async for message in messages:
+                if "event" in message.content:
+                    await connection.send_json(message.content["event"])
+                else:
+                    await connection.send_bytes(message.payload)
+        await connection.send_json({"type": "done"})
+    except RefusedError as refused:
+        await connection.send_json({"type": "error", "message": refused.message})
+
+
+async def _refuse(connection: WebSocket, reason: str) -> None:
+    await connection.send_json({"type": "error", "message": reason})
+    await connection.close(INVALID)
+
+
+def _reason(wrong: Exception) -> str:
+    if isinstance(wrong, ValidationError):
+        first = wrong.errors()[0]
+        return f"{'.'.join(map(str, first['loc'])) or 'message'}: {first['msg'][:200]}"
+    return str(wrong)

@@ -1,0 +1,188 @@
+"""Turns of the calls of a process: one at a time computes, and others go on while it waits for something else."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from tts2face.processes.child import Call, StoppedError
+from tts2face.serving.service.messages import CANCELS, Event, Step, Wait
+from tts2face.types import Chunk
+
+Result = TypeVar("Result")
+
+
+class InterruptedTaskError(Exception):
+    """What the task waited for is no longer needed; the task goes on."""
+
+
+@dataclass(slots=True, eq=False)
+class _Task:
+    """A call whose result is made step by step, in the thread that makes it.
+
+    Parameters
+    ----------
+    begin
+        Second of the clock.
+    seconds
+        Of the clip made so far.
+    """
+
+    turns: "Turns"
+    call: Call
+    priority: int
+    begin: float
+    seconds: float = 0.0
+    cpu_s: float = 0.0
+
+    @property
+    def is_urgent(self) -> bool:
+        """Whether something is to be ended by an input that the task has not read yet."""
+        with self.call.changed:
+            return any(one.content.get("type") in CANCELS for one in self.call.inputs)
+
+    def lead(self, now: float) -> float:
+        """Seconds by which the result is ahead of a listener who began at the request."""
+        return self.seconds - (now - self.begin)
+
+
+class Turns:
+    """Gives turns of some hundredths of a second to calls that run at once in the threads of one process.
+
+    A stopped call goes first, to release what it holds; then one with an urgent input; then by priority, a higher one
+    when no other can run; then whichever is nearest to running dry. A paused call waits.
+
+    Parameters
+    ----------
+    clock
+        Monotonic seconds.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._waiting: list[_Task] = []
+        self._holder: _Task | None = None
+        self._taken_at = 0.0
+
+    def run(self, call: Call, make: Callable[[], Iterator[Step]], priority: int = 0) -> dict[str, float]:
+        """Send the parts of a result; its seconds and those of the turns.
+
+        Parameters
+        ----------
+        make
+            Makes the steps, at the first turn.
+
+        Raises
+        ------
+        StoppedError
+            The caller has left.
+        """
+        task = _CURRENT.task = _Task(self, call, priority, self._clock())
+        steps: Any = None
+        try:
+            self._take(task)
+            steps = make()
+            for step in steps:
+                if isinstance(step, Wait):
+                    self._wait(task, lambda: bool(call.inputs), step.seconds)
+                else:
+                    _send(task, step)
+                    self._release(task)
+                self._take(task)
+        finally:
+            if hasattr(steps, "close"):
+                steps.close()
+            self._release(task)
+            del _CURRENT.task
+        return {"seconds": round(task.seconds, 4), "cpu_s": round(task.cpu_s, 4)}
+
+    def wait_elsewhere(self, task: _Task, future: Future[Result], end: Callable[[], None]) -> Result:
+        """As the function of this name, for a task."""
+        future.add_done_callback(lambda _: self._notify(task.call))
+        self._wait(task, lambda: future.done() or task.is_urgent)
+        if not future.done() and not future.cancel():
+            end()
+        self._take(task)
+        if task.is_urgent:
+            raise InterruptedTaskError
+        return future.result()
+
+    def _wait(self, task: _Task, is_over: Callable[[], bool], seconds: float | None = None) -> None:
+        """End the turn, and wait until it is over, `seconds` have passed, or the task is stopped."""
+        self._release(task)
+        with task.call.changed:
+            task.call.changed.wait_for(lambda: task.call.is_stopped or is_over(), seconds)
+
+    def _take(self, task: _Task) -> None:
+        """Wait for the turn of a task; one that is stopped gets it with a `StoppedError`."""
+        with task.call.changed:
+            self._waiting.append(task)
+            task.call.changed.wait_for(lambda: self._is_next(task))
+            self._waiting.remove(task)
+            self._holder, self._taken_at = task, self._clock()
+        if task.call.is_stopped:
+            raise StoppedError
+
+    def _is_next(self, task: _Task) -> bool:
+        if self._holder is not None:
+            return False
+        now = self._clock()
+        ready = [one for one in self._waiting if one.call.is_stopped or not one.call.is_paused]
+        first = min(
+            ready, key=lambda one: (not one.call.is_stopped, not one.is_urgent, one.priority, one.lead(now)),
+            default=None,
+        )  # fmt: skip
+        return first is task
+
+    def _release(self, task: _Task) -> None:
+        """End the turn of a task, if it has one."""
+        if self._holder is task:
+            task.cpu_s += self._clock() - self._taken_at
+            self._holder = None
+            self._notify(task.call)
+
+    @staticmethod
+    def _notify(call: Call) -> None:
+        with call.changed:
+            call.changed.notify_all()
+
+
+def _send(task: _Task, step: Chunk | Event) -> None:
+    task.seconds += step.seconds
+    if isinstance(step, Event):
+        task.call.event({"seconds": step.seconds, "event": step.content})
+    elif step.content:
+        task.call.event({"seconds": step.seconds}, step.content)
+
+
+class OneAtATime:
+    """Runs computations of native code one after another while other tasks have their turns."""
+
+    def __init__(self) -> None:
+        self._thread = ThreadPoolExecutor(1, "native")
+
+    def __call__(self, compute: Callable[[], Result], end: Callable[[], None]) -> Result:
+        """Result of `compute`, which `end` ends early; both are called from different threads."""
+        return wait_elsewhere(self._thread.submit(compute), end)
+
+
+_CURRENT = threading.local()
+
+
+def wait_elsewhere(future: Future[Result], end: Callable[[], None] = lambda: None) -> Result:
+    """Result of what another thread or process does, during which other tasks have their turns.
+
+    Parameters
+    ----------
+    end
+        Ends it early, when it runs and the task is stopped or interrupted; nobody waits for its end.
+
+    Raises
+    ------
+    StoppedError, InterruptedTaskError
+        The task has been stopped or interrupted.
+    """
+    task: _Task | None = getattr(_CURRENT, "task", None)
+    return future.result() if task is None else task.turns.wait_elsewhere(task, future, end)

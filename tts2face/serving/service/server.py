@@ -1,0 +1,223 @@
+"""Running the service with uvicorn.
+
+The ASGI application of the service.
+"""
+
+import asyncio
+import signal
+import socket
+import sys
+import time
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass
+
+import uvicorn
+from fastapi import FastAPI
+from fastapi import Request as HttpRequest
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from fastapi.telemetry import TelemetryConfig
+from starlette.exceptions import HTTPException
+from starlette.routing import Match
+
+from lexicon.errors import Tts2faceError
+from tts2face import __version__
+from tts2face.numeric.kernels import disable_telemetry
+from tts2face.serving.service.connections import connection_classes
+from tts2face.serving.service.errors import DOCUMENTED, RefusedError, as_refused, error_body
+from tts2face.serving.service.exchange import PAGES
+from tts2face.serving.service.guard import Guard
+from tts2face.serving.service.logs import configure_logs, log_event
+from tts2face.serving.service.routes import clips, headtts, health, jobs, live, openai, resources, results
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.service.state import ServiceState
+
+# FastAPI's own telemetry exports addresses and messages of errors, which may hold keys and texts (decision 099).
+NO_TELEMETRY: TelemetryConfig = {"tracing": False, "metrics": False, "logs": False, "auto_configure": False}
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """What another room adds to a service.
+
+    Parameters
+    ----------
+    add
+        Adds its parts to the application, behind the same checks.
+    tasks
+        ``module:NAME`` of its tables of tasks of the synthesis processes.
+    """
+
+    add: Callable[[FastAPI, ServiceState], None]
+    tasks: tuple[str, ...]
+
+
+def create_app(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> FastAPI:
+    """Application with the given settings; its synthesis processes run from startup to shutdown."""
+    state = ServiceState(settings, tuple(table for mount in mounts for table in mount.tasks))
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        state.pool.start()
+        state.jobs.start()
+        try:
+            yield
+        finally:
+            await state.jobs.close()
+            await state.pool.close()
+            state.library.close()
+            if state.tracing is not None:
+                await asyncio.to_thread(state.tracing.close)
+
+    app = FastAPI(
+        title="tts2face",
+        version=__version__,
+        lifespan=lifespan,
+        redoc_url=None,
+        description="Text to talking face.",
+        responses=DOCUMENTED,
+        telemetry=NO_TELEMETRY,
+    )
+    app.state.service = state
+    for part in (openai, clips, headtts, live, jobs, results, resources, health):
+        app.include_router(part.router)
+    app.add_exception_handler(RefusedError, _answer_refused)
+    app.add_exception_handler(Tts2faceError, _answer_error)
+    app.add_exception_handler(RequestValidationError, _answer_invalid)
+    app.add_exception_handler(HTTPException, _answer_http)
+    for mount in mounts:
+        mount.add(app, state)
+    app.add_middleware(Guard, state=state)
+    return app
+
+
+async def _answer_error(request: HttpRequest, error: Exception) -> JSONResponse:
+    assert isinstance(error, Tts2faceError)
+    return await _answer_refused(request, as_refused(error))
+
+
+async def _answer_refused(request: HttpRequest, error: Exception) -> JSONResponse:
+    assert isinstance(error, RefusedError)
+    request.state.exchange.code = error.code
+    return JSONResponse(error_body(error.code, error.message), error.status, error.headers)
+
+
+async def _answer_invalid(request: HttpRequest, error: Exception) -> JSONResponse:
+    assert isinstance(error, RequestValidationError)
+    first = error.errors()[0]
+    name = ".".join(str(part) for part in first["loc"] if part != "body") or "body"
+    message = f"{name}: {first['msg'][:200]}"
+    request.state.exchange.code = "invalid_request"
+    return JSONResponse(error_body("invalid_request", message, name), 422)
+
+
+async def _answer_http(request: HttpRequest, error: Exception) -> JSONResponse:
+    assert isinstance(error, HTTPException)
+    headers = dict(error.headers or {})
+    if error.status_code == 405:
+        headers["Allow"] = ", ".join(sorted(_methods(request)))
+    return JSONResponse(error_body("http", str(error.detail)), error.status_code, headers)
+
+
+def _methods(request: HttpRequest) -> set[str]:
+    """Methods of all routes of a path; Starlette names those of the first one only."""
+    routes = (one for one in request.app.routes if one.matches(request.scope)[0] != Match.NONE)
+    return {method for one in routes for method in getattr(one, "methods", None) or ()}
+
+
+SOCKET_GRACE_S = 3.0  # between the message to the clients of WebSockets and their end
+FORCED_CODE = 143  # exit code after a second signal; 0 after the first
+CUT_S = 2  # in which requests that were cut release what they hold
+
+
+def serve(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> None:
+    """Serve until SIGTERM or SIGINT; running requests then have `drain_s` seconds to finish.
+
+    Raises
+    ------
+    InputError, DataError
+        The file of keys cannot be read, or the variables of OpenTelemetry ask for something else than OTLP over HTTP.
+    BackendError
+        Traces are asked for and their libraries are missing.
+    """
+    disable_telemetry()
+    configure_logs(settings.log_format, with_text=settings.log_text)
+    _allow_files(settings.connections)
+    server = make_server(settings, mounts)
+    server.run()
+    if server.force_exit:
+        sys.exit(FORCED_CODE)
+
+
+def make_server(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> "DrainingServer":
+    """Server of an application with the given settings, before it runs."""
+    app = create_app(settings, mounts)
+    http, socket_class = connection_classes(settings)
+    return DrainingServer(uvicorn.Config(
+        app, host=settings.host, port=settings.port, http=http, ws=socket_class,  # type: ignore[arg-type]
+        loop="asyncio",  # whatever else is installed
+        log_config=None, log_level="warning", access_log=False, server_header=False, proxy_headers=False,
+        timeout_graceful_shutdown=CUT_S, ws_max_size=1024 * settings.message_kb, lifespan="on",
+        timeout_keep_alive=settings.keep_alive_s,  # type: ignore[arg-type]
+        h11_max_incomplete_event_size=1024 * settings.head_kb,
+    ), app.state.service)  # fmt: skip
+
+
+class DrainingServer(uvicorn.Server):
+    """Server that says where it listens, and that refuses new requests while the running ones finish."""
+
+    def __init__(self, config: uvicorn.Config, state: ServiceState) -> None:
+        super().__init__(config)
+        self._state = state
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Listen; then write the address, whose port may have been chosen by the system."""
+        await super().startup(sockets)
+        if hasattr(signal, "SIGHUP"):
+            asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, self._state.reload_keys)
+        for server in self.servers:
+            for one in server.sockets:
+                host, port = one.getsockname()[:2]
+                url = f"http://{host}:{port}"
+                log_event("listening", url=url, studio=f"{url}{PAGES}" if self._state.settings.studio else None)
+
+    async def main_loop(self) -> None:
+        """Serve until a signal comes, then until the running requests are complete, or `drain_s` seconds."""
+        await super().main_loop()
+        state, began = self._state, time.monotonic()
+        state.is_draining = True
+        log_event("draining", running=len(state.running), seconds=state.settings.drain_s)
+        telling = asyncio.create_task(self._end_sockets())
+        while state.running and not self.force_exit and time.monotonic() < began + state.settings.drain_s:
+            await asyncio.sleep(0.05)
+        telling.cancel()
+        for request in list(state.running):
+            await request.cut()
+        log_event("drained", seconds=round(time.monotonic() - began, 3))
+
+    def handle_exit(self, sig: int, frame: object) -> None:
+        """Begin to drain; a second signal ends the server at once."""
+        self.force_exit = self.should_exit
+        self.should_exit = self._state.is_draining = True
+
+    async def _end_sockets(self) -> None:
+        sockets = [request for request in self._state.running if request.scope["type"] == "websocket"]
+        for request in sockets:
+            await request.announce_end("the service is shutting down; connect again")
+        await asyncio.sleep(min(SOCKET_GRACE_S, self._state.settings.drain_s))
+        for request in sockets:
+            if request in self._state.running:
+                await request.cut()
+
+
+def _allow_files(connections: int) -> None:
+    """Raise the limit of open files to what the connections need, as far as the system allows."""
+    with suppress(ImportError, OSError, ValueError):
+        import resource
+
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        wanted = 2 * connections + 256
+        if soft != resource.RLIM_INFINITY and soft < wanted:
+            most = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+            resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, most), hard))

@@ -1,0 +1,201 @@
+"""What all parts of a running service share.
+
+Prometheus metrics of the service.
+"""
+
+import logging
+import os
+from collections.abc import AsyncIterator
+from contextlib import aclosing
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
+
+from lexicon.errors import Tts2faceError
+from tts2face.processes.message import RESULT, Message
+from tts2face.serving.service.errors import RefusedError, as_refused
+from tts2face.serving.service.job_service import JobService
+from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits, read_keys
+from tts2face.serving.service.library import Library
+from tts2face.serving.service.logs import log_event
+from tts2face.serving.service.messages import Work, check_words
+from tts2face.serving.service.pool import STREAM_PRIORITY, InputQueue, Pool, PoolSettings
+from tts2face.serving.service.result_cache import CACHED_KINDS, ResultCache
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.service.tracing import tracing_from_environment
+from tts2face.serving.service.uploads import Checks
+
+if TYPE_CHECKING:
+    from tts2face.serving.service.exchange import Exchange
+    from tts2face.serving.service.pool import Pool
+    from tts2face.serving.service.result_cache import ResultCache
+
+
+LATENCY_BUCKETS_S = (0.025, 0.05, 0.1, 0.15, 0.25, 0.35, 0.5, 0.75, 1, 2, 5, 10, 30, 120)
+
+
+class Metrics:
+    """Counters of requests and results; gauges of the pool are read when they are asked for."""
+
+    def __init__(self, pool: "Pool", jobs: "JobService", cache: "ResultCache | None" = None) -> None:
+        self.registry = CollectorRegistry()
+        self.requests = Counter(
+            "tts2face_requests", "Requests by path and status.", ["path", "status"], registry=self.registry
+        )
+        self.first_byte = Histogram(
+            "tts2face_first_byte_seconds", "Seconds to the first byte of the body.", ["path"],
+            buckets=LATENCY_BUCKETS_S, registry=self.registry,
+        )  # fmt: skip
+        self.sent_bytes = Counter("tts2face_sent_bytes", "Bytes of bodies.", registry=self.registry)
+        self.failures = Counter("tts2face_failures", "Failed works by kind.", ["kind"], registry=self.registry)
+        self.speech = Counter("tts2face_speech_seconds", "Seconds of speech made.", registry=self.registry)
+        self.cpu = Counter("tts2face_synthesis_seconds", "Seconds that processes spent on it.", registry=self.registry)
+        self.cancel = Histogram(
+            "tts2face_cancel_seconds", "Seconds until a cancelled work had released what it held.",
+            buckets=LATENCY_BUCKETS_S, registry=self.registry,
+        )  # fmt: skip
+        for process in pool.processes:
+            process.on_cancelled = self.cancel.observe
+        gauges = {
+            "tts2face_processes_ready": ("Synthesis processes that are ready.", lambda: pool.n_ready),
+            "tts2face_waiting": ("Requests that wait for a process.", lambda: pool.n_waiting),
+            "tts2face_oldest_waiting_seconds": ("Age of the oldest of them.", lambda: pool.oldest_waiting_s),
+            "tts2face_jobs_oldest_waiting_seconds": ("Age of the oldest waiting job.", lambda: jobs.oldest_waiting_s),
+            "tts2face_load": ("Cost of the running works; 1 is a movie.", lambda: pool.load),
+        }
+        if cache is not None:
+            gauges |= {
+                "tts2face_cache_hits": ("Results that the cache had.", lambda: cache.n_hits),
+                "tts2face_cache_misses": ("Results that it did not have.", lambda: cache.n_misses),
+                "tts2face_cache_bytes": ("Size of the cache.", lambda: cache.n_bytes),
+            }
+        for name, (text, read) in gauges.items():
+            Gauge(name, text, registry=self.registry).set_function(read)
+        by_state = Gauge("tts2face_jobs", "Jobs of the database by state.", ["state"], registry=self.registry)
+        for state in jobs.counts:
+            by_state.labels(state).set_function(partial(_count, jobs, state))
+
+    def as_text(self) -> bytes:
+        """All metrics in Prometheus' text format."""
+        return generate_latest(self.registry)
+
+
+def _count(jobs: "JobService", state: str) -> float:
+    return jobs.counts[state]
+
+
+WARM_TEXT = "Hello there."
+
+
+class ServiceState:
+    """Settings, keys, pool, limits and metrics of a service; `tasks` as `server.Mount` has them."""
+
+    def __init__(self, settings: ServiceSettings, tasks: tuple[str, ...] = ()) -> None:
+        self.settings = settings
+        self.keys = read_keys(settings.keys) if settings.keys is not None else ()
+        self.pool = Pool(PoolSettings(
+            settings.processes, settings.waiting,
+            (self.work(format="mp4", request={"text": WARM_TEXT}).as_json(),
+             self.work(kind="speech", request={"text": WARM_TEXT}).as_json()),
+            {"n_sessions": settings.sessions, "log_format": settings.log_format, "log_text": settings.log_text,
+             "memory_mb": settings.memory_mb, "sentences_mb": settings.sentences_mb, "tasks": tasks},
+        ))  # fmt: skip
+        self.library, self.checks, self.video_checks = Library(settings), Checks(), Checks()
+        self.jobs = JobService(settings, self.library)
+        self.cache: ResultCache | None = None
+        if settings.cache_mb:
+            self.cache = ResultCache(settings.data_folder / "cache", settings.cache_mb * 1_000_000)
+        self.limits, self.metrics = RateLimits(), Metrics(self.pool, self.jobs, self.cache)
+        self.tracing = tracing_from_environment(os.environ)
+        self.is_draining = False
+        self.running: set[Exchange] = set()
+
+    def reload_keys(self) -> None:
+        """Read the file of keys again; the present keys stay valid if it cannot be read."""
+        if self.settings.keys is None:
+            return log_event("keys not reloaded", reason="the service has no file of keys")
+        try:
+            self.keys = read_keys(self.settings.keys)
+        except (Tts2faceError, OSError) as error:
+            return log_event("keys not reloaded", level=logging.ERROR, reason=str(error))
+        return log_event("keys reloaded", keys=[key.name for key in self.keys])
+
+    def work(self, *, models: dict[str, Any] | None = None, **fields: Any) -> Work:
+        """A work with the models of the settings unless it names others."""
+        defaults = {"talker": self.settings.talker, "face": self.settings.face, "palette": self.settings.palette}
+        return Work(models=defaults | (models or {}), owner=self.common_owner, **fields)
+
+    @property
+    def common_owner(self) -> str:
+        """For whom processes keep finished sentences, whoever asks: the one user of a service without keys."""
+        return LOCAL_KEY.name if self.settings.studio and self.settings.keys is None else ""
+
+    async def messages(
+        self, work: Work, key: ApiKey, inputs: InputQueue | None = None, priority: int = STREAM_PRIORITY
+    ) -> AsyncIterator[Message]:
+        """Messages of a work, without the last one; counted in the metrics.
+
+        A work of a higher `priority` runs in its process when no other one can.
+
+        Raises
+        ------
+        RefusedError
+            The work failed, or too many works wait.
+        """
+        if len(str(work.request.get("text", ""))) > self.settings.text_characters:
+            raise RefusedError(
+                413, "too_long", f"the text has more than {self.settings.text_characters} characters; divide it"
+            )
+        if "speak" not in key.scopes:
+            raise RefusedError(403, "forbidden", f"the key {key.name} lacks the scope speak; use another key")
+        self.limits.check_speech(key)
+        made = 0.0
+        if self.settings.log_text and work.request.get("text"):
+            log_event("text", text=work.request["text"])
+        try:
+            check_words(str(work.request.get("text", "")))
+            async with aclosing(self._stream(work, key, inputs, priority)) as stream:  # type: ignore[type-var]
+                async for message in stream:
+                    seconds = message.content["seconds"]
+                    if message.kind == RESULT:
+                        self.limits.add_speech(key, seconds - made)  # of parts without content
+                        self.metrics.speech.inc(seconds)
+                        self.metrics.cpu.inc(message.content["cpu_s"])
+                        return
+                    made += seconds
+                    self.limits.add_speech(key, seconds)
+                    if self.settings.log_text and work.kind == "live" and "event" in message.content:
+                        _log_spoken(message)
+                    yield message
+        except Tts2faceError as error:
+            refused = as_refused(error)
+            self.metrics.failures.labels(refused.code).inc()
+            raise refused from error
+
+    def _stream(self, work: Work, key: ApiKey, inputs: InputQueue | None, priority: int) -> AsyncIterator[Message]:
+        """Messages of a work from the cache, or from a process."""
+        made = self.pool.stream(work, key.name, priority, inputs)
+        if self.cache is None or work.kind not in CACHED_KINDS:
+            return made
+        return self.cache.messages(work, made)
+
+    def record(self, request: "Exchange", key: ApiKey | None) -> None:
+        """Log, count and trace a finished request."""
+        self.metrics.requests.labels(request.route, str(request.status)).inc()
+        self.metrics.sent_bytes.inc(request.n_bytes)
+        if request.first_byte_s is not None and request.status == 200:
+            self.metrics.first_byte.labels(request.route).observe(request.first_byte_s)
+        log_event(
+            "request", id=request.id, method=request.method, path=request.route, status=request.status,
+            code=request.code, key=key.name if key else None, bytes=request.n_bytes,
+            first_byte_s=round(request.first_byte_s, 4) if request.first_byte_s is not None else None,
+            seconds=round(request.age_s, 4), cut=request.is_cut,
+        )  # fmt: skip
+        if self.tracing is not None:
+            self.tracing.record(request)
+
+
+def _log_spoken(message: Message) -> None:
+    if text := message.content["event"].get("text"):
+        log_event("text", text=text)

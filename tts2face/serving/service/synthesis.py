@@ -1,0 +1,116 @@
+"""What a synthesis process of the server does: it keeps sessions warm and makes several results in turn.
+
+Tasks of the service: each makes a result step by step with a session.
+"""
+
+import logging
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from lexicon.errors import Tts2faceError
+from tts2face.picture.options import Picture
+from tts2face.processes.child import Call, Handler
+from tts2face.processes.program import Program
+from tts2face.request import Request
+from tts2face.serving.service.aligner import RemoteAligner
+from tts2face.serving.service.live import listen, live
+from tts2face.serving.service.logs import configure_logs, log_event
+from tts2face.serving.service.messages import SERVE, SYNTHESISE, DefectError, Event, Inputs, Step, Task, Work
+from tts2face.serving.service.scheduler import OneAtATime, Turns
+from tts2face.session.functions import SessionCache
+from tts2face.session.named_models import Models
+from tts2face.sound.voice_pool import VoicePool
+from tts2face.types import Chunk
+
+if TYPE_CHECKING:
+    from tts2face.session.session import Session
+
+
+def stream_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
+    """Bytes of a movie, of sound, or of lines."""
+    request, picture = Request(**work.request), Picture(**work.picture)
+    return session.stream_file(request, work.format, picture=picture, threads=1)
+
+
+def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk]:
+    """For each sentence an event with its words, phones and visemes in seconds of the whole, then its sound (PCM)."""
+    from tts2face.interchange.exports.parts import Label
+    from tts2face.interchange.exports.visemes import viseme_labels
+    from tts2face.storage.media_files import pcm_bytes
+
+    for timed in session.stream_speech(Request(**work.request)):
+        spoken, phones, begin = timed.speech, timed.speech.phones, timed.begin
+        times = [(float(a) + begin, float(b) + begin) for a, b in zip(phones.edges, phones.edges[1:], strict=False)]
+        labels = [Label(phone, *span) for phone, span in zip(phones.phones, times, strict=True)]
+        yield Event({
+            "rate": spoken.waveform.rate,
+            "marks": [[mark.name, mark.seconds] for mark in timed.marks],
+            "words": [[word.text, times[word.first][0], times[word.last - 1][1]] for word in spoken.words],
+            "visemes": [[viseme.text, viseme.start, viseme.end, label.text]
+                        for label in labels for viseme in viseme_labels(label, "oculus")],
+        })  # fmt: skip
+        yield Chunk(pcm_bytes(spoken.waveform.samples), spoken.waveform.duration)
+
+
+TASKS: Mapping[str, Task] = MappingProxyType({
+    "file": stream_file, "speech": timed_speech, "live": live, "listen": listen,
+})  # fmt: skip
+
+
+class Synthesis:
+    """Handlers that share sessions and take turns; `tasks` by the kinds of their works."""
+
+    def __init__(self, sessions: SessionCache, tasks: Mapping[str, Task] = TASKS) -> None:
+        self._sessions, self._tasks, self._turns = sessions, tasks, Turns()
+
+    def synthesise(self, call: Call) -> Mapping[str, float]:
+        """Send the parts of the result of a ``work``; its measures.
+
+        Raises
+        ------
+        Tts2faceError
+            As the task of the work.
+        DefectError
+            The task raised another error.
+        """
+        try:
+            return self._turns.run(call, lambda: self._steps(call), call.content["priority"])
+        except Tts2faceError:
+            raise
+        except Exception as error:
+            log_event("defect", level=logging.ERROR, error=error, id=call.content["id"])
+            raise DefectError(f"internal error: {type(error).__name__}; see the log of the service") from error
+
+    def _steps(self, call: Call) -> Iterator[Step]:
+        work = Work(**call.content["work"])
+        return self._tasks[work.kind](self._sessions.get(Models(**work.models), work.owner), work, call.inputs)
+
+
+def serve(call: Call) -> Mapping[str, Any]:
+    """Send an event as soon as the process has loaded; the call lasts as long as the process."""
+    call.event({})
+    return call.more().content
+
+
+def handlers(
+    *, log_format: str, log_text: bool, n_sessions: int, memory_mb: int, sentences_mb: int, tasks: Sequence[str] = ()
+) -> Mapping[str, Handler]:
+    """Handlers of a process with the settings of the service; the aligner starts meanwhile.
+
+    Parameters
+    ----------
+    tasks
+        ``module:NAME`` of further tables of tasks by kind.
+    """
+    configure_logs(log_format, with_text=log_text)
+    aligner = RemoteAligner()
+    aligner.start()
+    sessions = SessionCache(
+        n_sessions, voices=VoicePool(aligner, OneAtATime()), max_bytes=memory_mb * 1_000_000 or None,
+        memory_mb=sentences_mb,
+    )  # fmt: skip
+    known = dict(TASKS)
+    for table in tasks:
+        known |= Program(table).load()
+    return {SYNTHESISE: Synthesis(sessions, known).synthesise, SERVE: serve}

@@ -1,0 +1,93 @@
+"""The studio within the application of the service."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi import Request as HttpRequest
+from nicegui import app as pages_app
+from nicegui import ui
+
+from lexicon.errors import InputError
+from tts2face.serving.service.exchange import PAGES
+from tts2face.serving.service.server import NO_TELEMETRY, Mount
+from tts2face.serving.service.state import ServiceState
+from tts2face.serving.studio.pages import animate, frame, projects, puppet, reports, styles
+from tts2face.serving.studio.pages.record import add_record_page
+from tts2face.serving.studio.recording_work import Recordings
+from tts2face.serving.studio.requests import TASKS
+from tts2face.serving.studio.routes import comparing as comparison_routes
+from tts2face.serving.studio.routes import projects as projects_routes
+from tts2face.serving.studio.routes import reports as report_routes
+from tts2face.serving.studio.routes import styles as style_routes
+from tts2face.serving.studio.routes import takes as take_routes
+from tts2face.serving.studio.studio import Studio
+
+TITLE = "tts2face studio"
+RECONNECT_S = 30.0  # for which the state of a page is kept while its connection is away
+
+
+def mount_studio(app: FastAPI, state: ServiceState) -> None:
+    """Add the studio to an application: pages under `PAGES`, what they fetch, and the login."""
+    studio = Studio(state)
+    app.include_router(frame.make_router(state))
+    app.state.studio = studio
+    for room in (projects_routes, comparison_routes, report_routes, style_routes, take_routes):
+        app.include_router(room.router)
+    for page in (projects, animate, styles, puppet, reports):
+        page.register(studio)
+    recordings = add_record_page(app, studio.folder, _recording_owner)
+    _disable_telemetry()
+    pages_app.config.socket_io_js_transports = ["websocket"]
+    ui.run_with(
+        app, mount_path=PAGES, title=TITLE, language="en-US", dark=None, tailwind=False, reconnect_timeout=RECONNECT_S,
+        show_welcome_message=False,
+    )  # fmt: skip
+    _run_with(app, studio, recordings)
+
+
+STUDIO = Mount(mount_studio, TASKS)
+
+
+def _recording_owner(request: HttpRequest) -> str:
+    """Name of the key of a request that may build talkers.
+
+    Raises
+    ------
+    InputError
+        It may not.
+    """
+    key = request.state.key
+    if "build" not in key.scopes:
+        raise InputError(
+            f"the key {key.name} lacks the scope build, which recordings need; ask the operator for a key with it "
+            "(`tts2face keys add NAME --scope speak --scope build`)"
+        )
+    return str(key.name)
+
+
+def _run_with(app: FastAPI, studio: Studio, recordings: Recordings) -> None:
+    """Check takes while the application runs; save all projects when it ends, while its processes still run."""
+    before = app.router.lifespan_context
+
+    @asynccontextmanager
+    async def lifespan(whole: FastAPI) -> AsyncIterator[Any]:
+        async with before(whole) as state:
+            recordings.checks.start()
+            await studio.start()
+            await asyncio.to_thread(studio.takes.store.end_readings)
+            try:
+                yield state
+            finally:
+                await asyncio.shield(recordings.stop())
+                await asyncio.shield(studio.close())
+
+    app.router.lifespan_context = lifespan
+
+
+def _disable_telemetry() -> None:
+    """Switch off FastAPI's telemetry of the pages, as in `tts2face.serving.service.server`."""
+    pages_app._telemetry = {**pages_app._telemetry, **NO_TELEMETRY}
+    pages_app._native_telemetry = type(pages_app._native_telemetry)(pages_app._telemetry)

@@ -1,0 +1,311 @@
+"""Edits of a project, as a page sends them. Pure: no files, no clock, no pages.
+
+An edit is a JSON object with a ``kind`` and the fields of `EDITS`.
+
+The history of a project: what was before, what was undone. Pure.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from typing import Any
+
+from lexicon.errors import InputError
+from lexicon.inputs import check_type, is_number
+from lexicon.sequence import PhoneSequence
+from tts2face.gestures.elements import KINDS, ElementKind, GazeTarget, Nod, StyleSpan, check_feature
+from tts2face.gestures.timeline import Timeline, expand_feature
+from tts2face.lips.options import ExcludedToken
+from tts2face.picture.options import Picture
+from tts2face.request import Request
+from tts2face.session.named_models import Models
+from tts2face.session.prepared import SentenceEdges
+from tts2face.session.project import Project
+
+MIN_PHONE_S = 0.01  # shortest phone that dragging an edge leaves: a frame of the alignment
+NEAR_S = 0.05  # within which a nod is the one at a time
+
+Edit = Mapping[str, Any]
+Sentences = Mapping[tuple[str, int], PhoneSequence]  # phones of each sentence by its text and occurrence
+
+
+def apply(project: Project, edit: Edit, sentences: Sentences | None = None) -> Project:
+    """The project after an edit.
+
+    Parameters
+    ----------
+    sentences
+        Phones of the sentences as they are shown, which only dragged edges need.
+
+    Raises
+    ------
+    InputError, DataError
+        There is no such kind of edit, a field is missing or has the wrong type, or its value is refused.
+    """
+    kind = edit.get("kind")
+    if not isinstance(kind, str) or kind not in EDITS:
+        raise InputError(f"there is no edit {str(kind)[:40]!r}; choose one of {', '.join(EDITS)}")
+    types, change = EDITS[kind]
+    given = {name: _checked(kind, name, wanted, edit) for name, wanted in types.items()}
+    return change(project, given, sentences or {})
+
+
+def _checked(kind: str, name: str, wanted: type, edit: Edit) -> Any:
+    """Value of a field; a missing or empty ``end`` is the end of the clip."""
+    if name == "end" and edit.get(name) is None:
+        return math.inf
+    if name not in edit:
+        raise InputError(f"the edit {kind} needs {name}; send it")
+    return check_type(f"{name} of the edit {kind}", edit[name], wanted)
+
+
+def _paint(project: Project, given: Edit, _: Sentences) -> Project:
+    spans = tuple(
+        StyleSpan(feature, given["style"], max(0.0, given["start"]), given["end"])
+        for feature in expand_feature(given["feature"])
+    )
+    return _timed(project, spans=KINDS["spans"].merged(project.timeline.spans, spans))
+
+
+def _erase(project: Project, given: Edit, _: Sentences) -> Project:
+    features = expand_feature(given["feature"])
+    kept = [span for span in project.timeline.spans if span.feature not in features]
+    for feature in features:
+        own = [span for span in project.timeline.spans if span.feature == feature]
+        for start, end in ((-1.0, given["start"]), (given["end"], math.inf)):
+            kept += KINDS["spans"].restricted(own, start, end)
+    return _timed(project, spans=tuple(kept))
+
+
+def _curve(kind: ElementKind, project: Project, given: Edit, _: Sentences) -> Project:
+    """Replace the curve of a lane, or remove it if there are no keys."""
+    keys = given["keys"]
+    if not all(isinstance(key, list | tuple) and len(key) == 2 and all(is_number(one) for one in key) for key in keys):
+        raise InputError("keys must be a list of [seconds, value]")
+    kept = [one for one in getattr(project.timeline, kind.name) if kind.lane(one) != given[kind.owner]]
+    made = [kind.record(given[kind.owner], tuple(map(tuple, keys)))] if keys else []
+    return _timed(project, **{kind.name: (*kept, *made)})
+
+
+def _nod(project: Project, given: Edit, _: Sentences) -> Project:
+    others = tuple(nod for nod in project.timeline.nods if abs(nod.time - given["time"]) >= NEAR_S)
+    return _timed(project, nods=(*others, Nod(given["time"], given["size"])))
+
+
+def _remove_nod(project: Project, given: Edit, _: Sentences) -> Project:
+    nods = project.timeline.nods
+    near = min(nods, key=lambda nod: abs(nod.time - given["time"]), default=None)
+    if near is None or abs(near.time - given["time"]) > NEAR_S:
+        raise InputError(f"there is no nod at {given['time']:.2f} s; click on one")
+    return _timed(project, nods=tuple(nod for nod in nods if nod is not near))
+
+
+def _gaze(project: Project, given: Edit, _: Sentences) -> Project:
+    target = GazeTarget(given["down_deg"], given["left_deg"], max(0.0, given["start"]), given["end"])
+    return _timed(project, gaze=KINDS["gaze"].merged(project.timeline.gaze, (target,)))
+
+
+def _remove_gaze(project: Project, given: Edit, _: Sentences) -> Project:
+    kept = tuple(one for one in project.timeline.gaze if not one.start <= given["time"] < one.end)
+    if len(kept) == len(project.timeline.gaze):
+        raise InputError(f"there is no gaze target at {given['time']:.2f} s; click on one")
+    return _timed(project, gaze=kept)
+
+
+def _mute(project: Project, given: Edit, _: Sentences) -> Project:
+    return replace(project, muted=_toggled(project.muted, given))
+
+
+def _solo(project: Project, given: Edit, _: Sentences) -> Project:
+    return replace(project, solo=_toggled(project.solo, given))
+
+
+def _toggled(features: frozenset[str], given: Edit) -> frozenset[str]:
+    feature = check_feature(given["feature"])
+    return features | {feature} if given["on"] else features - {feature}
+
+
+def _seed(project: Project, given: Edit, _: Sentences) -> Project:
+    seeds = {**project.timeline.seeds, **dict.fromkeys(expand_feature(given["feature"]), given["seed"])}
+    return _timed(project, seeds=seeds)
+
+
+def _edge(project: Project, given: Edit, sentences: Sentences) -> Project:
+    sentence, index = (given["text"], given["occurrence"]), given["index"]
+    phones = sentences.get(sentence)
+    if phones is None:
+        raise InputError(
+            f"there is no sentence {given['text'][:40]!r} in the clip; wait until it is made, and try again"
+        )
+    edges = phones.edges.tolist()
+    if not 0 < index < len(edges) - 1:
+        raise InputError(
+            f"edge {index} of a sentence cannot move; choose one between two phones, 1 to {len(edges) - 2}"
+        )
+    low, high = edges[index - 1] + MIN_PHONE_S, edges[index + 1] - MIN_PHONE_S
+    if low > high:
+        raise InputError("the two phones are too short to move the edge between them; move a neighbouring edge first")
+    edges[index] = min(max(given["time"], low), high)
+    others = tuple(one for one in project.edges if (one.text, one.occurrence) != sentence)
+    return replace(project, edges=(*others, SentenceEdges(*sentence, phones.phones, tuple(edges))))
+
+
+def _reset_edges(project: Project, given: Edit, _: Sentences) -> Project:
+    sentence = (given["text"], given["occurrence"])
+    return replace(project, edges=tuple(one for one in project.edges if (one.text, one.occurrence) != sentence))
+
+
+def _pronounce(project: Project, given: Edit, _: Sentences) -> Project:
+    word, phones = given["word"].strip(), given["phones"].strip()
+    others = {one: written for one, written in project.pronunciations.items() if one.lower() != word.lower()}
+    return replace(project, pronunciations=others | ({word: phones} if phones else {}))
+
+
+def _exclude(project: Project, given: Edit, _: Sentences) -> Project:
+    token = ExcludedToken(given["utterance"], given["start"])
+    others = tuple(one for one in project.excluded if one != token)
+    return replace(project, excluded=(*others, token) if given["on"] else others)
+
+
+def _request(project: Project, given: Edit, _: Sentences) -> Project:
+    return replace(project, request=_with_options(project.request, given["options"], Request))
+
+
+def _models(project: Project, given: Edit, _: Sentences) -> Project:
+    models = _with_options(project.models, given["options"], Models)
+    excluded = project.excluded if models.talker == project.models.talker else ()  # they are the talker's
+    return replace(project, models=models, excluded=excluded)
+
+
+def _picture(project: Project, given: Edit, _: Sentences) -> Project:
+    return replace(project, picture=_with_options(project.picture, given["options"], Picture))
+
+
+def _with_options(options: Any, given: Edit, kind: type) -> Any:
+    known = [one.name for one in fields(kind)]
+    for name in given:
+        if name not in known:
+            raise InputError(f"there is no option {str(name)[:40]!r}; choose {', '.join(known)}")
+    return replace(options, **given)
+
+
+def _name(project: Project, given: Edit, _: Sentences) -> Project:
+    return replace(project, name=given["name"].strip())
+
+
+def _timed(project: Project, **changes: Any) -> Project:
+    timeline: Timeline = replace(project.timeline, **changes)
+    return replace(project, timeline=timeline)
+
+
+Change = Callable[[Project, Edit, Sentences], Project]
+_SPAN = {"start": float, "end": float}
+EDITS: Mapping[str, tuple[Mapping[str, type], Change]] = {
+    "paint": ({"feature": str, "style": str, **_SPAN}, _paint),
+    "erase": ({"feature": str, **_SPAN}, _erase),
+    **{
+        edit: ({KINDS[name].owner: str, "keys": list}, partial(_curve, KINDS[name]))
+        for edit, name in (("curve", "curves"), ("strength", "strengths"), ("channel", "edits"))
+    },
+    "nod": ({"time": float, "size": float}, _nod),
+    "remove_nod": ({"time": float}, _remove_nod),
+    "gaze": ({**_SPAN, "down_deg": float, "left_deg": float}, _gaze),
+    "remove_gaze": ({"time": float}, _remove_gaze),
+    "mute": ({"feature": str, "on": bool}, _mute),
+    "solo": ({"feature": str, "on": bool}, _solo),
+    "seed": ({"feature": str, "seed": int}, _seed),
+    "edge": ({"text": str, "occurrence": int, "index": int, "time": float}, _edge),
+    "reset_edges": ({"text": str, "occurrence": int}, _reset_edges),
+    "pronounce": ({"word": str, "phones": str}, _pronounce),
+    "exclude": ({"utterance": str, "start": float, "on": bool}, _exclude),
+    "request": ({"options": dict}, _request),
+    "models": ({"options": dict}, _models),
+    "picture": ({"options": dict}, _picture),
+    "name": ({"name": str}, _name),
+}  # fields with their types, and what the edit changes
+
+
+MAX_STEPS = 100  # that can be undone
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """A state of a project beside its present one; `topic` is that of the edit between it and the next later state."""
+
+    project: Project
+    topic: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class History:
+    """A project with its earlier and its undone states.
+
+    Parameters
+    ----------
+    past
+        Earlier states, the oldest first, at most `MAX_STEPS`.
+    future
+        Undone states, the one that `redo` returns to last.
+    """
+
+    present: Project
+    past: tuple[Step, ...] = ()
+    future: tuple[Step, ...] = ()
+
+    def add(self, project: Project, topic: str = "", *, continues: bool = False) -> "History":
+        """The history with a new state.
+
+        Parameters
+        ----------
+        topic
+            What the edit changed: its kind, and in which part.
+        continues
+            Whether the edit continues the last one if both have the same topic, so that one undo takes both back.
+        """
+        if _is_equal(project, self.present):
+            return self
+        if continues and self.past and not self.future and topic and self.past[-1].topic == topic:
+            return replace(self, present=project)
+        return History(project, (*self.past, Step(self.present, topic))[-MAX_STEPS:])
+
+    def amend(self, project: Project) -> "History":
+        """The history with another present state, which undo does not know: for what follows from an edit."""
+        return replace(self, present=project)
+
+    def revise(self, change: Callable[[Project], Project]) -> "History":
+        """The history with every state changed alike: for what holds of the past, too, as the name of a style."""
+        past, future = (
+            tuple(Step(change(one.project), one.topic) for one in part) for part in (self.past, self.future)
+        )
+        return History(change(self.present), past, future)
+
+    def undo(self) -> "History":
+        """The state before the last edit.
+
+        Raises
+        ------
+        InputError
+            There is none.
+        """
+        if not self.past:
+            raise InputError("there is nothing to undo")
+        last = self.past[-1]
+        return History(last.project, self.past[:-1], (*self.future, Step(self.present, last.topic)))
+
+    def redo(self) -> "History":
+        """The state that was undone last.
+
+        Raises
+        ------
+        InputError
+            There is none.
+        """
+        if not self.future:
+            raise InputError("there is nothing to redo")
+        last = self.future[-1]
+        return History(last.project, (*self.past, Step(self.present, last.topic)), self.future[:-1])
+
+
+def _is_equal(a: Project, b: Project) -> bool:
+    return all(getattr(a, one.name) == getattr(b, one.name) for one in fields(Project))

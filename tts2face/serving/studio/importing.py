@@ -1,0 +1,162 @@
+"""New projects: from a text, a recording, subtitles, a project file, or as an example.
+
+What the parts of a studio need of it, without an import circle.
+"""
+
+import asyncio
+import tempfile
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Protocol
+
+from lexicon.errors import InputError
+from lexicon.inputs import parse_json
+from tts2face.gestures.elements import StyleSpan
+from tts2face.gestures.timeline import Timeline
+from tts2face.interchange.subtitles.reader import SUFFIXES, read_subtitles
+from tts2face.request import Request
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.keys import ApiKey
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.service.state import ServiceState
+from tts2face.serving.service.uploads import MAX_TEXT_BYTES, SOUND, SUBTITLES, decode_file
+from tts2face.serving.studio.requests import check_project
+from tts2face.serving.studio.store import ProjectEntry, ProjectStore
+from tts2face.serving.studio.workspace import Workspace
+from tts2face.session.project import MAX_NAME, Project
+
+
+class StudioHost(Protocol):
+    """Projects of all keys, those that are open, and the service around them (`studio.Studio`)."""
+
+    state: ServiceState
+    store: ProjectStore
+
+    @property
+    def folder(self) -> Path:
+        """Folder of projects, styles and takes."""
+
+    async def entries(self, key: ApiKey) -> list[ProjectEntry]:
+        """Projects of a key."""
+
+    async def create(self, key: ApiKey, project: Project) -> str:
+        """Id of a new project."""
+
+    async def open(self, key: ApiKey, number: str) -> Workspace:
+        """An open project."""
+
+    def open_projects(self, key: ApiKey) -> list[Workspace]:
+        """Open projects of a key."""
+
+    def check_scope(self, key: ApiKey) -> None:
+        """Refuse keys that may not make speech."""
+
+
+SOUND_SUFFIXES = (
+    ".wav", ".mp3", ".ogg", ".oga", ".opus", ".flac", ".aac", ".m4a", ".mp4", ".mov", ".webm", ".mkv", ".aiff",
+)  # fmt: skip
+TEXT_SUFFIXES = (".txt", ".ssml", ".md")
+RECORDING = "recording.wav"
+SAMPLE_TEXT = "Hello! This face was learnt from a real talker. Paint a style on the timeline, and watch it change."
+SAMPLE_TIMELINE = Timeline(
+    spans=(StyleSpan("expression", "delighted", 0.0, 1.6), StyleSpan("head", "delighted", 0.0, 3.0))
+)
+
+
+async def import_text(studio: StudioHost, key: ApiKey, text: str, name: str = "") -> str:
+    """Id of a new project that speaks a text, with marks or SSML."""
+    if len(text) > studio.state.settings.text_characters:
+        raise InputError(f"the text has more than {studio.state.settings.text_characters} characters; divide it")
+    project = Project(name=_title(name or text), request=Request(text=text))
+    return await studio.create(key, project)
+
+
+async def import_sample(studio: StudioHost, key: ApiKey) -> str:
+    """Id of a new project that shows what the studio does."""
+    return await studio.create(
+        key, Project(name="Example", request=Request(text=SAMPLE_TEXT), timeline=SAMPLE_TIMELINE)
+    )
+
+
+async def import_file(studio: StudioHost, key: ApiKey, path: Path, name: str, transcript: str = "") -> str:
+    """Id of a new project from an uploaded file, whose ending says what it is.
+
+    Parameters
+    ----------
+    path
+        The file as it came.
+    name
+        Its name at the client.
+    transcript
+        Words of a recording, if they are known.
+
+    Raises
+    ------
+    InputError, DataError
+        It is none of the kinds, damaged or too large.
+    """
+    suffix, title = Path(name).suffix.lower(), _title(Path(name).stem)
+    if suffix == ".json":
+        return await _import_project(studio, key, path)
+    if suffix in TEXT_SUFFIXES:
+        return await import_text(studio, key, _read_text(path, name), title)
+    if suffix in SUFFIXES:
+        async with _decoded(studio.state.settings, SUBTITLES, path, suffix) as checked:
+            text = await asyncio.to_thread(_spoken_text, checked)
+        return await import_text(studio, key, text, title)
+    if suffix in SOUND_SUFFIXES:
+        async with _decoded(studio.state.settings, SOUND, path, ".wav") as checked:
+            return await add_recording(studio, key, checked, title, transcript)
+    kinds = (*TEXT_SUFFIXES, *SUFFIXES, *SOUND_SUFFIXES, ".json")
+    raise InputError(f"a file {name[-40:]!r} cannot be imported; give one that ends in {', '.join(kinds)}")
+
+
+async def _import_project(studio: StudioHost, key: ApiKey, path: Path) -> str:
+    content = parse_json(_read_text(path, "the project"), "the project")
+    with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as empty:
+        project = await check_project(studio.state, key, Path(empty), content)
+    return await studio.create(key, project)
+
+
+async def add_recording(studio: StudioHost, key: ApiKey, sound: Path, title: str, transcript: str) -> str:
+    """Id of a new project with a checked sound and its words, if they are known."""
+    number = await studio.create(key, Project(name=title))
+    asset = await asyncio.to_thread(studio.store.add_asset, number, RECORDING, sound)
+    workspace = await studio.open(key, number)
+    request = Request(audio=asset, text=transcript)
+    workspace.history = workspace.history.amend(replace(workspace.project, request=request))
+    await workspace.save()
+    return number
+
+
+def _spoken_text(path: Path) -> str:
+    return "\n".join(cue.text for cue in read_subtitles(path).cues if cue.text)
+
+
+@asynccontextmanager
+async def _decoded(settings: ServiceSettings, kind: str, path: Path, suffix: str) -> AsyncIterator[Path]:
+    """The file after its check in a process with limits."""
+    limit = settings.sound_s if kind == SOUND else settings.job_cues
+    with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
+        target = Path(folder, f"checked{suffix}")
+        try:
+            await decode_file((kind, path, target, limit), "the file", settings.decode_s)
+        except RefusedError as refused:
+            raise InputError(refused.message) from refused
+        yield target
+
+
+def _read_text(path: Path, name: str) -> str:
+    if path.stat().st_size > MAX_TEXT_BYTES:
+        raise InputError(f"{name[-40:]} has more than {MAX_TEXT_BYTES} bytes; divide it")
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as wrong:
+        raise InputError(f"{name[-40:]} is no text in UTF-8; save it as UTF-8") from wrong
+
+
+def _title(text: str) -> str:
+    words = " ".join(text.split())[: min(60, MAX_NAME)].strip()
+    return words or "untitled"

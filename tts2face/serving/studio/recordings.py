@@ -1,0 +1,284 @@
+"""Recordings of the studio on disk: prompts, takes and the talker that is built of them, each in a folder of its own.
+
+``recordings/ID/recordings`` holds the accepted takes with their transcripts, as `tts2face corpus build` reads them;
+``unchecked`` and ``refused`` the others; ``prompts.json`` what is to be read, ``manifest.json`` the state of each take;
+`owned_folders` says whose it is. A crash leaves whole files only. All methods block.
+
+Folders of the studio that belong to one key each: projects, recordings, takes.
+
+Each has a random name, a file ``owner`` with the name of the key, and a file that lists it. All methods block.
+"""
+
+import json
+import os
+import re
+import secrets
+import shutil
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import DataError, InputError
+from lexicon.inputs import read_json
+from tts2face.storage.files import translate_disk_errors, write_atomically
+
+ID = re.compile(r"[0-9a-f]{16}")
+OWNER = "owner"
+
+
+class OwnedFolders:
+    """Folders in a folder, which is made at its first use.
+
+    Parameters
+    ----------
+    entry
+        Name of the file without which a folder is not complete, and not listed.
+    noun
+        What a folder is, for messages.
+    """
+
+    def __init__(self, folder: Path, entry: str, noun: str) -> None:
+        self._folder, self._entry, self._noun = folder, entry, noun
+
+    def make(self, owner: str, *parts: str) -> Path:
+        """A new folder of an owner, with folders in it."""
+        folder = self._folder / secrets.token_hex(8)
+        with translate_disk_errors(folder):
+            folder.mkdir(parents=True)
+            for part in parts:
+                (folder / part).mkdir()
+            (folder / OWNER).write_text(owner, encoding="utf-8")
+        return folder
+
+    def of(self, owner: str | None = None) -> list[Path]:
+        """Complete folders of an owner, or of all, those changed last first."""
+        files = [
+            file
+            for file in self._folder.glob(f"*/{self._entry}")
+            if ID.fullmatch(file.parent.name) and owner in {None, _owner(file.parent)}
+        ]
+        return [file.parent for file in sorted(files, key=lambda file: -file.stat().st_mtime)]
+
+    def at(self, number: str) -> Path:
+        """Path of a folder by its name, whoever owns it."""
+        return self._folder / number
+
+    def find(self, number: str, owner: str) -> Path:
+        """A complete folder of an owner.
+
+        Raises
+        ------
+        InputError
+            The owner has no such one.
+        """
+        folder = self._folder / number
+        if not ID.fullmatch(number) or _owner(folder) != owner or not (folder / self._entry).is_file():
+            raise InputError(f"there is no {self._noun} {number[:40]!r}; choose one from the list")
+        return folder
+
+    def remove(self, number: str) -> None:
+        """Remove a folder with everything in it; no half of one is ever listed."""
+        gone = self._folder / f".{number}"
+        with translate_disk_errors(gone):
+            self.at(number).rename(gone)
+            shutil.rmtree(gone)
+
+
+def _owner(folder: Path) -> str | None:
+    try:
+        return (folder / OWNER).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return None
+
+
+SUFFIXES = {"video/webm": ".webm", "video/mp4": ".mp4"}  # as MediaRecorder writes them
+PROMPTS, MANIFEST, CACHE = "prompts.json", "manifest.json", "cache"
+ACCEPTED_FOLDER, UNCHECKED_FOLDER, REFUSED_FOLDER = "recordings", "unchecked", "refused"
+CHECKING, GOOD, WEAK, REFUSED = "checking", "good", "weak", "refused"  # states of a take
+FOLDERS = {
+    CHECKING: UNCHECKED_FOLDER, GOOD: ACCEPTED_FOLDER, WEAK: ACCEPTED_FOLDER, REFUSED: REFUSED_FOLDER,
+}  # fmt: skip
+MAX_NAME_CHARACTERS = 60
+ENGLISH = "en"  # language of the transcripts that `tts2face corpus build` pronounces
+
+
+@dataclass(frozen=True, slots=True)
+class Take:
+    """A recorded prompt: its file, one of the states, what to do better, and the beginning of names in the cache."""
+
+    file: str
+    state: str
+    advice: str = ""
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingEntry:
+    """A recording in a list, with the number of accepted takes and of prompts."""
+
+    id: str
+    name: str
+    n_accepted: int
+    n_prompts: int
+    changed: float
+
+
+class RecordingStore:
+    """Recordings of all owners in a folder, which is made at its first use."""
+
+    def __init__(self, folder: Path) -> None:
+        self._recordings = OwnedFolders(folder / "recordings", MANIFEST, "recording")
+        self._lock = threading.Lock()  # of the manifests
+        self.revision = 0  # increased with every change
+
+    def create(self, owner: str, name: str, prompts: Mapping[str, Any]) -> str:
+        """Id of a new recording; `prompts` as the tool ``recordings`` gives them.
+
+        Raises
+        ------
+        InputError
+            The name is empty or too long.
+        """
+        if not name.strip() or len(name) > MAX_NAME_CHARACTERS:
+            raise InputError(f"the name must have 1 to {MAX_NAME_CHARACTERS} characters; write a name")
+        folder = self._recordings.make(owner, *set(FOLDERS.values()))
+        write_atomically(folder / PROMPTS, json.dumps(prompts, ensure_ascii=False).encode())
+        self._write(folder.name, {"name": name.strip(), "takes": {}})
+        return folder.name
+
+    def entries(self, owner: str) -> list[RecordingEntry]:
+        """Recordings of an owner, those changed last first."""
+        return [self._entry(folder) for folder in self._recordings.of(owner)]
+
+    def folder(self, number: str, owner: str) -> Path:
+        """Folder of a recording.
+
+        Raises
+        ------
+        InputError
+            The owner has no such recording.
+        """
+        return self._recordings.find(number, owner)
+
+    def name(self, number: str) -> str:
+        """Name of a recording."""
+        return str(self._read(number)["name"])
+
+    def prompts(self, number: str) -> dict[str, Any]:
+        """Prompts of a recording with their units, and the counts of running text."""
+        return dict(self._read_json(number, PROMPTS))
+
+    def takes(self, number: str) -> dict[int, Take]:
+        """The take of each recorded prompt, by its index."""
+        return {int(at): Take(**take) for at, take in sorted(self._read(number)["takes"].items())}
+
+    def add_take(self, number: str, at: int, content: Path, media_type: str) -> Take:
+        """Take of a prompt, which replaces an earlier one; the file `content` is moved.
+
+        Raises
+        ------
+        InputError
+            There is no such prompt, or the file is of another kind than those of `SUFFIXES`.
+        """
+        prompts = self.prompts(number)["prompts"]
+        if not 0 <= at < len(prompts):
+            raise InputError(f"there is no prompt {at + 1}; there are {len(prompts)}")
+        suffix = SUFFIXES.get(media_type.partition(";")[0].strip().lower())
+        if suffix is None:
+            raise InputError(f"a take must be {' or '.join(SUFFIXES)}, not {media_type[:40]!r}; use another browser")
+        take = Take(f"take-{at + 1:04d}-{secrets.token_hex(3)}{suffix}", CHECKING)
+        with self._lock, translate_disk_errors(content):
+            manifest = self._read(number)
+            os.replace(content, self._recordings.at(number) / UNCHECKED_FOLDER / take.file)
+            earlier = manifest["takes"].get(str(at))
+            manifest["takes"][str(at)] = asdict(take)
+            self._write(number, manifest)
+            if earlier is not None:
+                self._remove_files(number, Take(**earlier))
+        return take
+
+    def judge(self, number: str, at: int, judged: Take) -> None:
+        """Set the state of a take after its check; if it was recorded again or deleted meanwhile, forget it."""
+        folder = self._recordings.at(number)
+        with self._lock:
+            if not folder.is_dir():
+                return
+            manifest = self._read(number)
+            current = manifest["takes"].get(str(at), {})
+            if current.get("file") != judged.file:
+                self._remove_files(number, judged)
+                return
+            target = folder / FOLDERS[judged.state] / judged.file
+            with translate_disk_errors(target):
+                text = self.transcript(number, at)
+                if text is not None:
+                    target.with_suffix(".txt").write_text(text, encoding="utf-8")
+                os.replace(folder / FOLDERS[current["state"]] / judged.file, target)
+            manifest["takes"][str(at)] = asdict(judged)
+            self._write(number, manifest)
+
+    def delete_take(self, number: str, at: int) -> None:
+        """Delete the take of a prompt and its files; without one, do nothing."""
+        with self._lock:
+            manifest = self._read(number)
+            take = manifest["takes"].pop(str(at), None)
+            if take is not None:
+                self._write(number, manifest)
+                self._remove_files(number, Take(**take))
+
+    def delete(self, number: str) -> None:
+        """Delete a recording with all that was made of it."""
+        with self._lock:
+            self._recordings.remove(number)
+
+    def path(self, number: str, take: Take) -> Path:
+        """File of a take."""
+        return self._recordings.at(number) / FOLDERS[take.state] / take.file
+
+    def unchecked(self) -> Sequence[tuple[str, int, Take]]:
+        """Takes whose check did not end, of all recordings: id, index of the prompt, take."""
+        numbers = [folder.name for folder in self._recordings.of()]
+        return [
+            (number, at, take)
+            for number in numbers
+            for at, take in self.takes(number).items()
+            if take.state == CHECKING
+        ]
+
+    def transcript(self, number: str, at: int) -> str | None:
+        """What is said in a take, in English; None in other languages, whose phones are recognised."""
+        prompts = self.prompts(number)
+        is_english = str(prompts.get("language", ENGLISH)).partition("-")[0] == ENGLISH
+        return str(prompts["prompts"][at]["text"]) if is_english else None
+
+    def _remove_files(self, number: str, take: Take) -> None:
+        """Remove a take, its transcript, and what its check cached."""
+        for folder in set(FOLDERS.values()):
+            file = self._recordings.at(number) / folder / take.file
+            file.unlink(missing_ok=True)
+            file.with_suffix(".txt").unlink(missing_ok=True)
+        if take.key:
+            for file in (self._recordings.at(number) / CACHE).glob(f"{take.key}-*"):
+                file.unlink(missing_ok=True)
+
+    def _entry(self, folder: Path) -> RecordingEntry:
+        manifest, number = folder / MANIFEST, folder.name
+        n_accepted = sum(FOLDERS[take.state] == ACCEPTED_FOLDER for take in self.takes(number).values())
+        n_prompts = len(self.prompts(number)["prompts"])
+        return RecordingEntry(number, self.name(number), n_accepted, n_prompts, manifest.stat().st_mtime)
+
+    def _read(self, number: str) -> dict[str, Any]:
+        return dict(self._read_json(number, MANIFEST))
+
+    def _read_json(self, number: str, name: str) -> Any:
+        path = self._recordings.at(number) / name
+        try:
+            return read_json(path)
+        except OSError as refused:
+            raise DataError(f"{path} cannot be read ({refused.strerror}); delete the recording") from refused
+
+    def _write(self, number: str, manifest: Mapping[str, Any]) -> None:
+        self.revision += 1
+        write_atomically(self._recordings.at(number) / MANIFEST, json.dumps(manifest, ensure_ascii=False).encode())

@@ -1,0 +1,217 @@
+"""The studio of a service: its projects, those that are open, and what is made of them.
+
+A face that is kept compressed, as a page fetches it.
+"""
+
+import asyncio
+import gzip
+import hashlib
+import json
+from contextlib import suppress
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from fastapi import Request as HttpRequest
+from fastapi.responses import Response
+
+from lexicon.errors import InputError
+from tts2face import __version__
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.keys import LOCAL_KEY, ApiKey
+from tts2face.serving.service.messages import Work
+from tts2face.serving.service.state import ServiceState
+from tts2face.serving.studio.previews import PieceMemory
+from tts2face.serving.studio.renders import RenderQueue
+from tts2face.serving.studio.reports import Reports
+from tts2face.serving.studio.requests import data_of, studio_folder
+from tts2face.serving.studio.store import ProjectEntry, ProjectStore
+from tts2face.serving.studio.styles import Styles
+from tts2face.serving.studio.takes import Takes
+from tts2face.serving.studio.workspace import Workspace
+from tts2face.session.project import Project
+from tts2face.storage.files import translate_disk_errors, write_atomically
+
+MB = 1_000_000
+MAX_IDLE = 10  # open projects that no page shows
+MAX_FACES = 40  # faces kept on disk for pages
+
+
+class Studio:
+    """Projects of all keys of a service."""
+
+    def __init__(self, state: ServiceState) -> None:
+        self.state = state
+        self._folder: Path = studio_folder(state)
+        self.store = ProjectStore(self._folder)
+        self.memory = PieceMemory(state.settings.previews_mb * MB)
+        self.renders = RenderQueue(state)
+        self.styles = Styles(self)
+        self.takes = Takes(self, self.styles)
+        self.reports = Reports(state.library, self._folder)
+        self._open: dict[tuple[str, str], Workspace] = {}
+        self._opening = asyncio.Lock()
+        self._preparing: asyncio.Task[None] | None = None
+        self._making: dict[str, asyncio.Lock] = {}  # of faces by name
+
+    @property
+    def folder(self) -> Path:
+        """Folder of projects, recordings and faces."""
+        return self._folder
+
+    async def entries(self, key: ApiKey) -> list[ProjectEntry]:
+        """Projects of a key, those changed last first."""
+        return await asyncio.to_thread(self.store.entries, key.name)
+
+    async def create(self, key: ApiKey, project: Project) -> str:
+        """Id of a new project, with the pronunciations that the key keeps.
+
+        Raises
+        ------
+        InputError
+            The key may not use the studio.
+        """
+        self.check_scope(key)
+        words = await asyncio.to_thread(self.store.words, key.name)
+        project = replace(project, pronunciations={**words, **project.pronunciations})
+        return await asyncio.to_thread(self.store.create, key.name, project)
+
+    async def open(self, key: ApiKey, number: str) -> Workspace:
+        """An open project.
+
+        Raises
+        ------
+        InputError
+            The key has no such project.
+        DataError
+            It is damaged.
+        """
+        self.check_scope(key)
+        async with self._opening:
+            found = self._open.get((key.name, number))
+            if found is None:
+                found = Workspace(self.state, self.store, key, number, self.memory)
+                self._open[key.name, number] = found
+                await self._close_idle()
+        found.key = key
+        return found
+
+    async def remove(self, key: ApiKey, number: str) -> None:
+        """Remove a project with everything that was made of it; errors as `open`."""
+        self.check_scope(key)
+        found = self._open.pop((key.name, number), None)
+        if found is not None:
+            await found.close()
+            found.tell_removed()
+        self.renders.forget(number)
+        await asyncio.to_thread(self.store.remove, number, key.name)
+
+    async def start(self) -> None:
+        """Begin what an earlier server did not finish, and the face of new projects, as the settings say."""
+        await self.renders.resume(self._folder / "projects")
+        if self.state.settings.warm_studio:
+            self.prepare()
+
+    def prepare(self) -> None:
+        """Begin to make the face of new projects, so that the first one shows it at once; only the first call does."""
+        if self._preparing is None:
+            self._preparing = asyncio.get_running_loop().create_task(self._prepare())
+
+    async def _prepare(self) -> None:
+        project = Project()
+        work = self.state.work(kind="face", models=asdict(project.models), request={"has_gestures": True})
+        with suppress(RefusedError):  # the first page says why
+            await self._face_file(project, work, LOCAL_KEY)
+
+    async def face(self, workspace: Workspace) -> tuple[str, Path]:
+        """Look of a project and the file of its face, compressed by gzip; made at its first use, and kept.
+
+        Raises
+        ------
+        InputError
+            It is a talker's own face, which has no mesh.
+        """
+        while True:
+            look, project = workspace.look, workspace.project
+            work = await workspace.work("face", has_gestures=project.request.has_gestures)
+            try:
+                # In any process: making a face takes seconds, in which the project's own process makes its preview.
+                return look, await self._face_file(project, replace(work, affinity=""), workspace.key)
+            except RefusedError:
+                if look == workspace.look:
+                    raise
+                # The project has changed meanwhile, and what its face was made of may have been removed.
+
+    async def plain_face(self, key: ApiKey) -> Path:
+        """File of the default head without gestures, as takes move it; errors as `face`."""
+        project = Project()
+        project = replace(project, request=replace(project.request, gestures="none"))
+        work = self.state.work(kind="face", models=asdict(project.models), request={"has_gestures": False})
+        return await self._face_file(project, work, key)
+
+    async def _face_file(self, project: Project, work: Work, key: ApiKey) -> Path:
+        looks = [asdict(project.models), dict(work.models), project.request.has_gestures, __version__]
+        name = hashlib.sha256(json.dumps(looks, default=str, sort_keys=True).encode()).hexdigest()[:24]
+        path = self._folder / "faces" / f"{name}.glb.gz"
+        async with self._making.setdefault(name, asyncio.Lock()):
+            if not path.is_file():
+                with translate_disk_errors(path):
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                content = await data_of(self.state, key, work)
+                await asyncio.to_thread(lambda: write_atomically(path, gzip.compress(content, mtime=0)))
+                await asyncio.to_thread(_keep_last, path.parent, MAX_FACES)
+        return path
+
+    def open_projects(self, key: ApiKey) -> list[Workspace]:
+        """Open projects of a key."""
+        return [one for (owner, _), one in self._open.items() if owner == key.name]
+
+    async def close(self) -> None:
+        """Save all projects, and end what is being made."""
+        await self.styles.close()
+        await self.takes.close()
+        if self._preparing is not None:
+            self._preparing.cancel()
+        await self.renders.close()
+        await self.reports.close()
+        for one in self._open.values():
+            await one.close()
+
+    def check_scope(self, key: ApiKey) -> None:
+        """Refuse keys that may not make speech."""
+        if "speak" not in key.scopes:
+            raise InputError(f"the key {key.name} lacks the scope speak; use another key")
+
+    async def _close_idle(self) -> None:
+        """Close the projects used least recently that no page shows."""
+        idle = sorted(
+            (one for one in self._open.items() if not one[1].listeners and not one[1].preview.is_running),
+            key=lambda one: one[1].used_at,
+        )
+        for name, one in idle[: max(0, len(idle) - MAX_IDLE)]:
+            await one.close()
+            del self._open[name]
+
+
+def _keep_last(folder: Path, count: int) -> None:
+    files = sorted(folder.glob("*.glb*"), key=lambda path: path.stat().st_mtime)
+    for path in files[: max(0, len(files) - count)]:
+        path.unlink(missing_ok=True)
+
+
+async def face_answer(request: HttpRequest, path: Path, *, is_named: bool = True) -> Response:
+    """The binary glTF of a file compressed by gzip; decompressed for a program that does not take it so.
+
+    Parameters
+    ----------
+    is_named
+        Whether the query of the address says what is drawn: then the answer never changes, and a browser keeps it.
+    """
+    content = await asyncio.to_thread(path.read_bytes)
+    headers = {"Vary": "Accept-Encoding"}
+    if is_named:
+        headers["Cache-Control"] = "private, max-age=31536000, immutable"
+    if "gzip" in request.headers.get("accept-encoding", ""):
+        headers["Content-Encoding"] = "gzip"
+    else:
+        content = gzip.decompress(content)
+    return Response(content, media_type="model/gltf-binary", headers=headers)

@@ -1,0 +1,119 @@
+"""Changes of the state of jobs: begin, progress and end; each end happens once."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from tts2face.serving.work.connection import JobDatabase
+from tts2face.serving.work.table import (
+    INPUT,
+    IS_OPEN,
+    OPEN_STATES,
+    OUTPUT,
+    JobFile,
+    JobRecord,
+    JobTable,
+    insert_files,
+    remove_unused,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How a job has ended: its state, its results, or the reason."""
+
+    state: str
+    outputs: tuple[JobFile, ...] = ()
+    error: str | None = None
+
+
+class JobChanges:
+    """Changes of jobs by whoever executes them."""
+
+    def __init__(self, database: JobDatabase) -> None:
+        self._database = database
+        self.table = JobTable(database)
+
+    def begin(self, job_id: str) -> JobRecord | None:
+        """Note that a job runs, also when another worker has begun it before; None if it has ended or was deleted."""
+        with self._database.transaction(is_change=True) as change:
+            n_begun = change.run(
+                f"UPDATE tts2face_jobs SET state = 'running', started = {self._database.now} "
+                "WHERE id = :id AND state = 'waiting'", id=job_id,
+            )  # fmt: skip
+            if n_begun:
+                self.table.add_event(change, job_id, {"type": "state", "state": "running"})
+        found = self.table.get(job_id)
+        return found if found is not None and found.is_open else None
+
+    def is_open(self, job_id: str) -> bool:
+        """Whether a job waits or runs."""
+        with self._database.transaction() as look:
+            return look.value("SELECT state FROM tts2face_jobs WHERE id = :id", id=job_id) in OPEN_STATES
+
+    def note_segments(self, job_id: str, addresses: Iterable[str]) -> None:
+        """Note which segments a job needs."""
+        with self._database.transaction(is_change=True) as change:
+            change.run("DELETE FROM tts2face_job_segments WHERE job_id = :id", id=job_id)
+            change.run_many(
+                "INSERT INTO tts2face_job_segments (job_id, address) VALUES (:id, :address)",
+                [{"id": job_id, "address": one} for one in sorted(set(addresses))],
+            )
+
+    def report(self, job_id: str, content: dict[str, Any]) -> bool:
+        """Add an event to an open job; false if it is not open. Numbers ``done`` and ``of`` become its progress."""
+        with self._database.transaction(is_change=True) as change:
+            n_open = change.run(
+                f"UPDATE tts2face_jobs SET n_done = coalesce(:done, n_done), n_all = coalesce(:of, n_all) "
+                f"WHERE id = :id AND {IS_OPEN}", id=job_id, done=content.get("done"), of=content.get("of"),
+            )  # fmt: skip
+            if n_open:
+                self.table.add_event(change, job_id, content)
+        return bool(n_open)
+
+    def end(
+        self,
+        job_id: str,
+        ending: Ending,
+        store: Callable[[Sequence[JobFile]], None] = lambda _: None,
+        also: Callable[[Any], None] = lambda _: None,
+    ) -> bool:
+        """End an open job; false if it has ended already, by another worker or its owner.
+
+        Parameters
+        ----------
+        store
+            Called with the results within the transaction: it stores those that have been removed meanwhile.
+        also
+            Called with the transaction.
+        """
+        with self._database.transaction(is_change=True) as change:
+            n_ended = change.run(
+                f"UPDATE tts2face_jobs SET state = :state, error = :error, finished = {self._database.now}, "
+                "webhook_due = CASE WHEN webhook IS NULL THEN NULL ELSE 0 END "
+                f"WHERE id = :id AND {IS_OPEN}", id=job_id, state=ending.state, error=ending.error,
+            )  # fmt: skip
+            if not n_ended:
+                return False
+            insert_files(change, job_id, OUTPUT, ending.outputs)
+            change.run("DELETE FROM tts2face_job_segments WHERE job_id = :id", id=job_id)
+            event: dict[str, Any] = {"type": "state", "state": ending.state}
+            if ending.error is not None:
+                event["error"] = ending.error
+            self.table.add_event(change, job_id, event)
+            store(ending.outputs)
+            also(change)
+        return True
+
+    def forget_inputs(self, job_id: str, remove: Callable[[str], None]) -> None:
+        """Forget the files of an ended job, which are somebody's recordings; `remove` gets those of no other job."""
+        with self._database.transaction(is_change=True) as change:
+            query = "SELECT sha256 FROM tts2face_job_files WHERE job_id = :id AND role = :role"
+            hashes = {row[0] for row in change.rows(query, id=job_id, role=INPUT)}
+            change.run("DELETE FROM tts2face_job_files WHERE job_id = :id AND role = :role", id=job_id, role=INPUT)
+            remove_unused(change, hashes, remove)
+
+    def remove_unused(self, hashes: set[str], remove: Callable[[str], None]) -> None:
+        """Call `remove` with the files that no job uses, while no job can begin to use them."""
+        with self._database.transaction(is_change=True) as change:
+            remove_unused(change, hashes, remove)

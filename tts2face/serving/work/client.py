@@ -1,0 +1,347 @@
+"""Jobs of the service as its server sees them: submit, cancel, delete, webhooks.
+
+Control of jobs: list, show, cancel, retry, prune.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from lexicon.errors import InputError
+from tts2face.serving.batch.segment import segment_from_json
+from tts2face.serving.work.blobs import BlobStore
+from tts2face.serving.work.changes import Ending, JobChanges
+from tts2face.serving.work.connection import JobDatabase, Transaction
+from tts2face.serving.work.database import (
+    APPLICATION,
+    APPLICATION_VERSION,
+    JOB_QUEUE,
+    JOB_WORKFLOW,
+    QUEUE,
+    TALKER_QUEUE,
+    WORKFLOW,
+    Workers,
+    database_url,
+    prepare_database,
+)
+from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, enqueue, failure_reason, open_client
+from tts2face.serving.work.resource_check import TALKER
+from tts2face.serving.work.table import CANCELLED, JobRecord, JobTable, NewJob
+
+CONNECT_S = 2  # to PostgreSQL; then the request is refused
+SESSION_OPTIONS = "-c statement_timeout=10000 -c lock_timeout=8000"  # ms
+N_CONNECTIONS = 8
+FILES_PER_LOOK = 100  # while all changes of jobs wait
+LEASE_S = 60.0  # within which a server delivers a webhook that it has taken
+FIRST_PAUSE_S, PAUSE_FACTOR, MAX_TRIES = 2.0, 3.0, 10  # of webhooks: the last try comes 8 hours after the first
+
+
+@dataclass(frozen=True, slots=True)
+class Delivery:
+    """A webhook that is to be sent now."""
+
+    job_id: str
+    url: str
+    n_tries: int
+
+
+class JobClient:
+    """Jobs in a prepared database.
+
+    Parameters
+    ----------
+    url
+        URL of the database.
+    blobs
+        Files of the jobs.
+    """
+
+    def __init__(self, url: str, blobs: BlobStore) -> None:
+        from dbos import DBOSClient
+
+        self._database = JobDatabase(url, n_connections=N_CONNECTIONS, connect_s=CONNECT_S, options=SESSION_OPTIONS)
+        self._client: Any = DBOSClient(
+            system_database_url=url, application_name=APPLICATION, retry_connection_errors=False, lazy=True
+        )
+        self.blobs = blobs
+        self.table, self._changes = JobTable(self._database), JobChanges(self._database)
+
+    def close(self) -> None:
+        """Close all connections."""
+        self._client.destroy()
+        self._database.close()
+
+    def submit(
+        self, new: NewJob, max_waiting: int | None = None, put_missing: Callable[[], None] = lambda: None
+    ) -> tuple[JobRecord, bool]:
+        """Queue a job; arguments, result and errors as `JobTable.submit`.
+
+        Parameters
+        ----------
+        put_missing
+            Called within the transaction: stores files that another job's deletion has removed meanwhile.
+        """
+
+        def enqueue(change: Transaction, n_waiting: int) -> None:
+            put_missing()
+            options = {
+                "queue_name": TALKER_QUEUE if new.kind == TALKER else JOB_QUEUE,
+                "workflow_name": JOB_WORKFLOW,
+                "workflow_id": new.id,
+                "app_version": APPLICATION_VERSION,
+                "priority": 1 + n_waiting,  # keys take turns: their first jobs, then their second ones
+            }
+            self._client.enqueue_in_transaction(change.connection, options, new.id)
+
+        return self.table.submit(new, enqueue, max_waiting)
+
+    def cancel(self, job_id: str) -> bool:
+        """Cancel an open job, and the segments that only it uses; false if it has ended before."""
+        segments = self.table.own_segments(job_id)
+        if not self._changes.end(job_id, Ending(CANCELLED, error="cancelled")):
+            return False
+        self._changes.forget_inputs(job_id, self.blobs.delete)
+        self._client.cancel_workflows([job_id])
+        for at in range(0, len(segments), JOBS_PER_QUERY):
+            found = [self._active(address) for address in segments[at : at + JOBS_PER_QUERY]]
+            names = [name for part in found for name in part]
+            if names:
+                self._client.cancel_workflows(names)
+        return True
+
+    def delete(self, job_id: str) -> None:
+        """Delete a job with the files that no other job uses; an open one is cancelled first."""
+        self.cancel(job_id)
+        self.table.delete(job_id, self.blobs.delete)
+        self._client.delete_workflows([job_id])
+
+    def remove_unused_files(self, older_than_s: float) -> int:
+        """Remove files that no job has, such as those of requests that were refused; their number.
+
+        Parameters
+        ----------
+        older_than_s
+            Seconds since they were stored.
+        """
+        before, n_removed = time.time() - older_than_s, 0
+
+        def remove(sha256: str) -> None:
+            nonlocal n_removed
+            self.blobs.delete(sha256)
+            n_removed += 1
+
+        old = [sha256 for sha256, stored_s in self.blobs.entries() if stored_s < before]
+        for at in range(0, len(old), FILES_PER_LOOK):
+            self._changes.remove_unused(set(old[at : at + FILES_PER_LOOK]), remove)
+        return n_removed
+
+    def due_webhooks(self, limit: int = 16) -> list[Delivery]:
+        """Webhooks that are to be sent now; no other server gets them for `LEASE_S`."""
+        query = "SELECT id, webhook, webhook_tries, webhook_due FROM tts2face_jobs WHERE webhook_due <="
+        taken = []
+        with self._database.transaction() as look:
+            found = look.rows(f"{query} {self._database.now} ORDER BY webhook_due LIMIT :limit", limit=limit)
+        for job_id, url, n_tries, due in found:
+            with self._database.transaction(is_change=True) as change:
+                if change.run(
+                    f"UPDATE tts2face_jobs SET webhook_due = {self._database.now} + :lease "
+                    "WHERE id = :id AND webhook_due = :due", id=job_id, due=due, lease=LEASE_S,
+                ):  # fmt: skip
+                    taken.append(Delivery(job_id, url, n_tries))
+        return taken
+
+    def note_delivery(self, delivery: Delivery, *, is_delivered: bool) -> None:
+        """Note that a webhook has arrived, or when it is sent again."""
+        n_tries = delivery.n_tries + 1
+        is_last = is_delivered or n_tries >= MAX_TRIES
+        due = "NULL" if is_last else f"{self._database.now} + :pause"
+        state = "delivered" if is_delivered else "failed" if is_last else "waiting"
+        pause = {} if is_last else {"pause": FIRST_PAUSE_S * PAUSE_FACTOR**delivery.n_tries}
+        with self._database.transaction(is_change=True) as change:
+            change.run(
+                f"UPDATE tts2face_jobs SET webhook_due = {due}, webhook_tries = :tries, webhook_state = :state "
+                "WHERE id = :id", id=delivery.job_id, tries=n_tries, state=state, **pause,
+            )  # fmt: skip
+
+    def is_reachable(self) -> bool:
+        """Whether the database answers; raises `DatabaseAwayError` if not."""
+        with self._database.transaction() as look:
+            return bool(look.value("SELECT 1"))
+
+    def _active(self, address: str) -> list[str]:
+        """Names of the jobs of the queue of a segment that have not ended."""
+        found = self._client.list_workflows(
+            workflow_id_prefix=f"{address}.",
+            queue_name=QUEUE,
+            status=sorted(ACTIVE),
+            load_input=False,
+            load_output=False,
+        )
+        return [one.workflow_id for one in found]
+
+
+STATES = {
+    "ENQUEUED": "waiting",
+    "DELAYED": "waiting",
+    "PENDING": "running",
+    "SUCCESS": "done",
+    "ERROR": "failed",
+    "MAX_RECOVERY_ATTEMPTS_EXCEEDED": "failed",
+    "CANCELLED": "cancelled",
+}
+MIN_NAME_CHARACTERS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A segment in the queue.
+
+    Parameters
+    ----------
+    name
+        Content address of the segment, a point, and the number of the try.
+    state
+        waiting, running, done, failed or cancelled.
+    text
+        Words of the segment; empty for silence.
+    worker
+        Place of the worker that runs it or ran it last.
+    """
+
+    name: str
+    state: str
+    priority: int
+    text: str
+    worker: str
+    n_tries: int
+    reason: str
+    created_s: float
+    took_s: float | None
+
+
+def list_jobs(database: str, states: Sequence[str] = (), limit: int | None = None) -> tuple[Job, ...]:
+    """Jobs of a database, the oldest first.
+
+    Raises
+    ------
+    InputError
+        There is no such state.
+    BackendError
+        The database cannot be used.
+    """
+    for state in states:
+        if state not in STATES.values():
+            raise InputError(f"there is no state {state!r}; choose {', '.join(dict.fromkeys(STATES.values()))}")
+    url = _prepared(database)
+    statuses = [status for status, state in STATES.items() if not states or state in states]
+    with open_client(url) as client, Workers(url) as workers:
+        places = workers.alive(within_s=1e9)
+        found = client.list_workflows(name=WORKFLOW, status=statuses, limit=limit)
+        return tuple(_job(one, places) for one in found)
+
+
+def show_job(database: str, name: str) -> tuple[Job, dict[str, Any]]:
+    """A job by the begin of its name, and its segment as JSON; errors as `list_jobs` and `InputError` without one."""
+    url = _prepared(database)
+    with open_client(url) as client, Workers(url) as workers:
+        one = _find(client, name)
+        content = one.input["args"][1] if one.input else {}
+        return _job(one, workers.alive(within_s=1e9)), dict(content)
+
+
+def cancel_jobs(database: str, names: Sequence[str] = ()) -> int:
+    """Cancel waiting and running jobs by name, or all of them; their number."""
+    with open_client(_prepared(database)) as client:
+        chosen = [_find(client, name) for name in names] if names else _of_states(client, ACTIVE, load_input=False)
+        active = [one.workflow_id for one in chosen if one.status in ACTIVE]
+        for at in range(0, len(active), JOBS_PER_QUERY):
+            client.cancel_workflows(active[at : at + JOBS_PER_QUERY], cancel_children=True)
+        return len(active)
+
+
+def retry_jobs(database: str, names: Sequence[str] = (), priority: int | None = None) -> int:
+    """Queue failed and cancelled jobs again by name, or all of them; their number."""
+    ended = frozenset(status for status, state in STATES.items() if state in ("failed", "cancelled"))
+    url = _prepared(database)
+    with open_client(url) as client, Workers(url) as workers:
+        chosen = [_find(client, name) for name in names] if names else _of_states(client, ended)
+        latest = {one.workflow_id.partition(".")[0]: one for one in chosen if one.status in ended}
+        for address, one in latest.items():
+            segment = segment_from_json(one.input["args"][1])
+            enqueue(client, workers, {address: segment}, one.priority if priority is None else priority)
+        return len(latest)
+
+
+def unfinished_segments(database: str) -> frozenset[str]:
+    """Addresses of the segments of waiting and running jobs."""
+    with open_client(_prepared(database)) as client:
+        found = _of_states(client, ACTIVE, load_input=False)
+    return frozenset(one.workflow_id.partition(".")[0] for one in found)
+
+
+def prune_jobs(database: str, older_than_s: float = 0.0, *, dry_run: bool = False) -> int:
+    """Remove jobs that have ended some seconds ago or earlier; their number. Stored segments stay."""
+    url = _prepared(database)
+    removed = 0
+    with open_client(url) as client, Workers(url) as workers:
+        before = datetime.fromtimestamp(workers.now() - older_than_s, UTC).isoformat()
+        while True:
+            ended = client.list_workflows(
+                name=[WORKFLOW, JOB_WORKFLOW],
+                status=sorted(frozenset(STATES) - ACTIVE),
+                completed_before=before,
+                limit=JOBS_PER_QUERY,
+                offset=removed if dry_run else 0,
+                load_input=False,
+                load_output=False,
+            )
+            removed += len(ended)
+            if not ended:
+                break
+            if not dry_run:
+                client.delete_workflows([one.workflow_id for one in ended])
+        if not dry_run:
+            workers.forget_dead()
+    return removed
+
+
+def _prepared(database: str) -> str:
+    url = database_url(database)
+    prepare_database(url)
+    return url
+
+
+def _of_states(client: Any, statuses: frozenset[str], *, load_input: bool = True) -> list[Any]:
+    found: list[Any] = client.list_workflows(
+        name=WORKFLOW, status=sorted(statuses), load_input=load_input, load_output=False
+    )
+    return found
+
+
+def _find(client: Any, name: str) -> Any:
+    if len(name) < MIN_NAME_CHARACTERS:
+        raise InputError(f"the name {name!r} is too short; give at least {MIN_NAME_CHARACTERS} characters of it")
+    found = client.list_workflows(workflow_id_prefix=name, name=WORKFLOW)
+    addresses = {one.workflow_id.partition(".")[0] for one in found}
+    if len(addresses) != 1:
+        raise InputError(f"{len(addresses)} jobs begin with {name!r}; give more of the name that `jobs list` prints")
+    return max(found, key=lambda one: int(one.workflow_id.partition(".")[2] or 0))
+
+
+def _job(one: Any, places: dict[str, str]) -> Job:
+    content = one.input["args"][1] if one.input and len(one.input.get("args", ())) > 1 else {}
+    state = STATES.get(one.status, one.status)
+    took = None if not one.completed_at or not one.dequeued_at else (one.completed_at - one.dequeued_at) / 1000.0
+    return Job(
+        one.workflow_id,
+        state,
+        one.priority or 0,
+        str(content.get("request", {}).get("text", "")),
+        places.get(str(one.executor_id), str(one.executor_id or "")),
+        one.recovery_attempts or 0,
+        failure_reason(one) if state in ("failed", "cancelled") else "",
+        (one.created_at or 0) / 1000.0,
+        took,
+    )

@@ -1,0 +1,147 @@
+"""Connections to the database of jobs: SQLite or PostgreSQL, with transactions whose failures are `BackendError`."""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from lexicon.errors import BackendError
+
+NOW = {"sqlite": "(julianday('now') - 2440587.5) * 86400.0", "postgresql": "EXTRACT(EPOCH FROM clock_timestamp())"}
+CONNECTIONS = {"pool_size": 1, "max_overflow": 2}  # of a process to a table; one of them stays open
+N_CREATE_TRIES, CREATE_PAUSE_S = 5, 0.2  # of tables that another process may be creating
+LOCK_KEY = 5_742_301  # of PostgreSQL's advisory lock for changes of jobs
+# SQLite begins a transaction, and takes its lock for writing, with the first statement that changes something.
+_LOCK = {"sqlite": "DELETE FROM tts2face_jobs WHERE id = ''", "postgresql": f"SELECT pg_advisory_xact_lock({LOCK_KEY})"}
+
+
+class DatabaseAwayError(BackendError):
+    """The database cannot be reached now; another try may succeed."""
+
+
+def database_kind(url: str) -> str:
+    """``sqlite`` or ``postgresql``."""
+    return "sqlite" if url.startswith("sqlite") else "postgresql"
+
+
+def open_engine(
+    url: str, connections: Mapping[str, Any] = CONNECTIONS, *, connect_s: int = 5, options: str = ""
+) -> Any:
+    """Engine of SQLAlchemy for a URL of `tts2face.serving.work.database.database_url`.
+
+    Parameters
+    ----------
+    connections
+        Size of the pool.
+    connect_s
+        Seconds to wait for a connection to PostgreSQL.
+    options
+        Options of PostgreSQL's sessions.
+    """
+    import sqlalchemy
+
+    if database_kind(url) == "sqlite":
+        arguments: dict[str, Any] = {"timeout": 30.0}
+    else:
+        arguments = {"connect_timeout": connect_s} | ({"options": options} if options else {})
+        url = url.replace("postgresql://", "postgresql+psycopg://", 1)
+    return sqlalchemy.create_engine(url, pool_pre_ping=True, connect_args=arguments, **connections)
+
+
+def connection_errors() -> tuple[type[Exception], ...]:
+    """Errors of SQLAlchemy after which another try may succeed."""
+    from sqlalchemy import exc
+
+    return exc.OperationalError, exc.InterfaceError, exc.InternalError, exc.TimeoutError
+
+
+def database_reason(error: Exception, n_characters: int = 200) -> str:
+    """The message of the database's own driver, if an error of SQLAlchemy has one, on one line."""
+    return " ".join(str(getattr(error, "orig", None) or error).split())[:n_characters]
+
+
+class JobDatabase:
+    """Transactions in the tables of jobs."""
+
+    def __init__(self, url: str, *, n_connections: int = 4, connect_s: int = 5, options: str = "") -> None:
+        import sqlalchemy
+
+        self._away = connection_errors()
+        self.kind = database_kind(url)
+        self.now = NOW[self.kind]
+        self._sql = sqlalchemy.text
+        pool = {"pool_size": 1, "max_overflow": n_connections - 1, "pool_timeout": 10}
+        self._engine = open_engine(url, pool, connect_s=connect_s, options=options)
+
+    @contextmanager
+    def transaction(self, *, is_change: bool = False) -> Iterator["Transaction"]:
+        """A transaction; one that changes something waits for the others of all processes.
+
+        Raises
+        ------
+        DatabaseAwayError
+            The database cannot be reached.
+        """
+        try:
+            with self._engine.begin() as connection:
+                transaction = Transaction(connection, self._sql)
+                if is_change:
+                    transaction.run(_LOCK[self.kind])
+                yield transaction
+        except self._away as away:
+            raise DatabaseAwayError(
+                f"the database cannot be reached ({database_reason(away, 160)}); try again"
+            ) from away
+
+    def close(self) -> None:
+        """Close all connections."""
+        self._engine.dispose()
+
+
+class Transaction:
+    """Statements of one transaction."""
+
+    def __init__(self, connection: Any, sql: Any) -> None:
+        self.connection, self._sql = connection, sql
+
+    def run(self, statement: str, **values: Any) -> int:
+        """Execute a statement; the number of rows that it has changed."""
+        return int(self.connection.execute(self._sql(statement), values).rowcount)
+
+    def run_many(self, statement: str, rows: list[dict[str, Any]]) -> None:
+        """Execute a statement for each row."""
+        if rows:
+            self.connection.execute(self._sql(statement), rows)
+
+    def rows(self, statement: str, **values: Any) -> list[Any]:
+        """Rows of a query."""
+        return list(self.connection.execute(self._sql(statement), values))
+
+    def value(self, statement: str, **values: Any) -> Any:
+        """First value of a query; None without a row."""
+        return self.connection.execute(self._sql(statement), values).scalar()
+
+
+def create_tables(database: JobDatabase, statements: Sequence[str]) -> None:
+    """Create tables where they are missing; several processes may do so at once."""
+
+    def create() -> None:
+        with database.transaction() as change:
+            for statement in statements:
+                change.run(statement)
+
+    repeat_creation(create)
+
+
+def repeat_creation(create: Callable[[], None]) -> None:
+    """Call a function that creates tables again if another process was creating them."""
+    import sqlalchemy
+
+    for attempt in range(N_CREATE_TRIES):
+        try:
+            create()
+            return
+        except (sqlalchemy.exc.DBAPIError, BackendError):
+            if attempt == N_CREATE_TRIES - 1:
+                raise
+            time.sleep(CREATE_PAUSE_S)

@@ -1,0 +1,207 @@
+"""The database of jobs: a SQLite file, or PostgreSQL by URL; and the table of the workers that are alive in it."""
+
+import logging
+import sqlite3
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from lexicon.errors import BackendError, InputError
+from tts2face.serving.batch.segment import SEGMENT_FORMAT
+from tts2face.serving.work.connection import (
+    NOW,
+    DatabaseAwayError,
+    JobDatabase,
+    database_kind,
+    database_reason,
+    open_engine,
+    repeat_creation,
+)
+from tts2face.serving.work.table import JobTable
+
+DEFAULT_DATABASE = "tts2face-jobs.sqlite"
+QUEUE = "tts2face-segments"
+APPLICATION = "tts2face"
+APPLICATION_VERSION = f"segments-{SEGMENT_FORMAT}"  # pinned: workers of equal segments share their work
+WORKFLOW = "render_segment"
+WORK = "work"  # call of the process of a worker
+JOB_QUEUE, JOB_WORKFLOW = "tts2face-jobs", "run_job"  # of the service; a job waits for its segments
+TALKER_QUEUE = "tts2face-talkers"  # of jobs that compute for minutes; they never occupy the places of others
+BEAT_S = 1.5  # between two signs of life of a worker
+DEAD_AFTER_S = 6.0  # without a sign of life; with the interval of looking this is below 10 s
+POSTGRES_SCHEMES = ("postgresql://", "postgres://", "postgresql+psycopg://")
+_TABLE = """
+CREATE TABLE IF NOT EXISTS tts2face_workers (
+    executor_id VARCHAR(64) PRIMARY KEY, beat DOUBLE PRECISION NOT NULL, place VARCHAR(200) NOT NULL
+)"""
+_BEAT = """
+INSERT INTO tts2face_workers (executor_id, beat, place) VALUES (:id, {now}, :place)
+ON CONFLICT (executor_id) DO UPDATE SET beat = {now}"""
+
+
+def database_url(where: str | Path) -> str:
+    """URL of a database: PostgreSQL as given, everything else is the path of a SQLite file.
+
+    Raises
+    ------
+    InputError
+        The URL names another kind of database, or the folder of the file does not exist.
+    """
+    text = str(where)
+    if text.startswith(POSTGRES_SCHEMES):
+        return text.replace("postgres://", "postgresql://", 1).replace("postgresql+psycopg://", "postgresql://", 1)
+    path = text.removeprefix("sqlite:///")
+    if "://" in path:
+        raise InputError(f"there is no database {path.split('://')[0]}; give a SQLite file or postgresql://...")
+    if not Path(path).resolve().parent.is_dir():
+        raise InputError(f"there is no folder {Path(path).resolve().parent} for the database; create it first")
+    return f"sqlite:///{Path(path).resolve()}"
+
+
+def prepare_database(url: str) -> None:
+    """Create the tables of jobs and workers where they are missing; SQLite gets a write-ahead log.
+
+    Raises
+    ------
+    BackendError
+        The package dbos is missing, or the database cannot be reached or written.
+    """
+    try:
+        from dbos import DBOS
+    except ImportError as missing:
+        raise BackendError("jobs need the package dbos; pip install 'tts2face[batch]'") from missing
+    import sqlalchemy
+
+    quiet_dbos()
+    try:
+        if url.startswith("sqlite"):
+            with sqlite3.connect(url.removeprefix("sqlite:///"), timeout=30.0) as connection:
+                connection.execute("PRAGMA journal_mode=WAL")
+        DBOS.migrate(url)
+        with Workers(url) as workers:
+            workers.create()
+        jobs = JobDatabase(url)
+        try:
+            JobTable(jobs).create()
+        finally:
+            jobs.close()
+    except (sqlite3.Error, sqlalchemy.exc.SQLAlchemyError, ModuleNotFoundError) as error:
+        reason = database_reason(error)
+        raise DatabaseAwayError(f"cannot use the database {shown_url(url)} ({reason}); check it") from error
+
+
+def quiet_dbos(level: int = logging.ERROR) -> None:
+    """Messages of the engine below a level are not written; it never sends any."""
+    logging.getLogger("dbos").setLevel(level)
+
+
+def shown_url(url: str) -> str:
+    """A URL without its password."""
+    before, at, after = url.rpartition("@")
+    if not at or "://" not in before:
+        return url
+    scheme, _, user = before.partition("://")
+    return f"{scheme}://{user.partition(':')[0]}@{after}"
+
+
+def _waiting_query(kind: str) -> str:
+    """Query for one job of this version that waits in a queue, in the engine's table."""
+    table = "workflow_status" if kind == "sqlite" else "dbos.workflow_status"
+    queues = ", ".join(f"'{name}'" for name in (QUEUE, JOB_QUEUE, TALKER_QUEUE))
+    return (
+        f"SELECT 1 FROM {table} WHERE status = 'ENQUEUED' AND queue_name IN ({queues}) "
+        f"AND application_version = '{APPLICATION_VERSION}' LIMIT 1"
+    )
+
+
+class Workers:
+    """Table of workers with the time of their last sign of life, by the clock of the database."""
+
+    def __init__(self, url: str) -> None:
+        import sqlalchemy
+
+        self._sql = sqlalchemy.text
+        self._now = NOW[database_kind(url)]
+        self._waiting = _waiting_query(database_kind(url))
+        self._database_error = sqlalchemy.exc.SQLAlchemyError
+        self._engine = open_engine(url)
+        self._looking: Any = None
+
+    def __enter__(self) -> "Workers":
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the connections."""
+        if self._looking is not None:
+            self._looking.close()
+        self._engine.dispose()
+
+    def create(self) -> None:
+        """Create the table where it is missing; several processes may do so at once."""
+
+        def create() -> None:
+            with self._engine.begin() as connection:
+                connection.execute(self._sql(_TABLE))
+
+        repeat_creation(create)
+
+    def transaction(self) -> Any:
+        """Context of a transaction in the database; the value is its connection."""
+        return self._engine.begin()
+
+    def now(self) -> float:
+        """Seconds since 1970 by the clock of the database."""
+        with self._engine.begin() as connection:
+            return float(connection.execute(self._sql(f"SELECT {self._now}")).scalar() or 0.0)
+
+    def beat(self, executor_id: str, place: str) -> set[str]:
+        """Note that a worker is alive; the ids of workers without a sign of life."""
+        query = f"SELECT executor_id FROM tts2face_workers WHERE beat <= {self._now} - :age"
+        with self._engine.begin() as connection:
+            connection.execute(self._sql(_BEAT.format(now=self._now)), {"id": executor_id, "place": place[:200]})
+            return {str(row[0]) for row in connection.execute(self._sql(query), {"age": DEAD_AFTER_S})}
+
+    def has_waiting(self) -> bool:
+        """Whether a job waits in a queue; for one thread, which asks often: on a connection that stays open.
+
+        Raises
+        ------
+        DatabaseAwayError
+            The database cannot be reached.
+        """
+        try:
+            if self._looking is None:
+                self._looking = self._engine.connect().execution_options(isolation_level="AUTOCOMMIT")
+            return self._looking.connection.driver_connection.execute(self._waiting).fetchone() is not None
+        except (self._engine.dialect.dbapi.Error, self._database_error) as away:
+            looking, self._looking = self._looking, None
+            if looking is not None:
+                looking.invalidate()
+                looking.close()
+            raise DatabaseAwayError(f"the database cannot be reached ({database_reason(away)}); try again") from away
+
+    def leave(self, executor_id: str) -> None:
+        """Note that a worker ends; the others take its jobs over without waiting."""
+        with self._engine.begin() as connection:
+            query = "UPDATE tts2face_workers SET beat = 0 WHERE executor_id = :id"
+            connection.execute(self._sql(query), {"id": executor_id})
+
+    def alive(self, within_s: float = DEAD_AFTER_S) -> dict[str, str]:
+        """Places of the workers that gave a sign of life within some seconds, by their ids."""
+        query = f"SELECT executor_id, place FROM tts2face_workers WHERE beat > {self._now} - :age"
+        with self._engine.begin() as connection:
+            rows = connection.execute(self._sql(query), {"age": within_s})
+            return {str(row[0]): str(row[1]) for row in rows}
+
+    def forget(self, executor_ids: Iterable[str]) -> None:
+        """Remove workers."""
+        with self._engine.begin() as connection:
+            for one in executor_ids:
+                connection.execute(self._sql("DELETE FROM tts2face_workers WHERE executor_id = :id"), {"id": one})
+
+    def forget_dead(self, older_than_s: float = 3600.0) -> None:
+        """Remove workers without a sign of life for a long time."""
+        query = f"DELETE FROM tts2face_workers WHERE beat < {self._now} - :age"
+        with self._engine.begin() as connection:
+            connection.execute(self._sql(query), {"age": older_than_s})

@@ -1,0 +1,371 @@
+"""Check of an uploaded talker, face, palette, dictionary or character, in a limited process.
+
+What is stored is written here again from what was read, never the bytes of the upload.
+
+The error of a decoding process that refuses its file.
+"""
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lexicon.errors import BackendError, DataError, InputError
+from tts2face.photo.photograph import HEIC_BRANDS
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+    from tts2face.session.session import Session
+
+
+class RefusedFileError(DataError):
+    """The file is not what it should be."""
+
+
+TALKER, FACE, PALETTE, DICTIONARY = "talker", "face", "palette", "dictionary"
+CHARACTER, PHOTO = "character", "photo"  # files that become faces
+RESOURCE_KINDS = (TALKER, FACE, PALETTE, DICTIONARY)
+CONTENT, DESCRIPTION, PICTURE = "content", "description.json", "picture.png"  # files of a checked resource
+MAX_TEXT = 200  # characters of a text of the description
+MAX_ENTRIES = 200  # identities or styles of the description
+PICTURE_SIDE_PX, TILE_SIDE_PX, TILE_COLUMNS, MAX_TILES = 384, 192, 4, 12
+REST_S, STYLE_S = 0.1, 2.0  # of idle motion that is synthesised for a picture
+# CPU seconds: shipped models take 0.03, 0.4 and 0.02. A slower one would hold up the streams of everybody.
+MAX_FRAME_CPU_S, MAX_STYLE_CPU_S, MAX_SPEECH_CPU_S = 1.0, 8.0, 4.0
+# First bytes of files that are sent by mistake, or on purpose.
+FOREIGN = {
+    b"PK\x03\x04": "a zip archive", b"\x80\x02": "a Python pickle", b"\x80\x03": "a Python pickle",
+    b"\x80\x04": "a Python pickle", b"\x80\x05": "a Python pickle", b"\x93NUMPY": "a NumPy array",
+    b"\x1f\x8b": "a gzip file", b"\x89PNG": "a picture", b"\xff\xd8\xff": "a picture", b"%PDF": "a PDF",
+    b"glTF": "a glTF character", b"RIFF": "a sound or video", b"\x1aE\xdf\xa3": "a video",
+}  # fmt: skip
+GLTF_MAGIC = b"glTF"
+PICTURE_MAGIC = (b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"BM", b"II*\x00", b"MM\x00*")
+BOXED_PICTURES = ((0, b"RIFF", b"WEBP"), *((4, b"ftyp", brand) for brand in HEIC_BRANDS))  # offset, box, kind
+N_MAGIC = 12  # bytes by which a picture is told
+STATEMENT = "statement.json"  # beside a photo: name of the face, consent of the person shown, pixels, corrections
+SHOWN, PLACES = "shown.jpg", "places.json"  # files of a photo whose places a person may correct
+SHOWN_PX = 1600  # side of the picture that is shown for it, at most
+
+
+def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> None:
+    """Check a file and write `CONTENT`, `DESCRIPTION` and, unless it is a dictionary, `PICTURE` into a folder.
+
+    Parameters
+    ----------
+    kind
+        One of `RESOURCE_KINDS`. Characters (.glb, .vrm) and photos, which have a file `STATEMENT` beside them, become
+        faces.
+    max_bytes
+        Largest size of the written content.
+
+    Raises
+    ------
+    RefusedFileError
+        The file is of another type, damaged, or does not work.
+    """
+    with source.open("rb") as file:
+        head = file.read(N_MAGIC)
+    if kind == FACE:
+        kind = CHARACTER if head.startswith(GLTF_MAGIC) else PHOTO if is_picture(head) else FACE
+    try:
+        if kind not in {DICTIONARY, CHARACTER, PHOTO}:
+            _check_type(kind, source)
+        _describe(_CHECKS[kind](source, folder / CONTENT), folder)
+        if kind != DICTIONARY:
+            draw_resource(FACE if kind in {CHARACTER, PHOTO} else kind, folder / CONTENT, folder / PICTURE)
+    except (DataError, InputError, BackendError) as error:
+        raise RefusedFileError(_sentence(error, source, folder)) from error
+    except MemoryError as error:
+        raise RefusedFileError("it needs too much memory") from error
+    except (
+        ValueError,
+        TypeError,
+        KeyError,
+        IndexError,
+        ArithmeticError,
+        EOFError,
+    ) as error:  # valid in form, but not usable
+        raise RefusedFileError(f"it is no {kind} that works ({type(error).__name__})") from error
+    if (folder / CONTENT).stat().st_size > max_bytes:
+        raise RefusedFileError(f"it has more than {max_bytes / 1e6:g} MB as a {kind}")
+
+
+def is_picture(head: bytes) -> bool:
+    """Whether the first bytes of a file are those of a picture."""
+    boxed = (head[at : at + 4] == box and head[8:].startswith(kind) for at, box, kind in BOXED_PICTURES)
+    return head.startswith(PICTURE_MAGIC) or any(boxed)
+
+
+def draw_resource(kind: str, source: Path, picture: Path) -> None:
+    """Write the picture of a talker, face or palette that is known to be valid."""
+    _DRAW[kind](source).save(picture, "PNG")
+
+
+def _check_type(kind: str, source: Path) -> None:
+    """Refuse other types of files by their first bytes: model files are safetensors, which hold no code."""
+    with source.open("rb") as file:
+        head = file.read(9)
+    for begin, name in FOREIGN.items():
+        if head.startswith(begin):
+            raise RefusedFileError(f"it is {name}, not a .{kind} file")
+    if len(head) < 9 or head[8:] != b"{" or int.from_bytes(head[:8], "little") > source.stat().st_size:
+        raise RefusedFileError(f"it is not a .{kind} file, or is truncated")
+
+
+def _check_talker(source: Path, out: Path) -> dict[str, Any]:
+    from tts2face.models import talker
+    from tts2face.session.catalogue import describe_talker
+
+    _rewrite(source, out, TALKER, talker.FORMAT_VERSION)
+    found = talker.read_talker(out)
+    if found.appearance is not None and "consent" not in found.metadata:
+        raise DataError("it shows a person's face, but states no consent; build it with --consent")
+    _try_speech(out)
+    return _without_name(asdict(describe_talker(out)))
+
+
+def _try_speech(content: Path) -> None:
+    """Synthesise two sentences with a talker; the first one also compiles kernels."""
+    from tts2face.session.session import Session
+
+    session = Session(str(content), palette=None)
+    session.clip("We were away.", voice="espeak", gestures="none")
+    began = time.process_time()
+    session.clip("Bob may move.", voice="espeak", gestures="none")
+    if time.process_time() - began > MAX_SPEECH_CPU_S:
+        raise RefusedFileError(f"a short sentence takes more than {MAX_SPEECH_CPU_S:g} s to synthesise")
+
+
+def _check_face(source: Path, out: Path) -> dict[str, Any]:
+    from tts2face.models import face_file
+    from tts2face.session.catalogue import describe_face
+
+    _rewrite(source, out, FACE, face_file.FORMAT_VERSION)
+    face = face_file.read_face(out)
+    if face.photograph is not None and "consent" not in face.metadata:
+        raise DataError("it shows a person's photograph, but states no consent; make it with --consent")
+    for identity in describe_face(out).identities:
+        face_file.read_face(out, identity)
+    return _without_name(asdict(describe_face(out))) | {"licence": str(face.metadata.get("licence", "not stated"))}
+
+
+def _check_character(source: Path, out: Path) -> dict[str, Any]:
+    """Make a face of a character whose file holds everything that it needs."""
+    from tts2face.interchange.characters.importing import import_face
+    from tts2face.models.face_file import write_face
+
+    named = source.with_name("character.glb")
+    named.hardlink_to(source)
+    imported = import_face(named)
+    made = out.with_name("imported.face")
+    write_face(made, imported.face)
+    return _check_face(made, out) | {"notes": list(imported.report.notes)}
+
+
+def _check_photo(source: Path, out: Path) -> dict[str, Any]:
+    """Make a face that speaks in a photo."""
+    from lexicon.inputs import parse_json
+    from tts2face.models.face_file import write_face
+    from tts2face.photo.face_from_photo import face_from_photo
+    from tts2face.photo.fit import parse_fit
+
+    notes: list[str] = []
+    stated = read_statement(source)
+    fit = stated.get("fit")
+    given = None if fit is None else parse_fit(parse_json(fit, "the fit"))
+    made = out.with_name("photo.face")
+    face = face_from_photo(source, consent=stated["consent"], name=stated["name"], fit=given, on_warning=notes.append)
+    write_face(made, face)
+    return _check_face(made, out) | {"notes": [note.replace(str(source), "the photo") for note in notes]}
+
+
+def read_statement(photo: Path) -> dict[str, Any]:
+    """What is stated of a photo, whose size is checked.
+
+    Raises
+    ------
+    DataError
+        It has too many pixels.
+    """
+    from lexicon.inputs import read_json
+    from tts2face.photo.photograph import open_photograph
+
+    stated: dict[str, Any] = read_json(photo.with_name(STATEMENT))
+    with open_photograph(photo) as file:
+        if file.width * file.height > stated["max_pixels"]:
+            raise DataError(
+                f"{photo} has {file.width} x {file.height} pixels, more than {stated['max_pixels']}; reduce its size"
+            )
+    return stated
+
+
+def find_places(source: Path, folder: Path) -> None:
+    """Find lips, lids, teeth and pivot in a photo with a `STATEMENT`: write `PLACES`, and the picture as `SHOWN`.
+
+    Raises
+    ------
+    RefusedFileError
+        It is no picture, or shows no face that can be moved.
+    """
+    from PIL import Image
+
+    from tts2face.photo.face_from_photo import places_in_photo
+
+    notes: list[str] = []
+    try:
+        read_statement(source)
+        picture, fit = places_in_photo(source, notes.append)
+    except (DataError, InputError, BackendError) as error:
+        raise RefusedFileError(_sentence(error, source, folder)) from error
+    except MemoryError as error:
+        raise RefusedFileError("it needs too much memory") from error
+    height, width = picture.pixels.shape[:2]
+    places = {
+        "size": [round(width * picture.reduced_by), round(height * picture.reduced_by)], "fit": fit,
+        "notes": [note.replace(str(source), "the photo") for note in notes],
+    }  # fmt: skip
+    (folder / PLACES).write_text(json.dumps(places))
+    shown = Image.fromarray(picture.pixels)
+    shown.thumbnail((SHOWN_PX, SHOWN_PX))
+    shown.save(folder / SHOWN, "JPEG", quality=88)
+
+
+def _check_palette(source: Path, out: Path) -> dict[str, Any]:
+    from tts2face.models import palette
+    from tts2face.session.catalogue import styles
+
+    _rewrite(source, out, PALETTE, palette.FORMAT_VERSION)
+    return {"styles": [{"name": one.name, "summary": one.summary} for one in styles(str(out))]}
+
+
+def _check_dictionary(source: Path, out: Path) -> dict[str, Any]:
+    from lexicon.dictionary import parse_dictionary
+    from lexicon.inputs import read_text
+
+    text = read_text(source)
+    entries = parse_dictionary(text, "the dictionary").entries
+    if not entries:
+        raise DataError("it has no word; write one word and its pronunciation on each line")
+    out.write_text(text, encoding="utf-8")
+    return {"n_words": len(entries)}
+
+
+def _rewrite(source: Path, out: Path, kind: str, version: int) -> None:
+    """Write arrays and metadata again, without links to files of the machine that made them."""
+    from tts2face.interchange.characters.character import KEY
+    from tts2face.models.face_schema import check_face
+    from tts2face.storage.tensors import read_tensors, write_tensors
+
+    arrays, metadata = read_tensors(source, kind, version)
+    if kind == FACE:
+        check_face(source, arrays, metadata)
+        metadata = metadata | {"metadata": {k: v for k, v in metadata["metadata"].items() if k != KEY}}
+    write_tensors(out, kind, version, arrays, metadata, is_packed=kind == FACE)
+
+
+def _draw_talker(content: Path) -> "Image":
+    from tts2face.request import OWN_FACE
+    from tts2face.session.catalogue import describe_talker
+    from tts2face.session.session import Session
+
+    face = OWN_FACE if describe_talker(content).has_own_face else None
+    return _rest_picture(Session(str(content), face, palette=None))
+
+
+def _draw_face(content: Path) -> "Image":
+    from tts2face.session.session import Session
+
+    return _rest_picture(Session(face=str(content), palette=None))
+
+
+def _draw_palette(content: Path) -> "Image":
+    """For each style the head in its typical pose: the frame of idle motion that is nearest to the mean."""
+    import numpy as np
+    from PIL import Image, ImageDraw
+
+    from tts2face.picture.options import Picture
+    from tts2face.session.session import Session
+
+    session = Session(palette=str(content))
+    names = session.palette.names[:MAX_TILES] if session.palette is not None else ()
+    size = Picture(size=f"{TILE_SIDE_PX}x{TILE_SIDE_PX}")
+    rows = -(-len(names) // TILE_COLUMNS)
+    sheet = Image.new("RGB", (TILE_SIDE_PX * min(len(names), TILE_COLUMNS), TILE_SIDE_PX * rows), "white")
+    pen = ImageDraw.Draw(sheet)
+    for number, name in enumerate(names):
+        began = time.process_time()
+        clip = session.clip("", idle=STYLE_S, style=name)
+        if number and time.process_time() - began > MAX_STYLE_CPU_S:  # the first one also compiles kernels
+            raise RefusedFileError(f"{STYLE_S:g} s of a style take more than {MAX_STYLE_CPU_S:g} s to synthesise")
+        values = clip.motion.values
+        typical = int(np.linalg.norm(values - values.mean(axis=0), axis=1).argmin())
+        tile = Image.fromarray(session.renderer(size).frame(clip, typical))
+        place = TILE_SIDE_PX * (number % TILE_COLUMNS), TILE_SIDE_PX * (number // TILE_COLUMNS)
+        sheet.paste(tile, place)
+        pen.text((place[0] + 6, place[1] + 4), name[:24].encode("ascii", "replace").decode(), fill="white")
+    return sheet
+
+
+def _rest_picture(session: "Session") -> "Image":
+    from PIL import Image
+
+    from tts2face.picture.options import Picture
+
+    clip = session.clip("", idle=REST_S, gestures="none")
+    size = Picture(size=f"{PICTURE_SIDE_PX}x{PICTURE_SIDE_PX}")
+    renderer = session.renderer(size, has_gestures=False)
+    renderer.frame(clip, 0)  # compiles kernels
+    began = time.process_time()
+    picture = Image.fromarray(renderer.frame(clip, 1))
+    if time.process_time() - began > MAX_FRAME_CPU_S:
+        raise RefusedFileError(f"a picture of it takes more than {MAX_FRAME_CPU_S:g} s to draw; simplify it")
+    return picture
+
+
+_CHECKS: Mapping[str, Callable[[Path, Path], dict[str, Any]]] = {
+    TALKER: _check_talker,
+    FACE: _check_face,
+    PALETTE: _check_palette,
+    DICTIONARY: _check_dictionary,
+    CHARACTER: _check_character,
+    PHOTO: _check_photo,
+}
+_DRAW: Mapping[str, Callable[[Path], "Image"]] = {TALKER: _draw_talker, FACE: _draw_face, PALETTE: _draw_palette}
+
+
+def _describe(description: dict[str, Any], folder: Path) -> None:
+    text = json.dumps(_bounded(description), ensure_ascii=False)
+    (folder / DESCRIPTION).write_text(text, encoding="utf-8")
+
+
+def _without_name(entry: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in entry.items() if key != "name"}
+
+
+def _bounded(value: Any) -> Any:
+    """JSON with texts and lists of limited length: a file chooses what its description says."""
+    if isinstance(value, str):
+        return value[:MAX_TEXT]
+    if isinstance(value, list | tuple):
+        return [_bounded(item) for item in value[:MAX_ENTRIES]]
+    if isinstance(value, dict):
+        return {str(key)[:MAX_TEXT]: _bounded(item) for key, item in value.items()}
+    return value
+
+
+def _sentence(error: Exception, source: Path, folder: Path) -> str:
+    """The message of an error without paths of this machine."""
+    text = " ".join(str(error).split())
+    for path in (
+        source,
+        folder / CONTENT,
+        source.with_name("character.glb"),
+        folder / "imported.face",
+        folder / "photo.face",
+    ):
+        text = text.replace(f"{path}: ", "").replace(str(path), "it")
+    return text

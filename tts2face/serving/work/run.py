@@ -1,0 +1,300 @@
+"""Execution of jobs of the service by a worker: each ends once, whatever dies meanwhile.
+
+Kinds of jobs: what executes each, with what, and what it returns.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from importlib import import_module
+from pathlib import Path
+from tempfile import gettempdir
+from typing import Any
+
+from lexicon.errors import DataError, Tts2faceError
+from tts2face.serving.batch.engine import Engine, Rendered
+from tts2face.serving.batch.object_store import StoreAwayError
+from tts2face.serving.batch.segment import Segment
+from tts2face.serving.batch.store import Store, wait_for_store
+from tts2face.serving.work.blobs import BlobStore, open_blobs, place_file, place_models
+from tts2face.serving.work.changes import Ending, JobChanges
+from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase, connection_errors
+from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, DatabaseEngine, failure_reason, open_client
+from tts2face.serving.work.table import DONE, FAILED, JobFile, JobRecord
+from tts2face.storage.temporary import Temporary
+
+RUNNERS: Mapping[str, str] = {
+    "clip": "tts2face.serving.work.kinds:run_clip",
+    "subtitles": "tts2face.serving.work.kinds:run_subtitles",
+    "talker": "tts2face.serving.work.kinds:run_talker",
+}  # name of a kind: module and function
+# No HTML: a report that ran as a page of the service could use the key of its reader.
+MEDIA_TYPES = {
+    ".mp4": "video/mp4", ".webm": "video/webm", ".mov": "video/quicktime", ".json": "application/json",
+    ".csv": "text/csv", ".jsonl": "application/jsonl", ".glb": "model/gltf-binary", ".wav": "audio/wav",
+    ".vtt": "text/vtt", ".txt": "text/plain",
+}  # fmt: skip
+
+
+class JobCancelledError(Exception):
+    """The job was cancelled or deleted while it ran."""
+
+
+@dataclass(frozen=True, slots=True)
+class JobTask:
+    """What a function of `RUNNERS` gets.
+
+    Parameters
+    ----------
+    request
+        JSON of the job, as the service has checked it.
+    inputs
+        Files by name.
+    folder
+        Empty folder, which is removed afterwards.
+    engine, store
+        Engine and store of the segments of a batch.
+    report
+        Adds an event to the job; ``done`` and ``of`` are its progress.
+    check
+        Raises `JobCancelledError` if the job is no longer wanted; to be called now and then.
+    database, resources
+        URL of the database, and the files of the uploaded models in the store.
+    """
+
+    request: Mapping[str, Any]
+    inputs: Mapping[str, Path]
+    folder: Path
+    engine: Engine
+    store: Store
+    report: Callable[[dict[str, Any]], None]
+    check: Callable[[], None]
+    database: str = ""
+    resources: Callable[[], BlobStore] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Product:
+    """A file that a job has made; clients see its name."""
+
+    path: Path
+    name: str
+    media_type: str
+
+
+@dataclass(frozen=True, slots=True)
+class Products:
+    """Files that a job has made, and why some are missing."""
+
+    files: tuple[Product, ...]
+    error: str | None = None
+
+
+def find_runner(kind: str) -> Callable[[JobTask], Products]:
+    """Function that executes the jobs of a kind.
+
+    Raises
+    ------
+    DataError
+        This version has no such kind.
+    """
+    if kind not in RUNNERS:
+        raise DataError(f"this worker cannot execute jobs of kind {kind!r}; install the version of the service")
+    module, name = RUNNERS[kind].split(":")
+    runner: Callable[[JobTask], Products] = getattr(import_module(module), name)
+    return runner
+
+
+def media_type(name: str) -> str:
+    """Media type of a file name."""
+    return MEDIA_TYPES.get(Path(name).suffix.lower(), "application/octet-stream")
+
+
+def products_of(paths: Sequence[Path], error: str | None = None) -> Products:
+    """Products with the names of their files."""
+    return Products(tuple(Product(path, path.name, media_type(path.name)) for path in paths), error)
+
+
+BLOBS, RESOURCES = "results", "resources"  # kinds of files in a store: of jobs, and uploaded models
+MODEL_SECTIONS = ("models", "request")  # parts of a job's JSON that may name uploads
+PAUSE_S = 2.0  # before another try while the database or the store cannot be reached
+CHECK_S = 1.0  # between two looks whether a job is still wanted
+REPORT_S = 0.5  # between two notes of its progress
+SMALLEST_PRIORITY, LARGEST_PRIORITY, SEGMENTS_PER_STEP = 10, 100, 20  # small jobs overtake large ones
+
+
+def job_blobs(store: str) -> Callable[[], tuple[BlobStore, ...]]:
+    """Stores of the files of jobs and of uploaded models; opened when they are first needed."""
+    return lru_cache(maxsize=1)(lambda: (open_blobs(store, BLOBS), open_blobs(store, RESOURCES)))
+
+
+class JobRunner:
+    """Executes jobs.
+
+    Parameters
+    ----------
+    url
+        URL of the database.
+    place, store
+        Store of segments, as its name and opened.
+    blobs
+        Stores of files; the first one is that of jobs.
+    """
+
+    def __init__(self, url: str, place: str, store: Store, blobs: Callable[[], tuple[BlobStore, ...]]) -> None:
+        self._url, self._place, self._store, self._blobs = url, place, store, blobs
+
+    def run(self, job_id: str) -> str:
+        """Execute a job unless it has ended; its state afterwards.
+
+        While the database or the store cannot be reached, it is tried again; stored segments are not rendered again.
+        """
+        away: tuple[type[Exception], ...] = (DatabaseAwayError, StoreAwayError, *connection_errors())
+        with self._changes() as changes:
+            while True:
+                try:
+                    job = changes.begin(job_id)
+                    return "ended" if job is None else self._execute(job, changes)
+                except JobCancelledError:
+                    return "cancelled"
+                except away:
+                    time.sleep(PAUSE_S)
+
+    def end_abandoned(self) -> None:
+        """End the jobs whose workflow has ended without them, such as after the deaths of all workers that had them."""
+        with self._changes() as changes, open_client(self._url) as client:
+            names = changes.table.open_jobs()
+            for at in range(0, len(names), JOBS_PER_QUERY):
+                part = names[at : at + JOBS_PER_QUERY]
+                found = {one.workflow_id: one for one in client.list_workflows(workflow_ids=part, load_input=False)}
+                for name in part:
+                    reason = "it was removed from the queue; send it again"
+                    if name in found:
+                        reason = "" if found[name].status in ACTIVE else failure_reason(found[name])
+                    if reason and changes.end(name, Ending(FAILED, error=reason)):
+                        changes.forget_inputs(name, self._blobs()[0].delete)
+
+    @contextmanager
+    def _changes(self) -> Iterator[JobChanges]:
+        database = JobDatabase(self._url, n_connections=2)
+        try:
+            yield JobChanges(database)
+        finally:
+            database.close()
+
+    def _execute(self, job: JobRecord, changes: JobChanges) -> str:
+        watch = _Watch(job.id, changes)
+        scratch = self._store.scratch() or Path(gettempdir())
+        with Temporary(scratch / "job", is_folder=True) as folder:
+            try:
+                inputs = self._inputs(job, folder.path)
+                work = folder.path / "work"
+                work.mkdir()
+                task = JobTask(
+                    self._request(job), inputs, work, self._engine(watch), self._store, watch.report, watch.check,
+                    self._url, lambda: self._blobs()[1],
+                )  # fmt: skip
+                products = find_runner(job.kind)(task)
+                ending = Ending(DONE, self._put(products.files), products.error)
+                paths = {one.name: one.path for one in products.files}
+            except (DatabaseAwayError, StoreAwayError):
+                raise
+            except Tts2faceError as wrong:
+                ending, paths = Ending(FAILED, error=_without_folders(str(wrong), folder.path)), {}
+            self._end(changes, job, ending, paths)
+        return ending.state
+
+    def _engine(self, watch: "_Watch") -> "_JobEngine":
+        return _JobEngine(watch, partial(DatabaseEngine, self._url, self._place, 0))
+
+    def _request(self, job: JobRecord) -> dict[str, Any]:
+        """JSON of a job with the paths of uploaded models on this machine."""
+        found = dict(job.request)
+        for name in MODEL_SECTIONS:
+            if name in found:
+                found[name] = place_models(found[name], self._blobs)
+        if "cast" in found:
+            cast = dict(found["cast"])
+            default, roles = cast.get("default", {}), cast.get("role", [])
+            found["cast"] = {
+                "default": place_models(default, self._blobs),
+                "role": [place_models(one, self._blobs) for one in roles],
+            }
+        return found
+
+    def _inputs(self, job: JobRecord, folder: Path) -> dict[str, Path]:
+        return {one.name: place_file(self._blobs(), one.sha256, one.name, folder / "inputs") for one in job.inputs}
+
+    def _put(self, products: Sequence[Product]) -> tuple[JobFile, ...]:
+        store = self._blobs()[0]
+        return tuple(
+            JobFile(
+                one.name, wait_for_store(partial(store.put, one.path), _ignore), one.media_type, one.path.stat().st_size
+            )
+            for one in products
+        )
+
+    def _end(self, changes: JobChanges, job: JobRecord, ending: Ending, paths: Mapping[str, Path]) -> None:
+        """End a job, whose results are in the store then even if another job's deletion has removed equal ones."""
+        store = self._blobs()[0]
+
+        def put_missing(files: Sequence[JobFile]) -> None:
+            for one in files:
+                if not store.has(one.sha256):
+                    store.put(paths[one.name])
+
+        if not changes.end(job.id, ending, put_missing):
+            changes.remove_unused({one.sha256 for one in ending.outputs}, store.delete)
+        changes.forget_inputs(job.id, store.delete)
+
+
+class _Watch:
+    """Progress of a job, and whether it is still wanted."""
+
+    def __init__(self, job_id: str, changes: JobChanges) -> None:
+        self.job_id, self.changes = job_id, changes
+        self._checked_at = self._reported_at = 0.0
+
+    def check(self) -> None:
+        """Raise `JobCancelledError` if the job has ended or was deleted; looks at most once in `CHECK_S`."""
+        if time.monotonic() - self._checked_at > CHECK_S:
+            self._checked_at = time.monotonic()
+            if not self.changes.is_open(self.job_id):
+                raise JobCancelledError
+
+    def report(self, content: dict[str, Any]) -> None:
+        """Add an event; of progress only some."""
+        is_last = content.get("done") == content.get("of")
+        if "done" in content and not is_last and time.monotonic() - self._reported_at < REPORT_S:
+            return
+        self._reported_at = time.monotonic()
+        if not self.changes.report(self.job_id, content):
+            raise JobCancelledError
+
+
+@dataclass(frozen=True, slots=True)
+class _JobEngine:
+    """Queues the segments of a job for all workers."""
+
+    watch: _Watch
+    make: Callable[..., DatabaseEngine]
+
+    def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
+        """Yield each segment as soon as it is stored or has failed."""
+        self.watch.check()
+        self.watch.changes.note_segments(self.watch.job_id, segments)
+        priority = min(SMALLEST_PRIORITY + len(segments) // SEGMENTS_PER_STEP, LARGEST_PRIORITY)
+        yield from self.make(priority, on_wait=self.watch.check).render(segments, store)
+
+
+def _without_folders(message: str, folder: Path) -> str:
+    """A message without the paths of this machine."""
+    for path in sorted((folder / "inputs").glob("*"), reverse=True):
+        message = message.replace(f"{path}/", "")
+    return message.replace(f"{folder}/", "").replace(str(folder), "the job")
+
+
+def _ignore(_: str) -> None:
+    """Nobody reads these messages."""

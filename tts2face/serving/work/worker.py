@@ -1,0 +1,433 @@
+"""A worker: takes segments and jobs from the queues of a database, and takes over from the dead.
+
+Segments are rendered in a child process. A job of the service plans, queues its segments and waits for them, so that
+all workers share the rendering; the queues have places of their own, so that jobs never block what they wait for.
+
+DBOS keeps the queue. Its open-source package has no fail-over of its own: work of an executor that died waits for an
+executor of the same id. Here every worker has a new id and gives signs of life (`Workers`); with
+each of them it learns which workers have given none for some time, and returns their work to the queue. A worker is
+forgotten only when none of its work is running any more. Now and then each worker also looks at all running work, for
+owners that are not in the table. A segment that two workers take nevertheless is rendered twice and stored once, as its
+name is its content address.
+
+Return of the work of dead workers to the queue, and how often workers look at it.
+
+Rendering of segments from the queue in a child process, which is ended when a segment is cancelled.
+"""
+
+import contextlib
+import logging
+import os
+import random
+import socket
+import threading
+import time
+import uuid
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import gettempdir
+from types import MappingProxyType
+from typing import Any
+
+from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
+from tts2face.processes.child import Call, Handler
+from tts2face.processes.parent import ChildEndedError
+from tts2face.serving.batch.engine import Message, Renders, render_into
+from tts2face.serving.batch.render import RenderProcess
+from tts2face.serving.batch.segment import Segment, SegmentResult, segment_from_json
+from tts2face.serving.batch.store import Store, open_store, wait_for_store
+from tts2face.serving.work.blobs import BlobStore, place_segment_files
+from tts2face.serving.work.connection import DatabaseAwayError, database_reason
+from tts2face.serving.work.database import (
+    APPLICATION,
+    APPLICATION_VERSION,
+    BEAT_S,
+    JOB_QUEUE,
+    JOB_WORKFLOW,
+    QUEUE,
+    TALKER_QUEUE,
+    WORK,
+    WORKFLOW,
+    Workers,
+    database_url,
+    prepare_database,
+    quiet_dbos,
+)
+from tts2face.serving.work.engine import EnginePauses
+from tts2face.serving.work.run import JobRunner, job_blobs
+from tts2face.storage.temporary import Temporary
+
+POLL_S = 0.2  # between two looks at the queue
+MAX_LOOKS_PER_S = 200.0  # of all workers together: with more than 40, each looks less often
+
+
+def poll_interval(n_workers: int) -> float:
+    """Seconds between two looks of a worker at the queue, for a number of workers."""
+    return max(POLL_S, n_workers / MAX_LOOKS_PER_S)
+
+
+def return_work(executor_ids: set[str]) -> set[str]:
+    """Return the running work of executors to the queue; the executors that have none left.
+
+    The engine has no public function that does so safely: `resume_workflows` has no condition on the owner, so that it
+    would take work from a worker that has just taken it over, and it sets the number of tries to zero, so that a
+    segment that ends every worker would never fail (decision 083).
+    """
+    from dbos import DBOS
+
+    names = sorted(executor_ids)
+    DBOS._recover_pending_workflows(names)
+    return executor_ids - {str(one.executor_id) for one in list_running(names)}
+
+
+def list_running(executor_ids: list[str] | None = None) -> list[Any]:
+    """Running jobs of this version, of some executors or all."""
+    from dbos import DBOS
+
+    found: list[Any] = DBOS.list_workflows(
+        status="PENDING",
+        name=[WORKFLOW, JOB_WORKFLOW],
+        app_version=APPLICATION_VERSION,
+        executor_id=executor_ids,
+        load_input=False,
+        load_output=False,
+    )
+    return found
+
+
+def is_cancelled(name: str) -> bool:
+    """Whether a job of the queue was cancelled."""
+    from dbos import DBOS
+
+    found = DBOS.list_workflows(workflow_ids=[name], load_input=False, load_output=False)
+    return any(one.status == "CANCELLED" for one in found)
+
+
+class SegmentFailedError(RuntimeError):
+    """A segment that cannot be rendered; the reason is kept in the database."""
+
+
+class SegmentWorker:
+    """Renders one segment at a time.
+
+    Parameters
+    ----------
+    blobs
+        Stores of the files that segments of jobs name; the first that has a file gives it.
+    renderer
+        What renders; None: a child process.
+    core
+        Core to which the child process is bound; None: all.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        blobs: Callable[[], tuple[BlobStore, ...]],
+        *,
+        renderer: Renders | None = None,
+        core: int | None = None,
+        on_message: Message = lambda _: None,
+    ) -> None:
+        self._store, self._blobs, self._on_message = store, blobs, on_message
+        self._process = RenderProcess(core) if renderer is None else None
+        self._renderer: Renders = renderer or self
+        self._rendering = threading.Lock()  # one segment at a time
+        self._files: Temporary | None = None
+        self._current: str | None = None
+        self._is_cancelled = False
+        self.n_rendered = 0
+
+    def work(self, name: str, address: str, content: dict[str, Any]) -> dict[str, Any]:
+        """Render a segment unless it is stored; after a death it runs again and has no other effect.
+
+        Parameters
+        ----------
+        name
+            Name of the job of the queue.
+
+        Raises
+        ------
+        SegmentFailedError
+            It cannot be rendered.
+        """
+        try:
+            found = wait_for_store(partial(self._store.result, address), self._on_message)
+            if found is not None:
+                return found.as_json()
+            segment = place_segment_files(segment_from_json(content), self._blobs, self._folder)
+            if replace(segment, file_hashes=segment.input_hashes()).address != address:
+                raise DataError(
+                    "a model, voice, file or program version of this machine differs from that of the batch; "
+                    "install and copy the same ones"
+                )
+        except Tts2faceError as wrong:
+            raise SegmentFailedError(str(wrong)) from None
+        with self._rendering:
+            self._current, self._is_cancelled = name, False
+            rendered = render_into(self._store, segment, self._renderer, self._on_message)
+            self._current = None
+        if rendered.result is None:
+            raise SegmentFailedError(rendered.reason)
+        self.n_rendered += 1
+        return rendered.result.as_json()
+
+    def render(self, segment: Segment, out: Path) -> SegmentResult:
+        """Render a segment in the child process; after `end_cancelled` there is no other try.
+
+        Raises
+        ------
+        InputError
+            It was cancelled; or as the child process.
+        """
+        assert self._process is not None
+        try:
+            return self._process.render(segment, out)
+        except ChildEndedError:
+            if self._is_cancelled:
+                raise InputError("cancelled") from None
+            raise
+
+    def end_cancelled(self, is_cancelled: Callable[[str], bool]) -> None:
+        """End the rendering of the present segment if its job was cancelled."""
+        name = self._current
+        if name is None or self._process is None or not is_cancelled(name):
+            return
+        self._is_cancelled = True
+        if name == self._current:
+            self._process.kill()
+
+    def close(self) -> None:
+        """End the child process."""
+        if self._process is not None:
+            self._process.close()
+        if self._files is not None:
+            self._files.remove()
+
+    def _folder(self) -> Path:
+        """Folder of the files of jobs on this machine, removed by a later worker if this one is killed."""
+        if self._files is None:
+            folder = self._store.scratch() or Path(gettempdir())
+            self._files = Temporary(folder / "inputs", is_folder=True)
+        return self._files.path
+
+
+MAX_DEATHS = 8  # of workers that had the same segment; then it counts as failed
+ALL_WORK_S = 60.0  # between two looks at all running work
+MAX_JOB_DEATHS = 30  # of workers that executed the same job of the service, which lasts longer than a segment
+N_TAKEN = 2  # segments that a worker holds: one is rendered, one waits, so that no time is lost between them
+N_JOBS = 4  # of the service, which mostly wait for their segments; they never occupy the places of segments
+N_TALKERS = 1  # built at a time: each takes a core and 1 GB
+# Connections of a worker to the database: two stay open, besides that of its signs of life.
+CONNECTIONS = {"pool_size": 2, "max_overflow": 3}
+
+
+class Worker:
+    """A worker of a database.
+
+    Parameters
+    ----------
+    database
+        SQLite file or PostgreSQL URL.
+    store
+        Store of the segments: a folder or a URL.
+    renderer
+        What renders; None: a child process.
+    core
+        Core to which the child process is bound; None: all.
+
+    Raises
+    ------
+    InputError, BackendError
+        The database or store cannot be used.
+    """
+
+    def __init__(
+        self,
+        database: str,
+        store: str,
+        *,
+        renderer: Renders | None = None,
+        core: int | None = None,
+        on_message: Message = lambda _: None,
+    ) -> None:
+        self._url = database_url(database)
+        self._store: Store = open_store(store)
+        blobs = job_blobs(store)
+        self._segments = SegmentWorker(self._store, blobs, renderer=renderer, core=core, on_message=on_message)
+        self._jobs = JobRunner(self._url, store, self._store, blobs)
+        self._on_message = on_message
+        self.executor_id = f"{uuid.uuid4().hex[:20]}"
+        self._place = f"{socket.gethostname()}, process {os.getpid()}"
+        self._stopped = threading.Event()
+        self._pauses = EnginePauses()
+        self._look_s = poll_interval(1)
+        self._vanished: set[str] = set()
+        self._next_all_work_s = 0.0
+        self._noting = threading.Lock()
+        self._is_reached, self._reached_s = True, 0.0
+
+    @property
+    def n_rendered(self) -> int:
+        """Number of segments rendered so far."""
+        return self._segments.n_rendered
+
+    def run(self, until: Callable[[], bool] = lambda: False) -> None:
+        """Work until `until` returns true, or `stop` is called."""
+        self._store.check()
+        prepare_database(self._url)
+        from dbos import DBOS
+
+        engine = DBOS(
+            config={
+                "name": APPLICATION,
+                "system_database_url": self._url,
+                "application_version": APPLICATION_VERSION,
+                "executor_id": self.executor_id,
+                "log_level": "ERROR",
+                "enable_otlp": False,
+                "max_executor_threads": N_TAKEN + N_JOBS + N_TALKERS + 2,
+                "run_migrations": False,
+                "use_listen_notify": False,  # a connection that nothing here needs
+                "db_engine_kwargs": dict(CONNECTIONS),
+            }
+        )
+
+        @DBOS.workflow(name=WORKFLOW, max_recovery_attempts=MAX_DEATHS)
+        def render_segment(address: str, content: dict[str, Any]) -> dict[str, Any]:
+            with self._pauses.busy():
+                return self._segments.work(str(DBOS.workflow_id), address, content)
+
+        @DBOS.workflow(name=JOB_WORKFLOW, max_recovery_attempts=MAX_JOB_DEATHS)
+        def run_job(job_id: str) -> str:
+            with self._pauses.busy():
+                return self._jobs.run(job_id)
+
+        with Workers(self._url) as workers:
+            self._launch(workers)
+            self._pauses.install(engine)
+            beats = threading.Thread(target=self._beat, args=(workers,), name="beat", daemon=True)
+            beats.start()
+            try:
+                while not self._stopped.wait(BEAT_S) and not until():
+                    self._take_over(workers)
+            finally:
+                self._stopped.set()
+                beats.join(2 * BEAT_S)
+                self._segments.close()
+                self._pauses.wake()
+                DBOS.destroy(workflow_completion_timeout_sec=0)
+                with contextlib.suppress(Exception):
+                    workers.leave(self.executor_id)
+
+    def _launch(self, workers: Workers) -> None:
+        import sqlalchemy
+        from dbos import DBOS
+        from dbos import error as dbos_error
+
+        quiet_dbos(logging.CRITICAL)  # a failure is raised, or kept in the database with its reason
+        try:
+            workers.beat(self.executor_id, self._place)
+            DBOS.launch()
+            self._look_s = poll_interval(len(workers.alive()))
+            for queue, n_places in ((QUEUE, N_TAKEN), (JOB_QUEUE, N_JOBS), (TALKER_QUEUE, N_TALKERS)):
+                DBOS.register_queue(queue, worker_concurrency=n_places, polling_interval_sec=self._look_s)
+        except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException) as away:
+            raise BackendError(f"the worker cannot start: {database_reason(away)}; check the database") from away
+
+    def stop(self) -> None:
+        """End `run` soon; a segment in work is taken over by other workers."""
+        self._stopped.set()
+
+    def _beat(self, workers: Workers) -> None:
+        """Give signs of life and look for work, also while the database is away for a time."""
+        import sqlalchemy
+
+        next_beat_s = time.monotonic() + BEAT_S
+        while not self._stopped.wait(self._look_s if self._is_reached else BEAT_S):
+            began_s = time.monotonic()
+            try:
+                if not self._pauses.is_awake and workers.has_waiting():
+                    self._pauses.wake()
+                if began_s >= next_beat_s:
+                    next_beat_s = began_s + BEAT_S
+                    self._vanished = workers.beat(self.executor_id, self._place)
+            except (sqlalchemy.exc.SQLAlchemyError, DatabaseAwayError) as away:
+                self._note_database(away, began_s)
+            else:
+                self._note_database(None, began_s)
+
+    def _take_over(self, workers: Workers) -> None:
+        """Return the work of workers without a sign of life to the queue; called again and again."""
+        import sqlalchemy
+        from dbos import error as dbos_error
+
+        began_s = time.monotonic()
+        try:
+            dead = set(self._vanished)
+            self._segments.end_cancelled(is_cancelled)
+            if began_s >= self._next_all_work_s:
+                dead |= self._look_at_all_work(workers)
+                self._jobs.end_abandoned()
+                self._next_all_work_s = began_s + ALL_WORK_S * random.uniform(0.5, 1.5)
+            dead.discard(self.executor_id)
+            if dead:
+                ended = return_work(dead)
+                workers.forget(ended)
+                self._vanished -= ended
+                if ended:
+                    self._on_message(f"took over from {len(ended)} workers without a sign of life")
+        except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException, DatabaseAwayError) as away:
+            self._note_database(away, began_s)
+
+    def _note_database(self, away: Exception | None, began_s: float) -> None:
+        """Say once that the database cannot be reached, and once that it can be reached again.
+
+        A failure of what began before the database was last reached is older news.
+        """
+        with self._noting:
+            if away is None:
+                self._reached_s = time.monotonic()
+            elif began_s < self._reached_s:
+                return
+            if (away is None) != self._is_reached:
+                self._is_reached = away is None
+                self._on_message(
+                    "the database can be reached again"
+                    if away is None
+                    else f"the database cannot be reached ({type(away).__name__}); trying again"
+                )
+
+    def _look_at_all_work(self, workers: Workers) -> set[str]:
+        """Owners of running work that give no sign of life; the interval of the queue follows the number of workers."""
+        from dbos import DBOS
+
+        alive = set(workers.alive())
+        wanted = self._look_s = poll_interval(len(alive))
+        for name in (QUEUE, JOB_QUEUE, TALKER_QUEUE):
+            queue = DBOS.retrieve_queue(name)
+            if queue is not None and not 0.8 < wanted / queue.polling_interval_sec < 1.25:
+                queue.set_polling_interval_sec(wanted)
+        return {str(one.executor_id) for one in list_running() if one.executor_id} - alive
+
+
+def work(call: Call) -> dict[str, Any]:
+    """Work on a ``database`` and a ``store`` with a renderer on a ``core``; events are lines of messages.
+
+    Raises
+    ------
+    InputError, BackendError
+        As `Worker`.
+    """
+    order = call.content
+
+    def send(text: str) -> None:
+        call.event({"line": f"{time.strftime('%H:%M:%S')} {text}"})
+
+    Worker(order["database"], order["store"], core=order["core"], on_message=send).run()
+    return {}
+
+
+HANDLERS: Mapping[str, Handler] = MappingProxyType({WORK: work})

@@ -1,0 +1,1 @@
+"""From a request to a clip: text, recordings and performances, in pieces."""

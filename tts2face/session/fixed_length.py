@@ -1,0 +1,155 @@
+"""Clips of a given number of frames, from rest to rest, which can be joined in any order."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.marked_text import MAX_PAUSE_S, PauseMark
+from lexicon.sequence import PhoneSequence
+from tts2face.numeric.arrays import smoothstep
+from tts2face.request import IDLE_LIMITS_S, Request
+from tts2face.session.prepared import PreparedRequest, prepare
+from tts2face.session.speech_stream import Piece
+from tts2face.types import Clip, Speech, Waveform, first_sample
+
+EASE_S = 0.25  # from and to rest; a head turns back within a quarter of a second
+MARGIN_FRAMES = 0.25  # by which a padded sound ends before its last frame does, so that rounding adds no frame
+MIN_PHONE_S = 0.005  # shorter rests of a phone that is cut are dropped
+Stream = Callable[[PreparedRequest], Iterator[Piece]]
+
+
+@dataclass(frozen=True, slots=True)
+class Length:
+    """Length of a clip in frames, and the share of its channels that are eased: all, or those from `first_channel`."""
+
+    n_frames: int
+    first_channel: int = 0
+
+
+def clips_of_length(
+    prepared: PreparedRequest, sound_end: float | None, length: Length, stream: Stream
+) -> Iterator[Clip]:
+    """Yield the clip of a request in pieces with `length.n_frames` frames in total.
+
+    Idle animation follows the speech up to the end; speech beyond the end is cut. Head and face are at rest in the
+    first and last frame, so that clips can be joined.
+
+    Parameters
+    ----------
+    sound_end
+        Seconds of the clip at which the sound of its text ends; None for a recording or idle animation.
+    stream
+        Function that synthesises a prepared request, as `Session.stream`.
+    """
+    fps, left = prepared.fps, length.n_frames
+    done, rate = 0, 0
+    speech = prepared if sound_end is None else _with_pause(prepared, sound_end, left)
+    clips: Iterator[Clip] = (piece.clip for piece in stream(speech))
+    n_speech = left if sound_end is None else min(left, _frames_with_pause(sound_end, left, fps))
+    if prepared.request.audio is not None:
+        recorded = list(clips)
+        clips, n_speech = iter(recorded), min(left, sum(len(clip.motion) for clip in recorded))
+    for clip in _eased(clips, n_speech, length.first_channel):
+        rate = clip.speech.waveform.rate
+        done += len(clip.motion)
+        yield clip
+    while done < length.n_frames:
+        n_idle = min(length.n_frames - done, int(IDLE_LIMITS_S[1] * fps))
+        if n_idle < IDLE_LIMITS_S[0] * fps:
+            yield _resting(clip, n_idle, done, fps)
+            return
+        request = replace(_idle_request(prepared.request), idle=float(n_idle / fps), seed=prepared.request.seed + done)
+        for idle in _eased((piece.clip for piece in stream(prepare(request))), n_idle, length.first_channel):
+            yield _with_silence(idle, rate, done, fps)
+            done += len(idle.motion)
+
+
+def first_frames(clip: Clip, n_frames: int) -> Clip:
+    """The first frames of a clip, with the phones and whole words that they contain."""
+    if n_frames >= len(clip.motion):
+        return clip
+    fps, sound = clip.fps, clip.speech.waveform
+    n_samples = min(round(n_frames / fps * sound.rate), len(sound.samples))
+    seconds, phones = n_samples / sound.rate, clip.speech.phones
+    n_phones = max(int(np.searchsorted(phones.edges[:-1], seconds - MIN_PHONE_S)), 1)
+    labels = [*phones.phones[:n_phones]]
+    speech = Speech(
+        sound.part(0, n_samples),
+        PhoneSequence(labels, [*phones.edges[:n_phones], seconds]),
+        tuple(word for word in clip.speech.words if word.last <= n_phones),
+    )
+    return Clip(clip.motion.part(0, n_frames), clip.head.part(0, n_frames), speech)
+
+
+def ease_weights(n_frames: int, fps: float) -> NDArray[np.float32]:
+    """(n_frames,) weights that rise from 0 at the first frame and fall to 0 at the last one within `EASE_S`."""
+    n_ease = max(1, min(round(EASE_S * fps), (n_frames - 1) // 2)) if n_frames > 1 else 1
+    to_edge = np.minimum(np.arange(n_frames), np.arange(n_frames)[::-1])
+    return smoothstep(to_edge / n_ease).astype(np.float32)
+
+
+def _eased(clips: Iterator[Clip], n_frames: int, first_channel: int) -> Iterator[Clip]:
+    """Clips cut to `n_frames` in total, with head and face at rest in the first and last frame."""
+    at = 0
+    weights: NDArray[np.float32] | None = None
+    for whole in clips:
+        if at >= n_frames:
+            return
+        clip = first_frames(whole, n_frames - at)
+        weights = ease_weights(n_frames, clip.fps) if weights is None else weights
+        part = weights[at : at + len(clip.motion), None]
+        at += len(clip.motion)
+        values = clip.motion.values.copy()
+        values[:, first_channel:] *= part
+        yield replace(
+            clip,
+            motion=replace(clip.motion, values=values),
+            head=replace(clip.head, values=clip.head.values * part),
+        )
+
+
+def _with_pause(prepared: PreparedRequest, sound_end: float, n_frames: int) -> PreparedRequest:
+    """The request with a pause at its end, as long as the clip or as a pause may be."""
+    pause = _pause(sound_end, n_frames, prepared.fps)
+    if pause <= 0.0:
+        return prepared
+    text = prepared.text
+    return replace(prepared, text=replace(text, marks=(*text.marks, PauseMark(len(text.text), pause))))
+
+
+def _pause(sound_end: float, n_frames: int, fps: Fraction) -> float:
+    return min(float((n_frames - MARGIN_FRAMES) / fps) - sound_end, MAX_PAUSE_S)
+
+
+def _frames_with_pause(sound_end: float, n_frames: int, fps: Fraction) -> int:
+    pause = max(_pause(sound_end, n_frames, fps), 0.0)
+    return int(np.ceil((sound_end + pause) * float(fps) - 0.01))
+
+
+def _idle_request(request: Request) -> Request:
+    """The request without its speech."""
+    return replace(
+        request, text="", audio=None, audio_map=None, voice=None, rate=1.0, volume=1.0, expression=None, timeline=None
+    )
+
+
+def _with_silence(clip: Clip, rate: int, first: int, fps: Fraction) -> Clip:
+    """A silent clip with another sample rate; `first` is its first frame in the whole clip."""
+    return replace(clip, speech=_silence(len(clip.motion), rate, first, fps))
+
+
+def _resting(like: Clip, n_frames: int, first: int, fps: Fraction) -> Clip:
+    """Some frames in which the face keeps its last position."""
+    return Clip(
+        replace(like.motion, values=np.repeat(like.motion.values[-1:], n_frames, axis=0)),
+        replace(like.head, values=np.repeat(like.head.values[-1:], n_frames, axis=0)),
+        _silence(n_frames, like.speech.waveform.rate, first, fps),
+    )
+
+
+def _silence(n_frames: int, rate: int, first: int, fps: Fraction) -> Speech:
+    n_samples = first_sample(first + n_frames, rate, fps) - first_sample(first, rate, fps)
+    return Speech.without_phones(Waveform(np.zeros(n_samples, np.float32), rate))

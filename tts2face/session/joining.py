@@ -1,0 +1,216 @@
+"""Concatenation of utterances with pauses between them, exact to the sample.
+
+Times of the letters of a text, from the times of its spoken words.
+"""
+
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.normalize import canonical_text
+from lexicon.pronounce import spoken_form
+from lexicon.sentences import n_letters, text_prefix
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.sound.alignment import enforce_increasing
+from tts2face.types import Speech, Waveform, concatenate_speech
+
+CUT_SILENCE_S = 0.05  # after a phrase within a sentence; with the silence before the next one a pause as at a comma
+AUDIBLE_SHARE = 0.01  # of the largest amplitude
+FADE_S = 0.005  # linear fade at each cut, which avoids clicks
+
+
+def join_utterances(speeches: Sequence[Speech], gaps: Sequence[float]) -> tuple[Speech, list[float]]:
+    """Concatenate utterances with given pauses.
+
+    Parameters
+    ----------
+    speeches
+        N utterances at one sample rate.
+    gaps
+        N - 1 pauses in seconds; silences at the ends of the utterances count as part of them.
+
+    Returns
+    -------
+    speech
+        The utterances in sequence.
+    begins
+        N offsets in seconds from times of the utterances to times of the whole.
+    """
+    parts: list[Speech] = []
+    begins: list[float] = []
+    at = 0.0
+    for number, speech in enumerate(speeches):
+        before = gaps[number - 1] if number > 0 else math.inf
+        behind = gaps[number] if number < len(gaps) else math.inf
+        short, cut = trim_silence(speech, before=before / 2, behind=behind / 2)
+        if parts:
+            missing = before - _silence_at_ends(parts[-1])[1] - _silence_at_ends(short)[0]
+            if round(missing * speech.waveform.rate) > 0:
+                parts.append(silent_speech(missing, speech.waveform.rate))
+                at += parts[-1].waveform.duration
+        parts.append(short)
+        begins.append(at - cut)
+        at += short.waveform.duration
+    return (concatenate_speech(parts) if len(parts) > 1 else parts[0]), begins
+
+
+def trim_silence(speech: Speech, *, before: float, behind: float) -> tuple[Speech, float]:
+    """Limit the silence at the start and end of speech to `before` and `behind` seconds.
+
+    Returns
+    -------
+    speech
+        The trimmed speech.
+    cut
+        Seconds removed from the start.
+    """
+    sound, phones = speech.waveform, speech.phones
+    lead, trail = _silence_at_ends(speech)
+    begin = round(max(lead - before, 0.0) * sound.rate)
+    end = len(sound.samples) - round(max(trail - behind, 0.0) * sound.rate)
+    if (begin, end) == (0, len(sound.samples)):
+        return speech, 0.0
+    samples = sound.samples[begin:end] * _fade_gains(end - begin, sound.rate, begin > 0, end < len(sound.samples))
+    edges = phones.edges - begin / sound.rate
+    edges[0], edges[-1] = 0.0, len(samples) / sound.rate
+    return Speech(Waveform(samples, sound.rate), PhoneSequence(phones.phones, edges), speech.words), begin / sound.rate
+
+
+def trim_end(speech: Speech) -> Speech:
+    """Speech with at most `CUT_SILENCE_S` of silence after its last audible sample, whatever its phones."""
+    sound, phones = speech.waveform, speech.phones
+    level = np.abs(sound.samples)
+    audible = np.flatnonzero(level > AUDIBLE_SHARE * level.max(initial=0.0))
+    end = int(audible[-1]) + 1 + round(CUT_SILENCE_S * sound.rate) if len(audible) else len(level)
+    if end >= len(level):
+        return speech
+    short = Waveform(sound.samples[:end] * _fade_gains(end, sound.rate, False, True), sound.rate)
+    edges = enforce_increasing(np.minimum(phones.edges, short.duration))
+    return Speech(short, PhoneSequence(phones.phones, edges), speech.words)
+
+
+def silent_speech(seconds: float, rate: int) -> Speech:
+    """Speech that consists of silence, of at least one sample."""
+    n_samples = max(round(seconds * rate), 1)
+    return Speech.without_phones(Waveform(np.zeros(n_samples, np.float32), rate))
+
+
+def resampled_speech(speech: Speech, rate: int) -> Speech:
+    """Resample speech to `rate` Hz; all phone edges but the last, the duration of the sound, are unchanged."""
+    if speech.waveform.rate == rate:
+        return speech
+    sound = speech.waveform.resampled(rate)
+    edges = speech.phones.edges.copy()
+    edges[-1] = sound.duration
+    return Speech(sound, PhoneSequence(speech.phones.phones, edges), speech.words)
+
+
+def _silence_at_ends(speech: Speech) -> tuple[float, float]:
+    """Seconds of silence at the start and at the end."""
+    labels, edges = speech.phones.phones, speech.phones.edges
+    lead = float(edges[1]) if labels[0] == SILENCE else 0.0
+    return lead, float(edges[-1] - edges[-2]) if labels[-1] == SILENCE else 0.0
+
+
+def _fade_gains(n_samples: int, rate: int, begins: bool, ends: bool) -> NDArray[np.float32]:
+    ramp = np.linspace(0.0, 1.0, min(round(FADE_S * rate), n_samples // 2), endpoint=False, dtype=np.float32)
+    gain = np.ones(n_samples, np.float32)
+    if begins:
+        gain[: len(ramp)] = ramp
+    if ends:
+        gain[n_samples - len(ramp) :] = ramp[::-1]
+    return gain
+
+
+class WordTimes:
+    """Times of the letters of a text, from the onsets and ends of its spoken words.
+
+    The words before a letter are counted in the normalised text. If a voice divides the text into another number of
+    words, the letter is assigned to the word boundary whose share of preceding letters is most similar.
+
+    Parameters
+    ----------
+    written
+        The text as written.
+    phones, words
+        Spoken phones and words of the text.
+    language
+        espeak-ng code.
+    first
+        Index of the text's first letter.
+    """
+
+    def __init__(
+        self, written: str, phones: PhoneSequence, words: Sequence[WordSpan], *, language: str, first: int = 0
+    ) -> None:
+        self._written, self._language, self._first = written, language, first
+        self._n_letters = max(n_letters(written), 1)
+        self._onsets = [float(phones.edges[word.first]) for word in words] or [phones.start]
+        self._ends = [float(phones.edges[word.last]) for word in words] or [phones.end]
+        self._counts_agree = self._count_words(written) == len(self._onsets)
+        lengths = [max(n_letters(word.text), 1) for word in words] or [1]
+        self._cache: dict[int, int] = {}
+        self._shares = np.concatenate([[0.0], np.cumsum(lengths) / sum(lengths)])
+
+    def onset(self, letter: int) -> float:
+        """Start in seconds of the word at or after a letter; after the last word, the end of that word."""
+        word = self._words_before(letter)
+        return self._onsets[word] if word < len(self._onsets) else self._ends[-1]
+
+    def end(self, letter: int) -> float:
+        """End in seconds of the word before a letter; before the first word, the onset of that word."""
+        word = self._words_before(letter)
+        return self._ends[word - 1] if word > 0 else self._onsets[0]
+
+    def _words_before(self, letter: int) -> int:
+        if letter not in self._cache:
+            self._cache[letter] = self._search_word(min(max(letter - self._first, 0), self._n_letters))
+        return self._cache[letter]
+
+    def _search_word(self, at: int) -> int:
+        if not self._counts_agree:
+            return int(np.abs(self._shares - at / self._n_letters).argmin())
+        before = text_prefix(self._written, at).rstrip()
+        rest = self._written[len(before) :]
+        is_inside = before[-1:].isalnum() and rest[:1].isalnum()
+        return min(self._count_words(before) - is_inside, len(self._onsets))
+
+    def _count_words(self, written: str) -> int:
+        normalised = spoken_form(written, self._language)
+        if not self._language.startswith("en"):
+            normalised = canonical_text(normalised, keep_marks=True)
+        return sum(any(letter.isalnum() for letter in word) for word in normalised.split())
+
+
+class LetterTimes(Protocol):
+    """Times in seconds of the words around a letter, which is given by its index."""
+
+    def onset(self, letter: int) -> float:
+        """Start of the word at or after a letter."""
+
+    def end(self, letter: int) -> float:
+        """End of the word before a letter."""
+
+
+@dataclass(frozen=True, slots=True)
+class SentenceTimes:
+    """Times of the letters of several utterances: index of the first letter, word times and start of each."""
+
+    firsts: tuple[int, ...]
+    word_times: tuple[WordTimes, ...]
+    begins: tuple[float, ...]
+
+    def onset(self, letter: int) -> float:
+        """Start in seconds of the word at or after a letter."""
+        at = max(bisect_right(self.firsts, letter) - 1, 0)
+        return self.begins[at] + self.word_times[at].onset(letter)
+
+    def end(self, letter: int) -> float:
+        """End in seconds of the word before a letter."""
+        at = max(bisect_left(self.firsts, letter) - 1, 0)
+        return self.begins[at] + self.word_times[at].end(letter)

@@ -1,0 +1,283 @@
+"""Live facial capture: a performer before a camera animates a face, after some seconds of calibration.
+
+Lip motion of speech that is still being spoken, from its sound alone.
+
+Speech that is extended sentence by sentence while it plays, with idle motion between: one continuous clip.
+"""
+
+import threading
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from tts2face.lips.performer import PerformerRetargeter, build_performer_retargeter
+from tts2face.models.face import Face
+from tts2face.models.talker import speech_channels
+from tts2face.request import Request
+from tts2face.session.models import SessionModels
+from tts2face.session.pieces import pieces_from
+from tts2face.session.prepared import prepare
+from tts2face.session.recording import select_audio_map
+from tts2face.session.speech_stream import Piece
+from tts2face.sound.features import FEATURE_RATE
+from tts2face.sound.listener import StreamingAudioMap
+from tts2face.types import Trajectory, exact_rate
+from tts2face.video.media import TimedFrame
+from tts2face.video.pose import head_angles, remove_pose
+from tts2face.video.take import BLENDSHAPES, BlendshapeReader
+from tts2face.video.tracking import FaceTracker
+
+CALIBRATION_S = 5.0  # long enough for the lips to close and open and the eyes to blink
+MIN_CALIBRATION_FRAMES = 40  # frames with a face
+SCALE_WINDOW_S = 2.0  # window over which the size of the face is averaged
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LivePose:
+    """One frame of captured motion: shape weights (K,) and head pose (6,) as `HEAD_CHANNELS`."""
+
+    weights: NDArray[np.float32]
+    head: NDArray[np.float32]
+
+
+def track_poses(
+    pictures: Iterable[TimedFrame], face: Face, tracker: FaceTracker, reader: BlendshapeReader, fps: float
+) -> Iterator[LivePose | None]:
+    """Yield a pose for each picture as it arrives; None during calibration and for pictures without a face.
+
+    Parameters
+    ----------
+    fps
+        Approximate rate of the pictures in Hz.
+
+    Raises
+    ------
+    DataError
+        The face lacks landmarks or shapes.
+    """
+    calibrator, calibration = _Calibrator(), None
+    recent: deque[NDArray[np.float32]] = deque(maxlen=max(2, round(SCALE_WINDOW_S * fps)))
+    waiting: deque[TimedFrame] = deque()
+    for (points, _), _ in tracker.follow(_queue_frames(pictures, waiting)):
+        time = waiting.popleft().time
+        if not np.isfinite(points[0, 0]):
+            yield None
+            continue
+        recent.append(points)
+        scores = reader.blendshape_scores(points)
+        if calibration is None:
+            calibrator.add(time, points, scores)
+            calibration = calibrator.finish(face, fps)
+            yield None
+        else:
+            yield calibration.pose(np.array(recent), scores, fps)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Calibration:
+    """A calibrated performer: the retargeter from performer to face, and the median head pose (6,)."""
+
+    retargeter: PerformerRetargeter
+    head: NDArray[np.float64]
+
+    def pose(self, recent: NDArray[np.float32], scores: NDArray[np.float32], fps: float) -> LivePose:
+        """Pose of the last frame of recent landmarks (T, 478, 3) in pixels, with its blendshape scores (52,)."""
+        posed = remove_pose(recent, fps)
+        now = Trajectory(BLENDSHAPES, scores[None], fps)
+        weights = self.retargeter.weights(posed.landmarks[-1:], now).values[0]
+        head = np.concatenate([head_angles(posed.rotations[-1:])[0], posed.translations[-1]]) - self.head
+        head[5] = 0.0  # the distance is relative to the recent frames and drifts over longer times
+        return LivePose(weights, head.astype(np.float32))
+
+
+class _Calibrator:
+    """Collects the frames of the first seconds."""
+
+    def __init__(self) -> None:
+        self._times: list[float] = []
+        self._points: list[NDArray[np.float32]] = []
+        self._scores: list[NDArray[np.float32]] = []
+
+    def add(self, time: float, points: NDArray[np.float32], scores: NDArray[np.float32]) -> None:
+        """Add one frame: time in seconds, landmarks (478, 3) in pixels, blendshape scores (52,)."""
+        self._times.append(time)
+        self._points.append(points)
+        self._scores.append(scores)
+
+    def finish(self, face: Face, fps: float) -> _Calibration | None:
+        """The calibration; None until `CALIBRATION_S` and `MIN_CALIBRATION_FRAMES` are reached."""
+        if len(self._times) < MIN_CALIBRATION_FRAMES or self._times[-1] - self._times[0] < CALIBRATION_S:
+            return None
+        posed = remove_pose(np.array(self._points), fps)
+        scores = Trajectory(BLENDSHAPES, np.array(self._scores), fps)
+        head = np.column_stack([head_angles(posed.rotations), posed.translations])
+        return _Calibration(build_performer_retargeter(posed.landmarks, scores, face), np.median(head, axis=0))
+
+
+class LiveCapture:
+    """Capture in a background thread, from which a window reads the latest pose.
+
+    Raises
+    ------
+    BackendError
+        LiteRT, OpenCV or the landmark models are missing.
+    """
+
+    def __init__(self, pictures: Iterable[TimedFrame], face: Face, fps: float, model: Path | None = None) -> None:
+        self._poses = track_poses(pictures, face, FaceTracker(model), BlendshapeReader(model), fps)
+        self._last: LivePose | None = None
+        self._stopped = False
+        self._thread = threading.Thread(target=self._run, name="actor", daemon=True)
+
+    def __enter__(self) -> "LiveCapture":
+        """Start the capture."""
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop the capture and wait for its thread."""
+        self._stopped = True
+        self._thread.join()
+
+    def latest_pose(self) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
+        """Shape weights (K,) and head pose (6,) of the latest frame; None if no frame arrived since the last call."""
+        last, self._last = self._last, None
+        return None if last is None else (last.weights, last.head)
+
+    def _run(self) -> None:
+        for pose in self._poses:
+            self._last = pose or self._last
+            if self._stopped:
+                return
+
+
+def _queue_frames(pictures: Iterable[TimedFrame], waiting: "deque[TimedFrame]") -> Iterator[NDArray[np.uint8]]:
+    """Yield the pixels of each picture and append the picture to `waiting`."""
+    for picture in pictures:
+        waiting.append(picture)
+        yield picture.pixels
+
+
+RATE_LIMITS = (8_000, 192_000)  # Hz
+
+
+class LiveLips:
+    """Lip motion of a sound that arrives in blocks; independent of the blocks at 16 kHz. Not thread-safe.
+
+    Parameters
+    ----------
+    rate
+        Sample rate of the sound in Hz; rates other than 16 kHz are resampled.
+    audio_map
+        Name of an audio map of the talker; None for the default.
+
+    Raises
+    ------
+    InputError
+        The rate is out of range, or the talker has no such audio map.
+    """
+
+    def __init__(self, models: "SessionModels", rate: int = FEATURE_RATE, audio_map: str | None = None) -> None:
+        low, high = RATE_LIMITS
+        if not low <= rate <= high:
+            raise InputError(f"the sample rate must lie between {low} and {high} Hz, not {rate}; convert the sound")
+        talker = models.talker
+        request = Request(text="unused", audio_map=audio_map)
+        self._stream = StreamingAudioMap(select_audio_map(request, talker), talker.fps)
+        self._face, self._channels, self.fps = models.speech_face, speech_channels(talker.model), talker.fps
+        self._resampler: Any = None
+        if rate != FEATURE_RATE:
+            import soxr
+
+            self._resampler = soxr.ResampleStream(rate, FEATURE_RATE, 1, dtype="float32")
+
+    @property
+    def look_ahead_s(self) -> float:
+        """Seconds of sound after a frame that are needed to compute it."""
+        return self._stream.look_ahead_s
+
+    def add_samples(self, samples: NDArray[np.floating]) -> Trajectory | None:
+        """Motion of the frames that are known after samples (m,) in [-1, 1]; None if there are none.
+
+        Raises
+        ------
+        InputError
+            The block is not a vector of finite samples.
+        """
+        if self._resampler is not None:
+            samples = self._resampler.resample_chunk(np.asarray(samples, np.float32))
+        return self._motion(self._stream.add_samples(samples))
+
+    def finish(self) -> Trajectory | None:
+        """Motion of the remaining frames."""
+        parts = []
+        if self._resampler is not None:
+            parts.append(self._stream.add_samples(self._resampler.resample_chunk(np.zeros(0, np.float32), last=True)))
+        if not self._stream.n_samples:
+            return None
+        return self._motion(np.concatenate([*parts, self._stream.finish()]))
+
+    def _motion(self, parameters: NDArray[np.float32]) -> Trajectory | None:
+        if not len(parameters):
+            return None
+        return self._face.motion_of_parameters(Trajectory(self._channels, parameters, self.fps))
+
+
+UNUSED_IDLE_S = 1.0  # of the request from which the gestures of the whole are made
+
+
+class LiveSpeech:
+    """A clip without an end: `say` appends speech, `idle` appends silence with a living face.
+
+    Gestures continue from piece to piece. Not thread-safe.
+
+    Parameters
+    ----------
+    request
+        Options of all pieces; without text, recording and idle time.
+
+    Raises
+    ------
+    InputError, DataError
+        The request has a text, recording or timeline, or an option is invalid.
+    """
+
+    def __init__(self, request: Request, models: SessionModels) -> None:
+        if request.text or request.audio is not None or request.idle is not None or request.timeline is not None:
+            raise InputError("a live request has options only; send its text in parts")
+        self._request, self._models = request, models
+        self._layer = models.gesture_layer(prepare(_idle_request(request, UNUSED_IDLE_S)))
+        self._n_frames = 0
+
+    @property
+    def seconds(self) -> float:
+        """Duration of all pieces so far."""
+        return float(self._n_frames / exact_rate(self._request.fps))
+
+    def say(self, text: str) -> Iterator[Piece]:
+        """Append the sentences of a text; errors as `Session.stream`."""
+        yield from self._append(replace(self._request, text=text))
+
+    def idle(self, seconds: float) -> Iterator[Piece]:
+        """Append silence."""
+        yield from self._append(_idle_request(self._request, seconds))
+
+    def _append(self, request: Request) -> Iterator[Piece]:
+        prepared = prepare(request)
+        for piece in pieces_from(prepared, self._models.for_request(prepared), self._layer, self._n_frames):
+            self._n_frames += len(piece.clip.motion)
+            yield piece
+
+
+def _idle_request(request: Request, seconds: float) -> Request:
+    """The request with idle animation, which has no voice."""
+    return replace(request, idle=seconds, voice=None, rate=1.0, volume=1.0, dictionary=None)

@@ -1,0 +1,224 @@
+"""Models that the requests of a session share, each loaded or computed at its first use."""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Iterator
+from copy import copy
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from lexicon.errors import InputError
+from tts2face.gestures.stream import FIELD_OPTIONS, GestureFields
+from tts2face.lips.exemplar import ExemplarModel, build_exemplar_model, exclude_tokens
+from tts2face.lips.options import ExcludedToken
+from tts2face.models.face import Face
+from tts2face.models.face_loading import default_face, load_face
+from tts2face.models.palette import Derivation, Palette, load_palette
+from tts2face.models.palette_editing import add_derivation
+from tts2face.models.talker import Talker, load_talker
+from tts2face.numeric.reuse import NO_MEMORY, SentenceMemory
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import FrameRenderer
+from tts2face.request import FIELDS, OWN_FACE, Request
+from tts2face.session.animated_face import AnimatedFace, mesh_face
+from tts2face.session.gesture_layer import GestureLayer
+from tts2face.session.pieces import SynthesisModels, pieces
+from tts2face.session.prepared import PreparedRequest, marked_styles
+from tts2face.session.speech import NO_DELIVERIES
+from tts2face.session.speech_stream import Piece, SpeechModels
+from tts2face.session.warm_up import preload_voice
+from tts2face.sound.voice import Voice
+from tts2face.sound.voice_pool import VoicePool
+
+MAX_RENDERERS = 2  # renderers in memory, one for each picture; about 30 MB each
+
+Value = TypeVar("Value")
+
+
+def shown_face(
+    face: str | Path | Face | None, identity: str | None, hair: str | None, hair_color: str | None
+) -> Face | None:
+    """Face that a session shows; None for the talker's own face.
+
+    Raises
+    ------
+    InputError
+        There is no such face, identity, haircut or colour, or they exclude each other.
+    DataError
+        A file is damaged.
+    """
+    has_hair = hair is not None or hair_color is not None
+    if isinstance(face, Face):
+        if has_hair or identity is not None:
+            raise InputError("identity and hair belong to a face given by name; remove them, or load it with them")
+        return face
+    if face != OWN_FACE:
+        name = str(face) if face else default_face(identity, hair)
+        return load_face(name, identity, hair=hair, hair_color=hair_color)
+    if identity is not None:
+        raise InputError("a talker's own face has no identity presets; remove the identity, or choose another face")
+    if has_hair:
+        raise InputError("a talker's own face has the hair of its video; remove --hair and --hair-color")
+    return None
+
+
+class SessionModels:
+    """Talker, faces, palette, exemplars, gesture fields, renderers and voices of a session.
+
+    All methods are thread-safe: each model is made by one thread, once, and is read-only.
+
+    Parameters
+    ----------
+    talker, palette, voices
+        As for `tts2face.Session`.
+    mesh
+        Face to show; None for the talker's own face.
+    memory
+        Speech and lip motion of finished sentences.
+
+    Raises
+    ------
+    InputError, DataError
+        As for `tts2face.Session`.
+    """
+
+    def __init__(
+        self,
+        talker: str | Path | Talker,
+        mesh: Face | None,
+        palette: str | Path | Palette | None,
+        voices: VoicePool | None = None,
+        memory: SentenceMemory = NO_MEMORY,
+    ) -> None:
+        self.talker: Talker = talker if isinstance(talker, Talker) else load_talker(str(talker))
+        self._mesh, self._memory = mesh, memory
+        self._palette = palette
+        self._lock = threading.RLock()
+        self._cache: dict[Hashable, Any] = {}
+        self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
+        self._voices = voices or VoicePool()
+        self._without: tuple[tuple[ExcludedToken, ...], ExemplarModel] | None = None
+        self.speech_face: AnimatedFace = self._make_face()
+
+    def _make_face(self) -> AnimatedFace:
+        if self._mesh is not None:
+            return mesh_face(self.talker, self._exemplars, self._mesh)
+        from tts2face.session.animated_face import own_appearance_face
+
+        return own_appearance_face(self.talker, self._exemplars)
+
+    @property
+    def palette(self) -> Palette | None:
+        """Palette with the styles of the gestures; None without gestures."""
+        given = self._palette
+        if given is None or isinstance(given, Palette):
+            return given
+        return self._once("palette", lambda: load_palette(str(given)))
+
+    @property
+    def n_fixed_channels(self) -> int:
+        """Number of first channels that have no rest: those of a talker's own video, 0 for a mesh."""
+        return len(self.speech_face.channels) if self._mesh is None else 0
+
+    def face(self, *, has_gestures: bool = True) -> AnimatedFace:
+        """Face with the channels of speech, and with those of the palette's gestures if there is a palette."""
+        palette = self.palette if has_gestures else None
+        if palette is None:
+            return self.speech_face
+        return self._once("face", lambda: self.speech_face.with_gestures_of(palette))
+
+    def with_style(self, name: str, derived: Derivation) -> "SessionModels":
+        """Models with one more derived style, which share everything else; errors as `Session.with_style`."""
+        palette = self.palette
+        if palette is None:
+            raise InputError("a session without a palette has no styles; open it with one")
+        new = copy(self)
+        more = add_derivation(palette, name, derived)
+        new._palette, new._memory = more, NO_MEMORY  # finished sentences are kept by the names of styles
+        with self._lock:
+            new._cache = {
+                key: replace(value, palette=more) if isinstance(value, GestureFields) else value
+                for key, value in self._cache.items()
+            }
+        return new
+
+    def renderer(self, picture: Picture, *, has_gestures: bool) -> FrameRenderer:
+        """Renderer of the face for drawing options; the last `MAX_RENDERERS` renderers are cached."""
+        face, key = self.face(has_gestures=has_gestures), (picture, has_gestures)
+        with self._lock:
+            if key not in self._renderers:
+                while len(self._renderers) >= MAX_RENDERERS:
+                    self._renderers.popitem(last=False)
+                self._renderers[key] = face.renderer(picture)
+            return self._renderers[key]
+
+    def gesture_layer(self, prepared: PreparedRequest) -> GestureLayer | None:
+        """Gestures of one clip from its beginning; None for a request without gestures."""
+        request = prepared.request
+        palette = self.palette if request.has_gestures else None
+        if palette is None:
+            return None
+        return GestureLayer(prepared, self._fields(palette, request), self.face(), self._voices.give_way, self._memory)
+
+    def for_request(self, prepared: PreparedRequest, *, keeps_utterances: bool = False) -> SynthesisModels:
+        """Models of a request with its own dictionary and without the tokens that it excludes.
+
+        Parameters
+        ----------
+        keeps_utterances
+            As for `VoicePool.voice`.
+
+        Raises
+        ------
+        InputError
+            The face does not have the articulation of the request, or an excluded token does not exist.
+        """
+        request = prepared.request
+
+        def load_voice(name: str | None, language: str) -> Voice:
+            return self._voices.voice(name, language, prepared.dictionary, keeps_utterances=keeps_utterances)
+
+        exemplars = self._exemplars if not prepared.excluded else self._exemplars_without(prepared.excluded)
+        face = self.face(has_gestures=request.has_gestures)
+        face.check_articulation(request.articulation_factor)
+        has_style = request.style is not None or marked_styles(prepared.text)  # without one, no palette is needed here
+        palette = self.palette if request.has_gestures and has_style else None
+        deliveries = NO_DELIVERIES if palette is None else palette.deliveries
+        speech = SpeechModels(load_voice, self._voices.give_way, self._memory, deliveries)
+        return SynthesisModels(self.talker, exemplars, face, speech)
+
+    def preload_voice(self, prepared: PreparedRequest) -> None:
+        """Load the voice of a request's text in a thread, while the face is prepared."""
+        preload_voice(self._voices, prepared)
+
+    def pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
+        """Synthesise the clip of a request piece by piece."""
+        return pieces(prepared, self.for_request(prepared), self.gesture_layer(prepared))
+
+    @property
+    def _exemplars(self) -> ExemplarModel:
+        return self._once("exemplars", lambda: build_exemplar_model(self.talker))
+
+    def _exemplars_without(self, excluded: tuple[ExcludedToken, ...]) -> ExemplarModel:
+        """The exemplars without some tokens; those of the last call are cached."""
+        with self._lock:
+            if self._without is None or self._without[0] != excluded:
+                self._without = (excluded, exclude_tokens(self._exemplars, excluded))
+            return self._without[1]
+
+    def _fields(self, palette: Palette, request: Request) -> GestureFields:
+        method = request.gestures if request.gestures in FIELD_OPTIONS else FIELDS  # noise has no options
+        key = ("fields", method, request.pitch)
+        is_published = method == "ju2008"
+        return self._once(
+            key, lambda: GestureFields(palette, FIELD_OPTIONS[method], request.pitch, has_presentation=not is_published)
+        )
+
+    def _once(self, key: Hashable, make: Callable[[], Value]) -> Value:
+        """Cached value of a key, computed at the first call by one thread only."""
+        with self._lock:
+            if key not in self._cache:
+                self._cache[key] = make()
+            value: Value = self._cache[key]
+            return value

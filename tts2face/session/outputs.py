@@ -1,0 +1,410 @@
+"""Files that one clip is written to: a film or pictures, exports, or both.
+
+Writing of the pieces of a clip to its outputs, with progress in the steps of the request.
+
+Clips as the bytes of a file that is sent while it is made: a movie, sound, or lines of text.
+
+Files that hold the sound and phones of a clip, written without talker, face and palette.
+"""
+
+import io
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from lexicon.errors import InputError
+from lexicon.marked_text import NameMark
+from tts2face.gestures.timeline import Timeline
+from tts2face.interchange.exports.parts import FormatWriter, FrameGrid
+from tts2face.interchange.exports.table import FormatInfo, all_formats
+from tts2face.interchange.exports.writer import ExportFile, ExportWriter, make_target, mesh_of, plan_exports
+from tts2face.models.face import Face
+from tts2face.numeric.reuse import Prefetch
+from tts2face.picture.film import check_output
+from tts2face.picture.movie import MOVIE_KINDS, encode_movie, find_movie_kind
+from tts2face.picture.options import Picture
+from tts2face.picture.sound_stream import SOUND_KINDS, encode_sound
+from tts2face.session.animated_face import AnimatedFace
+from tts2face.session.models import SessionModels
+from tts2face.session.prepared import PreparedRequest, marked_styles
+from tts2face.session.speech import MarkTime
+from tts2face.session.speech_stream import Piece, SpeechModels, sounds, speech_pieces
+from tts2face.sound.transcript import TextMismatch
+from tts2face.sound.voice_pool import VoicePool
+from tts2face.storage.files import AnyPath, refuse_overwriting
+from tts2face.types import Chunk, Clip, Progress
+
+if TYPE_CHECKING:
+    from tts2face.picture.film import ClipWriter
+    from tts2face.picture.renderer import FrameRenderer
+
+
+@dataclass(frozen=True, slots=True)
+class OutputFiles:
+    """Checked outputs of one clip.
+
+    Parameters
+    ----------
+    out
+        Film or folder of pictures; None for exports only.
+    exports
+        Files of other formats, those beside them included.
+    """
+
+    out: Path | None
+    exports: tuple[ExportFile, ...]
+
+    @property
+    def path(self) -> Path:
+        """First file of the clip."""
+        return self.exports[0].path if self.out is None else self.out
+
+    @property
+    def export_paths(self) -> tuple[Path, ...]:
+        """Paths of the exports."""
+        return tuple(file.path for file in self.exports)
+
+    def check_face(self, face: "AnimatedFace") -> None:
+        """Reject exports that a face cannot fill.
+
+        Raises
+        ------
+        InputError
+            An export holds a mesh, and the face has none.
+        """
+        mesh_of(face, self.exports)
+
+    @contextmanager
+    def open(
+        self, face: "AnimatedFace | None", renderer: "FrameRenderer | None", on_frames: Progress | None
+    ) -> Iterator["OpenOutputs"]:
+        """Writer of consecutive clips to all files; errors as `ClipWriter` and `ExportWriter`.
+
+        Parameters
+        ----------
+        face
+            Animated face of the clips; None if no file holds its mesh or shapes.
+        renderer
+            Draws the clips; None if `out` is None.
+        on_frames
+            Called with the number of frames drawn and the number added so far.
+        """
+        with ExitStack() as stack:
+            film = None
+            if self.out is not None and renderer is not None:
+                from tts2face.picture.film import ClipWriter  # not for exports alone
+
+                film = stack.enter_context(ClipWriter(self.out, renderer, on_progress=on_frames))
+            exports = stack.enter_context(ExportWriter(self.exports, face=mesh_of(face, self.exports)))
+            yield OpenOutputs(film, exports)
+
+
+@dataclass(frozen=True, slots=True)
+class OpenOutputs:
+    """Writers of a film and of exports."""
+
+    film: "ClipWriter | None"
+    exports: ExportWriter
+
+    def add(self, clip: Clip, text: str = "") -> None:
+        """Append a clip, and its written text for captions."""
+        self.exports.add(clip, text)
+        if self.film is not None:
+            self.film.add(clip)
+
+
+def plan_outputs(out: str | Path | None, exports: Sequence[str | Path], inputs: Mapping[str, AnyPath]) -> OutputFiles:
+    """Check the outputs of a clip before anything is computed.
+
+    Parameters
+    ----------
+    inputs
+        Files that the request reads, by names for messages.
+
+    Raises
+    ------
+    InputError
+        There is no output, a suffix is unknown, or an output would replace an input or another output.
+    BackendError
+        A folder cannot be written.
+    """
+    if out is not None:
+        check_output(out)
+    files = plan_exports(exports)
+    if out is None and not files:
+        raise InputError("there is no output; give the path of a film or of an export")
+    names: dict[str, AnyPath] = {f"export {number}": file.path for number, file in enumerate(files, start=1)}
+    refuse_overwriting(names | {"out": out}, inputs)
+    return OutputFiles(None if out is None else Path(out), files)
+
+
+N_PIECES_AHEAD = 2  # pieces synthesised before they are drawn
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenClip:
+    """Summary of a written file.
+
+    Parameters
+    ----------
+    seconds
+        Duration of the sound.
+    n_frames
+        Number of video frames.
+    marks
+        Named marks of the text with their times.
+    is_silent
+        Whether the file has no sound.
+    mismatches
+        Words of the text that the recording probably does not contain.
+    exports
+        Files of other formats, those beside them included.
+    """
+
+    path: Path
+    seconds: float
+    n_frames: int
+    marks: tuple[MarkTime, ...] = ()
+    is_silent: bool = False
+    mismatches: tuple[TextMismatch, ...] = ()
+    exports: tuple[Path, ...] = ()
+
+    @property
+    def names(self) -> str:
+        """All files written, separated by commas."""
+        return ", ".join(dict.fromkeys(str(path) for path in (self.path, *self.exports)))
+
+
+class RequestSteps:
+    """Converts the number of drawn frames into steps of a request."""
+
+    def __init__(self, n_steps: int, on_progress: Progress | None) -> None:
+        self._n_steps, self._on_progress = n_steps, on_progress
+        self._steps_before = self._piece_steps = self._frames_before = self._n_frames = 0
+
+    def begin(self, piece: Piece) -> None:
+        """Start the next piece."""
+        self._steps_before += self._piece_steps
+        self._piece_steps, self._frames_before = piece.n_steps, self._n_frames
+        self._n_frames += len(piece.clip.motion)
+
+    def report_piece(self) -> None:
+        """Report that the piece is done."""
+        self.report_frames(self._n_frames, self._n_frames)
+
+    def report_frames(self, n_drawn: int, n_submitted: int) -> None:
+        """Report the frames drawn, out of those passed to the writer so far."""
+        if self._on_progress:
+            share = (n_drawn - self._frames_before) / max(n_submitted - self._frames_before, 1)
+            self._on_progress(min(self._n_steps, int(self._steps_before + self._piece_steps * share)), self._n_steps)
+
+    def finish(self) -> None:
+        """Report that all steps are done."""
+        if self._on_progress:
+            self._on_progress(self._n_steps, self._n_steps)
+
+
+def ahead(pieces: Iterable[Piece]) -> Prefetch[Piece]:
+    """Pieces that are synthesised in a thread, ahead of their use, as long as the ``with`` block lasts."""
+    return Prefetch(pieces, N_PIECES_AHEAD)
+
+
+def write_pieces(
+    pieces: Iterable[Piece],
+    files: OpenOutputs,
+    outputs: OutputFiles,
+    progress: RequestSteps,
+    on_piece: Callable[[Piece], None] | None,
+) -> WrittenClip:
+    """Write all pieces to the open files of `outputs`, while the next ones are synthesised if they are of `ahead`.
+
+    Parameters
+    ----------
+    on_piece
+        Called with each piece before it is drawn.
+    """
+    marks: list[MarkTime] = []
+    mismatches: list[TextMismatch] = []
+    seconds, n_frames = 0.0, 0
+    for piece in pieces:
+        if on_piece:
+            on_piece(piece)
+        progress.begin(piece)
+        files.add(piece.clip, piece.text)
+        if files.film is None:
+            progress.report_piece()
+        marks += piece.marks
+        mismatches += piece.mismatches
+        seconds += piece.clip.speech.waveform.duration
+        n_frames += len(piece.clip.motion)
+    progress.finish()
+    return WrittenClip(
+        outputs.path, seconds, n_frames, tuple(marks), mismatches=tuple(mismatches), exports=outputs.export_paths
+    )
+
+
+BLOCK_BYTES = 1 << 18  # of a file that is read when it is complete
+
+
+@cache
+def line_formats() -> Mapping[str, FormatInfo]:
+    """Formats of lines by name, of other packages, too."""
+    return MappingProxyType({one.name: one for one in all_formats() if one.has_lines})
+
+
+@cache
+def media_types() -> Mapping[str, str]:
+    """Media types of the formats of `Session.stream_file`."""
+    return MappingProxyType({
+        **{name: kind.media_type for name, kind in MOVIE_KINDS.items()},
+        **{name: kind.media_type for name, kind in SOUND_KINDS.items()},
+        **dict.fromkeys(line_formats(), "application/jsonl"),
+        "livelink": "text/csv",
+        "glb": "model/gltf-binary",
+    })  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class StreamFormat:
+    """Format of streamed bytes, one of `media_types`, and the drawing options of movies.
+
+    Parameters
+    ----------
+    threads
+        Number of frames drawn in advance; None for one on each core.
+
+    Raises
+    ------
+    InputError
+        There is no such format, or it cannot be transparent.
+    """
+
+    name: str
+    picture: Picture
+    threads: int | None = None
+
+    def __post_init__(self) -> None:
+        """Check the format."""
+        if self.name not in media_types():
+            raise InputError(f"there is no streamed format {self.name!r}; the formats are {', '.join(media_types())}")
+        if self.name in MOVIE_KINDS:
+            find_movie_kind(self.name, self.picture)
+
+
+def encode_stream(prepared: PreparedRequest, models: SessionModels, format: StreamFormat) -> Iterator[Chunk]:
+    """Synthesise and encode a request; yields consecutive chunks of a file."""
+    request, name = prepared.request, format.name
+    if name in MOVIE_KINDS:
+        renderer = models.renderer(format.picture, has_gestures=request.has_gestures)
+        clips = (piece.clip for piece in models.pieces(prepared))
+        return encode_movie(clips, renderer, name, threads=format.threads)
+    if name in SOUND_KINDS:
+        if request.audio is None:
+            return encode_sound(sounds(prepared, models.for_request(prepared).speech), name)
+        return encode_sound((piece.clip.speech.waveform for piece in models.pieces(prepared)), name)
+    if name not in line_formats():
+        file, face = f"clip.{name}", models.face(has_gestures=request.has_gestures)
+        return encode_whole(models.pieces(prepared), file, face, lambda folder: folder / file)
+    mesh = models.face(has_gestures=request.has_gestures).mesh if line_formats()[name].uses_face else None
+    return encode_lines(models.pieces(prepared), name, mesh)
+
+
+def encode_whole(
+    pieces: Iterable[Piece], name: str, face: AnimatedFace, choose: Callable[[Path], Path]
+) -> Iterator[Chunk]:
+    """Write pieces to an export of a name, whose bytes come after the last piece.
+
+    Parameters
+    ----------
+    choose
+        Path of the file that is sent, in the folder of all files that were written.
+
+    Raises
+    ------
+    InputError, BackendError
+        As `plan_exports`, `mesh_of` and `ExportWriter`.
+    """
+    with tempfile.TemporaryDirectory(prefix="tts2face-") as folder:
+        files = plan_exports([Path(folder, name)])
+        with ExportWriter(files, face=mesh_of(face, files)) as writer:
+            for piece in pieces:
+                writer.add(piece.clip, piece.text)
+                yield Chunk(b"", piece.clip.speech.waveform.duration)
+        with choose(Path(folder)).open("rb") as file:
+            while block := file.read(BLOCK_BYTES):
+                yield Chunk(block)
+
+
+class LineBuffer(io.StringIO):
+    """Text that is taken in parts; closing it keeps what was not yet taken."""
+
+    def take(self) -> bytes:
+        """Return the text written since the last call as UTF-8."""
+        taken = self.getvalue().encode()
+        self.seek(0)
+        self.truncate()
+        return taken
+
+    def close(self) -> None:
+        """Do nothing: memory is all that a buffer holds."""
+
+
+def encode_lines(pieces: Iterable[Piece], format: str, face: Face | None) -> Iterator[Chunk]:
+    """Write consecutive pieces in a format of lines; yields a chunk for each piece.
+
+    Parameters
+    ----------
+    format
+        One of `line_formats`.
+    face
+        Mesh whose shapes the clips' channels are, for formats of ARKit shapes.
+
+    Raises
+    ------
+    InputError
+        As `ExportWriter`.
+    """
+    info = line_formats()[format]
+    file, buffer = ExportFile(Path(f"clip{info.suffixes[0]}"), info), LineBuffer()
+    grid: FrameGrid | None = None
+    writer: FormatWriter | None = None
+    for piece in pieces:
+        if grid is None or writer is None:
+            grid = FrameGrid(piece.clip, info.default_fps)
+            writer = info.make_writer()(make_target(file, grid, piece.clip, face, file.path, buffer))
+        writer.add(grid.place(piece.clip, piece.text))
+        yield Chunk(buffer.take(), piece.clip.speech.waveform.duration)
+    if grid is not None and writer is not None:
+        writer.add(grid.remainder())
+        writer.finish()
+        yield Chunk(buffer.take())
+
+
+def is_speech_only(prepared: PreparedRequest, outputs: OutputFiles) -> bool:
+    """Whether no output holds motion, and the request asks for nothing that a talker, face or palette could lack."""
+    asks_for_motion = prepared.timeline != Timeline() or marked_styles(prepared.text) or prepared.excluded
+    holds_motion = outputs.out is not None or any(file.format.has_motion for file in outputs.exports)
+    return prepared.request.audio is None and not asks_for_motion and not holds_motion
+
+
+def write_speech(
+    prepared: PreparedRequest, outputs: OutputFiles, voices: VoicePool, on_progress: Progress | None
+) -> WrittenClip:
+    """Write outputs for which `is_speech_only` holds: the same files as those of a session.
+
+    Raises
+    ------
+    InputError, DataError, BackendError
+        As `Session.export`.
+    """
+    models = SpeechModels(lambda name, language: voices.voice(name, language, prepared.dictionary), voices.give_way)
+    has_phones = any(not file.format.is_sound for file in outputs.exports)
+    has_names = any(isinstance(mark, NameMark) for mark in prepared.text.marks)
+    pieces = speech_pieces(prepared, models, has_phones=has_phones or has_names)
+    with outputs.open(None, None, None) as files, ahead(pieces) as spoken:
+        return write_pieces(spoken, files, outputs, RequestSteps(prepared.n_steps, on_progress), None)

@@ -1,0 +1,202 @@
+"""Transfer of a performer's video or an ARKit capture to a face; the original sound is retained.
+
+Writing of a recorded performance to its outputs.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from lexicon.errors import InputError
+from lexicon.inputs import check_limits
+from tts2face.face.body import Body
+from tts2face.numeric.arrays import interpolate_rows
+from tts2face.picture.options import Picture
+from tts2face.session.animated_face import AnimatedFace, FaceMotion
+from tts2face.session.models import SessionModels
+from tts2face.session.outputs import OutputFiles, WrittenClip
+from tts2face.types import Clip, Progress, Speech, Waveform, exact_rate, first_sample
+from tts2face.video.media import read_media_info, read_sound
+from tts2face.video.streaming import StreamingTracker
+from tts2face.video.take import BlendshapeReader, Take, read_livelink, read_take
+
+CAPTURE_SUFFIX = ".csv"
+CAPTURE_FPS = 30.0  # default frame rate of captures, whose own is higher than a video needs
+GAINS = (0.0, 4.0)
+SOUND_RATE = 48_000  # Hz
+MAX_CLIP_FRAMES = 300  # frames of each clip into which a take is divided
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Performance:
+    """A recorded performance and the options of its transfer to a face.
+
+    Parameters
+    ----------
+    take
+        A video of one person, or a .csv table of Live Link Face.
+    gain
+        Factor of the motion of lips and brows, 0 to 4.
+    fps
+        Frames per second; None for the take's own rate, limited to 30 for a capture.
+    audio
+        Sound file that belongs to a capture.
+    append_missing
+        Whether lip motion that the talker's recordings lack is added to the talker's own face.
+    model
+        Path of the face landmark models; None for the installed ones.
+
+    Raises
+    ------
+    InputError
+        The gain is out of range, or `audio` is given for a video, which has its own sound.
+    """
+
+    take: Path
+    gain: float = 1.0
+    fps: float | None = None
+    audio: Path | None = None
+    append_missing: bool = False
+    model: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Reject options that exclude each other."""
+        check_limits("the gain", self.gain, GAINS)
+        if self.audio is not None and not is_capture(self.take):
+            raise InputError(f"{self.take} has its own sound; --audio belongs to a Live Link Face .csv file")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PerformedTake:
+    """A take transferred to a face: the face, its motion, and the sound, which is empty if the take has none."""
+
+    face: AnimatedFace
+    motion: FaceMotion
+    sound: Waveform
+
+    @property
+    def seconds(self) -> float:
+        """Duration of the motion."""
+        return self.motion.face.duration
+
+
+def perform(
+    performance: Performance, face: AnimatedFace, *, on_progress: Callable[[int, int], None] | None = None
+) -> PerformedTake:
+    """Transfer a recorded performance to a face.
+
+    Parameters
+    ----------
+    on_progress
+        Called with the number of frames tracked and their total, for a video.
+
+    Raises
+    ------
+    InputError
+        The take does not exist, or the face cannot show such a take.
+    DataError
+        The take cannot be read, is too short, or shows no face or several.
+    BackendError
+        LiteRT, OpenCV or the landmark models are missing.
+    """
+    take = performance.take
+    sound = sound_of_take(take) if performance.audio is None else read_sound(performance.audio, SOUND_RATE)
+    if is_capture(take):
+        motion = retarget_capture(take, face, gain=performance.gain)
+        fps = performance.fps or min(motion.face.fps, CAPTURE_FPS)
+        return PerformedTake(face, resample_take(motion, fps), sound)
+    tracked = read_video_take(take, performance.model, on_progress=on_progress)
+    if performance.append_missing:
+        face = face.with_motion_of(tracked)
+    motion = retarget_take(tracked, face, gain=performance.gain)
+    return PerformedTake(face, motion if performance.fps is None else resample_take(motion, performance.fps), sound)
+
+
+def is_capture(take: Path) -> bool:
+    """Whether the suffix of a path is that of a Live Link Face table; other files are read as videos."""
+    return take.suffix.lower() == CAPTURE_SUFFIX
+
+
+def read_video_take(
+    video: Path, model: Path | None = None, *, on_progress: Callable[[int, int], None] | None = None
+) -> Take:
+    """Track landmarks, head pose and blendshape scores of a performer in a video.
+
+    Raises
+    ------
+    InputError
+        The file does not exist.
+    DataError
+        The video cannot be read, or shows no face or several.
+    BackendError
+        LiteRT, OpenCV or the landmark models are missing.
+    """
+    return read_take(video, StreamingTracker(model), BlendshapeReader(model), on_progress=on_progress)
+
+
+def retarget_take(take: Take, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
+    """Motion of a face from a tracked video."""
+    return FaceMotion(face.motion_of_take(take, gain=gain), take.head)
+
+
+def retarget_capture(table: Path, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
+    """Motion of a face from a Live Link Face table."""
+    capture = read_livelink(table)
+    return FaceMotion(face.motion_of_capture(capture, gain=gain), capture.head)
+
+
+def sound_of_take(take: Path) -> Waveform:
+    """Sound of a video at `SOUND_RATE`; empty if the file has no sound."""
+    if not is_capture(take) and read_media_info(take).rate:
+        return read_sound(take, SOUND_RATE)
+    return Waveform(np.zeros(0, np.float32), SOUND_RATE)
+
+
+def resample_take(motion: FaceMotion, fps: float) -> FaceMotion:
+    """Resample motion to another frame rate by linear interpolation."""
+    old = motion.face.fps
+    if exact_rate(fps) == exact_rate(old):
+        return motion
+    n_frames = max(1, int(np.floor((len(motion.face) - 1) / old * fps + 1e-6)) + 1)
+    at = np.minimum(np.arange(n_frames) / fps * old, len(motion.face) - 1)
+
+    return FaceMotion(
+        *(replace(one, values=interpolate_rows(one.values, at), fps=fps) for one in (motion.face, motion.head))
+    )
+
+
+def take_clips(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
+    """Divide motion and sound into clips of at most `MAX_CLIP_FRAMES` frames; short sound is padded with silence."""
+    fps, body = exact_rate(motion.face.fps), Body(motion.face.channels, 0)
+    for first in range(0, len(motion.face), MAX_CLIP_FRAMES):
+        last = min(first + MAX_CLIP_FRAMES, len(motion.face))
+        begin, end = (first_sample(frame, sound.rate, fps) for frame in (first, last))
+        speech = Speech.without_phones(sound.part(begin, end).padded(end - begin))
+        face, head = motion.face.part(first, last), motion.head.part(first, last)
+        yield Clip(body.move(face, head, speech.phones), head, speech)
+
+
+def write_take(
+    performance: Performance,
+    models: SessionModels,
+    to: tuple[OutputFiles, Picture],
+    stages: Callable[[str], Progress] | None,
+) -> WrittenClip:
+    """Transfer a performance to the face of a session and write it; as `Session.write_performance`."""
+    outputs, picture = to
+    face = models.speech_face
+    outputs.check_face(face)  # before the video is tracked, as are the drawing options
+    renderer = None if outputs.out is None else models.renderer(picture, has_gestures=False)
+    take = perform(performance, face, on_progress=stages("tracking") if stages else None)
+    if renderer is not None and take.face is not face:  # motion was appended to the face
+        renderer = take.face.renderer(picture)
+    n_frames = len(take.motion.face)
+    draw = stages("writing" if renderer is None else "drawing") if stages else None
+    on_frames = (lambda done, _: draw(done, n_frames)) if draw else None
+    with outputs.open(take.face, renderer, on_frames) as files:
+        for clip in take_clips(take.motion, take.sound):
+            files.add(clip)
+    is_silent = not len(take.sound.samples)
+    return WrittenClip(outputs.path, take.seconds, n_frames, is_silent=is_silent, exports=outputs.export_paths)

@@ -1,0 +1,307 @@
+"""Parsing and checking of a request's text, marks and timeline file.
+
+Styles of the marks of a text, and marks that cannot be combined with a request.
+
+Phone edges that a person has corrected, in place of those of the voice or of the alignment.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from lexicon.dictionary import read_dictionary
+from lexicon.errors import InputError
+from lexicon.inputs import is_file
+from lexicon.ipa import Segment
+from lexicon.languages import check_readable, language_code
+from lexicon.marked_text import MarkedText
+from lexicon.sentences import Sentence, split_sentences
+from lexicon.sequence import PhoneSequence
+from lexicon.ssml import parse_marks
+from tts2face.gestures.elements import Gains
+from tts2face.gestures.timeline import Timeline, parse_expressions, parse_gains, parse_style
+from tts2face.gestures.timeline_file import read_timeline
+from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
+from tts2face.picture.options import Picture
+from tts2face.request import RATE_LIMITS, VOLUME_LIMITS, Request
+from tts2face.storage.files import AnyPath
+from tts2face.types import exact_rate
+
+
+@lru_cache(maxsize=1000)
+def innermost_styles(nested: tuple[str, ...]) -> Mapping[str, str]:
+    """Style of each feature under nested marks; the innermost mark of a feature applies."""
+    chosen: dict[str, str] = {}
+    for written in nested:
+        chosen |= parse_style(written)
+    return chosen
+
+
+def marked_styles(text: MarkedText) -> tuple[str, ...]:
+    """Names of all styles in the marks of a text, in order of first use; raises as `check_marks`."""
+    runs = dict.fromkeys(run.styles for run in text.runs)
+    return tuple(dict.fromkeys(style for styles in runs for style in innermost_styles(styles).values()))
+
+
+def check_marks(text: MarkedText, request: Request) -> None:
+    """Reject marks that are invalid or cannot be combined with the request, in time linear in the length of the text.
+
+    Raises
+    ------
+    InputError
+        A style cannot be parsed, the product of a speed or loudness with the request's is out of range, the text names
+        another language, or the text of a recording has marks that change pauses or the voice.
+    """
+    if request.audio is not None and text.has_voice_changes:
+        raise InputError(
+            "[pause], <break>, <prosody>, <emphasis>, <voice> and <lang> have no effect on a recording; remove them or "
+            "--audio"
+        )
+    if text.language is not None and _primary(language_code(text.language)) != _primary(request.language):
+        raise InputError(f"the text names the language {text.language}, not {request.language}; choose one of them")
+    marked_styles(text)
+    for what, marked, requested, (low, high) in (
+        ("speed", {run.rate for run in text.runs}, request.rate, RATE_LIMITS),
+        ("loudness", {run.volume for run in text.runs}, request.volume, VOLUME_LIMITS),
+    ):
+        for factor in marked:
+            if not low <= factor * requested <= high:
+                raise InputError(
+                    f"a {what} of {factor:g} in the text times {requested:g} of the request lies outside "
+                    f"{low:g} to {high:g}; change one of them"
+                )
+
+
+def _primary(language: str) -> str:
+    """Primary language of a code: ``en`` of ``en-gb``."""
+    return language.partition("-")[0]
+
+
+RECORDING = ""  # text of the one sentence of a recording
+MAX_END_CHANGE_S = 0.05  # the last edge is the end of the sound, padded to a whole number of frames
+
+
+class StaleEdgesError(InputError):
+    """Corrected edges of a sentence that has other phones or another duration now."""
+
+    def __init__(self, text: str, occurrence: int) -> None:
+        self.text, self.occurrence = text, occurrence
+        where = f"the sentence {text[:60]!r}" if text else "the recording"
+        super().__init__(
+            f"the corrected phone edges of {where} belong to other phones or to another sound; remove them, or "
+            "restore the text, voice and pronunciations for which they were made"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SentenceEdges:
+    """Corrected edges of one sentence.
+
+    Parameters
+    ----------
+    text, occurrence
+        Written sentence without its marks (`RECORDING` for a recording), and the number of equal sentences before it.
+    phones
+        The N phones for which the edges were corrected.
+    edges
+        N + 1 edges in seconds of the sentence, increasing from 0.
+
+    Raises
+    ------
+    InputError
+        The number is negative, or there is not one edge more than phones.
+    """
+
+    text: str
+    occurrence: int
+    phones: tuple[str, ...]
+    edges: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse edges that do not fit the phones, and times that do not increase."""
+        if self.occurrence < 0:
+            raise InputError(f"the occurrence of a sentence must be 0 or more, not {self.occurrence}")
+        PhoneSequence(self.phones, self.edges)
+
+    def fits(self, phones: PhoneSequence) -> bool:
+        """Whether a sentence has these phones and this duration."""
+        has_end = abs(phones.end - self.edges[-1]) <= MAX_END_CHANGE_S and self.edges[-2] < phones.end
+        return has_end and phones.phones == self.phones
+
+
+def correct_phones(
+    phones: PhoneSequence, text: str, occurrence: int, corrections: Sequence[SentenceEdges]
+) -> PhoneSequence:
+    """Phones of a sentence at their corrected edges, or as they are without a correction.
+
+    Raises
+    ------
+    StaleEdgesError
+        The correction belongs to other phones or to a sound of another length.
+    """
+    for one in corrections:
+        if (one.text, one.occurrence) == (text, occurrence):
+            if not one.fits(phones):
+                raise StaleEdgesError(text, occurrence)
+            return PhoneSequence(phones.phones, np.concatenate([one.edges[:-1], [phones.end]]))
+    return phones
+
+
+RECORDING_STEPS = 1000  # steps of progress of a recording
+IDLE_STEPS = 1000  # steps of progress of idle animation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PreparedRequest:
+    """A request with its parsed text, timeline and synthesis options, as `prepare` returns it.
+
+    Parameters
+    ----------
+    text
+        Text and marks; empty for a recording without words and for idle animation.
+    timeline
+        Gestures requested by the flags and the timeline file.
+    options
+        Options of lip synthesis from exemplars.
+    dictionary
+        The user's pronunciations by `lexicon.dictionary.word_key`.
+    edges
+        Corrected phone edges of sentences.
+    excluded
+        Recorded tokens that are not used.
+    """
+
+    request: Request
+    text: MarkedText
+    timeline: Timeline
+    options: SynthesisOptions
+    dictionary: Mapping[str, tuple[Segment, ...]] = field(default_factory=dict)
+    edges: tuple[SentenceEdges, ...] = ()
+    excluded: tuple[ExcludedToken, ...] = ()
+
+    @property
+    def fps(self) -> Fraction:
+        """Frames per second."""
+        return exact_rate(self.request.fps)
+
+    @property
+    def n_steps(self) -> int:
+        """Total steps of progress: characters of a text, or parts of a recording or of idle animation."""
+        if self.request.audio is not None:
+            return RECORDING_STEPS
+        return IDLE_STEPS if self.request.idle is not None else max(len(self.text.text), 1)
+
+    def sentences(self) -> Iterator[Sentence]:
+        """Sentences of the text in order."""
+        return split_sentences(self.text, self.request.language, self.dictionary)
+
+
+def prepare(request: Request) -> PreparedRequest:
+    """Parse and check the text, marks and timeline of a request, in time linear in the length of the text.
+
+    Raises
+    ------
+    InputError
+        The text has no word or characters that the language does not read, a mark or a gesture option is invalid, or
+        the recording does not exist.
+    DataError
+        The timeline file or the dictionary is invalid.
+    """
+    if request.audio is not None and not is_file(request.audio):
+        raise InputError(f"there is no recording {request.audio}; check the path")
+    prepared = PreparedRequest(
+        request,
+        parse_marks(request.text, request.language),
+        build_request_timeline(request),
+        synthesis_options(request),
+        read_dictionary(request.dictionary).entries if request.dictionary else {},
+    )
+    if not request.text.strip() and (request.audio is not None or request.idle is not None):
+        return prepared
+    check_readable(prepared.text, request.language)
+    check_marks(prepared.text, request)
+    if next(prepared.sentences(), None) is None:
+        raise InputError(f"there is nothing to say in {request.text[:40]!r}; give at least one word")
+    return prepared
+
+
+def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:
+    """Prepare a text with options by name, or a complete request, once.
+
+    Raises
+    ------
+    InputError
+        An option does not exist, or options are given together with a complete request; errors as `prepare`.
+    """
+    known = _option_names(Request)
+    for name in options:
+        if name not in known:
+            raise InputError(f"there is no option {name!r}; the options are {', '.join(known)}")
+    if isinstance(text, str):
+        return prepare(Request(text=text, **options))
+    if options:
+        raise InputError(
+            f"the option {next(iter(options))!r} cannot be given with a complete request; set it in the request"
+        )
+    return prepare(text) if isinstance(text, Request) else text
+
+
+def split_picture(picture: Picture | None, options: dict[str, Any]) -> tuple[Picture, dict[str, Any]]:
+    """A picture, from its fields among the options if it is None, and the options of the request.
+
+    Raises
+    ------
+    InputError
+        A field of the picture is invalid.
+    """
+    if picture is not None:
+        return picture, options
+    names = _option_names(Picture)
+    chosen = {name: value for name, value in options.items() if name in names}
+    return Picture(**chosen), {name: value for name, value in options.items() if name not in names}
+
+
+def _option_names(kind: type) -> tuple[str, ...]:
+    return tuple(option.name for option in fields(kind) if option.name != "text")
+
+
+def build_request_timeline(request: Request) -> Timeline:
+    """Timeline of a request's ``timeline`` file, overridden by its ``style``, ``gain`` and ``expression``.
+
+    Raises
+    ------
+    InputError, DataError
+        An option cannot be parsed, or the file is invalid.
+    """
+    flags = Timeline(
+        style=parse_style(request.style) if request.style is not None else {},
+        expressions=parse_expressions(request.expression) if request.expression is not None else (),
+        gains=parse_gains(request.gain) if request.gain is not None else Gains(),
+    )
+    return read_timeline(request.timeline).merge(flags) if request.timeline is not None else flags
+
+
+def synthesis_options(request: Request) -> SynthesisOptions:
+    """Synthesis options of the request's method, with the request's own context, exemplars and articulation."""
+    options = METHOD_OPTIONS[request.synthesis]
+    if request.context is not None:
+        options = replace(options, context=request.context)
+    if request.exemplars is not None:
+        options = replace(options, k=request.exemplars)
+    return replace(options, articulation=request.articulation_factor)
+
+
+def input_paths(request: Request, picture: Picture) -> dict[str, AnyPath]:
+    """Paths of the files that a request and a picture read, by the names of their options."""
+    return {
+        "audio": request.audio,
+        "dictionary": request.dictionary,
+        "timeline": request.timeline,
+        "voice": request.voice,
+        "voice settings": f"{request.voice}.json" if request.voice else None,
+        "background": picture.background,
+    }

@@ -1,0 +1,178 @@
+"""Project files: one JSON object with everything that makes a clip (docs/file-formats.md)."""
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, TypeVar
+
+from lexicon.errors import DataError, InputError
+from lexicon.inputs import (
+    LARGEST_JSON_BYTES,
+    check_list,
+    check_mapping,
+    check_object,
+    check_type,
+    is_file,
+    parse_json,
+    read_text,
+)
+from tts2face.gestures.timeline_file import parse_timeline_object, timeline_json
+from tts2face.lips.options import ExcludedToken
+from tts2face.picture.options import Picture
+from tts2face.request import Request
+from tts2face.session.named_models import Models
+from tts2face.session.prepared import SentenceEdges
+from tts2face.session.project import Project
+from tts2face.storage.files import write_atomically
+
+FORMAT, VERSION = "tts2face project", 2
+FIRST_FACE = "head"  # that files of version 1 mean where they name none
+PROJECT_SUFFIX = ".json"
+# Options that name files; their paths are relative to the folder of the project.
+REQUEST_FILES, MODEL_FILES, PICTURE_FILES = (
+    ("audio", "dictionary", "voice"),
+    ("talker", "face", "palette"),
+    ("background",),
+)
+KEYS = (
+    "format", "version", "name", "request", "models", "picture", "timeline", "pronunciations", "edges", "excluded",
+    "muted", "solo",
+)  # fmt: skip
+
+Options = TypeVar("Options", Request, Models, Picture)
+Made = TypeVar("Made")
+
+
+def load_project(path: str | Path) -> Project:
+    """A project from its file; paths in it are relative to its folder.
+
+    Raises
+    ------
+    InputError
+        There is no such file.
+    DataError
+        It is not JSON or not a project; the message names the place and the value.
+    """
+    file = Path(path)
+    try:
+        content = read_text(file, LARGEST_JSON_BYTES)
+    except OSError as refused:
+        raise InputError(f"cannot read the project {file}: {refused.strerror}; check the path") from refused
+    return parse_project(parse_json(content, str(file)), str(file), file.parent)
+
+
+def parse_project(content: Any, name: str, folder: Path) -> Project:
+    """A project from its object of JSON; errors as `load_project`."""
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise DataError(f'{name} is not a project: "format" is not {FORMAT!r}; choose a file written by the studio')
+    if content.get("version") not in (1, VERSION):
+        raise DataError(
+            f"{name} has version {content.get('version')!r}; this program reads version {VERSION}; update it"
+        )
+    for key in content:
+        if key not in KEYS:
+            raise DataError(f"{name}: there is no {key!r} in a project; choose {', '.join(KEYS)}")
+
+    first = {"face": FIRST_FACE} if content["version"] == 1 else {}
+
+    def part(key: str, make: Callable[[Any], Made], empty: Any) -> Made:
+        try:
+            return make(content.get(key, empty))
+        except (InputError, DataError) as wrong:
+            raise DataError(f"{name}, {key}: {wrong}") from wrong
+
+    parts = (
+        part("request", lambda given: _options(Request, given, folder, REQUEST_FILES), {}),
+        part("models", lambda given: _options(Models, first | check_mapping(given), folder, MODEL_FILES), {}),
+        part("picture", lambda given: _options(Picture, given, folder, PICTURE_FILES), {}),
+        part("timeline", lambda given: parse_timeline_object(check_mapping(given)), {}),
+        part("pronunciations", _pronunciations, {}),
+        part("edges", lambda given: tuple(map(_sentence_edges, check_type("edges", given, list))), []),
+        part("excluded", lambda given: tuple(map(_excluded, check_type("excluded", given, list))), []),
+        part("muted", lambda given: frozenset(check_list("muted", given, str)), []),
+        part("solo", lambda given: frozenset(check_list("solo", given, str)), []),
+    )
+    return part("name", lambda title: Project(title, *parts), "untitled")
+
+
+def project_json(project: Project, folder: Path) -> dict[str, Any]:
+    """The project as an object of JSON without parts that have their defaults; paths relative to a folder."""
+    parts: dict[str, Any] = {
+        "request": _options_json(project.request, Request(text=""), folder, REQUEST_FILES),
+        "models": _options_json(project.models, Models(), folder, MODEL_FILES),
+        "picture": _options_json(project.picture, Picture(), folder, PICTURE_FILES),
+        "timeline": timeline_json(project.timeline),
+        "pronunciations": dict(project.pronunciations),
+        "edges": [
+            {"text": one.text, "occurrence": one.occurrence, "phones": list(one.phones), "edges": list(one.edges)}
+            for one in project.edges
+        ],
+        "excluded": [{"utterance": one.utterance, "start": one.start} for one in project.excluded],
+        "muted": sorted(project.muted),
+        "solo": sorted(project.solo),
+    }
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "name": project.name,
+        **{key: value for key, value in parts.items() if value},
+    }
+
+
+def save_project(project: Project, path: str | Path) -> None:
+    """Write a project to its file, which appears when it is complete; an earlier one is replaced.
+
+    Raises
+    ------
+    BackendError
+        The file cannot be written.
+    """
+    file = Path(path)
+    content = json.dumps(project_json(project, file.parent), ensure_ascii=False, indent=1)
+    write_atomically(file, f"{content}\n".encode())
+
+
+def _options(kind: type[Options], given: Any, folder: Path, files: tuple[str, ...]) -> Options:
+    known = {option.name for option in fields(kind)}
+    chosen = dict(check_mapping(given))
+    for name in chosen:
+        if name not in known:
+            raise InputError(f"there is no option {name!r}; choose {', '.join(sorted(known))}")
+    for name in files:
+        value = chosen.get(name)
+        if isinstance(value, str) and is_file(folder / value):
+            chosen[name] = str(folder / value)
+    return kind(**chosen)
+
+
+def _options_json(options: Options, default: Options, folder: Path, files: tuple[str, ...]) -> dict[str, Any]:
+    chosen = {}
+    for option in fields(options):
+        value = getattr(options, option.name)
+        if value == getattr(default, option.name):
+            continue
+        if option.name in files and is_file(Path(value)):
+            value = os.path.relpath(value, folder)
+        chosen[option.name] = str(value) if isinstance(value, Path) else value
+    return chosen
+
+
+def _pronunciations(given: Any) -> dict[str, str]:
+    return {word: check_type(word, written, str) for word, written in check_mapping(given).items()}
+
+
+def _sentence_edges(given: Any) -> SentenceEdges:
+    parts = check_object(given, {"phones": list, "edges": list}, {"text": "", "occurrence": 0})
+    return SentenceEdges(
+        check_type("text", parts["text"], str),
+        check_type("occurrence", parts["occurrence"], int),
+        tuple(check_list("phones", parts["phones"], str)),
+        tuple(check_list("edges", parts["edges"], float)),
+    )
+
+
+def _excluded(given: Any) -> ExcludedToken:
+    parts = check_object(given, {"utterance": str, "start": float}, {})
+    return ExcludedToken(parts["utterance"], parts["start"])

@@ -1,0 +1,182 @@
+"""Lip motion for recorded speech, by forced alignment of its transcript or by an audio map.
+
+Long recordings are read in blocks, once each for their level, their features and the sound of the clips, so that memory
+use is bounded.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.dictionary import Dictionary
+from lexicon.errors import DataError, InputError
+from lexicon.ipa import Segment
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.models.audio_map import AudioMap
+from tts2face.models.talker import Talker, speech_channels
+from tts2face.numeric.arrays import interpolate_cubic
+from tts2face.request import Request
+from tts2face.sound.features import FEATURE_RATE, speech_level
+from tts2face.sound.listener import StreamingFeatures
+from tts2face.sound.transcript import TextMismatch, align_recording, pronounce_transcript
+from tts2face.types import Clip, Speech, Trajectory, Waveform, exact_rate, first_sample, frame_count, resting_head
+from tts2face.video.media import sound_blocks
+
+CLIP_RATE = 48_000  # Hz, sample rate of the clips
+MAX_CLIP_FRAMES = 300  # frames of each clip into which a recording is divided
+MIN_RECORDING_S = 0.1  # shorter recordings contain no phone
+SILENCE_LEVEL = 1e-4  # peak amplitude, relative to full scale, below which a recording counts as silent
+DEFAULT_AUDIO_MAP = "network"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TimedTranscript:
+    """Phones and words of a recording with their times; a single silence if the words are unknown.
+
+    ``mismatches`` are spans in which the recording probably contains other words.
+    """
+
+    phones: PhoneSequence
+    words: tuple[WordSpan, ...]
+    mismatches: tuple[TextMismatch, ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """Duration in seconds."""
+        return self.phones.end
+
+
+def select_audio_map(request: Request, talker: Talker) -> AudioMap:
+    """Audio map of a talker chosen by a request; `DEFAULT_AUDIO_MAP` if the request names none.
+
+    Raises
+    ------
+    InputError
+        The talker has no such audio map.
+    """
+    name = request.audio_map or DEFAULT_AUDIO_MAP
+    if name not in talker.audio_maps:
+        raise InputError(
+            f"the talker {talker.metadata.get('name', '')} has no {name} audio map because its recordings were too few "
+            "to learn one; give the words of the recording with --text, or choose another talker"
+        )
+    return talker.audio_maps[name]
+
+
+def align_transcript(
+    text: str, language: str, path: Path, dictionary: Mapping[str, tuple[Segment, ...]]
+) -> TimedTranscript:
+    """Align a text with a recording of it; `dictionary` holds the user's pronunciations by `word_key`.
+
+    Raises
+    ------
+    InputError, DataError
+        The recording cannot be read, is silent or too short, or does not contain the words.
+    BackendError
+        The recording is longer than a minute and the phone recogniser is not installed.
+    """
+    words = pronounce_transcript(text, language, Dictionary(dictionary) if dictionary else None)
+    sound = Waveform(np.concatenate(list(_read_audible_blocks(path))), FEATURE_RATE)
+    return TimedTranscript(*align_recording(sound, words, is_english=language.startswith("en")))
+
+
+def map_audio_to_motion(
+    path: Path, audio_map: AudioMap, talker: Talker, fps: float
+) -> tuple[TimedTranscript, Trajectory]:
+    """Speech parameters (T, S) of a recording without a transcript, at `fps` frames per second.
+
+    Raises
+    ------
+    InputError, DataError
+        The recording cannot be read, is silent or too short.
+    """
+    levels, _ = _features(path, "level", talker.fps, 1.0)
+    gain = audio_map.gain_for(speech_level(levels))
+    features, duration = _features(path, audio_map.feature, talker.fps, gain)
+    lips = resample_motion(audio_map.parameters(features), talker.fps, fps, frame_count(duration, fps))
+    phones = PhoneSequence([SILENCE], [0.0, duration])
+    return TimedTranscript(phones, ()), Trajectory(speech_channels(talker.model), lips, fps)
+
+
+def _features(path: Path, kind: str, fps: float, gain: float) -> tuple[NDArray[np.float32], float]:
+    """(T, D) features of a recording multiplied by `gain`, and its duration in seconds."""
+    stream = StreamingFeatures(kind, fps)
+    features = [stream.add_samples(np.clip(gain * block, -1.0, 1.0)) for block in _read_audible_blocks(path)]
+    return np.concatenate([*features, stream.finish()]), stream.n_samples / FEATURE_RATE
+
+
+def resample_motion(values: NDArray[np.float32], rate: float, fps: float, n_frames: int) -> NDArray[np.float32]:
+    """Resample (T, D) values at `rate` Hz to (n_frames, D) values at `fps` Hz; the last value is held."""
+    return interpolate_cubic(values, np.minimum(np.arange(n_frames) / fps * rate, len(values) - 1))
+
+
+def recording_clips(path: Path, transcript: TimedTranscript, motion: Trajectory, *, volume: float) -> Iterator[Clip]:
+    """Divide a recording's motion and sound into clips of at most `MAX_CLIP_FRAMES` frames, each with its phones."""
+    fps = exact_rate(motion.fps)
+    sound = _SampleReader(sound_blocks(path, CLIP_RATE))
+    for first in range(0, len(motion), MAX_CLIP_FRAMES):
+        last = min(first + MAX_CLIP_FRAMES, len(motion))
+        begin, end = (first_sample(frame, CLIP_RATE, fps) for frame in (first, last))
+        samples = np.clip(volume * sound.next(end - begin), -1.0, 1.0)
+        seconds = (float(Fraction(first) / fps), len(samples) / CLIP_RATE)
+        phones, words = _phones_within(transcript, *seconds)
+        yield Clip(
+            motion.part(first, last),
+            resting_head(last - first, motion.fps),
+            Speech(Waveform(samples, CLIP_RATE), phones, words),
+        )
+
+
+def _phones_within(
+    transcript: TimedTranscript, begin: float, duration: float
+) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+    """Phones of a time span, relative to its start, and the words whose first phone lies in the span."""
+    edges = transcript.phones.edges - begin
+    inside = [at for at in range(len(transcript.phones)) if edges[at] < duration - 1e-6 and edges[at + 1] > 1e-6]
+    if not inside:  # after the end of the sound
+        return PhoneSequence([SILENCE], [0.0, duration]), ()
+    first, last = inside[0], inside[-1] + 1
+    cut = edges[first : last + 1].copy()
+    cut[0], cut[-1] = 0.0, duration
+    words = tuple(
+        WordSpan(word.text, word.first - first, min(word.last, last) - first)
+        for word in transcript.words
+        if first <= word.first < last
+    )
+    return PhoneSequence(transcript.phones.phones[first:last], cut), words
+
+
+class _SampleReader:
+    """Sequential reader of sound blocks; returns silence after their end."""
+
+    def __init__(self, blocks: Iterator[NDArray[np.float32]]) -> None:
+        self._blocks, self._rest = blocks, np.zeros(0, np.float32)
+
+    def next(self, n_samples: int) -> NDArray[np.float32]:
+        """The next `n_samples` samples."""
+        parts, n = [self._rest], len(self._rest)
+        while n < n_samples and (block := next(self._blocks, None)) is not None:
+            parts.append(block)
+            n += len(block)
+        whole = np.concatenate([*parts, np.zeros(max(n_samples - n, 0), np.float32)])
+        self._rest = whole[n_samples:]
+        return whole[:n_samples]
+
+
+def _read_audible_blocks(path: Path) -> Iterator[NDArray[np.float32]]:
+    """Yield blocks of a recording at `FEATURE_RATE`; DataError after the last one if it is silent or too short."""
+    n_samples, peak = 0, 0.0
+    for block in sound_blocks(path, FEATURE_RATE):
+        n_samples += len(block)
+        peak = max(peak, float(np.abs(block).max(initial=0.0)))
+        yield block
+    if n_samples < MIN_RECORDING_S * FEATURE_RATE:
+        raise DataError(
+            f"{path} lasts {n_samples / FEATURE_RATE:.3f} s; give a recording of {MIN_RECORDING_S} s or more"
+        )
+    if peak < SILENCE_LEVEL:
+        raise DataError(f"{path} is silent; check the microphone, or give another recording")

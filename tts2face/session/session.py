@@ -1,0 +1,362 @@
+"""The session: a talker, a face and a palette, loaded once, for synthesising any number of clips."""
+
+from collections.abc import Callable, Iterator, Sequence
+from copy import copy
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lexicon.errors import InputError
+from tts2face.models.face import Face
+from tts2face.models.palette import Derivation, Palette
+from tts2face.models.talker import Talker
+from tts2face.numeric.reuse import SentenceMemory
+from tts2face.picture.options import Picture
+from tts2face.picture.renderer import FrameRenderer
+from tts2face.request import Request
+from tts2face.session.animated_face import AnimatedFace
+from tts2face.session.fixed_length import Length, clips_of_length
+from tts2face.session.live import LiveSpeech
+from tts2face.session.models import SessionModels, shown_face
+from tts2face.session.outputs import OutputFiles, RequestSteps, WrittenClip, ahead, plan_outputs, write_pieces
+from tts2face.session.prepared import PreparedRequest, input_paths, prepare_request, split_picture
+from tts2face.session.speech_stream import Piece, SpeechSpan, TimedSpeech, measure_speech, timed_speech
+from tts2face.sound.features import FEATURE_RATE
+from tts2face.sound.voice_pool import VoicePool
+from tts2face.types import Chunk, Clip, Progress, concatenate_clips
+
+if TYPE_CHECKING:
+    from tts2face.session.live import LiveLips
+    from tts2face.session.performance import Performance
+
+
+class Session:
+    """A talker, a face and a palette for any number of requests.
+
+    Talker and face are loaded by the constructor; palette, voices and renderers at their first use. All methods are
+    thread-safe: a voice speaks for one caller at a time, and all other models are read-only. The same request, talker,
+    face, palette and version give the same clip, independent of earlier and concurrent requests.
+
+    Parameters
+    ----------
+    talker
+        Name of a shipped talker, path of a .talker file, or a `Talker`.
+    face
+        Name of a shipped face, path of a .face file, a `Face`, or ``"self"`` for the talker's own face; None for the
+        drawn woman, or for the realistic head where an identity or hair is chosen.
+    identity
+        Name of a preset of the face's age, sex and ancestry.
+    photo, consent, smile
+        Picture of a person who speaks in place of a face, that person's consent, and a picture of the person's smile,
+        as for `tts2face.face_from_photo`.
+    hair, hair_color
+        Haircut and colour of the hair, as for `tts2face.load_face`; None for the face's own.
+    palette
+        Name of a shipped palette, path of a .palette file, or a `Palette`; None for clips without gestures.
+    voices
+        Loaded voices shared with other sessions; None for those of this session.
+    memory_mb
+        Megabytes of finished sentences to keep: a request that is changed and made again, as in an editor, repeats only
+        what has changed. The result is the same.
+
+    Raises
+    ------
+    InputError
+        A model, identity preset or haircut does not exist, or the talker has no face of its own.
+    DataError
+        A file is damaged, or the face lacks landmarks or shapes that speech needs.
+
+    Examples
+    --------
+    >>> session = Session()  # doctest: +SKIP
+    >>> session.write("Hello there.", "hello.mp4", style="delighted")  # doctest: +SKIP
+    """
+
+    def __init__(  # noqa: PLR0913 - one parameter a model
+        self,
+        talker: str | Path | Talker = "grid_s1",
+        face: str | Path | Face | None = None,
+        *,
+        identity: str | None = None,
+        palette: str | Path | Palette | None = "starter",
+        hair: str | None = None,
+        hair_color: str | None = None,
+        photo: str | Path | None = None,
+        consent: str | None = None,
+        smile: str | Path | None = None,
+        voices: VoicePool | None = None,
+        memory_mb: float = 0.0,
+    ) -> None:
+        if photo is not None:
+            face = _face_of(photo, consent, smile, (face, identity, hair, hair_color))
+        memory = SentenceMemory(round(memory_mb * 1e6))
+        self._models = SessionModels(talker, shown_face(face, identity, hair, hair_color), palette, voices, memory)
+
+    @property
+    def talker(self) -> Talker:
+        """Talker whose lip motion the clips show."""
+        return self._models.talker
+
+    @property
+    def palette(self) -> Palette | None:
+        """Palette with the styles of the gestures; None for a session without gestures."""
+        return self._models.palette
+
+    @property
+    def mesh(self) -> Face:
+        """Mesh of the face with the shapes of all channels.
+
+        Raises
+        ------
+        InputError
+            The face is a talker's own face, which has no mesh.
+        """
+        return self.face.mesh
+
+    @property
+    def face(self) -> AnimatedFace:
+        """Face whose channels the clips of this session use; `tts2face.write_clip` draws clips on it."""
+        return self._models.face()
+
+    def clip(self, text: str | Request | PreparedRequest, **options: Any) -> Clip:
+        """Synthesise the whole clip of a text or request.
+
+        Parameters
+        ----------
+        text
+            Text to speak, or a complete request, prepared or not.
+        options
+            Fields of `Request`, such as ``style="delighted"``; only with a text.
+
+        Raises
+        ------
+        InputError
+            The text is empty or contains characters that the voice cannot speak, or an option is invalid.
+        DataError
+            A file of the request is damaged, or the recording is silent or does not contain the words.
+        BackendError
+            The voice is not installed.
+        """
+        return concatenate_clips([piece.clip for piece in self.stream(text, **options)])
+
+    def stream(self, text: str | Request | PreparedRequest, **options: Any) -> Iterator[Piece]:
+        """Synthesise the clip of a text or request piece by piece, in bounded memory; arguments as for `clip`."""
+        return self._models.pieces(prepare_request(text, options))
+
+    def measure_speech(self, text: str | Request | PreparedRequest, **options: Any) -> SpeechSpan:
+        """Seconds at which the speech of a text begins and ends in its clip, without synthesis of motion.
+
+        The last utterances are kept, so that a following `stream` of the same text does not speak it again.
+        """
+        prepared = prepare_request(text, options)
+        return measure_speech(prepared, self._models.for_request(prepared, keeps_utterances=True).speech)
+
+    def stream_to_length(self, text: str | Request | PreparedRequest, n_frames: int, **options: Any) -> Iterator[Clip]:
+        """Synthesise the clip of a text or request in pieces with `n_frames` frames in total.
+
+        Idle animation follows the speech; speech beyond the last frame is cut. Head and face are at rest in the first
+        and last frame, so that such clips can be joined. Arguments and errors as `clip`.
+        """
+        prepared = prepare_request(text, options)
+        sound_end = self.measure_speech(prepared).total if prepared.request.is_text else None
+        length = Length(n_frames, self._models.n_fixed_channels)
+        yield from clips_of_length(prepared, sound_end, length, self._models.pieces)
+
+    def stream_speech(self, text: str | Request | PreparedRequest, **options: Any) -> Iterator[TimedSpeech]:
+        """Synthesise the speech of a text sentence by sentence: sound, phones and words as in its clip, no motion.
+
+        Arguments and errors as `clip`; a recording is refused.
+        """
+        prepared = prepare_request(text, options)
+        return timed_speech(prepared, self._models.for_request(prepared).speech)
+
+    def live(self, **options: Any) -> LiveSpeech:
+        """A clip without an end, extended by `say` and `idle` of the result; options and errors as `clip`."""
+        return LiveSpeech(Request(**options), self._models)
+
+    def listen(self, rate: int = FEATURE_RATE, *, audio_map: str | None = None) -> "LiveLips":
+        """Lip motion of speech that is still being spoken; arguments and errors as `LiveLips`."""
+        from tts2face.session.live import LiveLips
+
+        return LiveLips(self._models, rate, audio_map)
+
+    def stream_file(
+        self,
+        text: str | Request | PreparedRequest,
+        format: str = "mp4",
+        *,
+        picture: Picture | None = None,
+        threads: int | None = None,
+        **options: Any,
+    ) -> Iterator[Chunk]:
+        """Synthesise and encode the clip of a text or request; yields the file in chunks while it is made.
+
+        Parameters
+        ----------
+        text, picture, options
+            As for `write`.
+        format
+            A movie (mp4 in fragments, webm), sound (wav, mp3, opus, aac, flac, pcm), or lines (curves, oculus, azure,
+            livelink), or glb, whose bytes come when it is complete. Sound alone needs neither lips nor phones, and
+            starts sooner.
+        threads
+            Number of frames drawn in advance; None for one on each core.
+
+        Raises
+        ------
+        InputError, DataError, BackendError
+            As `write`; or the format is unknown or cannot be transparent.
+        """
+        picture, options = split_picture(picture, options)
+        prepared = prepare_request(text, options)
+        from tts2face.session.outputs import StreamFormat, encode_stream
+
+        return encode_stream(prepared, self._models, StreamFormat(format, picture, threads))
+
+    def write(
+        self,
+        text: str | Request | PreparedRequest,
+        out: str | Path,
+        *,
+        picture: Picture | None = None,
+        exports: Sequence[str | Path] = (),
+        on_progress: Progress | None = None,
+        on_piece: Callable[[Piece], None] | None = None,
+        **options: Any,
+    ) -> WrittenClip:
+        """Synthesise, draw and encode the clip of a text or request into a file.
+
+        Synthesis and drawing run in parallel, piece by piece.
+
+        Parameters
+        ----------
+        text
+            As for `clip`.
+        out
+            .mp4, .webm, .mov, .gif, or a folder of .png files. The file appears when it is complete; after an error no
+            partial file remains.
+        picture
+            Drawing options; if None, fields of `Picture` may be given among the options.
+        exports
+            Files of other formats written beside it, by suffix, as by `tts2face.export`.
+        on_progress
+            Called with the number of steps done and the total: characters of a text, or parts of a recording.
+        on_piece
+            Called with each piece before it is drawn.
+        options
+            Fields of `Request` and `Picture`, such as ``style="delighted"`` or ``size="768x768"``.
+
+        Raises
+        ------
+        InputError, DataError, BackendError
+            As `clip`; or the file cannot be written.
+        """
+        picture, options = split_picture(picture, options)
+        prepared = prepare_request(text, options)
+        outputs = plan_outputs(out, exports, input_paths(prepared.request, picture))
+        return self._write(prepared, outputs, picture, on_progress, on_piece)
+
+    def export(
+        self,
+        text: str | Request | PreparedRequest,
+        paths: str | Path | Sequence[str | Path],
+        *,
+        on_progress: Progress | None = None,
+        on_piece: Callable[[Piece], None] | None = None,
+        **options: Any,
+    ) -> WrittenClip:
+        """Synthesise the clip of a text or request into files of other programs, without drawing it.
+
+        Parameters
+        ----------
+        text, on_progress, on_piece, options
+            As for `write`, without fields of `Picture`.
+        paths
+            Output, or several; the suffix selects the format (docs/exports.md). The files appear when all are complete.
+
+        Raises
+        ------
+        InputError, DataError, BackendError
+            As `clip` and `tts2face.export`.
+        """
+        prepared = prepare_request(text, options)
+        exports = [paths] if isinstance(paths, str | Path) else paths
+        outputs = plan_outputs(None, exports, input_paths(prepared.request, Picture()))
+        return self._write(prepared, outputs, Picture(), on_progress, on_piece)
+
+    def write_performance(
+        self,
+        performance: "Performance",
+        out: str | Path | None,
+        *,
+        picture: Picture | None = None,
+        exports: Sequence[str | Path] = (),
+        stages: Callable[[str], Progress] | None = None,
+    ) -> WrittenClip:
+        """Transfer a recorded performance to the session's face and write the clip to a file.
+
+        Parameters
+        ----------
+        performance
+            The video or capture and its options.
+        out, picture, exports
+            As for `write`; without `out`, only the exports are written.
+        stages
+            Called with the name of each stage of the work; returns the progress callback of that stage.
+
+        Raises
+        ------
+        InputError, DataError, BackendError
+            As `tts2face.session.performance.perform`; or the file cannot be written, or is one of the inputs.
+        """
+        picture = picture or Picture()
+        inputs = {"the take": performance.take, "audio": performance.audio, "model": performance.model}
+        outputs = plan_outputs(out, exports, inputs | {"background": picture.background})
+        from tts2face.session.performance import write_take
+
+        return write_take(performance, self._models, (outputs, picture), stages)
+
+    def renderer(self, picture: Picture, *, has_gestures: bool = True) -> FrameRenderer:
+        """Renderer of the session's face for drawing options; the last few renderers are cached."""
+        return self._models.renderer(picture, has_gestures=has_gestures)
+
+    def animated_face(self, *, has_gestures: bool = True) -> AnimatedFace:
+        """Face whose channels the clips of requests with or without gestures use."""
+        return self._models.face(has_gestures=has_gestures)
+
+    def with_style(self, name: str, derived: Derivation) -> "Session":
+        """A session with one more derived style, which shares all models with this one.
+
+        Raises
+        ------
+        InputError
+            The name is taken or cannot be used, or the session has no palette.
+        """
+        new = copy(self)
+        new._models = self._models.with_style(name, derived)
+        return new
+
+    def _write(
+        self,
+        prepared: PreparedRequest,
+        outputs: OutputFiles,
+        picture: Picture,
+        on_progress: Progress | None,
+        on_piece: Callable[[Piece], None] | None,
+    ) -> WrittenClip:
+        has_gestures = prepared.request.has_gestures
+        self._models.preload_voice(prepared)
+        progress = RequestSteps(prepared.n_steps, on_progress)
+        face = self._models.face(has_gestures=has_gestures)
+        with ahead(self._models.pieces(prepared)) as pieces:  # spoken while the renderer is built
+            renderer = None if outputs.out is None else self.renderer(picture, has_gestures=has_gestures)
+            with outputs.open(face, renderer, progress.report_frames) as files:
+                return write_pieces(pieces, files, outputs, progress, on_piece)
+
+
+def _face_of(photo: str | Path, consent: str | None, smile: str | Path | None, others: tuple[object, ...]) -> Face:
+    """Face of a photo, beside which there are no other choices of a face."""
+    from tts2face.photo.face_from_photo import face_from_photo
+
+    if any(other is not None for other in others):
+        raise InputError("a photo has its own face and hair; remove face, identity and hair, or the photo")
+    return face_from_photo(photo, consent=consent, smile=smile)

@@ -1,0 +1,315 @@
+"""Synthesis of sentences with marks: sound with pauses, and the times of the marks.
+
+Speaking rate and level of a voice under a style of gestures.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache
+from itertools import pairwise
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import InputError
+from lexicon.marked_text import Mark, MarkedText, NameMark, NodMark, StyleRun
+from lexicon.pronounce import PAUSES_S
+from lexicon.sentences import Phrase, Sentence, index_by_letters, n_letters
+from lexicon.sequence import PhoneSequence, WordSpan
+from tts2face.gestures.elements import Nod, StyleSpan, span_weights
+from tts2face.gestures.timeline import Timeline, parse_style
+from tts2face.models.palette import FEATURES, PLAIN, Delivery
+from tts2face.request import Request
+from tts2face.session.joining import (
+    LetterTimes,
+    SentenceTimes,
+    WordTimes,
+    join_utterances,
+    resampled_speech,
+    silent_speech,
+    trim_end,
+)
+from tts2face.session.prepared import innermost_styles
+from tts2face.sound.level import level_speech
+from tts2face.sound.voice import SpeechInput, SpokenWord, Voice, apply_volume
+from tts2face.sound.voice_pool import has_voice, speaks
+from tts2face.types import GiveWay, Speech, Waveform, concatenate_speech, first_sample, frame_count, keep_on
+
+Deliveries = Mapping[str, Delivery]  # of a palette's styles, by name
+NO_DELIVERIES: Deliveries = MappingProxyType({})
+
+
+def delivery_of(part: Phrase, runs: Sequence[StyleRun], request: Request, deliveries: Deliveries) -> Delivery:
+    """Delivery of a phrase: that of the style of most of its letters, if the style is one of the whole face.
+
+    A rate or volume that the request or a mark sets replaces that of the style.
+    """
+    if request.plain_delivery:
+        return PLAIN
+    found = deliveries.get(_whole_style(request.style, _longest_run(part, runs).styles), PLAIN)
+    has_volume = request.volume != 1.0 or any(run.volume != 1.0 for run in runs)
+    return Delivery(
+        1.0 if request.rate != 1.0 or part.rate != 1.0 else found.rate, 0.0 if has_volume else found.level_db
+    )
+
+
+def _longest_run(part: Phrase, runs: Sequence[StyleRun]) -> StyleRun:
+    """The run with most letters of a phrase; the first of equal ones."""
+    ends = [*(run.start for run in runs[1:]), part.last]
+    lengths = [min(end, part.last) - max(run.start, part.first) for run, end in zip(runs, ends, strict=True)]
+    return runs[lengths.index(max(lengths))]
+
+
+@lru_cache(maxsize=1000)
+def _whole_style(base: str | None, nested: tuple[str, ...]) -> str:
+    """Name of the style that all features have; empty if they differ or have none."""
+    chosen: dict[str, str] = {}
+    for written in ([base] if base is not None else []) + list(nested):
+        chosen |= parse_style(written)
+    names = {chosen.get(feature, "") for feature in FEATURES}
+    return names.pop() if len(names) == 1 else ""
+
+
+MIN_UTTERANCE_GAP_S = 0.02  # between utterances of a sentence; less would cut into speech (edges are exact to 16 ms)
+SPEED_CHANGE_PAUSE_S = 0.06  # between utterances that differ in speed only
+IDLE_PART_S = 10.0  # length of the parts of idle animation, similar to a long sentence
+IDLE_RATE = 48_000  # Hz, sample rate of idle animation
+LOUDNESS_RAMP_S = 0.03  # transition between two loudness levels
+
+Floats = NDArray[np.float64]
+Voices = Callable[[str | None, str], Voice]  # a voice by name (None: the best one) and language
+
+
+@dataclass(frozen=True, slots=True)
+class MarkTime:
+    """A named mark and its time in seconds."""
+
+    name: str
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpokenSentence:
+    """A synthesised sentence; times are relative to its start.
+
+    Parameters
+    ----------
+    speech
+        Speech as the voice returns it, from which motion is computed.
+    timeline
+        Gestures requested by the marks.
+    marks
+        Named marks.
+    sound
+        Sound of `speech` at the loudness of the clip.
+    """
+
+    speech: Speech
+    timeline: Timeline
+    marks: tuple[MarkTime, ...]
+    sound: Waveform
+
+
+def speak_sentence(
+    voice: Voice,
+    sentence: Sentence,
+    request: Request,
+    voices: Voices | None = None,
+    give_way: GiveWay = keep_on,
+    *,
+    deliveries: Deliveries = NO_DELIVERIES,
+) -> SpokenSentence:
+    """Synthesise a sentence with its pauses, speeds and loudness, and compute the times of its marks.
+
+    The speech of a sentence without marks equals the output of the voice, byte for byte. The sound is normalised to the
+    loudness of all clips, to which the loudness of the request and of the marks is relative. `give_way` is called
+    between the steps.
+
+    Parameters
+    ----------
+    voice
+        Voice of the request.
+    voices
+        Returns the voice of a name and a language, for spans in another voice or language; their sound is resampled to
+        the sample rate of `voice`.
+    deliveries
+        Of the styles of the palette.
+
+    Raises
+    ------
+    InputError
+        A voice cannot speak the text, or `voices` is None and the sentence needs other voices.
+    """
+    spoken: list[Speech] = []
+    word_times: list[WordTimes] = []
+    gains: list[Floats] = []
+    volumes: list[float] = []  # of the sound; motion follows the voice's own loudness
+    for part in sentence.utterances:
+        speaker = speaker_of(part, voice, request, voices)
+        delivery = delivery_of(part, sentence.runs, request, deliveries)
+        rate = request.rate * part.rate * delivery.rate
+        speech = speaker.speak(phrase_content(part), rate=rate, seed=request.seed)
+        speech = _ended(resampled_speech(speech, voice.sample_rate), sentence, part)
+        language = part.language or request.language
+        times_of_part = WordTimes(part.source, speech.phones, speech.words, language=language, first=part.first)
+        spoken.append(speech)
+        word_times.append(times_of_part)
+        gains.append(_gain(speech.waveform, sentence.runs, part, times_of_part))
+        volumes.append(request.volume * delivery.volume)
+    scaled = [_scale_speech(speech, request.volume, gain) for speech, gain in zip(spoken, gains, strict=True)]
+    speech, begins = _join_sentence(scaled, sentence, voice.sample_rate)
+    give_way()
+    levelled = level_speech(spoken, [volume * gain for volume, gain in zip(volumes, gains, strict=True)], give_way)
+    sound = _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
+    times = SentenceTimes(tuple(part.first for part in sentence.utterances), tuple(word_times), tuple(begins))
+    return SpokenSentence(
+        speech, *resolve_marks(sentence.runs, sentence.marks, times, (sentence.first, sentence.last)), sound
+    )
+
+
+def sentence_sound(
+    voice: Voice,
+    sentence: Sentence,
+    request: Request,
+    voices: Voices | None = None,
+    *,
+    deliveries: Deliveries = NO_DELIVERIES,
+) -> Waveform:
+    """Sound of `speak_sentence`, byte for byte, without aligning the phones of a sentence that needs no edges."""
+    part = sentence.utterances[0]
+    if len(sentence.utterances) > 1 or any(run.volume != 1.0 for run in sentence.runs):
+        return speak_sentence(voice, sentence, request, voices, deliveries=deliveries).sound
+    speaker = speaker_of(part, voice, request, voices)
+    delivery = delivery_of(part, sentence.runs, request, deliveries)
+    rate = request.rate * part.rate * delivery.rate
+    sound = speaker.sound(phrase_content(part), rate=rate, seed=request.seed)
+    whole = _ended(resampled_speech(Speech.without_phones(sound), voice.sample_rate), sentence, part)
+    levelled = level_speech([whole], [request.volume * delivery.volume * np.ones(1)])
+    return _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
+
+
+def _ended(speech: Speech, sentence: Sentence, part: Phrase) -> Speech:
+    """Speech of a phrase with little silence after it if the written sentence continues after its last phrase."""
+    return trim_end(speech) if sentence.is_cut and part is sentence.utterances[-1] else speech
+
+
+def phrase_content(part: Phrase) -> SpeechInput:
+    """Words of a phrase with their phones, or its text."""
+    return [SpokenWord(word.text, word.segments, word.after) for word in part.words] or part.text
+
+
+def speaker_of(part: Phrase, voice: Voice, request: Request, voices: Voices | None) -> Voice:
+    """Voice of a phrase: the request's, or for a span with a voice or language of its own, the matching one.
+
+    Raises
+    ------
+    InputError
+        `voices` is None and the phrase needs another voice, or no voice has this name or language.
+    """
+    if part.voice is None and part.language is None:
+        return voice
+    if voices is None:
+        raise InputError("a text with spans of other voices or languages needs voices to speak them")
+    return voices(voice_in(part.voice or request.voice, part.language), part.language or request.language)
+
+
+def voice_in(name: str | None, language: str | None) -> str | None:
+    """`name` if that voice speaks `language` (None: the language of the text), else None for the default voice."""
+    if language is None or name is None or (has_voice(name) and speaks(name, language)):
+        return name
+    return None
+
+
+def _join_sentence(speeches: Sequence[Speech], sentence: Sentence, rate: int) -> tuple[Speech, list[float]]:
+    """Utterances of a sentence with its pauses, and the start of each in seconds."""
+    speech, begins = join_utterances(speeches, [_pause_after(part) for part in sentence.utterances[:-1]])
+    if sentence.leading_pause > 0:
+        before = silent_speech(sentence.leading_pause, rate)
+        speech, begins = concatenate_speech([before, speech]), [second + before.waveform.duration for second in begins]
+    if pause := sentence.utterances[-1].pause:
+        speech = concatenate_speech([speech, silent_speech(pause, rate)])
+    return speech, begins
+
+
+def silent_sentences(seconds: float, fps: Fraction, n_steps: int) -> Iterator[tuple[SpokenSentence, int]]:
+    """Yield silence in parts of up to `IDLE_PART_S` that end on frames, with the progress steps of each part."""
+    n_frames = frame_count(seconds, float(fps))
+    bounds = [*range(0, n_frames, max(round(IDLE_PART_S * fps), 1)), n_frames]
+    for first, last in pairwise(bounds):
+        n_samples = first_sample(last, IDLE_RATE, fps) - first_sample(first, IDLE_RATE, fps)
+        steps = n_steps * last // n_frames - n_steps * first // n_frames
+        silence = silent_speech(n_samples / IDLE_RATE, IDLE_RATE)
+        yield SpokenSentence(silence, Timeline(), (), silence.waveform), steps
+
+
+def resolve_marks(
+    runs: Sequence[StyleRun], marks: Sequence[Mark], times: LetterTimes, letters: tuple[int, int]
+) -> tuple[Timeline, tuple[MarkTime, ...]]:
+    """Convert marks in a range of letters to a timeline and named marks, by the times of the letters.
+
+    A style that starts at the first letter starts at 0 s, and one that reaches the last letter has no end. Other styles
+    start with their first word and end with their last word, or at the onset of the next style.
+    """
+    first, last = letters
+    spans: list[StyleSpan] = []
+    previous_end = 0.0
+    for run, following in zip(runs, [*runs[1:], None], strict=True):
+        start = max(times.onset(run.start) if run.start > first else 0.0, previous_end)
+        if following is None or following.start >= last:
+            end = math.inf
+        else:
+            end = times.onset(following.start) if following.styles else times.end(following.start)
+        previous_end = max(end, previous_end)
+        if start < end:
+            spans += [StyleSpan(feature, style, start, end) for feature, style in innermost_styles(run.styles).items()]
+    nods = tuple(Nod(times.onset(mark.at), mark.size) for mark in marks if isinstance(mark, NodMark))
+    names = tuple(MarkTime(mark.name, times.onset(mark.at)) for mark in marks if isinstance(mark, NameMark))
+    return Timeline(spans=tuple(spans), nods=nods), names
+
+
+def resolve_recording_marks(
+    text: MarkedText, phones: PhoneSequence, words: Sequence[WordSpan], language: str
+) -> tuple[Timeline, tuple[MarkTime, ...]]:
+    """As `resolve_marks`, for a recording; an empty timeline if its words are unknown."""
+    if not words:
+        return Timeline(), ()
+    indexed = index_by_letters(text)
+    times = WordTimes(text.text, phones, words, language=language)
+    return resolve_marks(indexed.runs, indexed.marks, times, (0, n_letters(text.text)))
+
+
+def _pause_after(utterance: Phrase) -> float:
+    """Pause in seconds between an utterance and the next one of its sentence."""
+    if utterance.pause is not None:
+        return max(utterance.pause, MIN_UTTERANCE_GAP_S)
+    return max(PAUSES_S.get(utterance.source[-1:], 0.0), SPEED_CHANGE_PAUSE_S)
+
+
+def _gain(sound: Waveform, runs: Sequence[StyleRun], part: Phrase, times: WordTimes) -> Floats:
+    """(n,) or (1,) gain of an utterance's samples, from the loudness of its runs."""
+    volumes = [
+        (run.volume, max(run.start, part.first), end)
+        for run, end in zip(runs, [*(run.start for run in runs[1:]), part.last], strict=True)
+        if run.start < part.last and end > part.first
+    ]
+    if all(volume == 1.0 for volume, _, _ in volumes):
+        return np.ones(1)
+    seconds = np.arange(len(sound.samples)) / sound.rate
+    gain = np.ones(len(seconds))
+    for volume, first, last in volumes:
+        start = times.onset(first) if first > part.first else 0.0
+        end = times.end(last) if last < part.last else math.inf
+        if start < end:
+            gain += (volume - 1.0) * span_weights(seconds, start, end, LOUDNESS_RAMP_S)
+    factors: Floats = np.maximum(gain, 0.0)
+    return factors
+
+
+def _scale_speech(speech: Speech, volume: float, gain: Floats) -> Speech:
+    """Speech times a volume and a gain, limited to full scale, from which motion is computed."""
+    samples = apply_volume(speech.waveform.samples, volume)
+    scaled = samples if len(gain) == 1 else apply_volume(samples * gain, 1.0)
+    return replace(speech, waveform=Waveform(scaled, speech.waveform.rate))

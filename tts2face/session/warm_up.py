@@ -1,0 +1,149 @@
+"""Compilation of all kernels at the first run on a machine; later runs load them from the disk cache.
+
+The kernels of motion, of gestures and of strands are compiled in child processes while this process compiles the
+other drawing kernels, because numba compiles one kernel at a time in each process.
+
+Loading of a request's voice ahead of its use; a module without heavy imports.
+"""
+
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import MappingProxyType, ModuleType
+from typing import Any
+
+import numpy as np
+
+from lexicon.errors import BackendError
+from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.lips import tokens
+from tts2face.models.face import Face, keep_parts
+from tts2face.models.face_loading import load_face
+from tts2face.models.talker import Talker
+from tts2face.picture.options import Picture
+from tts2face.processes.child import Call, Handler
+from tts2face.processes.parent import Child
+from tts2face.processes.program import Program
+from tts2face.session.prepared import PreparedRequest
+from tts2face.sound.voice_pool import VoicePool
+
+COMPILE_TIMEOUT_S = 120.0
+
+
+def kernels_are_compiled(drawn: Face | None) -> bool:
+    """Whether the kernels of motion, and those that draw a face, are in the disk cache.
+
+    Compiling them delays the first result by some seconds.
+    """
+    kernels: list[tuple[ModuleType, str]] = [(tokens, "sample_tokens")]
+    if drawn is not None:
+        from tts2face.picture.baked import surface
+        from tts2face.picture.kernels import raster
+
+        kernels.append((surface, "find_nearest") if drawn.light else (raster, "draw_band"))
+    return all(_index_files(module, name) for module, name in kernels)
+
+
+def compile_kernels(drawn: Face | None) -> None:
+    """Compile all kernels that a clip of a face needs; None for a clip without pictures.
+
+    If a child process fails, its kernels are compiled at their first use.
+    """
+    from tts2face.face.deformation import REST_HEAD
+    from tts2face.picture.renderer import draw
+    from tts2face.picture.surface import STRANDS
+
+    has_strands = drawn is not None and not drawn.light
+    works = ["compile_motion", "compile_gestures", *(["compile_strands"] if has_strands else [])]
+    children = [Child(Program(f"{__name__}:HANDLERS")) for _ in works]
+    threads = [
+        threading.Thread(target=_compile, args=(child, work), daemon=True)
+        for child, work in zip(children, works, strict=True)
+    ]
+    for thread in threads:
+        thread.start()
+    try:
+        if drawn is not None:
+            face = keep_parts(drawn, lambda part: part.kind != STRANDS) if has_strands else drawn
+            head = np.full(len(REST_HEAD), 0.01, np.float32)
+            draw(face, np.zeros(len(face.shape_names), np.float32), head, picture=Picture(size="64x64"))
+        for thread in threads:
+            thread.join()
+    finally:
+        for child in children:
+            child.close()
+
+
+def _compile(child: Child, work: str) -> None:
+    with suppress(BackendError):  # its kernels are compiled at their first use
+        child.call(work, {}, timeout_s=COMPILE_TIMEOUT_S)
+
+
+def _index_files(module: ModuleType, name: str) -> list[Path]:
+    folder = Path(str(getattr(module, name).stats.cache_path))
+    return list(folder.glob(f"{module.__name__.rpartition('.')[2]}.{name}-*.nbi"))
+
+
+def compile_strands() -> None:
+    """Compile the kernels of hair, lashes and brows, a quarter of the drawing kernels' time, without the others."""
+    from tts2face.picture.camera import camera_matrices
+    from tts2face.picture.kernels.picture import allocate_buffers, arrange_cards, blend_strands
+    from tts2face.picture.kernels.strands import light_strands
+    from tts2face.picture.kernels.tables import FIRST_LIGHT_ROW, LAMPS
+    from tts2face.picture.surface import build_surface
+
+    face, picture = load_face("head"), Picture(size="16x16")
+    surface, optics = build_surface(face), camera_matrices(picture.view, face, (16, 16))
+    buffers, cards = allocate_buffers(surface, (16, 16), picture.samples_per_side), surface.strands
+    lights = np.zeros((FIRST_LIGHT_ROW + len(LAMPS), 6), np.float32)
+    exposure, turn = np.zeros((len(face.vertices), 1 + len(LAMPS)), np.float32), np.eye(3, dtype=np.float32)
+    light = (exposure, lights, optics.lens)
+    light_strands(cards.vertices, cards.outward @ turn, cards.tangents @ turn, light, buffers.vertex, buffers.strands)
+    blend_strands(surface, arrange_cards(cards, buffers.strands), 0, lights, buffers)
+
+
+def compile_motion() -> None:
+    """Compile the kernels of lip synthesis and retargeting by synthesising one second of motion."""
+    from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
+    from tts2face.lips.retargeting import build_retargeter
+    from tts2face.models.talker import load_talker
+
+    talker: Talker = load_talker("grid_s1")
+    retargeter = build_retargeter(talker, load_face("head"))
+    phones = PhoneSequence([SILENCE, "p", "f", "ɑ", SILENCE], [0.0, 0.3, 0.4, 0.5, 0.7, 1.0])
+    retargeter.retarget(speech_trajectory(phones, build_exemplar_model(talker), fps=30.0, n_frames=30))
+
+
+def compile_gestures() -> None:
+    """Compile the kernels of gestures and of the level of sound by three frames of gestures."""
+    from tts2face.gestures.stream import GestureFields, GestureStream
+    from tts2face.gestures.timeline import Timeline
+    from tts2face.models.palette import load_palette
+    from tts2face.sound.level import block_powers
+    from tts2face.types import Waveform
+
+    gestures = GestureStream(GestureFields(load_palette("starter")), style="grid_s1", seed=0, fps=30.0)
+    sound = Waveform(np.zeros(1600), 16_000)
+    gestures.next(sound, 3, Timeline())
+    block_powers(sound)
+
+
+def _handler(work: Callable[[], None]) -> Handler:
+    def handle(_: Call) -> dict[str, Any]:
+        work()
+        return {}
+
+    return handle
+
+
+HANDLERS: Mapping[str, Handler] = MappingProxyType(
+    {work.__name__: _handler(work) for work in (compile_motion, compile_gestures, compile_strands)}
+)
+
+
+def preload_voice(voices: VoicePool, prepared: PreparedRequest) -> None:
+    """Load the voice of a request's text in a thread; none for a recording or a request without text."""
+    request = prepared.request
+    if request.text and not request.audio:
+        voices.preload(request.voice, request.language, prepared.dictionary)

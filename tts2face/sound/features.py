@@ -1,0 +1,301 @@
+"""Acoustic features of video frames: formants, MFCC, LPC, LSF, level (Theobald et al. 2007, section 3.2).
+
+Each frame is analysed in its own window of samples, so that block-wise analysis gives the same bytes as analysis of the
+whole sound.
+
+Intensity and pitch of a voice over time, as Praat defines them.
+"""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError, InputError
+from tts2face.sound.pauses import NOISE_QUANTILE, SPEECH_QUANTILE
+from tts2face.types import Trajectory, Waveform
+
+FEATURE_RATE = 16_000  # Hz, sample rate of the analysed sound
+WINDOW_S = 0.04  # effective length of the Gaussian window (T07, section 3.2)
+WINDOW_SAMPLES = 1361  # odd; twice the window length, at which Praat truncates its Gaussian, and 5 ms
+HALF_WINDOW_SAMPLES = WINDOW_SAMPLES // 2  # samples needed after a frame's time
+N_MFCC = 12
+LPC_ORDER = 16  # two for each kHz of the rate
+PRE_EMPHASIS_HZ = 50.0
+N_FORMANT_POLES = 8  # formants up to half the rate, one for each kHz; the first four are returned
+NEUTRAL_TUBE_HZ = (500.0, 1500.0, 2500.0, 3500.0)  # formants of a neutral vocal tract, for frames without formants
+NOISE_LEVEL = 3e-5  # relative to full scale; digital silence has neither logarithm nor formants
+WINDOWS_AT_ONCE = 1000  # 11 MB
+
+AnalysisWindows = NDArray[np.float64]
+Measure = Callable[[AnalysisWindows], NDArray[np.float64]]
+FEATURE_KINDS = ("formants", "mfcc", "lpc", "lsf", "level")
+
+
+def speech_features(sound: Waveform, kind: str, *, fps: float, n_frames: int, start: float = 0.0) -> Trajectory:
+    """(n_frames, D) features of a sound at the times ``start + i / fps``; the sound is padded with silence.
+
+    Parameters
+    ----------
+    sound
+        Sound at `FEATURE_RATE`.
+    kind
+        One of `FEATURE_KINDS`, or several as ``mfcc+lsf``: ``formants`` (4, Hz), ``mfcc`` (13, the first is the level),
+        ``lpc`` (16 prediction coefficients), ``lsf`` (16, rad), ``level`` (1, dB relative to full scale).
+    start
+        Time of the first frame in seconds.
+
+    Raises
+    ------
+    InputError
+        The kind does not exist, or the sound has another sample rate.
+    """
+    measures = feature_measures(kind)
+    if sound.rate != FEATURE_RATE:
+        raise InputError(f"features are measured at {FEATURE_RATE} Hz, not {sound.rate}; resample the sound")
+    centres = np.rint((start + np.arange(n_frames) / fps) * FEATURE_RATE).astype(np.int64)
+    parts = [
+        measure_windows(analysis_windows(sound.samples, centres[at : at + WINDOWS_AT_ONCE]), measures)
+        for at in range(0, n_frames, WINDOWS_AT_ONCE)
+    ]
+    values = np.concatenate(parts)
+    return Trajectory([f"{kind}.{i}" for i in range(values.shape[1])], values, fps)
+
+
+def feature_measures(kind: str) -> tuple[Measure, ...]:
+    """Functions that compute a kind of feature, or several kinds joined by ``+``.
+
+    Raises
+    ------
+    InputError
+        A kind does not exist.
+    """
+    names = kind.split("+")
+    for name in names:
+        if name not in MEASURES:
+            raise InputError(f"there is no feature {name!r}; choose {', '.join(FEATURE_KINDS)}")
+    return tuple(MEASURES[name] for name in names)
+
+
+def measure_windows(windows: AnalysisWindows, measures: tuple[Measure, ...]) -> NDArray[np.float32]:
+    """(T, D) features of T windows; the columns of all measures are concatenated."""
+    if not len(windows):  # Praat does not accept sounds without samples
+        return measure_windows(np.zeros((1, WINDOW_SAMPLES)) + NOISE_LEVEL, measures)[:0]
+    return np.concatenate([measure(windows) for measure in measures], axis=1).astype(np.float32)
+
+
+def analysis_windows(samples: NDArray[np.float32], centres: NDArray[np.int64]) -> AnalysisWindows:
+    """(T, `WINDOW_SAMPLES`) samples around T indices, padded with zeros, plus a fixed noise of `NOISE_LEVEL`."""
+    first = max(int(centres.min(initial=len(samples))) - HALF_WINDOW_SAMPLES, 0)
+    last = max(int(centres.max(initial=0)) + HALF_WINDOW_SAMPLES + 1, first)
+    part = np.zeros(last - first + 2 * WINDOW_SAMPLES)
+    available = samples[first:last]
+    part[WINDOW_SAMPLES : WINDOW_SAMPLES + len(available)] = available
+    starts = np.clip(centres - HALF_WINDOW_SAMPLES - first + WINDOW_SAMPLES, 0, len(part) - WINDOW_SAMPLES)
+    noise = np.random.default_rng(0).normal(0.0, NOISE_LEVEL, WINDOW_SAMPLES)
+    return np.asarray(part[starts[:, None] + np.arange(WINDOW_SAMPLES)] + noise, np.float64)
+
+
+def mfcc(windows: AnalysisWindows) -> NDArray[np.float64]:
+    """(T, 13) mel-frequency cepstral coefficients of T windows; the first is the level."""
+    sound = _concatenate_windows(
+        np.concatenate([windows, windows[-1:]])
+    )  # for a single frame Praat returns the level only
+    found = sound.to_mfcc(number_of_coefficients=N_MFCC, window_length=WINDOW_S, time_step=_sample_step(windows))
+    return np.asarray(found.to_array().T[: len(windows)], np.float64)
+
+
+def lpc(windows: AnalysisWindows) -> NDArray[np.float64]:
+    """(T, 16) linear prediction coefficients of T windows, by autocorrelation."""
+    from parselmouth.praat import call
+
+    analysis = ("To LPC (autocorrelation)...", LPC_ORDER, WINDOW_S, _sample_step(windows), PRE_EMPHASIS_HZ)
+    found = call(call(_concatenate_windows(windows), *analysis), "Down to Matrix (lpc)")
+    return np.asarray(found.values.T, np.float64)
+
+
+def lsf(windows: AnalysisWindows) -> NDArray[np.float64]:
+    """(T, 16) line spectral frequencies of T windows in radians."""
+    return line_spectral_frequencies(lpc(windows))
+
+
+def line_spectral_frequencies(coefficients: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(T, M) angles in (0, pi), increasing, of T all-pole filters ``1 / A(z)``.
+
+    Parameters
+    ----------
+    coefficients : (T, M)
+        ``a_1 ... a_M`` of ``A(z) = 1 + sum_k a_k z^-k``; M is even, and A has its roots inside the unit circle.
+
+    Raises
+    ------
+    InputError
+        M is odd or 0.
+
+    Notes
+    -----
+    ``P, Q = A(z) +- z^-(M+1) A(1/z)`` have their roots on the unit circle (Itakura 1975). Without those at z = -1 and
+    z = 1 each is a polynomial in cos w, written in Chebyshev polynomials; its roots are the eigenvalues of their
+    colleague matrix (Good 1961).
+    """
+    n_frames, order = coefficients.shape
+    if order == 0 or order % 2:
+        raise InputError(f"line spectral frequencies need an even number of coefficients above 0, not {order}")
+    filters = np.concatenate([np.ones((n_frames, 1)), coefficients, np.zeros((n_frames, 1))], axis=1)
+    mirrored = filters[:, ::-1]
+    signs = (-1.0) ** np.arange(order + 2)
+    half = order // 2
+    quotients = (  # long division by 1 + z^-1 and 1 - z^-1; the first half, middle included, of a symmetric polynomial
+        (signs * np.cumsum(signs * (filters + mirrored), axis=1))[:, : half + 1],
+        np.cumsum(filters - mirrored, axis=1)[:, : half + 1],
+    )
+    angles = [np.arccos(np.clip(_chebyshev_roots(quotient[:, ::-1]), -1.0, 1.0)) for quotient in quotients]
+    return np.sort(np.concatenate(angles, axis=1), axis=1)
+
+
+def _chebyshev_roots(middle_out: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(T, n) real roots of ``c_0 / 2 + sum_k c_k T_k(x)``, doubled, for (T, n + 1) coefficients c."""
+    n = middle_out.shape[1] - 1
+    series = 2.0 * middle_out
+    series[:, 0] /= 2.0
+    colleague = np.zeros((len(series), n, n))
+    rows = np.arange(n - 1)
+    colleague[:, rows, rows + 1] = 0.5
+    colleague[:, rows + 1, rows] = 0.5
+    if n > 1:
+        colleague[:, 0, 1] = 1.0
+    leading = series[:, n:] * (2.0 if n > 1 else 1.0)
+    colleague[:, n - 1] -= series[:, :n] / leading
+    return np.asarray(np.linalg.eigvals(colleague).real, np.float64)
+
+
+def formants(windows: AnalysisWindows) -> NDArray[np.float64]:
+    """(T, 4) first formants of T windows in Hz; `NEUTRAL_TUBE_HZ` if none is found."""
+    even = windows[:, :-1]  # with an even length, no sample lies at the middle, where Praat would round
+    found = _concatenate_windows(even).to_formant_burg(
+        time_step=_sample_step(even),
+        max_number_of_formants=N_FORMANT_POLES,
+        maximum_formant=FEATURE_RATE / 2,
+        window_length=WINDOW_S,
+        pre_emphasis_from=PRE_EMPHASIS_HZ,
+    )
+    instants = found.x1 + np.arange(len(even)) * found.dx
+    numbers = range(1, len(NEUTRAL_TUBE_HZ) + 1)
+    values = np.array([[found.get_value_at_time(number, at) for number in numbers] for at in instants])
+    return np.where(np.isfinite(values), values, NEUTRAL_TUBE_HZ)
+
+
+def level(windows: AnalysisWindows) -> NDArray[np.float64]:
+    """(T, 1) level of T windows in dB relative to full scale, with a Hann taper of twice `WINDOW_S`."""
+    taper = np.hanning(windows.shape[1])
+    power = np.square(windows) @ taper / taper.sum()
+    return np.asarray(10.0 * np.log10(power)[:, None], np.float64)
+
+
+def speech_level(levels: NDArray[np.floating]) -> float:
+    """Mean in dB of those (T, 1) levels that exceed the midpoint of the noise and speech levels."""
+    noise, speech = np.quantile(levels, NOISE_QUANTILE), np.quantile(levels, SPEECH_QUANTILE)
+    return float(levels[levels >= (noise + speech) / 2].mean())
+
+
+MEASURES: Mapping[str, Measure] = MappingProxyType(
+    dict(zip(FEATURE_KINDS, (formants, mfcc, lpc, lsf, level), strict=True))
+)
+
+
+def _sample_step(windows: AnalysisWindows) -> float:
+    return float(windows.shape[1] / FEATURE_RATE)
+
+
+def _concatenate_windows(windows: AnalysisWindows) -> Any:
+    import parselmouth
+
+    return parselmouth.Sound(windows.ravel(), sampling_frequency=FEATURE_RATE)
+
+
+LOUDNESS_WINDOW_S, STEP_S = 0.064, 0.008  # analysis window and interval of Praat for a pitch of 100 Hz or more
+THRESHOLD_POWER = 4e-10  # square of 20 micropascals
+MIN_INTENSITY_DB = 0.0  # threshold of hearing, for digital silence, which has no level
+BESSEL_BORDER = 3.75
+BESSEL_SMALL = (1.0, 3.5156229, 3.0899424, 1.2067492, 0.2659732, 0.0360768, 0.0045813)
+BESSEL_LARGE = (
+    0.39894228, 0.01328592, 0.00225319, -0.00157565, 0.00916281, -0.02057706, 0.02635537, -0.01647633, 0.00392377,
+)  # fmt: skip
+PITCH_RANGE_HZ = (75.0, 600.0)  # Praat's default
+SEMITONES_PER_OCTAVE = 12.0
+
+
+def intensity(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(T,) intensity of a sound in dB relative to 20 micropascals, at times (T,) in seconds.
+
+    Raises
+    ------
+    DataError
+        The sound is shorter than the analysis window.
+
+    Notes
+    -----
+    Mean square in a Kaiser-20 window, less the mean, as Praat's *Sound: To Intensity*. Own code, since the library
+    takes 62 MB of memory at run time (decision 073).
+    """
+    period = 1.0 / sound.rate
+    half = int(np.floor(LOUDNESS_WINDOW_S / 2 / period))
+    duration = period * len(sound.samples)
+    n_frames = int(np.floor((duration - LOUDNESS_WINDOW_S) / STEP_S)) + 1
+    if n_frames < 1:
+        raise DataError(f"a sound of {sound.duration:.3f} s is too short to measure; give a longer recording")
+    place = np.arange(-half, half + 1) * period / (LOUDNESS_WINDOW_S / 2)
+    window = _bessel_i0((2 * np.pi**2 + 0.5) * np.sqrt(np.maximum(1.0 - place**2, 0.0)))
+    first = 0.5 * duration - 0.5 * (n_frames * STEP_S) + 0.5 * STEP_S
+    centres = first + np.arange(n_frames) * STEP_S
+    nearest = np.floor((centres - 0.5 * period) / period + 1.5) - 1.0  # rounds ties as Praat does
+    samples = sound.samples.astype(np.float64)
+    powers = np.zeros(n_frames)
+    for frame, centre in enumerate(nearest.astype(int)):
+        begin, end = max(centre - half, 0), min(centre + half + 1, len(samples))
+        part, weights = samples[begin:end], window[begin - centre + half : end - centre + half]
+        powers[frame] = np.square(part - part.mean()) @ weights / weights.sum()
+    levels = 10.0 * np.log10(np.maximum(powers / THRESHOLD_POWER, 10 ** (MIN_INTENSITY_DB / 10)))
+    at_times: NDArray[np.float64] = np.interp(times, centres, levels)
+    return at_times.astype(np.float32)
+
+
+def pitch(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(T,) pitch in semitones relative to the sound's median, at times (T,) in seconds; 0 for unvoiced frames.
+
+    Raises
+    ------
+    DataError
+        The sound is shorter than the analysis window.
+    """
+    import parselmouth
+
+    low, high = PITCH_RANGE_HZ
+    try:
+        praat_sound = parselmouth.Sound(sound.samples.astype(np.float64), sampling_frequency=sound.rate)
+        found = praat_sound.to_pitch_ac(pitch_floor=low, pitch_ceiling=high)
+    except parselmouth.PraatError as refused:
+        raise DataError(
+            f"a sound of {sound.duration:.3f} s is too short to have a pitch; give a longer one"
+        ) from refused
+    hertz = np.interp(times, found.xs(), found.selected_array["frequency"])
+    nearest = np.clip(np.rint((times - found.xs()[0]) / found.dx).astype(int), 0, found.n_frames - 1)
+    voiced = found.selected_array["frequency"][nearest] > low
+    if not voiced.any():
+        return np.zeros(len(times), np.float32)
+    median = float(np.median(hertz[voiced]))
+    semitones = SEMITONES_PER_OCTAVE * np.log2(np.maximum(hertz, low) / median)
+    return np.where(voiced, semitones, 0.0).astype(np.float32)
+
+
+def _bessel_i0(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Modified Bessel function of order 0 by the approximation that Praat uses, so that its levels are the same.
+
+    Source: Abramowitz and Stegun (1964), 9.8.1 and 9.8.2.
+    """
+    small = np.polynomial.polynomial.polyval((values / BESSEL_BORDER) ** 2, BESSEL_SMALL)
+    above = np.maximum(values, BESSEL_BORDER)
+    large = np.polynomial.polynomial.polyval(BESSEL_BORDER / above, BESSEL_LARGE) * np.exp(above) / np.sqrt(above)
+    return np.where(values < BESSEL_BORDER, small, large)

@@ -1,0 +1,293 @@
+"""The neural English voice ``heart`` of hibari-tts, with phone edges by forced alignment of its sound.
+
+The alphabet of the neural voice: letters of misaki, in which Kokoro and its students are trained, for phones.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import BackendError, DataError
+from lexicon.phones import PHONES, nearest_phones
+from lexicon.pronounce import Word
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.numeric.kernels import disable_telemetry
+from tts2face.sound.alignment import Aligner, SpeechAligner, enforce_increasing
+from tts2face.sound.voice import (
+    NativeRun,
+    PronunciationMap,
+    SpeechInput,
+    apply_volume,
+    pronounce_content,
+    split_spoken_sentences,
+)
+from tts2face.types import Speech, Waveform, concatenate_speech
+
+# Letters to phones of the table.
+PHONE_OF_LETTER = MappingProxyType({
+    "A": "eɪ", "I": "aɪ", "O": "oʊ", "Q": "oʊ", "W": "aʊ", "Y": "ɔɪ", "ʤ": "dʒ", "ʧ": "tʃ", "ə": "ə", "ɐ": "ə",
+    "ᵊ": "ə", "ᵻ": "ɪ", "ɪ": "ɪ", "i": "i", "ɛ": "ɛ", "æ": "æ", "a": "æ", "ɑ": "ɑ", "ɒ": "ɑ", "ɔ": "ɔ", "ʊ": "ʊ",
+    "u": "u", "ʌ": "ʌ", "ɜ": "ɝ", "ɚ": "ɚ", "e": "ɛ", "o": "ɔ", "ɹ": "ɹ", "r": "ɹ", "ð": "ð", "θ": "θ", "ʃ": "ʃ",
+    "ʒ": "ʒ", "ŋ": "ŋ", "j": "j", "ɡ": "ɡ", "T": "t", "ɾ": "t", "ʔ": "t", "h": "h", "x": "k", "b": "b", "d": "d",
+    "f": "f", "k": "k", "l": "l", "m": "m", "n": "n", "p": "p", "s": "s", "t": "t", "v": "v", "w": "w", "z": "z",
+})  # fmt: skip
+LETTERS_OF_PHONE = MappingProxyType({
+    "eɪ": "A", "aɪ": "I", "oʊ": "O", "aʊ": "W", "ɔɪ": "Y", "dʒ": "ʤ", "tʃ": "ʧ", "ə": "ə", "ɪ": "ɪ", "i": "i",
+    "ɛ": "ɛ", "æ": "æ", "ɑ": "ɑ", "ɔ": "ɔ", "ʊ": "ʊ", "u": "u", "ʌ": "ʌ", "ɝ": "ɜɹ", "ɚ": "əɹ", "ɹ": "ɹ", "ð": "ð",
+    "θ": "θ", "ʃ": "ʃ", "ʒ": "ʒ", "ŋ": "ŋ", "j": "j", "ɡ": "ɡ", "h": "h", "b": "b", "d": "d", "f": "f", "k": "k",
+    "l": "l", "m": "m", "n": "n", "p": "p", "s": "s", "t": "t", "v": "v", "w": "w", "z": "z",
+})  # fmt: skip
+STRESS_MARKS = MappingProxyType({1: "ˈ", 2: "ˌ"})
+_SYLLABIC, _SHORT_SCHWA = "ᵊ", "ɐ"
+_FLAP, _SHORT_I = "T", "ᵻ"
+_ENDINGS = MappingProxyType(
+    dict.fromkeys(("t", "d"), (("d",),)) | dict.fromkeys(("s", "z", "ʃ", "ʒ", "tʃ", "dʒ"), (("z",),))
+)  # -ed after a stop of the tongue, -es after a sibilant
+_BEFORE_FLAP = frozenset(phone for phone in LETTERS_OF_PHONE if PHONES[phone].is_vowel) | {"ɹ"}
+_ARTICLES = frozenset({("ə",), ("ə", "n"), ("ə", "m")})  # a, an, am
+
+
+def voice_phones(phones: Sequence[str]) -> list[str]:
+    """Phones of the voice's alphabet; a phone that the alphabet lacks is replaced by the nearest one."""
+    return [own for phone in phones for own in nearest_phones(phone, LETTERS_OF_PHONE.keys())]
+
+
+def word_letters(phones: Sequence[str], stress: Sequence[int]) -> tuple[str, tuple[int, ...]]:
+    """Letters of a word, and the place of the first letter of each of its `voice_phones`.
+
+    The alphabet distinguishes variants of one phone: /t/ between vowels is a flap unless a stressed vowel or a syllabic
+    /n/ follows, /ə/ before a final /l/ is short, and so is the vowel of the endings -ed and -es.
+
+    Parameters
+    ----------
+    phones, stress : N
+        Phones of the table and their stress: 1 primary, 2 secondary, 0 none.
+    """
+    pairs = [
+        (own, digit if at == 0 else 0)
+        for phone, digit in zip(phones, stress, strict=True)
+        for at, own in enumerate(nearest_phones(phone, LETTERS_OF_PHONE.keys()))
+    ]
+    letters, places = "", []
+    for at, (_, digit) in enumerate(pairs):
+        letters += STRESS_MARKS.get(digit, "")
+        places.append(len(letters))
+        letters += _variant(pairs, at)
+    is_article = tuple(phone for phone, _ in pairs) in _ARTICLES and pairs[0][1] == 0
+    return (_SHORT_SCHWA + letters[1:] if is_article else letters), tuple(places)
+
+
+def _variant(pairs: Sequence[tuple[str, int]], at: int) -> str:
+    """Letters of the phone at an index."""
+    phone, digit = pairs[at]
+    after = [following for following, _ in pairs[at + 1 : at + 3]]
+    if phone == "t" and 0 < at < len(pairs) - 1 and pairs[at - 1][0] in _BEFORE_FLAP:
+        is_unstressed = PHONES[after[0]].is_vowel and pairs[at + 1][1] == 0
+        return _FLAP if is_unstressed and after != ["ə", "n"] else "t"
+    if phone == "ə" and at > 0 and not digit and after[:1] == ["l"]:
+        return LETTERS_OF_PHONE[phone] if len(after) == 2 and PHONES[after[1]].is_vowel else _SYLLABIC
+    if phone in {"ə", "ɪ"} and not digit and at > 0 and tuple(after) in _ENDINGS.get(pairs[at - 1][0], ()):
+        return _SHORT_I
+    return LETTERS_OF_PHONE[phone]
+
+
+LANGUAGE = "en-us"
+CLAUSE_MARKS = frozenset({",", ";", ":"})
+MAX_LETTERS = 400  # the model accepts at most this many letters in one call
+DURATION_STEP_S = 0.025  # length of one step of the model's durations
+BOUNDARY_DELAY_S = 0.045  # delay of the model's own boundaries against its sound (41-51 ms)
+DURATION_TENSOR = "/Cast_32_output_0"  # internal tensor of the ONNX graph: steps of 25 ms for each letter
+# A network that returns its input: Hibari's constructor loads one, with an arena, and loading the voice's takes 0.1 s.
+IDENTITY_NETWORK = (
+    b'\x08\x08B\x02\x10\x11:+\n\x10\n\x01x\x12\x01y"\x08Identity\x12\x01e'
+    b"Z\t\n\x01x\x12\x04\n\x02\x08\x01b\t\n\x01y\x12\x04\n\x02\x08\x01"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class _Token:
+    """A spoken word with its phones, and its letters in the voice's alphabet with the punctuation after it."""
+
+    text: str
+    phones: tuple[str, ...]
+    letters: str
+    places: tuple[int, ...]  # index of the letter of each phone
+
+
+class NeuralVoice:
+    """The voice ``heart``: American English, 24 kHz. Not thread-safe.
+
+    Parameters
+    ----------
+    aligner
+        Aligns its sound with its phones; None for an aligner of its own.
+    run
+        Runs the model; None: within the call.
+    """
+
+    def __init__(
+        self, own_words: PronunciationMap, aligner: SpeechAligner | None = None, run: NativeRun | None = None
+    ) -> None:
+        self._own_words = own_words
+        disable_telemetry()
+        try:
+            from hibari import Hibari
+            from hibari.voices import voice_path
+        except ImportError as missing:
+            raise BackendError("the voice heart needs hibari-tts; run: pip install hibari-tts") from missing
+        self._path = Path(voice_path("heart"))
+        self._model: Any = Hibari(voice="heart", model=IDENTITY_NETWORK, threads=1)
+        session = _session_without_arena(str(self._path))
+        self._model.sess = session if run is None else _OwnRun(session, run)
+        self._aligner: SpeechAligner = aligner or Aligner()
+        pronounce_content("Hello.", LANGUAGE, {})  # reads the dictionary while other models are loaded
+
+    @property
+    def sample_rate(self) -> int:
+        """Sample rate in Hz."""
+        return int(self._model.sample_rate)
+
+    def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
+        """Synthesise a sentence; see `tts2face.sound.voice.Voice`."""
+        return concatenate_speech([self._speak_tokens(part, rate, seed) for part in self._spoken_parts(content)])
+
+    def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
+        """Sound without the alignment of its phones, which takes most of the time."""
+        sounds = [self._sound_of(part, rate, seed).samples for part in self._spoken_parts(content)]
+        return Waveform(np.concatenate(sounds), self.sample_rate)
+
+    def _spoken_parts(self, content: SpeechInput) -> list[list[_Token]]:
+        """Tokens of each part that the model synthesises in one call."""
+        words = pronounce_content(content, LANGUAGE, self._own_words)
+        return [part for sentence in split_spoken_sentences(words) for part in _cut_tokens([*map(_token, sentence)])]
+
+    def _speak_tokens(self, tokens: Sequence[_Token], rate: float, seed: int) -> Speech:
+        sound = self._sound_of(tokens, rate, seed)
+        try:
+            phones, spans = self._align(tokens, sound)
+        except DataError:
+            phones, spans = self._predict_phones(tokens, _joined_letters(tokens), rate, sound)
+        return Speech(sound, phones, spans)
+
+    def _sound_of(self, tokens: Sequence[_Token], rate: float, seed: int) -> Waveform:
+        samples = self._model.from_phonemes(_joined_letters(tokens), speed=rate, seed=seed)
+        return Waveform(apply_volume(samples), self.sample_rate)
+
+    def _align(self, tokens: Sequence[_Token], sound: Waveform) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+        found = self._aligner.align(sound, [(token.text, [token.phones]) for token in tokens])
+        return found.phones, found.words
+
+    def _predict_phones(
+        self, tokens: Sequence[_Token], letters: str, rate: float, sound: Waveform
+    ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+        """Phone edges from the model's durations, corrected for its delay, for sound that cannot be aligned."""
+        begins = np.concatenate([[0.0], np.cumsum(self._durations(letters, rate) * DURATION_STEP_S)])[1:]
+        labels, starts, spans, at = [SILENCE], [0.0], [], 0
+        for token in tokens:
+            spans.append(WordSpan(token.text, len(labels), len(labels) + len(token.phones)))
+            labels += token.phones
+            starts += [float(begins[at + place]) - BOUNDARY_DELAY_S for place in token.places]
+            at += len(token.letters) + 1
+        labels.append(SILENCE)
+        starts.append(min(float(begins[len(letters)]) - BOUNDARY_DELAY_S, sound.duration))
+        edges = enforce_increasing(np.array([*starts, sound.duration]))
+        return PhoneSequence(labels, edges), tuple(spans)
+
+    def _durations(self, letters: str, rate: float) -> NDArray[np.float64]:
+        """(L + 2,) durations in steps of `DURATION_STEP_S` of L letters and the padding at both ends."""
+        disable_telemetry()
+        import onnxruntime
+
+        graph = add_graph_output(self._path.read_bytes(), DURATION_TENSOR)
+        session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
+        inputs = {
+            "ids": np.array([self._model.ids(letters)], np.int64),
+            "speed": np.array([rate], np.float32),
+        }
+        steps: NDArray[np.float64] = np.asarray(session.run([DURATION_TENSOR], inputs)[0], np.float64).ravel()
+        return steps
+
+
+@dataclass(frozen=True, slots=True)
+class _OwnRun:
+    """An ONNX session whose runs can be ended."""
+
+    session: Any
+    native_run: NativeRun
+
+    def run(self, names: Any, inputs: Any) -> Any:
+        """Outputs of the model."""
+        import onnxruntime
+
+        options = onnxruntime.RunOptions()
+        options.log_severity_level = 4  # fatal errors; an end is none
+
+        def end() -> None:
+            options.terminate = True
+
+        return self.native_run(lambda: self.session.run(names, inputs, options), end)
+
+    def __getattr__(self, name: str) -> Any:
+        """Other attributes of the session."""
+        return getattr(self.session, name)
+
+
+def _session_without_arena(path: str) -> Any:
+    """ONNX session that frees its memory after each sentence; an arena would retain up to 100 MB."""
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 3  # errors
+    options.enable_cpu_mem_arena = options.enable_mem_pattern = False
+    return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+
+
+def _joined_letters(tokens: Sequence[_Token]) -> str:
+    return " ".join(token.letters for token in tokens)
+
+
+def _token(word: Word) -> _Token:
+    letters, places = word_letters(word.phones, word.stress)
+    return _Token(word.text, tuple(voice_phones(word.phones)), letters + word.mark, places)
+
+
+def _cut_tokens(tokens: Sequence[_Token]) -> Iterator[list[_Token]]:
+    """Divide tokens into parts of at most `MAX_LETTERS` letters, after a clause mark if the part has one."""
+    part: list[_Token] = []
+    length = 0
+    for token in tokens:
+        if part and length + len(token.letters) + 1 > MAX_LETTERS:
+            marks = [at for at, earlier in enumerate(part) if earlier.letters[-1:] in CLAUSE_MARKS]
+            keep = marks[-1] + 1 if marks else len(part)
+            yield part[:keep]
+            part = part[keep:]
+            length = sum(len(earlier.letters) + 1 for earlier in part)
+        part.append(token)
+        length += len(token.letters) + 1
+    if part:
+        yield part
+
+
+def add_graph_output(model: bytes, tensor: str) -> bytes:
+    """Add an output tensor to a serialised ONNX model.
+
+    Protocol buffers merge appended messages, so that the output is appended as a ``GraphProto`` (ONNX IR).
+    """
+    graph_field, output_field, name_field = 7, 12, 1
+    message = _length_delimited(name_field, tensor.encode())
+    return model + _length_delimited(graph_field, _length_delimited(output_field, message))
+
+
+def _length_delimited(field: int, content: bytes) -> bytes:
+    return _encode_varint(field << 3 | 2) + _encode_varint(len(content)) + content
+
+
+def _encode_varint(number: int) -> bytes:
+    low, rest = number & 0x7F, number >> 7
+    return bytes([low | 0x80]) + _encode_varint(rest) if rest else bytes([low])

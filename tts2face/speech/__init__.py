@@ -1,1 +1,0 @@
-"""Speech analysis: phone edges and features of sound."""

@@ -1,1 +1,0 @@
-"""Projects: edits, previews, files, and where they are kept."""

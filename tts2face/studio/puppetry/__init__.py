@@ -1,1 +1,0 @@
-"""Takes of a person who moves the head, recorded or live."""

@@ -1,1 +1,0 @@
-"""Recordings of a person, and the talkers that are built of them."""

@@ -1,1 +1,0 @@
-"""Own styles of a palette."""

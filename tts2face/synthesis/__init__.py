@@ -1,1 +1,0 @@
-"""Synthesis of clips from text, recorded speech and recorded performances."""

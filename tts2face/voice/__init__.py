@@ -1,1 +1,0 @@
-"""Speech synthesis: text to sound with phone edges."""
