@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 # Measured (docs/performance.md), at 25 frames/s, 2 x 2 samples, the neural voice
 JOIN_S = 0.08  # core seconds in which a batch joins a clip of 5 s
-DATABASE_S = 0.0046  # core seconds of PostgreSQL for a job, with the looks and signs of life of 200 workers
+DATABASE_S = 0.0046  # core seconds of PostgreSQL for a job, with the polls and heartbeats of 200 workers
 JOB_BYTES = 2000  # in the database, until it is pruned
 WORKER_GB = 0.75  # worker and its rendering process
 CONNECTIONS = 3  # of a worker

@@ -43,11 +43,11 @@ def _checked_read_only(values: ArrayLike, what: str, ndim: int) -> NDArray[np.fl
 
 
 Progress = Callable[[int, int], None]  # number of finished steps, number of all steps
-GiveWay = Callable[[], None]  # called between the steps of a computation, so that another one can run
+YieldTurn = Callable[[], None]  # called between the steps of a computation, so that another one can run
 
 
 def keep_on() -> None:
-    """Give way to nothing: `GiveWay` of a computation that runs alone."""
+    """Yield to nothing: `YieldTurn` of a computation that runs alone."""
 
 
 @dataclass(frozen=True, slots=True)

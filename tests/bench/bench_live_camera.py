@@ -34,7 +34,7 @@ def jpegs(folder: Path, count: int) -> list[bytes]:
     for clip in sorted(folder.iterdir()):
         for frame in read_frames(clip):
             if frame.pixels.std() < 2:
-                continue  # blank pictures at the begin
+                continue  # blank pictures at the start
             height = SIZE[1]
             width = round(frame.pixels.shape[1] * height / frame.pixels.shape[0])
             whole = np.full((height, SIZE[0], 3), 110, np.uint8)

@@ -1,6 +1,6 @@
 -- The statements that a worker sends to PostgreSQL in one interval of looking, as recorded by pg_stat_statements
 -- (dbos 3.4), for pgbench: :share is the share of intervals in which it ends a job and takes another one, in millionths;
--- :beats that of signs of life; :pause_us the time between two intervals.
+-- :beats that of heartbeats; :pause_us the time between two intervals.
 \set draw random(1, 1000000)
 SELECT * FROM dbos.queues WHERE name = 'tts2face-segments';
 \if :draw <= :share

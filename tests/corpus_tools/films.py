@@ -11,7 +11,7 @@ from tts2face.video.media import read_frames, read_sound
 
 
 def join_clips(sources: list[Path], out: Path, late_s: float = 0.0) -> list[tuple[float, float]]:
-    """Join clips to one MP4 with 44.1 kHz stereo sound; returns the begin and end of each in seconds.
+    """Join clips to one MP4 with 44.1 kHz stereo sound; returns the start and end of each in seconds.
 
     ``late_s`` delays the sound.
     """

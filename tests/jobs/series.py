@@ -14,7 +14,7 @@ class Episode:
     """A subtitle file: what is spoken from when on, by cue."""
 
     path: Path
-    spoken: dict[float, str] = field(default_factory=dict)  # seconds of the begin -> words
+    spoken: dict[float, str] = field(default_factory=dict)  # seconds of the start -> words
     n_defects: int = 0
 
 

@@ -17,7 +17,7 @@ MAX_SHARE = 0.3  # of the time after the voice in one step; 0.48 before gestures
 
 
 class InterruptedSpeechError(Exception):
-    """Raised where live speech gives way."""
+    """Raised where live speech yields."""
 
 
 class Turns:

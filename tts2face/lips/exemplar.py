@@ -31,7 +31,7 @@ from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.networks import PhoneNetwork
 from tts2face.models.talker import Talker, require_appearance, speech_channels
 from tts2face.numeric.arrays import interpolate_columns, smoothstep
-from tts2face.types import GiveWay, Trajectory, keep_on
+from tts2face.types import Trajectory, YieldTurn, keep_on
 
 RELEASE_FROM_S = 0.08  # distance from speech at which the transition to rest begins
 REST_FROM_S = 0.20  # distance from speech at which the face is at rest; recorded lips settle within 0.2 s
@@ -155,13 +155,13 @@ def speech_trajectory(
 
 
 def blend_trajectory(
-    selection: TokenSelection, exemplars: ExemplarModel, *, fps: float, n_frames: int, give_way: GiveWay = keep_on
+    selection: TokenSelection, exemplars: ExemplarModel, *, fps: float, n_frames: int, yield_turn: YieldTurn = keep_on
 ) -> Trajectory:
     """Motion of the talker's speech parameters from selected tokens; the first and the last frame are at rest.
 
     Parameters
     ----------
-    give_way
+    yield_turn
         Called between the steps.
 
     Notes
@@ -172,7 +172,7 @@ def blend_trajectory(
     """
     frame_times = np.arange(n_frames) / fps
     n_instants = int(np.ceil(max(selection.phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2
-    motion = _blend_motion(selection, exemplars, n_instants, give_way)
+    motion = _blend_motion(selection, exemplars, n_instants, yield_turn)
     return Trajectory(exemplars.channels, read_at_frames(motion, selection.phones, frame_times, exemplars.rest), fps)
 
 
@@ -190,7 +190,7 @@ def read_at_frames(
 
 
 def _blend_motion(
-    selection: TokenSelection, exemplars: ExemplarModel, n_instants: int, give_way: GiveWay
+    selection: TokenSelection, exemplars: ExemplarModel, n_instants: int, yield_turn: YieldTurn
 ) -> NDArray[np.float32]:
     """(n, D) motion at the instants of the clock."""
     targets, found, options = selection.targets, selection.found, selection.options
@@ -198,12 +198,12 @@ def _blend_motion(
     pieces = blending.average_tokens(exemplars.tokens, found.tokens, weights, exemplars.spread, options)
     joined, is_covered = blending.join_averages(pieces, targets, n_instants, options)
     speech = joined * exemplars.spread
-    give_way()
+    yield_turn()
     if exemplars.network is not None and options.network > 0:
         farness = interpolated_farness(targets, context_farness(selection), n_instants)[:, None]
         predicted = _network_motion(exemplars.network, selection.phones, n_instants)
         speech = speech + (options.network + (1 - options.network) * farness) * (predicted - speech)
-        give_way()
+        yield_turn()
     speech = exemplars.mean_speaking_pose + options.amplitude * (speech - exemplars.mean_speaking_pose)
     motion = np.where(is_covered[:, None], speech, exemplars.rest).astype(np.float32)
     motion = blending.gaussian_smooth(motion, options.smoothing_s, blending.CLOCK_HZ)

@@ -44,7 +44,7 @@ from tts2face.models.talker import Talker
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import FrameRenderer
 from tts2face.request import NATURAL
-from tts2face.types import GiveWay, Trajectory, keep_on, resting_head
+from tts2face.types import Trajectory, YieldTurn, keep_on, resting_head
 
 if TYPE_CHECKING:
     from tts2face.video.take import FaceCapture, Take
@@ -87,9 +87,9 @@ class AnimatedFace(Protocol):
         """
 
     def motion_of_tokens(
-        self, selection: TokenSelection, *, fps: float, n_frames: int, give_way: GiveWay = keep_on
+        self, selection: TokenSelection, *, fps: float, n_frames: int, yield_turn: YieldTurn = keep_on
     ) -> Trajectory:
-        """Speech motion (`n_frames`, K) from selected tokens of the talker; `give_way` is called between its steps."""
+        """Speech motion (`n_frames`, K) from selected tokens; `yield_turn` is called between its steps."""
 
     def motion_of_parameters(self, speech: Trajectory) -> Trajectory:
         """Speech motion (T, K) from the talker's speech parameters (T, S)."""
@@ -206,14 +206,14 @@ class MeshFace:
         return self.face if self.gestures is None else self.gestures.face
 
     def motion_of_tokens(
-        self, selection: TokenSelection, *, fps: float, n_frames: int, give_way: GiveWay = keep_on
+        self, selection: TokenSelection, *, fps: float, n_frames: int, yield_turn: YieldTurn = keep_on
     ) -> Trajectory:
         """Shape weights (`n_frames`, K) from selected tokens of the talker."""
-        lips = blend_trajectory(selection, self.exemplars, fps=fps, n_frames=n_frames, give_way=give_way)
+        lips = blend_trajectory(selection, self.exemplars, fps=fps, n_frames=n_frames, yield_turn=yield_turn)
         weights, options = self.retargeter.retarget(lips), selection.options
         if not options.contacts and options.articulation is None:
             return weights
-        give_way()
+        yield_turn()
         factor = DEFAULT_ARTICULATION if options.articulation is None else options.articulation
         return self.articulator.articulate(weights, selection.phones, factor)
 
@@ -312,11 +312,11 @@ class OwnAppearanceFace:
         raise InputError("a talker's own face has no mesh; choose --face head, ada or a .face file")
 
     def motion_of_tokens(
-        self, selection: TokenSelection, *, fps: float, n_frames: int, give_way: GiveWay = keep_on
+        self, selection: TokenSelection, *, fps: float, n_frames: int, yield_turn: YieldTurn = keep_on
     ) -> Trajectory:
         """Speech and appearance parameters (`n_frames`, K), both blended from the same selected tokens."""
-        lips = blend_trajectory(selection, self.exemplars, fps=fps, n_frames=n_frames, give_way=give_way)
-        give_way()
+        lips = blend_trajectory(selection, self.exemplars, fps=fps, n_frames=n_frames, yield_turn=yield_turn)
+        yield_turn()
         appearance = appearance_trajectory(selection, self.appearance, fps=fps, n_frames=n_frames)
         values = np.concatenate([lips.values, appearance.values], axis=1)
         return Trajectory(lips.channels + appearance.channels, values, fps)

@@ -23,7 +23,7 @@ from tts2face.numeric.reuse import NO_MEMORY, SentenceMemory
 from tts2face.request import FIELDS
 from tts2face.session.animated_face import AnimatedFace, FaceMotion
 from tts2face.session.prepared import PreparedRequest, marked_styles
-from tts2face.types import HEAD_CHANNELS, Clip, GiveWay, Speech, Trajectory, Waveform, keep_on
+from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, YieldTurn, keep_on
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +83,7 @@ class GestureLayer:
 
     Parameters
     ----------
-    give_way
+    yield_turn
         Called between the steps of a piece.
     memory
         Keeps the motion of pieces, so that a changed timeline repeats only the pieces from the change on.
@@ -99,11 +99,11 @@ class GestureLayer:
         prepared: PreparedRequest,
         fields: GestureFields,
         face: AnimatedFace,
-        give_way: GiveWay = keep_on,
+        yield_turn: YieldTurn = keep_on,
         memory: SentenceMemory = NO_MEMORY,
     ) -> None:
         self._requested = Timeline(style=face.default_styles).merge(prepared.timeline)
-        self._face, self._give_way, self._memory = face, give_way, memory
+        self._face, self._yield_turn, self._memory = face, yield_turn, memory
         self._history: Hashable = ("gestures", prepared.request.seed, prepared.request.gestures, prepared.request.pitch)
         palette, request = fields.palette, prepared.request
         self._requested.check_styles(palette)
@@ -130,7 +130,7 @@ class GestureLayer:
         self._seconds = 0.0
 
     def add(self, speech: Speech, lips: Trajectory, marks: Timeline) -> Clip:
-        """Add gestures to the next piece of the clip; after an exception of `give_way`, the next one is the same piece.
+        """Add gestures to the next piece of the clip; after an exception of `yield_turn`, the next is the same piece.
 
         Parameters
         ----------
@@ -166,7 +166,7 @@ class GestureLayer:
     ) -> tuple[GestureValues, GestureStream | NoiseStream]:
         """Gestures of the next piece, and the stream for the piece after it."""
         stream = (self._stream or self._first.result()).copy()
-        gestures = _gaze_relative_to_head(stream.next(sound, len(times), timeline, self._give_way))
+        gestures = _gaze_relative_to_head(stream.next(sound, len(times), timeline, self._yield_turn))
         if "gaze" in gestures and self._has_microsaccades:
             seed = self._requested.seeds.get("gaze", self._seed)
             gestures = {**gestures, "gaze": gestures["gaze"] + microsaccades(times, seed).astype(np.float32)}

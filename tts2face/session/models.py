@@ -159,7 +159,9 @@ class SessionModels:
         palette = self.palette if request.has_gestures else None
         if palette is None:
             return None
-        return GestureLayer(prepared, self._fields(palette, request), self.face(), self._voices.give_way, self._memory)
+        return GestureLayer(
+            prepared, self._fields(palette, request), self.face(), self._voices.yield_turn, self._memory
+        )
 
     def for_request(self, prepared: PreparedRequest, *, keeps_utterances: bool = False) -> SynthesisModels:
         """Models of a request with its own dictionary and without the tokens that it excludes.
@@ -185,7 +187,7 @@ class SessionModels:
         has_style = request.style is not None or marked_styles(prepared.text)  # without one, no palette is needed here
         palette = self.palette if request.has_gestures and has_style else None
         deliveries = NO_DELIVERIES if palette is None else palette.deliveries
-        speech = SpeechModels(load_voice, self._voices.give_way, self._memory, deliveries)
+        speech = SpeechModels(load_voice, self._voices.yield_turn, self._memory, deliveries)
         return SynthesisModels(self.talker, exemplars, face, speech)
 
     def preload_voice(self, prepared: PreparedRequest) -> None:

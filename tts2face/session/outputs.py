@@ -402,7 +402,7 @@ def write_speech(
     InputError, DataError, BackendError
         As `Session.export`.
     """
-    models = SpeechModels(lambda name, language: voices.voice(name, language, prepared.dictionary), voices.give_way)
+    models = SpeechModels(lambda name, language: voices.voice(name, language, prepared.dictionary), voices.yield_turn)
     has_phones = any(not file.format.is_sound for file in outputs.exports)
     has_names = any(isinstance(mark, NameMark) for mark in prepared.text.marks)
     pieces = speech_pieces(prepared, models, has_phones=has_phones or has_names)

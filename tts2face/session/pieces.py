@@ -64,9 +64,9 @@ def pieces_from(
         speech, begin = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
         timeline = spoken.timeline.restrict(0.0, speech.waveform.duration).shift(begin)
         n_frames = frame_count(speech.waveform.duration, float(fps))
-        models.speech.give_way()
+        models.speech.yield_turn()
         selection, lips = _sentence_lips(speech.phones, n_frames, prepared, models)
-        models.speech.give_way()
+        models.speech.yield_turn()
         clip = _with_sound(_with_gestures(speech, lips, timeline, layer), spoken.sound)
         first_frame += n_frames
         explain = _explanation(selection, models.exemplars, begin)
@@ -85,8 +85,8 @@ def _sentence_lips(
 
     def make() -> tuple[TokenSelection, Trajectory]:
         selection = select_tokens(phones, models.exemplars, prepared.options)
-        models.speech.give_way()
-        lips = models.face.motion_of_tokens(selection, fps=fps, n_frames=n_frames, give_way=models.speech.give_way)
+        models.speech.yield_turn()
+        lips = models.face.motion_of_tokens(selection, fps=fps, n_frames=n_frames, yield_turn=models.speech.yield_turn)
         return selection, lips
 
     return models.speech.memory.recall(key, make, lambda made: made[1].values.nbytes + made[0].found.tokens.nbytes * 3)

@@ -36,7 +36,7 @@ from tts2face.session.prepared import innermost_styles
 from tts2face.sound.level import level_speech
 from tts2face.sound.voice import SpeechInput, SpokenWord, Voice, apply_volume
 from tts2face.sound.voice_pool import has_voice, speaks
-from tts2face.types import GiveWay, Speech, Waveform, concatenate_speech, first_sample, frame_count, keep_on
+from tts2face.types import Speech, Waveform, YieldTurn, concatenate_speech, first_sample, frame_count, keep_on
 
 Deliveries = Mapping[str, Delivery]  # of a palette's styles, by name
 NO_DELIVERIES: Deliveries = MappingProxyType({})
@@ -118,14 +118,14 @@ def speak_sentence(
     sentence: Sentence,
     request: Request,
     voices: Voices | None = None,
-    give_way: GiveWay = keep_on,
+    yield_turn: YieldTurn = keep_on,
     *,
     deliveries: Deliveries = NO_DELIVERIES,
 ) -> SpokenSentence:
     """Synthesise a sentence with its pauses, speeds and loudness, and compute the times of its marks.
 
     The speech of a sentence without marks equals the output of the voice, byte for byte. The sound is normalised to the
-    loudness of all clips, to which the loudness of the request and of the marks is relative. `give_way` is called
+    loudness of all clips, to which the loudness of the request and of the marks is relative. `yield_turn` is called
     between the steps.
 
     Parameters
@@ -161,8 +161,8 @@ def speak_sentence(
         volumes.append(request.volume * delivery.volume)
     scaled = [_scale_speech(speech, request.volume, gain) for speech, gain in zip(spoken, gains, strict=True)]
     speech, begins = _join_sentence(scaled, sentence, voice.sample_rate)
-    give_way()
-    levelled = level_speech(spoken, [volume * gain for volume, gain in zip(volumes, gains, strict=True)], give_way)
+    yield_turn()
+    levelled = level_speech(spoken, [volume * gain for volume, gain in zip(volumes, gains, strict=True)], yield_turn)
     sound = _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
     times = SentenceTimes(tuple(part.first for part in sentence.utterances), tuple(word_times), tuple(begins))
     return SpokenSentence(

@@ -30,10 +30,10 @@ from tts2face.sound.transcript import TextMismatch
 from tts2face.sound.voice import Voice
 from tts2face.types import (
     Clip,
-    GiveWay,
     Speech,
     Trajectory,
     Waveform,
+    YieldTurn,
     first_sample,
     frame_count,
     keep_on,
@@ -92,12 +92,12 @@ class Piece:
 class SpeechModels:
     """What speaks: ``voice`` returns the voice of a name and a language.
 
-    ``give_way`` is called between the steps of a piece; ``memory`` keeps the speech and the lip motion of sentences;
+    ``yield_turn`` is called between the steps of a piece; ``memory`` keeps the speech and the lip motion of sentences;
     ``deliveries`` are those of the styles of a palette.
     """
 
     voice: Voices
-    give_way: GiveWay = keep_on
+    yield_turn: YieldTurn = keep_on
     memory: SentenceMemory = NO_MEMORY
     deliveries: Deliveries = field(default_factory=lambda: NO_DELIVERIES)
 
@@ -227,7 +227,7 @@ def speak_sentences(prepared: PreparedRequest, models: SpeechModels) -> Iterator
         text = " ".join(phrase.source for phrase in sentence.utterances)
         spoken = models.memory.recall(
             lambda: ("speech", sentence.relative(), spoken_with()),
-            lambda: speak_sentence(voice, sentence, request, voices, models.give_way, deliveries=models.deliveries),
+            lambda: speak_sentence(voice, sentence, request, voices, models.yield_turn, deliveries=models.deliveries),
             lambda made: made.sound.samples.nbytes + made.speech.waveform.samples.nbytes,
         )
         speech = spoken.speech

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.numeric.kernels import kernel
-from tts2face.types import GiveWay, Speech, Waveform, keep_on
+from tts2face.types import Speech, Waveform, YieldTurn, keep_on
 
 BLOCK_S, STEP_S = 0.4, 0.1  # gating blocks overlap by 75 % (BS.1770-4, annex 1)
 OFFSET_LUFS = -0.691  # cancels the gain of the K-weighting at 997 Hz
@@ -144,7 +144,7 @@ TOLERANCE_LU = 0.05
 MOST_STEPS = 12  # iterations; speech of espeak-ng takes 5
 
 
-def level_speech(speeches: Sequence[Speech], gains: Sequence[Floats], give_way: GiveWay = keep_on) -> list[Speech]:
+def level_speech(speeches: Sequence[Speech], gains: Sequence[Floats], yield_turn: YieldTurn = keep_on) -> list[Speech]:
     """Normalise utterances together to `LOUDNESS_LUFS`, apply a relative gain to each, and limit the peaks.
 
     Parameters
@@ -153,11 +153,11 @@ def level_speech(speeches: Sequence[Speech], gains: Sequence[Floats], give_way: 
         N utterances.
     gains
         N arrays of shape (n,), one factor for each sample, or (1,).
-    give_way
+    yield_turn
         Called between the steps.
     """
     levelled = normalise_loudness([speech.waveform for speech in speeches])
-    give_way()
+    yield_turn()
     return [
         replace(speech, waveform=Waveform(limit_peaks(sound.samples * gain, sound.rate), sound.rate))
         for speech, sound, gain in zip(speeches, levelled, gains, strict=True)

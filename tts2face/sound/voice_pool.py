@@ -216,7 +216,7 @@ class VoicePool:
             )
             thread.shutdown(wait=False)
 
-    def give_way(self) -> None:
+    def yield_turn(self) -> None:
         """Let other requests take their turn, between two steps of a synthesis."""
         if self._native_run is not None:
             self._native_run(_nothing, _nothing)

@@ -53,7 +53,7 @@ class Cue:
     number
         Position in order of time, from 1.
     begin_s, end_s
-        Instants in seconds; the end lies after the begin.
+        Instants in seconds; the end lies after the start.
     text
         Spoken words on one line, without tags, noises, lyrics and speaker labels; empty for a silent cue.
     line
@@ -67,7 +67,7 @@ class Cue:
     language
         Language tag, where the file has one.
     has_estimated_end
-        Whether the end is estimated from the length of the text, as the file has none after the begin.
+        Whether the end is estimated from the length of the text, as the file has none after the start.
     parts
         Words of each speaker in a cue of several; else empty.
     """
@@ -152,7 +152,7 @@ class SpokenText:
 def spoken_text(written: str) -> SpokenText:
     """Divide the text of a cue into words, tags, noises, lyrics and speakers.
 
-    A label is a name in capitals before a colon and a space (``JOHN:``), at the begin of a line. A part begins at a
+    A label is a name in capitals before a colon and a space (``JOHN:``), at the start of a line. A part begins at a
     label, at a tag of one of several WebVTT voices, and at each of two or more lines that begin with a dash.
     """
     is_dialogue = len({name.strip() for name in _VOICE.findall(written)}) > 1

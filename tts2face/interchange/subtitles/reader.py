@@ -179,10 +179,10 @@ def _ordered(written: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> 
     latest, seen = 0.0, set()
     for cue in written:
         if cue.begin_s > MAX_S:
-            warnings.append(SubtitleWarning(cue.line, f"the begin {cue.begin_s:.0f} s is damaged; the cue is left out"))
+            warnings.append(SubtitleWarning(cue.line, f"the start {cue.begin_s:.0f} s is damaged; the cue is left out"))
             continue
         if cue.begin_s < 0:
-            warnings.append(SubtitleWarning(cue.line, "the begin is negative; the cue begins at 0 s"))
+            warnings.append(SubtitleWarning(cue.line, "the start is negative; the cue begins at 0 s"))
             cue = replace(cue, begin_s=0.0)  # noqa: PLW2901 - the corrected cue
         if cue.begin_s < latest:
             warnings.append(SubtitleWarning(cue.line, "this cue begins before the one above it; cues are sorted"))
@@ -221,6 +221,6 @@ def _timed(written: Sequence[WrittenCue], warnings: list[SubtitleWarning]) -> tu
 
 
 def _estimated_end(begin: float, following: float | None, text: str) -> float:
-    """End of a cue by the length of its text, but not after the begin of the next one."""
+    """End of a cue by the length of its text, but not after the start of the next one."""
     end = begin + max(MIN_ESTIMATED_S, len(text) / CHARACTERS_PER_S)
     return min(end, following) if following is not None and following > begin else end

@@ -283,5 +283,5 @@ def _client_options() -> dict[str, Any]:
 
 
 def _first_line(error: Exception) -> str:
-    """Begin of a message, without the queries of URLs, which may be signatures."""
+    """Start of a message, without the queries of URLs, which may be signatures."""
     return re.sub(r"\?\S+", "", str(error).split("\n")[0])[:160]

@@ -269,7 +269,7 @@ class Track:
         self.file.close()
 
     def read(self, begin: int, end: int) -> NDArray[np.int16]:
-        """Samples [begin, end); silence before the begin and after the end of the recording."""
+        """Samples [begin, end); silence before the start and after the end of the recording."""
         samples = np.zeros(max(end - begin, 0), np.int16)
         first, last = max(begin, 0), min(end, self.n_samples)
         if first < last:

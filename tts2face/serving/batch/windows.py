@@ -98,7 +98,7 @@ def _with_margins(windows: Sequence[Window], margin: int) -> list[Window]:
 
 
 def _with_slots(windows: Sequence[Window], fps: Fraction) -> list[Window]:
-    """Windows cut at the begin of the next one, with their slots."""
+    """Windows cut at the start of the next one, with their slots."""
     slots: list[Window] = []
     extension, tail = round(EXTENSION_S * fps), round(MAX_TAIL_S * fps)
     at = 0
@@ -219,7 +219,7 @@ class Fit:
     rate
         Speaking rate.
     speech_s
-        Seconds from the begin of the cue to the end of the last word.
+        Seconds from the start of the cue to the end of the last word.
     overflow_s
         Seconds by which the last word ends after the cue; 0 if it fits.
     n_steps

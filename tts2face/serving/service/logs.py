@@ -13,7 +13,7 @@ from contextvars import ContextVar
 from typing import Any, TextIO
 
 LOG = logging.getLogger("tts2face.service")
-PACKAGE = "tts2face."  # begin of the names of loggers whose records are events without texts
+PACKAGE = "tts2face."  # start of the names of loggers whose records are events without texts
 REQUEST_ID: ContextVar[str | None] = ContextVar("request_id", default=None)
 MAX_LINES = 10_000  # that wait to be written
 CLOSE_S = 1.0  # in which they are written at the end

@@ -162,7 +162,7 @@ def _sound_key(piece: Mapping[str, Any]) -> Any:
 
 
 def _changed(new: Sequence[Mapping[str, Any]], old: Sequence[Mapping[str, Any]], key: Any) -> tuple[int, int]:
-    """Range of the pieces that differ; those after it are equal, and as far from the begin as before."""
+    """Range of the pieces that differ; those after it are equal, and as far from the start as before."""
     new_keys, old_keys = [key(piece) for piece in new], [key(piece) for piece in old]
     first = 0
     while first < min(len(new), len(old)) and new_keys[first] == old_keys[first]:

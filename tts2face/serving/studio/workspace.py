@@ -23,7 +23,7 @@ SAVE_S = 0.5  # between an edit and the time at which it is on disk
 SAVE_AGAIN_S = 5.0  # after a failure, such as a full disk
 CONTINUE_S = 1.5  # within which edits of the same kind are one step of the history
 MOVE_S = 0.3  # within which an element that is removed and added has been moved
-LEASE_S = 45.0  # after the last sign of life of a tab, for which it stays the one that edits
+LEASE_S = 45.0  # after the last heartbeat of a tab, for which it stays the one that edits
 SHOWN_ONLY = frozenset({"name"})  # kinds of edits that change neither motion nor sound
 PICTURE_ONLY = frozenset({"picture"})  # kinds that change final pictures only
 

@@ -243,7 +243,7 @@ def list_jobs(database: str, states: Sequence[str] = (), limit: int | None = Non
 
 
 def show_job(database: str, name: str) -> tuple[Job, dict[str, Any]]:
-    """A job by the begin of its name, and its segment as JSON; errors as `list_jobs` and `InputError` without one."""
+    """A job by the start of its name, and its segment as JSON; errors as `list_jobs` and `InputError` without one."""
     url = _prepared(database)
     with open_client(url) as client, Workers(url) as workers:
         one = _find(client, name)

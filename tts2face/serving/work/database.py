@@ -27,8 +27,8 @@ WORKFLOW = "render_segment"
 WORK = "work"  # call of the process of a worker
 JOB_QUEUE, JOB_WORKFLOW = "tts2face-jobs", "run_job"  # of the service; a job waits for its segments
 TALKER_QUEUE = "tts2face-talkers"  # of jobs that compute for minutes; they never occupy the places of others
-BEAT_S = 1.5  # between two signs of life of a worker
-DEAD_AFTER_S = 6.0  # without a sign of life; with the interval of looking this is below 10 s
+BEAT_S = 1.5  # between two heartbeats of a worker
+DEAD_AFTER_S = 6.0  # without a heartbeat; with the interval of looking this is below 10 s
 POSTGRES_SCHEMES = ("postgresql://", "postgres://", "postgresql+psycopg://")
 _TABLE = """
 CREATE TABLE IF NOT EXISTS tts2face_workers (
@@ -115,7 +115,7 @@ def _waiting_query(kind: str) -> str:
 
 
 class Workers:
-    """Table of workers with the time of their last sign of life, by the clock of the database."""
+    """Table of workers with the time of their last heartbeat, by the clock of the database."""
 
     def __init__(self, url: str) -> None:
         import sqlalchemy
@@ -156,7 +156,7 @@ class Workers:
             return float(connection.execute(self._sql(f"SELECT {self._now}")).scalar() or 0.0)
 
     def beat(self, executor_id: str, place: str) -> set[str]:
-        """Note that a worker is alive; the ids of workers without a sign of life."""
+        """Note that a worker is alive; the ids of workers without a heartbeat."""
         query = f"SELECT executor_id FROM tts2face_workers WHERE beat <= {self._now} - :age"
         with self._engine.begin() as connection:
             connection.execute(self._sql(_BEAT.format(now=self._now)), {"id": executor_id, "place": place[:200]})
@@ -188,7 +188,7 @@ class Workers:
             connection.execute(self._sql(query), {"id": executor_id})
 
     def alive(self, within_s: float = DEAD_AFTER_S) -> dict[str, str]:
-        """Places of the workers that gave a sign of life within some seconds, by their ids."""
+        """Places of the workers that sent a heartbeat within some seconds, by their ids."""
         query = f"SELECT executor_id, place FROM tts2face_workers WHERE beat > {self._now} - :age"
         with self._engine.begin() as connection:
             rows = connection.execute(self._sql(query), {"age": within_s})
@@ -201,7 +201,7 @@ class Workers:
                 connection.execute(self._sql("DELETE FROM tts2face_workers WHERE executor_id = :id"), {"id": one})
 
     def forget_dead(self, older_than_s: float = 3600.0) -> None:
-        """Remove workers without a sign of life for a long time."""
+        """Remove workers without a heartbeat for a long time."""
         query = f"DELETE FROM tts2face_workers WHERE beat < {self._now} - :age"
         with self._engine.begin() as connection:
             connection.execute(self._sql(query), {"age": older_than_s})

@@ -64,7 +64,7 @@ class DatabaseEngine:
     on_wait
         Called at each look at the jobs; what it raises ends the waiting.
     niceness
-        What is added to the niceness of the local workers: 10 gives way to other processes.
+        What is added to the niceness of the local workers: 10 yields to other processes.
     """
 
     database: str

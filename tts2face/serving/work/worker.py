@@ -4,13 +4,13 @@ Segments are rendered in a child process. A job of the service plans, queues its
 all workers share the rendering; the queues have places of their own, so that jobs never block what they wait for.
 
 DBOS keeps the queue. Its open-source package has no fail-over of its own: work of an executor that died waits for an
-executor of the same id. Here every worker has a new id and gives signs of life (`Workers`); with
-each of them it learns which workers have given none for some time, and returns their work to the queue. A worker is
-forgotten only when none of its work is running any more. Now and then each worker also looks at all running work, for
-owners that are not in the table. A segment that two workers take nevertheless is rendered twice and stored once, as its
+executor of the same id. Here every worker has a new id and sends heartbeats (`Workers`); with each
+of them it learns which workers have sent none for some time, and returns their work to the queue. A worker is forgotten
+only when none of its work is running any more. Now and then each worker also polls all running work, for owners that
+are not in the table. A segment that two workers take nevertheless is rendered twice and stored once, as its
 name is its content address.
 
-Return of the work of dead workers to the queue, and how often workers look at it.
+Return of the work of dead workers to the queue, and how often workers poll it.
 
 Rendering of segments from the queue in a child process, which is ended when a segment is cancelled.
 """
@@ -220,7 +220,7 @@ MAX_JOB_DEATHS = 30  # of workers that executed the same job of the service, whi
 N_TAKEN = 2  # segments that a worker holds: one is rendered, one waits, so that no time is lost between them
 N_JOBS = 4  # of the service, which mostly wait for their segments; they never occupy the places of segments
 N_TALKERS = 1  # built at a time: each takes a core and 1 GB
-# Connections of a worker to the database: two stay open, besides that of its signs of life.
+# Connections of a worker to the database: two stay open, besides that of its heartbeats.
 CONNECTIONS = {"pool_size": 2, "max_overflow": 3}
 
 
@@ -342,7 +342,7 @@ class Worker:
         self._stopped.set()
 
     def _beat(self, workers: Workers) -> None:
-        """Give signs of life and look for work, also while the database is away for a time."""
+        """Send heartbeats and poll for work, also while the database is away for a time."""
         import sqlalchemy
 
         next_beat_s = time.monotonic() + BEAT_S
@@ -360,7 +360,7 @@ class Worker:
                 self._note_database(None, began_s)
 
     def _take_over(self, workers: Workers) -> None:
-        """Return the work of workers without a sign of life to the queue; called again and again."""
+        """Return the work of workers without a heartbeat to the queue; called again and again."""
         import sqlalchemy
         from dbos import error as dbos_error
 
@@ -378,7 +378,7 @@ class Worker:
                 workers.forget(ended)
                 self._vanished -= ended
                 if ended:
-                    self._on_message(f"took over from {len(ended)} workers without a sign of life")
+                    self._on_message(f"took over from {len(ended)} workers without a heartbeat")
         except (sqlalchemy.exc.SQLAlchemyError, dbos_error.DBOSException, DatabaseAwayError) as away:
             self._note_database(away, began_s)
 
@@ -401,7 +401,7 @@ class Worker:
                 )
 
     def _look_at_all_work(self, workers: Workers) -> set[str]:
-        """Owners of running work that give no sign of life; the interval of the queue follows the number of workers."""
+        """Owners of running work that send no heartbeat; the interval of the queue follows the number of workers."""
         from dbos import DBOS
 
         alive = set(workers.alive())

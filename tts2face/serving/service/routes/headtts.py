@@ -78,10 +78,10 @@ class HeadTtsAudio(BaseModel):
     ]
     audioEncoding: Annotated[str, Field(description="wav or pcm.", examples=["wav"])]  # noqa: N815
     words: Annotated[list[str], Field(description="Words, each but the last with a space behind it.")]
-    wtimes: Annotated[list[int], Field(description="Begin of each word.")]
+    wtimes: Annotated[list[int], Field(description="Start of each word.")]
     wdurations: Annotated[list[int], Field(description="Duration of each word.")]
     visemes: Annotated[list[str], Field(description="Oculus visemes.")]
-    vtimes: Annotated[list[int], Field(description="Begin of each viseme.")]
+    vtimes: Annotated[list[int], Field(description="Start of each viseme.")]
     vdurations: Annotated[list[int], Field(description="Duration of each viseme.")]
     phonemes: Annotated[list[str], Field(description="Phone of each viseme.")]
 

@@ -45,7 +45,7 @@ def strip_svg(outlines: Outlines, cell: Cell, whose: str) -> str:
     Parameters
     ----------
     whose
-        Begin of the words, such as ``Lips of bbaf2n``.
+        Start of the words, such as ``Lips of bbaf2n``.
     """
     width, height = 2 * cell.half_width, cell.bottom - cell.top
     gaps = ", ".join(f"{opening_mm(one):.1f}" for one in outlines)
