@@ -169,10 +169,10 @@ def network_bytes(path: Path) -> str:
 OTHER_MACHINE = """
 import sys
 from pathlib import Path
-from corpus_tools.pooling import base_phrases
-from corpus_tools.training import train_phone_network
+from corpus_tools.training import phone_network
+from corpus_tools.training.pooling import speech
 from tests.corpus_tools.build.test_base_phrases import FEW_PASSES, network_bytes
-base_phrases.N_PHRASES, train_phone_network.MIN_FRAMES, train_phone_network.TRAINING = 40, 100, FEW_PASSES
+speech.N_PHRASES, phone_network.MIN_FRAMES, phone_network.TRAINING = 40, 100, FEW_PASSES
 print(network_bytes(Path(sys.argv[1])))
 """
 

@@ -94,6 +94,12 @@ def movie(seconds: float = 2.0, side: int = 128, samples: NDArray[np.int16] | No
     return buffer.getvalue()
 
 
+def faceless(take: Path) -> bytes:
+    """Coloured noise with the sound of the take, so that only the face is missing."""
+    spoken = read_sound(take, RATE)
+    return movie(spoken.duration, samples=(spoken.samples * 32767).astype(np.int16))
+
+
 def sound() -> bytes:
     buffer = io.BytesIO()
     with wave.open(buffer, "wb") as file:
@@ -143,9 +149,7 @@ def test_a_recording_becomes_a_talker_that_speaks(
 def test_a_recording_without_a_face_is_refused_with_the_reason(
     clients: dict[str, httpx.Client], build: Build, take: Path
 ) -> None:
-    """The sound is that of the take, so that only the face is missing."""
-    spoken = read_sound(take, RATE)
-    queued = build(movie(spoken.duration, samples=(spoken.samples * 32767).astype(np.int16)), name="nobody")
+    queued = build(faceless(take), name="nobody")
     assert queued.status_code == 202, queued.text
     job = finished(clients["ann"], queued.json())
     assert (job["state"], job["results"]) == ("failed", [])
@@ -195,8 +199,8 @@ def test_building_needs_its_scope_and_only_it_may_be_large(clients: dict[str, ht
     assert (other.status_code, "the kinds are talker" in other.text) == (422, True)
 
 
-def test_a_key_may_have_some_talkers_in_work(clients: dict[str, httpx.Client], build: Build) -> None:
-    video = movie(0.5)
+def test_a_key_may_have_some_talkers_in_work(clients: dict[str, httpx.Client], build: Build, take: Path) -> None:
+    video = faceless(take)  # in which a face is looked for in seconds, so that all are in work at once
     queued = [build(video, name=f"t{number}") for number in range(4)]
     assert [one.status_code for one in queued] == [202] * 4, queued[-1].text
     fifth = build(video, name="t5")
