@@ -5,27 +5,23 @@ import unicodedata
 from collections.abc import Callable
 
 from lexicon import written_forms as readings
+from lexicon.dictionary import word_set
 from lexicon.languages import language_scripts, letter_name, letter_script
 from lexicon.sentence_ends import is_abbreviated, starts_sentence
 from lexicon.written_forms import cardinal_words, digit_words, number_words, ordinal_words, roman_value, year_words
 
-
-def _word_set(written: str) -> frozenset[str]:
-    return frozenset(written.split())
-
-
 _MARKS = frozenset(".,;:!?")
 _NEVER_LETTERS = frozenset({"II", "III", "VII", "VIII"})  # Roman numerals that abbreviate nothing
-_BEFORE_YEAR = _word_set(
+_BEFORE_YEAR = word_set(
     "in since of by from until till before after during early late mid circa around year copyright to and between "
     "summer winter spring fall autumn class"
 )
-_BEFORE_ROMAN = _word_set(
+_BEFORE_ROMAN = word_set(
     "chapter part volume act scene section book war phase type level class appendix article figure table episode "
     "season stage grade title rocky unit version schedule group tier bowl fantasy "
     "apollo gemini round"
 )
-_RULERS = _word_set(
+_RULERS = word_set(
     "henry louis elizabeth george edward charles william james richard mary philip pius benedict paul francis "
     "frederick wilhelm nicholas catherine peter alexander napoleon ramses leo gregory clement innocent urban ivan "
     "ferdinand henri boniface constantine albert margaret"
@@ -216,7 +212,7 @@ def read_roman_numeral(m: re.Match[str], previous: str) -> str:
 _BEFORE_NAME = re.compile(r" [A-Z]")
 _BEFORE_LETTER = re.compile(r" [a-z]")
 _BEFORE_NUMBER = re.compile(r" ?[0-9]")
-_NO_NAMES = _word_set("The On In At And But When Dear I If As To From Near")
+_NO_NAMES = word_set("The On In At And But When Dear I If As To From Near")
 _AT_END = re.compile(r"\s*$")
 _CONTEXT_AFTER = 48  # characters after a full stop that decide whether a sentence begins there
 

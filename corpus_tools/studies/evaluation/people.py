@@ -19,6 +19,7 @@ from corpus_tools.studies.evaluation.methods import SynthesisMethod, build_metho
 from corpus_tools.studies.evaluation.reference import LipCurves, ReferenceUtterance
 from corpus_tools.studies.evaluation.scores import IntervalEstimate, PairedCurves, estimate, estimate_difference
 from corpus_tools.studies.evaluation.splits import check_unknown
+from corpus_tools.studies.evaluation.tables import markdown_table
 from corpus_tools.studies.evaluation.tracks import ExternalTrack, map_tracks
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
@@ -292,7 +293,7 @@ def people_table(found: PeopleEvaluation) -> str:
     for method, figures in found.figures.items():
         cells = (_interval_text(figures[name], signed=False) for name, _ in FIGURE_HEADS)
         rows.append((method, *cells, *(_plain_text(value) for value in found.heard[method])))
-    return _markdown(rows)
+    return markdown_table(rows)
 
 
 def difference_table(found: PeopleEvaluation, method: str) -> str:
@@ -301,7 +302,7 @@ def difference_table(found: PeopleEvaluation, method: str) -> str:
     for (one, other), values in found.differences.items():
         if one == method:
             rows.append((other, *(_interval_text(values[name], signed=True) for name, _ in FIGURE_HEADS)))
-    return _markdown(rows)
+    return markdown_table(rows)
 
 
 def phone_table(found: PeopleEvaluation, methods: Sequence[str]) -> str:
@@ -310,7 +311,7 @@ def phone_table(found: PeopleEvaluation, methods: Sequence[str]) -> str:
     for one in found.phones:
         cells = (_pair_text(one.made[method]) for method in methods)
         rows.append((one.phone, str(one.n_tokens), "yes" if one.is_heard else "no", _pair_text(one.real), *cells))
-    return _markdown(rows)
+    return markdown_table(rows)
 
 
 def people_rows(found: PeopleEvaluation) -> Iterator[tuple[str, ...]]:
@@ -339,8 +340,3 @@ def _plain_text(value: float) -> str:
 
 def _pair_text(pair: tuple[float, float]) -> str:
     return f"{pair[0]:+.2f}, {pair[1]:+.2f}"
-
-
-def _markdown(rows: Sequence[Sequence[str]]) -> str:
-    lines = [f"| {' | '.join(row)} |" for row in rows]
-    return "\n".join([lines[0], "| --- |" + " --- |" * (len(rows[0]) - 1), *lines[1:]])

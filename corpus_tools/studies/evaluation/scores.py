@@ -331,7 +331,8 @@ class PairedCurves:
     ) -> "PairedCurves":
         """Of real and synthesised curves (T, 2), one pair for each utterance, and their warping costs."""
         moments = [
-            [_moments_of_pair(a[:, at], b[:, at]) for at in range(2)] for a, b in zip(real, synthesised, strict=True)
+            [_curve_moments(a[:, at].astype(np.float64), b[:, at].astype(np.float64)) for at in range(2)]
+            for a, b in zip(real, synthesised, strict=True)
         ]
         return cls(np.array(moments), np.asarray(costs, np.float64))
 
@@ -372,11 +373,6 @@ def interval_of(values: Floats) -> IntervalEstimate:
     """The first of (W,) values, with the interval that holds `CONFIDENCE` of the others."""
     low, high = np.quantile(values[1:], (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2))
     return IntervalEstimate(float(values[0]), float(low), float(high))
-
-
-def _moments_of_pair(a: NDArray[np.floating], b: NDArray[np.floating]) -> list[float]:
-    a, b = a.astype(np.float64), b.astype(np.float64)
-    return [len(a), a.sum(), b.sum(), a @ a, b @ b, a @ b]
 
 
 def _pooled_correlation(moments: Floats) -> Floats:

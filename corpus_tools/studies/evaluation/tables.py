@@ -54,14 +54,14 @@ class Evaluation:
 
     def table(self) -> str:
         """Markdown tables, one method a line."""
-        every = [(name, _markdown_table(figure_rows(scores))) for name, scores in self.tables()]
+        every = [(name, markdown_table(figure_rows(scores))) for name, scores in self.tables()]
         if self.folds:
             every.append((f"spread over {len(self.folds)} folds", self.fold_table()))
         return every[0][1] if len(every) == 1 else "\n\n".join(f"{name}\n\n{lines}" for name, lines in every)
 
     def class_table(self) -> str:
         """Markdown table of the classes of phones, one method and class a line."""
-        return _markdown_table(class_rows(self.scores))
+        return markdown_table(class_rows(self.scores))
 
     def fold_table(self) -> str:
         """Markdown table of the standard deviation of each figure over the folds, one method a line."""
@@ -71,7 +71,7 @@ class Evaluation:
             spreads = (self.fold_mean_and_deviation(one.method, name)[1] for name, _, _ in heads)
             cells = (f"{spread:.{digits}f}" for spread, (_, _, digits) in zip(spreads, heads, strict=True))
             rows.append((one.method, *cells))
-        return _markdown_table(rows)
+        return markdown_table(rows)
 
     def fold_mean_and_deviation(self, method: str, figure: str) -> tuple[float, float]:
         """Mean and standard deviation (of a sample) of a figure over the folds."""
@@ -109,7 +109,8 @@ def class_rows(scores: Sequence[Scores]) -> list[tuple[str, ...]]:
     return rows
 
 
-def _markdown_table(rows: Sequence[Sequence[str]]) -> str:
+def markdown_table(rows: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown; the first row is its heading."""
     lines = [f"| {' | '.join(row)} |" for row in rows]
     return "\n".join([lines[0], "| --- |" + " --- |" * (len(rows[0]) - 1), *lines[1:]])
 
