@@ -118,6 +118,18 @@ def test_a_child_ends_with_its_parent() -> None:
     eventually(lambda: not is_running(child), 10.0)
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="needs SIGSTOP")
+def test_a_stopped_child_ends_with_the_loop() -> None:
+    async def stop() -> int:
+        child = AsyncChild(PROGRAM)
+        process: int = (await child.call("double", {"n": 1})).content["pid"]
+        os.kill(process, signal.SIGSTOP)  # so that it does not see that its input ends
+        return process
+
+    process = asyncio.run(stop())
+    eventually(lambda: not is_running(process), 10.0)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="limits are those of POSIX")
 def test_limits_hold_and_credentials_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "hidden")

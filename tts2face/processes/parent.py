@@ -278,12 +278,23 @@ class _Running:
     async def end(self) -> None:
         """End the process at once."""
         if not self.reading.done():
-            with suppress(ProcessLookupError):
-                self.process.kill()
+            self._kill()
         await asyncio.wait({self.reading})
 
+    def _kill(self) -> None:
+        with suppress(ProcessLookupError):
+            self.process.kill()
+
     async def _read(self) -> None:
-        """Distribute messages until the process ends."""
+        """Distribute messages until the process ends; a loop that ends first takes the process with it."""
+        try:
+            await self._distribute()
+        except asyncio.CancelledError:
+            self._kill()
+            self.why = _last_words(self._errors, await self.process.wait())
+            raise
+
+    async def _distribute(self) -> None:
         assert self.process.stdout is not None
         assert self.process.stdin is not None
         while (message := await receive_message(self.process.stdout)) is not None:
@@ -294,8 +305,7 @@ class _Running:
         try:  # killing one that has just ended would take its exit status from asyncio, which warns then
             await asyncio.wait_for(self.process.wait(), END_S)
         except TimeoutError:
-            with suppress(ProcessLookupError):
-                self.process.kill()
+            self._kill()
         self.why = _last_words(self._errors, await self.process.wait())
         for call in self._calls.values():
             call.messages.put_nowait(None)
