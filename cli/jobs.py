@@ -22,7 +22,7 @@ from lexicon.errors import InputError
 from tts2face.serving.service.settings import read_settings
 
 if TYPE_CHECKING:
-    from tts2face.serving.work.client import Job
+    from tts2face.serving.work.client import QueuedSegment
 
 
 DEFAULT_DATABASE = "tts2face-jobs.sqlite"
@@ -182,7 +182,7 @@ def _existing(database: str) -> str:
     return database
 
 
-def _row(one: "Job") -> tuple[str, ...]:
+def _row(one: "QueuedSegment") -> tuple[str, ...]:
     took = "" if one.took_s is None else f"{one.took_s:.1f} s"
     text = one.text if len(one.text) <= SHOWN_CHARACTERS else f"{one.text[:SHOWN_CHARACTERS]}..."
     return one.name[:12], one.state.ljust(9), str(one.priority).rjust(4), took.rjust(8), text, one.reason

@@ -36,10 +36,10 @@ def similarity(  # noqa: PLR0913 - one parameter a flag
 ) -> None:
     """Analyse the visual similarity of phones: matrix, neighbours, viseme classes, reliability, articulation."""
     refuse_overwriting({"--out": out}, {"the talker": talker, "--compare": compare})
-    from corpus_tools.studies.similarity.analysis import Options
+    from corpus_tools.studies.similarity.analysis import SimilarityOptions
     from corpus_tools.studies.similarity.write import write_similarity
 
-    options = Options(_parse_numbers(classes), halves, seed)
+    options = SimilarityOptions(_parse_numbers(classes), halves, seed)
     with progress_bar("comparing halves") as on_progress:
         analysis = write_similarity(talker, out, options, other=compare, labels=labels, on_progress=on_progress)
     write_message(
@@ -61,10 +61,10 @@ def gestures(
 ) -> None:
     """Compare each style's gestures with motion from its fields, noise and published fields for the same sound."""
     refuse_overwriting({"--out": out}, {"the palette": palette})
-    from corpus_tools.studies.gestures.analysis import Options
+    from corpus_tools.studies.gestures.analysis import StudyOptions
     from corpus_tools.studies.gestures.write import write_gestures
 
-    options = Options(held_out, halves, clips, seed)
+    options = StudyOptions(held_out, halves, clips, seed)
     with progress_bar("analysing styles") as on_progress:
         study = write_gestures(palette, out, options, on_progress=on_progress)
     n_met, n_targets = study.targets

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.appearance.frame import rasterise_triangles
+from corpus_tools.build_talker import NOT_STATED
 from corpus_tools.run_options import StageCallback, ignore_stage
 from corpus_tools.training.phone_network import MIN_FRAMES, add_phone_network
 from corpus_tools.training.pooling.lip_tracks import read_lip_tracks
@@ -85,7 +86,6 @@ CONTENT_WITH_PICTURES = (
     "one talker's recorded motion transferred to another's face, with pictures of that face by consent; no sound"
 )
 LICENCE_FIELDS = ("sources", "licence", "attribution")  # of both talkers; they apply to the clone
-NOT_STATED = "not stated"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,7 +6,7 @@ Run: python docs/make_gestures.py
 from dataclasses import replace
 from pathlib import Path
 
-from corpus_tools.studies.gestures.analysis import Options, StyleStudy, TraitComparison, study_gestures
+from corpus_tools.studies.gestures.analysis import StudyOptions, StyleStudy, TraitComparison, study_gestures
 from corpus_tools.studies.gestures.moods import MoodOptions, MoodStudy, mood_rows, study_moods
 from tts2face.models.palette import MEASURED_STYLE, load_palette
 from tts2face.session.session import Session
@@ -99,7 +99,7 @@ def _headed(names: tuple[str, ...]) -> list[str]:
 def main() -> None:
     """Measure and write."""
     palette = replace(load_palette("starter"), derivations={})
-    (found,) = study_gestures("starter", palette, Options()).styles
+    (found,) = study_gestures("starter", palette, StudyOptions()).styles
     page = PAGE.read_text(encoding="utf-8")
     session = Session(face="head")  # the tracker reads its brows
     tables = {

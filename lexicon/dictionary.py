@@ -18,7 +18,7 @@ from types import MappingProxyType
 
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_text
-from lexicon.ipa import Segment, parse_ipa
+from lexicon.ipa import IpaPhone, parse_ipa
 from lexicon.phones import PHONES, arpabet_to_ipa
 
 MAX_EQUAL_LETTERS = 20_000  # characters of CMUdict in which lines of equal letters lie (o'brien, o'neill: 6,000)
@@ -41,7 +41,7 @@ def word_set(written: str) -> frozenset[str]:
 
 
 @functools.lru_cache(maxsize=50_000)
-def arpabet_segments(names: str) -> tuple[Segment, ...]:
+def arpabet_segments(names: str) -> tuple[IpaPhone, ...]:
     """Phones of ARPABET names separated by spaces, with their stress.
 
     Raises
@@ -53,7 +53,7 @@ def arpabet_segments(names: str) -> tuple[Segment, ...]:
     for name in names.upper().split():
         phone = arpabet_to_ipa(name)
         stress = int(name[-1]) if name[-1].isdigit() else 0
-        segments.append(Segment(phone, stress, is_syllabic=PHONES[phone].is_vowel))
+        segments.append(IpaPhone(phone, stress, is_syllabic=PHONES[phone].is_vowel))
     return tuple(segments)
 
 
@@ -61,14 +61,14 @@ def arpabet_segments(names: str) -> tuple[Segment, ...]:
 class Dictionary:
     """The user's pronunciations by `word_key`."""
 
-    entries: Mapping[str, tuple[Segment, ...]]
+    entries: Mapping[str, tuple[IpaPhone, ...]]
 
-    def lookup(self, word: str) -> tuple[Segment, ...] | None:
+    def lookup(self, word: str) -> tuple[IpaPhone, ...] | None:
         """Phones of a word, or None if the dictionary does not contain it."""
         return self.entries.get(word_key(word))
 
 
-def _parse_entry(line: str, where: str) -> tuple[str, tuple[Segment, ...]]:
+def _parse_entry(line: str, where: str) -> tuple[str, tuple[IpaPhone, ...]]:
     word, _, written = line.partition(" ")
     written = written.strip()
     if not written:
@@ -154,7 +154,7 @@ def _cmudict_names(word: str) -> str | None:
     return text[start : text.index("\n", start)]
 
 
-def cmudict_lookup(word: str) -> tuple[Segment, ...] | None:
+def cmudict_lookup(word: str) -> tuple[IpaPhone, ...] | None:
     """First pronunciation of a word in CMUdict, or None."""
     key = word_key(word)
     names = None if not key or any(letter.isspace() for letter in key) else _cmudict_names(key)
@@ -173,7 +173,7 @@ def _own_table() -> dict[str, str]:
     return {word_key(word): names for word, names in (line.split("\t") for line in lines)}
 
 
-def own_pronunciation(word: str) -> tuple[Segment, ...] | None:
+def own_pronunciation(word: str) -> tuple[IpaPhone, ...] | None:
     """Pronunciation of a word in ``pronunciations.tsv``: words that CMUdict lacks, or reads otherwise."""
     names = _own_table().get(word_key(word))
     return None if names is None else arpabet_segments(names)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from lexicon.dictionary import cmudict_lookup, own_pronunciation, word_set
-from lexicon.ipa import Segment
+from lexicon.ipa import IpaPhone
 from lexicon.phones import ARPABET, PHONES, nearest_phones
 
 _INVENTORY = frozenset(ARPABET.values())
@@ -30,26 +30,26 @@ _VOICELESS_ENDINGS = frozenset({"p", "t", "k", "f", "θ"})
 _SIBILANTS = frozenset({"s", "z", "ʃ", "ʒ", "tʃ", "dʒ"})
 
 
-def fold_to_arpabet(segments: tuple[Segment, ...]) -> tuple[Segment, ...]:
+def fold_to_arpabet(segments: tuple[IpaPhone, ...]) -> tuple[IpaPhone, ...]:
     """A word in CMUdict's inventory: 39 ARPABET phones and the reduced vowels."""
-    result: list[Segment] = []
+    result: list[IpaPhone] = []
     for segment in segments:
         phone, stress = segment.phone, segment.stress
         if phone == "ɹ" and result and result[-1].phone == "ɹ":
             continue  # espeak-ng writes a linking r twice: ɑːɹ ɹ
         phones = (phone,) if phone in _INVENTORY else _FOLDED_PHONES.get(phone) or nearest_phones(phone, _INVENTORY)
         if segment.is_syllabic and not PHONES[phone].is_vowel:
-            result.append(Segment("ə", stress, is_syllabic=True))
+            result.append(IpaPhone("ə", stress, is_syllabic=True))
             stress = 0
         for at, one in enumerate(phones):
             is_vowel = PHONES[one].is_vowel
             own_stress = stress if is_vowel and at == 0 else 0
             by_stress = _FULL_VOWELS.get(one, one) if own_stress else _REDUCED_VOWELS.get(one, one)
-            result.append(Segment(by_stress, own_stress, is_syllabic=is_vowel))
+            result.append(IpaPhone(by_stress, own_stress, is_syllabic=is_vowel))
     return tuple(result)
 
 
-def _spell_letters(letters: str) -> tuple[Segment, ...] | None:
+def _spell_letters(letters: str) -> tuple[IpaPhone, ...] | None:
     """Concatenated names of letters; the last one has the primary stress."""
     names = [cmudict_lookup("a." if letter in "Aa" else letter) for letter in letters]
     if None in names:
@@ -58,13 +58,13 @@ def _spell_letters(letters: str) -> tuple[Segment, ...] | None:
     return (*(segment for name in others for segment in _demote_stress(name)), *last)
 
 
-def _demote_stress(segments: Sequence[Segment]) -> tuple[Segment, ...]:
+def _demote_stress(segments: Sequence[IpaPhone]) -> tuple[IpaPhone, ...]:
     """Phones with secondary in place of primary stress, and none in place of secondary stress."""
     lower = {0: 0, 1: 2, 2: 0}
     return tuple(replace(segment, stress=lower[segment.stress]) for segment in segments)
 
 
-def _join_compound(parts: Sequence[str], spoken: Sequence[tuple[Segment, ...]]) -> tuple[Segment, ...]:
+def _join_compound(parts: Sequence[str], spoken: Sequence[tuple[IpaPhone, ...]]) -> tuple[IpaPhone, ...]:
     """Phones of a compound with hyphens: of the parts with primary stress the lighter half loses it.
 
     After a single letter (X-ray), the other part loses it. These are the rules of misaki, by whose phones the neural
@@ -82,12 +82,12 @@ def _join_compound(parts: Sequence[str], spoken: Sequence[tuple[Segment, ...]]) 
     )
 
 
-def add_s(base: tuple[Segment, ...]) -> tuple[Segment, ...]:
+def add_s(base: tuple[IpaPhone, ...]) -> tuple[IpaPhone, ...]:
     """Phones of a word with the ending -s."""
     last = base[-1].phone
     if last in _SIBILANTS:
-        return (*base, Segment("ɪ", is_syllabic=True), Segment("z"))
-    return (*base, Segment("s" if last in _VOICELESS_ENDINGS else "z"))
+        return (*base, IpaPhone("ɪ", is_syllabic=True), IpaPhone("z"))
+    return (*base, IpaPhone("s" if last in _VOICELESS_ENDINGS else "z"))
 
 
 def is_initialism(word: str) -> bool:
@@ -97,15 +97,15 @@ def is_initialism(word: str) -> bool:
     return len(word) <= MAX_SPELLED_LETTERS or (cmudict_lookup(word) is None and not set(word) & set("AEIOUY"))
 
 
-def _look_up_without_accents(word: str) -> tuple[Segment, ...] | None:
+def _look_up_without_accents(word: str) -> tuple[IpaPhone, ...] | None:
     plain = "".join(letter for letter in unicodedata.normalize("NFD", word) if not unicodedata.combining(letter))
     return None if plain == word else own_pronunciation(plain) or cmudict_lookup(plain)
 
 
-Lookup = Callable[[str], tuple[Segment, ...] | None]
+Lookup = Callable[[str], tuple[IpaPhone, ...] | None]
 
 
-def look_up_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[Segment, ...] | None:
+def look_up_word(word: str, *, is_letter: bool, own: Lookup) -> tuple[IpaPhone, ...] | None:
     """Phones of an English word from the user's entries, CMUdict or its parts; None if spelling rules are needed.
 
     Parameters

@@ -22,8 +22,9 @@ from itertools import pairwise
 from lexicon.dictionary import Dictionary, arpabet_segments, word_key, word_set
 from lexicon.english import CAPITALISED_WORDS, add_s, fold_to_arpabet, is_initialism, look_up_word
 from lexicon.g2p import DEFAULT_LANGUAGE, segments_by_rules
-from lexicon.ipa import Segment, parse_ipa
+from lexicon.ipa import IpaPhone, parse_ipa
 from lexicon.part_of_speech import tag_words
+from lexicon.sentence_ends import MARKS
 
 _DEMONSTRATIVE_BEFORE = word_set("of for with at like about after before in on by from than")
 _DEMONSTRATIVE_AFTER = word_set("is was will would could may might must one sounds looks means makes")
@@ -32,9 +33,9 @@ _ALWAYS_REDUCED = frozenset({"a", "an", "am", "the", "to", "in"})  # also where 
 
 @dataclass(frozen=True, slots=True)
 class _Forms:
-    before_consonant: tuple[Segment, ...]
-    before_vowel: tuple[Segment, ...]
-    before_pause: tuple[Segment, ...]
+    before_consonant: tuple[IpaPhone, ...]
+    before_vowel: tuple[IpaPhone, ...]
+    before_pause: tuple[IpaPhone, ...]
 
 
 @functools.cache
@@ -48,7 +49,9 @@ def _forms() -> dict[str, _Forms]:
     return found
 
 
-def reduced_segments(word: str, before: str, after: str, following: tuple[Segment, ...]) -> tuple[Segment, ...] | None:
+def reduced_segments(
+    word: str, before: str, after: str, following: tuple[IpaPhone, ...]
+) -> tuple[IpaPhone, ...] | None:
     """Phones of a function word in its context; None for any other word.
 
     A capitalised one, as at the beginning of a sentence, has secondary stress.
@@ -69,7 +72,7 @@ def reduced_segments(word: str, before: str, after: str, following: tuple[Segmen
     else:
         segments = forms.before_vowel if following[0].is_syllabic else forms.before_consonant
     if word[:1].isupper() and key not in _ALWAYS_REDUCED and not any(segment.stress for segment in segments):
-        return tuple(Segment(s.phone, 2 if s.is_syllabic else 0, s.is_long, s.is_syllabic) for s in segments)
+        return tuple(IpaPhone(s.phone, 2 if s.is_syllabic else 0, s.is_long, s.is_syllabic) for s in segments)
     return segments
 
 
@@ -104,7 +107,6 @@ _TIMES = word_set(
     "night week weekend month year summer winter spring autumn fall term time monday tuesday wednesday thursday friday "
     "saturday sunday january february march april may june july august september october november december"
 )
-_MARKS = frozenset(".,;:!?")
 _MAX_SUBJECT_WORDS, _MAX_WORDS = 6, 40  # of a subject; on each side of the verb, that are searched
 
 
@@ -129,8 +131,8 @@ def tense_tag(tags: Sequence[str], lower: Sequence[str], at: int) -> str:
     auxiliary = _after_auxiliary(before, lower)
     if auxiliary:
         return auxiliary
-    if before in _MARKS or before in _CONJUNCTIONS:
-        return _beside_verb(tags, place, default="VB" if before in _MARKS else "")
+    if before in MARKS or before in _CONJUNCTIONS:
+        return _beside_verb(tags, place, default="VB" if before in MARKS else "")
     if tags[place] in {"NN", "NNS", "NNP", "NNPS", "PRP"} or before in _SINGULAR | _PLURAL | _RELATIVES:
         return _after_subject(tags, lower, place, at)
     return ""
@@ -200,7 +202,7 @@ _BEFORE_PREPOSITION = word_set("from due thanks according access addition next c
 class Reading:
     """One pronunciation of a spelling, and the evidence for it."""
 
-    segments: tuple[Segment, ...]
+    segments: tuple[IpaPhone, ...]
     tags: tuple[str, ...]
     before: frozenset[str]
     after: frozenset[str]
@@ -233,7 +235,7 @@ def _readings_of(word: str) -> tuple[Reading, ...]:
     return tuple(replace(reading, segments=add_s(reading.segments)) for reading in stem if "VBD" not in reading.tags)
 
 
-def homograph_segments(words: Sequence[str], places: Iterable[int]) -> dict[int, tuple[Segment, ...]]:
+def homograph_segments(words: Sequence[str], places: Iterable[int]) -> dict[int, tuple[IpaPhone, ...]]:
     """Phones of words of a sentence by their context, by index; none for a spelling without readings.
 
     Parameters
@@ -248,7 +250,7 @@ def homograph_segments(words: Sequence[str], places: Iterable[int]) -> dict[int,
     BackendError, DataError
         The tagger is missing or damaged.
     """
-    found: dict[int, tuple[Segment, ...]] = {}
+    found: dict[int, tuple[IpaPhone, ...]] = {}
     lower = [word.lower() for word in words]
     tags: Sequence[str] = ()
     for at in places:
@@ -290,7 +292,7 @@ def _evidence(reading: Reading, lower: Sequence[str], at: int, tag: str, *, is_s
     before = lower[at - 1] if at else "."
     after = lower[at + 1] if at + 1 < len(lower) else "."
     score += _NEIGHBOUR_WEIGHT * (
-        (before in reading.before) + ((after if after not in _MARKS else ".") in reading.after)
+        (before in reading.before) + ((after if after not in MARKS else ".") in reading.after)
     )
     around = [*lower[max(at - NEAR_WORDS, 0) : at], *lower[at + 1 : at + 1 + NEAR_WORDS]]
     return score + _NEAR_WEIGHT * min(sum(word in reading.near for word in around), _MOST_NEAR)
@@ -303,7 +305,7 @@ def _is_tag(tag: str, pattern: str) -> bool:
 _SENTENCE_MARKS = frozenset(".!?")
 
 
-def english_segments(texts: Sequence[str], marks: Sequence[str], own: Dictionary) -> list[tuple[Segment, ...]]:
+def english_segments(texts: Sequence[str], marks: Sequence[str], own: Dictionary) -> list[tuple[IpaPhone, ...]]:
     """Phones of each word of a normalised text; empty for a word that cannot be read.
 
     Parameters
@@ -318,7 +320,7 @@ def english_segments(texts: Sequence[str], marks: Sequence[str], own: Dictionary
     BackendError
         A word needs espeak-ng or the tagger, which are not installed.
     """
-    spoken: list[tuple[Segment, ...] | None] = []
+    spoken: list[tuple[IpaPhone, ...] | None] = []
     forms = _lookup_forms(texts)
     ends = [at + 1 for at, mark in enumerate(marks) if mark in _SENTENCE_MARKS]
     for begin, end in pairwise(sorted({0, *ends, len(texts)})):
@@ -330,7 +332,9 @@ def english_segments(texts: Sequence[str], marks: Sequence[str], own: Dictionary
     return _reduce_function_words(texts, forms, marks, [segments or () for segments in spoken], own)
 
 
-def _sentence_segments(forms: Sequence[str], marks: Sequence[str], own: Dictionary) -> list[tuple[Segment, ...] | None]:
+def _sentence_segments(
+    forms: Sequence[str], marks: Sequence[str], own: Dictionary
+) -> list[tuple[IpaPhone, ...] | None]:
     """Phones of the words of one sentence; None where spelling rules are needed."""
     tokens: list[str] = []
     places: list[int] = []
@@ -358,8 +362,12 @@ def _is_letter(forms: Sequence[str], marks: Sequence[str], at: int) -> bool:
 
 
 def _reduce_function_words(
-    texts: Sequence[str], forms: Sequence[str], marks: Sequence[str], spoken: list[tuple[Segment, ...]], own: Dictionary
-) -> list[tuple[Segment, ...]]:
+    texts: Sequence[str],
+    forms: Sequence[str],
+    marks: Sequence[str],
+    spoken: list[tuple[IpaPhone, ...]],
+    own: Dictionary,
+) -> list[tuple[IpaPhone, ...]]:
     """Replace the citation forms of function words, from the last word to the first."""
     for at in reversed(range(len(texts))):
         is_letter = forms[at] == "A" and _is_letter(forms, marks, at)

@@ -7,10 +7,9 @@ from collections.abc import Callable
 from lexicon import written_forms as readings
 from lexicon.dictionary import word_set
 from lexicon.languages import language_scripts, letter_name, letter_script
-from lexicon.sentence_ends import is_abbreviated, starts_sentence
+from lexicon.sentence_ends import MARKS, is_abbreviated, starts_sentence
 from lexicon.written_forms import cardinal_words, digit_words, number_words, ordinal_words, roman_value, year_words
 
-_MARKS = frozenset(".,;:!?")
 _NEVER_LETTERS = frozenset({"II", "III", "VII", "VIII"})  # Roman numerals that abbreviate nothing
 _BEFORE_YEAR = word_set(
     "in since of by from until till before after during early late mid circa around year copyright to and between "
@@ -141,7 +140,7 @@ def read_initial(m: re.Match[str], previous: str) -> str:
     """The J of J. Smith; a letter that ends a sentence keeps its full stop."""
     if m.group()[0] in "IVXLCDM" and previous.lower() in _RULERS | _BEFORE_ROMAN:
         return m.group()
-    is_first = not previous or previous in _MARKS
+    is_first = not previous or previous in MARKS
     if not is_first and starts_sentence(m.string[m.end() : m.end() + _CONTEXT_AFTER].lstrip()):
         return m.group()
     starts_name = is_first or previous[:1].isupper() or previous in {"by", "and", "with"}

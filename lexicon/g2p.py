@@ -17,7 +17,7 @@ from types import MappingProxyType
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
-from lexicon.ipa import Segment, parse_ipa
+from lexicon.ipa import IpaPhone, parse_ipa
 from lexicon.sentence_ends import split_chunks
 
 DEFAULT_LANGUAGE = "en-us"
@@ -134,7 +134,7 @@ def phonemize(lines: Sequence[str], language: str) -> tuple[tuple[str, ...], ...
     return tuple(written)
 
 
-def parse_espeak_word(written: str, language: str) -> tuple[Segment, ...]:
+def parse_espeak_word(written: str, language: str) -> tuple[IpaPhone, ...]:
     """Phones of one word in the notation of espeak-ng.
 
     Raises
@@ -148,7 +148,7 @@ def parse_espeak_word(written: str, language: str) -> tuple[Segment, ...]:
     return parse_ipa(written)
 
 
-def segments_by_rules(words: Sequence[str], language: str) -> tuple[tuple[Segment, ...], ...]:
+def segments_by_rules(words: Sequence[str], language: str) -> tuple[tuple[IpaPhone, ...], ...]:
     """Phones of words by espeak-ng, each word by itself; empty for a word that it does not read.
 
     Raises

@@ -26,7 +26,7 @@ _IGNORED = frozenset('ʰʱʲʷˠˤⁿˡʼ̚ʴʵʶᵝᵊᵐᶮᵑ˞˥˦˧˨˩↗�
 
 
 @dataclass(frozen=True, slots=True)
-class Segment:
+class IpaPhone:
     """One phone with its stress and length.
 
     Parameters
@@ -67,7 +67,7 @@ def _longest_spelling(text: str, at: int) -> str:
     return ""
 
 
-def _apply_mark(segments: list[Segment], mark: str) -> bool:
+def _apply_mark(segments: list[IpaPhone], mark: str) -> bool:
     """Apply a mark to the phone before it; False if the character is not a mark."""
     if mark in LENGTHS:
         if segments:
@@ -80,7 +80,7 @@ def _apply_mark(segments: list[Segment], mark: str) -> bool:
     return mark in _IGNORED or mark in SEPARATORS or unicodedata.combining(mark) > 0
 
 
-def _apply_stress(segments: Sequence[Segment], marks: Sequence[tuple[int, int]]) -> tuple[Segment, ...]:
+def _apply_stress(segments: Sequence[IpaPhone], marks: Sequence[tuple[int, int]]) -> tuple[IpaPhone, ...]:
     """Assign each stress mark (index of the next phone, stress) to the first syllabic phone from that index."""
     stressed = list(segments)
     syllabic = [at for at, segment in enumerate(segments) if segment.is_syllabic]
@@ -91,7 +91,7 @@ def _apply_stress(segments: Sequence[Segment], marks: Sequence[tuple[int, int]])
     return tuple(stressed)
 
 
-def parse_ipa(text: str) -> tuple[Segment, ...]:
+def parse_ipa(text: str) -> tuple[IpaPhone, ...]:
     """Phones of an IPA string in order.
 
     The longest symbol of the table is matched (tʃ is one phone), except across separators (``t_ʃ``, ``t.ʃ`` are two).
@@ -103,7 +103,7 @@ def parse_ipa(text: str) -> tuple[Segment, ...]:
     """
     spellings, _ = _spellings()
     decomposed = unicodedata.normalize("NFD", text).translate(dict.fromkeys(map(ord, _TIES)))
-    segments: list[Segment] = []
+    segments: list[IpaPhone] = []
     marks: list[tuple[int, int]] = []
     at = 0
     while at < len(decomposed):
@@ -113,7 +113,7 @@ def parse_ipa(text: str) -> tuple[Segment, ...]:
             marks.append((len(segments), STRESSES[letter]))
         elif spelling:
             symbol = spellings[spelling]
-            segments.append(Segment(symbol, is_syllabic=PHONES[symbol].is_vowel))
+            segments.append(IpaPhone(symbol, is_syllabic=PHONES[symbol].is_vowel))
         elif not _apply_mark(segments, letter):
             name = unicodedata.name(letter, f"U+{ord(letter):04X}")
             raise InputError(

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 from lexicon.errors import InputError
 from lexicon.inputs import check_limits
-from lexicon.ipa import Segment
+from lexicon.ipa import IpaPhone
 
 RATE_LIMITS = (0.5, 2.0)  # speaking rate of marked words, as of a whole request
 VOLUME_LIMITS = (0.0, 2.0)
-NOD_SIZE_LIMITS = (0.1, 2.0)
+NOD_SIZE_LIMITS = (0.1, 2.0)  # above 12 degrees a nod is a bow
 MAX_PAUSE_S = 10.0  # s, at one position; speech services allow 10 to 20
 MAX_NESTING = 16  # levels of marks within marks
 
@@ -69,7 +69,7 @@ class PhoneMark:
 
     at: int
     end: int
-    segments: tuple[Segment, ...]
+    segments: tuple[IpaPhone, ...]
 
 
 Mark = PauseMark | NodMark | NameMark | PhoneMark

@@ -14,7 +14,7 @@ from lexicon.english import fold_to_arpabet
 from lexicon.english_text import english_segments
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE, has_kanji, parse_espeak_word, phonemize, segments_by_rules, to_kana
-from lexicon.ipa import Segment
+from lexicon.ipa import IpaPhone
 from lexicon.languages import check_script, language_code, name_foreign_letters
 from lexicon.normalize import MARKS, canonical_text, normalize, split_tokens
 from lexicon.phones import PHONES, ipa_to_arpabet
@@ -131,7 +131,7 @@ class _WordDraft:
     text: str
     source: str
     mark: str = ""
-    segments: tuple[Segment, ...] | None = None
+    segments: tuple[IpaPhone, ...] | None = None
 
 
 def _split_words(forms: Iterator[tuple[str, str]]) -> list[_WordDraft]:
@@ -180,7 +180,7 @@ def _is_sonority_rising(onset: tuple[str, ...]) -> bool:
     return all(low < high for low, high in pairwise(steps))
 
 
-def split_syllables(segments: Sequence[Segment], *, is_english: bool) -> tuple[tuple[int, int], ...]:
+def split_syllables(segments: Sequence[IpaPhone], *, is_english: bool) -> tuple[tuple[int, int], ...]:
     """Half-open phone ranges of the syllables of a word; a word without vowel is one syllable.
 
     A vowel takes the longest legal onset; consonants before the first and after the last vowel belong to the first and

@@ -17,13 +17,12 @@ from types import MappingProxyType
 
 from lexicon.dictionary import Dictionary, word_key
 from lexicon.errors import InputError
-from lexicon.ipa import Segment
+from lexicon.ipa import IpaPhone
 from lexicon.marked_text import Mark, MarkedText, NodMark, PauseMark, PhoneMark, StyleRun
 from lexicon.pronounce import Word, pronounce, spoken_form
-from lexicon.sentence_ends import middle_place, split_chunks, split_phrase
+from lexicon.sentence_ends import MARKS, middle_place, split_chunks, split_phrase
 
 _STEM = "qzx"  # of the placeholders of given words during normalisation; not a word of any language
-_MARKS = frozenset(".,;:!?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +30,7 @@ class TextWord:
     """A normalised word, the phones given for it (or none), and the punctuation after it."""
 
     text: str
-    segments: tuple[Segment, ...] = ()
+    segments: tuple[IpaPhone, ...] = ()
     after: str = ""
 
 
@@ -59,7 +58,7 @@ def words_with_given_phones(written: str, phones: Sequence[PhoneMark], language:
         if match is None or mark is None:
             words.append(TextWord(word))
         else:
-            after = "".join(character for character in word[match.end() :] if character in _MARKS)
+            after = "".join(character for character in word[match.end() :] if character in MARKS)
             words.append(TextWord(written[mark.at : mark.end], mark.segments, after))
     if marks:
         mark = next(iter(marks.values()))
@@ -215,7 +214,7 @@ class Sentence:
 
 
 def split_sentences(
-    text: MarkedText, language: str, own: Mapping[str, tuple[Segment, ...]] | None = None
+    text: MarkedText, language: str, own: Mapping[str, tuple[IpaPhone, ...]] | None = None
 ) -> Iterator[Sentence]:
     """Sentences that contain words, lazily and in linear time.
 
@@ -261,7 +260,7 @@ def split_sentences(
         yield replace(pending, marks=(*pending.marks, *others[n_used:]))
 
 
-def _pieces(placed: MarkedText, language: str, own: Mapping[str, tuple[Segment, ...]]) -> Iterator[tuple[str, bool]]:
+def _pieces(placed: MarkedText, language: str, own: Mapping[str, tuple[IpaPhone, ...]]) -> Iterator[tuple[str, bool]]:
     """Parts of a text that become sentences, and whether the written sentence continues after a part."""
     phones = [mark for mark in placed.marks if isinstance(mark, PhoneMark)]
     starts, begin = [mark.at for mark in phones], 0
@@ -282,7 +281,7 @@ def _pieces(placed: MarkedText, language: str, own: Mapping[str, tuple[Segment, 
 
 
 def _spoken_letters(
-    chunk: str, language: str, given: Sequence[PhoneMark], own: Mapping[str, tuple[Segment, ...]]
+    chunk: str, language: str, given: Sequence[PhoneMark], own: Mapping[str, tuple[IpaPhone, ...]]
 ) -> int:
     """About the number of letters of the spoken form of a text, where each given phone is a letter."""
     text = spoken_form(chunk, language)

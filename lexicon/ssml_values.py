@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from lexicon.dictionary import arpabet_segments
 from lexicon.errors import InputError
-from lexicon.ipa import Segment, parse_ipa
+from lexicon.ipa import IpaPhone, parse_ipa
 from lexicon.languages import language_code
 
 Attributes = Mapping[str, str]
@@ -96,7 +96,7 @@ def parse_volume(written: str) -> float:
     return NAMED_VOLUMES[written.strip()]
 
 
-ALPHABETS: Mapping[str, Callable[[str], tuple[Segment, ...]]] = MappingProxyType({
+ALPHABETS: Mapping[str, Callable[[str], tuple[IpaPhone, ...]]] = MappingProxyType({
     "ipa": parse_ipa, "x-arpabet": arpabet_segments, "arpabet": arpabet_segments, "x-cmu": arpabet_segments,
 })  # fmt: skip
 # Voices that a document may name, as in tts2face.sound; Piper voices are files, which a document cannot open.
@@ -107,7 +107,7 @@ MAX_PHONES_CHARACTERS = 500  # characters of ``ph``
 MAX_WORD_CHARACTERS = 60  # characters of a word with given phones
 _NO_WORD = re.compile(r"[^\w'’-]+")
 
-PhonemeWord = tuple[str, tuple[Segment, ...]]
+PhonemeWord = tuple[str, tuple[IpaPhone, ...]]
 
 
 def phoneme_words(text: str, written: str, alphabet: str) -> list[PhonemeWord]:

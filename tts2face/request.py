@@ -9,9 +9,8 @@ from typing import Any
 
 from lexicon.errors import InputError
 from lexicon.inputs import check_fields, check_limits, is_number
+from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS
 
-RATE_LIMITS = (0.5, 2.0)
-VOLUME_LIMITS = (0.0, 2.0)
 FPS_LIMITS = (1.0, 120.0)
 AUDIO_MAP_NAMES = ("linear", "network")
 SYNTHESIS_METHODS = ("exemplar", "theobald2007")

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.drawn.character import Character
+from corpus_tools.drawn.character import DrawnCharacter
 from corpus_tools.drawn.elder import ELDER
 from corpus_tools.drawn.eyes import brow_piece, find_lining, lash_piece, shut_lids, still_lining, tuck_lining
 from corpus_tools.drawn.girl import GIRL
@@ -27,10 +27,10 @@ from corpus_tools.head.correspondence import add_landmarks
 from corpus_tools.head.eyes import eyeball_piece, fit_eyeballs
 from corpus_tools.head.head import PIVOT, REFERENCE_PERSON, ReferenceHead, shirt_piece, skin_piece
 from corpus_tools.head.lips import close_lips, lip_ring
-from corpus_tools.head.mesh import Cage, Eyeball, HeadPieces, Piece, assemble_face, build_cage
+from corpus_tools.head.mesh import Cage, Eyeball, HeadPart, HeadPieces, assemble_face, build_cage
 from corpus_tools.head.mouth import tongue_piece
 from corpus_tools.head.shapes import LID_SHAPES, clear_eyeballs, correct_shapes, find_lid_edges, fit_jaw, wet_piece
-from corpus_tools.head.skin import Skin, build_shoulders, build_skin
+from corpus_tools.head.skin import HeadSkin, build_shoulders, build_skin
 from corpus_tools.head.source import SourceMesh, fetch_data, read_source
 from corpus_tools.training.calibrate_face import calibrate_face_file
 from tts2face.face.body import BREATH_SHAPE, LIMIT_RAD, PUPIL_SHAPE
@@ -38,14 +38,16 @@ from tts2face.models.face import Face, Hairdo, Texture
 from tts2face.models.face_file import write_face
 from tts2face.models.hair_file import SWING_SHAPES
 
-CAST: Mapping[str, Character] = {one.name: one for one in (WOMAN, MAN, ELDER, GIRL, REALISTIC_WOMAN, REALISTIC_MAN)}
+CAST: Mapping[str, DrawnCharacter] = {
+    one.name: one for one in (WOMAN, MAN, ELDER, GIRL, REALISTIC_WOMAN, REALISTIC_MAN)
+}
 CLEAR_MM = 0.6  # between lid and eyeball: the edges of stretched lids are 6 mm long and sink between vertices
 BODY_SHAPES = (BREATH_SHAPE, *SWING_SHAPES, PUPIL_SHAPE)
 BODY_LIMITS = ((0.0, 1.0), *[(-LIMIT_RAD, LIMIT_RAD)] * len(SWING_SHAPES), (-1.0, 1.0))
 NO_TEXTURE = Texture(np.zeros((4, 4, 3), np.uint8))  # in place of the cards of brows and lashes
 
 
-def drawn_face(source: SourceMesh, character: Character) -> Face:
+def drawn_face(source: SourceMesh, character: DrawnCharacter) -> Face:
     """The face of a character, without score map."""
     reference, cage, balls, skin = _sculpted(source, character)
     pieces = [_breathing(piece) for piece in _pieces(cage, skin, reference, balls, character)]
@@ -66,13 +68,13 @@ def drawn_face(source: SourceMesh, character: Character) -> Face:
     return add_landmarks(_centred(replace(face, limits=limits)), skin.base)
 
 
-def own_hairdo(character: Character) -> Hairdo:
+def own_hairdo(character: DrawnCharacter) -> Hairdo:
     """Haircut and hair colour of a character; its face has them once it has the light of its hair, and others fit."""
     colour = "#" + "".join(f"{round(255 * share):02x}" for share in character.palette.hair)
     return Hairdo(character.hair.name, colour)
 
 
-def other_hair(source: SourceMesh, character: Character) -> OtherHair:
+def other_hair(source: SourceMesh, character: DrawnCharacter) -> OtherHair:
     """The hair of a character in other colours."""
     skin = _sculpted(source, character)[-1]
     others = other_palettes(character.palette)
@@ -81,7 +83,9 @@ def other_hair(source: SourceMesh, character: Character) -> OtherHair:
     return OtherHair(np.rint(255 * np.clip(painted, 0, 1)).astype(np.uint8), np.array(known, np.float32))
 
 
-def _sculpted(source: SourceMesh, character: Character) -> tuple[ReferenceHead, Cage, tuple[Eyeball, Eyeball], Skin]:
+def _sculpted(
+    source: SourceMesh, character: DrawnCharacter
+) -> tuple[ReferenceHead, Cage, tuple[Eyeball, Eyeball], HeadSkin]:
     """A person's head for reference, and a character's cage, eyeballs and skin."""
     reference = _reference(source)
     cage = drawn_cage(source, character.targets, character.proportions)
@@ -96,7 +100,7 @@ def _centred(face: Face) -> Face:
     return replace(face, vertices=face.vertices - middle, eyes=eyes, pivot=face.pivot - middle)
 
 
-def _breathing(piece: Piece) -> Piece:
+def _breathing(piece: HeadPart) -> HeadPart:
     moved = breath(piece.vertices)
     return replace(piece, shapes={**piece.shapes, BREATH_SHAPE: moved}) if moved.any() else piece
 
@@ -117,7 +121,9 @@ def _reference(source: SourceMesh) -> ReferenceHead:
     return ReferenceHead(cage, skin, build_shoulders(cage), lip_ring(skin), lids, {}, {})
 
 
-def _skin(own: Skin, reference: ReferenceHead, balls: tuple[Eyeball, Eyeball], character: Character) -> Skin:
+def _skin(
+    own: HeadSkin, reference: ReferenceHead, balls: tuple[Eyeball, Eyeball], character: DrawnCharacter
+) -> HeadSkin:
     """The skin of a character, with its expressions, and its slight smile at rest."""
     shut = shut_lids(correct_shapes(close_lips(own, reference.lips)), balls, reference.lids)
     skin = round_lips(soften(shut, reference.lids, reference.lips), character.pucker)
@@ -130,8 +136,8 @@ def _skin(own: Skin, reference: ReferenceHead, balls: tuple[Eyeball, Eyeball], c
 
 
 def _pieces(
-    cage: Cage, skin: Skin, reference: ReferenceHead, balls: tuple[Eyeball, Eyeball], character: Character
-) -> tuple[Piece, ...]:
+    cage: Cage, skin: HeadSkin, reference: ReferenceHead, balls: tuple[Eyeball, Eyeball], character: DrawnCharacter
+) -> tuple[HeadPart, ...]:
     palette, jaw = character.palette, fit_jaw(cage)
     wet = wet_piece(skin, balls, reference.lids)
     upper, lower = teeth_pieces(cage, skin, reference, jaw, character)
@@ -152,7 +158,7 @@ def _pieces(
     )
 
 
-def build_character(source: SourceMesh, character: Character, out: Path, report: Callable[[str], None]) -> None:
+def build_character(source: SourceMesh, character: DrawnCharacter, out: Path, report: Callable[[str], None]) -> None:
     """Write a character, calibrated, into a file; `report` gets the name of each step."""
     report(f"{character.name}: shape")
     face = drawn_face(source, character)

@@ -58,7 +58,7 @@ class Proportions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Palette:
+class CharacterColours:
     """Colours of a character.
 
     ``tints`` are applied to the skin in their order. ``hair`` is the colour of a lock's middle, ``hair_tip`` that of
@@ -206,7 +206,7 @@ class Collar:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Character:
+class DrawnCharacter:
     """A drawn character.
 
     ``targets`` are weights of MakeHuman's targets; ``rest`` are weights of the face's shapes that it has at rest.
@@ -221,7 +221,7 @@ class Character:
     summary: str
     targets: Mapping[str, float]
     proportions: Proportions
-    palette: Palette
+    palette: CharacterColours
     eyes: EyeStyle
     brow: Brow
     lashes: Profile

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from corpus_tools.drawn.character import Brow, Character, Collar, Hairstyle, Lock, Proportions
+from corpus_tools.drawn.character import Brow, Collar, DrawnCharacter, Hairstyle, Lock, Proportions
 from corpus_tools.drawn.woman import PALETTE as HER_PALETTE
 from corpus_tools.head.eyes import EyeStyle
 
@@ -66,7 +66,7 @@ SIDE = (
     (0, 34), (15, 35), (30, 33), (42, 26), (52, 16), (62, 6), (72, -4), (80, -10), (88, -6), (98, -2), (108, -12),
     (124, -24), (150, -34), (180, -36),
 )  # fmt: skip
-ELDER = Character(
+ELDER = DrawnCharacter(
     name="noor",
     summary="an old woman with silver hair in a bun, drawn as for an animated film",
     targets=TARGETS,

@@ -17,9 +17,9 @@ from scipy.spatial import cKDTree
 from corpus_tools.drawn.character import Brow, Colour, Profile
 from corpus_tools.drawn.fields import Front, arc_length, profile, smooth_line, smooth_rows
 from corpus_tools.head.correspondence import nearest_surface_points
-from corpus_tools.head.mesh import Eyeball, MaterialSpan, Piece, grid_triangles, triangulate
+from corpus_tools.head.mesh import Eyeball, HeadPart, MaterialSpan, grid_triangles, triangulate
 from corpus_tools.head.shapes import LidEdge, neighbour_means
-from corpus_tools.head.skin import Skin, vertex_normals
+from corpus_tools.head.skin import HeadSkin, vertex_normals
 from tts2face.numeric.arrays import smoothstep, unit_vectors
 
 Floats = NDArray[np.float64]
@@ -37,7 +37,7 @@ LINING_MM, LINING_DEEP_MM = 0.2, 14.0  # distance of the tucked lining from the 
 BROWS = ("browInnerUp", "browOuterUpLeft", "browOuterUpRight", "browDownLeft", "browDownRight")
 
 
-def facing(skin: Skin, ball: Eyeball) -> tuple[Floats, Floats, Floats]:
+def facing(skin: HeadSkin, ball: Eyeball) -> tuple[Floats, Floats, Floats]:
     """Offset (N, 3) of the skin from an eyeball's centre, its length (N,), and its cosine (N,) with the normal."""
     off = skin.vertices - ball.centre
     distance = np.linalg.norm(off, axis=1)
@@ -45,7 +45,7 @@ def facing(skin: Skin, ball: Eyeball) -> tuple[Floats, Floats, Floats]:
     return off, distance, np.einsum("nc,nc->n", off / distance[:, None], normals)
 
 
-def find_lining(skin: Skin, balls: Sequence[Eyeball], most: float) -> Bools:
+def find_lining(skin: HeadSkin, balls: Sequence[Eyeball], most: float) -> Bools:
     """(N,) inner side of the lids: near an eyeball, with a cosine of its normal below `most`."""
     lining = np.zeros(len(skin.vertices), bool)
     for ball in balls:
@@ -54,7 +54,7 @@ def find_lining(skin: Skin, balls: Sequence[Eyeball], most: float) -> Bools:
     return lining
 
 
-def shut_lids(skin: Skin, balls: Sequence[Eyeball], lids: Sequence[LidEdge]) -> Skin:
+def shut_lids(skin: HeadSkin, balls: Sequence[Eyeball], lids: Sequence[LidEdge]) -> HeadSkin:
     """Blinks that shut: larger openings stay open with MakeHuman's.
 
     The way of the upper lid is scaled column by column until its edge meets the lower one; it is then laid on the
@@ -70,7 +70,7 @@ def shut_lids(skin: Skin, balls: Sequence[Eyeball], lids: Sequence[LidEdge]) -> 
     return replace(skin, shapes=shapes)
 
 
-def _raise_lower_lid(skin: Skin, moved: Floats, ball: Eyeball, edge: LidEdge) -> Floats:
+def _raise_lower_lid(skin: HeadSkin, moved: Floats, ball: Eyeball, edge: LidEdge) -> Floats:
     """A blink (N, 3) whose lower lid comes up to an arc: a deep one would draw a shut eye with a hook at its corner."""
     low = (skin.vertices + moved)[edge.lower]
     ends = low[[low[:, 0].argmin(), low[:, 0].argmax()]]
@@ -106,7 +106,7 @@ def _way_factors(vertices: Floats, moved: Floats, edge: LidEdge) -> Floats:
     return np.interp(vertices[:, 0], columns, smooth)
 
 
-def _lay_on_ball(skin: Skin, moved: Floats, ball: Eyeball, edge: LidEdge, means: sparse.csr_array) -> Floats:
+def _lay_on_ball(skin: HeadSkin, moved: Floats, ball: Eyeball, edge: LidEdge, means: sparse.csr_array) -> Floats:
     """A blink (N, 3) whose shut lid lies on the eyeball."""
     _, distance, cosine = facing(skin, ball)
     off = skin.vertices + moved - ball.centre
@@ -123,7 +123,7 @@ def _lay_on_ball(skin: Skin, moved: Floats, ball: Eyeball, edge: LidEdge, means:
     return moved
 
 
-def tuck_lining(skin: Skin, balls: Sequence[Eyeball], lining: Bools) -> Skin:
+def tuck_lining(skin: HeadSkin, balls: Sequence[Eyeball], lining: Bools) -> HeadSkin:
     """Blinks whose lids' inner side lies on the eyeball: in front of the outer side it would be a dark patch."""
     shapes = dict(skin.shapes)
     for ball, side in zip(balls, ("Left", "Right"), strict=True):
@@ -138,7 +138,7 @@ def tuck_lining(skin: Skin, balls: Sequence[Eyeball], lining: Bools) -> Skin:
     return replace(skin, shapes=shapes)
 
 
-def still_lining(skin: Skin, balls: Sequence[Eyeball]) -> Skin:
+def still_lining(skin: HeadSkin, balls: Sequence[Eyeball]) -> HeadSkin:
     """Brows that do not move the folded inner side of the lids, which would slit a shut lid under raised brows."""
     means, shapes = neighbour_means(skin), dict(skin.shapes)
     lining = find_lining(skin, balls, 0.1).astype(np.float64)
@@ -149,7 +149,7 @@ def still_lining(skin: Skin, balls: Sequence[Eyeball]) -> Skin:
     return replace(skin, shapes=shapes)
 
 
-def keep_outside(skin: Skin, vertices: Floats, balls: Sequence[Eyeball]) -> Floats:
+def keep_outside(skin: HeadSkin, vertices: Floats, balls: Sequence[Eyeball]) -> Floats:
     """Skin (N, 3) around the eyes that stays outside the eyeballs at rest; the inner side of the lids is left alone."""
     means = neighbour_means(skin)
     moved = vertices
@@ -175,7 +175,9 @@ ROW_TURNS = np.array([0.0, 0.10, 0.8, 1.0])
 MATERIAL = {"specular": 0.03, "shininess": 8.0, "wrap": 0.3}
 
 
-def lash_piece(skin: Skin, lids: Sequence[LidEdge], balls: Sequence[Eyeball], length: Profile, colour: Colour) -> Piece:
+def lash_piece(
+    skin: HeadSkin, lids: Sequence[LidEdge], balls: Sequence[Eyeball], length: Profile, colour: Colour
+) -> HeadPart:
     """The lashes of both eyes; `length` in mm by share of the lid from the inner corner."""
     rows = np.flatnonzero((skin.vertices[:, 2] > -25) & (np.abs(skin.vertices[:, 1]) < 34))
     points, faces = [], []
@@ -195,7 +197,7 @@ def lash_piece(skin: Skin, lids: Sequence[LidEdge], balls: Sequence[Eyeball], le
             shapes[name].append(follow)
     vertices = np.concatenate(points)
     joined = {name: np.concatenate(blocks) for name, blocks in shapes.items()}
-    return Piece(
+    return HeadPart(
         vertices,
         (MaterialSpan("lashes", np.concatenate(faces), MATERIAL),),
         np.tile(colour, (len(vertices), 1)),
@@ -206,7 +208,7 @@ def lash_piece(skin: Skin, lids: Sequence[LidEdge], balls: Sequence[Eyeball], le
 class _Band:
     """The band of one eye: rows of points along the lid's edge `line`, from the root outwards."""
 
-    def __init__(self, skin: Skin, line: NDArray[np.int64], ball: Eyeball, sign: float, length: Profile) -> None:
+    def __init__(self, skin: HeadSkin, line: NDArray[np.int64], ball: Eyeball, sign: float, length: Profile) -> None:
         edge = skin.vertices[line]
         along = arc_length(edge)
         along /= along[-1]
@@ -261,7 +263,7 @@ AHEAD_SHARE = 0.18  # of a rise by which the brow comes forward: it drowns in th
 BROW_MATERIAL = {"specular": 0.05, "shininess": 10.0, "wrap": 0.5}
 
 
-def brow_piece(skin: Skin, brow: Brow, colour: Colour) -> Piece:
+def brow_piece(skin: HeadSkin, brow: Brow, colour: Colour) -> HeadPart:
     """Both brows on the skin of a character."""
     triangles = _forehead(skin)
     points, faces = [], []
@@ -282,7 +284,7 @@ def brow_piece(skin: Skin, brow: Brow, colour: Colour) -> Piece:
             shapes[name] = follow.reshape(-1, 3)
     span = MaterialSpan("brows", np.concatenate(faces), BROW_MATERIAL)
     bright = 1 - SHADE * _between_hairs().ravel()
-    return Piece(vertices, (span,), np.array(colour) * np.tile(bright, 2)[:, None], shapes)
+    return HeadPart(vertices, (span,), np.array(colour) * np.tile(bright, 2)[:, None], shapes)
 
 
 def _between_hairs() -> Floats:
@@ -292,14 +294,14 @@ def _between_hairs() -> Floats:
     return between
 
 
-def _forehead(skin: Skin) -> NDArray[np.int64]:
+def _forehead(skin: HeadSkin) -> NDArray[np.int64]:
     """(F, 3) triangles of the skin on which brows lie."""
     triangles = triangulate(skin.quads)
     places = skin.vertices[triangles].mean(axis=1)
     return np.asarray(triangles[(places[:, 2] > -20) & (places[:, 1] > 2) & (places[:, 1] < 70)])
 
 
-def _ribbon(skin: Skin, triangles: NDArray[np.int64], brow: Brow, sign: float) -> Floats:
+def _ribbon(skin: HeadSkin, triangles: NDArray[np.int64], brow: Brow, sign: float) -> Floats:
     """(`N_ALONG` x `N_ACROSS`, 3) points of the brow on the side of x with a sign."""
     places, normals = skin.vertices[triangles].mean(axis=1), vertex_normals(skin.vertices, skin.quads, skin.base)
     along = np.linspace(0, 1, N_ALONG_BROW)

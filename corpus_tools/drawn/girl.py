@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from corpus_tools.drawn.character import Brow, Character, Collar, Hairstyle, Lock, Proportions
+from corpus_tools.drawn.character import Brow, Collar, DrawnCharacter, Hairstyle, Lock, Proportions
 from corpus_tools.drawn.woman import PALETTE as HER_PALETTE
 from corpus_tools.head.eyes import EyeStyle
 
@@ -66,7 +66,7 @@ SIDE = (
     (0, 31), (12, 32), (26, 31), (38, 27), (48, 20), (58, 11), (66, 3), (74, -5), (84, -6), (96, -2), (108, -12),
     (124, -24), (150, -33), (180, -35),
 )  # fmt: skip
-GIRL = Character(
+GIRL = DrawnCharacter(
     name="zuri",
     summary="a girl with two puffs of curls, drawn as for an animated film",
     targets=TARGETS,

@@ -8,10 +8,10 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
-from corpus_tools.drawn.character import Curls, Hairstyle, Lock, Palette
+from corpus_tools.drawn.character import CharacterColours, Curls, Hairstyle, Lock
 from corpus_tools.drawn.fields import arc_length, hair_tiles, in_tile, profile, smooth_rows, wind_outward
-from corpus_tools.head.mesh import MaterialSpan, Piece, grid_triangles, triangulate
-from corpus_tools.head.skin import Skin, vertex_normals
+from corpus_tools.head.mesh import HeadPart, MaterialSpan, grid_triangles, triangulate
+from corpus_tools.head.skin import HeadSkin, vertex_normals
 from tts2face.models.hair_file import swing_shapes
 from tts2face.numeric.arrays import smoothstep, unit_vectors
 
@@ -45,7 +45,7 @@ MOST_TO_TIP = 1.25  # factor of the colour from the root to the tip
 MATERIAL = {"specular": 0.05, "shininess": 10.0, "wrap": 0.5}
 
 
-def hair_piece(skin: Skin, style: Hairstyle, palette: Palette) -> Piece:
+def hair_piece(skin: HeadSkin, style: Hairstyle, palette: CharacterColours) -> HeadPart:
     """The hair of a character, with a tile of the texture for the shell and for each lock."""
     scalp = Scalp(skin, style)
     still = [scalp.shell(), *(() if style.curls is None else (curled_tube(style.curls, scalp),))]
@@ -66,7 +66,7 @@ def hair_piece(skin: Skin, style: Hairstyle, palette: Palette) -> Piece:
         uv.append(in_tile(tile, *tube.places.T))
         count += len(tube.points)
     span = MaterialSpan("hair", np.concatenate(faces), MATERIAL)
-    return Piece(
+    return HeadPart(
         np.concatenate(points),
         (span,),
         np.concatenate(colours),
@@ -84,7 +84,7 @@ class OtherHair:
     colours: NDArray[np.float32]
 
 
-def other_palettes(palette: Palette) -> tuple[Palette, ...]:
+def other_palettes(palette: CharacterColours) -> tuple[CharacterColours, ...]:
     """Colours with black and with light hair, as far as a character's own is neither.
 
     Between its pictures in these, hair is drawn in any colour.
@@ -95,7 +95,7 @@ def other_palettes(palette: Palette) -> tuple[Palette, ...]:
     return tuple(replace(palette, hair=one, hair_tip=tuple((np.array(one) * to_tip).tolist())) for one in others)
 
 
-def hair_cover(skin: Skin, style: Hairstyle) -> Floats:
+def hair_cover(skin: HeadSkin, style: Hairstyle) -> Floats:
     """(N,) share of the skin that hair covers, painted in its colour."""
     return smoothstep(height_over_hairline(skin.vertices, style), -1.0, 2.0)
 
@@ -154,7 +154,7 @@ class Tube:
 class Scalp:
     """The skin that hair grows on and stays outside of."""
 
-    def __init__(self, skin: Skin, style: Hairstyle) -> None:
+    def __init__(self, skin: HeadSkin, style: Hairstyle) -> None:
         self._skin, self._style = skin, style
         self._height = height_over_hairline(skin.vertices, style)
         self._normals = vertex_normals(skin.vertices, skin.quads, skin.base)
@@ -323,7 +323,7 @@ def _capped(rings: Floats) -> tuple[Floats, Ints]:
     return points, np.concatenate([grid_triangles(n, k), *fans])
 
 
-def _colours(tube: Tube, palette: Palette) -> Floats:
+def _colours(tube: Tube, palette: CharacterColours) -> Floats:
     """(N, 3) colours of a lock: lighter tips, slightly darker rims; highlights are left to the light."""
     own, tip = np.array(palette.hair), np.array(palette.hair_tip)
     shade = 1 - PAINTED_SHADE * (1 - tube.shade[:, None])

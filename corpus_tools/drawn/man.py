@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from corpus_tools.drawn.character import Brow, Character, Collar, Hairstyle, Lock, Proportions
+from corpus_tools.drawn.character import Brow, Collar, DrawnCharacter, Hairstyle, Lock, Proportions
 from corpus_tools.drawn.woman import PALETTE as HER_PALETTE
 from corpus_tools.drawn.woman import WOMAN
 from corpus_tools.head.eyes import EyeStyle
@@ -93,7 +93,7 @@ SIDE = (
     (0, 37), (15, 37), (30, 37), (42, 33), (50, 25), (56, 14), (61, 2), (66, -11), (72, -17), (80, -18), (90, -16),
     (105, -18), (120, -24), (150, -32), (180, -34),
 )  # fmt: skip
-MAN = Character(
+MAN = DrawnCharacter(
     name="ben",
     summary="a young man with a dark quiff, drawn as for an animated film",
     targets=TARGETS,

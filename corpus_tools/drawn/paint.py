@@ -8,12 +8,12 @@ from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
 from corpus_tools.dense.texels import Texels, find_texels
-from corpus_tools.drawn.character import Brow, Character, Colour, Palette
+from corpus_tools.drawn.character import Brow, CharacterColours, Colour, DrawnCharacter
 from corpus_tools.drawn.fields import profile, smooth_line
 from corpus_tools.head.eyes import TEXTURE_SIDE, EyeStyle
 from corpus_tools.head.mesh import gaussian_bump, layout_coordinates, triangulate
 from corpus_tools.head.shapes import LidEdge
-from corpus_tools.head.skin import Skin
+from corpus_tools.head.skin import HeadSkin
 from corpus_tools.head.source import SourceMesh
 from corpus_tools.head.texture import INNER_LIP_Z, fill_gaps, in_mouth, line_distance, sample_mask
 from tts2face.numeric.arrays import smoothstep
@@ -37,9 +37,9 @@ SPOKES = ((23, 0.5, 0.3), (37, 0.35, 1.9), (52, 0.25, 4.0))  # of the iris: numb
 
 def paint_skin(
     source: SourceMesh,
-    skin: Skin,
+    skin: HeadSkin,
     lids: Sequence[LidEdge],
-    character: Character,
+    character: DrawnCharacter,
     mouth_y: float,
     hair: Floats,
 ) -> NDArray[np.uint8]:
@@ -96,7 +96,7 @@ def _mask(source: SourceMesh, name: str, blur: float, where: Floats) -> Floats:
     return sample_mask(gaussian_filter(source.mask(name), blur), where)
 
 
-def _lips(place: Floats, palette: Palette, mouth_y: float) -> Floats:
+def _lips(place: Floats, palette: CharacterColours, mouth_y: float) -> Floats:
     """(P, 3) colour of the lips: the upper one darker, both deeper towards the line between them."""
     upper = smoothstep(place[:, 1], mouth_y - 0.6, mouth_y + 2.2)
     line = np.exp(-(((place[:, 1] - mouth_y) / 1.3) ** 2)) * (np.abs(place[:, 0]) < 40)
@@ -104,7 +104,7 @@ def _lips(place: Floats, palette: Palette, mouth_y: float) -> Floats:
     return np.asarray(np.array(palette.lips) * darker * (1 - 0.16 * line[:, None]))
 
 
-def _mouth(source: SourceMesh, place: Floats, where: Floats, palette: Palette) -> tuple[Floats, Floats]:
+def _mouth(source: SourceMesh, place: Floats, where: Floats, palette: CharacterColours) -> tuple[Floats, Floats]:
     """Share (P,) and colour (P, 3) of the inside of the mouth: dark towards the throat, lips towards the front."""
     colour = np.array(palette.cavity) * (1 - 0.55 * smoothstep(-place[:, 2], -15.0, 25.0))[:, None]
     near = smoothstep(place[:, 2], *INNER_LIP_Z)[:, None]
@@ -116,7 +116,9 @@ def _in_mouth(source: SourceMesh, where: Floats) -> Floats:
     return smoothstep(np.maximum(_mask(source, "inside-mouth", 2.0, where), in_mouth(where)), 0.15, 0.95)
 
 
-def _paint_lids(colour: _Paint, texels: Texels, skin: Skin, lids: Sequence[LidEdge], palette: Palette) -> None:
+def _paint_lids(
+    colour: _Paint, texels: Texels, skin: HeadSkin, lids: Sequence[LidEdge], palette: CharacterColours
+) -> None:
     """The dark edge of the upper lid, the shadow of its crease, and the waterline of the lower one."""
     place = texels.interpolate(skin.vertices)
     shut = skin.vertices + skin.shapes["eyeBlinkLeft"] + skin.shapes["eyeBlinkRight"]
@@ -191,7 +193,7 @@ def _as_bytes(colours: Floats) -> NDArray[np.uint8]:
     return np.asarray(np.rint(255 * np.clip(colours, 0, 1)), np.uint8)
 
 
-def paint_eye(style: EyeStyle, palette: Palette) -> NDArray[np.uint8]:
+def paint_eye(style: EyeStyle, palette: CharacterColours) -> NDArray[np.uint8]:
     """(TEXTURE_SIDE, TEXTURE_SIDE, 3) texture of an eyeball: a dark ring, a light crescent opposite the key light."""
     grid = (np.arange(TEXTURE_SIDE) + 0.5) / TEXTURE_SIDE - 0.5
     across, up = np.meshgrid(grid, -grid)

@@ -6,7 +6,7 @@ docs/decisions/170-people-in-film-light.md.
 
 from dataclasses import replace
 
-from corpus_tools.drawn.character import Brow, Character, Collar, Hairstyle, Lock, Proportions
+from corpus_tools.drawn.character import Brow, Collar, DrawnCharacter, Hairstyle, Lock, Proportions
 from corpus_tools.drawn.man import PALETTE as DRAWN_MAN
 from corpus_tools.drawn.man import SIDE
 from corpus_tools.drawn.woman import HAIRLINE, LOCKS
@@ -166,7 +166,7 @@ HIS_HAIR = Hairstyle(
     shell_lift=3.2,
     fade=22.0,
 )
-REALISTIC_WOMAN = Character(
+REALISTIC_WOMAN = DrawnCharacter(
     name="mara",
     summary="a woman of about thirty with brown hair to her shoulders, in film light",
     targets=HER_TARGETS,
@@ -187,7 +187,7 @@ REALISTIC_WOMAN = Character(
     teeth_back=1.5,
     seams=SEAMS,
 )
-REALISTIC_MAN = Character(
+REALISTIC_MAN = DrawnCharacter(
     name="tomas",
     summary="a man of about thirty-five with short brown hair, in film light",
     targets=HIS_TARGETS,

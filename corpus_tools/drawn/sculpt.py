@@ -18,7 +18,7 @@ from corpus_tools.drawn.fields import bump
 from corpus_tools.head.lips import find_lip_line, ring_arcs
 from corpus_tools.head.mesh import SIDES, Cage, Eyeball, build_cage, gaussian_bump
 from corpus_tools.head.shapes import LidEdge, neighbour_means, smoothed
-from corpus_tools.head.skin import Skin
+from corpus_tools.head.skin import HeadSkin
 from corpus_tools.head.source import SourceMesh
 from tts2face.numeric.arrays import smoothstep
 
@@ -154,7 +154,7 @@ COLUMNS_MM = np.linspace(-30.0, 30.0, 61)  # across the mouth
 CORNER_MM, CHEEK_MM, MIDDLE_MM = np.array([1.5, 3.0, 1.5]), np.array([1.0, 1.6, 2.6]), np.array([0.0, 1.2, -0.6])
 
 
-def soften(skin: Skin, lids: Sequence[LidEdge], ring: NDArray[np.int64]) -> Skin:
+def soften(skin: HeadSkin, lids: Sequence[LidEdge], ring: NDArray[np.int64]) -> HeadSkin:
     """Smiles and squints whose motion of the cheeks is one smooth field; a smile lifts round cheeks.
 
     `ring` is where the lips meet.
@@ -179,7 +179,7 @@ def soften(skin: Skin, lids: Sequence[LidEdge], ring: NDArray[np.int64]) -> Skin
     return replace(skin, shapes=shapes)
 
 
-def part_lips(skin: Skin, ring: NDArray[np.int64]) -> Skin:
+def part_lips(skin: HeadSkin, ring: NDArray[np.int64]) -> HeadSkin:
     """Smiles and rounding whose lips touch and do not run into each other; `ring` is where they meet."""
     line, shapes = find_lip_line(skin, ring), dict(skin.shapes)
     upper, lower = ring_arcs(skin, ring)
@@ -198,12 +198,12 @@ def part_lips(skin: Skin, ring: NDArray[np.int64]) -> Skin:
     return replace(skin, shapes=shapes)
 
 
-def round_lips(skin: Skin, gain: float) -> Skin:
+def round_lips(skin: HeadSkin, gain: float) -> HeadSkin:
     """The skin with `mouthPucker` times a gain."""
     return replace(skin, shapes={**skin.shapes, "mouthPucker": gain * skin.shapes["mouthPucker"]})
 
 
-def thin_lips(skin: Skin, ring: NDArray[np.int64], still: float) -> Skin:
+def thin_lips(skin: HeadSkin, ring: NDArray[np.int64], still: float) -> HeadSkin:
     """Lifted upper lips that become thinner: the skin between them and the nose, which is short, would fold.
 
     The top of the lip does not follow the share `still` of a lift.
@@ -217,7 +217,7 @@ def thin_lips(skin: Skin, ring: NDArray[np.int64], still: float) -> Skin:
     return replace(skin, shapes={**skin.shapes, **lifted})
 
 
-def close_jaw(skin: Skin, ring: NDArray[np.int64]) -> Skin:
+def close_jaw(skin: HeadSkin, ring: NDArray[np.int64]) -> HeadSkin:
     """A `mouthClose` that undoes the gap of an open jaw: proportions change how far the jaw parts the lips."""
     upper, lower = ring_arcs(skin, ring)
     places, jaw, close = skin.vertices, skin.shapes["jawOpen"], skin.shapes["mouthClose"]
@@ -227,7 +227,7 @@ def close_jaw(skin: Skin, ring: NDArray[np.int64]) -> Skin:
     return replace(skin, shapes={**skin.shapes, "mouthClose": gain * close})
 
 
-def _lip_middle(skin: Skin, ring: NDArray[np.int64]) -> Floats:
+def _lip_middle(skin: HeadSkin, ring: NDArray[np.int64]) -> Floats:
     """(3,) middle of the line where lips meet, mm."""
     places = skin.vertices[ring]
     return np.asarray(places[np.abs(places[:, 0]) < LIP_MIDDLE_MM].mean(axis=0))
@@ -243,7 +243,7 @@ def _overlap(vertices: Floats, upper: NDArray[np.int64], lower: NDArray[np.int64
     return smooth
 
 
-def rest_in(skin: Skin, weights: Mapping[str, float], balls: Sequence[Eyeball]) -> Skin:
+def rest_in(skin: HeadSkin, weights: Mapping[str, float], balls: Sequence[Eyeball]) -> HeadSkin:
     """The skin with weights of its shapes (without sides) as the rest pose; blinks still shut."""
     lift = np.zeros_like(skin.vertices)
     for name, weight in weights.items():

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
-from corpus_tools.drawn.character import Character
+from corpus_tools.drawn.character import DrawnCharacter
 from corpus_tools.head.head import COVERED_POSES, ReferenceHead, cover_in_pose
 from corpus_tools.head.lips import add_retreat, lip_front
-from corpus_tools.head.mesh import Cage, MaterialSpan, Piece, grid_triangles
+from corpus_tools.head.mesh import Cage, HeadPart, MaterialSpan, grid_triangles
 from corpus_tools.head.mouth import (
     COVER_MM,
     LOWER,
@@ -22,7 +22,7 @@ from corpus_tools.head.mouth import (
     keep_behind,
 )
 from corpus_tools.head.shapes import Jaw
-from corpus_tools.head.skin import Skin
+from corpus_tools.head.skin import HeadSkin
 from tts2face.numeric.arrays import smoothstep
 
 Floats = NDArray[np.float64]
@@ -49,8 +49,8 @@ GUM_MATERIAL = {"specular": 0.25, "shininess": 30.0, "wrap": 0.4}
 
 
 def teeth_pieces(
-    cage: Cage, skin: Skin, reference: ReferenceHead, jaw: Jaw, character: Character
-) -> tuple[Piece, Piece]:
+    cage: Cage, skin: HeadSkin, reference: ReferenceHead, jaw: Jaw, character: DrawnCharacter
+) -> tuple[HeadPart, HeadPart]:
     """Upper and lower arch of a character's cage, behind its skin; `reference` is that of a person."""
     pieces = []
     ahead = lip_front(skin.vertices, reference.lips) - lip_front(reference.skin.vertices, reference.lips)
@@ -63,12 +63,12 @@ def teeth_pieces(
         pose, cover = COVERED_POSES[name]
         points = _smooth_cover(points, cover_in_pose(points, skin, jaw, pose, cover))
         moved = add_retreat(points, jaw.shapes(points), skin, reference.lips) if name == "lower" else {}
-        pieces.append(Piece(points, piece.spans, piece.colours, moved))
+        pieces.append(HeadPart(points, piece.spans, piece.colours, moved))
     upper, lower = pieces
     return upper, replace(lower, vertices=lower.vertices - [0.0, 0.0, character.teeth_back])
 
 
-def _follow_line(points: Floats, name: str, skin: Skin, ring: NDArray[np.int64]) -> Floats:
+def _follow_line(points: Floats, name: str, skin: HeadSkin, ring: NDArray[np.int64]) -> Floats:
     """An arch (N, 3) whose edge lies `SHOWN_MM` over the line between the lips, and follows a share of its curve."""
     line = skin.vertices[ring]
     front = line[np.abs(line[:, 0]) < FRONT_X_MM]
@@ -93,7 +93,7 @@ def _smooth_cover(points: Floats, covered: Floats) -> Floats:
     return moved
 
 
-def _arch_piece(arch: Arch, name: str, character: Character) -> Piece:
+def _arch_piece(arch: Arch, name: str, character: DrawnCharacter) -> HeadPart:
     """Teeth and gum of an arch; its two spans are ``teeth_<name>`` and ``gums_<name>``."""
     tooth_colour, seams = np.array(character.palette.teeth), character.seams
     path, total = arch_path(arch.curve), arch.widths.sum()
@@ -122,7 +122,7 @@ def _arch_piece(arch: Arch, name: str, character: Character) -> Piece:
         MaterialSpan(f"teeth_{name}", _facing_front(points), TEETH_MATERIAL),
         MaterialSpan(f"gums_{name}", gum.spans[0].triangles + len(points), GUM_MATERIAL),
     )
-    return Piece(
+    return HeadPart(
         np.concatenate([points, gum.vertices]),
         spans,
         np.concatenate([np.stack(colours, axis=1).reshape(-1, 3), gum.colours]),

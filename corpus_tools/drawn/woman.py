@@ -3,7 +3,7 @@
 Measures that looked right, and what looked wrong beside them, are in docs/decisions/161-drawn.md.
 """
 
-from corpus_tools.drawn.character import Brow, Character, Collar, Hairstyle, Lock, Palette, Proportions
+from corpus_tools.drawn.character import Brow, CharacterColours, Collar, DrawnCharacter, Hairstyle, Lock, Proportions
 from corpus_tools.head.eyes import EyeStyle
 
 TARGETS = {
@@ -25,7 +25,7 @@ TARGETS = {
 }  # fmt: skip
 # Rosy rather than yellow skin, as the warm key light adds the yellow. The hair is two values darker than the skin, as
 # auburn has its value and hue; the green of the eyes is the hair's complement, and an echo of the wall.
-PALETTE = Palette(
+PALETTE = CharacterColours(
     skin=(0.89, 0.665, 0.55), ears=(1.0, 0.94, 0.93), lids=(1.0, 0.95, 0.93),
     tints=(
         ((36, -32, 14), (17, 13, 30), (1.04, 0.80, 0.80)),  # cheeks
@@ -138,7 +138,7 @@ HAIRLINE = (  # on her right it lies under the fringe
     (12, 34), (20, 41), (31, 45), (40, 37), (48, 26), (58, 17), (70, 4), (84, -8), (100, -14), (120, -22), (150, -34),
     (180, -36),
 )  # fmt: skip
-WOMAN = Character(
+WOMAN = DrawnCharacter(
     name="ada",
     summary="a young woman with a chestnut bob, drawn as for an animated film",
     targets=TARGETS,

@@ -21,8 +21,8 @@ from corpus_tools.drawn.man import MAN
 from corpus_tools.drawn.woman import WOMAN
 from corpus_tools.head.build_head import METADATA
 from corpus_tools.head.head import PIVOT
-from corpus_tools.head.mesh import Eyeball, MaterialSpan, Piece, grid_triangles
-from corpus_tools.head.skin import Skin
+from corpus_tools.head.mesh import Eyeball, HeadPart, MaterialSpan, grid_triangles
+from corpus_tools.head.skin import HeadSkin
 from tts2face.models.baked_light import HairLight
 from tts2face.models.face import Face
 from tts2face.models.hair_file import LitHair, swing_shapes
@@ -187,7 +187,7 @@ BREATH_FROM_MM = (105.0, 150.0)  # below the eyes: from the neck to the shoulder
 BREATH_MM, BREATH_GAIN = np.array([0.0, 3.0, 1.2]), np.array([0.008, 0.0, 0.0])
 
 
-def sweater_piece(shirt: Piece, collar: Collar | None, colour: Colour) -> Piece:
+def sweater_piece(shirt: HeadPart, collar: Collar | None, colour: Colour) -> HeadPart:
     """A shirt of one colour, with a rolled collar if given; both are cut open at the back, for the texture."""
     off = shirt.vertices - [0.0, 0.0, NECK_Z if collar is None else collar.middle]
     turn = np.arctan2(off[:, 0], off[:, 2]) / (2 * np.pi) + 0.5
@@ -196,7 +196,7 @@ def sweater_piece(shirt: Piece, collar: Collar | None, colour: Colour) -> Piece:
     down = np.hypot(radius - radius.min(), height.max() - height)  # from the collar outwards: around the neck as well
     uv = in_tile(SHIRT, turn / turn.max(), down / down.max())
     if collar is None:
-        return Piece(
+        return HeadPart(
             shirt.vertices[rows], (MaterialSpan("shirt", body, MATERIAL),), np.tile(colour, (len(rows), 1)), uv=uv
         )
     points, triangles, places = _roll(collar)
@@ -204,7 +204,7 @@ def sweater_piece(shirt: Piece, collar: Collar | None, colour: Colour) -> Piece:
     colours = np.concatenate([np.ones(len(rows)), np.full(len(points), ROLL_SHADE)])[:, None] * colour
     uv = np.concatenate([uv, in_tile(COLLAR, *places.T)])
     vertices = np.concatenate([shirt.vertices[rows], points])
-    return Piece(vertices, (MaterialSpan("shirt", faces, MATERIAL),), colours, uv=uv)
+    return HeadPart(vertices, (MaterialSpan("shirt", faces, MATERIAL),), colours, uv=uv)
 
 
 def _roll(collar: Collar) -> tuple[Floats, NDArray[np.int64], Floats]:
@@ -241,7 +241,7 @@ def breath(vertices: Floats) -> Floats:
     return np.asarray(share * (BREATH_MM + vertices * BREATH_GAIN))
 
 
-def stud_pieces(skin: Skin) -> tuple[Piece, Piece]:
+def stud_pieces(skin: HeadSkin) -> tuple[HeadPart, HeadPart]:
     """Round studs on the lobes of both ears."""
     row, column = np.meshgrid(np.arange(STUD_GRID[0]), np.arange(STUD_GRID[1]), indexing="ij")
     down, around = (row / (STUD_GRID[0] - 1) * np.pi).ravel(), (column / STUD_GRID[1] * 2 * np.pi).ravel()
@@ -254,7 +254,7 @@ def stud_pieces(skin: Skin) -> tuple[Piece, Piece]:
         lobe = ear[ear[:, 1] < ear[:, 1].min() + 9]
         centre = lobe[np.argmax(sign * lobe[:, 0])] + STUD_OFF * [sign, 1, 1]
         span = MaterialSpan("stud", triangles, STUD_MATERIAL)
-        pieces.append(Piece(centre + STUD_MM * ball, (span,), np.tile(STUD_COLOUR, (len(ball), 1))))
+        pieces.append(HeadPart(centre + STUD_MM * ball, (span,), np.tile(STUD_COLOUR, (len(ball), 1))))
     return pieces[0], pieces[1]
 
 
@@ -267,7 +267,7 @@ N_TEMPLE, N_BRIDGE = 24, 14
 GLASSES_MATERIAL = {"specular": 0.5, "shininess": 50.0, "wrap": 0.3}
 
 
-def glasses_piece(balls: Sequence[Eyeball], colour: Colour) -> Piece:
+def glasses_piece(balls: Sequence[Eyeball], colour: Colour) -> HeadPart:
     """Glasses before both eyes."""
     tubes, inner = [], []
     for ball in balls:
@@ -289,7 +289,7 @@ def glasses_piece(balls: Sequence[Eyeball], colour: Colour) -> Piece:
     counts = np.cumsum([0, *(len(points) for points, _ in tubes)])
     points = np.concatenate([points for points, _ in tubes])
     faces = np.concatenate([faces + count for (_, faces), count in zip(tubes, counts, strict=False)])
-    return Piece(points, (MaterialSpan("glasses", faces, GLASSES_MATERIAL),), np.tile(colour, (len(points), 1)))
+    return HeadPart(points, (MaterialSpan("glasses", faces, GLASSES_MATERIAL),), np.tile(colour, (len(points), 1)))
 
 
 def _tube(path: Floats, *, is_closed: bool = False) -> tuple[Floats, NDArray[np.int64]]:

@@ -13,7 +13,7 @@ from corpus_tools.drawn.build_drawn import (
     own_hairdo,
     step_reporter,
 )
-from corpus_tools.drawn.character import Character
+from corpus_tools.drawn.character import DrawnCharacter
 from corpus_tools.drawn.worn import HAIRCUTS, lit_haircut
 from corpus_tools.film.bake import HAIRCUT, Effort, bake_poses
 from corpus_tools.film.fit_light import fit_haircut, fit_light
@@ -28,7 +28,7 @@ from tts2face.models.hair_file import OF_FACE, write_lit_hair
 
 
 def bake_face(
-    source: SourceMesh, face: Face, character: Character, effort: Effort, report: Callable[[str], None]
+    source: SourceMesh, face: Face, character: DrawnCharacter, effort: Effort, report: Callable[[str], None]
 ) -> PoseLight:
     """Light of a character that `corpus_tools.drawn.build_drawn` has built: with `HAIRCUT`, at rest and in turns."""
     scene = FilmScene(face, look_of(character.name), face_masks(source, face))
@@ -43,7 +43,7 @@ def main() -> None:
     arguments = parser.parse_args()
     source = read_source(arguments.data or fetch_data(Path.home() / ".cache/tts2face"))
 
-    def baked(face: Face, character: Character, effort: Effort) -> PoseLight:
+    def baked(face: Face, character: DrawnCharacter, effort: Effort) -> PoseLight:
         kept = None if arguments.keep is None else arguments.keep / f"{character.name}-{character.hair.name}.npz"
         if kept is not None and kept.is_file():
             return PoseLight.load(kept)

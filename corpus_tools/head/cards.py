@@ -17,9 +17,10 @@ from scipy.spatial import cKDTree
 
 from corpus_tools.dense.texels import Texels, find_texels
 from corpus_tools.head.mesh import layout_coordinates, triangulate, value_noise
-from corpus_tools.head.skin import Skin, vertex_normals
+from corpus_tools.head.skin import HeadSkin, vertex_normals
 from corpus_tools.head.source import asset_files, read_picture
 from tts2face.models.face import Texture
+from tts2face.models.hair import MEAN_RELIEF
 from tts2face.numeric.arrays import LUMINANCE, decode_srgb, smoothstep, unit_vectors
 
 Floats = NDArray[np.float64]
@@ -29,7 +30,6 @@ SHADE_PX = 22.0  # at 512 pixels; lighter and darker areas wider than this are p
 FINE_PX, FINE_STEPS = 0.55, 26  # width of a fine strand, and half its length, in pixels
 BROAD_PX, BROAD_STEPS = 2.2, 60
 FINE_GAIN, BROAD_GAIN, ALPHA_GAIN = 0.20, 0.165, 0.22
-MEAN_RELIEF = 128.0
 N_SMOOTHINGS = 3
 OUTLINE_PX, SOLID_COVER = 5, 0.9  # width of a card's outline in its picture, and coverage inside
 OUTLINE_LIGHT, OUTLINE_WEIGHT = 1.0, 0.02  # brightness of outlines relative to the hair beside, and share of direction
@@ -230,7 +230,7 @@ def hair_share(places: Floats, soft_mm: float = SOFT_MM) -> Floats:
     return grown
 
 
-def covered_share(skin: Skin, hair: Floats) -> Floats:
+def covered_share(skin: HeadSkin, hair: Floats) -> Floats:
     """(N,) share of a skin's scalp that lies under hair, given as points (S, 3) on the cards where strands are."""
     share = np.zeros(len(skin.vertices))
     scalp = np.flatnonzero(hair_share(skin.vertices) > 0)
@@ -247,7 +247,7 @@ def covered_share(skin: Skin, hair: Floats) -> Floats:
     return share
 
 
-def paint_scalp(skin: Skin, share: Floats, side: int, generator: np.random.Generator) -> NDArray[np.uint8]:
+def paint_scalp(skin: HeadSkin, share: Floats, side: int, generator: np.random.Generator) -> NDArray[np.uint8]:
     """(side, side) coverage of the skin's texture by hair, 0-255, with strands at its edge; `share` is (N,)."""
     texels = find_texels(layout_coordinates(skin.source_uv), triangulate(skin.quads), side)
     place = texels.interpolate(skin.vertices)
@@ -259,7 +259,7 @@ def paint_scalp(skin: Skin, share: Floats, side: int, generator: np.random.Gener
     return _fill_gaps(texels, 0.97 * cover, side)
 
 
-def paint_stubble(skin: Skin, side: int, generator: np.random.Generator) -> NDArray[np.uint8]:
+def paint_stubble(skin: HeadSkin, side: int, generator: np.random.Generator) -> NDArray[np.uint8]:
     """(side, side) coverage of the skin's texture by hair of a few millimetres, 0-255."""
     texels = find_texels(layout_coordinates(skin.source_uv), triangulate(skin.quads), side)
     place = texels.interpolate(skin.vertices)

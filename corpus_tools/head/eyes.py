@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from corpus_tools.head.cards import EYE_TEXTURE
-from corpus_tools.head.mesh import Cage, Eyeball, MaterialSpan, Piece, fit_sphere
+from corpus_tools.head.mesh import Cage, Eyeball, HeadPart, MaterialSpan, fit_sphere
 from tts2face.numeric.arrays import smoothstep
 from tts2face.picture.baked.eyes import EDGE_RAD
 
@@ -67,7 +67,7 @@ def ball_radius(ball: Eyeball, off: Floats) -> Floats:
     return ball.radius * (1.0 + ball.bulge * np.clip(1.0 - (off / (ball.iris * 1.15)) ** 2, 0, None) ** 1.3)
 
 
-def eyeball_piece(ball: Eyeball, side: str, style: EyeStyle) -> Piece:
+def eyeball_piece(ball: Eyeball, side: str, style: EyeStyle) -> HeadPart:
     """The piece of the eyeball on the side ``Left`` or ``Right``."""
     rings = _ring_angles(style)
     around = np.linspace(0, 2 * np.pi, N_AROUND, endpoint=False)
@@ -79,7 +79,7 @@ def eyeball_piece(ball: Eyeball, side: str, style: EyeStyle) -> Piece:
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     in_disc = off <= style.iris
     in_iris = off[triangles].max(axis=1) <= style.iris + 0.031
-    return Piece(
+    return HeadPart(
         vertices=ball.centre + ball_radius(ball, off)[:, None] * towards,
         spans=(
             MaterialSpan("sclera", triangles[~in_iris], MATERIALS["sclera"]),

@@ -26,7 +26,7 @@ from corpus_tools.head.cards import (
     stubble_share,
 )
 from corpus_tools.head.mesh import Cage, triangulate, value_noise
-from corpus_tools.head.skin import Skin, vertex_normals
+from corpus_tools.head.skin import HeadSkin, vertex_normals
 from corpus_tools.head.source import ASSETS_PACKAGE, Asset, read_asset
 from tts2face.models.hair import Hair
 from tts2face.numeric.arrays import smoothstep, unit_vectors
@@ -210,7 +210,7 @@ FUZZ_MM, FUZZ, FUZZ_SIDE = 1.6, 0.42, 512  # height of the layer above a cropped
 SEED = 11
 
 
-def build_haircuts(folder: Path, cage: Cage, skin: Skin, head: Floats) -> Iterator[tuple[str, Hair]]:
+def build_haircuts(folder: Path, cage: Cage, skin: HeadSkin, head: Floats) -> Iterator[tuple[str, Hair]]:
     """Each haircut by name, on the reference head with vertices (V, 3), whose first ones are the skin's."""
     for name in HAIRCUTS:
         asset = read_asset(folder, f"hair/{name}", cage.source.vertices)
@@ -218,7 +218,7 @@ def build_haircuts(folder: Path, cage: Cage, skin: Skin, head: Floats) -> Iterat
     yield CROPPED, build_cropped(skin, head)
 
 
-def build_hair(name: str, asset: Asset, cage: Cage, skin: Skin, head: Floats) -> Hair:
+def build_hair(name: str, asset: Asset, cage: Cage, skin: HeadSkin, head: Floats) -> Hair:
     """A haircut of the package."""
     cut = HAIRCUTS[name]
     cards = split_seams(asset, asset.fit(cage.vertices, cage.source.vertices))
@@ -243,7 +243,7 @@ def build_hair(name: str, asset: Asset, cage: Cage, skin: Skin, head: Floats) ->
     )
 
 
-def build_cropped(skin: Skin, head: Floats) -> Hair:
+def build_cropped(skin: HeadSkin, head: Floats) -> Hair:
     """Hair of a few millimetres: painted, with a layer of fuzz above the scalp."""
     generator = np.random.default_rng(SEED)
     normals = vertex_normals(skin.vertices, skin.quads, skin.base)

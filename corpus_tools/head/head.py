@@ -21,7 +21,7 @@ from corpus_tools.head.cards import CardChoice
 from corpus_tools.head.eyes import EyeStyle, eyeball_piece, fit_eyeballs
 from corpus_tools.head.lashes import BrowCards, LashCards, bind_brows, bind_lashes, brow_piece, lash_piece
 from corpus_tools.head.lips import add_retreat, close_lips, lip_front, lip_ring
-from corpus_tools.head.mesh import Cage, HeadPieces, MaterialSpan, Piece, layout_coordinates, triangulate
+from corpus_tools.head.mesh import Cage, HeadPart, HeadPieces, MaterialSpan, layout_coordinates, triangulate
 from corpus_tools.head.mouth import (
     COVER_MM,
     LOWER,
@@ -33,7 +33,7 @@ from corpus_tools.head.mouth import (
     tongue_piece,
 )
 from corpus_tools.head.shapes import Jaw, LidEdge, clear_eyeballs, correct_shapes, find_lid_edges, fit_jaw, wet_piece
-from corpus_tools.head.skin import Skin, build_shoulders, build_skin, vertex_normals
+from corpus_tools.head.skin import HeadSkin, build_shoulders, build_skin, vertex_normals
 from corpus_tools.head.texture import HeadColours
 
 Floats = NDArray[np.float64]
@@ -59,7 +59,7 @@ def height_above_collar(places: Floats) -> Floats:
     return places[:, 1] - COLLAR_Y - COLLAR_SLOPE * np.minimum(places[:, 2], 20.0)
 
 
-def shirt_piece(default: Skin, own: Skin, colour: Floats) -> Piece:
+def shirt_piece(default: HeadSkin, own: HeadSkin, colour: Floats) -> HeadPart:
     """The shirt over the shoulders `own` of an identity, cut where the shoulders of the `default` identity are."""
     normals = vertex_normals(own.vertices, own.quads, own.base)
     whole = Sheet(np.column_stack([default.vertices, own.vertices, normals]), triangulate(own.quads))
@@ -75,7 +75,7 @@ def shirt_piece(default: Skin, own: Skin, colour: Floats) -> Piece:
         faces.append(rolled.triangles + count)
         colours.append(np.tile(colour * shade, (len(rolled.points), 1)))
         count += len(rolled.points)
-    return Piece(
+    return HeadPart(
         np.concatenate(points), (MaterialSpan("shirt", np.concatenate(faces), MATERIAL),), np.concatenate(colours)
     )
 
@@ -169,8 +169,8 @@ class ReferenceHead:
     """The reference person, on whose skin texture, cards and shirt are defined."""
 
     cage: Cage
-    skin: Skin
-    shoulders: Skin
+    skin: HeadSkin
+    shoulders: HeadSkin
     lips: NDArray[np.int64]
     lids: tuple[LidEdge, LidEdge]
     brows: dict[str, BrowCards]
@@ -206,14 +206,14 @@ def assemble_head(cage: Cage, reference: ReferenceHead, style: HeadStyle) -> Hea
     return HeadPieces(pieces, (1, 2), balls, PIVOT)
 
 
-def skin_piece(skin: Skin, colour: tuple[float, float, float], material: Mapping[str, Any]) -> Piece:
+def skin_piece(skin: HeadSkin, colour: tuple[float, float, float], material: Mapping[str, Any]) -> HeadPart:
     """The skin, of one colour where its texture is not drawn."""
     span = MaterialSpan("skin", triangulate(skin.quads), material)
     colours = np.tile(np.array(colour), (len(skin.vertices), 1))
-    return Piece(skin.vertices, (span,), colours, skin.shapes, layout_coordinates(skin.source_uv))
+    return HeadPart(skin.vertices, (span,), colours, skin.shapes, layout_coordinates(skin.source_uv))
 
 
-def _teeth_pieces(cage: Cage, skin: Skin, reference: ReferenceHead, jaw: Jaw) -> tuple[Piece, Piece]:
+def _teeth_pieces(cage: Cage, skin: HeadSkin, reference: ReferenceHead, jaw: Jaw) -> tuple[HeadPart, HeadPart]:
     pieces = []
     ahead = lip_front(skin.vertices, reference.lips) - lip_front(reference.skin.vertices, reference.lips)
     for arch, name in ((UPPER, "upper"), (LOWER, "lower")):
@@ -224,11 +224,11 @@ def _teeth_pieces(cage: Cage, skin: Skin, reference: ReferenceHead, jaw: Jaw) ->
         pose, cover = COVERED_POSES[name]
         points = cover_in_pose(points, skin, jaw, pose, cover)
         moved = add_retreat(points, jaw.shapes(points), skin, reference.lips) if name == "lower" else {}
-        pieces.append(Piece(points, piece.spans, piece.colours, moved))
+        pieces.append(HeadPart(points, piece.spans, piece.colours, moved))
     return pieces[0], pieces[1]
 
 
-def cover_in_pose(points: Floats, skin: Skin, jaw: Jaw, pose: Mapping[str, float], cover: float) -> Floats:
+def cover_in_pose(points: Floats, skin: HeadSkin, jaw: Jaw, pose: Mapping[str, float], cover: float) -> Floats:
     """Teeth and gums (N, 3) that stay `cover` mm behind the skin in a pose; the lower ones move with the jaw."""
     posed = skin.vertices + sum(weight * skin.shapes[name] for name, weight in pose.items())
     opened = pose.get("jawOpen", 0.0) * jaw.shapes(points)["jawOpen"]

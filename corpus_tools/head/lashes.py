@@ -22,9 +22,9 @@ from corpus_tools.head.cards import (
 )
 from corpus_tools.head.correspondence import nearest_surface_points
 from corpus_tools.head.haircut import split_seams
-from corpus_tools.head.mesh import Cage, MaterialSpan, Piece, triangulate
+from corpus_tools.head.mesh import Cage, HeadPart, MaterialSpan, triangulate
 from corpus_tools.head.shapes import LidEdge
-from corpus_tools.head.skin import Skin, vertex_normals
+from corpus_tools.head.skin import HeadSkin, vertex_normals
 from corpus_tools.head.source import Asset, read_asset
 
 Floats = NDArray[np.float64]
@@ -51,7 +51,7 @@ class LashCards:
     is_upper: NDArray[np.bool_]
 
 
-def bind_lashes(folder: Path, cage: Cage, skin: Skin, edges: tuple[LidEdge, LidEdge]) -> dict[str, LashCards]:
+def bind_lashes(folder: Path, cage: Cage, skin: HeadSkin, edges: tuple[LidEdge, LidEdge]) -> dict[str, LashCards]:
     """Each set of lashes, bound to the lids of the reference head."""
     lines = [(edge.upper, edge.lower) for edge in edges]
     bound = {}
@@ -75,7 +75,7 @@ def bind_lashes(folder: Path, cage: Cage, skin: Skin, edges: tuple[LidEdge, LidE
     return bound
 
 
-def lash_piece(cage: Cage, skin: Skin, bound: Mapping[str, LashCards], shown: str) -> Piece:
+def lash_piece(cage: Cage, skin: HeadSkin, bound: Mapping[str, LashCards], shown: str) -> HeadPart:
     """All sets of lashes of a head; those that are not shown lie inside the skull."""
     points, faces, coordinates, tangents, count = [], [], [], [], 0
     shapes: dict[str, list[Floats]] = {name: [] for name in skin.shapes}
@@ -93,7 +93,7 @@ def lash_piece(cage: Cage, skin: Skin, bound: Mapping[str, LashCards], shown: st
         count += len(root)
     vertices = np.concatenate(points)
     joined = {name: np.concatenate(blocks) for name, blocks in shapes.items()}
-    return Piece(
+    return HeadPart(
         vertices,
         (MaterialSpan("lashes", np.concatenate(faces), MATERIAL),),
         np.tile(COLOUR, (len(vertices), 1)),
@@ -133,7 +133,7 @@ class BrowCards:
     uv: Floats
 
 
-def bind_brows(folder: Path, cage: Cage, skin: Skin) -> dict[str, BrowCards]:
+def bind_brows(folder: Path, cage: Cage, skin: HeadSkin) -> dict[str, BrowCards]:
     """Each set of brows, bound to the skin of the reference head."""
     triangles = triangulate(skin.quads)
     places = skin.vertices[triangles].mean(axis=1)
@@ -147,7 +147,7 @@ def bind_brows(folder: Path, cage: Cage, skin: Skin) -> dict[str, BrowCards]:
     return bound
 
 
-def brow_piece(skin: Skin, bound: dict[str, BrowCards], shown: str) -> Piece:
+def brow_piece(skin: HeadSkin, bound: dict[str, BrowCards], shown: str) -> HeadPart:
     """All sets of brows on a skin; those that are not shown lie inside the skull."""
     normals = vertex_normals(skin.vertices, skin.quads, skin.base)
     points, faces, coordinates, count = [], [], [], 0
@@ -162,7 +162,7 @@ def brow_piece(skin: Skin, bound: dict[str, BrowCards], shown: str) -> Piece:
     vertices = np.concatenate(points)
     moved = {name: np.einsum("nk,nkd->nd", weights, shape[corners]) for name, shape in skin.shapes.items()}
     along = np.einsum("nk,nkd->nd", weights, skin.vertices[corners])[:, :1]
-    return Piece(
+    return HeadPart(
         vertices,
         (MaterialSpan("brows", np.concatenate(faces), BROW_MATERIAL),),
         np.tile([0.27, 0.20, 0.15], (len(vertices), 1)),

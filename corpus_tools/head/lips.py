@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
 from corpus_tools.head.mesh import triangulate
-from corpus_tools.head.skin import EdgeRings, Skin, find_narrowest_ring
+from corpus_tools.head.skin import EdgeRings, HeadSkin, find_narrowest_ring
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class LipLine:
     lower: Floats
 
 
-def lip_ring(skin: Skin) -> NDArray[np.int64]:
+def lip_ring(skin: HeadSkin) -> NDArray[np.int64]:
     """Vertices of the ring of edges where the lips meet; the same for every identity."""
     middles = [int(np.linalg.norm(skin.base - place, axis=1).argmin()) for place in LIP_MIDDLES]
     opened = skin.vertices + OPENING * skin.shapes["jawOpen"]
@@ -51,7 +51,7 @@ def lip_front(vertices: Floats, ring: NDArray[np.int64]) -> float:
     return float(line[np.abs(line[:, 0]) < MIDDLE_MM, 2].mean())
 
 
-def find_lip_line(skin: Skin, ring: NDArray[np.int64]) -> LipLine:
+def find_lip_line(skin: HeadSkin, ring: NDArray[np.int64]) -> LipLine:
     """The line between the lips, found with the jaw open."""
     opened = skin.vertices + OPENING * skin.shapes["jawOpen"]
     ring = np.roll(ring, -int(opened[ring, 0].argmin()))
@@ -63,7 +63,7 @@ def find_lip_line(skin: Skin, ring: NDArray[np.int64]) -> LipLine:
     return LipLine(half, lower * (np.abs(opened[:, 0]) < half))
 
 
-def close_lips(skin: Skin, ring: NDArray[np.int64]) -> Skin:
+def close_lips(skin: HeadSkin, ring: NDArray[np.int64]) -> HeadSkin:
     """The skin with lips in contact: first where they bulge most, then along the whole ring where they meet."""
     line = find_lip_line(skin, ring)
     vertices = skin.vertices
@@ -74,7 +74,7 @@ def close_lips(skin: Skin, ring: NDArray[np.int64]) -> Skin:
     return replace(skin, vertices=vertices)
 
 
-def ring_arcs(skin: Skin, ring: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def ring_arcs(skin: HeadSkin, ring: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Vertices of the upper and of the lower half of the ring, each from the right corner to the left one."""
     ring = np.roll(ring, -int(skin.base[ring, 0].argmin()))
     turn = int(skin.base[ring, 0].argmax())
@@ -85,7 +85,7 @@ def ring_arcs(skin: Skin, ring: NDArray[np.int64]) -> tuple[NDArray[np.int64], N
     return upper, lower
 
 
-def _ring_step(skin: Skin, lips: LipLine, ring: NDArray[np.int64]) -> Floats:
+def _ring_step(skin: HeadSkin, lips: LipLine, ring: NDArray[np.int64]) -> Floats:
     """(N, 3) displacement by which each point of the ring meets the one opposite, with the lip around it."""
     upper, lower = ring_arcs(skin, ring)
     moved = np.zeros_like(skin.vertices)
@@ -106,7 +106,7 @@ def _ring_step(skin: Skin, lips: LipLine, ring: NDArray[np.int64]) -> Floats:
     return moved
 
 
-def lip_gaps(skin: Skin, lips: LipLine) -> tuple[Floats, Floats, Floats]:
+def lip_gaps(skin: HeadSkin, lips: LipLine) -> tuple[Floats, Floats, Floats]:
     """Columns x (C,), and the upper and lower lip's edges there as (C, 2) of y and z, mm."""
     low, high = np.array(MOUTH_BOX).T
     near = np.all((skin.base > low) & (skin.base < high), axis=1)
@@ -133,7 +133,7 @@ def _rims(vertices: Floats, edges: NDArray[np.int64], columns: Floats, sign: flo
     return rims
 
 
-def _closing_step(skin: Skin, lips: LipLine) -> Floats:
+def _closing_step(skin: HeadSkin, lips: LipLine) -> Floats:
     """(N, 3) displacement of half the remaining gap on each lip."""
     columns, upper, lower = lip_gaps(skin, lips)
     gap = np.nan_to_num(upper[:, 0] - lower[:, 0]) + PRESS_MM
@@ -162,7 +162,9 @@ SMILES = ("mouthSmileLeft", "mouthSmileRight")
 BACKWARDS = np.array([0.0, 0.0, -1.0])
 
 
-def add_retreat(points: Floats, shapes: Mapping[str, Floats], skin: Skin, lips: NDArray[np.int64]) -> dict[str, Floats]:
+def add_retreat(
+    points: Floats, shapes: Mapping[str, Floats], skin: HeadSkin, lips: NDArray[np.int64]
+) -> dict[str, Floats]:
     """Shapes of the lower arch with vertices (N, 3) that stays behind the skin with an open jaw and with a smile.
 
     Parameters

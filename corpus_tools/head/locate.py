@@ -16,7 +16,7 @@ from corpus_tools.head.build_head import default_cage, fetch_all, head_face
 from corpus_tools.head.correspondence import nearest_surface_points, write_places
 from corpus_tools.head.eyes import fit_eyeballs
 from corpus_tools.head.mesh import Cage, triangulate
-from corpus_tools.head.skin import EdgeRings, Skin, build_skin, find_narrowest_ring
+from corpus_tools.head.skin import EdgeRings, HeadSkin, build_skin, find_narrowest_ring
 from lexicon.errors import DataError
 from tts2face.models.face import Face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, LID_RINGS, N_MESH_LANDMARKS
@@ -46,7 +46,7 @@ MOUTH_OPEN = 0.3  # weight of jawOpen at which the lips' ring has an inside
 MOUTH_REACH_MM, EYE_REACH_MM = 40.0, 30.0
 
 
-def locate_landmarks(face: Face, skin: Skin, cage: Cage, tracker: FaceTracker) -> dict[int, Floats]:
+def locate_landmarks(face: Face, skin: HeadSkin, cage: Cage, tracker: FaceTracker) -> dict[int, Floats]:
     """Position (3,) of each of the 468 mesh landmarks on the source's base mesh."""
     mirrored = mirrored_landmarks(face, tracker)
     triangles = triangulate(skin.quads)
@@ -154,7 +154,7 @@ def symmetrise(places: Floats, mirrored: Ints) -> Floats:
     return mean
 
 
-def _align_inner_lips(places: Floats, skin: Skin, strips: EdgeRings) -> None:
+def _align_inner_lips(places: Floats, skin: HeadSkin, strips: EdgeRings) -> None:
     """Move the inner lips onto the edge ring where they meet; opposite landmarks get the same x."""
     opened = skin.vertices + MOUTH_OPEN * skin.shapes["jawOpen"]
     lips = [int(np.linalg.norm(skin.base - places[lip], axis=1).argmin()) for lip in (0, 17)]  # outer, in the middle
@@ -170,7 +170,7 @@ def _align_inner_lips(places: Floats, skin: Skin, strips: EdgeRings) -> None:
     places[INNER_LIP_UPPER[0]], places[INNER_LIP_UPPER[-1]] = line[0], line[turn]
 
 
-def nearest_ring_point(skin: Skin, ring: Ints, point: Floats) -> Floats:
+def nearest_ring_point(skin: HeadSkin, ring: Ints, point: Floats) -> Floats:
     """Point (3,) of an edge ring, on the source's base mesh, nearest to a point in the frontal view."""
     after = np.roll(ring, -1)
     starts, along = skin.vertices[ring, :2], skin.vertices[after, :2] - skin.vertices[ring, :2]

@@ -20,7 +20,7 @@ from scipy.ndimage import map_coordinates
 
 from corpus_tools.dense.texels import ISLANDS_TOP
 from corpus_tools.head.source import SourceMesh
-from tts2face.models.face import Eye, Face, Part, Texture
+from tts2face.models.face import Eye, Face, FacePart, Texture
 from tts2face.numeric.arrays import nearest_rotation, unit_vectors
 
 
@@ -205,7 +205,7 @@ def _stretch(values: Floats, box: tuple[float, float], face: tuple[float, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaterialSpan:
-    """Triangles (F, 3) of one material within a piece; `material` holds the keyword arguments of `Part`."""
+    """Triangles (F, 3) of one material within a piece; `material` holds the keyword arguments of `FacePart`."""
 
     name: str
     triangles: NDArray[np.int64]
@@ -213,7 +213,7 @@ class MaterialSpan:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Piece:
+class HeadPart:
     """Vertices (N, 3) in mm, colours (N, 3) in 0..1, shapes by name (N, 3), texture coordinates (N, 2) or None.
 
     ``tangents`` (N, 3) are unit vectors along strands, or None.
@@ -246,7 +246,7 @@ class Eyeball:
 class HeadPieces:
     """The pieces of a head; pieces `eye_pieces` are the eyeballs `balls`."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[HeadPart, ...]
     eye_pieces: tuple[int, ...]
     balls: tuple[Eyeball, ...]
     pivot: Floats
@@ -294,12 +294,12 @@ def assemble_face(
     )
 
 
-def _parts(built: HeadPieces, firsts: NDArray[np.integer]) -> tuple[NDArray[np.int32], list[Part]]:
+def _parts(built: HeadPieces, firsts: NDArray[np.integer]) -> tuple[NDArray[np.int32], list[FacePart]]:
     triangles, parts, begin = [], [], 0
     for first, piece in zip(firsts, built.pieces, strict=False):
         for span in piece.spans:
             triangles.append(span.triangles + first)
-            parts.append(Part(span.name, begin, len(span.triangles), **span.material))
+            parts.append(FacePart(span.name, begin, len(span.triangles), **span.material))
             begin += len(span.triangles)
     return np.concatenate(triangles).astype(np.int32), parts
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.head.mesh import SCALE, Cage, MaterialSpan, Piece, catmull_clark, grid_triangles, triangulate
+from corpus_tools.head.mesh import SCALE, Cage, HeadPart, MaterialSpan, catmull_clark, grid_triangles, triangulate
 from corpus_tools.head.shapes import Jaw
-from corpus_tools.head.skin import Skin
+from corpus_tools.head.skin import HeadSkin
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import smoothstep
 from tts2face.picture.occlusion import sphere_directions
@@ -81,7 +81,7 @@ MATERIALS = {
 }
 
 
-def arch_piece(arch: Arch, name: str) -> Piece:
+def arch_piece(arch: Arch, name: str) -> HeadPart:
     """Crowns and gum of an arch; its two spans are ``teeth_<name>`` and ``gums_<name>``."""
     path = arch_path(arch.curve)
     points, colours, triangles, count = [], [], [], 0
@@ -100,15 +100,15 @@ def arch_piece(arch: Arch, name: str) -> Piece:
         MaterialSpan(f"teeth_{name}", _wind_outward(faces, arch.up), MATERIALS["teeth"]),
         MaterialSpan(f"gums_{name}", gum.spans[0].triangles + count, MATERIALS["gums"]),
     )
-    return Piece(np.concatenate([vertices, gum.vertices]), spans, np.concatenate([*colours, gum.colours]))
+    return HeadPart(np.concatenate([vertices, gum.vertices]), spans, np.concatenate([*colours, gum.colours]))
 
 
-def gum_piece(path: "ArchPath", arch: Arch, colour: Floats) -> Piece:
+def gum_piece(path: "ArchPath", arch: Arch, colour: Floats) -> HeadPart:
     """The gum of an arch, darker towards its ends."""
     vertices = _gum(path, arch)
     faces = _wind_outward(_tube_triangles(*_GUM_GRID, closed_start=False), arch.up)
     colours = np.repeat(_light_along(arch), _GUM_GRID[1])[:, None] * colour
-    return Piece(vertices, (MaterialSpan("gums", faces, MATERIALS["gums"]),), colours)
+    return HeadPart(vertices, (MaterialSpan("gums", faces, MATERIALS["gums"]),), colours)
 
 
 def fit_teeth(points: Floats, before: Floats, after: Floats) -> Floats:
@@ -260,7 +260,7 @@ MOUTH_U, MOUTH_V = (0.75, 0.93), 0.14  # MakeHuman's island of the mouth's cavit
 SEED = 5
 
 
-def scatter_in_mouth(face: Face, skin: Skin) -> Face:
+def scatter_in_mouth(face: Face, skin: HeadSkin) -> Face:
     """A face whose mouth is lit from inside: as with open lips at rest, where it is hidden, and by scattered light.
 
     `skin` is that of the reference head, whose vertices correspond to the face's first ones.
@@ -278,7 +278,7 @@ def scatter_in_mouth(face: Face, skin: Skin) -> Face:
     return replace(face, occlusion=np.packbits(bits, axis=2))
 
 
-def mouth_vertices(face: Face, skin: Skin) -> NDArray[np.int64]:
+def mouth_vertices(face: Face, skin: HeadSkin) -> NDArray[np.int64]:
     """Vertices of teeth, gums, tongue and the cavity."""
     u, v = skin.source_uv.T
     cavity = np.flatnonzero((u > MOUTH_U[0]) & (u < MOUTH_U[1]) & (v < MOUTH_V))
@@ -309,7 +309,7 @@ UNDERSIDE_COLOUR = np.array([0.92, 0.52, 0.50])  # seen in the shade, when the t
 MATERIAL = {"specular": 0.35, "shininess": 30.0, "wrap": 0.3}
 
 
-def tongue_piece(cage: Cage, jaw: Jaw) -> Piece:
+def tongue_piece(cage: Cage, jaw: Jaw) -> HeadPart:
     """The tongue with the shapes ``jaw...``, ``tongueOut`` and ``tongueUp``."""
     used, quads = np.unique(cage.source.groups["helper-tongue"].corners, return_inverse=True)
     matrix, fine = catmull_clark(len(used), quads.reshape(-1, 4))
@@ -326,7 +326,7 @@ def tongue_piece(cage: Cage, jaw: Jaw) -> Piece:
     below = smoothstep(-height, 0.0, 1.0) * tip
     colour += below[:, None] * (UNDERSIDE_COLOUR - colour)
     groove = np.exp(-((points[:, 0] / GROOVE_WIDTH_MM) ** 2)) * (tip < 0.9)
-    return Piece(
+    return HeadPart(
         points,
         (MaterialSpan("tongue", triangulate(fine), MATERIAL),),
         colour * (1 - 0.12 * groove[:, None]),

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from corpus_tools.head.eyes import RECEDE_MM, ball_radius
-from corpus_tools.head.mesh import Cage, Eyeball, MaterialSpan, Piece, fit_rotation, grid_triangles
-from corpus_tools.head.skin import EdgeRings, Skin, find_narrowest_ring
+from corpus_tools.head.mesh import Cage, Eyeball, HeadPart, MaterialSpan, fit_rotation, grid_triangles
+from corpus_tools.head.skin import EdgeRings, HeadSkin, find_narrowest_ring
 from tts2face.face.deformation import rotation_matrix
 from tts2face.numeric.arrays import smoothstep
 
@@ -44,7 +44,7 @@ NEAR, FAR = 0.30, 0.46  # distance from the mouth where smoothing begins (lips k
 BELOW_EYES = 7.10
 
 
-def correct_shapes(skin: Skin) -> Skin:
+def correct_shapes(skin: HeadSkin) -> HeadSkin:
     """The skin with smoother cheeks and stronger motion of brows and upper lids."""
     means = neighbour_means(skin)
     off = (skin.base - MOUTH) * [0.85, 1.25, 0.6]
@@ -61,7 +61,7 @@ def correct_shapes(skin: Skin) -> Skin:
     return replace(skin, shapes=shapes)
 
 
-def _smooth_rounding(skin: Skin, shapes: dict[str, Floats], means: sparse.csr_array) -> None:
+def _smooth_rounding(skin: HeadSkin, shapes: dict[str, Floats], means: sparse.csr_array) -> None:
     """Smooth the shapes of rounding on the skin above the upper lip, in place."""
     off = 100.0 * np.linalg.norm((skin.base - UPPER_LIP) * [0.45, 1.0, 0.6], axis=1)
     share = smoothstep(off, *LIP_NEAR_MM) * (1 - smoothstep(off, *LIP_FAR_MM)) * (skin.base[:, 1] > LIP_TOP)
@@ -77,7 +77,7 @@ def smoothed(moved: Floats, share: Floats, means: sparse.csr_array, number: int)
     return moved + share[:, None] * (smooth - moved)
 
 
-def neighbour_means(skin: Skin) -> sparse.csr_array:
+def neighbour_means(skin: HeadSkin) -> sparse.csr_array:
     """(N, N) averaging over vertices that share an edge; vertices along a seam count as one."""
     _, weld = np.unique(np.rint(skin.base * 1e6).astype(np.int64), axis=0, return_inverse=True)
     weld = weld.ravel()
@@ -99,12 +99,12 @@ N_SPREAD = 4  # edges over which the correction decays
 
 
 def clear_eyeballs(
-    skin: Skin,
+    skin: HeadSkin,
     balls: tuple[Eyeball, Eyeball],
     names: Sequence[str] = LID_SHAPES,
     clear_mm: float = CLEAR_MM,
     lining: NDArray[np.bool_] | None = None,
-) -> Skin:
+) -> HeadSkin:
     """The skin with shapes that keep the lids outside the eyeballs at every weight.
 
     Parameters
@@ -177,7 +177,7 @@ class LidEdge:
     lower: Ints
 
 
-def find_lid_edges(skin: Skin, balls: tuple[Eyeball, Eyeball]) -> tuple[LidEdge, LidEdge]:
+def find_lid_edges(skin: HeadSkin, balls: tuple[Eyeball, Eyeball]) -> tuple[LidEdge, LidEdge]:
     """Edges of the lids of the left and the right eye."""
     strips = EdgeRings(skin.quads, skin.base)
     found = []
@@ -191,7 +191,7 @@ def find_lid_edges(skin: Skin, balls: tuple[Eyeball, Eyeball]) -> tuple[LidEdge,
     return found[0], found[1]
 
 
-def wet_piece(skin: Skin, balls: tuple[Eyeball, Eyeball], edges: tuple[LidEdge, LidEdge]) -> Piece:
+def wet_piece(skin: HeadSkin, balls: tuple[Eyeball, Eyeball], edges: tuple[LidEdge, LidEdge]) -> HeadPart:
     """Thin strips of tear fluid between the lower lids and the eyeballs."""
     points, triangles, shapes, count = [], [], [], 0
     for ball, edge in zip(balls, edges, strict=True):
@@ -210,7 +210,7 @@ def wet_piece(skin: Skin, balls: tuple[Eyeball, Eyeball], edges: tuple[LidEdge, 
     moved = {name: shape[rows] for name, shape in skin.shapes.items() if shape[rows].any()}
     for side, sign in (("Left", 1.0), ("Right", -1.0)):  # behind the shut lids, as the eyeball
         moved[f"eyeBlink{side}"] = moved[f"eyeBlink{side}"] - np.outer(sign * vertices[:, 0] > 0, [0, 0, RECEDE_MM])
-    return Piece(
+    return HeadPart(
         vertices,
         (MaterialSpan("wet", np.concatenate(triangles), WET_MATERIAL),),
         np.tile(WET_COLOUR, (len(vertices), 1)),

@@ -23,7 +23,7 @@ SOCKET_U, SOCKET_Z = 0.2, 1.30  # MakeHuman's islands of the sockets; parts furt
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Skin:
+class HeadSkin:
     """The subdivided head.
 
     Parameters
@@ -49,7 +49,7 @@ class Skin:
     corrections: Mapping[str, Floats] = field(default_factory=dict)
 
 
-def build_skin(cage: Cage) -> Skin:
+def build_skin(cage: Cage) -> HeadSkin:
     """Head and neck of a cage after one Catmull-Clark step."""
     body = cage.source.groups["body"]
     places, where = cage.source.vertices[body.corners], cage.source.uv[body.uv_corners]
@@ -59,7 +59,7 @@ def build_skin(cage: Cage) -> Skin:
     return _subdivide(cage, kept)
 
 
-def build_shoulders(cage: Cage) -> Skin:
+def build_shoulders(cage: Cage) -> HeadSkin:
     """Neck and shoulders of a cage, under the shirt."""
     places = cage.source.vertices[cage.source.groups["body"].corners]
     inside = (places[:, :, 1] > LOWEST) & (places[:, :, 1] < SHOULDER_Y) & (np.abs(places[:, :, 0]) < WIDEST)
@@ -67,7 +67,7 @@ def build_shoulders(cage: Cage) -> Skin:
     return _subdivide(cage, kept)
 
 
-def _subdivide(cage: Cage, kept: NDArray[np.bool_]) -> Skin:
+def _subdivide(cage: Cage, kept: NDArray[np.bool_]) -> HeadSkin:
     body = cage.source.groups["body"]
     used, quads = np.unique(body.corners[kept], return_inverse=True)
     matrix, fine = catmull_clark(len(used), quads.reshape(-1, 4))
@@ -76,7 +76,7 @@ def _subdivide(cage: Cage, kept: NDArray[np.bool_]) -> Skin:
     _, first, corner = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     rows = fine.ravel()[first]
     split = matrix[rows]
-    return Skin(
+    return HeadSkin(
         vertices=split @ cage.vertices[used],
         shapes={name: split @ moved[used] for name, moved in cage.units.items()},
         quads=corner.reshape(-1, 4).astype(np.int64),

@@ -13,7 +13,7 @@ from corpus_tools.dense.texels import Texels, find_texels
 from corpus_tools.head.cards import BROW_COLOUR
 from corpus_tools.head.mesh import SIDE, gaussian_bump, layout_coordinates, triangulate, value_noise
 from corpus_tools.head.shapes import LidEdge
-from corpus_tools.head.skin import Skin
+from corpus_tools.head.skin import HeadSkin
 from corpus_tools.head.source import SourceMesh
 from tts2face.numeric.arrays import smoothstep
 
@@ -51,7 +51,7 @@ LINE_TINT = np.array([0.90, 1.0, 1.0])
 
 
 def paint_texture(
-    source: SourceMesh, skin: Skin, lids: Sequence[LidEdge], palette: HeadColours, generator: np.random.Generator
+    source: SourceMesh, skin: HeadSkin, lids: Sequence[LidEdge], palette: HeadColours, generator: np.random.Generator
 ) -> NDArray[np.uint8]:
     """(SIDE, SIDE, 3) texture of a skin with the edges `lids` of its lids."""
     texels = find_texels(layout_coordinates(skin.source_uv), triangulate(skin.quads), SIDE)

@@ -23,7 +23,7 @@ import numpy as np
 from corpus_tools.prompts.coverage import Coverage, RunningText, Units, count_units, select_sentences, sentence_units
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import InputError
-from lexicon.g2p import check_language
+from lexicon.g2p import DEFAULT_LANGUAGE, check_language
 from lexicon.inputs import read_text
 from lexicon.sentence_ends import split_chunks
 from tts2face.storage.files import write_atomically
@@ -74,7 +74,6 @@ def _n_words(sentence: str) -> int:
     return len(words) if is_separated else sum(map(len, words)) // 2
 
 
-DEFAULT_LANGUAGE = "en-us"
 POOL = Path(__file__).with_name("prompts_en_us.tsv")  # written by `write_prompts`, best first
 UNIT_COUNTS = Path(__file__).with_name("running_text_en_us.tsv")
 MAX_MINUTES = 60.0

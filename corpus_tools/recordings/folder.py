@@ -21,7 +21,7 @@ CUE_MARGIN_S = 0.3  # before and after a cue; subtitles are rarely closer to the
 
 
 @dataclass(frozen=True, slots=True)
-class Cue:
+class SpokenCue:
     """Words spoken between two instants in seconds."""
 
     begin: float
@@ -34,7 +34,7 @@ def find_subtitles(video: Path) -> Path | None:
     return next((path for suffix in SUBTITLE_SUFFIXES if (path := video.with_suffix(suffix)).is_file()), None)
 
 
-def read_cues(path: Path) -> tuple[Cue, ...]:
+def read_cues(path: Path) -> tuple[SpokenCue, ...]:
     """Spoken cues in temporal order, each extended by `CUE_MARGIN_S` but not beyond the middle to its neighbour.
 
     Cues without words and cues whose end is only estimated are left out.
@@ -53,7 +53,7 @@ def read_cues(path: Path) -> tuple[Cue, ...]:
         before = spoken[number - 1][1] if number else 0.0
         behind = spoken[number + 1][0] if number + 1 < len(spoken) else end + 2 * CUE_MARGIN_S
         earliest, latest = min((before + begin) / 2, begin), max((end + behind) / 2, end)
-        cues.append(Cue(max(begin - CUE_MARGIN_S, earliest, 0.0), min(end + CUE_MARGIN_S, latest), text))
+        cues.append(SpokenCue(max(begin - CUE_MARGIN_S, earliest, 0.0), min(end + CUE_MARGIN_S, latest), text))
     return tuple(cues)
 
 
@@ -63,7 +63,7 @@ _TOKEN = re.compile(r'"(?P<label>(?:[^"]|"")*)"|\[[^\]\n]*\]|!.*|(?<![\w.])(?P<n
 _TIER_ENTRY_SIZES = {"IntervalTier": 3, "TextTier": 2}  # entries of one interval or point
 
 
-def read_textgrid(path: Path) -> tuple[Cue, ...]:
+def read_textgrid(path: Path) -> tuple[SpokenCue, ...]:
     """The intervals of the first tier whose name contains "word", or else of the first interval tier.
 
     Raises
@@ -97,7 +97,7 @@ def _split_items(text: str) -> list[str | float]:
     return items
 
 
-def _read_tiers(items: Iterator[str | float]) -> Iterator[tuple[str, tuple[Cue, ...]]]:
+def _read_tiers(items: Iterator[str | float]) -> Iterator[tuple[str, tuple[SpokenCue, ...]]]:
     """Name and cues of each interval tier; point tiers are skipped."""
     for kind in items:
         name, _, _, size = (next(items) for _ in range(4))
@@ -106,16 +106,16 @@ def _read_tiers(items: Iterator[str | float]) -> Iterator[tuple[str, tuple[Cue, 
             yield str(name), tuple(_parse_cue(*row) for row in rows)
 
 
-def _parse_cue(start: str | float, end: str | float, label: str | float) -> Cue:
+def _parse_cue(start: str | float, end: str | float, label: str | float) -> SpokenCue:
     if not isinstance(label, str) or not 0 <= float(start) < float(end):
         raise ValueError(label)
-    return Cue(float(start), float(end), label.strip())
+    return SpokenCue(float(start), float(end), label.strip())
 
 
 UNITS_PER_S = 25_000  # Cooke et al. 2006: samples of the 25 kHz sound
 
 
-def read_word_times(path: Path) -> tuple[Cue, ...]:
+def read_word_times(path: Path) -> tuple[SpokenCue, ...]:
     """Words and times of an .align file (start, end and word per line, in units of 1/25000 s), without silences.
 
     Raises
@@ -131,7 +131,7 @@ def read_word_times(path: Path) -> tuple[Cue, ...]:
         if len(fields) != 3 or not (fields[0].isdecimal() and fields[1].isdecimal()):
             raise DataError(f"{path}, line {number}: {line[:60]!r} is not start, end and word; correct it")
         if fields[2].lower() not in SILENT_LABELS:
-            cues.append(Cue(int(fields[0]) / UNITS_PER_S, int(fields[1]) / UNITS_PER_S, fields[2]))
+            cues.append(SpokenCue(int(fields[0]) / UNITS_PER_S, int(fields[1]) / UNITS_PER_S, fields[2]))
     if not cues:
         raise DataError(f"{path} contains no word; check the file")
     return tuple(cues)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.recordings.sound import LEVEL_WINDOW_S
 from corpus_tools.recordings.video import MEASURES, NOT_COUNTED
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
@@ -22,7 +23,6 @@ WARNING, REFUSAL = "warning", "refusal"  # severities
 UNUSABLE, OUT_OF_SYNC = "unusable", "out_of_sync"  # codes of findings without a measure
 CLIPPED_LEVEL = 0.999  # amplitude from which a sample counts as clipped
 MIN_PICTURE_CHANGE = 0.02  # of an 8-bit step: frames that differ by less are equal; camera noise is above
-LEVEL_WINDOW_S = 0.02
 NOISE_QUANTILE = 0.1  # of the windows without speech; excludes footsteps and breaths
 NOISY_DB = 20.0  # ratio of speech to noise below which alignment fits worse although the words are right
 MEDIAN_TO_DEVIATION = 1.4826  # of a normal distribution

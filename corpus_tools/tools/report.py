@@ -41,19 +41,21 @@ class ReportOrder:
 
 def similarity_report(model: str, name: str, on_progress: Progress) -> str:
     """Page of the visual similarity of a talker's phones."""
-    from corpus_tools.studies.similarity.analysis import NamedTalker, Options, analyse
+    from corpus_tools.studies.similarity.analysis import NamedTalker, SimilarityOptions, analyse
     from corpus_tools.studies.similarity.page import similarity_page
 
-    return similarity_page(analyse(NamedTalker(name, load_talker(model)), Options(), None, on_progress), "both")
+    return similarity_page(
+        analyse(NamedTalker(name, load_talker(model)), SimilarityOptions(), None, on_progress), "both"
+    )
 
 
 def gesture_report(model: str, name: str, on_progress: Progress) -> str:
     """Page that compares a palette's gestures with motion from its fields, noise and published fields."""
-    from corpus_tools.studies.gestures.analysis import Options, study_gestures
+    from corpus_tools.studies.gestures.analysis import StudyOptions, study_gestures
     from corpus_tools.studies.gestures.page import gestures_page
     from tts2face.models.palette import load_palette
 
-    return gestures_page(study_gestures(name, load_palette(model), Options(), on_progress))
+    return gestures_page(study_gestures(name, load_palette(model), StudyOptions(), on_progress))
 
 
 def accuracy_report(model: str, name: str, on_progress: Progress) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.build_talker import NOT_STATED
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.studies.evaluation.evaluate import SpeakerScale
 from corpus_tools.studies.evaluation.methods import build_methods
@@ -200,7 +201,6 @@ EXAMPLES = {
     "W": "we", "Y": "yes", "Z": "zoo", "ZH": "vision",
 }  # fmt: skip
 STATED_BY_BOTH = ("sources", "licence", "attribution")
-NOT_STATED = "not stated"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

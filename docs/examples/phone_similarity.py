@@ -10,10 +10,10 @@ a page with dendrogram, reliability and agreement with articulation.
 import sys
 from pathlib import Path
 
-from corpus_tools.studies.similarity.analysis import Options
+from corpus_tools.studies.similarity.analysis import SimilarityOptions
 from corpus_tools.studies.similarity.write import table_csv, write_similarity
 
-analysis = write_similarity(sys.argv[1], Path("similarity.html"), Options(classes=(6,), halves=10))
+analysis = write_similarity(sys.argv[1], Path("similarity.html"), SimilarityOptions(classes=(6,), halves=10))
 table = analysis.table
 Path("similarity.csv").write_text(table_csv(table, "ipa"), encoding="utf-8")
 

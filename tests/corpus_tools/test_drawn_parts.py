@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from corpus_tools.drawn.build_drawn import CAST
-from corpus_tools.drawn.character import Character, Hairstyle, Palette
+from corpus_tools.drawn.character import CharacterColours, DrawnCharacter, Hairstyle
 from corpus_tools.drawn.fields import (
     COLLAR,
     MARGIN,
@@ -35,7 +35,7 @@ from corpus_tools.drawn.paint import _brow_hairs, paint_eye
 from corpus_tools.drawn.sculpt import apply_proportions
 from corpus_tools.drawn.worn import HAIRCUTS, _roll, comb, cut, grow, lay_closer
 from corpus_tools.head.mesh import grid_triangles
-from corpus_tools.head.skin import Skin
+from corpus_tools.head.skin import HeadSkin
 from lexicon.errors import DataError
 from tests.face.people import DRAWN
 from tts2face.models.face_loading import load_face
@@ -48,7 +48,7 @@ STYLES = {f"{name} {style.name}": style for name, one in CAST.items() for style 
 EVERY_STYLE = pytest.mark.parametrize("style", STYLES.values(), ids=list(STYLES))
 
 
-def ball(radius: float = 70.0) -> Skin:
+def ball(radius: float = 70.0) -> HeadSkin:
     """A ball about the middle of the hair, in place of a skull."""
     n_down, n_around = 24, 48
     down, around = np.meshgrid(np.linspace(0.05, np.pi - 0.05, n_down), np.arange(n_around) / n_around * 2 * np.pi)
@@ -57,7 +57,7 @@ def ball(radius: float = 70.0) -> Skin:
     row, column = (grid.ravel() for grid in np.meshgrid(np.arange(n_around), np.arange(n_down - 1), indexing="ij"))
     here, beside = row * n_down + column, (row + 1) % n_around * n_down + column
     quads = np.stack([here, beside, beside + 1, here + 1], axis=1)
-    return Skin(points, {}, quads, np.zeros((len(points), 2)), points)
+    return HeadSkin(points, {}, quads, np.zeros((len(points), 2)), points)
 
 
 def closed_sides(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -69,8 +69,8 @@ def closed_sides(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 @EVERYBODY
-def test_tables_are_within_their_ranges(character: Character) -> None:
-    for one in fields(Palette):
+def test_tables_are_within_their_ranges(character: DrawnCharacter) -> None:
+    for one in fields(CharacterColours):
         value = getattr(character.palette, one.name)
         if isinstance(value, tuple) and one.name not in ("tints", "ears", "lids"):
             assert all(0 <= part <= 1 for part in value), one.name
@@ -85,7 +85,7 @@ def test_tables_are_within_their_ranges(character: Character) -> None:
 
 
 @EVERYBODY
-def test_the_map_of_space_turns_nothing_inside_out(character: Character) -> None:
+def test_the_map_of_space_turns_nothing_inside_out(character: DrawnCharacter) -> None:
     """Its Jacobian determinant stays above 0 where faces are, so that surfaces neither fold nor meet."""
     axes = np.linspace(-85, 85, 35), np.linspace(-140, 120, 53), np.linspace(-120, 60, 37)
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -211,7 +211,7 @@ def test_a_lock_is_laid_closer_to_the_head() -> None:
 
 
 @pytest.mark.parametrize("character", [one for one in CAST.values() if one.collar], ids=[*WITH_COLLAR])
-def test_a_roll_goes_around_the_neck(character: Character) -> None:
+def test_a_roll_goes_around_the_neck(character: DrawnCharacter) -> None:
     points, triangles, places = _roll(character.collar)
     assert (closed_sides(points, triangles) == 2).all()
     assert (places.min(), places.max()) == (0, 1)
@@ -220,7 +220,7 @@ def test_a_roll_goes_around_the_neck(character: Character) -> None:
 
 
 @EVERYBODY
-def test_an_iris_has_a_dark_ring_and_a_black_pupil(character: Character) -> None:
+def test_an_iris_has_a_dark_ring_and_a_black_pupil(character: DrawnCharacter) -> None:
     pixels = paint_eye(character.eyes, character.palette).astype(int)
     row = pixels[len(pixels) // 2].sum(axis=1)
     half = len(row) // 2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from corpus_tools.head.mouth import mouth_vertices, scatter_in_mouth
-from corpus_tools.head.skin import Skin
+from corpus_tools.head.skin import HeadSkin
 from tests.render.tiny_face import tiny_face
 from tts2face.picture.occlusion import sphere_directions
 
@@ -25,7 +25,7 @@ def hidden_face():
 @pytest.fixture
 def skin():
     uv = np.array([[0.5, 0.5], [0.8, 0.05]])  # the second vertex is on the cavity's island
-    return Skin(np.zeros((2, 3)), {}, np.zeros((0, 4), np.int64), uv, np.zeros((2, 3)))
+    return HeadSkin(np.zeros((2, 3)), {}, np.zeros((0, 4), np.int64), uv, np.zeros((2, 3)))
 
 
 def test_the_mouth_is_its_parts_and_the_cavity(hidden_face, skin):

@@ -7,7 +7,7 @@ import pytest
 
 from corpus_tools.recordings.folder import (
     READERS,
-    Cue,
+    SpokenCue,
     find_recordings,
     find_transcript,
     pronounce_recording,
@@ -111,15 +111,15 @@ def test_vtt_keeps_its_first_cue_with_and_without_header(write, header):
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
 def test_a_long_textgrid_gives_its_tier_of_words(write, encoding):
-    assert cues_of(write(".TextGrid", LONG_GRID, encoding)) == (Cue(0.5, 1.25, 'say "hi" [2]'),)
+    assert cues_of(write(".TextGrid", LONG_GRID, encoding)) == (SpokenCue(0.5, 1.25, 'say "hi" [2]'),)
 
 
 def test_a_short_textgrid_without_a_tier_of_words_gives_its_first_intervals(write):
-    assert cues_of(write(".TextGrid", SHORT_GRID)) == (Cue(0.5, 2.0, "blue"),)
+    assert cues_of(write(".TextGrid", SHORT_GRID)) == (SpokenCue(0.5, 2.0, "blue"),)
 
 
 def test_word_times_are_samples_of_25_khz(write):
-    assert cues_of(write(".align", ALIGN)) == (Cue(0.95, 1.18, "bin"), Cue(1.18, 1.36, "blue"))
+    assert cues_of(write(".align", ALIGN)) == (SpokenCue(0.95, 1.18, "bin"), SpokenCue(1.18, 1.36, "blue"))
 
 
 def test_all_grid_alignments_agree_with_the_manifest(takes):

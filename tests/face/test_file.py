@@ -12,7 +12,7 @@ from safetensors.numpy import load_file
 from lexicon.errors import DataError, InputError
 from tests.face.posing import posed_vertices
 from tts2face.models import face_file
-from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Part, Texture
+from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Texture
 from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_loading import load_face
 from tts2face.session.catalogue import IdentityEntry, identities
@@ -34,8 +34,8 @@ def small_face(with_texture: bool = True) -> Face:
         vertices=rng.uniform(-90, 90, (N, 3)).astype(np.float32),
         triangles=rng.integers(0, N, (20, 3)).astype(np.int32),
         parts=(
-            Part("skin", 0, 12, specular=0.2, texture=0 if with_texture else VERTEX_COLOURS),
-            Part("iris", 12, 8, opacity=0.5),
+            FacePart("skin", 0, 12, specular=0.2, texture=0 if with_texture else VERTEX_COLOURS),
+            FacePart("iris", 12, 8, opacity=0.5),
         ),
         shape_names=("jawOpen", "eyeLookUpLeft"),
         shapes=shapes,

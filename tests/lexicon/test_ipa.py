@@ -3,7 +3,7 @@
 import pytest
 
 from lexicon.errors import InputError
-from lexicon.ipa import Segment, parse_ipa
+from lexicon.ipa import IpaPhone, parse_ipa
 from lexicon.phones import PHONES
 
 
@@ -42,7 +42,7 @@ def test_stress_is_assigned_to_the_next_vowel() -> None:
 
 
 def test_length_and_syllabic_marks() -> None:
-    assert parse_ipa("ˈr̩ːk") == (Segment("r", 1, is_long=True, is_syllabic=True), Segment("k"))
+    assert parse_ipa("ˈr̩ːk") == (IpaPhone("r", 1, is_long=True, is_syllabic=True), IpaPhone("k"))
 
 
 def test_every_symbol_is_read_as_itself(subtests: pytest.Subtests) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.render.tiny_face import ball, tiny_face
-from tts2face.models.face import Part
+from tts2face.models.face import FacePart
 from tts2face.picture.light import compute_exposure, lamp_weights
 from tts2face.picture.occlusion import bake_occlusion, sphere_directions
 from tts2face.picture.surface import build_surface
@@ -26,7 +26,7 @@ def face_of_bodies(*bodies):
         blank,
         vertices=vertices,
         triangles=triangles,
-        parts=tuple(Part(f"body{i}", int(firsts[i]), counts[i]) for i in range(len(bodies))),
+        parts=tuple(FacePart(f"body{i}", int(firsts[i]), counts[i]) for i in range(len(bodies))),
         shape_names=(),
         shapes=np.zeros((0, len(vertices), 3), np.float32),
         limits=np.zeros((0, 2), np.float32),

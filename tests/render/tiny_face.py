@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Part, Texture
+from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Texture
 
 SKIN, EYE, TONGUE, LASH = (206, 150, 124), (240, 240, 240), (190, 70, 80), (30, 20, 15)
-FLESH = Part("skin", 0, 0, specular=0.2, shininess=20.0, wrap=0.4)
+FLESH = FacePart("skin", 0, 0, specular=0.2, shininess=20.0, wrap=0.4)
 RADIUS = 90.0  # mm
 
 
@@ -73,10 +73,10 @@ def tiny_face(textured=False, n_rings=14):
         triangles=triangles,
         parts=(
             replace(FLESH, first=int(firsts[0]), count=counts[0], texture=0 if textured else VERTEX_COLOURS),
-            Part("eye_left", int(firsts[1]), counts[1], specular=0.8, shininess=200.0),
-            Part("eye_right", int(firsts[2]), counts[2], specular=0.8, shininess=200.0),
-            Part("tongue", int(firsts[3]), counts[3], specular=0.3, shininess=30.0, wrap=0.2),
-            Part("lashes", int(firsts[4]), counts[4], opacity=0.6),
+            FacePart("eye_left", int(firsts[1]), counts[1], specular=0.8, shininess=200.0),
+            FacePart("eye_right", int(firsts[2]), counts[2], specular=0.8, shininess=200.0),
+            FacePart("tongue", int(firsts[3]), counts[3], specular=0.3, shininess=30.0, wrap=0.2),
+            FacePart("lashes", int(firsts[4]), counts[4], opacity=0.6),
         ),
         shape_names=names,
         shapes=np.stack([jaw, smile, still, still]).astype(np.float32),

@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips.retargeting import build_retargeter, contact_gaps, inner_product_map
-from tts2face.models.face import Face, Part
+from tts2face.models.face import Face, FacePart
 from tts2face.models.landmarks import (
     INNER_LIP_LOWER,
     INNER_LIP_UPPER,
@@ -73,7 +73,7 @@ def face_of(shapes: np.ndarray, limits: tuple[float, float] = (-100.0, 100.0)) -
     return Face(
         vertices=vertices,
         triangles=np.array([[0, 1, 2]], np.int32),
-        parts=(Part("skin", 0, 1),),
+        parts=(FacePart("skin", 0, 1),),
         shape_names=tuple(f"mouth{i}" for i in range(n)),
         shapes=shapes.astype(np.float32),
         limits=np.tile(np.array(limits, np.float32), (n, 1)),

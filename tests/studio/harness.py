@@ -21,8 +21,8 @@ from cli.main import main
 from tts2face.gestures.timeline_file import parse_timeline_object, timeline_json
 from tts2face.interchange.exports.stage_glb import stage_glb
 from tts2face.models.palette import FEATURES
-from tts2face.serving.studio.components.stage import Stage
-from tts2face.serving.studio.components.timeline import Timeline as TimelineElement
+from tts2face.serving.studio.components.stage import StageElement
+from tts2face.serving.studio.components.timeline import TimelineElement
 from tts2face.session.session import Session
 from tts2face.types import Clip
 
@@ -132,7 +132,7 @@ def add_page(files: Path) -> None:
         with ui.element("div").classes("w-full").style(PAGE):
             with ui.element("div").style("flex: 0 1 480px; min-height: 200px; display: flex; gap: 8px"):
                 with ui.element("div").style(f"width: 640px; {LAYER}"):
-                    stage = Stage("/studio/files/face.glb", preview=f"/studio/files/{preview}")
+                    stage = StageElement("/studio/files/face.glb", preview=f"/studio/files/{preview}")
                 with ui.element("div").style(f"flex: 1; color: var(--studio-text); {LAYER}"):
                     ui.label("Harness of the components").props("role=heading aria-level=1").classes("text-h6")
                     picked = ui.label().classes("picked")

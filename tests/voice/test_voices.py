@@ -5,7 +5,7 @@ import pytest
 
 from lexicon.dictionary import MAX_PHONES, parse_dictionary
 from lexicon.errors import BackendError, DataError, InputError
-from lexicon.ipa import Segment, parse_ipa
+from lexicon.ipa import IpaPhone, parse_ipa
 from lexicon.phones import PHONES
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.session.joining import resampled_speech
@@ -189,7 +189,7 @@ def test_the_longest_words_of_a_dictionary_are_spoken(language: str) -> None:
 
 
 def test_a_crash_of_espeak_is_reported() -> None:
-    words = [SpokenWord("bob", (Segment("b"),) * 300)]
+    words = [SpokenWord("bob", (IpaPhone("b"),) * 300)]
     with pytest.raises(BackendError, match=r"espeak-ng crashed \(signal 11\) on '\[\[bbb.*change the spelling"):
         load_voice("espeak", "de").speak(words)
 

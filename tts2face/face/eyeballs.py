@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.models.face import Eye, Face, Part
+from tts2face.models.face import Eye, Face, FacePart
 from tts2face.numeric.kernels import kernel
 
 MARGIN_MM = 0.3  # between skin and eyeball: edges of 2 mm lie below a surface of 14 mm radius by a tenth of it
@@ -119,7 +119,7 @@ def _margins(beyond: NDArray[np.float64]) -> NDArray[np.float64]:
     return least
 
 
-def _part_vertices(face: Face, is_chosen: Callable[[Part], bool]) -> NDArray[np.int64]:
+def _part_vertices(face: Face, is_chosen: Callable[[FacePart], bool]) -> NDArray[np.int64]:
     """Vertices of some of a face's parts."""
     used = [face.triangles[part.first : part.first + part.count].ravel() for part in face.parts if is_chosen(part)]
     return np.unique(np.concatenate([np.zeros(0, np.int64), *used])).astype(np.int64)

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
 from lexicon.inputs import check_limits
+from lexicon.marked_text import NOD_SIZE_LIMITS
 from tts2face.models.palette import EXPRESSIONS, FEATURES
 from tts2face.numeric.arrays import smoothstep
 
@@ -23,7 +24,6 @@ EXPRESSION_WEIGHT_LIMITS = (-0.5, 1.5)  # -e to 1 + e with e = 0.5, the middle o
 GAIN_LIMITS = (0.0, 3.0)  # beyond three times as far, lids and brows of any face are at their limits
 GAIN_NAMES = (*FEATURES, "jaw", "lips")
 GAZE_LIMITS_DEG = (-35.0, 35.0)  # farther, people turn the head (Stahl 1999, Experimental Brain Research 126)
-NOD_SIZE_LIMITS = (0.1, 2.0)  # above 12 degrees a nod is a bow
 CHANNEL_OFFSET_LIMITS = (-1000.0, 1000.0)  # weights lie within 2; the head's position is in millimetres
 MAX_KEYS = 100_000  # of one curve: a key at each frame of half an hour
 MAX_OVERRUN_S = 0.05  # tolerance for spans that end after the clip: times are often rounded to tenths of a second

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.face.mouth import MIDDLE_PAIR
-from tts2face.lips.retargeting import Retargeter, build_retargeter
+from tts2face.lips.retargeting import MAX_CONTACT_MM, Retargeter, build_retargeter
 from tts2face.lips.score_matching import scaled_scores
 from tts2face.models.face import Face
 from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION, N_LANDMARKS, eye_aperture, inner_lip_gaps
@@ -18,7 +18,6 @@ from tts2face.types import Trajectory
 
 N_MOUTH_MODES = 20
 CLOSED_FRAME_SHARE = 0.15  # share of the frames that count as having closed lips
-MAX_CONTACT_MM = 1.5  # upper limit of the tracked gap of touching lips
 SCORE_DRIVEN_SHAPES = ("eye", "brow", "nose", "cheek")  # name prefixes of the shapes that follow scores
 SCORE_DEAD_ZONE = 0.04  # amplitude of the noise of scores
 OPEN_LID_QUANTILE, CLOSED_LID_SHARE = 0.9, 0.25  # aperture quantile of an open eye; share of it of a closed eye

@@ -21,7 +21,7 @@ PHOTO_NOTICE = "Synthetic media: synthesised by tts2face from a photograph of {n
 PART_KINDS = ("plain", "skin", "eye", "strands")
 HEAD_GAIN, HEAD_LIMIT_RAD, SHIFT_GAIN = 0.75, np.radians(9.0), 0.45  # of the motion of a head in a photograph
 NO_TURN_DEG = 75.0  # yaw of a photographed head that does not move
-VERTEX_COLOURS = -1  # `Part.texture` of a part without texture
+VERTEX_COLOURS = -1  # `FacePart.texture` of a part without texture
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +53,7 @@ class Hairdo:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class FacePart:
     """Named part of the surface with one material: the triangles [first, first + count) of the face.
 
     ``specular`` is the strength of the highlight (0 = matt), ``shininess`` its Blinn-Phong exponent, ``wrap`` the wrap
@@ -186,7 +186,7 @@ class Face:
 
     vertices: NDArray[np.float32]
     triangles: NDArray[np.int32]
-    parts: tuple[Part, ...]
+    parts: tuple[FacePart, ...]
     shape_names: tuple[str, ...]
     shapes: NDArray[np.float32]
     limits: NDArray[np.float32]
@@ -244,7 +244,7 @@ class Face:
                 array.setflags(write=False)
 
 
-def keep_parts(face: Face, is_kept: Callable[[Part], bool]) -> Face:
+def keep_parts(face: Face, is_kept: Callable[[FacePart], bool]) -> Face:
     """A face with the triangles of some of its parts; its vertices stay, so that landmarks and eyes hold.
 
     Baked light is left out: it belongs to all parts.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.baked_light import BakedLight
-from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Hairdo, Late, Part, PhotoView, Texture
+from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Hairdo, Late, PhotoView, Texture
 from tts2face.models.face_schema import (
     FOLLOW,
     LIGHT,
@@ -172,7 +172,7 @@ def _pack_identities(presets: Mapping[str, Identity], least_mm: float) -> dict[s
     return arrays
 
 
-def _part_fields(part: Part) -> dict[str, Any]:
+def _part_fields(part: FacePart) -> dict[str, Any]:
     """Fields of a part; those that not every part has only where they are set."""
     usual = {"cutout": False, "kind": "plain", "texture": VERTEX_COLOURS}
     return {key: value for key, value in asdict(part).items() if key not in usual or value != usual[key]}
@@ -185,10 +185,10 @@ def _hairdos(face: Face, presets: Mapping[str, Identity]) -> dict[str, list[str]
     return {name: [hairdo.haircut, hairdo.colour] for name, hairdo in (own | of_presets).items()}
 
 
-def _read_part(fields: Mapping[str, Any], n_textures: int) -> Part:
+def _read_part(fields: Mapping[str, Any], n_textures: int) -> FacePart:
     number = texture_number(fields)
     known = {key: value for key, value in fields.items() if key != "textured"}
-    return Part(**known | {"texture": number if number < n_textures else VERTEX_COLOURS})
+    return FacePart(**known | {"texture": number if number < n_textures else VERTEX_COLOURS})
 
 
 def _read_occlusion(
@@ -276,7 +276,7 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
     )
 
 
-def _part_texel_weights(face: Face, part: Part, shape: tuple[int, ...]) -> NDArray[np.float32]:
+def _part_texel_weights(face: Face, part: FacePart, shape: tuple[int, ...]) -> NDArray[np.float32]:
     """Weights (H, W): 1 on the texels of a part, 0 elsewhere, with a soft edge."""
     from PIL import Image, ImageDraw, ImageFilter
 
@@ -318,7 +318,7 @@ def tint_parts(face: Face, tints: Mapping[str, Any]) -> Face:
     return replace(face, colours=colours, textures=Late(len(face.textures), lambda: _tinted(face, tints)))
 
 
-def _tint(tints: Mapping[str, Any], part: Part) -> NDArray[np.float32]:
+def _tint(tints: Mapping[str, Any], part: FacePart) -> NDArray[np.float32]:
     return np.array(tints.get(part.name, (1.0, 1.0, 1.0)), np.float32)
 
 

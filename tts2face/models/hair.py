@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.models.face import Face, Hairdo, Late, Part, Texture
+from tts2face.models.face import Face, FacePart, Hairdo, Late, Texture
 from tts2face.numeric.arrays import decode_srgb, encode_srgb
 
 HAIR_COLOURS: Mapping[str, str] = {
@@ -50,7 +50,7 @@ def _parsed(colour: str, kind: str, names: Mapping[str, str]) -> NDArray[np.floa
 HAIR_PART = "hair"
 BALD = "bald"  # haircut without hair
 MEAN_RELIEF = 128.0  # relief at which a strand has the colour of the hair
-MATERIAL = Part(HAIR_PART, 0, 0, specular=0.3, shininess=24.0, wrap=0.3, cutout=True, kind="strands")
+MATERIAL = FacePart(HAIR_PART, 0, 0, specular=0.3, shininess=24.0, wrap=0.3, cutout=True, kind="strands")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

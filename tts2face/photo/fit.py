@@ -20,7 +20,7 @@ from lexicon.errors import DataError, InputError
 from lexicon.inputs import check_list, check_object, read_json
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
 from tts2face.photo.eyes import IRISES, EyePatch
-from tts2face.photo.lines import LID_MARGINS, N_LID, N_POINTS, LidLines, LipLine
+from tts2face.photo.lines import LID_MARGINS, N_LID, N_POINTS, InnerLips, LidLines
 from tts2face.photo.mesh import PhotoMesh
 from tts2face.storage.files import write_atomically
 
@@ -166,17 +166,17 @@ class PhotoPlaces:
         given = self._placed(name, self.fit.points[name][None], margin=1.0)[0]
         return np.array([*given, found[2]])
 
-    def lips(self, found: LipLine) -> LipLine:
+    def lips(self, found: InnerLips) -> InnerLips:
         """Edges of the lips with the lines that are given; errors as `lids`."""
         if ("lips", "seam") in self.fit.lines:
             seam = self._line("lips", "seam", (found.upper + found.lower) / 2)
-            return LipLine(seam, seam.copy(), 0.0)
+            return InnerLips(seam, seam.copy(), 0.0)
         if not any(part == "lips" for part, _ in self.fit.lines):
             return found
         upper, lower = self._opening("lips", found.upper, found.lower)
         gap = float(np.linalg.norm((upper - lower)[:, :2], axis=1).max() / self.scale)
-        lips = LipLine(upper, lower, gap)
-        return LipLine((upper + lower) / 2, (upper + lower) / 2, gap) if lips.is_closed else lips
+        lips = InnerLips(upper, lower, gap)
+        return InnerLips((upper + lower) / 2, (upper + lower) / 2, gap) if lips.is_closed else lips
 
     def lids(self, found: LidLines) -> LidLines:
         """Margins of the lids with the lines that are given.
@@ -195,7 +195,7 @@ class PhotoPlaces:
         (right, left) = eyes
         return LidLines((right[0], left[0]), (right[1], left[1]), found.fold)
 
-    def used(self, lips: LipLine, lids: LidLines, points: Mapping[str, Floats]) -> PhotoFit:
+    def used(self, lips: InnerLips, lids: LidLines, points: Mapping[str, Floats]) -> PhotoFit:
         """The fit that gives these lines and points (3,), pixels and depths."""
         lines = {("lips", "seam"): lips.upper} if lips.is_closed else {}
         if not lips.is_closed:

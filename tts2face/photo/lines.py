@@ -85,7 +85,7 @@ SMOOTHING, WAY_SMOOTHING, CORNER_POINTS = 5, 7, 4  # points of means, and points
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LipLine:
+class InnerLips:
     """Inner edges of the lips.
 
     Parameters
@@ -106,7 +106,7 @@ class LipLine:
         return self.gap < CLOSED_GAP
 
 
-def find_lip_line(pixels: NDArray[np.uint8], face: FoundFace) -> LipLine:
+def find_lip_line(pixels: NDArray[np.uint8], face: FoundFace) -> InnerLips:
     """Inner edges of the lips of a face in a picture (H, W, 3).
 
     Notes
@@ -120,13 +120,13 @@ def find_lip_line(pixels: NDArray[np.uint8], face: FoundFace) -> LipLine:
     scale = face.eye_distance_px
     if gap < CLOSED_GAP:
         seam = _seam(pixels, (inner[0] + inner[1]) / 2, scale)
-        return LipLine(seam, seam.copy(), gap)
+        return InnerLips(seam, seam.copy(), gap)
     outer = [weights @ face.landmarks[list(numbers)] for numbers in (OUTER_LIP_UPPER, OUTER_LIP_LOWER)]
     upper, lower = (_edge(pixels, line, around, scale) for line, around in zip(inner, outer, strict=True))
     crossed = lower[:, 1] < upper[:, 1]
     crossed[[0, -1]] = True
     upper[crossed] = lower[crossed] = ((upper + lower) / 2)[crossed]
-    return LipLine(upper, lower, gap)
+    return InnerLips(upper, lower, gap)
 
 
 def spline_weights(n: int, m: int) -> Floats:
@@ -136,7 +136,7 @@ def spline_weights(n: int, m: int) -> Floats:
     return np.asarray(CubicSpline(np.linspace(0, 1, n), np.eye(n), bc_type="natural")(np.linspace(0, 1, m)))
 
 
-def darken_lip_edges(pixels: NDArray[np.uint8], lips: LipLine, scale: float) -> NDArray[np.uint8]:
+def darken_lip_edges(pixels: NDArray[np.uint8], lips: InnerLips, scale: float) -> NDArray[np.uint8]:
     """Picture (H, W, 3) whose parted lips darken towards their inner edges, as lips that meet do."""
     if lips.is_closed:
         return pixels

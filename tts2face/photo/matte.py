@@ -41,7 +41,7 @@ BACKGROUND_CHANGE = 0.005  # of that of the person, by which its colour changes 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reading:
+class MatteReading:
     """Share (H, W) of a person in the pixels of a picture, and its standard deviation (H, W) over the readings."""
 
     share: Floats
@@ -87,7 +87,7 @@ def part_background(picture: Photograph, landmarks: NDArray[np.float64], scale: 
     return _layered(picture, cover, around, layers)
 
 
-def read_person(pixels: Pixels, places: NDArray[np.float64], scale: float, network: Network) -> Reading:
+def read_person(pixels: Pixels, places: NDArray[np.float64], scale: float, network: Network) -> MatteReading:
     """Mean of the network's readings of a picture and of two parts of it around a face, each also mirrored."""
     height, width = pixels.shape[:2]
     oval = places[list(FACE_OVAL)]
@@ -108,10 +108,10 @@ def read_person(pixels: Pixels, places: NDArray[np.float64], scale: float, netwo
     weights[:2] = np.maximum(1 - weights[2:].max(axis=0), WHOLE_WEIGHT)
     weights /= weights.sum(axis=0)
     share = (weights * shares).sum(axis=0)
-    return Reading(share, np.sqrt((weights * (shares - share) ** 2).sum(axis=0)))
+    return MatteReading(share, np.sqrt((weights * (shares - share) ** 2).sum(axis=0)))
 
 
-def _is_doubtful(reading: Reading, face: Mask, scale: float) -> bool:
+def _is_doubtful(reading: MatteReading, face: Mask, scale: float) -> bool:
     """Whether readings of the head differ much, or do not show the face (H, W), or nothing beside it."""
     rows, columns = np.flatnonzero(face.any(axis=1)), np.flatnonzero(face.any(axis=0))
     is_head = np.zeros(face.shape, bool)

@@ -24,7 +24,7 @@ from tts2face.models.landmarks import (
     OUTER_LIP_UPPER,
 )
 from tts2face.numeric.arrays import points_in_polygon
-from tts2face.photo.lines import LID_MARGINS, N_LID, LidLines, LipLine
+from tts2face.photo.lines import LID_MARGINS, N_LID, InnerLips, LidLines
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -99,7 +99,7 @@ class PhotoMesh:
         return dict(zip(self.landmarks.tolist(), self.landmark_vertices.tolist(), strict=True))
 
 
-def build_mesh(size: tuple[int, int], landmarks: Floats, lips: LipLine, lids: LidLines, scale: float) -> PhotoMesh:
+def build_mesh(size: tuple[int, int], landmarks: Floats, lips: InnerLips, lids: LidLines, scale: float) -> PhotoMesh:
     """Mesh of a picture of a size (width, height) with landmarks (478, 3), pixels and depths.
 
     `scale` is the distance of the outer eye corners, pixels.
@@ -207,7 +207,7 @@ class _Mouth:
     scale: float
 
     @classmethod
-    def between(cls, lips: LipLine, scale: float) -> "_Mouth":
+    def between(cls, lips: InnerLips, scale: float) -> "_Mouth":
         right, left = lips.upper[0, :2], lips.upper[-1, :2]
         half = float(np.linalg.norm(left - right)) / 2
         along = (left - right) / (2 * half)

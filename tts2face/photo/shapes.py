@@ -25,7 +25,7 @@ from tts2face.models.landmarks import (
 from tts2face.numeric.arrays import smoothstep
 from tts2face.photo.camera import PhotoCamera
 from tts2face.photo.eyes import EyePatch
-from tts2face.photo.lines import LID_MARGINS, N_LID, LipLine, spline_weights
+from tts2face.photo.lines import LID_MARGINS, N_LID, InnerLips, spline_weights
 from tts2face.photo.lines import N_POINTS as N_LIP
 from tts2face.photo.mesh import LIP_RINGS, PhotoMesh, Spreading, grid_triangles
 from tts2face.photo.teeth import OwnTeeth
@@ -79,7 +79,7 @@ class PhotoPerson:
 
     size: tuple[int, int]
     landmarks: Floats
-    lips: LipLine
+    lips: InnerLips
     smile: float
     scale: float
 

@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
-from tts2face.models.face import Face, Part, PhotoView
+from tts2face.models.face import Face, FacePart, PhotoView
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.photo.camera import PhotoCamera, find_camera
 from tts2face.photo.eyes import EYE_BEHIND_MM, SIDES, EyePatch, eye_patches, gaze_shapes
 from tts2face.photo.fit import NOTHING_GIVEN, PhotoFit, PhotoPlaces, place_landmarks
 from tts2face.photo.found_face import PhotographedFace
 from tts2face.photo.light import SMILING, MouthRows, picture_light, wrinkles
-from tts2face.photo.lines import LipLine, darken_lip_edges, find_lid_lines, find_lip_line
+from tts2face.photo.lines import InnerLips, darken_lip_edges, find_lid_lines, find_lip_line
 from tts2face.photo.mesh import PhotoMesh, Spreading, build_mesh
 from tts2face.photo.mouth import MouthInside, MouthPlace, cheek_light, mouth_light, mouth_walls
 from tts2face.photo.photograph import OPAQUE, Photograph
@@ -99,7 +99,7 @@ def speaking_photo(
     landmarks, scale = camera.depths_of(found.landmarks), found.eye_distance_px
     line = find_lip_line(pixels, found)
     given = PhotoPlaces(fit, (pixels.shape[1], pixels.shape[0]), picture.reduced_by, scale)
-    lips = given.lips(LipLine(camera.depths_of(line.upper), camera.depths_of(line.lower), line.gap))
+    lips = given.lips(InnerLips(camera.depths_of(line.upper), camera.depths_of(line.lower), line.gap))
     person = PhotoPerson(given.size, landmarks, lips, seen.mean_score(SMILING), scale)
     lids = given.lids(find_lid_lines(pixels, landmarks, scale))
     pivot = given.point("pivot", camera.to_pixels(head.pivot[None].astype(np.float64))[0])
@@ -172,10 +172,10 @@ def _view(picture: Photograph, camera: PhotoCamera, follow: Floats, pages: Photo
     return PhotoView((wide, high), camera.view, lens, rounded.astype(np.float32), corner, *layers)
 
 
-def _parts(surface: PhotoSurface) -> tuple[Part, ...]:
+def _parts(surface: PhotoSurface) -> tuple[FacePart, ...]:
     first, parts = 0, []
     for name, triangles in surface.parts:
-        parts.append(Part(name, first, len(triangles)))
+        parts.append(FacePart(name, first, len(triangles)))
         first += len(triangles)
     return tuple(parts)
 

@@ -14,7 +14,7 @@ from tts2face.models.landmarks import UPPER_LIP_INNER_MID
 from tts2face.numeric.arrays import decode_srgb, encode_srgb, points_in_polygon, smoothstep
 from tts2face.photo.camera import TO_CAMERA, PhotoCamera, find_camera
 from tts2face.photo.found_face import FoundFace, PhotoReader
-from tts2face.photo.lines import LEAST_LIP_BLUR_PX, LipLine, cheapest_path, colours_at, find_lip_line, lab_at
+from tts2face.photo.lines import LEAST_LIP_BLUR_PX, InnerLips, cheapest_path, colours_at, find_lip_line, lab_at
 from tts2face.photo.mesh import LIP_RINGS, grid_triangles
 from tts2face.photo.mouth import CHEEKS, PICTURED, TEETH, MouthInside, MouthLight, MouthPlace, cheek_light, head_mouth
 from tts2face.video.pose import rigid_points, similarity_transforms
@@ -107,7 +107,7 @@ class OwnTeeth:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Arch:
+class UpperTeeth:
     """Front of the upper teeth of a head: height of their edges, and depths (N,) at ways (N,) from the middle, mm."""
 
     edge: float
@@ -115,7 +115,7 @@ class Arch:
     depths: Floats
 
     @classmethod
-    def of(cls, head: Face) -> "Arch":
+    def of(cls, head: Face) -> "UpperTeeth":
         """Front of the upper teeth of a head."""
         part = next(part for part in head.parts if part.name == UPPER)
         teeth = head.vertices[np.unique(head.triangles[part.first : part.first + part.count])].astype(np.float64)
@@ -129,12 +129,12 @@ class Arch:
 
 
 def find_teeth(
-    pixels: NDArray[np.uint8], face: FoundFace, lips: LipLine, camera: PhotoCamera, head: Face
+    pixels: NDArray[np.uint8], face: FoundFace, lips: InnerLips, camera: PhotoCamera, head: Face
 ) -> OwnTeeth | None:
     """Upper teeth between the lips of a face in a picture (H, W, 3); None where too little of them is seen."""
     if lips.is_closed:
         return None
-    arch = Arch.of(head)
+    arch = UpperTeeth.of(head)
     view = _View(pixels, face, lips, camera, arch)
     across = np.arange(-HALF_WIDTH_MM, HALF_WIDTH_MM + COLUMN_MM / 2, COLUMN_MM)
     up = view.heights(across)
@@ -189,7 +189,7 @@ class _View:
     """Teeth of a picture in the axes of the head."""
 
     def __init__(
-        self, pixels: NDArray[np.uint8], face: FoundFace, lips: LipLine, camera: PhotoCamera, arch: Arch
+        self, pixels: NDArray[np.uint8], face: FoundFace, lips: InnerLips, camera: PhotoCamera, arch: UpperTeeth
     ) -> None:
         self._pixels, self._camera, self._arch = pixels, camera, arch
         self._opening = np.concatenate([lips.upper, lips.lower[::-1]])[:, :2]
@@ -310,7 +310,7 @@ def teeth_and_tongue(head: Face, place: MouthPlace, light: MouthLight, teeth: Ow
     """
     if teeth is None:
         return [head_mouth(head, place, light)]
-    arch = Arch.of(head)
+    arch = UpperTeeth.of(head)
     n = max(2, round(float(np.ptp(teeth.across)) / SHEET_STEP_MM) + 1)
     across = np.linspace(teeth.across[0], teeth.across[-1], n)
     edge = np.interp(across, teeth.across, teeth.edge)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.face.deformation import FaceRig, build_rig
-from tts2face.models.face import Face, Part, Texture
+from tts2face.models.face import Face, FacePart, Texture
 from tts2face.numeric.arrays import unit_vectors
 from tts2face.picture.kernels.eyes import EyeGeometry, eye_geometry
 from tts2face.picture.kernels.raster import FIRST, HOLES, LATER, NOT_DRAWN, TRANSLUCENT
@@ -275,7 +275,7 @@ def build_surface(face: Face, *, scatters: bool = True) -> Surface:
     )
 
 
-def _is_cut_out(face: Face, part: Part) -> bool:
+def _is_cut_out(face: Face, part: FacePart) -> bool:
     return part.cutout and part.texture >= 0 and face.textures[part.texture].alpha is not None
 
 

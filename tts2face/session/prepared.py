@@ -16,9 +16,9 @@ import numpy as np
 from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
 from lexicon.inputs import is_file
-from lexicon.ipa import Segment
+from lexicon.ipa import IpaPhone
 from lexicon.languages import check_readable, language_code
-from lexicon.marked_text import MarkedText
+from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS, MarkedText
 from lexicon.sentences import Sentence, split_sentences
 from lexicon.sequence import PhoneSequence
 from lexicon.ssml import parse_marks
@@ -27,7 +27,7 @@ from tts2face.gestures.timeline import Timeline, parse_expressions, parse_gains,
 from tts2face.gestures.timeline_file import read_timeline
 from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
 from tts2face.picture.options import Picture
-from tts2face.request import RATE_LIMITS, VOLUME_LIMITS, Request
+from tts2face.request import Request
 from tts2face.storage.files import AnyPath
 from tts2face.types import exact_rate
 
@@ -179,7 +179,7 @@ class PreparedRequest:
     text: MarkedText
     timeline: Timeline
     options: SynthesisOptions
-    dictionary: Mapping[str, tuple[Segment, ...]] = field(default_factory=dict)
+    dictionary: Mapping[str, tuple[IpaPhone, ...]] = field(default_factory=dict)
     edges: tuple[SentenceEdges, ...] = ()
     excluded: tuple[ExcludedToken, ...] = ()
 

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from lexicon.dictionary import Dictionary, parse_dictionary
 from lexicon.errors import InputError
 from lexicon.inputs import check_type
-from lexicon.ipa import Segment
+from lexicon.ipa import IpaPhone
 from tts2face.gestures.elements import Gains, StyleSpan, check_feature
 from tts2face.gestures.timeline import Timeline, parse_style
 from tts2face.lips.options import ExcludedToken
@@ -113,7 +113,7 @@ class Project:
             excluded=self.excluded,
         )
 
-    def _entries(self, prepared: PreparedRequest) -> Mapping[str, tuple[Segment, ...]]:
+    def _entries(self, prepared: PreparedRequest) -> Mapping[str, tuple[IpaPhone, ...]]:
         return {**prepared.dictionary, **self.dictionary().entries}
 
 

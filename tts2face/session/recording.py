@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lexicon.dictionary import Dictionary
 from lexicon.errors import DataError, InputError
-from lexicon.ipa import Segment
+from lexicon.ipa import IpaPhone
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.models.audio_map import AudioMap
 from tts2face.models.talker import Talker, speech_channels
@@ -68,7 +68,7 @@ def select_audio_map(request: Request, talker: Talker) -> AudioMap:
 
 
 def align_transcript(
-    text: str, language: str, path: Path, dictionary: Mapping[str, tuple[Segment, ...]]
+    text: str, language: str, path: Path, dictionary: Mapping[str, tuple[IpaPhone, ...]]
 ) -> TimedTranscript:
     """Align a text with a recording of it; `dictionary` holds the user's pronunciations by `word_key`.
 

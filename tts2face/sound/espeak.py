@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, InputError
 from lexicon.g2p import DEFAULT_LANGUAGE, has_kanji, parse_espeak_word, to_kana
-from lexicon.ipa import Segment
+from lexicon.ipa import IpaPhone
 from lexicon.languages import check_script, language_code
 from lexicon.phones import PHONES, nearest_phones, phone_distance
 from lexicon.pronounce import Word
@@ -181,7 +181,7 @@ class EspeakVoice:
         words = [word if word.segments else self._pronounce(word) for word in content]
         return " ".join(_word_mnemonic(word) for word in words), words
 
-    def _look_up(self, word: str) -> tuple[Segment, ...] | None:
+    def _look_up(self, word: str) -> tuple[IpaPhone, ...] | None:
         return self._own_words.get(word.strip(".,;:!?\"'()").lower())
 
     def _pronounce(self, word: SpokenWord) -> SpokenWord:
@@ -271,7 +271,7 @@ def _word_mnemonic(word: SpokenWord) -> str:
     return f"[[{''.join(_segment_mnemonic(segment) for segment in word.segments)}]]{word.after}"
 
 
-def _segment_mnemonic(segment: Segment) -> str:
+def _segment_mnemonic(segment: IpaPhone) -> str:
     phones = nearest_phones(segment.phone, MNEMONICS.keys())
     return STRESS_MARKS.get(segment.stress, "") + "".join(MNEMONICS[phone] for phone in phones)
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize
 from lexicon.inputs import read_json
-from lexicon.ipa import Segment
+from lexicon.ipa import IpaPhone
 from lexicon.languages import check_script, language_code
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.pronounce import Word
@@ -123,7 +123,7 @@ class PiperTextReader:
         return found
 
 
-def english_letters(segments: Sequence[Segment], phones: Collection[str], letters: Collection[str]) -> str:
+def english_letters(segments: Sequence[IpaPhone], phones: Collection[str], letters: Collection[str]) -> str:
     """Letters of an American English word as espeak-ng writes them: long vowels, flaps, the article a as ɐ.
 
     Parameters
@@ -134,7 +134,7 @@ def english_letters(segments: Sequence[Segment], phones: Collection[str], letter
         The alphabet of the voice.
     """
     own = [
-        Segment(phone, segment.stress if at == 0 else 0, is_syllabic=segment.is_syllabic)
+        IpaPhone(phone, segment.stress if at == 0 else 0, is_syllabic=segment.is_syllabic)
         for segment in segments
         for at, phone in enumerate(_own_phones(segment.phone, phones, letters))
     ]
@@ -153,13 +153,13 @@ def _own_phones(phone: str, phones: Collection[str], letters: Collection[str]) -
     return (phone,) if is_spelled else nearest_phones(phone, phones)
 
 
-def _english_spelling(segment: Segment, is_last: bool) -> str:
+def _english_spelling(segment: IpaPhone, is_last: bool) -> str:
     if segment.phone == "i" and not segment.stress and is_last:
         return "i"  # happy
     return ENGLISH_LETTERS.get(segment.phone, phone_letters(segment.phone))
 
 
-def _is_flap(segments: Sequence[Segment], at: int) -> bool:
+def _is_flap(segments: Sequence[IpaPhone], at: int) -> bool:
     """Whether a /t/ stands between a vowel or /ɹ/ and an unstressed vowel, other than that of -ten (button)."""
     if segments[at].phone != "t" or not 0 < at < len(segments) - 1:
         return False

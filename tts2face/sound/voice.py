@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.dictionary import Dictionary
-from lexicon.ipa import Segment
+from lexicon.ipa import IpaPhone
 from lexicon.phones import PHONES
 from lexicon.pronounce import Word, pronounce
 from lexicon.sentences import TextWord, pronounce_words
@@ -30,12 +30,12 @@ class SpokenWord:
     """
 
     text: str
-    segments: tuple[Segment, ...]
+    segments: tuple[IpaPhone, ...]
     after: str = ""
 
 
 SpeechInput = str | Sequence[SpokenWord]  # text, or phones word by word
-PronunciationMap = Mapping[str, tuple[Segment, ...]]  # pronunciations of a user's words, by lower-case spelling
+PronunciationMap = Mapping[str, tuple[IpaPhone, ...]]  # pronunciations of a user's words, by lower-case spelling
 
 
 # Runs a long computation of native code and returns its result; the second function ends it early, from another thread.
@@ -151,10 +151,10 @@ def pronounce_content(content: SpeechInput, language: str, own_words: Pronunciat
     return pronounce_words([TextWord(word.text, word.segments, word.after) for word in content], language, own)
 
 
-def word_segments(word: Word) -> tuple[Segment, ...]:
+def word_segments(word: Word) -> tuple[IpaPhone, ...]:
     """Phones of a word with their stress."""
     return tuple(
-        Segment(phone, stress, is_syllabic=PHONES[phone].is_vowel)
+        IpaPhone(phone, stress, is_syllabic=PHONES[phone].is_vowel)
         for phone, stress in zip(word.phones, word.stress, strict=True)
     )
 

@@ -47,7 +47,7 @@ Motion = Mapping[str, NDArray[np.floating]]
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class StudyOptions:
     """Options of a study: one in `one_in` recordings is held out; numbers of random halvings and clips; the seed.
 
     Raises
@@ -100,7 +100,7 @@ class TraitComparison:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MotionComparison:
+class FeatureComparison:
     """Spectra of a feature, the correlation (r) of its speed with the sound's intensity, and diversity.
 
     Spectra and r are those of recordings, field, noise and, for measured styles, the published field; diversity is
@@ -130,7 +130,7 @@ class StyleStudy:
     """Results for one style: `real` is its recordings, or for a derived style the motion of its source's field.
 
     Only measured styles have long clips and a clip of the published field; derived styles transform long clips.
-    `blinks_per_minute` has the order of `MotionComparison.spectra`.
+    `blinks_per_minute` has the order of `FeatureComparison.spectra`.
     """
 
     name: str
@@ -142,7 +142,7 @@ class StyleStudy:
     minutes: float
     blinks_per_minute: tuple[float, ...]
     trait_comparisons: tuple[TraitComparison, ...]
-    motion_comparisons: tuple[MotionComparison, ...]
+    motion_comparisons: tuple[FeatureComparison, ...]
     long_run: LongRun
 
 
@@ -151,7 +151,7 @@ class GestureStudy:
     """Results for all styles of a palette, and of what the body does whatever the style."""
 
     name: str
-    options: Options
+    options: StudyOptions
     styles: tuple[StyleStudy, ...]
     body: tuple[BodyMeasure, ...]
 
@@ -164,7 +164,9 @@ class GestureStudy:
         return sum(kept), len(kept)
 
 
-def study_gestures(name: str, palette: Palette, options: Options, on_progress: Progress | None = None) -> GestureStudy:
+def study_gestures(
+    name: str, palette: Palette, options: StudyOptions, on_progress: Progress | None = None
+) -> GestureStudy:
     """Measure every style of a palette."""
     studies: list[StyleStudy] = []
     prepared: dict[str, _PreparedStyle] = {}
@@ -191,7 +193,7 @@ class _PreparedStyle:
     reference_clip: Motion
 
 
-def _prepare_style(palette: Palette, source: str, options: Options) -> _PreparedStyle:
+def _prepare_style(palette: Palette, source: str, options: StudyOptions) -> _PreparedStyle:
     whole = palette.styles[source]
     is_held_out = len(whole.lengths) >= FEWEST
     training, held_out = hold_out(whole, options.one_in, options.seed) if is_held_out else (whole, whole)
@@ -200,7 +202,7 @@ def _prepare_style(palette: Palette, source: str, options: Options) -> _Prepared
     return _PreparedStyle(training, held_out, is_held_out, fields, reference)
 
 
-def _study_style(palette: Palette, name: str, prepared: _PreparedStyle, options: Options) -> StyleStudy:
+def _study_style(palette: Palette, name: str, prepared: _PreparedStyle, options: StudyOptions) -> StyleStudy:
     derived = palette.derivations.get(name)
     source = name if derived is None else derived.source
     training, held_out, fields = prepared.training, prepared.held_out, prepared.fields
@@ -234,7 +236,7 @@ def _blink_rate(motion: Motion, held_out: Style) -> float:
     return find_blinks(motion["blink"], held_out.lengths, GESTURE_FPS).per_minute if "blink" in motion else float("nan")
 
 
-def _compare_trait(trait: Trait, held_out: Style, kinds: list[list[Motion]], options: Options) -> TraitComparison:
+def _compare_trait(trait: Trait, held_out: Style, kinds: list[list[Motion]], options: StudyOptions) -> TraitComparison:
     def values_of(motion: Motion) -> list[Doubles]:
         return [trait.of(part) for part in split_recordings(motion[trait.feature], held_out.lengths)]
 
@@ -261,7 +263,7 @@ def _compare_trait(trait: Trait, held_out: Style, kinds: list[list[Motion]], opt
     )
 
 
-def _compare_motion(palette: Palette, held_out: Style, kinds: list[list[Motion]]) -> tuple[MotionComparison, ...]:
+def _compare_motion(palette: Palette, held_out: Style, kinds: list[list[Motion]]) -> tuple[FeatureComparison, ...]:
     (real,), clips, noises, *_ = kinds
     shown = [in_display_units(palette, kind[0]) for kind in kinds]
     intensity = frame_midpoints(held_out.intensity, held_out.lengths)
@@ -285,7 +287,7 @@ def _compare_motion(palette: Palette, held_out: Style, kinds: list[list[Motion]]
         diversities = [_diversity([one[feature] for one in kind], real[feature], held_out) for kind in (clips, noises)]
         unit = trait.unit.removesuffix("/s")
         found.append(
-            MotionComparison(
+            FeatureComparison(
                 feature,
                 "" if unit == "1" else unit,
                 tuple(spectra),

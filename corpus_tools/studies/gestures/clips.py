@@ -28,7 +28,7 @@ NO_SOUND = Waveform(np.zeros(2, np.float32), 16000)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Clip:
+class FieldClip:
     """Motion (T, k), and the recorded moment (T',) of each frame of the field."""
 
     values: Floats
@@ -74,7 +74,7 @@ def replace_style(palette: Palette, name: str, style: Style) -> Palette:
     return replace(palette, styles={**palette.styles, name: style})
 
 
-def field_clip(fields: GestureFields, style: str, feature: str, intensity: Floats, seed: int) -> Clip:
+def field_clip(fields: GestureFields, style: str, feature: str, intensity: Floats, seed: int) -> FieldClip:
     """A feature of a style, measured or derived, for an intensity (T,) at `GESTURE_FPS`."""
     source, tempo = fields.source(style, feature), fields.change(style, feature).tempo
     field = fields.of(source, feature)
@@ -86,7 +86,7 @@ def field_clip(fields: GestureFields, style: str, feature: str, intensity: Float
     values = sample.values[: len(intensity)]
     if tempo != 1.0:
         values = interpolate_cubic(sample.values, tempo * np.arange(len(intensity), dtype=np.float64))
-    return Clip(fields.apply_change(style, feature, values), sample.moments[: round(len(intensity) * tempo)])
+    return FieldClip(fields.apply_change(style, feature, values), sample.moments[: round(len(intensity) * tempo)])
 
 
 def published_clip(palette: Palette, style: str, intensity: Floats, seed: int) -> Mapping[str, Floats]:

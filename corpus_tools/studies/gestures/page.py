@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from corpus_tools.studies.gestures.analysis import (
     HALF,
     NEAR,
+    FeatureComparison,
     GestureStudy,
-    MotionComparison,
     StyleStudy,
     TraitComparison,
 )
@@ -98,7 +98,7 @@ def distribution_panel(style: StyleStudy, compared: TraitComparison) -> Panel:
     return Panel(compared.trait.name, draw)
 
 
-def spectrum_panel(style: StyleStudy, moving: MotionComparison) -> Panel:
+def spectrum_panel(style: StyleStudy, moving: FeatureComparison) -> Panel:
     """Power spectra without the mean, on a logarithmic scale."""
     title = f"{moving.feature}: power"
 
@@ -285,7 +285,7 @@ def _pad_columns(values: tuple[float, ...], n: int) -> tuple[float, ...]:
     return (*values, *[float("nan")] * (n - len(values)))
 
 
-def _correlation_result(style: StyleStudy, one: MotionComparison) -> str:
+def _correlation_result(style: StyleStudy, one: FeatureComparison) -> str:
     if one.feature != "head" or style.source is not None:
         return ""
     return "met" if one.follows_sound else "missed"

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.studies.gestures.analysis import (
+    FeatureComparison,
     GestureStudy,
-    MotionComparison,
-    Options,
+    StudyOptions,
     StyleStudy,
     TraitComparison,
     study_gestures,
@@ -114,7 +114,7 @@ def _trait_figures(style: StyleStudy, one: TraitComparison) -> dict[str, Any]:
     }
 
 
-def _motion_figures(one: MotionComparison) -> dict[str, Any]:
+def _motion_figures(one: FeatureComparison) -> dict[str, Any]:
     return {
         "name": one.feature,
         "r_with_intensity": _by_kind(one.with_intensity),
@@ -146,7 +146,9 @@ def _round_number(value: float) -> float | None:
     return float(f"{value:.6g}") if np.isfinite(value) else None
 
 
-def write_gestures(palette: str, out: Path, options: Options, *, on_progress: Progress | None = None) -> GestureStudy:
+def write_gestures(
+    palette: str, out: Path, options: StudyOptions, *, on_progress: Progress | None = None
+) -> GestureStudy:
     """Study a palette (by name or path), write the file, and return the study.
 
     ``.html`` is a page, ``.json`` has every figure, ``.csv`` the distances, ``.png`` the main plots of the first style.

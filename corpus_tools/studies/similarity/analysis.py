@@ -41,7 +41,7 @@ from tts2face.types import Progress
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Comparison:
+class TableComparison:
     """Comparison of two tables over their P common phones.
 
     ``difference`` (P, P) is the first talker's similarity minus the other's; ``per_phone`` (P,) the mean size of a
@@ -63,7 +63,9 @@ class Comparison:
         return [(self.phones[rows[at]], self.phones[columns[at]], float(sizes[at])) for at in order]
 
 
-def compare_tables(one: SimilarityTable, two: SimilarityTable, other: str, stream: np.random.Generator) -> Comparison:
+def compare_tables(
+    one: SimilarityTable, two: SimilarityTable, other: str, stream: np.random.Generator
+) -> TableComparison:
     """Compare two talkers' tables; `other` is the second one's name.
 
     Raises
@@ -80,7 +82,7 @@ def compare_tables(one: SimilarityTable, two: SimilarityTable, other: str, strea
     difference = a - b
     per_phone = np.abs(difference).sum(axis=1) / (len(common) - 1)
     apart = sorted({*one.phones, *two.phones} - set(common))
-    return Comparison(other, common, difference, per_phone, mantel(a, b, stream), tuple(apart))
+    return TableComparison(other, common, difference, per_phone, mantel(a, b, stream), tuple(apart))
 
 
 def _select_phones(table: SimilarityTable, phones: tuple[str, ...]) -> NDArray[np.float64]:
@@ -96,7 +98,7 @@ N_NEIGHBOURS = 3  # as in T07 Table 1
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class SimilarityOptions:
     """Numbers of `classes` (None: `USUAL_CLASSES` below the number of phones), of random halves, and the seed."""
 
     classes: tuple[int, ...] | None = None
@@ -124,7 +126,7 @@ class Analysis:
 
     name: str
     n_utterances: int
-    options: Options
+    options: SimilarityOptions
     table: SimilarityTable
     neighbours: tuple[tuple[tuple[str, float], ...], ...]
     tree: Tree
@@ -138,11 +140,14 @@ class Analysis:
     articulatory: tuple[tuple[str, Agreement], ...]
     movements: Consistency
     modes: Consistency
-    comparison: Comparison | None
+    comparison: TableComparison | None
 
 
 def analyse(
-    subject: NamedTalker, options: Options, other: NamedTalker | None = None, on_progress: Progress | None = None
+    subject: NamedTalker,
+    options: SimilarityOptions,
+    other: NamedTalker | None = None,
+    on_progress: Progress | None = None,
 ) -> Analysis:
     """Analyse a talker's similarity table, and compare it with another's.
 
@@ -189,7 +194,7 @@ def analyse(
     )
 
 
-def _class_numbers(options: Options, n_phones: int) -> tuple[int, ...]:
+def _class_numbers(options: SimilarityOptions, n_phones: int) -> tuple[int, ...]:
     if options.classes is None:
         return tuple(n for n in USUAL_CLASSES if n < n_phones)
     for n in options.classes:
@@ -198,7 +203,7 @@ def _class_numbers(options: Options, n_phones: int) -> tuple[int, ...]:
 
 
 def _split_halves(
-    tokens: SpokenTokens, options: Options, on_progress: Progress | None
+    tokens: SpokenTokens, options: SimilarityOptions, on_progress: Progress | None
 ) -> tuple[Reliability | None, Reliability | None, Reliability | None]:
     """Reliability by utterances, by words, and by utterances over the phones compared by words."""
     n, done = options.halves, 0
@@ -219,7 +224,10 @@ def _split_halves(
 
 
 def _articulatory_agreement(
-    phones: tuple[str, ...], distance: NDArray[np.float64], articulation: NDArray[np.float64], options: Options
+    phones: tuple[str, ...],
+    distance: NDArray[np.float64],
+    articulation: NDArray[np.float64],
+    options: SimilarityOptions,
 ) -> tuple[tuple[str, Agreement], ...]:
     """Agreement over all phones, and within consonants and vowels where there are `LEAST_PHONES` of them."""
     vowel = np.array([look_up_phone(phone).is_vowel for phone in phones])
@@ -233,12 +241,12 @@ def _articulatory_agreement(
 
 
 def _compare(
-    table: SimilarityTable, against: SimilarityTable | None, other: NamedTalker | None, options: Options
-) -> Comparison | None:
+    table: SimilarityTable, against: SimilarityTable | None, other: NamedTalker | None, options: SimilarityOptions
+) -> TableComparison | None:
     if against is None or other is None:
         return None
     return compare_tables(table, against, other.name, _stream(options, "comparison"))
 
 
-def _stream(options: Options, name: str) -> np.random.Generator:
+def _stream(options: SimilarityOptions, name: str) -> np.random.Generator:
     return np.random.default_rng([options.seed, STREAMS[name]])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.studies.plots import FIRST, INK, RULE, SECOND, SOFT, Tip, draw_png, draw_svg
-from corpus_tools.studies.similarity.analysis import Analysis, Comparison
+from corpus_tools.studies.similarity.analysis import Analysis, TableComparison
 from corpus_tools.studies.similarity.statistics import upper_triangle
 from corpus_tools.studies.similarity.tables import cluster_tree, phone_label
 from lexicon.phones import look_up_phone
@@ -78,7 +78,7 @@ def similarity_figure(analysis: Analysis, labels: str) -> TableFigure:
     )
 
 
-def difference_figure(analysis: Analysis, compared: Comparison, labels: str) -> TableFigure:
+def difference_figure(analysis: Analysis, compared: TableComparison, labels: str) -> TableFigure:
     """The differences of two talkers, ordered by similarity of the differences."""
     distance = np.sqrt(np.square(compared.difference[:, None] - compared.difference[None, :]).sum(axis=2))
     order = cluster_tree(distance).order

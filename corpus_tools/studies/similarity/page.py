@@ -6,7 +6,7 @@ from html import escape
 import numpy as np
 
 from corpus_tools.studies.pages import note_paragraph, page, paragraphs, scroll_box, table
-from corpus_tools.studies.similarity.analysis import Analysis, Comparison
+from corpus_tools.studies.similarity.analysis import Analysis, TableComparison
 from corpus_tools.studies.similarity.figures import (
     articulation_svg,
     difference_figure,
@@ -217,7 +217,7 @@ def _comparison(analysis: Analysis, labels: str) -> list[str]:
     ]
 
 
-def _pairs(compared: Comparison, labels: str) -> str:
+def _pairs(compared: TableComparison, labels: str) -> str:
     pairs = compared.largest_differences(N_DIFFERENT)
     rows = [(f"{phone_label(a, labels)} – {phone_label(b, labels)}", f"{value:+.3f}") for a, b, value in pairs]
     return table(("pair", "difference"), rows, numbers=(1,))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.studies.pages import report_writer
-from corpus_tools.studies.similarity.analysis import Analysis, Comparison, NamedTalker, Options, analyse
+from corpus_tools.studies.similarity.analysis import Analysis, NamedTalker, SimilarityOptions, TableComparison, analyse
 from corpus_tools.studies.similarity.figures import difference_figure, similarity_figure, table_png
 from corpus_tools.studies.similarity.page import similarity_page
 from corpus_tools.studies.similarity.statistics import Agreement, Consistency, Reliability
@@ -38,7 +38,7 @@ def table_csv(table: SimilarityTable, labels: str) -> str:
     return _csv_text([phone_label(phone, labels) for phone in table.phones], ["tokens"], counts, table.matrix)
 
 
-def difference_csv(compared: Comparison, labels: str) -> str:
+def difference_csv(compared: TableComparison, labels: str) -> str:
     """One line for each phone: its label, its similarity to each phone on the first talker minus that on the other."""
     names = [phone_label(phone, labels) for phone in compared.phones]
     return _csv_text(names, [], [[] for _ in names], compared.difference)
@@ -149,7 +149,7 @@ def _consistency(analysis: Analysis, consistency: Consistency) -> dict[str, Any]
     }
 
 
-def _comparison(compared: Comparison) -> dict[str, Any]:
+def _comparison(compared: TableComparison) -> dict[str, Any]:
     return {
         "other": compared.other,
         "phones": list(compared.phones),
@@ -163,7 +163,7 @@ def _comparison(compared: Comparison) -> dict[str, Any]:
 def write_similarity(
     talker: str,
     out: Path,
-    options: Options,
+    options: SimilarityOptions,
     *,
     other: str | None = None,
     labels: str = "both",

@@ -2,7 +2,7 @@
 
 import pytest
 
-from corpus_tools.studies.gestures.analysis import GestureStudy, Options, study_gestures
+from corpus_tools.studies.gestures.analysis import GestureStudy, StudyOptions, study_gestures
 from tests.corpus_tools.gesture_study.made_palette import made_palette
 from tests.kept import kept
 
@@ -13,4 +13,4 @@ def found() -> GestureStudy:
 
 
 def made_study() -> GestureStudy:
-    return study_gestures("made", made_palette(), Options(one_in=4, halves=10, clips=2))
+    return study_gestures("made", made_palette(), StudyOptions(one_in=4, halves=10, clips=2))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.studies.gestures.analysis import Options, StyleStudy, TraitComparison, study_gestures
+from corpus_tools.studies.gestures.analysis import StudyOptions, StyleStudy, TraitComparison, study_gestures
 from corpus_tools.studies.gestures.clips import (
     field_clip,
     hold_out,
@@ -157,7 +157,9 @@ def test_targets_are_those_of_measured_styles(found):
 
 def test_few_recordings_are_compared_with_themselves():
     palette = made_palette(n=5)
-    (calm,) = study_gestures("few", replace_style(palette, "calm", palette.styles["calm"]), Options(clips=2)).styles[:1]
+    (calm,) = study_gestures(
+        "few", replace_style(palette, "calm", palette.styles["calm"]), StudyOptions(clips=2)
+    ).styles[:1]
     assert (calm.n_training, calm.n_held_out, calm.is_held_out) == (5, 5, False)
 
 
@@ -172,4 +174,4 @@ def test_few_recordings_are_compared_with_themselves():
 )
 def test_options_out_of_range(wrong, reason):
     with pytest.raises(InputError, match=reason):
-        Options(**wrong)
+        StudyOptions(**wrong)

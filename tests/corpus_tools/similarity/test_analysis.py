@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.studies.similarity.analysis import NamedTalker, Options, analyse, compare_tables
+from corpus_tools.studies.similarity.analysis import NamedTalker, SimilarityOptions, analyse, compare_tables
 from corpus_tools.studies.similarity.page import similarity_page
 from corpus_tools.studies.similarity.statistics import (
     MOVEMENTS,
@@ -29,7 +29,7 @@ def spoken_tokens(talker):
 
 @pytest.fixture(scope="module")
 def found(talker):
-    return analyse(NamedTalker("made", talker), Options(halves=4))
+    return analyse(NamedTalker("made", talker), SimilarityOptions(halves=4))
 
 
 def test_the_table_is_the_one_that_synthesis_uses_without_silence(talker, spoken_tokens):
@@ -96,7 +96,7 @@ def test_a_talker_without_words_has_no_halves_of_words(talker):
     wordless = replace(
         talker, utterances=tuple(replace(spoken_tokens, words=()) for spoken_tokens in talker.utterances)
     )
-    found = analyse(NamedTalker("made", wordless), Options(halves=2))
+    found = analyse(NamedTalker("made", wordless), SimilarityOptions(halves=2))
     assert found.by_words is None
     assert found.by_utterances_same_phones is None
     assert "too few phones with tokens in both halves" in similarity_page(found, "both")
@@ -105,7 +105,9 @@ def test_a_talker_without_words_has_no_halves_of_words(talker):
 
 def test_progress_runs_to_its_end(talker):
     steps = []
-    analyse(NamedTalker("made", talker), Options(halves=2), on_progress=lambda done, of: steps.append((done, of)))
+    analyse(
+        NamedTalker("made", talker), SimilarityOptions(halves=2), on_progress=lambda done, of: steps.append((done, of))
+    )
     assert steps == [(done, 6) for done in range(1, 7)]
 
 
@@ -139,8 +141,8 @@ def test_no_halves_where_all_is_one_word(spoken_tokens):
 
 
 def test_the_seed_chooses_the_halves(talker, found):
-    again = analyse(NamedTalker("made", talker), Options(halves=4))
-    other = analyse(NamedTalker("made", talker), Options(halves=4, seed=1))
+    again = analyse(NamedTalker("made", talker), SimilarityOptions(halves=4))
+    other = analyse(NamedTalker("made", talker), SimilarityOptions(halves=4, seed=1))
     assert (again.by_utterances.correlations == found.by_utterances.correlations).all()
     assert (other.by_utterances.correlations != found.by_utterances.correlations).any()
 
@@ -188,7 +190,7 @@ def test_a_comparison_by_hand():
 
 def test_the_phones_made_to_differ_differ_most(talker):
     other = NamedTalker("other", made_talker(seed=9, gain=20.0))
-    compared = analyse(NamedTalker("made", talker), Options(halves=2), other).comparison
+    compared = analyse(NamedTalker("made", talker), SimilarityOptions(halves=2), other).comparison
     assert compared is not None
     assert {compared.phones[at] for at in np.argsort(-compared.per_phone)[:2]} <= {"p", "b", "m"}
     assert compared.agreement.p < 0.01
@@ -204,10 +206,10 @@ def test_refuses_talkers_without_common_phones():
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        (Options(classes=(4, 1)), "9 phones cannot make 1 classes; give a number from 2 to 9"),
-        (Options(classes=(10,)), "9 phones cannot make 10 classes"),
-        (Options(halves=1), "at least 2 random halves, not 1"),
-        (Options(seed=-1), "a seed is a whole number from 0, not -1"),
+        (SimilarityOptions(classes=(4, 1)), "9 phones cannot make 1 classes; give a number from 2 to 9"),
+        (SimilarityOptions(classes=(10,)), "9 phones cannot make 10 classes"),
+        (SimilarityOptions(halves=1), "at least 2 random halves, not 1"),
+        (SimilarityOptions(seed=-1), "a seed is a whole number from 0, not -1"),
     ],
 )
 def test_refuses_options_out_of_range(talker, options, reason):

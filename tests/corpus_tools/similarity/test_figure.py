@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from corpus_tools.studies.plots import open_figure
-from corpus_tools.studies.similarity.analysis import NamedTalker, Options, analyse
+from corpus_tools.studies.similarity.analysis import NamedTalker, SimilarityOptions, analyse
 from corpus_tools.studies.similarity.figures import (
     FREEDOM,
     LIKENESS,
@@ -28,7 +28,7 @@ from corpus_tools.studies.similarity.tables import cluster_tree, distances, phon
 
 @pytest.fixture(scope="module")
 def found(talker):
-    return analyse(NamedTalker("made", talker), Options(halves=2))
+    return analyse(NamedTalker("made", talker), SimilarityOptions(halves=2))
 
 
 def test_the_joins_of_three_phones_by_hand():

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.studies.similarity.analysis import Analysis, NamedTalker, Options, analyse
+from corpus_tools.studies.similarity.analysis import Analysis, NamedTalker, SimilarityOptions, analyse
 from tts2face.models.talker import load_talker
 
 DOC = Path(__file__).resolve().parents[3] / "docs" / "accuracy.md"
@@ -13,7 +13,7 @@ DOC = Path(__file__).resolve().parents[3] / "docs" / "accuracy.md"
 
 @pytest.fixture(scope="module")
 def found() -> Analysis:
-    return analyse(NamedTalker("grid_s1", load_talker("grid_s1")), Options())
+    return analyse(NamedTalker("grid_s1", load_talker("grid_s1")), SimilarityOptions())
 
 
 @pytest.fixture(scope="module")

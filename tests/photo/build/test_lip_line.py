@@ -10,7 +10,7 @@ from tests.photo.build.test_found_face import SIDE, found
 from tests.photo.pictures import projected, still
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.photo.found_face import FoundFace
-from tts2face.photo.lines import N_POINTS, LipLine, find_lip_line, spline_weights
+from tts2face.photo.lines import N_POINTS, InnerLips, find_lip_line, spline_weights
 from tts2face.video.tracking import FaceTracker
 
 CORNERS = 5  # points at each end whose place depends on what one calls a corner
@@ -23,7 +23,7 @@ def tracker(face_model: Path) -> FaceTracker:
     return FaceTracker(face_model)
 
 
-def errors(name: str, tracker: FaceTracker, **weights: float) -> tuple[LipLine, float, float]:
+def errors(name: str, tracker: FaceTracker, **weights: float) -> tuple[InnerLips, float, float]:
     """The line of a rendered face, and the mean vertical errors of it and of the tracker, of the eye distance."""
     pixels = still(name, SIDE, **weights)
     face = found(pixels, tracker)

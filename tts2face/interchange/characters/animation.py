@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.face.deformation import head_rotation, landmark_motion, rotation_matrix
 from tts2face.face.mouth import SPEECH_SHAPE_PREFIXES
-from tts2face.interchange.characters.character import Character, CharacterBinding, Target, character_file, read_binding
+from tts2face.interchange.characters.character import (
+    Character,
+    CharacterBinding,
+    MorphTarget,
+    character_file,
+    read_binding,
+)
 from tts2face.interchange.characters.head_mesh import mapped_targets, source_weights
 from tts2face.interchange.characters.readers import read_gltf_character
 from tts2face.interchange.characters.shapes import ShapeMapping
@@ -235,12 +241,12 @@ def animate_character(
 
 def target_weights(
     motion: Trajectory, face: Face, character: Character, mapping: ShapeMapping
-) -> dict[Target, FloatArray]:
+) -> dict[MorphTarget, FloatArray]:
     """Weights (T,) of each morph target that a motion moves."""
     channels = motion.channels
     own = [name for name in channels if name in mapping]
     values = dict(zip(own, _own_values(motion, face, own).T, strict=True))
-    found: dict[Target, FloatArray] = {}
+    found: dict[MorphTarget, FloatArray] = {}
     for name, track in values.items():
         for source in mapping[name]:
             share = BOTH_SIDES_SHARE if source.side else 1.0
@@ -288,7 +294,10 @@ def _with_replacement(
 
 
 def _weight_tracks(
-    file: GltfFile, tree: NodeTree, animated_targets: tuple[Mapping[Target, FloatArray], set[Target]], n_frames: int
+    file: GltfFile,
+    tree: NodeTree,
+    animated_targets: tuple[Mapping[MorphTarget, FloatArray], set[MorphTarget]],
+    n_frames: int,
 ) -> list[Track]:
     """Tracks of the morph weights (T * targets, 1) of every shown node whose mesh has animated targets.
 
@@ -306,7 +315,7 @@ def _weight_tracks(
         n_targets = max(len(p.children("targets")) for p in meshes[mesh].children("primitives"))
         holder = nodes[number] if nodes[number].has("weights") else meshes[mesh]
         rest = holder.numbers("weights", n_targets, (0.0,) * n_targets)
-        kept = [0.0 if Target(mesh, number) in driven else weight for number, weight in enumerate(rest or ())]
+        kept = [0.0 if MorphTarget(mesh, number) in driven else weight for number, weight in enumerate(rest or ())]
         rows = np.tile(np.array(kept), (n_frames, 1))
         for target, track in animated.items():
             if target < n_targets:

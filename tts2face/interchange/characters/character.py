@@ -24,7 +24,7 @@ OPAQUE, MASK, BLEND = "OPAQUE", "MASK", "BLEND"
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class MorphTarget:
     """Morph target `number` of mesh `mesh` of the file."""
 
     mesh: int
@@ -55,7 +55,7 @@ class Material:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Piece:
+class MaterialPiece:
     """Triangles of one material at rest, in world coordinates: y up.
 
     Parameters
@@ -81,9 +81,9 @@ class Piece:
     uv: FloatArray | None
     colours: FloatArray | None
     material: int
-    morphs: Mapping[Target, NDArray[np.float32]]
+    morphs: Mapping[MorphTarget, NDArray[np.float32]]
     bones: IntArray
-    defaults: Mapping[Target, float] = field(default_factory=dict)
+    defaults: Mapping[MorphTarget, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,10 +110,10 @@ class Character:
         What was not read, in sentences.
     """
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[MaterialPiece, ...]
     materials: tuple[Material, ...]
-    target_names: Mapping[Target, str]
-    expressions: Mapping[str, Mapping[Target, float]]
+    target_names: Mapping[MorphTarget, str]
+    expressions: Mapping[str, Mapping[MorphTarget, float]]
     bones: Mapping[str, int]
     bone_places: Mapping[str, FloatArray]
     parents: Mapping[int, int]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.interchange.characters.character import Character, Piece, Target
+from tts2face.interchange.characters.character import Character, MaterialPiece, MorphTarget
 from tts2face.interchange.characters.shapes import ShapeMapping, ShapeSource
 from tts2face.numeric.arrays import smoothstep
 
@@ -192,13 +192,13 @@ def moved_box(head: HeadMesh) -> tuple[FloatArray, FloatArray]:
     return places.min(axis=0), places.max(axis=0)
 
 
-def mapped_targets(character: Character, mapping: ShapeMapping) -> set[Target]:
+def mapped_targets(character: Character, mapping: ShapeMapping) -> set[MorphTarget]:
     """Morph targets that the shapes of a mapping use; their weights are 0 at rest, whatever the file's defaults are."""
     sources = (source for sources in mapping.values() for source in sources)
     return {target for source in sources for target in source_weights(character, source)}
 
 
-def source_weights(character: Character, source: ShapeSource) -> Mapping[Target, float]:
+def source_weights(character: Character, source: ShapeSource) -> Mapping[MorphTarget, float]:
     """Weights of the morph targets that a source names: targets of this name, otherwise a VRM expression."""
     named = {target: source.gain for target, name in character.target_names.items() if name == source.name}
     if named:
@@ -246,7 +246,7 @@ def _join(character: Character, mapping: ShapeMapping, turn: FloatArray) -> Head
     )
 
 
-def _at_rest(piece: Piece, driven: set[Target]) -> FloatArray:
+def _at_rest(piece: MaterialPiece, driven: set[MorphTarget]) -> FloatArray:
     """Vertices (N, 3) of a piece with weights of 0 of the driven targets."""
     vertices = piece.vertices
     for target in driven & piece.defaults.keys() & piece.morphs.keys():
@@ -254,7 +254,7 @@ def _at_rest(piece: Piece, driven: set[Target]) -> FloatArray:
     return vertices
 
 
-def _displacement(piece: Piece, sources: list[Mapping[Target, float]]) -> NDArray[np.float32] | None:
+def _displacement(piece: MaterialPiece, sources: list[Mapping[MorphTarget, float]]) -> NDArray[np.float32] | None:
     used = [
         (weight, piece.morphs[target])
         for source in sources

@@ -11,7 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from tts2face.interchange.characters.character import BLEND, MASK, OPAQUE, Material, Piece, Target, affine, linear
+from tts2face.interchange.characters.character import (
+    BLEND,
+    MASK,
+    OPAQUE,
+    Material,
+    MaterialPiece,
+    MorphTarget,
+    affine,
+    linear,
+)
 from tts2face.interchange.gltf.container import Fields
 from tts2face.interchange.gltf.reader import DRACO, GltfFile, NodeTree
 
@@ -23,7 +32,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
-def read_pieces(file: GltfFile, tree: NodeTree) -> Iterator[Piece]:
+def read_pieces(file: GltfFile, tree: NodeTree) -> Iterator[MaterialPiece]:
     """Pieces of all meshes of the shown scene; points and lines are skipped.
 
     Raises
@@ -72,7 +81,7 @@ class _Primitive:
         if fields.extension(DRACO) is not None:
             raise DataError(f"{fields.place} is compressed with Draco; export the character without compression")
 
-    def piece(self, tree: NodeTree, mesh: int, name: str) -> Piece | None:
+    def piece(self, tree: NodeTree, mesh: int, name: str) -> MaterialPiece | None:
         """The piece, or None for points, lines and empty primitives."""
         mode = self._fields.integer("mode", TRIANGLES, high=6)
         places = self._attribute("POSITION", (3,), None)
@@ -88,12 +97,12 @@ class _Primitive:
         if np.median(np.linalg.det(matrices[..., :3, :3])) < 0:  # a mirrored mesh
             triangles = triangles[:, ::-1]
         morphs = {
-            Target(mesh, number): linear(moved, matrices).astype(np.float32)
+            MorphTarget(mesh, number): linear(moved, matrices).astype(np.float32)
             for number, moved in enumerate(targets)
             if moved is not None and moved.any()
         }
         material = self._fields.index("material", self._file.count("materials"), "materials")
-        return Piece(
+        return MaterialPiece(
             name=name,
             vertices=affine(places, matrices),
             triangles=triangles,
@@ -102,7 +111,7 @@ class _Primitive:
             material=-1 if material is None else material,
             morphs=morphs,
             bones=bones,
-            defaults={Target(mesh, number): weight for number, weight in defaults.items()},
+            defaults={MorphTarget(mesh, number): weight for number, weight in defaults.items()},
         )
 
     def _accessor(self, fields: Fields, key: str, widths: tuple[int, ...], count: int | None) -> FloatArray | None:

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from lexicon.inputs import read_text
-from tts2face.interchange.characters.character import BLEND, Character, Material, Piece, Target
+from tts2face.interchange.characters.character import BLEND, Character, Material, MaterialPiece, MorphTarget
+from tts2face.interchange.characters.landmarks import MAX_COORDINATE
 from tts2face.interchange.characters.meshes import MaterialReader, decode_image, read_pieces, target_names
 from tts2face.interchange.gltf.container import Fields
 from tts2face.interchange.gltf.reader import GltfFile, find_bones, read_bytes, read_gltf, read_nodes
@@ -23,7 +24,7 @@ from tts2face.picture.kernels.tables import linear_light
 
 MAX_LICENCE = 500  # characters
 
-Expressions = dict[str, Mapping[Target, float]]
+Expressions = dict[str, Mapping[MorphTarget, float]]
 
 
 def read_gltf_character(path: Path) -> Character:
@@ -42,7 +43,7 @@ def read_gltf_character(path: Path) -> Character:
         raise DataError(f"{path} has no mesh with triangles in its scene; export the character again")
     materials = (*MaterialReader(file, notes).materials(), Material("plain"))
     names = {
-        Target(number, target): name
+        MorphTarget(number, target): name
         for number, mesh in enumerate(file.entries("meshes"))
         for target, name in enumerate(target_names(mesh))
     }
@@ -76,12 +77,12 @@ def _vrm1_expressions(file: GltfFile, fields: Fields) -> Expressions:
     for group in ("preset", "custom"):
         named = fields.child(group)
         for name in named.content:
-            binds: dict[Target, float] = {}
+            binds: dict[MorphTarget, float] = {}
             for bind in named.child(name).children("morphTargetBinds"):
                 node = bind.index("node", len(nodes), "nodes")
                 mesh = None if node is None else nodes[node].index("mesh", file.count("meshes"), "meshes")
                 if mesh is not None:
-                    binds[Target(mesh, bind.integer("index"))] = bind.number("weight", 1.0)
+                    binds[MorphTarget(mesh, bind.integer("index"))] = bind.number("weight", 1.0)
             found[str(name)] = binds
     return found
 
@@ -89,11 +90,11 @@ def _vrm1_expressions(file: GltfFile, fields: Fields) -> Expressions:
 def _vrm0_expressions(file: GltfFile, fields: Fields) -> Expressions:
     found = Expressions()
     for group in fields.children("blendShapeGroups"):
-        binds: dict[Target, float] = {}
+        binds: dict[MorphTarget, float] = {}
         for bind in group.children("binds"):
             mesh = bind.index("mesh", file.count("meshes"), "meshes")
             if mesh is not None:
-                binds[Target(mesh, bind.integer("index"))] = bind.number("weight", 100.0) / 100.0
+                binds[MorphTarget(mesh, bind.integer("index"))] = bind.number("weight", 100.0) / 100.0
         preset = group.text("presetName")
         found[preset if preset not in ("", "unknown") else group.text("name")] = binds
     return found
@@ -216,7 +217,6 @@ def _beside(folder: Path, name: str) -> Path | None:
 NEUTRAL = "neutral.obj"
 MAX_OBJ_VERTICES = 500_000
 MAX_SHAPES = 500
-MAX_COORDINATE = 1e6
 
 FloatArray = NDArray[np.float64]
 
@@ -236,8 +236,8 @@ def read_obj_folder(folder: Path) -> Character:
     if len(shapes) > MAX_SHAPES:
         raise DataError(f"{folder} has {len(shapes)} shapes; reduce them to at most {MAX_SHAPES}")
     mesh = _ObjFile(neutral)
-    names = {Target(0, number): path.stem for number, path in enumerate(shapes)}
-    moved: dict[Target, NDArray[np.float32]] = {}
+    names = {MorphTarget(0, number): path.stem for number, path in enumerate(shapes)}
+    moved: dict[MorphTarget, NDArray[np.float32]] = {}
     for target, path in zip(names, shapes, strict=True):
         places = read_vertices(path)
         if len(places) != len(mesh.vertices):
@@ -286,7 +286,7 @@ class _ObjFile:
         if not self.materials:
             self._use("plain")
 
-    def piece(self, material: int, shapes: dict[Target, NDArray[np.float32]]) -> Piece:
+    def piece(self, material: int, shapes: dict[MorphTarget, NDArray[np.float32]]) -> MaterialPiece:
         """Triangles of one material; vertices are divided at seams of the texture."""
         rows = np.array([n for n, used in enumerate(self._of) if used == material], np.int64)
         table = np.array(self._corners, np.int64).reshape(-1, 3, 2)[rows].reshape(-1, 2)
@@ -294,7 +294,7 @@ class _ObjFile:
         uv = None
         if len(unique) and (unique[:, 1] >= 0).all() and int(unique[:, 1].max()) < len(self._uv):
             uv = self._uv[unique[:, 1]] * [1.0, -1.0] + [0.0, 1.0]
-        return Piece(
+        return MaterialPiece(
             name=self.materials[material],
             vertices=self.vertices[unique[:, 0]],
             triangles=places.reshape(-1, 3),

@@ -27,7 +27,7 @@ from tts2face.interchange.characters.character import OPAQUE, Character, Materia
 from tts2face.interchange.characters.eyeballs import eyeball_centres, fit_sphere, gaze_turns
 from tts2face.interchange.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadMesh
 from tts2face.interchange.characters.shapes import ARKIT_SHAPES, VISEME_PREFIX
-from tts2face.models.face import VERTEX_COLOURS, Eye, Face, Part, Texture
+from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Texture
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
 
 # Highlights and softness of materials by kind, as on the default head: specular, shininess, wrap.
@@ -147,8 +147,8 @@ def _textures(atlas: Atlas, has_holes: bool) -> tuple[Texture, ...]:
     return () if atlas.texture is None else (Texture(atlas.texture, atlas.alpha if has_holes else None),)
 
 
-def _parts(keys: list[tuple[str, int, float]], character: Character, atlas: Atlas) -> tuple[Part, ...]:
-    parts: list[Part] = []
+def _parts(keys: list[tuple[str, int, float]], character: Character, atlas: Atlas) -> tuple[FacePart, ...]:
+    parts: list[FacePart] = []
     first = 0
     while first < len(keys):
         kind, material, opacity = keys[first]
@@ -158,7 +158,7 @@ def _parts(keys: list[tuple[str, int, float]], character: Character, atlas: Atla
         texture = 0 if material in atlas.places else VERTEX_COLOURS
         is_cut = opacity == CUTOUT
         opacity = 1.0 if is_cut else opacity
-        parts.append(Part(name, first, end - first, specular, shininess, wrap, opacity, texture, is_cut))
+        parts.append(FacePart(name, first, end - first, specular, shininess, wrap, opacity, texture, is_cut))
         first = end
     return tuple(parts)
 

@@ -19,6 +19,7 @@ from tts2face.interchange.exports.parts import Float32Array, Part, Target, frame
 from tts2face.models.face import Face
 from tts2face.numeric.least_squares import bounded_least_squares
 from tts2face.types import HEAD_CHANNELS
+from tts2face.video.take import TIMECODE_RATES
 
 # ARFaceAnchor.BlendShapeLocation, in the order of the columns of Live Link Face.
 ARKIT_SHAPES = (
@@ -132,7 +133,6 @@ def _inner_products(
 
 HEAD_COLUMNS = ("HeadYaw", "HeadPitch", "HeadRoll")
 EYES = ("Left", "Right")
-TIMECODE_RATES = (24, 25, 30, 50, 60, 120)  # frames in a second of timecode
 DEFAULT_TIMECODE_RATE = 60  # for other frame rates, with fractions of frames
 # Signs of the angles in the file relative to `HEAD_CHANNELS`: pitch down, yaw to the right, roll alike.
 HEAD_SIGNS = {"yaw": -1.0, "pitch": 1.0, "roll": 1.0}

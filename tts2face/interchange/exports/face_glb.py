@@ -41,7 +41,7 @@ MESH_NODE, FIRST_JOINT = 0, 1
 GENERATOR = "tts2face"
 
 
-class GlbWriter:
+class FaceGlbWriter:
     """Keeps frames in temporary files, and writes mesh and animation when their number is known."""
 
     def __init__(self, target: Target) -> None:
@@ -249,4 +249,4 @@ class CharacterGlbWriter:
 def make_glb_writer(target: Target) -> FormatWriter:
     """Writer of the character's own file for a face that was imported from one, otherwise of the face's mesh."""
     is_imported = target.face is not None and has_binding(target.face)
-    return CharacterGlbWriter(target) if is_imported else GlbWriter(target)
+    return CharacterGlbWriter(target) if is_imported else FaceGlbWriter(target)

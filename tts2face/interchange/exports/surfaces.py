@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tts2face.face.deformation import head_share
 from tts2face.interchange.exports.parts import Float32Array
-from tts2face.models.face import Face, Part
+from tts2face.models.face import Face, FacePart
 from tts2face.numeric.arrays import decode_srgb, quaternion_product, rotation_quaternions
 from tts2face.types import HEAD_CHANNELS
 
@@ -37,14 +37,14 @@ class ExportSurface:
         Indices into `vertices`.
     """
 
-    part: Part
+    part: FacePart
     vertices: NDArray[np.int64]
     triangles: NDArray[np.int64]
 
 
 def divide_surface(face: Face) -> list[ExportSurface]:
     """Surfaces of a face, those of equal names and materials merged."""
-    spans: dict[tuple[object, ...], list[Part]] = {}
+    spans: dict[tuple[object, ...], list[FacePart]] = {}
     for part in face.parts:
         material = (part.name, part.specular, part.shininess, part.wrap, part.opacity, part.texture, part.cutout)
         spans.setdefault(material, []).append(part)
@@ -131,7 +131,7 @@ def linear_colours(face: Face) -> NDArray[np.float64]:
     return colours
 
 
-def roughness(part: Part) -> float:
+def roughness(part: FacePart) -> float:
     """Roughness in [0, 1] of a Blinn-Phong exponent: the fourth root of 2 / (n + 2) (Karis 2013)."""
     return float((2.0 / (part.shininess + 2.0)) ** 0.25)
 

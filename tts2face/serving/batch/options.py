@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
+from lexicon.marked_text import RATE_LIMITS
 from tts2face.interchange.exports.table import batch_format
-from tts2face.request import RATE_LIMITS, option
+from tts2face.request import option
 
 MOVIE_FORMATS = ("mp4", "webm", "mov", "none")
 CLIP_UNITS = ("cue", "scene", "file", "film")

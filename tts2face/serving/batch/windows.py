@@ -13,9 +13,10 @@ from itertools import groupby
 from pathlib import Path
 
 from lexicon.errors import InputError
+from lexicon.marked_text import RATE_LIMITS
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.picture.options import Picture
-from tts2face.request import RATE_LIMITS
+from tts2face.serving.batch.options import CUT_PAUSES, REPORT
 from tts2face.serving.batch.output import Output, Plan, is_current, read_manifest
 from tts2face.serving.batch.segment import TRACK, Segment
 from tts2face.serving.batch.store import Store
@@ -194,9 +195,6 @@ def _output_bytes(output: Output) -> float:
     movies = output.segments if output.suffix else ()
     n_bytes = sum(_n_bytes(segment, output.fps, OUTPUT_SOUND_BYTES_PER_S) for segment in movies)
     return n_bytes + len(output.exports) * seconds * TRACK_BYTES_PER_S / 2
-
-
-EXTEND, CUT_PAUSES, REPORT = OVERFLOW_POLICIES = ("extend", "cut-pauses", "report")
 
 
 MAX_STEPS = 4  # of the search for a rate; two are usual

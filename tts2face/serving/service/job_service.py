@@ -32,7 +32,7 @@ from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.work.blobs import open_blobs
-from tts2face.serving.work.client import Delivery, JobClient, prune_jobs, unfinished_segments
+from tts2face.serving.work.client import JobClient, WebhookDelivery, prune_jobs, unfinished_segments
 from tts2face.serving.work.connection import DatabaseAwayError, connection_errors
 from tts2face.serving.work.database import database_url, prepare_database, shown_url
 from tts2face.serving.work.engine import DatabaseEngine, local_workers
@@ -198,7 +198,7 @@ def send_message(url: str, message_id: str, body: bytes, secret: str) -> bool:
         connection.close()
 
 
-def deliver(client: JobClient, delivery: Delivery, settings: ServiceSettings) -> bool:
+def deliver(client: JobClient, delivery: WebhookDelivery, settings: ServiceSettings) -> bool:
     """Send the message about a job once and note the result; the id of the message is that of the job."""
     record = client.table.get(delivery.job_id)
     if record is None:

@@ -55,7 +55,7 @@ class ClipRequest(ClipFields):
 
 
 @dataclass(frozen=True, slots=True)
-class Fields:
+class OptionValues:
     """Values of options by what takes them: models, `Request`, `Picture`."""
 
     models: dict[str, Any]
@@ -63,7 +63,7 @@ class Fields:
     picture: dict[str, Any]
 
 
-async def divide_options(state: ServiceState, key: ApiKey, given: dict[str, Any]) -> Fields:
+async def divide_options(state: ServiceState, key: ApiKey, given: dict[str, Any]) -> OptionValues:
     """Divide options that differ from their defaults; names of uploads become paths.
 
     Raises
@@ -79,7 +79,7 @@ async def divide_options(state: ServiceState, key: ApiKey, given: dict[str, Any]
     check_voice(request.get("voice"))
     check_background(picture.get("background", "studio"))
     _check_size(picture.get("size", AUTO_SIZE), state.settings.pixels)
-    return Fields(models, request, picture)
+    return OptionValues(models, request, picture)
 
 
 def _check_size(size: str, most: int) -> None:

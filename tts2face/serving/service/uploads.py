@@ -26,6 +26,7 @@ from starlette.datastructures import UploadFile
 
 from lexicon.errors import DataError, InputError, Tts2faceError
 from lexicon.inputs import parse_json
+from tts2face.picture.movie import SOUND_RATE
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.parent import ChildEndedError, call_once
 from tts2face.processes.program import ProcessLimits, Program
@@ -77,7 +78,6 @@ class Checks:
 SOUND, PICTURE, VIDEO, DRAW, SUBTITLES, PLACES = "sound", "picture", "video", "draw-", "subtitles-", "places"
 LIMITS = ProcessLimits(memory_bytes=2 << 30, cpu_s=60, file_bytes=1 << 30, n_files=64)
 RESOURCE_CPU_S = 180  # a resource with its picture takes 3 to 5 s, at the first time with the compilation of kernels
-SOUND_RATE = 48_000  # Hz
 SOUND_FORMATS = "wav,mp3,ogg,flac,aac,mov,mp4,m4a,matroska,webm,aiff,caf"
 # Formats of recordings, with the endings under which other readers recognise them.
 VIDEO_FORMATS = {

@@ -176,7 +176,7 @@ class OpenProject(Protocol):
         """A work of the project."""
 
 
-class Comparison:
+class ComparedProject:
     """What a project is compared with, its preview, and measures. All methods belong to the event loop.
 
     Parameters

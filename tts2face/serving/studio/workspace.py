@@ -12,7 +12,7 @@ from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.studio.comparison import Comparison
+from tts2face.serving.studio.comparison import ComparedProject
 from tts2face.serving.studio.editing import Edit, History, apply
 from tts2face.serving.studio.previews import PieceMemory, Preview, ProjectPreview
 from tts2face.serving.studio.requests import OPTION_PARTS, check_options, project_work
@@ -46,7 +46,7 @@ class Workspace:
             on_fit=self._fit,
             on_speech=lambda seconds: state.limits.add_speech(self.key, seconds),
         )
-        self.comparison = Comparison(state, self, memory, lambda: self._notify("comparison"))
+        self.comparison = ComparedProject(state, self, memory, lambda: self._notify("comparison"))
         self.listeners: set[Listener] = set()
         self._save_task: asyncio.Task[None] | None = None
         self._saved: History = self.history

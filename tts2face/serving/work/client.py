@@ -39,7 +39,7 @@ FIRST_PAUSE_S, PAUSE_FACTOR, MAX_TRIES = 2.0, 3.0, 10  # of webhooks: the last t
 
 
 @dataclass(frozen=True, slots=True)
-class Delivery:
+class WebhookDelivery:
     """A webhook that is to be sent now."""
 
     job_id: str
@@ -137,7 +137,7 @@ class JobClient:
             self._changes.remove_unused(set(old[at : at + FILES_PER_LOOK]), remove)
         return n_removed
 
-    def due_webhooks(self, limit: int = 16) -> list[Delivery]:
+    def due_webhooks(self, limit: int = 16) -> list[WebhookDelivery]:
         """Webhooks that are to be sent now; no other server gets them for `LEASE_S`."""
         query = "SELECT id, webhook, webhook_tries, webhook_due FROM tts2face_jobs WHERE webhook_due <="
         taken = []
@@ -149,10 +149,10 @@ class JobClient:
                     f"UPDATE tts2face_jobs SET webhook_due = {self._database.now} + :lease "
                     "WHERE id = :id AND webhook_due = :due", id=job_id, due=due, lease=LEASE_S,
                 ):  # fmt: skip
-                    taken.append(Delivery(job_id, url, n_tries))
+                    taken.append(WebhookDelivery(job_id, url, n_tries))
         return taken
 
-    def note_delivery(self, delivery: Delivery, *, is_delivered: bool) -> None:
+    def note_delivery(self, delivery: WebhookDelivery, *, is_delivered: bool) -> None:
         """Note that a webhook has arrived, or when it is sent again."""
         n_tries = delivery.n_tries + 1
         is_last = is_delivered or n_tries >= MAX_TRIES
@@ -195,7 +195,7 @@ MIN_NAME_CHARACTERS = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class QueuedSegment:
     """A segment in the queue.
 
     Parameters
@@ -221,7 +221,7 @@ class Job:
     took_s: float | None
 
 
-def list_jobs(database: str, states: Sequence[str] = (), limit: int | None = None) -> tuple[Job, ...]:
+def list_jobs(database: str, states: Sequence[str] = (), limit: int | None = None) -> tuple[QueuedSegment, ...]:
     """Jobs of a database, the oldest first.
 
     Raises
@@ -242,7 +242,7 @@ def list_jobs(database: str, states: Sequence[str] = (), limit: int | None = Non
         return tuple(_job(one, places) for one in found)
 
 
-def show_job(database: str, name: str) -> tuple[Job, dict[str, Any]]:
+def show_job(database: str, name: str) -> tuple[QueuedSegment, dict[str, Any]]:
     """A job by the start of its name, and its segment as JSON; errors as `list_jobs` and `InputError` without one."""
     url = _prepared(database)
     with open_client(url) as client, Workers(url) as workers:
@@ -330,11 +330,11 @@ def _find(client: Any, name: str) -> Any:
     return max(found, key=lambda one: int(one.workflow_id.partition(".")[2] or 0))
 
 
-def _job(one: Any, places: dict[str, str]) -> Job:
+def _job(one: Any, places: dict[str, str]) -> QueuedSegment:
     content = one.input["args"][1] if one.input and len(one.input.get("args", ())) > 1 else {}
     state = STATES.get(one.status, one.status)
     took = None if not one.completed_at or not one.dequeued_at else (one.completed_at - one.dequeued_at) / 1000.0
-    return Job(
+    return QueuedSegment(
         one.workflow_id,
         state,
         one.priority or 0,

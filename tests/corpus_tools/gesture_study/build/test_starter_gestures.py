@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from corpus_tools.studies.gestures.analysis import (
-    MotionComparison,
-    Options,
+    FeatureComparison,
+    StudyOptions,
     StyleStudy,
     TraitComparison,
     study_gestures,
@@ -23,14 +23,14 @@ def style() -> StyleStudy:
 
 
 def starter_style() -> StyleStudy:
-    return study_gestures("starter", replace(load_palette("starter"), derivations={}), Options()).styles[0]
+    return study_gestures("starter", replace(load_palette("starter"), derivations={}), StudyOptions()).styles[0]
 
 
 def compared(style: StyleStudy, name: str) -> TraitComparison:
     return next(one for one in style.trait_comparisons if one.trait.name == name)
 
 
-def moving(style: StyleStudy, feature: str) -> MotionComparison:
+def moving(style: StyleStudy, feature: str) -> FeatureComparison:
     return next(one for one in style.motion_comparisons if one.feature == feature)
 
 

@@ -8,12 +8,11 @@ from fastapi import APIRouter
 from fastapi import Request as HttpRequest
 from fastapi.responses import JSONResponse, Response
 
+from tts2face.serving.batch.engine import MIN_FREE_BYTES
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.routes.clips import service_state
 
 router = APIRouter(tags=["operation"])
-
-MIN_FREE_BYTES = 200 << 20
 
 
 @router.get("/healthz", summary="Whether the server runs")

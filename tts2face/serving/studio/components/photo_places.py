@@ -10,7 +10,7 @@ from nicegui.element import Element
 from tts2face.serving.studio.components.stage import COMPONENTS, MODULES
 
 
-class PhotoPlaces(Element, component="photo_places.js", esm={MODULES: str(COMPONENTS)}):
+class PhotoPlacesElement(Element, component="photo_places.js", esm={MODULES: str(COMPONENTS)}):
     """Handles over a picture.
 
     Parameters

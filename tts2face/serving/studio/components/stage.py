@@ -10,7 +10,7 @@ COMPONENTS = Path(__file__).parent
 MODULES = "tts2face-studio"
 
 
-class Stage(Element, component="stage.js", esm={MODULES: str(COMPONENTS)}):
+class StageElement(Element, component="stage.js", esm={MODULES: str(COMPONENTS)}):
     """Head of a project in WebGL.
 
     Parameters

@@ -10,7 +10,7 @@ from tts2face.models.palette import EXPRESSIONS, FEATURES
 from tts2face.serving.studio.components.stage import COMPONENTS, MODULES
 
 
-class Timeline(Element, component="timeline.js", esm={MODULES: str(COMPONENTS)}):
+class TimelineElement(Element, component="timeline.js", esm={MODULES: str(COMPONENTS)}):
     """Timeline of a project.
 
     Parameters

@@ -11,8 +11,8 @@ from tts2face.models.palette import FEATURES
 from tts2face.request import OWN_FACE
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import PAGES
-from tts2face.serving.studio.components.stage import Stage
-from tts2face.serving.studio.components.timeline import Timeline
+from tts2face.serving.studio.components.stage import StageElement
+from tts2face.serving.studio.components.timeline import TimelineElement
 from tts2face.serving.studio.editing import Edit
 from tts2face.serving.studio.pages.animate_bar import Bar
 from tts2face.serving.studio.pages.frame import begin_page, heading, sentence, shown_errors, styles
@@ -83,11 +83,11 @@ class AnimatePage:
                 self.speech = SpeechPanel(self)
                 await self.speech.build()
             with ui.element("div").classes("stage"):
-                self.stage = Stage(self.face_address, project.picture.background, f"{self.address}/preview")
+                self.stage = StageElement(self.face_address, project.picture.background, f"{self.address}/preview")
                 self.stage.on("failed", lambda event: ui.notify(str(event.args), type="negative"))
             with ui.element("div").classes("time"):
                 found = await styles(self.studio.state.library, self.workspace.key, project.models.palette)
-                self.timeline = Timeline(
+                self.timeline = TimelineElement(
                     timeline_json(project.timeline), styles=found, lanes=self._lanes(),
                     on_edit=lambda event: self.edit(event.args),
                 )  # fmt: skip

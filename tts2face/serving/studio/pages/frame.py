@@ -30,8 +30,8 @@ from tts2face.serving.service.guard import LOGIN_PATH, set_cookie
 from tts2face.serving.service.keys import ApiKey, find_key
 from tts2face.serving.service.library import Library, shipped_names
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.studio.components.stage import Stage
-from tts2face.serving.studio.components.timeline import Timeline
+from tts2face.serving.studio.components.stage import StageElement
+from tts2face.serving.studio.components.timeline import TimelineElement
 from tts2face.serving.studio.editing import Edit
 from tts2face.serving.studio.studio import Studio
 from tts2face.serving.studio.workspace import Workspace
@@ -235,8 +235,8 @@ class OpenPage(Protocol):
     workspace: Workspace
     client: Client
     tab: str
-    stage: Stage
-    timeline: Timeline
+    stage: StageElement
+    timeline: TimelineElement
 
     @property
     def address(self) -> str:

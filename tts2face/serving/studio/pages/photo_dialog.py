@@ -24,7 +24,7 @@ from tts2face.serving.service.routes.resources import (
     store_resource,
 )
 from tts2face.serving.service.uploads import UPLOAD_PREFIX, UploadFolder
-from tts2face.serving.studio.components.photo_places import PhotoPlaces
+from tts2face.serving.studio.components.photo_places import PhotoPlacesElement
 from tts2face.serving.studio.pages.frame import OpenPage, heading, shown_errors
 from tts2face.serving.work.resource_check import FACE
 
@@ -76,7 +76,7 @@ class PhotoDialog:
                 with ui.row().classes("items-center") as self._choices:
                     self._eyes = ui.select(EYES, label="Eyes", value="").props("dense outlined").style("width: 180px")
                     self._age_keep = ui.checkbox("Keep wrinkles")
-                self._places = PhotoPlaces(self._change)
+                self._places = PhotoPlacesElement(self._change)
                 self._name = ui.input("Name of the face").props(f"dense outlined maxlength={MAX_NAME}")
                 self._consent = ui.textarea("Statement of consent of the person, or: drawn").props(
                     f"outlined autogrow dense maxlength={MAX_CONSENT}"

@@ -11,7 +11,7 @@ from tts2face import __version__
 from tts2face.serving.service.exchange import TAKES
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.studio.components.puppet import Puppet
-from tts2face.serving.studio.components.stage import Stage
+from tts2face.serving.studio.components.stage import StageElement
 from tts2face.serving.studio.importing import SOUND_SUFFIXES
 from tts2face.serving.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
 from tts2face.serving.studio.pages.styles import ANY_TAKE
@@ -48,7 +48,7 @@ class PuppetPage:
             pass
         with ui.element("div").classes("puppet-page"):
             with ui.element("div").classes("stage"):
-                stage = Stage(f"{TAKES}/face.glb?version={__version__}")
+                stage = StageElement(f"{TAKES}/face.glb?version={__version__}")
                 stage.on("failed", lambda event: ui.notify(str(event.args), type="negative"))
             with ui.element("section").classes("panel").props('aria-label="Camera and takes"'):
                 if "build" in self._key.scopes:

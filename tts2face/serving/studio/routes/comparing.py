@@ -10,7 +10,7 @@ from fastapi.responses import Response
 
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.uploads import BLOCK_BYTES
-from tts2face.serving.studio.comparison import KEPT, NOT_READY, Comparison
+from tts2face.serving.studio.comparison import KEPT, NOT_READY, ComparedProject
 from tts2face.serving.studio.routes.projects import API, WAIT_S, opened
 
 router = APIRouter(prefix=f"{API}/projects/{{project}}", include_in_schema=False)
@@ -93,7 +93,7 @@ async def talker_recordings(request: HttpRequest, project: str) -> list[tuple[st
         return await workspace.comparison.recordings()
 
 
-def comparison_state(comparison: Comparison) -> dict[str, Any]:
+def comparison_state(comparison: ComparedProject) -> dict[str, Any]:
     """JSON of a comparison."""
     reference = comparison.reference
     return {

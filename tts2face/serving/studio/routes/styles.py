@@ -12,12 +12,10 @@ from lexicon.inputs import parse_json
 from tts2face.models.palette_editing import StyleMix
 from tts2face.serving.service.exchange import STYLES
 from tts2face.serving.studio.recordings import SUFFIXES
-from tts2face.serving.studio.routes.recordings import uploaded_take
+from tts2face.serving.studio.routes.recordings import NO_STORE, uploaded_take
 from tts2face.serving.studio.store import FILE
 from tts2face.serving.studio.styles import Styles, TakeWork
 from tts2face.session import catalogue
-
-NO_STORE = {"Cache-Control": "no-store"}
 
 router = APIRouter(prefix=STYLES, include_in_schema=False)
 
