@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.build_talker import NOT_STATED, PROVENANCE, PROVENANCE_FIELDS, read_provenance
+from corpus_tools.build_talker import PROVENANCE, PROVENANCE_FIELDS, read_provenance
 from corpus_tools.decomposition.basis import (
     NEUTRAL,
     ExpressionBasis,
@@ -48,6 +48,7 @@ from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import eye_aperture, inner_lip_gaps
 from tts2face.models.palette import Palette, write_palette
+from tts2face.models.talker import NOT_STATED
 from tts2face.types import Progress
 
 ESTIMATORS = ("least-squares", "samples")

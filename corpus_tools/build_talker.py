@@ -36,7 +36,7 @@ from corpus_tools.training.train_talker import correct_pose, learn_talker
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_json
 from lexicon.sequence import SILENCE
-from tts2face.models.talker import Talker, load_talker, write_talker
+from tts2face.models.talker import NOT_STATED, Talker, load_talker, write_talker
 from tts2face.storage.files import write_atomically
 from tts2face.types import Progress
 from tts2face.video.take import BlendshapeReader
@@ -44,7 +44,6 @@ from tts2face.video.tracking import find_bundle
 
 PROVENANCE = "provenance.json"  # in the folder of recordings: their sources and licence
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
-NOT_STATED = "not stated"
 READING_STAGE = "reading recordings"  # name of the first stage
 NETWORK_STAGE = "learning phone network"
 CONTENT_WITH_PICTURES = (

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.appearance.frame import rasterise_triangles
-from corpus_tools.build_talker import NOT_STATED
 from corpus_tools.run_options import StageCallback, ignore_stage
 from corpus_tools.training.phone_network import MIN_FRAMES, add_phone_network
 from corpus_tools.training.pooling.lip_tracks import read_lip_tracks
@@ -23,7 +22,7 @@ from lexicon.errors import InputError
 from tts2face.face.own_face import fit_appearance_regression
 from tts2face.lips.cloning import MAX_STANDARD_DEVIATIONS, ParameterTransfer, build_parameter_transfer, extend_talker
 from tts2face.models.appearance import Appearance, TextureModel, nearest_pixels
-from tts2face.models.talker import Talker, Utterance, load_talker, speech_channels, write_talker
+from tts2face.models.talker import NOT_STATED, Talker, Utterance, load_talker, speech_channels, write_talker
 from tts2face.picture.own_face import sample_triangles
 from tts2face.types import Trajectory
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from corpus_tools.dense.avatar import build_avatar
-from corpus_tools.studies.gestures.analysis import StudyOptions as GestureOptions
+from corpus_tools.studies.gestures.analysis import StudyOptions
 from corpus_tools.studies.gestures.write import write_gestures
-from corpus_tools.studies.similarity.analysis import StudyOptions
+from corpus_tools.studies.similarity.analysis import SimilarityOptions
 from corpus_tools.studies.similarity.write import write_similarity
 from lexicon.phones import ipa_to_arpabet
 from lexicon.sequence import SILENCE
@@ -331,8 +331,8 @@ def main() -> None:
     if given.own_face is not None:
         own_face_sheet(given.own_face).save(HERE / "own_face.jpg", quality=85)
     if not given.sheets:
-        write_similarity("grid_s1", HERE / "similarity.png", StudyOptions())
-        write_gestures("starter", HERE / "gestures.png", GestureOptions())
+        write_similarity("grid_s1", HERE / "similarity.png", SimilarityOptions())
+        write_gestures("starter", HERE / "gestures.png", StudyOptions())
     for name in given.sheets or SHEETS:
         SHEETS[name]().save(HERE / f"{name}.jpg", quality=JPEG_QUALITY, optimize=True)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.build_talker import NOT_STATED, PROVENANCE, read_provenance
+from corpus_tools.build_talker import PROVENANCE, read_provenance
 from corpus_tools.dense.mesh_fit import (
     adapt_head,
     align_to_head,
@@ -28,6 +28,7 @@ from lexicon.errors import InputError
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
+from tts2face.models.talker import NOT_STATED
 from tts2face.picture.occlusion import bake_occlusion
 from tts2face.picture.scene import available_cores
 from tts2face.storage.files import find_file

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.build_talker import NOT_STATED
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.studies.evaluation.evaluate import SpeakerScale
 from corpus_tools.studies.evaluation.methods import build_methods
@@ -31,7 +30,7 @@ from corpus_tools.training.train_talker import learn_talker
 from lexicon.phones import ARPABET
 from lexicon.sequence import SILENCE
 from tts2face.lips.explanation import DTW_BAND_S, correlation, range_ratio, speech_frames, warping_cost
-from tts2face.models.talker import ShapeModel, Talker, load_talker
+from tts2face.models.talker import NOT_STATED, ShapeModel, Talker, load_talker
 from tts2face.types import Progress
 
 MAX_FOLDS = 5

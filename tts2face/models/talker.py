@@ -28,6 +28,7 @@ from tts2face.types import HEAD_CHANNELS, Trajectory
 KIND = "talker"
 FORMAT_VERSION = 1
 STEPS_PER_SPREAD = 2000.0
+NOT_STATED = "not stated"  # by who made the model: its name, language, sources, licence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
