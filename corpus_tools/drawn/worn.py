@@ -147,7 +147,7 @@ def lit_haircut(face: Face, style: Hairstyle, light: HairLight) -> LitHair:
         **METADATA,
         "name": style.name,
         "summary": style.summary,
-        "made_by": "python -m corpus_tools.film.build_film",
+        "made_by": "python -m corpus_tools.make_models",
     }
     moves = {name: shape[n:] for name, shape in zip(face.shape_names, face.shapes, strict=True) if shape[n:].any()}
     middle = (MIDDLE + (face.pivot - PIVOT)).astype(np.float32)

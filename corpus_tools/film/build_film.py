@@ -1,18 +1,10 @@
-"""``python -m corpus_tools.film.build_film``: bakes the film light of drawn characters into their files. Needs bpy."""
+"""Film light of drawn characters, baked into their files. Needs bpy."""
 
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from corpus_tools.drawn.build_drawn import (
-    CAST,
-    cast_parser,
-    drawn_face,
-    face_masks,
-    other_hair,
-    own_hairdo,
-    step_reporter,
-)
+from corpus_tools.drawn.build_drawn import drawn_face, face_masks, other_hair, own_hairdo
 from corpus_tools.drawn.character import DrawnCharacter
 from corpus_tools.drawn.worn import HAIRCUTS, lit_haircut
 from corpus_tools.film.bake import HAIRCUT, Effort, bake_poses
@@ -20,7 +12,7 @@ from corpus_tools.film.fit_light import fit_haircut, fit_light
 from corpus_tools.film.look import look_of
 from corpus_tools.film.poses import PoseLight, lit_poses
 from corpus_tools.film.scene import FilmScene
-from corpus_tools.head.source import SourceMesh, fetch_data, read_source
+from corpus_tools.head.source import SourceMesh
 from corpus_tools.training.calibrate_face import calibrate_face_file
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
@@ -36,40 +28,40 @@ def bake_face(
     return bake_poses(scene, poses, other_hair(source, character), effort, report)
 
 
-def main() -> None:
-    """Bake, fit and write the light of characters and of their haircuts; steps go to standard error."""
-    parser, report = cast_parser(__doc__), step_reporter()
-    parser.add_argument("--keep", type=Path, help="folder in which the bakes are kept: with them light is fitted only")
-    arguments = parser.parse_args()
-    source = read_source(arguments.data or fetch_data(Path.home() / ".cache/tts2face"))
+def light_character(
+    source: SourceMesh, character: DrawnCharacter, faces: Path, bakes: Path, report: Callable[[str], None]
+) -> None:
+    """Bake, fit and write the light of a character and of its haircuts.
 
-    def baked(face: Face, character: DrawnCharacter, effort: Effort) -> PoseLight:
-        kept = None if arguments.keep is None else arguments.keep / f"{character.name}-{character.hair.name}.npz"
-        if kept is not None and kept.is_file():
+    Parameters
+    ----------
+    faces
+        Folder of the ``.face`` file, which gets the light, and of the haircuts.
+    bakes
+        Folder in which baked poses are kept: with them light is fitted only.
+    """
+
+    def baked(face: Face, dressed: DrawnCharacter, effort: Effort) -> PoseLight:
+        kept = bakes / f"{dressed.name}-{dressed.hair.name}.npz"
+        if kept.is_file():
             return PoseLight.load(kept)
-        poses = bake_face(source, face, character, effort, report)
-        if kept is not None:
-            poses.save(kept)
+        poses = bake_face(source, face, dressed, effort, report)
+        bakes.mkdir(parents=True, exist_ok=True)
+        poses.save(kept)
         return poses
 
-    for name in arguments.names or CAST:
-        path, character = arguments.faces / f"{name}.face", CAST[name]
-        face = read_face(path)
-        own = baked(face, character, Effort())
-        report(f"{name}: fit")
-        light = fit_light(face, own, look_of(name), character.eyes)
-        lit = replace(face, light=(light,), hairdo=own_hairdo(character))
-        write_face(path, lit)
-        report(f"{name}: calibration")  # again: the tracker sees other pictures of it now
-        calibrate_face_file(str(path), path)
-        for style in HAIRCUTS.get(name, ()):
-            report(f"{name}: {style.name}")
-            dressed = replace(character, hair=style)
-            wearing = drawn_face(source, dressed)
-            worn = fit_haircut((face, wearing), own, baked(wearing, dressed, HAIRCUT), light)
-            write_lit_hair(arguments.faces / f"{name}{OF_FACE}{style.name}.hair", lit_haircut(wearing, style, worn))
-    report("done")
-
-
-if __name__ == "__main__":
-    main()
+    name = character.name
+    path = faces / f"{name}.face"
+    face = read_face(path)
+    own = baked(face, character, Effort())
+    report(f"{name}: fit")
+    light = fit_light(face, own, look_of(name), character.eyes)
+    write_face(path, replace(face, light=(light,), hairdo=own_hairdo(character)))
+    report(f"{name}: calibration")  # again: the tracker sees other pictures of it now
+    calibrate_face_file(str(path), path)
+    for style in HAIRCUTS.get(name, ()):
+        report(f"{name}: {style.name}")
+        dressed = replace(character, hair=style)
+        wearing = drawn_face(source, dressed)
+        worn = fit_haircut((face, wearing), own, baked(wearing, dressed, HAIRCUT), light)
+        write_lit_hair(faces / f"{name}{OF_FACE}{style.name}.hair", lit_haircut(wearing, style, worn))

@@ -1,5 +1,7 @@
 """``python -m corpus_tools.film.measure_film``: baked light beside the path tracer, in unseen poses. Needs bpy."""
 
+import argparse
+import sys
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -8,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from corpus_tools.drawn.build_drawn import cast_parser, face_masks, step_reporter
+from corpus_tools.drawn.build_drawn import CAST, face_masks
 from corpus_tools.film.compare import View, differences, draw_view, over_grey
 from corpus_tools.film.look import look_of
 from corpus_tools.film.poses import LitPose, held_out_poses
@@ -56,13 +58,16 @@ def trace(
 
 def main() -> None:
     """Print mean differences of 255 by region; write a sheet of path tracer, picture and three times the difference."""
-    parser, report = cast_parser(__doc__), step_reporter()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="+", choices=list(CAST), help="characters")
+    parser.add_argument("--faces", type=Path, default=Path("tts2face/data"), help="folder of the .face files")
+    parser.add_argument("--keep", type=Path, default=Path.home() / ".cache/tts2face/models", help="downloads")
     parser.add_argument("--traced", type=Path, required=True, help="folder in which the traced pictures are kept")
     parser.add_argument("--out", type=Path, required=True, help="folder of the sheets")
     parser.add_argument("--hair", help="haircut; the face's own if omitted")
     parser.add_argument("--hair-color", help="its colour; the face's own if omitted")
     arguments = parser.parse_args()
-    source = read_source(arguments.data or fetch_data(Path.home() / ".cache/tts2face"))
+    source = read_source(fetch_data(arguments.keep))
     for folder in (arguments.traced, arguments.out):
         folder.mkdir(parents=True, exist_ok=True)
     for name in arguments.names:
@@ -71,7 +76,7 @@ def main() -> None:
         label = " ".join(filter(None, (name, arguments.hair, arguments.hair_color)))
         cells = []
         wanted = views(face)
-        pictures = trace(partial(build_scene, source, face, name), wanted, arguments.traced / label, report)
+        pictures = trace(partial(build_scene, source, face, name), wanted, arguments.traced / label, _report)
         for key, traced in pictures.items():
             view = wanted[key]
             drawn, regions = draw_view(face, view, SIDE_PX)
@@ -84,6 +89,11 @@ def main() -> None:
             cells.append(np.vstack([*pair, np.clip(off, 0, 255).astype(np.uint8)]))
         rows = [np.hstack(cells[at : at + N_COLUMNS]) for at in range(0, len(cells), N_COLUMNS)]
         Image.fromarray(np.vstack(rows)).save(arguments.out / f"{label}.png")
+
+
+def _report(view: str) -> None:
+    sys.stderr.write(f"{view}\n")
+    sys.stderr.flush()
 
 
 if __name__ == "__main__":

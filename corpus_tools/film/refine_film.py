@@ -1,4 +1,4 @@
-"""``python -m corpus_tools.film.refine_film``: fits the light of mouths to pictures of the fitted poses. Needs bpy.
+"""Light of mouths, fitted to pictures of the fitted poses. Needs bpy.
 
 It takes what `corpus_tools.film.build_film` has written.
 """
@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from corpus_tools.drawn.build_drawn import cast_parser, step_reporter
 from corpus_tools.film.compare import LIPS
 from corpus_tools.film.fit_pictures import SIDE_PX, fit_to_pictures
 from corpus_tools.film.measure_film import build_scene
 from corpus_tools.film.poses import LitPose, lit_poses
 from corpus_tools.film.scene import FilmScene
-from corpus_tools.head.source import fetch_data, read_source
+from corpus_tools.head.source import SourceMesh
 from corpus_tools.training.calibrate_face import calibrate_face_file
 from tts2face.face.deformation import build_rig
 from tts2face.models.face import Face
@@ -60,24 +59,19 @@ def _mouth_window(face: Face, points: NDArray[np.float32]) -> NDArray[np.float64
     return np.array([places.min(axis=0) - MARGIN_PX, places.max(axis=0) + MARGIN_PX]) / SIDE_PX
 
 
-def main() -> None:
-    """Trace the mouths, fit and write the light; steps go to standard error."""
-    parser, report = cast_parser(__doc__), step_reporter()
-    parser.add_argument("--traced", type=Path, required=True, help="folder in which the traced pictures are kept")
-    arguments = parser.parse_args()
-    source = read_source(arguments.data or fetch_data(Path.home() / ".cache/tts2face"))
-    arguments.traced.mkdir(parents=True, exist_ok=True)
-    for name in arguments.names:
-        path = arguments.faces / f"{name}.face"
-        face = read_face(path)
-        poses = [pose for pose in lit_poses(face) if not pose.head.any()]
-        scene = partial(build_scene, source, face, name)
-        pictures = trace_mouths(scene, face, poses, arguments.traced / name, report)
-        report(f"{name}: fit")
-        write_face(path, replace(face, light=(fit_to_pictures(face, poses, pictures),)))
-        report(f"{name}: calibration")  # again: the tracker sees other pictures of it now
-        calibrate_face_file(str(path), path)
+def refine_mouth(source: SourceMesh, name: str, path: Path, traced: Path, report: Callable[[str], None]) -> None:
+    """Trace the mouth of a character, and fit and write its light into its ``.face`` file.
 
-
-if __name__ == "__main__":
-    main()
+    Parameters
+    ----------
+    traced
+        Folder in which the traced pictures are kept.
+    """
+    traced.mkdir(parents=True, exist_ok=True)
+    face = read_face(path)
+    poses = [pose for pose in lit_poses(face) if not pose.head.any()]
+    pictures = trace_mouths(partial(build_scene, source, face, name), face, poses, traced / name, report)
+    report(f"{name}: fit")
+    write_face(path, replace(face, light=(fit_to_pictures(face, poses, pictures),)))
+    report(f"{name}: calibration")  # again: the tracker sees other pictures of it now
+    calibrate_face_file(str(path), path)

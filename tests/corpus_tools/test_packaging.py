@@ -9,7 +9,7 @@ from pathlib import Path
 from setuptools.discovery import PEP420PackageFinder
 
 ROOT = Path(__file__).parents[2]
-BUILDERS = ("corpus_tools.head", "corpus_tools.drawn", "corpus_tools.film")
+BUILDERS = ("corpus_tools.head", "corpus_tools.drawn", "corpus_tools.film", "corpus_tools.make_models")
 WITHOUT_BUILDERS = f"""
 import sys
 

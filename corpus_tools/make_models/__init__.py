@@ -1,0 +1,1 @@
+"""The script that makes every shipped model; in the repository only."""
