@@ -74,11 +74,10 @@ def run_prepared(prepared: "PreparedRequest", picture: Picture, options: SpeakOp
 
 
 def _make(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions) -> None:
-    from tts2face.session.warm_up import preload_voice
     from tts2face.sound.voice_pool import VoicePool
 
     voices = VoicePool()
-    preload_voice(voices, prepared)  # beside the imports of the session, and loading of talker and face
+    prepared.preload_voice(voices)  # beside the imports of the session, and loading of talker and face
     if not _write_speech(prepared, picture, options, voices):
         _write_clip(prepared, picture, options, voices)
 

@@ -3,10 +3,6 @@
 An animated face is prepared for one talker. It converts the talker's lip motion to its own channels, adds gestures, and
 creates the renderer of its frames. `mesh_face` and `own_appearance_face` make the two kinds; all other code depends on
 the protocol only.
-
-A mesh face prepared for one talker; implements `tts2face.session.animated_face.AnimatedFace`.
-
-A talker's own face prepared for animation; implements `tts2face.session.animated_face.AnimatedFace`.
 """
 
 from collections.abc import Mapping

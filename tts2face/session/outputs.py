@@ -1,10 +1,7 @@
-"""Files that one clip is written to: a film or pictures, exports, or both.
+"""Outputs of a clip: a film or pictures, exports, or both, as files or as bytes that are sent while they are made.
 
-Writing of the pieces of a clip to its outputs, with progress in the steps of the request.
-
-Clips as the bytes of a file that is sent while it is made: a movie, sound, or lines of text.
-
-Files that hold the sound and phones of a clip, written without talker, face and palette.
+`write_pieces` reports progress in the steps of the request; `encode_stream` yields a movie, sound or lines of text;
+`write_speech` makes files of sound and phones without talker, face and palette.
 """
 
 import io
@@ -33,7 +30,7 @@ from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.models import SessionModels
 from tts2face.session.prepared import PreparedRequest, marked_styles
 from tts2face.session.speech import MarkTime
-from tts2face.session.speech_stream import Piece, SpeechModels, sounds, speech_pieces
+from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces
 from tts2face.sound.transcript import TextMismatch
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.storage.files import AnyPath, refuse_overwriting
@@ -305,8 +302,10 @@ def encode_stream(prepared: PreparedRequest, models: SessionModels, format: Stre
         return encode_movie(clips, renderer, name, threads=format.threads)
     if name in SOUND_KINDS:
         if request.audio is None:
-            return encode_sound(sounds(prepared, models.for_request(prepared).speech), name)
-        return encode_sound((piece.clip.speech.waveform for piece in models.pieces(prepared)), name)
+            pieces = spoken_pieces(prepared, models.for_request(prepared).speech, has_phones=False)
+        else:
+            pieces = models.pieces(prepared)
+        return encode_sound((piece.speech.waveform for piece in pieces), name)
     if name not in line_formats():
         file, face = f"clip.{name}", models.face(has_gestures=request.has_gestures)
         return encode_whole(models.pieces(prepared), file, face, lambda folder: folder / file)
@@ -405,6 +404,6 @@ def write_speech(
     models = SpeechModels(lambda name, language: voices.voice(name, language, prepared.dictionary), voices.yield_turn)
     has_phones = any(not file.format.is_sound for file in outputs.exports)
     has_names = any(isinstance(mark, NameMark) for mark in prepared.text.marks)
-    pieces = speech_pieces(prepared, models, has_phones=has_phones or has_names)
+    pieces = spoken_pieces(prepared, models, has_phones=has_phones or has_names)
     with outputs.open(None, None, None) as files, ahead(pieces) as spoken:
         return write_pieces(spoken, files, outputs, RequestSteps(prepared.n_steps, on_progress), None)

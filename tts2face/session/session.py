@@ -19,7 +19,7 @@ from tts2face.session.live import LiveSpeech
 from tts2face.session.models import SessionModels, shown_face
 from tts2face.session.outputs import OutputFiles, RequestSteps, WrittenClip, ahead, plan_outputs, write_pieces
 from tts2face.session.prepared import PreparedRequest, input_paths, prepare_request, split_picture
-from tts2face.session.speech_stream import Piece, SpeechSpan, TimedSpeech, measure_speech, timed_speech
+from tts2face.session.speech_stream import Piece, SpeechSpan, measure_speech, timed_speech
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import Chunk, Clip, Progress, concatenate_clips
@@ -161,7 +161,7 @@ class Session:
         length = Length(n_frames, self._models.n_fixed_channels)
         yield from clips_of_length(prepared, sound_end, length, self._models.pieces)
 
-    def stream_speech(self, text: str | Request | PreparedRequest, **options: Any) -> Iterator[TimedSpeech]:
+    def stream_speech(self, text: str | Request | PreparedRequest, **options: Any) -> Iterator[Piece]:
         """Synthesise the speech of a text sentence by sentence: sound, phones and words as in its clip, no motion.
 
         Arguments and errors as `clip`; a recording is refused.
@@ -344,7 +344,7 @@ class Session:
         on_piece: Callable[[Piece], None] | None,
     ) -> WrittenClip:
         has_gestures = prepared.request.has_gestures
-        self._models.preload_voice(prepared)
+        prepared.preload_voice(self._models.voices)  # while the face is prepared
         progress = RequestSteps(prepared.n_steps, on_progress)
         face = self._models.face(has_gestures=has_gestures)
         with ahead(self._models.pieces(prepared)) as pieces:  # spoken while the renderer is built

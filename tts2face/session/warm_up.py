@@ -2,8 +2,6 @@
 
 The kernels of motion, of gestures and of strands are compiled in child processes while this process compiles the
 other drawing kernels, because numba compiles one kernel at a time in each process.
-
-Loading of a request's voice ahead of its use; a module without heavy imports.
 """
 
 import threading
@@ -25,8 +23,6 @@ from tts2face.picture.options import Picture
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.parent import Child
 from tts2face.processes.program import Program
-from tts2face.session.prepared import PreparedRequest
-from tts2face.sound.voice_pool import VoicePool
 
 COMPILE_TIMEOUT_S = 120.0
 
@@ -140,10 +136,3 @@ def _handler(work: Callable[[], None]) -> Handler:
 HANDLERS: Mapping[str, Handler] = MappingProxyType(
     {work.__name__: _handler(work) for work in (compile_motion, compile_gestures, compile_strands)}
 )
-
-
-def preload_voice(voices: VoicePool, prepared: PreparedRequest) -> None:
-    """Load the voice of a request's text in a thread; none for a recording or a request without text."""
-    request = prepared.request
-    if request.text and not request.audio:
-        voices.preload(request.voice, request.language, prepared.dictionary)
