@@ -20,7 +20,7 @@ from lexicon.errors import InputError
 from tts2face.picture.options import Picture
 from tts2face.request import OWN_FACE, Request
 from tts2face.session.named_models import Models
-from tts2face.storage.files import check_file_name, write_atomically
+from tts2face.storage.files import check_file_name, refuse_overwriting, write_atomically
 
 if TYPE_CHECKING:
     from tts2face.lips.explanation import PhoneExplanation
@@ -125,7 +125,6 @@ def _check_options(request: Request, picture: Picture, options: SpeakOptions) ->
 
 def _check_overwriting(request: Request, picture: Picture, options: SpeakOptions) -> None:
     from tts2face.session.prepared import input_paths
-    from tts2face.storage.files import refuse_overwriting
 
     inputs = {f"--{name}": path for name, path in input_paths(request, picture).items()}
     models = {"--talker": options.models.talker, "--face": options.models.face, "--palette": options.models.palette}

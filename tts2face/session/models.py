@@ -21,7 +21,7 @@ from tts2face.numeric.reuse import NO_MEMORY, SentenceMemory
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import FrameRenderer
 from tts2face.request import FIELDS, OWN_FACE, Request
-from tts2face.session.animated_face import AnimatedFace, mesh_face
+from tts2face.session.animated_face import AnimatedFace, mesh_face, own_appearance_face
 from tts2face.session.prepared import PreparedRequest, marked_styles
 from tts2face.session.speech import NO_DELIVERIES
 from tts2face.session.speech_stream import Piece, SpeechModels
@@ -97,14 +97,11 @@ class SessionModels:
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
         self.voices = voices or VoicePool()
         self._without: tuple[tuple[ExcludedToken, ...], ExemplarModel] | None = None
-        self.speech_face: AnimatedFace = self._make_face()
-
-    def _make_face(self) -> AnimatedFace:
-        if self._mesh is not None:
-            return mesh_face(self.talker, self._exemplars, self._mesh)
-        from tts2face.session.animated_face import own_appearance_face
-
-        return own_appearance_face(self.talker, self._exemplars)
+        self.speech_face: AnimatedFace = (
+            own_appearance_face(self.talker, self._exemplars)
+            if mesh is None
+            else mesh_face(self.talker, self._exemplars, mesh)
+        )
 
     @property
     def palette(self) -> Palette | None:

@@ -101,10 +101,12 @@ def perform(
     take = performance.take
     sound = sound_of_take(take) if performance.audio is None else read_sound(performance.audio, SOUND_RATE)
     if is_capture(take):
-        motion = retarget_capture(take, face, gain=performance.gain)
+        capture = read_livelink(take)
+        motion = FaceMotion(face.motion_of_capture(capture, gain=performance.gain), capture.head)
         fps = performance.fps or min(motion.face.fps, CAPTURE_FPS)
         return PerformedTake(face, resample_take(motion, fps), sound)
-    tracked = read_video_take(take, performance.model, on_progress=on_progress)
+    tracker, reader = StreamingTracker(performance.model), BlendshapeReader(performance.model)
+    tracked = read_take(take, tracker, reader, on_progress=on_progress)
     if performance.append_missing:
         face = face.with_motion_of(tracked)
     motion = retarget_take(tracked, face, gain=performance.gain)
@@ -116,32 +118,9 @@ def is_capture(take: Path) -> bool:
     return take.suffix.lower() == CAPTURE_SUFFIX
 
 
-def read_video_take(
-    video: Path, model: Path | None = None, *, on_progress: Callable[[int, int], None] | None = None
-) -> Take:
-    """Track landmarks, head pose and blendshape scores of a performer in a video.
-
-    Raises
-    ------
-    InputError
-        The file does not exist.
-    DataError
-        The video cannot be read, or shows no face or several.
-    BackendError
-        LiteRT, OpenCV or the landmark models are missing.
-    """
-    return read_take(video, StreamingTracker(model), BlendshapeReader(model), on_progress=on_progress)
-
-
 def retarget_take(take: Take, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
     """Motion of a face from a tracked video."""
     return FaceMotion(face.motion_of_take(take, gain=gain), take.head)
-
-
-def retarget_capture(table: Path, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
-    """Motion of a face from a Live Link Face table."""
-    capture = read_livelink(table)
-    return FaceMotion(face.motion_of_capture(capture, gain=gain), capture.head)
 
 
 def sound_of_take(take: Path) -> Waveform:

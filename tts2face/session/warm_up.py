@@ -18,7 +18,7 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips import tokens
 from tts2face.models.face import Face, keep_parts
 from tts2face.models.face_loading import load_face
-from tts2face.models.talker import Talker
+from tts2face.models.talker import load_talker
 from tts2face.picture.options import Picture
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.parent import Child
@@ -103,9 +103,8 @@ def compile_motion() -> None:
     """Compile the kernels of lip synthesis and retargeting by synthesising one second of motion."""
     from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
     from tts2face.lips.retargeting import build_retargeter
-    from tts2face.models.talker import load_talker
 
-    talker: Talker = load_talker("grid_s1")
+    talker = load_talker("grid_s1")
     retargeter = build_retargeter(talker, load_face("head"))
     phones = PhoneSequence([SILENCE, "p", "f", "ɑ", SILENCE], [0.0, 0.3, 0.4, 0.5, 0.7, 1.0])
     retargeter.retarget(speech_trajectory(phones, build_exemplar_model(talker), fps=30.0, n_frames=30))
