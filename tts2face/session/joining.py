@@ -5,7 +5,6 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -188,16 +187,6 @@ class WordTimes:
         if not self._language.startswith("en"):
             normalised = canonical_text(normalised, keep_marks=True)
         return sum(any(letter.isalnum() for letter in word) for word in normalised.split())
-
-
-class LetterTimes(Protocol):
-    """Times in seconds of the words around a letter, which is given by its index."""
-
-    def onset(self, letter: int) -> float:
-        """Start of the word at or after a letter."""
-
-    def end(self, letter: int) -> float:
-        """End of the word before a letter."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,6 @@ from tts2face.gestures.timeline import Timeline, parse_style
 from tts2face.models.palette import FEATURES, PLAIN, Delivery
 from tts2face.request import Request
 from tts2face.session.joining import (
-    LetterTimes,
     SentenceTimes,
     WordTimes,
     join_utterances,
@@ -243,7 +242,7 @@ def silent_sentences(seconds: float, fps: Fraction, n_steps: int) -> Iterator[tu
 
 
 def resolve_marks(
-    runs: Sequence[StyleRun], marks: Sequence[Mark], times: LetterTimes, letters: tuple[int, int]
+    runs: Sequence[StyleRun], marks: Sequence[Mark], times: WordTimes | SentenceTimes, letters: tuple[int, int]
 ) -> tuple[Timeline, tuple[MarkTime, ...]]:
     """Convert marks in a range of letters to a timeline and named marks, by the times of the letters.
 
