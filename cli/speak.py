@@ -20,7 +20,7 @@ from lexicon.errors import InputError
 from tts2face.picture.options import Picture
 from tts2face.request import OWN_FACE, Request
 from tts2face.session.named_models import Models
-from tts2face.storage.files import check_file_name, write_atomically
+from tts2face.storage.files import check_file_name, refuse_overwriting, write_atomically
 
 if TYPE_CHECKING:
     from tts2face.lips.explanation import PhoneExplanation
@@ -74,11 +74,10 @@ def run_prepared(prepared: "PreparedRequest", picture: Picture, options: SpeakOp
 
 
 def _make(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions) -> None:
-    from tts2face.session.warm_up import preload_voice
     from tts2face.sound.voice_pool import VoicePool
 
     voices = VoicePool()
-    preload_voice(voices, prepared)  # beside the imports of the session, and loading of talker and face
+    prepared.preload_voice(voices)  # beside the imports of the session, and loading of talker and face
     if not _write_speech(prepared, picture, options, voices):
         _write_clip(prepared, picture, options, voices)
 
@@ -126,7 +125,6 @@ def _check_options(request: Request, picture: Picture, options: SpeakOptions) ->
 
 def _check_overwriting(request: Request, picture: Picture, options: SpeakOptions) -> None:
     from tts2face.session.prepared import input_paths
-    from tts2face.storage.files import refuse_overwriting
 
     inputs = {f"--{name}": path for name, path in input_paths(request, picture).items()}
     models = {"--talker": options.models.talker, "--face": options.models.face, "--palette": options.models.palette}

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tts2face.face.body import BREATH_SHAPE, PUPIL_SHAPE, SWING_SHAPES, Body
-from tts2face.session import performance
+from tts2face.session import performance, recording
 from tts2face.session.animated_face import FaceMotion
 from tts2face.types import HEAD_CHANNELS, Trajectory, Waveform
 
@@ -20,7 +20,7 @@ def test_takes_move_the_body_whatever_the_pieces(monkeypatch) -> None:
     )
     found = []
     for most in (n, 40):
-        monkeypatch.setattr(performance, "MAX_CLIP_FRAMES", most)
+        monkeypatch.setattr(recording, "MAX_CLIP_FRAMES", most)
         clips = list(performance.take_clips(motion, Waveform(np.zeros(0, np.float32), 16_000)))
         found.append(np.concatenate([clip.motion.values for clip in clips]))
     np.testing.assert_allclose(found[0], found[1], atol=1e-5)

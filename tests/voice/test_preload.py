@@ -8,7 +8,6 @@ import pytest
 from lexicon.errors import InputError
 from tts2face.request import Request
 from tts2face.session.prepared import prepare
-from tts2face.session.warm_up import preload_voice
 from tts2face.sound import voice_pool
 from tts2face.sound.voice_pool import VoicePool
 
@@ -58,8 +57,8 @@ def test_an_unknown_voice_is_refused_when_it_is_used(loading: CountedLoading) ->
 def test_only_text_loads_a_voice(loading: CountedLoading) -> None:
     loading.done.set()
     voices = VoicePool()
-    preload_voice(voices, prepare(Request(idle=1.0)))
+    prepare(Request(idle=1.0)).preload_voice(voices)
     assert loading.names == []
-    preload_voice(voices, prepare(Request(text="Hello.")))
+    prepare(Request(text="Hello.")).preload_voice(voices)
     voices.voice(None, Request(text="Hello.").language, {})
     assert loading.names == [None]

@@ -3,10 +3,6 @@
 An animated face is prepared for one talker. It converts the talker's lip motion to its own channels, adds gestures, and
 creates the renderer of its frames. `mesh_face` and `own_appearance_face` make the two kinds; all other code depends on
 the protocol only.
-
-A mesh face prepared for one talker; implements `tts2face.session.animated_face.AnimatedFace`.
-
-A talker's own face prepared for animation; implements `tts2face.session.animated_face.AnimatedFace`.
 """
 
 from collections.abc import Mapping
@@ -36,13 +32,13 @@ from tts2face.lips.exemplar import (
     blend_trajectory,
     build_appearance_exemplars,
 )
-from tts2face.lips.performer import lip_model
+from tts2face.lips.performer import build_performer_retargeter, lip_model, match_shapes
 from tts2face.lips.retargeting import Retargeter, build_retargeter
 from tts2face.models.face import Face
 from tts2face.models.palette import MEASURED_STYLE, Palette
 from tts2face.models.talker import Talker
 from tts2face.picture.options import Picture
-from tts2face.picture.renderer import FrameRenderer
+from tts2face.picture.renderer import FrameRenderer, marked, mesh_renderer
 from tts2face.request import NATURAL
 from tts2face.types import Trajectory, YieldTurn, keep_on, resting_head
 
@@ -223,15 +219,11 @@ class MeshFace:
 
     def motion_of_take(self, take: "Take", *, gain: float = 1.0) -> Trajectory:
         """Shape weights (T, K) of a performer: lips by least squares on landmarks, eyes and brows from scores."""
-        from tts2face.lips.performer import build_performer_retargeter
-
         retargeter = build_performer_retargeter(take.landmarks, take.scores, self.face)
         return retargeter.weights(take.landmarks, take.scores, gain=gain)
 
     def motion_of_capture(self, capture: "FaceCapture", *, gain: float = 1.0) -> Trajectory:
         """Shape weights (T, K) of an ARKit capture, matched by name; the gain does not apply to the gaze."""
-        from tts2face.lips.performer import match_shapes
-
         return match_shapes(capture.weights, self.face, gain=gain)
 
     def with_motion_of(self, take: "Take") -> "AnimatedFace":
@@ -262,11 +254,6 @@ class MeshFace:
 
     def renderer(self, picture: Picture) -> FrameRenderer:
         """Create the renderer of the mesh."""
-        from tts2face.picture.renderer import (
-            marked,
-            mesh_renderer,  # exports draw nothing
-        )
-
         return marked(mesh_renderer(self.mesh, picture))
 
 
@@ -379,7 +366,6 @@ class OwnAppearanceFace:
     def renderer(self, picture: Picture) -> FrameRenderer:
         """Create the renderer that draws the face over the talker's video."""
         from tts2face.picture.own_face import own_face_renderer  # exports draw nothing
-        from tts2face.picture.renderer import marked
 
         return marked(own_face_renderer(self.talker, picture, self.gestures))
 

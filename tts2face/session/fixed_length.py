@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from lexicon.marked_text import MAX_PAUSE_S, PauseMark
 from lexicon.sequence import PhoneSequence
 from tts2face.numeric.arrays import smoothstep
-from tts2face.request import IDLE_LIMITS_S, Request
-from tts2face.session.prepared import PreparedRequest, prepare
+from tts2face.request import IDLE_LIMITS_S
+from tts2face.session.joining import silent_frames
+from tts2face.session.prepared import PreparedRequest, idle_request, prepare
 from tts2face.session.speech_stream import Piece
-from tts2face.types import Clip, Speech, Waveform, first_sample
+from tts2face.types import Clip, Speech
 
 EASE_S = 0.25  # from and to rest; a head turns back within a quarter of a second
 MARGIN_FRAMES = 0.25  # by which a padded sound ends before its last frame does, so that rounding adds no frame
@@ -61,9 +62,14 @@ def clips_of_length(
         if n_idle < IDLE_LIMITS_S[0] * fps:
             yield _resting(clip, n_idle, done, fps)
             return
-        request = replace(_idle_request(prepared.request), idle=float(n_idle / fps), seed=prepared.request.seed + done)
+        request = replace(
+            idle_request(prepared.request, float(n_idle / fps)),
+            seed=prepared.request.seed + done,
+            expression=None,
+            timeline=None,
+        )
         for idle in _eased((piece.clip for piece in stream(prepare(request))), n_idle, length.first_channel):
-            yield _with_silence(idle, rate, done, fps)
+            yield replace(idle, speech=silent_frames(done, done + len(idle.motion), rate, fps))
             done += len(idle.motion)
 
 
@@ -129,27 +135,10 @@ def _frames_with_pause(sound_end: float, n_frames: int, fps: Fraction) -> int:
     return int(np.ceil((sound_end + pause) * float(fps) - 0.01))
 
 
-def _idle_request(request: Request) -> Request:
-    """The request without its speech."""
-    return replace(
-        request, text="", audio=None, audio_map=None, voice=None, rate=1.0, volume=1.0, expression=None, timeline=None
-    )
-
-
-def _with_silence(clip: Clip, rate: int, first: int, fps: Fraction) -> Clip:
-    """A silent clip with another sample rate; `first` is its first frame in the whole clip."""
-    return replace(clip, speech=_silence(len(clip.motion), rate, first, fps))
-
-
 def _resting(like: Clip, n_frames: int, first: int, fps: Fraction) -> Clip:
     """Some frames in which the face keeps its last position."""
     return Clip(
         replace(like.motion, values=np.repeat(like.motion.values[-1:], n_frames, axis=0)),
         replace(like.head, values=np.repeat(like.head.values[-1:], n_frames, axis=0)),
-        _silence(n_frames, like.speech.waveform.rate, first, fps),
+        silent_frames(first, first + n_frames, like.speech.waveform.rate, fps),
     )
-
-
-def _silence(n_frames: int, rate: int, first: int, fps: Fraction) -> Speech:
-    n_samples = first_sample(first + n_frames, rate, fps) - first_sample(first, rate, fps)
-    return Speech.without_phones(Waveform(np.zeros(n_samples, np.float32), rate))

@@ -1,7 +1,4 @@
-"""Public functions besides `Session`: drawing an existing clip, exporting it, and reading it back.
-
-Sessions of a process by the names of their models; the least recently used ones are released.
-"""
+"""What is public besides `Session`: drawing, exporting and reading back a clip; and sessions by names of models."""
 
 import gc
 import os

@@ -1,13 +1,10 @@
-"""Concatenation of utterances with pauses between them, exact to the sample.
-
-Times of the letters of a text, from the times of its spoken words.
-"""
+"""Utterances with pauses between them, exact to the sample, and the times of the letters that they speak."""
 
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +14,7 @@ from lexicon.pronounce import spoken_form
 from lexicon.sentences import n_letters, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.sound.alignment import enforce_increasing
-from tts2face.types import Speech, Waveform, concatenate_speech
+from tts2face.types import Speech, Waveform, concatenate_speech, first_sample
 
 CUT_SILENCE_S = 0.05  # after a phrase within a sentence; with the silence before the next one a pause as at a comma
 AUDIBLE_SHARE = 0.01  # of the largest amplitude
@@ -98,6 +95,11 @@ def silent_speech(seconds: float, rate: int) -> Speech:
     """Speech that consists of silence, of at least one sample."""
     n_samples = max(round(seconds * rate), 1)
     return Speech.without_phones(Waveform(np.zeros(n_samples, np.float32), rate))
+
+
+def silent_frames(first: int, last: int, rate: int, fps: Fraction) -> Speech:
+    """Silence of the frames of a clip from `first` to before `last`."""
+    return silent_speech((first_sample(last, rate, fps) - first_sample(first, rate, fps)) / rate, rate)
 
 
 def resampled_speech(speech: Speech, rate: int) -> Speech:
@@ -185,16 +187,6 @@ class WordTimes:
         if not self._language.startswith("en"):
             normalised = canonical_text(normalised, keep_marks=True)
         return sum(any(letter.isalnum() for letter in word) for word in normalised.split())
-
-
-class LetterTimes(Protocol):
-    """Times in seconds of the words around a letter, which is given by its index."""
-
-    def onset(self, letter: int) -> float:
-        """Start of the word at or after a letter."""
-
-    def end(self, letter: int) -> float:
-        """End of the word before a letter."""
 
 
 @dataclass(frozen=True, slots=True)

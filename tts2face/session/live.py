@@ -1,8 +1,7 @@
-"""Live facial capture: a performer before a camera animates a face, after some seconds of calibration.
+"""Clips that are made while they play: a performer before a camera, a sound that is still being spoken, growing text.
 
-Lip motion of speech that is still being spoken, from its sound alone.
-
-Speech that is extended sentence by sentence while it plays, with idle motion between: one continuous clip.
+`track_poses` animates a face after some seconds of calibration. `LiveLips` moves lips by their sound alone.
+`LiveSpeech` appends sentences, and idle motion between them, to one continuous clip.
 """
 
 import threading
@@ -22,10 +21,10 @@ from tts2face.models.face import Face
 from tts2face.models.talker import speech_channels
 from tts2face.request import Request
 from tts2face.session.models import SessionModels
-from tts2face.session.pieces import pieces_from
-from tts2face.session.prepared import prepare
+from tts2face.session.prepared import idle_request, prepare
 from tts2face.session.recording import select_audio_map
 from tts2face.session.speech_stream import Piece
+from tts2face.session.steps import pieces_from
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.listener import StreamingAudioMap
 from tts2face.types import Trajectory, exact_rate
@@ -255,7 +254,7 @@ class LiveSpeech:
         if request.text or request.audio is not None or request.idle is not None or request.timeline is not None:
             raise InputError("a live request has options only; send its text in parts")
         self._request, self._models = request, models
-        self._layer = models.gesture_layer(prepare(_idle_request(request, UNUSED_IDLE_S)))
+        self._layer = models.gesture_layer(prepare(idle_request(request, UNUSED_IDLE_S)))
         self._n_frames = 0
 
     @property
@@ -269,15 +268,10 @@ class LiveSpeech:
 
     def idle(self, seconds: float) -> Iterator[Piece]:
         """Append silence."""
-        yield from self._append(_idle_request(self._request, seconds))
+        yield from self._append(idle_request(self._request, seconds))
 
     def _append(self, request: Request) -> Iterator[Piece]:
         prepared = prepare(request)
         for piece in pieces_from(prepared, self._models.for_request(prepared), self._layer, self._n_frames):
             self._n_frames += len(piece.clip.motion)
             yield piece
-
-
-def _idle_request(request: Request, seconds: float) -> Request:
-    """The request with idle animation, which has no voice."""
-    return replace(request, idle=seconds, voice=None, rate=1.0, volume=1.0, dictionary=None)

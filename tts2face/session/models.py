@@ -21,13 +21,11 @@ from tts2face.numeric.reuse import NO_MEMORY, SentenceMemory
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import FrameRenderer
 from tts2face.request import FIELDS, OWN_FACE, Request
-from tts2face.session.animated_face import AnimatedFace, mesh_face
-from tts2face.session.gesture_layer import GestureLayer
-from tts2face.session.pieces import SynthesisModels, pieces
+from tts2face.session.animated_face import AnimatedFace, mesh_face, own_appearance_face
 from tts2face.session.prepared import PreparedRequest, marked_styles
 from tts2face.session.speech import NO_DELIVERIES
 from tts2face.session.speech_stream import Piece, SpeechModels
-from tts2face.session.warm_up import preload_voice
+from tts2face.session.steps import GestureLayer, SynthesisModels, pieces
 from tts2face.sound.voice import Voice
 from tts2face.sound.voice_pool import VoicePool
 
@@ -97,16 +95,13 @@ class SessionModels:
         self._lock = threading.RLock()
         self._cache: dict[Hashable, Any] = {}
         self._renderers: OrderedDict[Hashable, FrameRenderer] = OrderedDict()
-        self._voices = voices or VoicePool()
+        self.voices = voices or VoicePool()
         self._without: tuple[tuple[ExcludedToken, ...], ExemplarModel] | None = None
-        self.speech_face: AnimatedFace = self._make_face()
-
-    def _make_face(self) -> AnimatedFace:
-        if self._mesh is not None:
-            return mesh_face(self.talker, self._exemplars, self._mesh)
-        from tts2face.session.animated_face import own_appearance_face
-
-        return own_appearance_face(self.talker, self._exemplars)
+        self.speech_face: AnimatedFace = (
+            own_appearance_face(self.talker, self._exemplars)
+            if mesh is None
+            else mesh_face(self.talker, self._exemplars, mesh)
+        )
 
     @property
     def palette(self) -> Palette | None:
@@ -159,9 +154,7 @@ class SessionModels:
         palette = self.palette if request.has_gestures else None
         if palette is None:
             return None
-        return GestureLayer(
-            prepared, self._fields(palette, request), self.face(), self._voices.yield_turn, self._memory
-        )
+        return GestureLayer(prepared, self._fields(palette, request), self.face(), self.voices.yield_turn, self._memory)
 
     def for_request(self, prepared: PreparedRequest, *, keeps_utterances: bool = False) -> SynthesisModels:
         """Models of a request with its own dictionary and without the tokens that it excludes.
@@ -179,7 +172,7 @@ class SessionModels:
         request = prepared.request
 
         def load_voice(name: str | None, language: str) -> Voice:
-            return self._voices.voice(name, language, prepared.dictionary, keeps_utterances=keeps_utterances)
+            return self.voices.voice(name, language, prepared.dictionary, keeps_utterances=keeps_utterances)
 
         exemplars = self._exemplars if not prepared.excluded else self._exemplars_without(prepared.excluded)
         face = self.face(has_gestures=request.has_gestures)
@@ -187,12 +180,8 @@ class SessionModels:
         has_style = request.style is not None or marked_styles(prepared.text)  # without one, no palette is needed here
         palette = self.palette if request.has_gestures and has_style else None
         deliveries = NO_DELIVERIES if palette is None else palette.deliveries
-        speech = SpeechModels(load_voice, self._voices.yield_turn, self._memory, deliveries)
+        speech = SpeechModels(load_voice, self.voices.yield_turn, self._memory, deliveries)
         return SynthesisModels(self.talker, exemplars, face, speech)
-
-    def preload_voice(self, prepared: PreparedRequest) -> None:
-        """Load the voice of a request's text in a thread, while the face is prepared."""
-        preload_voice(self._voices, prepared)
 
     def pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
         """Synthesise the clip of a request piece by piece."""

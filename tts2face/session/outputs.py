@@ -1,10 +1,7 @@
-"""Files that one clip is written to: a film or pictures, exports, or both.
+"""Outputs of a clip: a film or pictures, exports, or both, as files or as bytes that are sent while they are made.
 
-Writing of the pieces of a clip to its outputs, with progress in the steps of the request.
-
-Clips as the bytes of a file that is sent while it is made: a movie, sound, or lines of text.
-
-Files that hold the sound and phones of a clip, written without talker, face and palette.
+`write_pieces` reports progress in the steps of the request; `encode_stream` yields a movie, sound or lines of text;
+`write_speech` makes files of sound and phones without talker, face and palette.
 """
 
 import io
@@ -15,7 +12,6 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from lexicon.errors import InputError
 from lexicon.marked_text import NameMark
@@ -25,23 +21,20 @@ from tts2face.interchange.exports.table import FormatInfo, all_formats
 from tts2face.interchange.exports.writer import ExportFile, ExportWriter, make_target, mesh_of, plan_exports
 from tts2face.models.face import Face
 from tts2face.numeric.reuse import Prefetch
-from tts2face.picture.film import check_output
+from tts2face.picture.film import ClipWriter, check_output
 from tts2face.picture.movie import MOVIE_KINDS, encode_movie, find_movie_kind
 from tts2face.picture.options import Picture
+from tts2face.picture.renderer import FrameRenderer
 from tts2face.picture.sound_stream import SOUND_KINDS, encode_sound
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.models import SessionModels
 from tts2face.session.prepared import PreparedRequest, marked_styles
 from tts2face.session.speech import MarkTime
-from tts2face.session.speech_stream import Piece, SpeechModels, sounds, speech_pieces
+from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces
 from tts2face.sound.transcript import TextMismatch
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.storage.files import AnyPath, refuse_overwriting
 from tts2face.types import Chunk, Clip, Progress
-
-if TYPE_CHECKING:
-    from tts2face.picture.film import ClipWriter
-    from tts2face.picture.renderer import FrameRenderer
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +62,7 @@ class OutputFiles:
         """Paths of the exports."""
         return tuple(file.path for file in self.exports)
 
-    def check_face(self, face: "AnimatedFace") -> None:
+    def check_face(self, face: AnimatedFace) -> None:
         """Reject exports that a face cannot fill.
 
         Raises
@@ -81,7 +74,7 @@ class OutputFiles:
 
     @contextmanager
     def open(
-        self, face: "AnimatedFace | None", renderer: "FrameRenderer | None", on_frames: Progress | None
+        self, face: AnimatedFace | None, renderer: FrameRenderer | None, on_frames: Progress | None
     ) -> Iterator["OpenOutputs"]:
         """Writer of consecutive clips to all files; errors as `ClipWriter` and `ExportWriter`.
 
@@ -97,8 +90,6 @@ class OutputFiles:
         with ExitStack() as stack:
             film = None
             if self.out is not None and renderer is not None:
-                from tts2face.picture.film import ClipWriter  # not for exports alone
-
                 film = stack.enter_context(ClipWriter(self.out, renderer, on_progress=on_frames))
             exports = stack.enter_context(ExportWriter(self.exports, face=mesh_of(face, self.exports)))
             yield OpenOutputs(film, exports)
@@ -108,7 +99,7 @@ class OutputFiles:
 class OpenOutputs:
     """Writers of a film and of exports."""
 
-    film: "ClipWriter | None"
+    film: ClipWriter | None
     exports: ExportWriter
 
     def add(self, clip: Clip, text: str = "") -> None:
@@ -193,10 +184,6 @@ class RequestSteps:
         self._piece_steps, self._frames_before = piece.n_steps, self._n_frames
         self._n_frames += len(piece.clip.motion)
 
-    def report_piece(self) -> None:
-        """Report that the piece is done."""
-        self.report_frames(self._n_frames, self._n_frames)
-
     def report_frames(self, n_drawn: int, n_submitted: int) -> None:
         """Report the frames drawn, out of those passed to the writer so far."""
         if self._on_progress:
@@ -236,12 +223,12 @@ def write_pieces(
             on_piece(piece)
         progress.begin(piece)
         files.add(piece.clip, piece.text)
-        if files.film is None:
-            progress.report_piece()
         marks += piece.marks
         mismatches += piece.mismatches
         seconds += piece.clip.speech.waveform.duration
         n_frames += len(piece.clip.motion)
+        if files.film is None:
+            progress.report_frames(n_frames, n_frames)
     progress.finish()
     return WrittenClip(
         outputs.path, seconds, n_frames, tuple(marks), mismatches=tuple(mismatches), exports=outputs.export_paths
@@ -305,8 +292,10 @@ def encode_stream(prepared: PreparedRequest, models: SessionModels, format: Stre
         return encode_movie(clips, renderer, name, threads=format.threads)
     if name in SOUND_KINDS:
         if request.audio is None:
-            return encode_sound(sounds(prepared, models.for_request(prepared).speech), name)
-        return encode_sound((piece.clip.speech.waveform for piece in models.pieces(prepared)), name)
+            pieces = spoken_pieces(prepared, models.for_request(prepared).speech, has_phones=False)
+        else:
+            pieces = models.pieces(prepared)
+        return encode_sound((piece.speech.waveform for piece in pieces), name)
     if name not in line_formats():
         file, face = f"clip.{name}", models.face(has_gestures=request.has_gestures)
         return encode_whole(models.pieces(prepared), file, face, lambda folder: folder / file)
@@ -405,6 +394,6 @@ def write_speech(
     models = SpeechModels(lambda name, language: voices.voice(name, language, prepared.dictionary), voices.yield_turn)
     has_phones = any(not file.format.is_sound for file in outputs.exports)
     has_names = any(isinstance(mark, NameMark) for mark in prepared.text.marks)
-    pieces = speech_pieces(prepared, models, has_phones=has_phones or has_names)
+    pieces = spoken_pieces(prepared, models, has_phones=has_phones or has_names)
     with outputs.open(None, None, None) as files, ahead(pieces) as spoken:
         return write_pieces(spoken, files, outputs, RequestSteps(prepared.n_steps, on_progress), None)

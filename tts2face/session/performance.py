@@ -1,7 +1,4 @@
-"""Transfer of a performer's video or an ARKit capture to a face; the original sound is retained.
-
-Writing of a recorded performance to its outputs.
-"""
+"""Transfer of a performer's video or an ARKit capture to a face, with its original sound, and its writing to files."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -17,7 +14,8 @@ from tts2face.picture.options import Picture
 from tts2face.session.animated_face import AnimatedFace, FaceMotion
 from tts2face.session.models import SessionModels
 from tts2face.session.outputs import OutputFiles, WrittenClip
-from tts2face.types import Clip, Progress, Speech, Waveform, exact_rate, first_sample
+from tts2face.session.recording import clip_bounds
+from tts2face.types import Clip, Progress, Speech, Waveform, exact_rate
 from tts2face.video.media import read_media_info, read_sound
 from tts2face.video.streaming import StreamingTracker
 from tts2face.video.take import BlendshapeReader, Take, read_livelink, read_take
@@ -26,7 +24,6 @@ CAPTURE_SUFFIX = ".csv"
 CAPTURE_FPS = 30.0  # default frame rate of captures, whose own is higher than a video needs
 GAINS = (0.0, 4.0)
 SOUND_RATE = 48_000  # Hz
-MAX_CLIP_FRAMES = 300  # frames of each clip into which a take is divided
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,10 +101,12 @@ def perform(
     take = performance.take
     sound = sound_of_take(take) if performance.audio is None else read_sound(performance.audio, SOUND_RATE)
     if is_capture(take):
-        motion = retarget_capture(take, face, gain=performance.gain)
+        capture = read_livelink(take)
+        motion = FaceMotion(face.motion_of_capture(capture, gain=performance.gain), capture.head)
         fps = performance.fps or min(motion.face.fps, CAPTURE_FPS)
         return PerformedTake(face, resample_take(motion, fps), sound)
-    tracked = read_video_take(take, performance.model, on_progress=on_progress)
+    tracker, reader = StreamingTracker(performance.model), BlendshapeReader(performance.model)
+    tracked = read_take(take, tracker, reader, on_progress=on_progress)
     if performance.append_missing:
         face = face.with_motion_of(tracked)
     motion = retarget_take(tracked, face, gain=performance.gain)
@@ -119,32 +118,9 @@ def is_capture(take: Path) -> bool:
     return take.suffix.lower() == CAPTURE_SUFFIX
 
 
-def read_video_take(
-    video: Path, model: Path | None = None, *, on_progress: Callable[[int, int], None] | None = None
-) -> Take:
-    """Track landmarks, head pose and blendshape scores of a performer in a video.
-
-    Raises
-    ------
-    InputError
-        The file does not exist.
-    DataError
-        The video cannot be read, or shows no face or several.
-    BackendError
-        LiteRT, OpenCV or the landmark models are missing.
-    """
-    return read_take(video, StreamingTracker(model), BlendshapeReader(model), on_progress=on_progress)
-
-
 def retarget_take(take: Take, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
     """Motion of a face from a tracked video."""
     return FaceMotion(face.motion_of_take(take, gain=gain), take.head)
-
-
-def retarget_capture(table: Path, face: AnimatedFace, *, gain: float = 1.0) -> FaceMotion:
-    """Motion of a face from a Live Link Face table."""
-    capture = read_livelink(table)
-    return FaceMotion(face.motion_of_capture(capture, gain=gain), capture.head)
 
 
 def sound_of_take(take: Path) -> Waveform:
@@ -169,10 +145,8 @@ def resample_take(motion: FaceMotion, fps: float) -> FaceMotion:
 
 def take_clips(motion: FaceMotion, sound: Waveform) -> Iterator[Clip]:
     """Divide motion and sound into clips of at most `MAX_CLIP_FRAMES` frames; short sound is padded with silence."""
-    fps, body = exact_rate(motion.face.fps), Body(motion.face.channels, 0)
-    for first in range(0, len(motion.face), MAX_CLIP_FRAMES):
-        last = min(first + MAX_CLIP_FRAMES, len(motion.face))
-        begin, end = (first_sample(frame, sound.rate, fps) for frame in (first, last))
+    body = Body(motion.face.channels, 0)
+    for first, last, begin, end in clip_bounds(motion.face, sound.rate):
         speech = Speech.without_phones(sound.part(begin, end).padded(end - begin))
         face, head = motion.face.part(first, last), motion.head.part(first, last)
         yield Clip(body.move(face, head, speech.phones), head, speech)

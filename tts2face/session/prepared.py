@@ -1,15 +1,10 @@
-"""Parsing and checking of a request's text, marks and timeline file.
-
-Styles of the marks of a text, and marks that cannot be combined with a request.
-
-Phone edges that a person has corrected, in place of those of the voice or of the alignment.
-"""
+"""A request that is parsed and checked once: its text and marks, its timeline, and phone edges corrected by hand."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,6 +25,9 @@ from tts2face.picture.options import Picture
 from tts2face.request import Request
 from tts2face.storage.files import AnyPath
 from tts2face.types import exact_rate
+
+if TYPE_CHECKING:
+    from tts2face.sound.voice_pool import VoicePool
 
 
 @lru_cache(maxsize=1000)
@@ -199,6 +197,11 @@ class PreparedRequest:
         """Sentences of the text in order."""
         return split_sentences(self.text, self.request.language, self.dictionary)
 
+    def preload_voice(self, voices: "VoicePool") -> None:
+        """Load the voice of the text in a thread; none for a recording or a request without text."""
+        if self.request.text and not self.request.audio:
+            voices.preload(self.request.voice, self.request.language, self.dictionary)
+
 
 def prepare(request: Request) -> PreparedRequest:
     """Parse and check the text, marks and timeline of a request, in time linear in the length of the text.
@@ -227,6 +230,13 @@ def prepare(request: Request) -> PreparedRequest:
     if next(prepared.sentences(), None) is None:
         raise InputError(f"there is nothing to say in {request.text[:40]!r}; give at least one word")
     return prepared
+
+
+def idle_request(request: Request, seconds: float) -> Request:
+    """The request with idle animation in place of its speech."""
+    return replace(
+        request, text="", audio=None, audio_map=None, voice=None, rate=1.0, volume=1.0, dictionary=None, idle=seconds
+    )
 
 
 def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:

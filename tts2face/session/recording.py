@@ -114,13 +114,19 @@ def resample_motion(values: NDArray[np.float32], rate: float, fps: float, n_fram
     return interpolate_cubic(values, np.minimum(np.arange(n_frames) / fps * rate, len(values) - 1))
 
 
+def clip_bounds(motion: Trajectory, rate: int) -> Iterator[tuple[int, int, int, int]]:
+    """First frame, frame after the last, and the same of samples, of clips of at most `MAX_CLIP_FRAMES` frames."""
+    fps = exact_rate(motion.fps)
+    for first in range(0, len(motion), MAX_CLIP_FRAMES):
+        last = min(first + MAX_CLIP_FRAMES, len(motion))
+        yield first, last, first_sample(first, rate, fps), first_sample(last, rate, fps)
+
+
 def recording_clips(path: Path, transcript: TimedTranscript, motion: Trajectory, *, volume: float) -> Iterator[Clip]:
     """Divide a recording's motion and sound into clips of at most `MAX_CLIP_FRAMES` frames, each with its phones."""
     fps = exact_rate(motion.fps)
     sound = _SampleReader(sound_blocks(path, CLIP_RATE))
-    for first in range(0, len(motion), MAX_CLIP_FRAMES):
-        last = min(first + MAX_CLIP_FRAMES, len(motion))
-        begin, end = (first_sample(frame, CLIP_RATE, fps) for frame in (first, last))
+    for first, last, begin, end in clip_bounds(motion, CLIP_RATE):
         samples = np.clip(volume * sound.next(end - begin), -1.0, 1.0)
         seconds = (float(Fraction(first) / fps), len(samples) / CLIP_RATE)
         phones, words = _phones_within(transcript, *seconds)

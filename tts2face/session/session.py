@@ -15,17 +15,25 @@ from tts2face.picture.renderer import FrameRenderer
 from tts2face.request import Request
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.fixed_length import Length, clips_of_length
-from tts2face.session.live import LiveSpeech
+from tts2face.session.live import LiveLips, LiveSpeech
 from tts2face.session.models import SessionModels, shown_face
-from tts2face.session.outputs import OutputFiles, RequestSteps, WrittenClip, ahead, plan_outputs, write_pieces
+from tts2face.session.outputs import (
+    OutputFiles,
+    RequestSteps,
+    StreamFormat,
+    WrittenClip,
+    ahead,
+    encode_stream,
+    plan_outputs,
+    write_pieces,
+)
 from tts2face.session.prepared import PreparedRequest, input_paths, prepare_request, split_picture
-from tts2face.session.speech_stream import Piece, SpeechSpan, TimedSpeech, measure_speech, timed_speech
+from tts2face.session.speech_stream import Piece, SpeechSpan, measure_speech, timed_speech
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import Chunk, Clip, Progress, concatenate_clips
 
 if TYPE_CHECKING:
-    from tts2face.session.live import LiveLips
     from tts2face.session.performance import Performance
 
 
@@ -161,7 +169,7 @@ class Session:
         length = Length(n_frames, self._models.n_fixed_channels)
         yield from clips_of_length(prepared, sound_end, length, self._models.pieces)
 
-    def stream_speech(self, text: str | Request | PreparedRequest, **options: Any) -> Iterator[TimedSpeech]:
+    def stream_speech(self, text: str | Request | PreparedRequest, **options: Any) -> Iterator[Piece]:
         """Synthesise the speech of a text sentence by sentence: sound, phones and words as in its clip, no motion.
 
         Arguments and errors as `clip`; a recording is refused.
@@ -173,10 +181,8 @@ class Session:
         """A clip without an end, extended by `say` and `idle` of the result; options and errors as `clip`."""
         return LiveSpeech(Request(**options), self._models)
 
-    def listen(self, rate: int = FEATURE_RATE, *, audio_map: str | None = None) -> "LiveLips":
+    def listen(self, rate: int = FEATURE_RATE, *, audio_map: str | None = None) -> LiveLips:
         """Lip motion of speech that is still being spoken; arguments and errors as `LiveLips`."""
-        from tts2face.session.live import LiveLips
-
         return LiveLips(self._models, rate, audio_map)
 
     def stream_file(
@@ -208,8 +214,6 @@ class Session:
         """
         picture, options = split_picture(picture, options)
         prepared = prepare_request(text, options)
-        from tts2face.session.outputs import StreamFormat, encode_stream
-
         return encode_stream(prepared, self._models, StreamFormat(format, picture, threads))
 
     def write(
@@ -344,7 +348,7 @@ class Session:
         on_piece: Callable[[Piece], None] | None,
     ) -> WrittenClip:
         has_gestures = prepared.request.has_gestures
-        self._models.preload_voice(prepared)
+        prepared.preload_voice(self._models.voices)  # while the face is prepared
         progress = RequestSteps(prepared.n_steps, on_progress)
         face = self._models.face(has_gestures=has_gestures)
         with ahead(self._models.pieces(prepared)) as pieces:  # spoken while the renderer is built

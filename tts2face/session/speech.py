@@ -1,7 +1,4 @@
-"""Synthesis of sentences with marks: sound with pauses, and the times of the marks.
-
-Speaking rate and level of a voice under a style of gestures.
-"""
+"""Synthesis of sentences with marks: sound with pauses, rate and level under styles, and the times of the marks."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -24,11 +21,11 @@ from tts2face.gestures.timeline import Timeline, parse_style
 from tts2face.models.palette import FEATURES, PLAIN, Delivery
 from tts2face.request import Request
 from tts2face.session.joining import (
-    LetterTimes,
     SentenceTimes,
     WordTimes,
     join_utterances,
     resampled_speech,
+    silent_frames,
     silent_speech,
     trim_end,
 )
@@ -36,7 +33,7 @@ from tts2face.session.prepared import innermost_styles
 from tts2face.sound.level import level_speech
 from tts2face.sound.voice import SpeechInput, SpokenWord, Voice, apply_volume
 from tts2face.sound.voice_pool import has_voice, speaks
-from tts2face.types import Speech, Waveform, YieldTurn, concatenate_speech, first_sample, frame_count, keep_on
+from tts2face.types import Speech, Waveform, YieldTurn, concatenate_speech, frame_count, keep_on
 
 Deliveries = Mapping[str, Delivery]  # of a palette's styles, by name
 NO_DELIVERIES: Deliveries = MappingProxyType({})
@@ -234,19 +231,18 @@ def _join_sentence(speeches: Sequence[Speech], sentence: Sentence, rate: int) ->
     return speech, begins
 
 
-def silent_sentences(seconds: float, fps: Fraction, n_steps: int) -> Iterator[tuple[SpokenSentence, int]]:
-    """Yield silence in parts of up to `IDLE_PART_S` that end on frames, with the progress steps of each part."""
+def silent_sentences(seconds: float, fps: Fraction, n_steps: int) -> Iterator[tuple[SpokenSentence, int, str]]:
+    """Yield silence in parts of up to `IDLE_PART_S` that end on frames, each with its progress steps and no text."""
     n_frames = frame_count(seconds, float(fps))
     bounds = [*range(0, n_frames, max(round(IDLE_PART_S * fps), 1)), n_frames]
     for first, last in pairwise(bounds):
-        n_samples = first_sample(last, IDLE_RATE, fps) - first_sample(first, IDLE_RATE, fps)
         steps = n_steps * last // n_frames - n_steps * first // n_frames
-        silence = silent_speech(n_samples / IDLE_RATE, IDLE_RATE)
-        yield SpokenSentence(silence, Timeline(), (), silence.waveform), steps
+        silence = silent_frames(first, last, IDLE_RATE, fps)
+        yield SpokenSentence(silence, Timeline(), (), silence.waveform), steps, ""
 
 
 def resolve_marks(
-    runs: Sequence[StyleRun], marks: Sequence[Mark], times: LetterTimes, letters: tuple[int, int]
+    runs: Sequence[StyleRun], marks: Sequence[Mark], times: WordTimes | SentenceTimes, letters: tuple[int, int]
 ) -> tuple[Timeline, tuple[MarkTime, ...]]:
     """Convert marks in a range of letters to a timeline and named marks, by the times of the letters.
 

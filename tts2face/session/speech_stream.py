@@ -1,11 +1,11 @@
-"""Speech of a prepared request piece by piece: text or idle animation, without motion."""
+"""Pieces of a clip, and the first step of a text and of idle animation: speech in whole frames, the face at rest."""
 
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from lexicon.sentences import Sentence
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
 from tts2face.numeric.reuse import NO_MEMORY, SentenceMemory
-from tts2face.request import Request
 from tts2face.session.prepared import IDLE_STEPS, PreparedRequest, correct_phones
 from tts2face.session.speech import (
     NO_DELIVERIES,
@@ -27,14 +26,12 @@ from tts2face.session.speech import (
     speak_sentence,
 )
 from tts2face.sound.transcript import TextMismatch
-from tts2face.sound.voice import Voice
 from tts2face.types import (
     Clip,
     Speech,
     Trajectory,
     Waveform,
     YieldTurn,
-    first_sample,
     frame_count,
     keep_on,
     pad_to_frame,
@@ -44,8 +41,6 @@ from tts2face.types import (
 if TYPE_CHECKING:
     from tts2face.lips.explanation import PhoneExplanation
 
-
-Spoken = TypeVar("Spoken")
 # Options of a request that do not affect the speech of its sentences.
 NOT_SPOKEN: Mapping[str, Any] = MappingProxyType(
     {"expression": None, "gain": None, "timeline": None, "pitch": False, "context": None, "exemplars": None}
@@ -55,6 +50,8 @@ NOT_SPOKEN: Mapping[str, Any] = MappingProxyType(
 @dataclass(frozen=True, slots=True, eq=False)
 class Piece:
     """A part of a clip: a sentence of a text, or some seconds of a recording or of idle animation.
+
+    It gains speech, then lip motion, gestures and edits; what it lacks is at rest.
 
     Parameters
     ----------
@@ -75,6 +72,8 @@ class Piece:
         Written sentence without its marks; empty for a recording and for idle animation.
     transcript
         Phones of the whole recording, with its first piece; None for all other pieces.
+    voice_sound
+        Sound as the voice returns it, which gestures follow; None where it is that of the clip.
     """
 
     clip: Clip
@@ -86,6 +85,12 @@ class Piece:
     mismatches: tuple[TextMismatch, ...] = ()
     text: str = ""
     transcript: PhoneSequence | None = None
+    voice_sound: Waveform | None = None
+
+    @property
+    def speech(self) -> Speech:
+        """Speech with the final sound, in seconds of the piece."""
+        return self.clip.speech
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,22 +130,40 @@ def measure_speech(prepared: PreparedRequest, models: SpeechModels) -> SpeechSpa
     return SpeechSpan(begin, end, total)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TimedSpeech:
-    """Speech of a sentence with its final sound; its start and its named marks in seconds of the whole.
+def spoken_pieces(
+    prepared: PreparedRequest, models: SpeechModels, first_frame: int = 0, *, has_phones: bool = True
+) -> Iterator[Piece]:
+    """Pieces of a text or of idle animation with their speech and marks; the face is at rest and has no channels.
 
-    ``n_steps`` and ``text`` are as for `Piece`.
+    Each piece ends on a frame boundary, so that sound and picture stay synchronous at any length.
+
+    Parameters
+    ----------
+    first_frame
+        Frame of a longer clip at which the first piece begins.
+    has_phones
+        Whether more than the sound is wanted; otherwise it is not aligned with its phones, and marks have no time.
     """
+    fps = prepared.fps
+    for spoken, n_steps, text in speak_sentences(prepared, models, has_phones=has_phones):
+        speech, begin = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
+        n_frames = frame_count(speech.waveform.duration, float(fps))
+        still = Trajectory((), np.zeros((n_frames, 0), np.float32), float(fps))
+        sound = spoken.sound.padded(len(speech.waveform.samples))
+        yield Piece(
+            Clip(still, resting_head(n_frames, float(fps)), replace(speech, waveform=sound)),
+            begin,
+            n_steps,
+            spoken.timeline.restrict(0.0, speech.waveform.duration).shift(begin),
+            tuple(replace(mark, seconds=mark.seconds + begin) for mark in spoken.marks),
+            text=text,
+            voice_sound=speech.waveform,
+        )
+        first_frame += n_frames
 
-    speech: Speech
-    begin: float
-    marks: tuple[MarkTime, ...] = ()
-    n_steps: int = 0
-    text: str = ""
 
-
-def timed_speech(prepared: PreparedRequest, models: SpeechModels) -> Iterator[TimedSpeech]:
-    """Speech of each piece of a text or of idle animation, without motion.
+def timed_speech(prepared: PreparedRequest, models: SpeechModels) -> Iterator[Piece]:
+    """Pieces of a text or of idle animation without motion.
 
     Raises
     ------
@@ -149,100 +172,36 @@ def timed_speech(prepared: PreparedRequest, models: SpeechModels) -> Iterator[Ti
     """
     if prepared.request.audio is not None:
         raise InputError("a recording is not spoken; remove it, or stream its clip")
-    return _timed_sentences(prepared, models)
+    return spoken_pieces(prepared, models)
 
 
-def _timed_sentences(prepared: PreparedRequest, models: SpeechModels) -> Iterator[TimedSpeech]:
-    fps, first_frame = prepared.fps, 0
-    for spoken, n_steps, text in speak_sentences(prepared, models):
-        speech, begin = pad_to_frame(spoken.speech, first_frame, fps), float(first_frame / fps)
-        sound = spoken.sound.padded(len(speech.waveform.samples))
-        yield TimedSpeech(replace(speech, waveform=sound), begin, shifted(spoken.marks, begin), n_steps, text)
-        first_frame += frame_count(speech.waveform.duration, float(fps))
-
-
-def sounds(prepared: PreparedRequest, models: SpeechModels) -> Iterator[Waveform]:
-    """Sound of each piece of a text or of idle animation, without motion; the same samples as those of `pieces`."""
-    return (timed.speech.waveform for timed in _sounds(prepared, models))
-
-
-def _sounds(prepared: PreparedRequest, models: SpeechModels) -> Iterator[TimedSpeech]:
-    """Pieces of which only the sound is that of `timed_speech`: it is not aligned with its phones."""
-    fps, first_frame = prepared.fps, 0
-
-    def speak(voice: Voice, sentence: Sentence, request: Request, voices: Voices) -> tuple[Waveform, int]:
-        sound = sentence_sound(voice, sentence, request, voices, deliveries=models.deliveries)
-        return sound, sentence.n_characters
-
-    found: Iterator[tuple[Waveform, int]] = _spoken(prepared, models, speak)
-    if prepared.request.idle is not None:
-        found = ((spoken.sound, n_steps) for spoken, n_steps, _ in speak_sentences(prepared, models))
-    for sound, n_steps in found:
-        last_frame = first_frame + frame_count(sound.duration, float(fps))
-        n_samples = first_sample(last_frame, sound.rate, fps) - first_sample(first_frame, sound.rate, fps)
-        speech = Speech.without_phones(sound.padded(n_samples))
-        yield TimedSpeech(speech, float(first_frame / fps), n_steps=n_steps)
-        first_frame = last_frame
-
-
-def speech_pieces(prepared: PreparedRequest, models: SpeechModels, *, has_phones: bool) -> Iterator[Piece]:
-    """Pieces of a text or of idle animation with the sound, phones, words and marks of its clip, and without motion.
-
-    Parameters
-    ----------
-    has_phones
-        Whether more than the sound is wanted; otherwise it is not aligned with its phones.
-    """
-    fps = float(prepared.fps)
-    for timed in (timed_speech if has_phones else _sounds)(prepared, models):
-        n_frames = frame_count(timed.speech.waveform.duration, fps)
-        still = Trajectory((), np.zeros((n_frames, 0), np.float32), fps)
-        clip = Clip(still, resting_head(n_frames, fps), timed.speech)
-        yield Piece(clip, timed.begin, timed.n_steps, marks=timed.marks, text=timed.text)
-
-
-def _spoken(
-    prepared: PreparedRequest, models: SpeechModels, speak: Callable[[Voice, Sentence, Request, Voices], Spoken]
-) -> Iterator[Spoken]:
-    """Result of `speak` for each sentence of a text."""
-    request, voice_of = prepared.request, cache(models.voice)
-    voice = voice_of(request.voice, request.language)
-    for sentence in prepared.sentences():
-        yield speak(voice, sentence, request, voice_of)
-
-
-def speak_sentences(prepared: PreparedRequest, models: SpeechModels) -> Iterator[tuple[SpokenSentence, int, str]]:
+def speak_sentences(
+    prepared: PreparedRequest, models: SpeechModels, *, has_phones: bool = True
+) -> Iterator[tuple[SpokenSentence, int, str]]:
     """Spoken sentences with numbers of characters and texts, or parts of idle animation with steps and no text."""
     request = prepared.request
     if request.idle is not None:
-        yield from ((silent, steps, "") for silent, steps in silent_sentences(request.idle, prepared.fps, IDLE_STEPS))
+        yield from silent_sentences(request.idle, prepared.fps, IDLE_STEPS)
         return
+    voices, said = cache(models.voice), Counter[str]()
+    voice = voices(request.voice, request.language)
+    spoken_with = cache(lambda: (replace(request, text="", **NOT_SPOKEN), frozenset(prepared.dictionary.items())))
 
-    said: Counter[str] = Counter()
-    spoken_with = cache(
-        lambda: (replace(request, text="", **NOT_SPOKEN), dictionary_entries(prepared))
-    )  # of all sentences
-
-    def speak(voice: Voice, sentence: Sentence, request: Request, voices: Voices) -> tuple[SpokenSentence, int, str]:
-        text = " ".join(phrase.source for phrase in sentence.utterances)
-        spoken = models.memory.recall(
+    def speak(sentence: Sentence) -> SpokenSentence:
+        if not has_phones:
+            sound = sentence_sound(voice, sentence, request, voices, deliveries=models.deliveries)
+            return SpokenSentence(Speech.without_phones(sound), Timeline(), (), sound)
+        return models.memory.recall(
             lambda: ("speech", sentence.relative(), spoken_with()),
             lambda: speak_sentence(voice, sentence, request, voices, models.yield_turn, deliveries=models.deliveries),
             lambda made: made.sound.samples.nbytes + made.speech.waveform.samples.nbytes,
         )
-        speech = spoken.speech
-        phones = correct_phones(speech.phones, text, said[text], prepared.edges)
+
+    for sentence in prepared.sentences():
+        text = " ".join(phrase.source for phrase in sentence.utterances)
+        spoken = speak(sentence)
+        if has_phones:
+            phones = correct_phones(spoken.speech.phones, text, said[text], prepared.edges)
+            spoken = replace(spoken, speech=replace(spoken.speech, phones=phones))
         said[text] += 1
-        return replace(spoken, speech=replace(speech, phones=phones)), sentence.n_characters, text
-
-    yield from _spoken(prepared, models, speak)
-
-
-def dictionary_entries(prepared: PreparedRequest) -> Hashable:
-    """Pronunciations of the user, as part of a key."""
-    return frozenset(prepared.dictionary.items())
-
-
-def shifted(marks: tuple[MarkTime, ...], seconds: float) -> tuple[MarkTime, ...]:
-    """Marks with later times."""
-    return tuple(replace(mark, seconds=mark.seconds + seconds) for mark in marks)
+        yield spoken, sentence.n_characters, text

@@ -2,8 +2,6 @@
 
 The kernels of motion, of gestures and of strands are compiled in child processes while this process compiles the
 other drawing kernels, because numba compiles one kernel at a time in each process.
-
-Loading of a request's voice ahead of its use; a module without heavy imports.
 """
 
 import threading
@@ -20,13 +18,11 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips import tokens
 from tts2face.models.face import Face, keep_parts
 from tts2face.models.face_loading import load_face
-from tts2face.models.talker import Talker
+from tts2face.models.talker import load_talker
 from tts2face.picture.options import Picture
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.parent import Child
 from tts2face.processes.program import Program
-from tts2face.session.prepared import PreparedRequest
-from tts2face.sound.voice_pool import VoicePool
 
 COMPILE_TIMEOUT_S = 120.0
 
@@ -107,9 +103,8 @@ def compile_motion() -> None:
     """Compile the kernels of lip synthesis and retargeting by synthesising one second of motion."""
     from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
     from tts2face.lips.retargeting import build_retargeter
-    from tts2face.models.talker import load_talker
 
-    talker: Talker = load_talker("grid_s1")
+    talker = load_talker("grid_s1")
     retargeter = build_retargeter(talker, load_face("head"))
     phones = PhoneSequence([SILENCE, "p", "f", "ɑ", SILENCE], [0.0, 0.3, 0.4, 0.5, 0.7, 1.0])
     retargeter.retarget(speech_trajectory(phones, build_exemplar_model(talker), fps=30.0, n_frames=30))
@@ -140,10 +135,3 @@ def _handler(work: Callable[[], None]) -> Handler:
 HANDLERS: Mapping[str, Handler] = MappingProxyType(
     {work.__name__: _handler(work) for work in (compile_motion, compile_gestures, compile_strands)}
 )
-
-
-def preload_voice(voices: VoicePool, prepared: PreparedRequest) -> None:
-    """Load the voice of a request's text in a thread; none for a recording or a request without text."""
-    request = prepared.request
-    if request.text and not request.audio:
-        voices.preload(request.voice, request.language, prepared.dictionary)
