@@ -85,7 +85,7 @@ def filled(folder: Path) -> FolderStore:
 )
 def test_the_files_used_last_stay(limits: dict[str, object], left: list[str], tmp_path: Path) -> None:
     store = filled(tmp_path)
-    store.prune(**limits)  # type: ignore[arg-type]
+    assert store.prune(**limits) == 10 * len(left)  # type: ignore[arg-type]
     assert sorted(Path(one.name).name for one in store.entries()) == left
 
 

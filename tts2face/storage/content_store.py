@@ -6,9 +6,9 @@ A name is a file name, or one in a folder of its first two characters (`divided`
 import hashlib
 import os
 import shutil
-import stat
 import time
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
@@ -132,8 +132,8 @@ class FolderStore:
 
     def entries(self) -> Iterator[Stored]:
         """All files in the order of their names, without unfinished ones."""
-        for path, status in self._files():
-            yield Stored(path.relative_to(self.folder).as_posix(), status.st_size, status.st_mtime)
+        for name, status in self._files():
+            yield Stored(name, status.st_size, status.st_mtime)
 
     def scratch(self) -> Path:
         """Folder in which files are written that `add` then moves into place."""
@@ -153,8 +153,8 @@ class FolderStore:
         max_files: float = float("inf"),
         least_age_s: float = 0.0,
         kept: Collection[str] = (),
-    ) -> None:
-        """Remove the files that were not used for longest.
+    ) -> int:
+        """Remove the files that were not used for longest; the bytes of the others.
 
         Parameters
         ----------
@@ -165,28 +165,32 @@ class FolderStore:
         kept
             Names that stay.
         """
-        files = [(max(status.st_atime_ns, status.st_mtime_ns), status.st_size, path) for path, status in self._files()]
-        stay = {self.path(name) for name in kept}
-        n_bytes = 0
-        for number, (used_ns, size, path) in enumerate(sorted(files, reverse=True), start=1):
+        files = [(max(status.st_atime_ns, status.st_mtime_ns), status.st_size, name) for name, status in self._files()]
+        n_bytes = n_removed = 0
+        for number, (used_ns, size, name) in enumerate(sorted(files, reverse=True), start=1):
             n_bytes += size
             is_over = n_bytes > max_bytes or number > max_files
-            if is_over and path not in stay and time.time_ns() - used_ns >= least_age_s * 1e9:
-                path.unlink(missing_ok=True)
+            if is_over and name not in kept and time.time_ns() - used_ns >= least_age_s * 1e9:
+                self.delete(name)
+                n_removed += size
+        return n_bytes - n_removed
 
     def _target(self, name: str) -> Path:
         target = self.path(name)
         target.parent.mkdir(parents=True, exist_ok=True)
         return target
 
-    def _files(self) -> Iterator[tuple[Path, os.stat_result]]:
-        for path in sorted([*self.folder.glob("*"), *self.folder.glob("??/*")]):
-            try:
-                status = path.stat()
-            except OSError:  # another process has removed it
-                continue
-            if NAME_INFIX not in path.name and stat.S_ISREG(status.st_mode):
-                yield path, status
+    def _files(self, within: str = "") -> Iterator[tuple[str, os.stat_result]]:
+        try:
+            found = sorted(os.scandir(self.folder / within), key=lambda one: one.name)
+        except FileNotFoundError:
+            return
+        for one in found:
+            if not within and len(one.name) == len("ab") and one.is_dir():
+                yield from self._files(f"{one.name}/")
+            elif NAME_INFIX not in one.name and one.is_file():
+                with suppress(FileNotFoundError):  # another process has removed it
+                    yield f"{within}{one.name}", one.stat()
 
 
 ContentStore = FolderStore | BucketStore  # their methods are the same, except for those of caches

@@ -69,12 +69,7 @@ class ResultCache:
         self.n_hits = self.n_misses = 0
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         self._store.remove_drafts()
-        self._store.prune(max_bytes=max_bytes)
-
-    @property
-    def n_bytes(self) -> int:
-        """Size of all entries."""
-        return sum(one.n_bytes for one in self._store.entries())
+        self.n_bytes = self._store.prune(max_bytes=max_bytes)  # size of all entries
 
     async def messages(self, work: Work, made: AsyncIterator[Message]) -> AsyncIterator[Message]:
         """Messages of the entry of a work; without one those of `made`, which become an entry in the end."""
@@ -92,7 +87,7 @@ class ResultCache:
                 async for message in made:
                     await asyncio.to_thread(draft.add, message)
                     if message.kind == RESULT:
-                        await asyncio.to_thread(draft.keep, name, self._max_bytes)
+                        await asyncio.to_thread(self._keep, name, draft)
                     yield message
         finally:
             draft.close()
@@ -107,6 +102,13 @@ class ResultCache:
             self._store.touch(name)
         self.n_hits += 1
         return entry
+
+    def _keep(self, name: str, draft: "_Draft") -> None:
+        """Make a draft an entry, for which others give way."""
+        with suppress(OSError):
+            self.n_bytes += draft.keep(name)
+            if self.n_bytes > self._max_bytes:
+                self.n_bytes = self._store.prune(max_bytes=self._max_bytes)
 
 
 class _Draft:
@@ -132,15 +134,14 @@ class _Draft:
         except OSError:
             self.close()
 
-    def keep(self, name: str, max_bytes: int) -> None:
-        """Make the draft, which is complete, an entry, for which others give way."""
+    def keep(self, name: str) -> int:
+        """Make the draft, which is complete, an entry; its bytes, 0 where it was given up."""
         if self._temporary is None:
-            return
-        with suppress(OSError):
-            self._file.flush()
-            self._store.keep(self._temporary, name)
-            self._store.touch(name)
-            self._store.prune(max_bytes=max_bytes)
+            return 0
+        self._file.flush()
+        self._store.keep(self._temporary, name)
+        self._store.touch(name)
+        return self._n_bytes
 
     def close(self) -> None:
         """Remove the file unless it has become an entry."""
