@@ -10,11 +10,16 @@ import io
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+from cyclopts import Parameter
+
+from cli.corpus import corpus
+from cli.flags import Cache, Jobs, Model, switch, whole_number
+from cli.photo import Yes
 from cli.process import progress_bar, stage_bar, write_message
 from lexicon.errors import InputError
-from tts2face.storage.files import check_file_name
+from tts2face.storage.files import check_file_name, refuse_overwriting
 
 if TYPE_CHECKING:
     from corpus_tools.recordings.observation import Observation
@@ -29,18 +34,31 @@ if TYPE_CHECKING:
 OUTPUT_SUFFIXES = (".html", ".json", ".csv")
 
 
-@dataclass(frozen=True, slots=True)
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SplitFlags:
     """The flags that select training and test recordings."""
 
-    recordings: Path | None
-    hold_out: int | None
-    seed: int
-    folds: int | None
-    words: str | None
-    train: Path | None
-    test: Path | None
-    cross_talker: Path | None
+    recordings: Annotated[
+        Path | None, Parameter(help="Folder of recordings to split into training and held-out utterances.")
+    ] = None
+    hold_out: Annotated[
+        int | None, whole_number("Number of utterances held out of --recordings; by default a fifth, at most 100.")
+    ] = None
+    seed: Annotated[int, whole_number("Seed of the random choice of held-out utterances.")] = 0
+    folds: Annotated[int | None, whole_number("Number of folds for cross-validation, instead of --hold-out.")] = None
+    hold_out_words: Annotated[
+        str | None,
+        Parameter(
+            help="Instead of --hold-out: hold out utterances that contain one of these words, e.g. please,seven."
+        ),
+    ] = None
+    train: Annotated[Path | None, Parameter(help="Folder of training recordings, instead of --recordings.")] = None
+    test: Annotated[Path | None, Parameter(help="Folder of test recordings, with --train.")] = None
+    cross_talker: Annotated[
+        Path | None,
+        Parameter(help="Test on recordings of another talker, or a Live Link Face .csv with its sound; z-scored."),
+    ] = None
 
     def check(self) -> None:
         """Refuse flags that contradict each other."""
@@ -48,9 +66,9 @@ class SplitFlags:
             self._check_cross_talker()
         elif (self.recordings is None) == (self.train is None) or (self.train is None) != (self.test is None):
             raise InputError("the recordings are not selected; use either --recordings, or both --train and --test")
-        elif self.folds is not None and self.words is not None:
+        elif self.folds is not None and self.hold_out_words is not None:
             raise InputError("--folds cannot be combined with --hold-out-words; remove one of them")
-        elif self.train is not None and (self.folds is not None or self.words is not None):
+        elif self.train is not None and (self.folds is not None or self.hold_out_words is not None):
             raise InputError(
                 "--folds and --hold-out-words cannot be combined with --train and --test; use them with --recordings"
             )
@@ -59,7 +77,7 @@ class SplitFlags:
         """Refuse flags that contradict --people."""
         if not people:
             raise InputError("--talker has no effect without --people; give a folder of tracks, or remove it")
-        chosen = (self.recordings, self.train, self.test, self.folds, self.words, self.cross_talker)
+        chosen = (self.recordings, *self._other_selections())
         if comparison.own_durations or comparison.pool is not None or any(value is not None for value in chosen):
             raise InputError(
                 "--people tests a finished talker and can be combined only with --talker, --tracks and --out; "
@@ -68,7 +86,7 @@ class SplitFlags:
 
     def curve_recordings(self, comparison: "ComparisonFlags") -> Path:
         """The folder of recordings of a learning curve; refuse flags that contradict --learning-curve."""
-        chosen = (self.train, self.test, self.folds, self.words, self.cross_talker, comparison.tracks, comparison.pool)
+        chosen = (*self._other_selections(), comparison.tracks, comparison.pool)
         if self.recordings is None:
             raise InputError("--learning-curve needs the recordings of one person; give --recordings")
         if comparison.own_durations or any(value is not None for value in chosen):
@@ -78,22 +96,87 @@ class SplitFlags:
             )
         return self.recordings
 
+    def _other_selections(self) -> tuple[object, ...]:
+        """What selects utterances otherwise than --recordings and --hold-out."""
+        return self.train, self.test, self.folds, self.hold_out_words, self.cross_talker
+
     def _check_cross_talker(self) -> None:
         if (self.recordings is None) == (self.train is None):
             raise InputError(
                 "--cross-talker needs one folder of training recordings; use either --recordings or --train"
             )
-        if self.test is not None or self.folds is not None or self.words is not None:
+        if self.test is not None or self.folds is not None or self.hold_out_words is not None:
             raise InputError("--cross-talker cannot be combined with --test, --folds or --hold-out-words; remove them")
 
 
-@dataclass(frozen=True, slots=True)
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ComparisonFlags:
     """The flags that add trajectories to the comparison."""
 
-    tracks: Path | None
-    own_durations: bool
-    pool: Path | None
+    own_durations: Annotated[
+        bool, switch("Also evaluate synthesis from text with the durations of the default English voice.")
+    ] = False
+    tracks: Annotated[
+        Path | None,
+        Parameter(help="Also evaluate external trajectories: CSV with utterance, time and one column per channel."),
+    ] = None
+    pool: Annotated[
+        Path | None, Parameter(help="Train the networks also with lip tracks of this folder, as `corpus pool` does.")
+    ] = None
+
+
+NO_SPLIT, NO_COMPARISON = SplitFlags(), ComparisonFlags()
+
+
+@corpus.command
+def evaluate(  # noqa: PLR0913 - one parameter a flag
+    *,
+    split: SplitFlags = NO_SPLIT,
+    people: Annotated[
+        list[Path] | None,
+        Parameter(help="Test --talker on a folder of landmark tracks of one person (.npz); z-scored; can be repeated."),
+    ] = None,
+    talker: Annotated[str | None, Parameter(help="Finished talker that --people tests; by default grid_s1.")] = None,
+    comparison: ComparisonFlags = NO_COMPARISON,
+    learning_curve: Annotated[
+        str | None,
+        Parameter(
+            help="Learn from parts of --recordings of so many seconds, e.g. 10,20,40, or auto: 10 s to 40 minutes."
+        ),
+    ] = None,
+    base: Annotated[
+        str | None,
+        Parameter(help="With --learning-curve: as --base of corpus build; by default grid_s1."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        Parameter(
+            help="Write measures and plots (.html), measures (.json, .csv), or a learning curve (.svg, .png, too).",
+            alias="-o",
+        ),
+    ] = None,
+    jobs: Jobs = None,
+    cache: Cache = None,
+    model: Model = None,
+    yes: Yes = False,
+) -> None:
+    """Compare synthesised lip motion with held-out recordings."""
+    del yes  # read where the model is missing
+    inputs = {"--recordings": split.recordings, "--train": split.train, "--test": split.test}
+    inputs |= {"--cross-talker": split.cross_talker, "--tracks": comparison.tracks, "--model": model}
+    refuse_overwriting({"--out": out}, inputs)
+    if learning_curve is not None and not people and talker is None:
+        run_learning_curve(learning_curve, split, comparison, base, out, (cache, jobs, model))
+        return
+    if base is not None or learning_curve is not None:
+        reason = "--base has no effect without --learning-curve" if base else "--learning-curve tests no --talker"
+        raise InputError(f"{reason}; remove it")
+    if people or talker is not None:
+        split.check_people(people or [], comparison)
+        run_people_evaluation(talker or DEFAULT_TALKER, people or [], comparison.tracks, out)
+        return
+    run_evaluation(split, comparison, out, (cache, jobs, model))
 
 
 def run_evaluation(
@@ -173,8 +256,8 @@ def _make_splits(split_flags: SplitFlags, run_options: "RunOptions") -> "tuple[S
     found = _read_observations(split_flags.recordings, run_options)
     if split_flags.folds is not None:
         return split_into_folds(found, n_folds=split_flags.folds, seed=split_flags.seed)
-    if split_flags.words is not None:
-        return (split_by_words(found, [word for word in split_flags.words.replace(",", " ").split() if word]),)
+    if split_flags.hold_out_words is not None:
+        return (split_by_words(found, [word for word in split_flags.hold_out_words.replace(",", " ").split() if word]),)
     return (split_randomly(found, hold_out=split_flags.hold_out, seed=split_flags.seed),)
 
 

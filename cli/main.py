@@ -8,7 +8,8 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-import cli.build  # noqa: F401 - adds its command to `corpus`
+import cli.build
+import cli.evaluate  # noqa: F401 - both add their command to `corpus`
 from cli.batch import batch
 from cli.corpus import corpus
 from cli.face import face as face_commands

@@ -8,10 +8,10 @@ With noise 10 dB below the speech, forced alignment displaces words by 97 ms on 
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from corpus_tools.recordings.video import content_key
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.sound.pauses import Span, cut_at_pauses, cut_sound, sound_windows
-from tts2face.storage.tensors import read_tensors, write_tensors
+from tts2face.storage.tensors import read_kept, write_tensors
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 
@@ -221,13 +221,9 @@ class CachedAligner:
         whole, clean = self._read(video)
         kind = f"{RECOGNITION_VERSION}{'' if clean is whole else SUPPRESSED}"
         cached = self._cache / f"{content_key(video)}-{kind}.{RECOGNITION_KIND}"
-        if cached.is_file():
-            try:
-                stored = read_tensors(cached, RECOGNITION_KIND, RECOGNITION_VERSION)[1]["words"]
-                if len(stored) == len(spans):
-                    return [[tuple(word) for word in words] for words in stored]
-            except (DataError, KeyError):
-                pass  # a damaged file is written again
+        stored = read_kept(cached, RECOGNITION_KIND, RECOGNITION_VERSION, lambda _, header: header["words"])
+        if stored is not None and len(stored) == len(spans):
+            return [[tuple(word) for word in words] for words in stored]
         found = [list(self._recognise_words(cut_sound(clean, span))) for span in spans]
         write_tensors(cached, RECOGNITION_KIND, RECOGNITION_VERSION, {"spans": np.array(spans)}, {"words": found})
         return found
@@ -242,12 +238,10 @@ class CachedAligner:
 
 def _read_cached_alignment(cached: Path, sound: Waveform, *, is_recognised: bool) -> AlignedSpeech | None:
     """The cached alignment; None if it is missing or damaged."""
-    if not cached.is_file():
-        return None
-    try:
-        arrays, header = read_tensors(cached, ALIGNMENT_KIND, ALIGNMENT_VERSION)
+
+    def build(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> AlignedSpeech:
         words = tuple(WordSpan(text, first, last) for text, first, last in header["words"])
         phones = PhoneSequence(header["phones"], arrays["edges"])
         return AlignedSpeech(phones, words, float(header["confidence"]), sound, is_recognised)
-    except (DataError, KeyError):
-        return None
+
+    return read_kept(cached, ALIGNMENT_KIND, ALIGNMENT_VERSION, build)

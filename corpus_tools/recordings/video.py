@@ -3,11 +3,8 @@
 Light and sharpness of the face in pictures: whether its parts can be told apart.
 """
 
-import hashlib
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +14,8 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from lexicon.inputs import check_regular_file
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, FACE_OVAL
-from tts2face.storage.tensors import read_tensors, write_tensors
+from tts2face.storage.content_store import content_hash
+from tts2face.storage.tensors import read_kept, write_tensors
 from tts2face.video.media import TimedFrame, read_frames, read_media_info
 from tts2face.video.tracking import MODEL_SHA256, Tracking
 
@@ -170,9 +168,9 @@ class CachedTracker:
             The video cannot be read or contains no frames.
         """
         cached = self._cache / f"{content_key(video)}-{MODEL_SHA256[:8]}-{LIGHT_VERSION}.{LIGHT_KIND}"
-        if cached.is_file():
-            with suppress(DataError, KeyError):
-                return np.asarray(read_tensors(cached, LIGHT_KIND, LIGHT_VERSION)[0]["light"], np.float32)
+        kept = read_kept(cached, LIGHT_KIND, LIGHT_VERSION, lambda arrays, _: np.asarray(arrays["light"], np.float32))
+        if kept is not None:
+            return kept
         tracked = self.track(video)
         found = measure_light(read_frames(video), tracked.tracking.points, tracked.times)
         write_tensors(cached, LIGHT_KIND, LIGHT_VERSION, {"light": found}, {})
@@ -209,25 +207,17 @@ def content_key(path: Path) -> str:
         The path is no ordinary file.
     """
     check_regular_file(path)
-    about = path.stat()
-    return _content_key(path, about.st_size, about.st_mtime_ns)
-
-
-@lru_cache(maxsize=1)
-def _content_key(path: Path, _size: int, _changed_ns: int) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()[:32]
+    return content_hash(path)[:32]
 
 
 def _read_cached_tracking(path: Path) -> TrackedVideo | None:
     """The cached tracking; None if it is missing or damaged."""
-    if not path.is_file():
-        return None
-    try:
-        arrays, header = read_tensors(path, TRACKING_KIND, TRACKING_VERSION)
-        return _build_tracked_video(arrays, float(header["fps"]))
-    except (DataError, KeyError):
-        return None
+    return read_kept(
+        path,
+        TRACKING_KIND,
+        TRACKING_VERSION,
+        lambda arrays, header: _build_tracked_video(arrays, float(header["fps"])),
+    )
 
 
 def _build_tracked_video(arrays: Mapping[str, NDArray[Any]], fps: float) -> TrackedVideo:

@@ -13,7 +13,7 @@ from tests.batch.conftest import Planner
 from tests.synthesis.fake_voice import FakeVoice
 from tts2face.serving.batch.run import MIN_AGE_S, SEGMENT_FOLDER, prune_segments, run_batch
 from tts2face.serving.batch.segment import SegmentResult
-from tts2face.serving.batch.store import FolderStore, Store, open_store
+from tts2face.serving.batch.store import Store, open_store
 
 WEEK_S = 7 * 86_400.0
 
@@ -59,7 +59,7 @@ def test_only_old_segments_without_a_reference_are_removed(scheme: str, tmp_path
 
 
 def test_unfinished_files_of_killed_processes_are_removed(tmp_path: Path) -> None:
-    store = FolderStore(tmp_path / "store")
+    store = open_store(tmp_path / "store")
     scratch = store.scratch()
     assert scratch is not None
     (scratch / ".one.mov.tts2face-1").write_bytes(b"part")
@@ -91,11 +91,11 @@ def test_manifests_that_do_not_list_segments_are_refused(content: str, reason: s
     out = manifest(tmp_path / "out")
     (out / "manifest.json").write_text(content)
     with pytest.raises(DataError, match=reason):
-        prune_segments(FolderStore(tmp_path / "store"), [out], (), WEEK_S)
+        prune_segments(open_store(tmp_path / "store"), [out], (), WEEK_S)
 
 
 def test_a_prune_that_could_remove_segments_in_use_is_refused(tmp_path: Path) -> None:
-    store = FolderStore(tmp_path / "store")
+    store = open_store(tmp_path / "store")
     with pytest.raises(InputError, match=r"give --days 1 or more, not 0\.5"):
         prune_segments(store, [manifest(tmp_path / "out")], (), MIN_AGE_S / 2)
     with pytest.raises(InputError, match="give --outputs"):
@@ -108,7 +108,7 @@ def test_the_command_prunes_a_store_without_a_database(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    fill(FolderStore(tmp_path / "store"), tmp_path, "aa" * 32)
+    fill(open_store(tmp_path / "store"), tmp_path, "aa" * 32)
     age(tmp_path / "store", 2 * WEEK_S)
     out = manifest(tmp_path / "out")
     words = ["jobs", "prune", "--store", "store", "--outputs", str(out), "--days", "7"]

@@ -28,6 +28,7 @@ def test_a_segment_is_stored_whole_fetched_listed_and_removed(kind: str, tmp_pat
     assert store.result(ADDRESS) == RESULT
     assert store.fetch(ADDRESS, tmp_path).read_bytes() == b"movie"
     assert list(store.addresses()) == [ADDRESS]
+    assert {path.name for path in (place / "ab").iterdir()} == {f"{ADDRESS}.mov", f"{ADDRESS}.json"}  # as ever
     store.remove(ADDRESS)
     store.remove(ADDRESS)
     assert store.result(ADDRESS) is None

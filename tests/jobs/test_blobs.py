@@ -9,8 +9,9 @@ import pytest
 pytest.importorskip("obstore", reason="needs the extra [batch]")
 
 from lexicon.errors import BackendError
-from tts2face.serving.batch.object_store import ObjectStore
-from tts2face.serving.work.blobs import BlobStore, BucketBlobs, MissingBlobError, open_blobs
+from tts2face.serving.work.blobs import BlobStore, MissingBlobError, open_blobs
+from tts2face.storage.bucket import BucketStore
+from tts2face.storage.content_store import FolderStore
 
 CONTENT = b"some bytes"
 SHA256 = hashlib.sha256(CONTENT).hexdigest()
@@ -30,6 +31,7 @@ def test_a_file_is_stored_by_its_content(blobs: BlobStore, tmp_path: Path) -> No
     assert blobs.has(SHA256)
     assert blobs.fetch(SHA256).read_bytes() == CONTENT == path.read_bytes()
     assert blobs.fetch(SHA256).name == SHA256
+    assert (tmp_path / "store" / "results" / SHA256[:2] / SHA256).read_bytes() == CONTENT  # where it ever was
     ((name, stored_s),) = blobs.entries()
     assert name == SHA256
     assert abs(stored_s - time.time()) < 60.0
@@ -72,7 +74,9 @@ def test_a_damaged_copy_of_a_bucket_is_fetched_again(tmp_path: Path) -> None:
 
 
 def test_copies_of_a_bucket_are_bounded_and_the_used_ones_stay(tmp_path: Path) -> None:
-    blobs = BucketBlobs(ObjectStore(f"file://{tmp_path}/store"), "results", tmp_path / "cache", max_bytes=2500)
+    blobs = BlobStore(
+        BucketStore(f"file://{tmp_path}/store", "results"), FolderStore(tmp_path / "cache"), max_bytes=2500
+    )
     first, second = blobs.put(bytes(1000)), blobs.put(b"2" * 1000)
     blobs.fetch(first)
     third = blobs.put(b"3" * 1000)

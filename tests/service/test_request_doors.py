@@ -11,7 +11,9 @@ from tts2face.request import Request
 from tts2face.serving.batch.cast import MODEL_NAMES, NOT_IN_CAST, REQUEST_NAMES
 from tts2face.serving.service.options import BATCH_FIELDS, NOT_IN_CLIPS, NOT_IN_SUBTITLES, ClipRequest, SubtitlesRequest
 from tts2face.serving.service.request_fields import LIMITS, RECORDS
+from tts2face.serving.service.routes.headtts import HeadTtsRequest
 from tts2face.serving.service.routes.live import NOT_IN_LIVE_TEXT, TextOptions
+from tts2face.serving.service.routes.openai import SAME_NAMES, Speech
 from tts2face.session.named_models import Models
 
 OPTIONS = {one.name for record in RECORDS for one in fields(record)}
@@ -30,6 +32,20 @@ def test_a_door_takes_every_option_or_says_why_not(
     assert taken.isdisjoint(left_out)
     assert taken | set(left_out) == OPTIONS
     assert all(left_out.values())
+
+
+# Fields of protocols of others, and the options that they are.
+SAME: list[tuple[type[BaseModel], Mapping[str, str]]] = [
+    (Speech, {"speed": "rate"} | {name: name for name in SAME_NAMES}),
+    (HeadTtsRequest, {"language": "language", "dictionary": "dictionary"}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("door", "names"), SAME, ids=lambda one: getattr(one, "__name__", ""))
+def test_other_protocols_take_options_as_clips_do(door: type[BaseModel], names: Mapping[str, str]) -> None:
+    for name, option in names.items():
+        field, other = door.model_fields[name], ClipRequest.model_fields[option]
+        assert (field.annotation, field.default, field.metadata) == (other.annotation, other.default, other.metadata)
 
 
 def test_casts_take_every_option_of_a_request_and_every_model() -> None:

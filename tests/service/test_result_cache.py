@@ -12,6 +12,7 @@ from lexicon.errors import BackendError
 from tts2face.processes.message import EVENT, RESULT, Message
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.result_cache import ResultCache, work_hash
+from tts2face.storage.temporary import NAME_INFIX
 
 END = Message(RESULT, {"seconds": 1.0})
 HELLO = Work(request={"text": "Hello."}, models={"talker": "grid_s1"})
@@ -94,7 +95,7 @@ def test_a_large_result_does_not_displace_all_others(tmp_path: Path) -> None:
 
 
 def test_remains_of_a_server_that_ended_are_removed(tmp_path: Path) -> None:
-    (tmp_path / "x.part").write_bytes(b"begun")
+    (tmp_path / f".new{NAME_INFIX}0123").write_bytes(b"begun")
     assert ResultCache(tmp_path, 4000).n_bytes == 0
     assert list(tmp_path.iterdir()) == []
 

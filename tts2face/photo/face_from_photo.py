@@ -4,8 +4,6 @@ Faces of photos in the user's cache folder, with their consent, so that each is 
 """
 
 import hashlib
-import os
-import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -25,6 +23,7 @@ from tts2face.photo.photograph import Photograph, split_number
 from tts2face.photo.speaking_photo import speaking_photo
 from tts2face.photo.teeth import read_teeth
 from tts2face.request import REALISTIC_FACE
+from tts2face.storage.content_store import FolderStore
 from tts2face.storage.files import user_cache
 from tts2face.video.tracking import find_segmenter
 
@@ -149,7 +148,7 @@ def find_kept(kept: Path, consent: str | None) -> bool:
     with suppress(InputError, DataError, OSError):
         stated = read_face(kept).metadata["consent"]["statement"]
         if consent is None or consent.strip() == stated:
-            os.utime(kept)  # the last ones used are kept
+            FolderStore(kept.parent).touch(kept.name)
             return True
     return False
 
@@ -165,10 +164,4 @@ def keep_face(face: Face, kept: Path) -> None:
     with suppress(OSError):
         kept.parent.mkdir(parents=True, exist_ok=True)
     write_face(kept, face)
-    ages = {}
-    for path in kept.parent.glob(f"*.{KIND}"):
-        with suppress(OSError):
-            ages[path] = time.time() - path.stat().st_mtime
-    for path in sorted(ages, key=lambda path: ages[path])[N_KEPT:]:
-        if ages[path] > LEAST_AGE_S:
-            path.unlink(missing_ok=True)
+    FolderStore(kept.parent).prune(max_files=N_KEPT, least_age_s=LEAST_AGE_S)

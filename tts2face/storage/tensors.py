@@ -17,13 +17,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.inputs import parse_json
+from tts2face.storage.content_store import FolderStore
 from tts2face.storage.files import user_cache, write_atomically
 from tts2face.storage.schema import choice, list_of, refuse, row, text, whole
 
@@ -242,7 +243,8 @@ def _metadata(text: str, path: Path) -> dict[str, Any]:
     return found
 
 
-MAX_FILES = 64  # of one kind; the oldest are removed
+MAX_FILES = 64  # of one kind
+Built = TypeVar("Built")
 
 
 def fingerprint(parts: Iterable[NDArray[Any] | str]) -> str:
@@ -278,21 +280,32 @@ def computed_once(
 
 def read_cached(kind: str, version: int, name: str) -> dict[str, NDArray[Any]] | None:
     """Arrays that `write_cached` kept under a name; None without them, or if they are damaged or of another version."""
-    with suppress(InputError, DataError):
-        arrays, metadata = read_tensors(_folder(kind) / name, kind, version)
-        return arrays if metadata.get("checksum") == _checksum(arrays) else None
-    return None
+    return read_kept(
+        _cache(kind).path(name), kind, version,
+        lambda arrays, metadata: arrays if metadata.get("checksum") == _checksum(arrays) else None,
+    )  # fmt: skip
 
 
 def write_cached(kind: str, version: int, name: str, arrays: Arrays) -> None:
     """Keep arrays under a name; a folder that cannot be written costs the next run the same time."""
-    folder = _folder(kind)
+    cache = _cache(kind)
     with suppress(BackendError, OSError):
-        folder.mkdir(parents=True, exist_ok=True)
-        write_tensors(folder / name, kind, version, arrays, {"checksum": _checksum(arrays)})
-        files = sorted(folder.iterdir(), key=lambda path: path.stat().st_mtime)
-        for path in files[:-MAX_FILES]:
-            path.unlink(missing_ok=True)
+        cache.folder.mkdir(parents=True, exist_ok=True)
+        write_tensors(cache.path(name), kind, version, arrays, {"checksum": _checksum(arrays)})
+        cache.touch(name)
+        cache.prune(max_files=MAX_FILES)
+
+
+def read_kept(
+    path: Path, kind: str, version: int, build: Callable[[dict[str, NDArray[Any]], dict[str, Any]], Built | None]
+) -> Built | None:
+    """What `build` makes of a file's arrays and metadata; None if there is none, or it is damaged, so that it is made.
+
+    A DataError or KeyError of `build` tells that it is damaged.
+    """
+    with suppress(InputError, DataError, KeyError):
+        return build(*read_tensors(path, kind, version))
+    return None
 
 
 def _checksum(arrays: Arrays) -> int:
@@ -303,5 +316,5 @@ def _checksum(arrays: Arrays) -> int:
     return found
 
 
-def _folder(kind: str) -> Path:
-    return user_cache() / kind
+def _cache(kind: str) -> FolderStore:
+    return FolderStore(user_cache() / kind)

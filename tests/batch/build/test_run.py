@@ -23,7 +23,7 @@ from tts2face.serving.batch.engine import LocalEngine, Rendered
 from tts2face.serving.batch.render import RenderProcess, SegmentRenderer
 from tts2face.serving.batch.run import SEGMENT_FOLDER, run_batch
 from tts2face.serving.batch.segment import Segment, SegmentResult
-from tts2face.serving.batch.store import FolderStore, Store
+from tts2face.serving.batch.store import Store, open_store
 
 HALF_FRAME_S = 0.5 / FPS
 AAC_SMEAR_S = 0.025  # of an onset, by the transform's length of 1024 samples
@@ -156,7 +156,7 @@ def test_a_folder_that_cannot_be_written_is_named_before_anything_is_rendered(
 ) -> None:
     (tmp_path / "taken").write_text("a file")
     with pytest.raises(BackendError, match=rf"cannot write the folder .*{name}: .*; choose another --out"):
-        run_batch(plan_of(), tmp_path / name, store=FolderStore(tmp_path / "store"))
+        run_batch(plan_of(), tmp_path / name, store=open_store(tmp_path / "store"))
     assert voices == []
 
 
@@ -229,7 +229,7 @@ class DyingRenderer:
 def test_a_segment_whose_process_ends_is_tried_three_times(
     n_deaths: int, n_calls: int, is_stored: bool, plan_of: Planner, tmp_path: Path
 ) -> None:
-    store, renderer = FolderStore(tmp_path / "store"), DyingRenderer(n_deaths)
+    store, renderer = open_store(tmp_path / "store"), DyingRenderer(n_deaths)
     segment = plan_of().outputs[0].segments[0]
     rendered = engines.render_into(store, segment, renderer, lambda _: None)
     assert renderer.n_calls == n_calls
@@ -245,7 +245,7 @@ def test_a_full_disk_pauses_and_says_so(plan_of: Planner, tmp_path: Path, monkey
     monkeypatch.setattr(engines, "free_bytes", lambda _: next(free))
     monkeypatch.setattr(engines, "PAUSE_S", 0.01)
     messages: list[str] = []
-    store = FolderStore(tmp_path / "store")
+    store = open_store(tmp_path / "store")
     rendered = engines.render_into(store, plan_of().outputs[0].segments[0], DyingRenderer(0), messages.append)
     assert rendered.result is not None
     assert [message.split(":")[0] for message in messages] == ["paused", "continued"]
@@ -266,7 +266,7 @@ def test_an_error_of_a_full_disk_is_tried_again(
             return super().render(segment, out)
 
     rendered = engines.render_into(
-        FolderStore(tmp_path / "store"), plan_of().outputs[0].segments[0], Filling(0), lambda _: None
+        open_store(tmp_path / "store"), plan_of().outputs[0].segments[0], Filling(0), lambda _: None
     )
     assert rendered.result is not None
 
@@ -307,7 +307,7 @@ def test_an_interrupted_batch_ends_its_processes_while_they_render(
 ) -> None:
     monkeypatch.setattr(SlowProcess, "made", [])
     monkeypatch.setattr(engines, "RenderProcess", SlowProcess)
-    rendering = LocalEngine(2).render(plan_of().segments, FolderStore(tmp_path / "store"))
+    rendering = LocalEngine(2).render(plan_of().segments, open_store(tmp_path / "store"))
     assert next(rendering).result is not None
     rendering.close()  # as an exception of the loop over it does
     assert [process.is_closed for process in SlowProcess.made] == [True, True]

@@ -30,10 +30,11 @@ from tests.batch.emulators import (
 from tests.running import eventually
 from tests.synthesis.fake_voice import FakeVoice
 from tts2face.serving.batch import engine as engines
-from tts2face.serving.batch import object_store, store
+from tts2face.serving.batch import store
 from tts2face.serving.batch.run import run_batch
 from tts2face.serving.batch.segment import Segment, SegmentResult
 from tts2face.serving.batch.store import open_store
+from tts2face.storage import bucket as bucket_stores
 
 ADDRESS = "ab" * 32
 RESULT = SegmentResult(15, 10.0, 1.1, 1.4, 0.0, 0.0, ("a warning",), 2.5)
@@ -104,7 +105,7 @@ def bucket(
 @pytest.fixture
 def is_impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """One try for each request, and short pauses."""
-    monkeypatch.setattr(object_store, "RETRIES", {**object_store.RETRIES, "max_retries": 0})
+    monkeypatch.setattr(bucket_stores, "RETRIES", {**bucket_stores.RETRIES, "max_retries": 0})
     monkeypatch.setattr(store, "PAUSE_S", 0.2)
 
 
@@ -213,7 +214,7 @@ def test_a_killed_upload_leaves_nothing_visible(bucket: Bucket, tmp_path: Path) 
 def test_a_result_without_its_movie_is_removed(bucket: Bucket, tmp_path: Path) -> None:
     opened = open_store(bucket.url)
     opened.put(ADDRESS, write_movie(tmp_path), RESULT)
-    opened._obstore.delete(opened._store, f"ab/{ADDRESS}.mov")
+    opened.files.delete(f"ab/{ADDRESS}.mov")
     with pytest.raises(BackendError, match=rf"is missing in {bucket.url}; run again"):
         opened.fetch(ADDRESS, tmp_path)
     assert opened.result(ADDRESS) is None

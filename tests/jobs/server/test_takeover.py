@@ -18,7 +18,7 @@ from tests.jobs.server.test_jobs import collect, queue
 from tests.jobs.stub_worker import Stub
 from tests.running import eventually
 from tts2face.serving.batch.segment import Segment
-from tts2face.serving.batch.store import FolderStore, open_store
+from tts2face.serving.batch.store import open_store
 from tts2face.serving.work.client import cancel_jobs, list_jobs, prune_jobs
 from tts2face.serving.work.database import BEAT_S, Workers, database_url, prepare_database
 from tts2face.serving.work.engine import JOBS_PER_QUERY, DatabaseEngine, enqueue, open_client
@@ -200,7 +200,7 @@ def test_nothing_of_a_pruned_job_remains_in_the_database(
 def test_segments_of_unfinished_jobs_are_never_pruned(
     segments: Segments, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    database, store = str(tmp_path / "jobs.sqlite"), FolderStore(tmp_path / "store")
+    database, store = str(tmp_path / "jobs.sqlite"), open_store(tmp_path / "store")
     work = segments("Words.", "Others.")
     queue(database, work)
     waiting, ended = sorted(work)

@@ -34,7 +34,7 @@ from tts2face.session.named_models import Models
 from tts2face.sound.voice_pool import has_voice, voice_names
 from tts2face.storage.files import present_name
 
-MODEL_NAMES = ("talker", "face", "identity", "palette", "hair", "hair_color")
+MODEL_NAMES = tuple(option.name for option in fields(Models))
 PATTERN_NAMES = ("speaker", "subtitle_style", "file")
 NOT_IN_CAST: Mapping[str, str] = MappingProxyType({  # options, with the reason
     "text": "the cues have it", "audio": "that of the file", "audio_map": "the words are given", "idle": "cues speak",

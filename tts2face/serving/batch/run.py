@@ -15,7 +15,6 @@ from lexicon.errors import BackendError, InputError, Tts2faceError
 from tts2face.serving.batch.assemble import join_segments
 from tts2face.serving.batch.engine import Engine, LocalEngine
 from tts2face.serving.batch.export import Exporter
-from tts2face.serving.batch.object_store import StoredSegment
 from tts2face.serving.batch.output import (
     CSV_NAME,
     JSON_NAME,
@@ -29,7 +28,7 @@ from tts2face.serving.batch.output import (
     write_manifest,
 )
 from tts2face.serving.batch.segment import Segment, SegmentResult
-from tts2face.serving.batch.store import FolderStore, Store, open_store
+from tts2face.serving.batch.store import Store, open_store
 from tts2face.storage.files import refuse_overwriting
 from tts2face.storage.temporary import Temporary
 from tts2face.types import Progress
@@ -291,24 +290,22 @@ def prune_unused(store: Store, kept: Collection[str], older_than_s: float, *, dr
     """Remove segments and unfinished files stored some seconds ago or earlier, except those that are kept."""
     before = time.time() - older_than_s
     found = list(store.entries())
-    removed = [one for one in found if one.address not in kept and one.stored_s <= before]
+    removed = [one for one in found if one.name not in kept and one.stored_s <= before]
     abandoned = _unfinished_files(store, before)
-    n_bytes = sum(one.n_bytes for one in removed) + sum(one.n_bytes for _, one in abandoned)
+    n_bytes = sum(one.n_bytes for one in removed) + sum(size for _, size in abandoned)
     if not dry_run:
         for one in removed:
-            store.remove(one.address)
+            store.remove(one.name)
         for path, _ in abandoned:
             path.unlink(missing_ok=True)
     return Pruned(len(removed) + len(abandoned), n_bytes, len(found) - len(removed))
 
 
-def _unfinished_files(store: Store, before: float) -> list[tuple[Path, StoredSegment]]:
-    """Old files of renderings whose process was killed."""
-    if not isinstance(store, FolderStore):
-        return []
+def _unfinished_files(store: Store, before: float) -> list[tuple[Path, int]]:
+    """Old files of renderings whose process was killed, with their bytes."""
     found = []
-    for path in (store.folder / "scratch").glob("*"):
+    for path in (store.folder / "scratch").glob("*") if store.folder is not None else ():
         status = path.stat()
         if path.is_file() and status.st_mtime <= before:
-            found.append((path, StoredSegment(path.name, status.st_size, status.st_mtime)))
+            found.append((path, status.st_size))
     return found

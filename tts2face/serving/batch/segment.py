@@ -27,6 +27,7 @@ from tts2face.models.hair import BALD
 from tts2face.picture.movie import SOUND_RATE
 from tts2face.request import OWN_FACE, Request
 from tts2face.session.named_models import Models
+from tts2face.storage.content_store import content_hash
 from tts2face.storage.files import find_file, translate_disk_errors
 from tts2face.types import exact_rate, first_sample
 from tts2face.video.media import sound_blocks
@@ -96,16 +97,9 @@ def file_hash(path: Path) -> str:
         The file does not exist or cannot be read.
     """
     try:
-        status = path.stat()
-        return _file_hash(path, status.st_size, status.st_mtime_ns)
+        return content_hash(path)
     except OSError as refused:
         raise InputError(f"cannot read {path}: {refused.strerror}; check the path") from refused
-
-
-@lru_cache(maxsize=4096)
-def _file_hash(path: Path, _size: int, _time: int) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def model_hash(name: str, kind: str) -> str:

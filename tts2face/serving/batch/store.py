@@ -1,56 +1,27 @@
-"""Stores of rendered segments: a local folder, or a bucket by URL. A segment appears complete or not at all."""
+"""Rendered segments in a content store: a movie and its result. A segment appears complete or not at all."""
 
 import json
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
-from lexicon.errors import BackendError, InputError
-from tts2face.serving.batch.object_store import RESULT_SUFFIX, StoreAwayError, StoredSegment, parse_result, sum_files
-from tts2face.serving.batch.segment import SEGMENT_SUFFIX, SegmentResult
-from tts2face.storage.files import write_atomically
-from tts2face.storage.temporary import NAME_INFIX, Temporary
+from lexicon.errors import BackendError, DataError
+from lexicon.inputs import parse_json
+from tts2face.serving.batch.segment import SEGMENT_SUFFIX, SegmentResult, result_from_json
+from tts2face.storage.bucket import StoreAwayError, Stored
+from tts2face.storage.content_store import ContentStore, FolderStore, divided, open_content_store
 
 MAX_RESULT_BYTES = 1_000_000
 PAUSE_S = 5.0  # between two tries of a store that cannot be reached
-REMOTE_SCHEMES = ("s3://", "gs://", "az://", "abfs://", "file://", "memory://")
+RESULT_SUFFIX = ".json"
 
 
 Value = TypeVar("Value")
 
 
-class Store(Protocol):
-    """Segments by content address, for any number of processes."""
-
-    def check(self) -> None:
-        """Refuse a store that cannot be written, before anything is rendered."""
-
-    def result(self, address: str) -> SegmentResult | None:
-        """Result of a stored segment; None if it is not stored."""
-
-    def put(self, address: str, movie: Path, result: SegmentResult) -> None:
-        """Store a segment; the same segment may be stored twice."""
-
-    def fetch(self, address: str, folder: Path) -> Path:
-        """Local path of a stored segment, copied into a folder if it is not local."""
-
-    def addresses(self) -> Iterator[str]:
-        """Addresses of all stored segments."""
-
-    def entries(self) -> Iterator[StoredSegment]:
-        """All stored segments with their sizes and times."""
-
-    def remove(self, address: str) -> None:
-        """Remove a segment, if it is stored."""
-
-    def scratch(self) -> Path | None:
-        """Folder of the store for files that are being rendered; None if it is not local."""
-
-
-def open_store(where: str | Path) -> Store:
-    """Store of a local folder, or of a URL of S3, Google Cloud Storage or Azure.
+def open_store(where: str | Path) -> "Store":
+    """Store of a local folder, which is created, or of a URL of S3, Google Cloud Storage or Azure.
 
     Raises
     ------
@@ -59,102 +30,97 @@ def open_store(where: str | Path) -> Store:
     BackendError
         The package obstore is missing, or the folder cannot be created.
     """
-    text = str(where)
-    if text.startswith(REMOTE_SCHEMES):
-        from tts2face.serving.batch.object_store import ObjectStore
-
-        return ObjectStore(text)
-    if "://" in text:
-        raise InputError(
-            f"there is no store {text}; give a folder, or a URL that begins with {', '.join(REMOTE_SCHEMES)}"
-        )
-    return FolderStore(Path(text))
-
-
-class FolderStore:
-    """A local folder; files appear by rename, the result after its movie."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    store = Store(open_content_store(where))
+    if store.folder is not None:
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            store.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise BackendError(f"cannot create the folder {folder}: {error.strerror}; choose another one") from error
+            raise BackendError(
+                f"cannot create the folder {store.folder}: {error.strerror}; choose another one"
+            ) from error
+    return store
+
+
+class Store:
+    """Segments by content address; the result of one follows its movie."""
+
+    def __init__(self, files: ContentStore) -> None:
+        self.files = files
+        self.folder = files.folder if isinstance(files, FolderStore) else None
 
     def check(self) -> None:
-        """Refuse a folder that cannot be written.
+        """Refuse a store that cannot be written, before anything is rendered."""
+        self.files.check()
+
+    def scratch(self) -> Path | None:
+        """Folder of the store for files that are being rendered; None if it is not local."""
+        return self.files.scratch()
+
+    def result(self, address: str) -> SegmentResult | None:
+        """Result of a stored segment; None if it is not stored or damaged, so that it is rendered again."""
+        if self.folder is not None and not self.files.get(_movie(address), 1):
+            return None
+        content = self.files.get(_result(address), MAX_RESULT_BYTES)
+        if content is None:
+            return None
+        try:
+            return result_from_json(parse_json(content.decode(), "the result of a segment"))
+        except (ValueError, TypeError, AttributeError, DataError):
+            return None
+
+    def put(self, address: str, movie: Path, result: SegmentResult) -> None:
+        """Move a movie into the store, then write its result; the same segment may be stored twice."""
+        try:
+            self.files.add(_movie(address), movie)
+        except OSError as error:
+            target = f"{self.files.place}/{_movie(address)}"
+            raise BackendError(f"cannot write {target}: {error.strerror}; free some space") from error
+        self.files.put(_result(address), json.dumps(result.as_json()).encode())
+        movie.unlink(missing_ok=True)
+
+    def fetch(self, address: str, folder: Path) -> Path:
+        """Local path of a stored segment, copied into a folder if it is not local.
 
         Raises
         ------
         BackendError
-            It cannot be written.
+            It is not stored.
         """
         try:
-            folder = self.scratch() or self.folder
-            with Temporary(folder / "check"):
-                pass
-        except OSError as error:
-            raise BackendError(
-                f"cannot write the folder {self.folder}: {error.strerror}; change its permissions or choose another one"
-            ) from error
-
-    def result(self, address: str) -> SegmentResult | None:
-        """Result of a stored segment; None if it is not stored or damaged."""
-        movie = self._path(address)
-        try:
-            if movie.stat().st_size == 0:
-                return None
-            content = movie.with_suffix(RESULT_SUFFIX).read_bytes()[:MAX_RESULT_BYTES]
-        except OSError:
-            return None
-        return parse_result(content)
-
-    def put(self, address: str, movie: Path, result: SegmentResult) -> None:
-        """Move a movie into the store, then write its result."""
-        target = self._path(address)
-        target.parent.mkdir(exist_ok=True)
-        try:
-            if movie.parent == target.parent or movie.stat().st_dev == target.parent.stat().st_dev:
-                movie.replace(target)
-            else:
-                with Temporary(target) as temporary:
-                    shutil.copyfile(movie, temporary.path)
-                    temporary.replace(target)
-        except OSError as error:
-            raise BackendError(f"cannot write {target}: {error.strerror}; free some space") from error
-        write_atomically(target.with_suffix(RESULT_SUFFIX), json.dumps(result.as_json()).encode())
-
-    def fetch(self, address: str, folder: Path) -> Path:
-        """Path of a stored segment."""
-        del folder
-        return self._path(address)
+            return self.files.lend(_movie(address), folder / f"{address}{SEGMENT_SUFFIX}")
+        except FileNotFoundError:
+            self.remove(address)  # a result without its movie
+            raise BackendError(f"the segment {address[:12]} is missing in {self.files.place}; run again") from None
 
     def addresses(self) -> Iterator[str]:
         """Addresses of all stored segments."""
-        for path in sorted(self.folder.glob(f"??/*{RESULT_SUFFIX}")):
-            if NAME_INFIX not in path.name:
-                yield path.stem
+        for one in self.files.entries():
+            address = Path(one.name).stem
+            if one.name == _result(address):
+                yield address
 
-    def entries(self) -> Iterator[StoredSegment]:
-        """All stored segments with their sizes and times."""
-        for folder in sorted(self.folder.glob("??")):
-            paths = [path for path in folder.iterdir() if path.suffix in (SEGMENT_SUFFIX, RESULT_SUFFIX)]
-            yield from sum_files((path.stem, path.stat().st_size, path.stat().st_mtime) for path in paths)
+    def entries(self) -> Iterator[Stored]:
+        """All stored segments by address; each with the bytes of its files together, and the time of the latest."""
+        found: dict[str, Stored] = {}
+        for one in self.files.entries():
+            address = Path(one.name).stem
+            if one.name in (_movie(address), _result(address)):
+                other = found.get(address, Stored(address, 0, 0.0))
+                found[address] = Stored(address, other.n_bytes + one.n_bytes, max(other.stored_s, one.stored_s))
+        yield from found.values()
 
     def remove(self, address: str) -> None:
-        """Remove a segment, its result first."""
-        movie = self._path(address)
-        movie.with_suffix(RESULT_SUFFIX).unlink(missing_ok=True)
-        movie.unlink(missing_ok=True)
+        """Remove a segment, its result first, if it is stored."""
+        self.files.delete(_result(address))
+        self.files.delete(_movie(address))
 
-    def scratch(self) -> Path | None:
-        """Folder in which segments are rendered, so that they can be moved into place."""
-        folder = self.folder / "scratch"
-        folder.mkdir(exist_ok=True)
-        return folder
 
-    def _path(self, address: str) -> Path:
-        return self.folder / address[:2] / f"{address}{SEGMENT_SUFFIX}"
+def _movie(address: str) -> str:
+    return divided(f"{address}{SEGMENT_SUFFIX}")
+
+
+def _result(address: str) -> str:
+    return divided(f"{address}{RESULT_SUFFIX}")
 
 
 def wait_for_store(action: Callable[[], Value], on_message: Callable[[str], None]) -> Value:

@@ -9,7 +9,7 @@ OpenAPI description of the body of a new job, made of the kinds of jobs.
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -92,7 +92,7 @@ def _check_size(size: str, most: int) -> None:
         raise RefusedError(400, "invalid_request", f"size {size[:20]} has more than {most} pixels; give a smaller one")
 
 
-BATCH_FIELDS = ("per", "overflow", "max_rate", "scene_gap", "format", "exports", "encoding")
+BATCH_FIELDS = tuple(one.name for one in fields(BatchOptions) if one.name != "audio")  # which is a part of the form
 MAX_CAST_CHARACTERS = 1_000_000
 
 

@@ -14,6 +14,7 @@ from tts2face.request import Request
 from tts2face.session.named_models import Models
 
 RECORDS = (Request, Models, Picture)
+OPTIONS = {one.name: one for record in RECORDS for one in fields(record)}
 MODEL_FIELDS, PICTURE_FIELDS = (frozenset(one.name for one in fields(record)) for record in (Models, Picture))
 # What differs over HTTP: names of uploads and of lists in place of paths and commands, and limits for everybody's sake.
 DESCRIPTIONS: Mapping[str, str] = MappingProxyType({
@@ -55,13 +56,23 @@ def options_model(name: str, left_out: Mapping[str, str]) -> type[StrictModel]:
     return create_model(name, __base__=StrictModel, **taken)  # type: ignore[call-overload, no-any-return]
 
 
+def described(name: str, description: str = "", **more: Any) -> Any:
+    """Limits, examples and text of an option, for a field that may have another name, another text, and more limits."""
+    option = OPTIONS[name]
+    low, high = LIMITS.get(name) or option.metadata.get("limits") or (None, None)
+    has_example = name in EXAMPLES or option.default is None
+    return Field(
+        ge=low,
+        le=high,
+        description=description or DESCRIPTIONS.get(name) or option.metadata["help"],
+        **{"examples": [EXAMPLES.get(name)] if has_example else None} | more,
+    )
+
+
 def _definition(option: "Option[Any]", kind: Any, default: Any) -> tuple[Any, Any]:
     """Type and default of a field; a model that is not named is the default one."""
-    name, metadata = option.name, option.metadata
     kinds = [str if one is Path else one for one in get_args(kind) or (kind,)]
-    low, high = LIMITS.get(name) or metadata.get("limits") or (None, None)
-    value: Any = Literal[metadata["choices"]] if metadata.get("choices") else kinds[0]
+    choices = option.metadata.get("choices")
+    value: Any = Literal[choices] if choices else kinds[0]
     optional = value | None if NoneType in kinds or default is None else value
-    example = [EXAMPLES.get(name)] if name in EXAMPLES or default is None else None
-    described = Field(ge=low, le=high, description=DESCRIPTIONS.get(name) or metadata["help"], examples=example)
-    return Annotated[optional, described], default
+    return Annotated[optional, described(option.name)], default

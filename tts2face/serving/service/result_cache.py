@@ -7,9 +7,6 @@ larger than the budget. An entry appears when its result is complete; several se
 import asyncio
 import hashlib
 import json
-import os
-import tempfile
-from collections import OrderedDict
 from collections.abc import AsyncIterator, Mapping
 from contextlib import aclosing, suppress
 from pathlib import Path
@@ -18,6 +15,8 @@ from typing import Any, BinaryIO
 from tts2face import __version__
 from tts2face.processes.message import RESULT, Message, read_message
 from tts2face.serving.service.messages import Work
+from tts2face.storage.content_store import FolderStore, content_hash
+from tts2face.storage.temporary import Temporary
 
 FORMAT = 2  # of entries; those of others are not found
 CACHED_KINDS = frozenset({"file", "speech"})
@@ -43,8 +42,7 @@ def _content_hash(value: Any) -> Any:
     """Hash of the file of a path; another value, such as a colour, itself."""
     if not isinstance(value, str) or not Path(value).is_file():
         return value
-    with Path(value).open("rb") as file:
-        return ["file", hashlib.file_digest(file, "sha256").hexdigest()]
+    return ["file", content_hash(Path(value))]
 
 
 def _file_state(value: Any) -> Any:
@@ -67,22 +65,11 @@ class ResultCache:
     """
 
     def __init__(self, folder: Path, max_bytes: int) -> None:
-        self._folder, self._max_bytes = folder, max_bytes
-        self._sizes: OrderedDict[str, int] = OrderedDict()  # the least recently used first
+        self._store, self._max_bytes = FolderStore(folder), max_bytes
         self.n_hits = self.n_misses = 0
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        found = [(path.stat().st_mtime, path) for path in folder.iterdir()]
-        for _, path in sorted(found):
-            if path.suffix:  # of a result that was not completed
-                path.unlink(missing_ok=True)
-            else:
-                self._sizes[path.name] = path.stat().st_size
-        self._make_room(0)
-
-    @property
-    def n_bytes(self) -> int:
-        """Size of all entries."""
-        return sum(self._sizes.values())
+        self._store.remove_drafts()
+        self.n_bytes = self._store.prune(max_bytes=max_bytes)  # size of all entries
 
     async def messages(self, work: Work, made: AsyncIterator[Message]) -> AsyncIterator[Message]:
         """Messages of the entry of a work; without one those of `made`, which become an entry in the end."""
@@ -94,77 +81,72 @@ class ResultCache:
                 while message := await asyncio.to_thread(read_message, entry):
                     yield message
             return
-        draft = _Draft(self._folder, int(MAX_SHARE * self._max_bytes))
+        draft = _Draft(self._store, int(MAX_SHARE * self._max_bytes))
         try:
             async with aclosing(made):  # type: ignore[type-var]
                 async for message in made:
                     await asyncio.to_thread(draft.add, message)
                     if message.kind == RESULT:
-                        self._keep(name, draft)
+                        await asyncio.to_thread(self._keep, name, draft)
                     yield message
         finally:
             draft.close()
 
     def _open(self, name: str) -> BinaryIO | None:
         try:
-            entry = (self._folder / name).open("rb")
+            entry = self._store.path(name).open("rb")
         except OSError:
-            self._sizes.pop(name, None)
             self.n_misses += 1
             return None
-        self._sizes[name] = os.fstat(entry.fileno()).st_size
-        self._sizes.move_to_end(name)
         with suppress(OSError):
-            os.utime(self._folder / name)
+            self._store.touch(name)
         self.n_hits += 1
         return entry
 
     def _keep(self, name: str, draft: "_Draft") -> None:
-        if not draft.is_complete:
-            return
-        self._sizes.pop(name, None)
-        self._make_room(draft.n_bytes)
+        """Make a draft an entry, for which others give way."""
         with suppress(OSError):
-            draft.move_to(self._folder / name)
-            self._sizes[name] = draft.n_bytes
-
-    def _make_room(self, n_bytes: int) -> None:
-        while self._sizes and self.n_bytes + n_bytes > self._max_bytes:
-            name, _ = self._sizes.popitem(last=False)
-            (self._folder / name).unlink(missing_ok=True)
+            self.n_bytes += draft.keep(name)
+            if self.n_bytes > self._max_bytes:
+                self.n_bytes = self._store.prune(max_bytes=self._max_bytes)
 
 
 class _Draft:
     """An entry that is being written; given up when it becomes too large or the disk is full."""
 
-    def __init__(self, folder: Path, max_bytes: int) -> None:
-        self._max_bytes, self.n_bytes, self.is_complete = max_bytes, 0, False
-        self._file: Any = None
+    def __init__(self, store: FolderStore, max_bytes: int) -> None:
+        self._store, self._max_bytes, self._n_bytes = store, max_bytes, 0
+        self._temporary: Temporary | None = None
         with suppress(OSError):
-            self._file = tempfile.NamedTemporaryFile(dir=folder, suffix=".part", delete=False)  # noqa: SIM115
+            self._temporary = store.draft()
+            self._file = self._temporary.path.open("wb")
 
     def add(self, message: Message) -> None:
-        if self._file is None:
+        if self._temporary is None:
             return
         content = message.encoded()
-        self.n_bytes += len(content)
+        self._n_bytes += len(content)
         try:
-            if self.n_bytes > self._max_bytes:
+            if self._n_bytes > self._max_bytes:
                 self.close()
-                return
-            self._file.write(content)
-            self.is_complete = message.kind == RESULT
-            if self.is_complete:
-                self._file.flush()
+            else:
+                self._file.write(content)
         except OSError:
             self.close()
 
-    def move_to(self, path: Path) -> None:
-        Path(self._file.name).replace(path)
+    def keep(self, name: str) -> int:
+        """Make the draft, which is complete, an entry; its bytes, 0 where it was given up."""
+        if self._temporary is None:
+            return 0
+        self._file.flush()
+        self._store.keep(self._temporary, name)
+        self._store.touch(name)
+        return self._n_bytes
 
     def close(self) -> None:
-        """Remove the file unless it has been moved."""
-        file, self._file = self._file, None
-        if file is not None:
-            file.close()
-            Path(file.name).unlink(missing_ok=True)
+        """Remove the file unless it has become an entry."""
+        temporary, self._temporary = self._temporary, None
+        if temporary is not None:
+            with suppress(OSError):
+                self._file.close()
+            temporary.remove()

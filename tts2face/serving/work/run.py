@@ -15,7 +15,6 @@ from typing import Any
 
 from lexicon.errors import DataError, Tts2faceError
 from tts2face.serving.batch.engine import Engine, Rendered
-from tts2face.serving.batch.object_store import StoreAwayError
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import Store, wait_for_store
 from tts2face.serving.work.blobs import BlobStore, open_blobs, place_file, place_models
@@ -23,6 +22,7 @@ from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase, connection_errors
 from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, DatabaseEngine, failure_reason, open_client
 from tts2face.serving.work.table import DONE, FAILED, JobFile, JobRecord
+from tts2face.storage.bucket import StoreAwayError
 from tts2face.storage.temporary import Temporary
 
 RUNNERS: Mapping[str, str] = {

@@ -17,8 +17,10 @@ from lexicon.errors import DataError
 from lexicon.inputs import parse_json
 from tts2face.interchange.exports.parts import Label
 from tts2face.picture.sound_stream import wav_header
+from tts2face.request import RATE_LIMITS
 from tts2face.serving.service.errors import ErrorBody, RefusedError
 from tts2face.serving.service.library import check_voice, resolve_dictionary
+from tts2face.serving.service.request_fields import described
 from tts2face.serving.service.routes.clips import service_state, timed_speech
 
 router = APIRouter(tags=["headtts"])
@@ -44,10 +46,10 @@ class HeadTtsRequest(BaseModel):
     voice: Annotated[str, Field(description="A voice of GET /v1/voices, or one of Kokoro for the default.")] = (
         "af_bella"
     )
-    language: Annotated[str, Field(description="Language of the text.")] = "en-us"
+    language: Annotated[str, described("language")] = "en-us"
     speed: Annotated[float, Field(ge=0.25, le=4.0, description="Speaking rate; limited to 0.5 to 2.")] = 1.0
     dictionary: Annotated[
-        str | None, Field(description="A dictionary of GET /v1/dictionaries; not part of HeadTTS.", examples=[None])
+        str | None, described("dictionary", "A dictionary of GET /v1/dictionaries; not part of HeadTTS.")
     ] = None
     audioEncoding: Annotated[Literal["wav", "pcm"], Field(description="Sound.")] = "wav"  # noqa: N815
 
@@ -156,8 +158,8 @@ async def _speak(request: HttpRequest | WebSocket, body: HeadTtsRequest) -> tupl
     items = body.input if isinstance(body.input, list) else [body.input]
     text, subtitles = items_to_ssml(items)
     fields: dict[str, Any] = {
-        "text": text, "language": body.language, "rate": min(max(body.speed, 0.5), 2.0), "gestures": "none",
-        "dictionary": body.dictionary,
+        "text": text, "language": body.language, "rate": min(max(body.speed, RATE_LIMITS[0]), RATE_LIMITS[1]),
+        "gestures": "none", "dictionary": body.dictionary,
     }  # fmt: skip
     if not KOKORO_VOICE.fullmatch(body.voice):
         check_voice(body.voice)

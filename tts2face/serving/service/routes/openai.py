@@ -12,13 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from tts2face.picture.sound_stream import SOUND_KINDS
 from tts2face.processes.message import Message
-from tts2face.serving.service.library import (
-    OPENAI_MODELS,
-    check_voice,
-    resolve_dictionary,
-    resolve_models,
-    shipped_names,
-)
+from tts2face.serving.service.library import OPENAI_MODELS, shipped_names
+from tts2face.serving.service.options import divide_options
+from tts2face.serving.service.request_fields import described
 from tts2face.serving.service.routes.clips import data_bytes, service_state, stream_work
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.session import catalogue
@@ -29,6 +25,7 @@ router = APIRouter(prefix="/v1", tags=["speech"])
 OPENAI_VOICES = (
     "alloy", "ash", "ballad", "cedar", "coral", "echo", "fable", "marin", "nova", "onyx", "sage", "shimmer", "verse",
 )  # fmt: skip
+SAME_NAMES = {"language", "face", "palette", "dictionary"}  # of fields and of options of clips
 FORMATS = {"jsonl": "curves"}  # further names of formats
 Format = Literal["mp3", "opus", "aac", "flac", "wav", "pcm", "mp4", "webm", "glb", "jsonl", "curves", "oculus", "azure"]
 
@@ -38,7 +35,7 @@ class Speech(BaseModel):
 
     model_config = ConfigDict(extra="ignore", strict=True)
 
-    input: Annotated[str, Field(min_length=1, description="Text, with marks or SSML.", examples=["Hello there."])]
+    input: Annotated[str, described("text", "Text, with marks or SSML.", min_length=1)]
     model: Annotated[str, Field(description="A talker, or a model name of OpenAI for the default talker.")] = "tts-1"
     voice: Annotated[
         str | dict[str, Any], Field(description="A voice of GET /v1/voices, or one of OpenAI's for the default voice.")
@@ -49,20 +46,18 @@ class Speech(BaseModel):
             description="Sound; mp4, webm: the clip; glb: animated mesh; jsonl: ARKit curves; oculus, azure: visemes."
         ),
     ] = "mp3"
-    speed: Annotated[float, Field(ge=0.5, le=2.0, description="Factor of the speaking rate.")] = 1.0
+    speed: Annotated[float, described("rate", "Factor of the speaking rate.")] = 1.0
     stream_format: Annotated[
         Literal["audio", "sse"], Field(description="Bytes, or server-sent events with base64 (sound only).")
     ] = "audio"
     instructions: Annotated[str | None, Field(description="Accepted and not used.", examples=["Speak calmly."])] = None
-    language: Annotated[str, Field(description="Language of the text; not part of OpenAI's API.")] = "en-us"
+    language: Annotated[str, described("language", "Language of the text; not part of OpenAI's API.")] = "en-us"
     face: Annotated[
-        str | None, Field(description="A face of GET /v1/faces; not part of OpenAI's API.", examples=["head"])
+        str | None, described("face", "A face of GET /v1/faces; not part of OpenAI's API.", examples=["head"])
     ] = None
-    palette: Annotated[
-        str | None, Field(description="A palette of GET /v1/palettes; not part of it.", examples=["starter"])
-    ] = None
+    palette: Annotated[str | None, described("palette", "A palette of GET /v1/palettes; not part of it.")] = None
     dictionary: Annotated[
-        str | None, Field(description="A dictionary of GET /v1/dictionaries; not part of it.", examples=[None])
+        str | None, described("dictionary", "A dictionary of GET /v1/dictionaries; not part of it.")
     ] = None
 
 
@@ -70,18 +65,15 @@ class Speech(BaseModel):
 async def speak(request: HttpRequest, speech: Speech) -> StreamingResponse:
     """Sound of a text, or its clip, curves or visemes, sent while it is made."""
     voice = speech.voice if isinstance(speech.voice, str) else str(speech.voice.get("id", ""))
-    fields: dict[str, Any] = {"text": speech.input, "rate": speech.speed, "language": speech.language}
-    fields["dictionary"] = speech.dictionary
+    given = speech.model_dump(include=SAME_NAMES, exclude_none=True) | {"text": speech.input, "rate": speech.speed}
     if voice not in OPENAI_VOICES:
-        fields["voice"] = voice
-    models = {"face": speech.face, "palette": speech.palette}
-    models |= {} if speech.model in OPENAI_MODELS else {"talker": speech.model}
+        given["voice"] = voice
+    if speech.model not in OPENAI_MODELS:
+        given["talker"] = speech.model
     format = FORMATS.get(speech.response_format, speech.response_format)
-    state, key = service_state(request), request.state.key
-    models = await resolve_models(state.library, key, {name: one for name, one in models.items() if one is not None})
-    fields = await resolve_dictionary(state.library, key, fields)
-    check_voice(fields.get("voice"))
-    work = state.work(models=models, request=fields, format=format)
+    state = service_state(request)
+    fields = await divide_options(state, request.state.key, given)
+    work = state.work(models=fields.models, request=fields.request, format=format)
     if speech.stream_format == "sse" and format in SOUND_KINDS:
         return await stream_work(request, work, "text/event-stream", convert=_sse)
     return await stream_work(request, work, media_types()[format])
