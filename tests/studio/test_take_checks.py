@@ -6,23 +6,36 @@ import shutil
 import pytest
 
 from lexicon.errors import InputError
-from tts2face.serving.studio.recording_work import TakeChecks
+from tts2face.serving.studio.recording_work import Recordings
 from tts2face.serving.studio.recordings import CHECKING, REFUSED, RecordingStore
+from tts2face.serving.studio.work import WorkList
 
 
 def run(coroutine):
     return asyncio.run(asyncio.wait_for(coroutine, 120))
 
 
+async def check_all(folder, store, number):
+    """Check the takes of a recording as a server that starts."""
+    work = WorkList(folder)
+    recordings = Recordings(folder, work)
+    await work.resume()
+    recordings.start()
+    while any(take.state == CHECKING for take in store.takes(number).values()):
+        await asyncio.sleep(0.05)
+    await work.close()
+    await recordings.close()
+
+
 def test_prompts_come_with_their_units(tmp_path):
     async def ask():
-        checks = TakeChecks(RecordingStore(tmp_path))
+        recordings = Recordings(tmp_path, WorkList(tmp_path))
         try:
             with pytest.raises(InputError, match="no shipped prompts in de"):
-                await checks.prompts(2, "de", None)
-            return await checks.prompts(2, "en-us", None)
+                await recordings.prompts(2, "de", None)
+            return await recordings.prompts(2, "en-us", None)
         finally:
-            await checks.stop()
+            await recordings.close()
 
     found = run(ask())
     assert len(found["prompts"]) == 25
@@ -43,14 +56,7 @@ def test_takes_that_were_not_checked_are_checked_after_a_restart(tmp_path, rende
         shutil.copy(clip, upload)
         store.add_take(number, at, upload, "video/webm")
 
-    async def check():
-        checks = TakeChecks(RecordingStore(tmp_path))  # as a server that starts again
-        checks.start()
-        while any(take.state == CHECKING for take in store.takes(number).values()):
-            await asyncio.sleep(0.05)
-        await checks.stop()
-
-    run(check())
+    run(check_all(tmp_path, store, number))
     takes = store.takes(number)
     assert takes[1].state == REFUSED
     assert "read exactly what is shown" in takes[1].advice
@@ -64,14 +70,7 @@ def test_a_file_that_is_no_video_is_refused_with_one_sentence(tmp_path, face_mod
     (tmp_path / "upload").write_bytes(b"no video at all" * 100)
     take = store.add_take(number, 0, tmp_path / "upload", "video/webm")
 
-    async def check():
-        checks = TakeChecks(store)
-        checks.start()
-        while store.takes(number)[0].state == CHECKING:
-            await asyncio.sleep(0.05)
-        await checks.stop()
-
-    run(check())
+    run(check_all(tmp_path, store, number))
     found = store.takes(number)[0]
     assert (found.file, found.state) == (take.file, REFUSED)
     assert "cannot be read as video or sound" in found.advice

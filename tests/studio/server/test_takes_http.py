@@ -16,7 +16,8 @@ from tests.corpus_tools.test_takes_tool import write_table
 from tests.running import RunningService, eventually
 from tests.studio.server.test_styles_http import owned, wait_for_take  # noqa: F401 - a fixture
 from tts2face.serving.studio.previews import read_bundle
-from tts2face.serving.studio.takes import FAILED, READY, TakeStore
+from tts2face.serving.studio.takes import READY
+from tts2face.serving.work.table import FAILED
 from tts2face.session.performance import Performance, perform
 from tts2face.session.session import Session
 from tts2face.video.media import read_frames
@@ -83,17 +84,6 @@ def test_what_is_no_take_is_refused_in_one_sentence(studio: httpx.Client, table:
     answer = studio.put("/api/takes/new", content=b"%PDF", headers={"Content-Type": "application/pdf"})
     assert "a take must be" in answer.json()["error"]["message"]
     assert studio.get("/api/takes/../takes/files").status_code in {404, 405}
-
-
-def test_a_stop_of_the_server_deletes_videos_that_were_being_read(tmp_path: Path) -> None:
-    store = TakeStore(tmp_path)
-    entry = store.create("ann", "One")
-    video = store.folder("ann", entry.id) / "video.webm"
-    video.write_bytes(b"video")
-    TakeStore(tmp_path).end_readings()
-    assert not video.exists()
-    assert store.entry("ann", entry.id).state == FAILED
-    assert store.entries("bob") == []
 
 
 def test_a_live_camera_is_followed_and_only_one_at_a_time(

@@ -16,7 +16,6 @@ from tts2face.serving.service.server import NO_TELEMETRY, Mount
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio.pages import animate, frame, projects, puppet, reports, styles
 from tts2face.serving.studio.pages.record import add_record_page
-from tts2face.serving.studio.recording_work import Recordings
 from tts2face.serving.studio.requests import TASKS
 from tts2face.serving.studio.routes import comparing as comparison_routes
 from tts2face.serving.studio.routes import projects as projects_routes
@@ -38,14 +37,14 @@ def mount_studio(app: FastAPI, state: ServiceState) -> None:
         app.include_router(room.router)
     for page in (projects, animate, styles, puppet, reports):
         page.register(studio)
-    recordings = add_record_page(app, studio.folder, _recording_owner)
+    add_record_page(app, studio.recordings, _recording_owner)
     _disable_telemetry()
     pages_app.config.socket_io_js_transports = ["websocket"]
     ui.run_with(
         app, mount_path=PAGES, title=TITLE, language="en-US", dark=None, tailwind=False, reconnect_timeout=RECONNECT_S,
         show_welcome_message=False,
     )  # fmt: skip
-    _run_with(app, studio, recordings)
+    _run_with(app, studio)
 
 
 STUDIO = Mount(mount_studio, TASKS)
@@ -68,20 +67,17 @@ def _recording_owner(request: HttpRequest) -> str:
     return str(key.name)
 
 
-def _run_with(app: FastAPI, studio: Studio, recordings: Recordings) -> None:
-    """Check takes while the application runs; save all projects when it ends, while its processes still run."""
+def _run_with(app: FastAPI, studio: Studio) -> None:
+    """Go on with the work of an earlier server; save all projects when it ends, while its processes still run."""
     before = app.router.lifespan_context
 
     @asynccontextmanager
     async def lifespan(whole: FastAPI) -> AsyncIterator[Any]:
         async with before(whole) as state:
-            recordings.checks.start()
             await studio.start()
-            await asyncio.to_thread(studio.takes.store.end_readings)
             try:
                 yield state
             finally:
-                await asyncio.shield(recordings.stop())
                 await asyncio.shield(studio.close())
 
     app.router.lifespan_context = lifespan

@@ -24,6 +24,7 @@ from tts2face.serving.service.state import ServiceState
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES, SOUND, SUBTITLES, decode_file
 from tts2face.serving.studio.requests import check_project
 from tts2face.serving.studio.store import ProjectEntry, ProjectStore
+from tts2face.serving.studio.work import WorkList
 from tts2face.serving.studio.workspace import Workspace
 from tts2face.session.project import MAX_NAME, Project
 
@@ -33,6 +34,7 @@ class StudioHost(Protocol):
 
     state: ServiceState
     store: ProjectStore
+    work: WorkList
 
     @property
     def folder(self) -> Path:

@@ -1,27 +1,24 @@
 """Recordings of the studio at work: the store, the checks of takes, and the building of talkers.
 
-Prompts and checks of takes by a process of the tools, and the takes that wait for it.
+Prompts and checks are made by a process of the tool ``recordings``. It is started by the first order, loads its
+networks once, and ends when there was nothing to do for `IDLE_S`.
 
-The process (the tool ``recordings``) is started by the first order, loads its networks once, and ends when
-there was nothing to do for `IDLE_S`.
-
-A talker from the accepted takes of a recording, and its first sentence, each in a child process.
-
-The building is that of the service's jobs (the tool ``talker``), with its limits.
+A talker from the accepted takes of a recording, and its first sentence, are made in a child process each. The building
+is that of the service's jobs (the tool ``talker``), with its limits.
 """
 
 import asyncio
 import os
 import shutil
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from lexicon.errors import BackendError, InputError, Tts2faceError
+from lexicon.errors import BackendError, InputError
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.parent import AsyncChild, ChildEndedError, call_once
 from tts2face.processes.program import ProcessLimits, Program
@@ -29,94 +26,21 @@ from tts2face.processes.tools import run_tool
 from tts2face.serving.studio.recordings import (
     ACCEPTED_FOLDER,
     CACHE,
-    CHECKING,
     FOLDERS,
-    GOOD,
     REFUSED,
-    WEAK,
+    UNCHECKED_FOLDER,
     RecordingStore,
     Take,
+    judge,
 )
+from tts2face.serving.studio.work import BackgroundWork, WorkKind, WorkList
 from tts2face.serving.work.kinds import BUILDER, CPU_S, CPU_S_PER_S, LIMITS, SLOWNESS
+from tts2face.serving.work.table import FAILED
 
 TOOL = "recordings"
-CHECK_LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=100_000, file_bytes=1 << 30, n_files=256)
+TOOL_LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=100_000, file_bytes=1 << 30, n_files=256)
 ANSWER_S = 120.0  # of one order, with the loading of the networks
 IDLE_S = 300.0
-REFUSAL = "refusal"  # severity of a finding
-
-
-class TakeChecks:
-    """Checks of takes, one after the other, while the page goes on."""
-
-    def __init__(self, store: RecordingStore) -> None:
-        self._store = store
-        self._child = AsyncChild(Program(TOOL, CHECK_LIMITS))
-        self._waiting: asyncio.Queue[tuple[str, int, Take]] = asyncio.Queue()
-        self._worker: asyncio.Task[None] | None = None
-
-    async def prompts(self, minutes: float, language: str, text: str | None) -> Mapping[str, Any]:
-        """Prompts as the tool gives them; `text` is the path of the user's text.
-
-        Raises
-        ------
-        InputError, DataError, BackendError
-            As `tts2face corpus prompts` says.
-        """
-        return await self._ask("prompts", {"minutes": minutes, "language": language, "text": text})
-
-    def start(self) -> None:
-        """Check the takes that wait, also those of an earlier run, from now on."""
-        if self._worker is None:
-            for one in self._store.unchecked():
-                self._waiting.put_nowait(one)
-            self._worker = asyncio.create_task(self._check_all())
-
-    def add(self, number: str, at: int, take: Take) -> None:
-        """Check a new take in its turn."""
-        self.start()
-        self._waiting.put_nowait((number, at, take))
-
-    async def stop(self) -> None:
-        """End the process and the checks; what was not checked is checked after the next start."""
-        if self._worker is not None:
-            self._worker.cancel()
-            with suppress(asyncio.CancelledError):
-                await self._worker
-        await self._child.close()
-
-    async def _check_all(self) -> None:
-        while True:
-            try:
-                number, at, take = await asyncio.wait_for(self._waiting.get(), IDLE_S)
-            except TimeoutError:
-                await self._child.close_when_idle()
-                continue
-            await asyncio.to_thread(self._store.judge, number, at, await self._check(number, at, take))
-
-    async def _check(self, number: str, at: int, take: Take) -> Take:
-        """The take with its state and, in one line, what to do better."""
-        video = self._store.path(number, take)
-        if not video.is_file() or take.state != CHECKING:
-            return take  # recorded again, or deleted
-        text, cache = self._store.transcript(number, at), str(video.parents[1] / CACHE)
-        try:
-            answer = await self._ask("check", {"video": str(video), "text": text, "cache": cache})
-        except Tts2faceError as error:
-            return replace(take, state=REFUSED, advice=str(error))
-        findings = answer["findings"]
-        if not findings:
-            return replace(take, state=GOOD, key=answer["key"])
-        state = REFUSED if findings[0]["severity"] == REFUSAL else WEAK
-        return replace(take, state=state, advice=str(findings[0]["message"]), key=answer["key"])
-
-    async def _ask(self, kind: str, order: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Answer of the process; it is started anew if it ended."""
-        try:
-            return (await self._child.call(kind, order, timeout_s=ANSWER_S)).content
-        except (ChildEndedError, TimeoutError) as failed:
-            raise BackendError("the take could not be checked in time; record it again, shorter or smaller") from failed
-
 
 TALKER, REPORT, CLIP = "talker.talker", "report.html", "first.mp4"  # files in the folder of a recording
 MADE, CHECKED = "made.talker", "checked"  # as the builder names them
@@ -187,42 +111,55 @@ HANDLERS: Mapping[str, Handler] = MappingProxyType({SPEAK: _speak})
 
 
 MAX_SENTENCE_CHARACTERS = 300
-
-
-@dataclass(slots=True)
-class Progress:
-    """Work on one recording: its stage with steps done and of all while it runs, then one sentence, or an error."""
-
-    stage: str = ""
-    done: int = 0
-    of: int = 0
-    is_running: bool = True
-    message: str = ""
-    error: str = ""
-
-    def show(self, stage: str, done: int, of: int) -> None:
-        """Set the stage and its steps."""
-        self.stage, self.done, self.of = stage, done, of
+BUILD, SAY, CHECK = "build", "say", "check"  # tasks of the work on a recording, and the kind of work on its takes
+WORK, ORDER = "recording", "work.json"  # kind of work, and its order in the folder of a recording
+AT_ONCE = 5  # recordings of an owner
 
 
 class Recordings:
-    """Recordings in a data folder; its methods run in the event loop of the server."""
+    """Recordings of all keys of a studio; methods belong to the event loop."""
 
-    def __init__(self, folder: Path) -> None:
-        self.store = RecordingStore(folder)
-        self.checks = TakeChecks(self.store)
-        self._progress: dict[str, Progress] = {}
-        self._tasks: dict[str, asyncio.Task[None]] = {}
+    def __init__(self, folder: Path, work: WorkList) -> None:
+        self.store, self._work = RecordingStore(folder), work
+        self._tool, self._turn = AsyncChild(Program(TOOL, TOOL_LIMITS)), asyncio.Lock()
+        self._used_at = 0.0
+        self._ending: asyncio.Task[None] | None = None
+        busy = "the last order still runs; wait for it, or cancel it"
+        late = "the work took too long; try it with fewer takes"
+        orders = f"recordings/*/{ORDER}"
+        work.register(WorkKind(WORK, orders, self._run, stage="starting", at_once=AT_ONCE, busy=busy, late=late))
+        work.register(WorkKind(CHECK, f"recordings/*/{UNCHECKED_FOLDER}/*.json", self._check, end=self._end_check))
 
-    def progress(self, number: str) -> Progress | None:
-        """Latest work on a recording since the server started."""
-        return self._progress.get(number)
+    async def prompts(self, minutes: float, language: str, text: str | None) -> Mapping[str, Any]:
+        """Prompts as the tool gives them; `text` is the path of the user's text.
+
+        Raises
+        ------
+        InputError, DataError, BackendError
+            As `tts2face corpus prompts` says.
+        """
+        return await self._ask("prompts", {"minutes": minutes, "language": language, "text": text})
+
+    def start(self) -> None:
+        """Check takes whose check has not begun."""
+        for number, at, take in self.store.unchecked():
+            with suppress(InputError):  # its work goes on
+                self.check(number, at, take)
+
+    def check(self, number: str, at: int, take: Take) -> None:
+        """Check a new take in its turn."""
+        order = self.store.at(number) / UNCHECKED_FOLDER / f"{take.file}.json"
+        self._work.add(CHECK, self.store.owner(number), order, {"at": at})
+
+    def work_on(self, number: str) -> BackgroundWork | None:
+        """The last work on a recording since the server began."""
+        return self._work.get(self.store.at(number) / ORDER)
 
     def accepted(self, number: str) -> list[int]:
         """Indices of the prompts with an accepted take."""
         return [at for at, take in self.store.takes(number).items() if FOLDERS[take.state] == ACCEPTED_FOLDER]
 
-    def build(self, number: str, folder: Path, consent: str) -> None:
+    def build(self, number: str, consent: str) -> None:
         """Start to build the talker.
 
         Raises
@@ -230,15 +167,11 @@ class Recordings:
         InputError
             There is no accepted take, or the recording is at work already.
         """
-        n_takes, name = len(self.accepted(number)), self.store.name(number)
-        if not n_takes:
+        if not self.accepted(number):
             raise InputError("there is no accepted take; record some prompts")
-        self._start(
-            number,
-            lambda show: build_talker(folder, name=name, consent=consent, n_takes=n_takes, on_message=show),
-        )
+        self._start(number, {"task": BUILD, "consent": consent})
 
-    def speak(self, number: str, folder: Path, text: str) -> None:
+    def speak(self, number: str, text: str) -> None:
         """Start to make the clip of a sentence.
 
         Raises
@@ -246,54 +179,77 @@ class Recordings:
         InputError
             There is no talker yet, the sentence is empty or too long, or the recording is at work already.
         """
-        if not (folder / TALKER).is_file():
+        if not (self.store.at(number) / TALKER).is_file():
             raise InputError("there is no talker yet; build it first")
         if not text.strip() or len(text) > MAX_SENTENCE_CHARACTERS:
             raise InputError(f"the sentence must have 1 to {MAX_SENTENCE_CHARACTERS} characters; change it")
+        self._start(number, {"task": SAY, "text": text})
 
-        async def make(show: Callable[[str, int, int], None]) -> str:
-            show("rendering the clip", 0, 0)
-            await speak(folder, text)
-            return "The clip is ready."
-
-        self._start(number, make)
-
-    async def cancel(self, number: str) -> None:
+    def cancel(self, number: str) -> None:
         """End the work on a recording."""
-        task = self._tasks.get(number)
-        if task is not None:
-            task.cancel()
-            await asyncio.wait([task])
+        work = self.work_on(number)
+        if work is not None:
+            self._work.cancel(work)
 
     async def delete(self, number: str) -> None:
-        """End the work on a recording and delete all of it."""
-        await self.cancel(number)
-        self._progress.pop(number, None)
-        self._tasks.pop(number, None)
+        """End the work on a recording and its takes, and delete all of it."""
+        await self._work.forget(self.store.at(number))
         await asyncio.to_thread(self.store.delete, number)
 
-    async def stop(self) -> None:
-        """End the processes."""
-        for number in list(self._tasks):
-            await self.cancel(number)
-        await self.checks.stop()
+    async def close(self) -> None:
+        """End the process of the tool."""
+        if self._ending is not None:
+            self._ending.cancel()
+        await self._tool.close()
 
-    def _start(self, number: str, work: Callable[[Callable[[str, int, int], None]], Coroutine[Any, Any, str]]) -> None:
-        running = self._progress.get(number)
-        if running is not None and running.is_running:
-            raise InputError("the last order still runs; wait for it, or cancel it")
-        progress = self._progress[number] = Progress("starting")
+    def _start(self, number: str, content: Mapping[str, Any]) -> None:
+        self._work.add(WORK, self.store.owner(number), self.store.at(number) / ORDER, content)
 
-        async def follow() -> None:
+    async def _run(self, work: BackgroundWork) -> str:
+        folder, content = work.order.parent, work.content
+        if content["task"] == SAY:
+            work.show("rendering the clip", 0, 0)
+            await speak(folder, content["text"])
+            return "The clip is ready."
+        n_takes, name = len(self.accepted(folder.name)), self.store.name(folder.name)
+        consent = content["consent"]
+        return await build_talker(folder, name=name, consent=consent, n_takes=n_takes, on_message=work.show)
+
+    async def _check(self, work: BackgroundWork) -> str:
+        """Give the take its state and, in one line, what to do better."""
+        folder, at = work.order.parents[1], work.content["at"]
+        take = self.store.takes(folder.name).get(at)
+        if take is None or take.file != work.id:
+            return ""  # recorded again, or deleted
+        order = {
+            "video": str(self.store.path(folder.name, take)), "text": self.store.transcript(folder.name, at),
+            "cache": str(folder / CACHE),
+        }  # fmt: skip
+        answer = await self._ask("check", order)
+        state, advice = judge(answer["findings"])
+        judged = replace(take, state=state, advice=advice, key=answer["key"])
+        await asyncio.to_thread(self.store.judge, folder.name, at, judged)
+        return advice
+
+    def _end_check(self, work: BackgroundWork) -> None:
+        if work.state == FAILED:
+            number, refused = work.order.parents[1].name, Take(work.id, REFUSED, work.message)
+            self.store.judge(number, work.content.get("at", -1), refused)
+
+    async def _ask(self, kind: str, order: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Answer of the tool, to one order after the other; its process is started anew if it ended."""
+        async with self._turn:
             try:
-                progress.message = await work(progress.show)
-            except Tts2faceError as error:
-                progress.error = str(error)
-            except TimeoutError:
-                progress.error = "the work took too long; try it with fewer takes"
-            except asyncio.CancelledError:
-                progress.error = "cancelled"
+                return (await self._tool.call(kind, order, timeout_s=ANSWER_S)).content
+            except (ChildEndedError, TimeoutError) as failed:
+                reason = "the take could not be checked in time; record it again, shorter or smaller"
+                raise BackendError(reason) from failed
             finally:
-                progress.is_running = False
+                self._used_at = asyncio.get_running_loop().time()
+                if self._ending is None or self._ending.done():
+                    self._ending = asyncio.create_task(self._end_when_idle())
 
-        self._tasks[number] = asyncio.create_task(follow())
+    async def _end_when_idle(self) -> None:
+        while (left_s := self._used_at + IDLE_S - asyncio.get_running_loop().time()) > 0:
+            await asyncio.sleep(left_s)
+        await self._tool.close_when_idle()

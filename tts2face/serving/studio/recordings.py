@@ -104,6 +104,13 @@ MAX_NAME_CHARACTERS = 60
 ENGLISH = "en"  # language of the transcripts that `tts2face corpus build` pronounces
 
 
+def judge(findings: Sequence[Mapping[str, Any]]) -> tuple[str, str]:
+    """State of a take by the findings of its check, the gravest first; what to do better, in one sentence."""
+    if not findings:
+        return GOOD, ""
+    return REFUSED if findings[0]["severity"] == "refusal" else WEAK, str(findings[0]["message"])
+
+
 @dataclass(frozen=True, slots=True)
 class Take:
     """A recorded prompt: its file, one of the states, what to do better, and the beginning of names in the cache."""
@@ -162,6 +169,14 @@ class RecordingStore:
         """
         return self._recordings.find(number, owner)
 
+    def at(self, number: str) -> Path:
+        """Path of the folder of a recording, whoever owns it."""
+        return self._recordings.at(number)
+
+    def owner(self, number: str) -> str:
+        """Owner of a recording; empty if it is deleted."""
+        return _owner(self.at(number)) or ""
+
     def name(self, number: str) -> str:
         """Name of a recording."""
         return str(self._read(number)["name"])
@@ -191,7 +206,7 @@ class RecordingStore:
         take = Take(f"take-{at + 1:04d}-{secrets.token_hex(3)}{suffix}", CHECKING)
         with self._lock, translate_disk_errors(content):
             manifest = self._read(number)
-            os.replace(content, self._recordings.at(number) / UNCHECKED_FOLDER / take.file)
+            os.replace(content, self.at(number) / UNCHECKED_FOLDER / take.file)
             earlier = manifest["takes"].get(str(at))
             manifest["takes"][str(at)] = asdict(take)
             self._write(number, manifest)
@@ -201,7 +216,7 @@ class RecordingStore:
 
     def judge(self, number: str, at: int, judged: Take) -> None:
         """Set the state of a take after its check; if it was recorded again or deleted meanwhile, forget it."""
-        folder = self._recordings.at(number)
+        folder = self.at(number)
         with self._lock:
             if not folder.is_dir():
                 return
@@ -235,7 +250,7 @@ class RecordingStore:
 
     def path(self, number: str, take: Take) -> Path:
         """File of a take."""
-        return self._recordings.at(number) / FOLDERS[take.state] / take.file
+        return self.at(number) / FOLDERS[take.state] / take.file
 
     def unchecked(self) -> Sequence[tuple[str, int, Take]]:
         """Takes whose check did not end, of all recordings: id, index of the prompt, take."""
@@ -256,11 +271,11 @@ class RecordingStore:
     def _remove_files(self, number: str, take: Take) -> None:
         """Remove a take, its transcript, and what its check cached."""
         for folder in set(FOLDERS.values()):
-            file = self._recordings.at(number) / folder / take.file
+            file = self.at(number) / folder / take.file
             file.unlink(missing_ok=True)
             file.with_suffix(".txt").unlink(missing_ok=True)
         if take.key:
-            for file in (self._recordings.at(number) / CACHE).glob(f"{take.key}-*"):
+            for file in (self.at(number) / CACHE).glob(f"{take.key}-*"):
                 file.unlink(missing_ok=True)
 
     def _entry(self, folder: Path) -> RecordingEntry:
@@ -273,7 +288,7 @@ class RecordingStore:
         return dict(self._read_json(number, MANIFEST))
 
     def _read_json(self, number: str, name: str) -> Any:
-        path = self._recordings.at(number) / name
+        path = self.at(number) / name
         try:
             return read_json(path)
         except OSError as refused:
@@ -281,4 +296,4 @@ class RecordingStore:
 
     def _write(self, number: str, manifest: Mapping[str, Any]) -> None:
         self.revision += 1
-        write_atomically(self._recordings.at(number) / MANIFEST, json.dumps(manifest, ensure_ascii=False).encode())
+        write_atomically(self.at(number) / MANIFEST, json.dumps(manifest, ensure_ascii=False).encode())

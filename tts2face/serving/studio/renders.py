@@ -1,86 +1,46 @@
 """Films and exports of projects: queued, made one after another behind previews, kept until they are deleted.
 
-What waits or runs lies beside the files as ``ID.json``, with the project as it was; the next server queues it again.
+``renders/ID-NAME`` in the folder of a project is such a file; until it is made, the order ``ID.json`` beside it holds
+the project as it was.
 """
 
-import asyncio
-import json
 import re
 import secrets
-from collections.abc import Callable
 from contextlib import aclosing
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from lexicon.errors import DataError, InputError, Tts2faceError
-from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
+from lexicon.errors import InputError
 from tts2face.interchange.exports.table import all_formats, find_format
 from tts2face.picture.movie import MOVIE_KINDS
 from tts2face.picture.sound_stream import SOUND_KINDS
-from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.keys import LOCAL_KEY, ApiKey
-from tts2face.serving.service.logs import log_event
-from tts2face.serving.service.messages import Work
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.studio.requests import project_work
+from tts2face.serving.studio.requests import key_of, project_work
 from tts2face.serving.studio.store import RENDERS
+from tts2face.serving.studio.work import ID, BackgroundWork, WorkKind, WorkList
 from tts2face.serving.studio.workspace import Workspace
+from tts2face.serving.work.table import DONE
 from tts2face.session.project_file import parse_project, project_json
-from tts2face.storage.files import translate_disk_errors, write_atomically
+from tts2face.storage.files import translate_disk_errors
 
-WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"
+RENDER = "render"  # kind of work
 PRIORITY = 1  # below that of previews and of all requests over HTTP
 MAX_OPEN = 20  # of an owner, waiting or running
-MAX_TRIES = 3  # of a file by servers that ended meanwhile
-ORDER = re.compile(r"([0-9a-f]{12})\.json")
-FILE = re.compile(r"([0-9a-f]{12})-(.+)")
+FILE = re.compile(f"({ID})-(.+)")
 
 
-@dataclass(slots=True)
-class Render:
-    """A file of a project that is made, or was made.
+class Renders:
+    """Files of all projects; at most one of each owner is made at a time.
 
-    Parameters
-    ----------
-    name
-        Name under which it is downloaded.
-    seconds, total
-        Seconds of the clip that are done, and of the whole clip.
+    The first of the files of a work is the one that is downloaded, by its title; `done` and `of` are seconds of the
+    clip.
     """
 
-    id: str
-    project: str
-    owner: str
-    name: str
-    path: Path
-    state: str = WAITING
-    seconds: float = 0.0
-    total: float = 0.0
-    message: str = ""
-    task: "asyncio.Task[None] | None" = field(default=None, repr=False)
+    def __init__(self, state: ServiceState, work: WorkList) -> None:
+        self._state, self._work = state, work
+        orders = f"projects/*/{RENDERS}/{ID}.json"
+        work.register(WorkKind(RENDER, orders, self._make, _prepare, max_open=MAX_OPEN, noun="files"))
 
-    @property
-    def order(self) -> Path:
-        """File with what is to be made, while it is not done."""
-        return self.path.with_name(f"{self.id}.json")
-
-    @property
-    def share(self) -> float:
-        """Done part, 0 to 1."""
-        return 1.0 if self.state == DONE else min(self.seconds / self.total, 1.0) if self.total else 0.0
-
-
-class RenderQueue:
-    """Renders of all projects; at most one of each owner runs."""
-
-    def __init__(self, state: ServiceState) -> None:
-        self._state = state
-        self._renders: dict[str, Render] = {}
-        self._turns: dict[str, asyncio.Lock] = {}
-        self.listeners: set[Callable[[], None]] = set()
-
-    async def add(self, workspace: Workspace, form: str) -> Render:
+    async def add(self, workspace: Workspace, form: str) -> BackgroundWork:
         """Queue a file of a project as it is now.
 
         Parameters
@@ -91,158 +51,68 @@ class RenderQueue:
         Raises
         ------
         InputError
-            There is no such format, or too many files wait.
+            There is no such format, too many files wait, or the project names what does not exist.
         """
-        owner = workspace.key.name
-        if sum(one.owner == owner and one.state in {WAITING, RUNNING} for one in self._renders.values()) >= MAX_OPEN:
-            raise InputError(f"{MAX_OPEN} files are being made already; wait, or cancel one")
-        number = secrets.token_hex(6)
-        name, kind, more = _plan(workspace.project.name, form)
-        path = workspace.folder / RENDERS / f"{number}-{name}"
-        total = workspace.preview.current.duration
-        content = project_json(workspace.project, workspace.folder)
-        order = {"owner": owner, "format": form, "total": total, "tries": 1, "project": content}
-        work = await workspace.work(kind, **more)
-        made = Render(number, workspace.id, owner, name, path, total=total)
-        await asyncio.to_thread(_write_order, made.order, order)
-        self._begin(made, work, workspace.key)
-        return made
+        _, kind, more = _plan(workspace.project.name, form)
+        await workspace.work(kind, **more)  # refuses what cannot be made
+        content = {
+            "format": form, "total": workspace.preview.current.duration,
+            "project": project_json(workspace.project, workspace.folder),
+        }  # fmt: skip
+        order = workspace.folder / RENDERS / f"{secrets.token_hex(6)}.json"
+        return self._work.add(RENDER, workspace.key.name, order, content)
 
-    async def resume(self, projects: Path) -> None:
-        """Queue again what an earlier server did not finish.
-
-        Parameters
-        ----------
-        projects
-            Folder of the folders of projects.
-        """
-        for path, order in await asyncio.to_thread(_read_orders, projects):
-            try:
-                await self._resume(path, order)
-            except (Tts2faceError, RefusedError, KeyError, TypeError) as wrong:
-                log_event("file not queued again", file=path.name, reason=str(wrong))
-                path.unlink(missing_ok=True)
-
-    async def _resume(self, path: Path, order: dict[str, Any]) -> None:
-        folder, owner = path.parent.parent, order["owner"]
-        key = next((one for one in self._state.keys or (LOCAL_KEY,) if one.name == owner), None)
-        if key is None or order["tries"] >= MAX_TRIES:
-            raise InputError("its key is gone" if key is None else f"{MAX_TRIES} servers ended while it was made")
-        project = parse_project(order["project"], path.name, folder)
-        name, kind, more = _plan(project.name, order["format"])
-        work = await project_work(self._state, key, project, folder, kind, **more)
-        await asyncio.to_thread(_write_order, path, order | {"tries": order["tries"] + 1})
-        file = path.with_name(f"{path.stem}-{name}")
-        self._begin(Render(path.stem, folder.name, owner, name, file, total=order["total"]), work, key)
-
-    def _begin(self, render: Render, work: Work, key: ApiKey) -> None:
-        self._renders[render.id] = render
-        render.task = asyncio.get_running_loop().create_task(self._make(render, work, key))
-        self._notify()
-
-    def of_project(self, project: str, owner: str, folder: Path) -> list[Render]:
-        """Renders of a project, those made before this server began too."""
-        known = {one.id: one for one in self._renders.values() if (one.project, one.owner) == (project, owner)}
+    def of_project(self, owner: str, folder: Path) -> list[BackgroundWork]:
+        """Files of a project by its folder, those made before this server began too."""
+        known = {one.id: one for one in self._work.of(RENDER, owner) if one.order.parents[1] == folder}
         for path in sorted((folder / RENDERS).glob("*")):
             found = FILE.fullmatch(path.name)
             if found is not None and found[1] not in known and not path.name.endswith(".part"):
-                known[found[1]] = Render(found[1], project, owner, found[2], path, DONE)
+                order = path.with_name(f"{found[1]}.json")
+                known[found[1]] = BackgroundWork(RENDER, owner, order, {}, found[2], DONE, files=(path,))
         return list(known.values())
 
-    def find(self, project: str, owner: str, folder: Path, number: str) -> Render:
-        """A render of a project.
+    def find(self, owner: str, folder: Path, number: str) -> BackgroundWork:
+        """A file of a project.
 
         Raises
         ------
         InputError
             There is none.
         """
-        for one in self.of_project(project, owner, folder):
+        for one in self.of_project(owner, folder):
             if one.id == number:
                 return one
         raise InputError(f"there is no file {number[:20]!r} of this project; choose one from its list")
 
-    def cancel(self, render: Render) -> None:
-        """Cancel a render that waits or runs; delete the file of one that is done."""
-        if render.task is not None:
-            render.task.cancel()
-        if render.state in {WAITING, RUNNING}:
-            render.state = CANCELLED
+    def cancel(self, render: BackgroundWork) -> None:
+        """Cancel a file that waits or runs; delete one that is done, or forget it."""
+        if render.is_open:
+            self._work.cancel(render)
         else:
-            self._renders.pop(render.id, None)
-        render.path.unlink(missing_ok=True)
-        render.order.unlink(missing_ok=True)
-        self._notify()
+            self._work.remove(render)
 
-    def forget(self, project: str) -> None:
-        """Cancel and forget all renders of a project that is removed."""
-        for one in [one for one in self._renders.values() if one.project == project]:
-            if one.task is not None:
-                one.task.cancel()
-            del self._renders[one.id]
-
-    async def close(self) -> None:
-        """End all; a later server makes what is not done."""
-        tasks = [one.task for one in self._renders.values() if one.task is not None and not one.task.done()]
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-
-    async def _make(self, render: Render, work: Work, key: ApiKey) -> None:
-        part = render.path.with_name(f"{render.path.name}.part")
-        try:
-            async with self._turns.setdefault(render.owner, asyncio.Lock()):
-                render.state = RUNNING
-                await self._write(render, part, work, key)
-                part.replace(render.path)
-                render.state = DONE
-                render.order.unlink(missing_ok=True)
-        except (RefusedError, Tts2faceError) as wrong:
-            render.state, render.message = FAILED, wrong.message if isinstance(wrong, RefusedError) else str(wrong)
-            render.order.unlink(missing_ok=True)
-        except asyncio.CancelledError:
-            render.state = CANCELLED
-            raise
-        finally:
-            part.unlink(missing_ok=True)
-            render.task = None
-            self._notify()
-
-    async def _write(self, render: Render, part: Path, work: Work, key: ApiKey) -> None:
-        with translate_disk_errors(render.path):
-            part.parent.mkdir(exist_ok=True)
+    async def _make(self, render: BackgroundWork) -> str:
+        (path, part), folder = render.files, render.order.parents[1]
+        key = key_of(self._state, render.owner)
+        project = parse_project(render.content["project"], render.order.name, folder)
+        _, kind, more = _plan(project.name, render.content["format"])
+        work = await project_work(self._state, key, project, folder, kind, **more)
+        with translate_disk_errors(path):
             with part.open("wb") as file:
                 async with aclosing(self._state.messages(work, key, priority=PRIORITY)) as messages:  # type: ignore[type-var]
                     async for message in messages:
                         file.write(message.payload)
-                        render.seconds += message.content["seconds"]
-                        self._notify()
-
-    def _notify(self) -> None:
-        for listener in list(self.listeners):
-            listener()
+                        render.show("", render.done + message.content["seconds"], render.of)
+            part.replace(path)
+        return ""
 
 
-def _write_order(path: Path, order: dict[str, Any]) -> None:
-    with translate_disk_errors(path):
-        path.parent.mkdir(exist_ok=True)
-    write_atomically(path, json.dumps(order, ensure_ascii=False).encode())
-
-
-def _read_orders(projects: Path) -> list[tuple[Path, dict[str, Any]]]:
-    """Orders of all projects, the oldest first; what an ended server left of their files is removed."""
-    found = []
-    for path in projects.glob(f"*/{RENDERS}/*.json"):
-        if ORDER.fullmatch(path.name):
-            for part in path.parent.glob(f"{path.stem}-*.part"):
-                part.unlink(missing_ok=True)
-            try:
-                found.append(
-                    (path.stat().st_mtime, path, dict(parse_json(read_text(path, LARGEST_JSON_BYTES), path.name)))
-                )
-            except (OSError, DataError, TypeError, ValueError):
-                path.unlink(missing_ok=True)
-    return [(path, order) for _, path, order in sorted(found, key=lambda one: one[0])]
+def _prepare(render: BackgroundWork) -> None:
+    render.title, _, _ = _plan(render.content["project"]["name"], render.content["format"])
+    render.of = render.content["total"]
+    path = render.order.with_name(f"{render.id}-{render.title}")
+    render.files = path, path.with_name(f"{path.name}.part")
 
 
 def formats() -> dict[str, str]:

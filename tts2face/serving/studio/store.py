@@ -310,9 +310,13 @@ class PaletteStore:
         folder = self.path(owner).parent / "swatches" if own else self._studio / "swatches"
         return folder / f"{hashlib.sha256(f'{__version__} {style}'.encode()).hexdigest()[:24]}.webp"
 
+    def take_folder(self, owner: str) -> Path:
+        """Folder of the take, which may not exist."""
+        return self.path(owner).parent / TAKE
+
     def take(self, owner: str) -> Path | None:
         """The take of which a style is to be made."""
-        return next((file for file in self._take_folder(owner).glob("take.*") if file.suffix in SUFFIXES), None)
+        return next((file for file in self.take_folder(owner).glob("take.*") if file.suffix in SUFFIXES), None)
 
     def put_take(self, owner: str, source: Path, suffix: str, sound: Path | None = None) -> Path:
         """Keep a file, which is moved, as the take in place of an earlier one; the sound of a table is copied.
@@ -325,7 +329,7 @@ class PaletteStore:
         if suffix not in SUFFIXES:
             raise InputError(f"a take {suffix[:10]!r} cannot be read; give {', '.join(sorted(SUFFIXES))}")
         self.delete_take(owner)
-        target = self._take_folder(owner) / f"take{suffix}"
+        target = self.take_folder(owner) / f"take{suffix}"
         with translate_disk_errors(target):
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.move(source, target)
@@ -335,13 +339,10 @@ class PaletteStore:
 
     def delete_take(self, owner: str) -> None:
         """Delete the take, and what its check and the making of a style have stored of it."""
-        folder = self._take_folder(owner)
+        folder = self.take_folder(owner)
         with translate_disk_errors(folder):
             if folder.is_dir():
                 shutil.rmtree(folder)
-
-    def _take_folder(self, owner: str) -> Path:
-        return self.path(owner).parent / TAKE
 
 
 @lru_cache(maxsize=1)

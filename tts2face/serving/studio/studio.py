@@ -21,12 +21,14 @@ from tts2face.serving.service.keys import LOCAL_KEY, ApiKey
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio.previews import PieceMemory
-from tts2face.serving.studio.renders import RenderQueue
+from tts2face.serving.studio.recording_work import Recordings
+from tts2face.serving.studio.renders import Renders
 from tts2face.serving.studio.reports import Reports
 from tts2face.serving.studio.requests import data_of, studio_folder
 from tts2face.serving.studio.store import ProjectEntry, ProjectStore
 from tts2face.serving.studio.styles import Styles
 from tts2face.serving.studio.takes import Takes
+from tts2face.serving.studio.work import WorkList
 from tts2face.serving.studio.workspace import Workspace
 from tts2face.session.project import Project
 from tts2face.storage.files import translate_disk_errors, write_atomically
@@ -44,10 +46,12 @@ class Studio:
         self._folder: Path = studio_folder(state)
         self.store = ProjectStore(self._folder)
         self.memory = PieceMemory(state.settings.previews_mb * MB)
-        self.renders = RenderQueue(state)
+        self.work = WorkList(self._folder)
+        self.renders = Renders(state, self.work)
         self.styles = Styles(self)
         self.takes = Takes(self, self.styles)
-        self.reports = Reports(state.library, self._folder)
+        self.recordings = Recordings(self._folder, self.work)
+        self.reports = Reports(state, self._folder, self.work)
         self._open: dict[tuple[str, str], Workspace] = {}
         self._opening = asyncio.Lock()
         self._preparing: asyncio.Task[None] | None = None
@@ -102,12 +106,14 @@ class Studio:
         if found is not None:
             await found.close()
             found.tell_removed()
-        self.renders.forget(number)
+        await self.work.forget(self.store.folder(number, key.name))
         await asyncio.to_thread(self.store.remove, number, key.name)
 
     async def start(self) -> None:
         """Begin what an earlier server did not finish, and the face of new projects, as the settings say."""
-        await self.renders.resume(self._folder / "projects")
+        await self.work.resume()
+        self.recordings.start()
+        self.takes.start()
         if self.state.settings.warm_studio:
             self.prepare()
 
@@ -167,12 +173,10 @@ class Studio:
 
     async def close(self) -> None:
         """Save all projects, and end what is being made."""
-        await self.styles.close()
-        await self.takes.close()
+        await self.work.close()
+        await self.recordings.close()
         if self._preparing is not None:
             self._preparing.cancel()
-        await self.renders.close()
-        await self.reports.close()
         for one in self._open.values():
             await one.close()
 

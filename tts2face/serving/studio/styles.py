@@ -3,7 +3,7 @@
 import asyncio
 import os
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,36 +20,34 @@ from tts2face.models.palette_editing import (
 from tts2face.processes.tools import run_take_tool
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.studio.importing import StudioHost
-from tts2face.serving.studio.requests import data_of
-from tts2face.serving.studio.store import CACHE, MADE, SHIPPED, PaletteStore, ProjectEntry, is_own_palette
+from tts2face.serving.studio.recordings import REFUSED, judge
+from tts2face.serving.studio.requests import data_of, key_of
+from tts2face.serving.studio.store import CACHE, MADE, SHIPPED, TAKE, PaletteStore, ProjectEntry, is_own_palette
+from tts2face.serving.studio.work import BackgroundWork, WorkKind
+from tts2face.serving.work.table import FAILED
 from tts2face.session import project as style_names
 from tts2face.session.project import Project
 from tts2face.storage.files import translate_disk_errors, write_atomically
 
-GOOD, WEAK, REFUSED = "good", "weak", "refused"  # states of a take that was checked
-CHECKING, MAKING, CHECKED = "checking", "making", "checked"
+CHECKING, MAKING = "checking", "making"  # tasks of the work on a take
+WORK, ORDER = "style", "work.json"  # kind of work, and its order in the folder of the take
 N_SHOWN = 5  # names of projects in a sentence
 
 
-@dataclass(slots=True)
-class TakeWork:
-    """Work on the take of an owner: its stage with steps done and of all, then what came of it.
+@dataclass(frozen=True, slots=True)
+class TakeState:
+    """The take of an owner: the work on it with its stage, steps done and of all, then what came of it.
 
-    ``doing`` is `CHECKING`, `MAKING` or empty; ``state`` is `GOOD`, `WEAK` or `REFUSED` after the check; ``advice`` one
+    ``doing`` is `CHECKING`, `MAKING` or empty; ``state`` is that of `recordings.judge` after the check; ``advice`` one
     sentence.
     """
 
     doing: str = ""
     stage: str = ""
-    done: int = 0
-    of: int = 0
+    done: float = 0
+    of: float = 0
     state: str = ""
     advice: str = ""
-    task: "asyncio.Task[None] | None" = field(default=None, repr=False)
-
-    def show(self, stage: str, done: int, of: int) -> None:
-        """Set the stage and its steps."""
-        self.stage, self.done, self.of = stage, done, of
 
 
 class Styles:
@@ -58,16 +56,23 @@ class Styles:
     def __init__(self, studio: StudioHost) -> None:
         self._studio = studio
         self.store = PaletteStore(studio.folder)
-        self._works: dict[str, TakeWork] = {}
+        self._found: dict[str, tuple[str, str]] = {}  # states of the takes of owners, and advice
         self._drawing: dict[Path, asyncio.Lock] = {}
         self._drawn: dict[str, tuple[StyleMix, bytes]] = {}  # last mixes of owners
+        late = "the take needs too much time; record a shorter one"
+        orders = f"palettes/*.styles/{TAKE}/{ORDER}"
+        studio.work.register(WorkKind(WORK, orders, self._run, end=self._end, stage="starting", late=late))
 
-    def work(self, key: ApiKey) -> TakeWork:
-        """What is done with the key's take; one that came before the server started is checked anew."""
-        found = self._works.setdefault(key.name, TakeWork())
-        if not found.doing and not found.state and self.store.take(key.name) is not None:
-            self._start(key, CHECKING, lambda one: self._check(key, one))
-        return found
+    def take_state(self, key: ApiKey) -> TakeState:
+        """What is known of the key's take; one that came before the server started is checked anew."""
+        work = self._studio.work.get(self._order(key.name))
+        if key.name not in self._found and work is None and self.store.take(key.name) is not None:
+            work = self._start(key, {"task": CHECKING})
+        state, advice = self._found.get(key.name, ("", ""))
+        if work is None:
+            return TakeState(state=state, advice=advice)
+        doing = work.content["task"] if work.is_open else ""
+        return TakeState(doing, work.stage, work.done, work.of, state, advice)
 
     async def add_take(self, key: ApiKey, source: Path, suffix: str, sound: Path | None = None) -> None:
         """Check a new take, which replaces an earlier one; the file is moved, the sound of a table is copied.
@@ -80,14 +85,14 @@ class Styles:
         self.check_scope(key)
         await self._end_work(key)
         await asyncio.to_thread(self.store.put_take, key.name, source, suffix, sound)
-        self._works[key.name] = TakeWork()
-        self._start(key, CHECKING, lambda one: self._check(key, one))
+        self._found[key.name] = "", ""
+        self._start(key, {"task": CHECKING})
 
     async def delete_take(self, key: ApiKey) -> None:
         """Delete the take and end the work on it."""
         await self._end_work(key)
         await asyncio.to_thread(self.store.delete_take, key.name)
-        self._works[key.name] = TakeWork()
+        self._found[key.name] = "", ""
 
     async def make(self, key: ApiKey, name: str) -> None:
         """Begin to make a style of the take, which is deleted then.
@@ -98,13 +103,13 @@ class Styles:
             There is no usable take, or the name cannot be used.
         """
         self.check_scope(key)
-        work, take = self.work(key), self.store.take(key.name)
-        if take is None or work.doing:
+        take = self.take_state(key)
+        if take.doing or self.store.take(key.name) is None:
             raise InputError("there is no checked take; record or upload one, and wait for its check")
-        if work.state == REFUSED:
+        if take.state == REFUSED:
             raise InputError("the take cannot be used; record it again, or upload another one")
         name = check_new_style(await asyncio.to_thread(self.store.read, key.name), name)
-        self._start(key, MAKING, lambda one: self._make(key, one, take, name))
+        self._start(key, {"task": MAKING, "name": name})
 
     async def derive(self, key: ApiKey, name: str, mix: StyleMix) -> str:
         """Name of a new style that is mixed of others; errors as `mix_styles` and `add_derivation`."""
@@ -170,57 +175,45 @@ class Styles:
         if "build" not in key.scopes:
             raise InputError(f"the key {key.name} lacks the scope build, which recordings need; use another key")
 
-    async def close(self) -> None:
-        """End all work; takes stay, and are checked after the next start."""
-        for work in self._works.values():
-            if work.task is not None:
-                work.task.cancel()
-        await asyncio.gather(
-            *(one.task for one in self._works.values() if one.task is not None), return_exceptions=True
-        )
-
     async def _draw(self, key: ApiKey, request: dict[str, Any]) -> bytes:
         models = {"palette": self.store.base(key.name)}
         state = self._studio.state
         return await data_of(state, key, state.work(kind="swatch", models=models, request=request))
 
-    def _start(self, key: ApiKey, doing: str, run: Callable[[TakeWork], Any]) -> None:
-        work = self._works.setdefault(key.name, TakeWork())
-        work.doing, work.stage, work.done, work.of = doing, "starting", 0, 0
+    def _order(self, owner: str) -> Path:
+        return self.store.take_folder(owner) / ORDER
 
-        async def follow() -> None:
-            try:
-                await run(work)
-            except Tts2faceError as error:
-                work.state, work.advice = REFUSED, str(error)
-            except TimeoutError:
-                work.state, work.advice = REFUSED, "the take needs too much time; record a shorter one"
-            finally:
-                work.doing, work.task = "", None
+    def _start(self, key: ApiKey, content: dict[str, Any]) -> BackgroundWork:
+        return self._studio.work.add(WORK, key.name, self._order(key.name), content)
 
-        work.task = asyncio.get_running_loop().create_task(follow())
-
-    async def _check(self, key: ApiKey, work: TakeWork) -> None:
-        take = self.store.take(key.name)
-        assert take is not None
+    async def _run(self, work: BackgroundWork) -> str:
+        take = self.store.take(work.owner)
+        if take is None:
+            raise InputError("the take is gone; record or upload it again")
         order = {"take": str(take), "cache": str(take.with_name(CACHE))}
+        if work.content["task"] == MAKING:
+            return await self._make(work, take, order)
         found = await run_take_tool("check", order, work.show)
-        findings = found["findings"]
-        work.state = GOOD if not findings else REFUSED if findings[0]["severity"] == "refusal" else WEAK
-        work.advice = findings[0]["message"] if findings else f"a good take of {found['seconds']:.0f} s"
+        state, advice = judge(found["findings"])
+        self._found[work.owner] = state, advice or f"a good take of {found['seconds']:.0f} s"
+        return advice
 
-    async def _make(self, key: ApiKey, work: TakeWork, take: Path, name: str) -> None:
-        made = take.with_name(MADE)
-        order = {
-            "take": str(take), "cache": str(take.with_name(CACHE)), "base": self.store.base(key.name),
-            "name": name, "out": str(made),
-        }  # fmt: skip
+    async def _make(self, work: BackgroundWork, take: Path, order: dict[str, str]) -> str:
+        made, name = take.with_name(MADE), work.content["name"]
+        order = {**order, "base": self.store.base(work.owner), "name": name, "out": str(made)}
         built = await run_take_tool("style", order, work.show)
         learnt = await asyncio.to_thread(read_palette, made)
         # The palette may have changed meanwhile: only the new style is taken.
+        key = key_of(self._studio.state, work.owner)
         await self._change(key, lambda palette: _with_recorded(palette, learnt, name))
-        await asyncio.to_thread(self.store.delete_take, key.name)
-        work.state, work.advice = "", f"the style {name} is made of {built['seconds']:.0f} s; its take is deleted"
+        await asyncio.to_thread(self.store.delete_take, work.owner)
+        advice = f"the style {name} is made of {built['seconds']:.0f} s; its take is deleted"
+        self._found[work.owner] = "", advice
+        return advice
+
+    def _end(self, work: BackgroundWork) -> None:
+        if work.state == FAILED:
+            self._found[work.owner] = REFUSED, work.message
 
     async def _change(self, key: ApiKey, change: Callable[[Palette], Palette]) -> None:
         await asyncio.to_thread(self.store.change, key.name, change)
@@ -256,10 +249,8 @@ class Styles:
             await workspace.save()
 
     async def _end_work(self, key: ApiKey) -> None:
-        work = self._works.get(key.name)
-        if work is not None and work.task is not None:
-            work.task.cancel()
-            await asyncio.wait([work.task])
+        self._found.setdefault(key.name, ("", ""))  # no check begins while the take is replaced or deleted
+        await self._studio.work.forget(self.store.take_folder(key.name))
 
 
 def named(entries: list[ProjectEntry]) -> str:

@@ -12,14 +12,14 @@ import json
 import os
 import shutil
 import struct
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lexicon.errors import DataError, InputError, Tts2faceError
+from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_json
 from tts2face.processes.tools import run_take_tool
 from tts2face.serving.service.errors import RefusedError
@@ -31,12 +31,14 @@ from tts2face.serving.studio.recordings import OwnedFolders
 from tts2face.serving.studio.requests import events_of
 from tts2face.serving.studio.store import SUFFIXES
 from tts2face.serving.studio.styles import Styles
+from tts2face.serving.studio.work import BackgroundWork, WorkKind
+from tts2face.serving.work.table import FAILED
 from tts2face.storage.files import translate_disk_errors, write_atomically
 
 ENTRY, TABLE, SOUND, PREVIEW, FILM, VIDEO = (
     "take.json", "take.csv", "sound.wav", "preview.bin", "film.mp4", "video",
 )  # fmt: skip
-READING, READY, FAILED = "reading", "ready", "failed"  # states of a take
+READING, READY = "reading", "ready"  # states of a take, besides FAILED
 MAX_NAME = 60
 MAX_TAKES = 200  # of an owner
 
@@ -109,15 +111,17 @@ class TakeStore:
             raise InputError(f"the name must have 1 to {MAX_NAME} characters; write another one")
         self.write(replace(self.entry(owner, number), name=name))
 
-    def end_readings(self) -> None:
-        """Mark takes whose reading a stop of the server ended as failed, and delete their videos."""
-        for folder in self._takes.of():
-            entry = self._read(folder / ENTRY)
-            if entry.state == READING:
-                for video in folder.glob(f"{VIDEO}.*"):
-                    video.unlink()
-                message = "the server stopped while it was read; record or upload it again"
-                self.write(replace(entry, state=FAILED, message=message))
+    def readings(self) -> list[Path]:
+        """Folders of the takes of all owners that are being read."""
+        return [folder for folder in self._takes.of() if self._read(folder / ENTRY).state == READING]
+
+    def end_reading(self, folder: Path, message: str) -> None:
+        """Delete the video of a take, of which nothing but motion and sound is kept; if it is not read, it failed."""
+        for video in folder.glob(f"{VIDEO}.*"):
+            video.unlink()
+        entry = self._read(folder / ENTRY)
+        if entry.state == READING:
+            self.write(replace(entry, state=FAILED, message=message))
 
     @staticmethod
     def _read(file: Path) -> TakeEntry:
@@ -128,23 +132,10 @@ class TakeStore:
             return TakeEntry(file.parent.name, "damaged take", FAILED, message="its file is damaged; delete it")
 
 
+WORK, ORDER = "take", "work.json"  # kind of work, and its order in the folder of a take
+READ, MAKE_FILM = "read", "film"  # tasks of the work
 QUIET_RATE = 8000  # Hz of the silence that a take without sound has on the stage, whose clock it is
 FLOAT_BYTES = 4
-
-
-@dataclass(slots=True)
-class TakeProgress:
-    """Work on one take: its stage with steps done and of all, or an error."""
-
-    stage: str = ""
-    done: int = 0
-    of: int = 0
-    error: str = ""
-    task: "asyncio.Task[None] | None" = field(default=None, repr=False)
-
-    def show(self, stage: str, done: int, of: int) -> None:
-        """Set the stage and its steps."""
-        self.stage, self.done, self.of = stage, done, of
 
 
 class Takes:
@@ -154,12 +145,20 @@ class Takes:
         self._studio, self._styles = studio, styles
         self.store = TakeStore(studio.folder)
         self.live: set[str] = set()  # names of the keys with a live camera
-        self._works: dict[str, TakeProgress] = {}
-        self._turns: dict[str, asyncio.Lock] = {}  # of owners: one process at a time
+        busy = "the take is at work already; wait until it is done"
+        late = "the take needs too much time; record a shorter one"
+        orders = f"takes/*/{ORDER}"
+        studio.work.register(WorkKind(WORK, orders, self._run, end=self._end, stage="waiting", busy=busy, late=late))
 
-    def progress(self, number: str) -> TakeProgress:
-        """Work on a take."""
-        return self._works.setdefault(number, TakeProgress())
+    def work_on(self, key: ApiKey, number: str) -> BackgroundWork | None:
+        """The last work on a take since the server began; errors as `TakeStore.folder`."""
+        return self._studio.work.get(self.store.folder(key.name, number) / ORDER)
+
+    def start(self) -> None:
+        """Mark takes as failed that nothing reads on."""
+        for folder in self.store.readings():
+            if self._studio.work.get(folder / ORDER) is None:
+                self.store.end_reading(folder, "the server stopped while it was read; record or upload it again")
 
     async def add(self, key: ApiKey, source: Path, suffix: str, name: str) -> TakeEntry:
         """A new take of a video or a table, which is read from now on; the file is moved.
@@ -176,7 +175,7 @@ class Takes:
         file = self.store.folder(key.name, entry.id) / (TABLE if suffix == ".csv" else f"{VIDEO}{suffix}")
         with translate_disk_errors(file):
             await asyncio.to_thread(shutil.move, source, file)
-        self._start(key, entry.id, lambda show: self._read(key, entry, file, show))
+        self._studio.work.add(WORK, key.name, file.parent / ORDER, {"task": READ, "file": file.name})
         return entry
 
     async def add_sound(self, key: ApiKey, number: str, source: Path) -> None:
@@ -213,10 +212,8 @@ class Takes:
 
     def film(self, key: ApiKey, number: str) -> None:
         """Begin to render the take as a film."""
-        folder, entry = self._ready(key, number)
-        sound = str(folder / SOUND) if entry.has_sound else None
-        order = {"take": str(folder / TABLE), "sound": sound, "out": str(folder / FILM)}
-        self._start(key, number, lambda show: run_take_tool("film", order, show))
+        folder, _ = self._ready(key, number)
+        self._studio.work.add(WORK, key.name, folder / ORDER, {"task": MAKE_FILM})
 
     async def make_style_take(self, key: ApiKey, number: str) -> None:
         """Make the take the one of which a style is made; errors as `Styles.add_take`."""
@@ -240,19 +237,8 @@ class Takes:
 
     async def remove(self, key: ApiKey, number: str) -> None:
         """End the work on a take and delete it; errors as `TakeStore.folder`."""
-        self.store.folder(key.name, number)
-        work = self._works.pop(number, None)
-        if work is not None and work.task is not None:
-            work.task.cancel()
-            await asyncio.wait([work.task])
+        await self._studio.work.forget(self.store.folder(key.name, number))
         await asyncio.to_thread(self.store.remove, key.name, number)
-
-    async def close(self) -> None:
-        """End all work."""
-        tasks = [one.task for one in self._works.values() if one.task is not None]
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
 
     def _ready(self, key: ApiKey, number: str) -> tuple[Path, TakeEntry]:
         folder, entry = self.store.folder(key.name, number), self.store.entry(key.name, number)
@@ -260,44 +246,33 @@ class Takes:
             raise InputError(f"the take {entry.name} is not ready; wait until it is read, or delete it")
         return folder, entry
 
-    async def _read(self, key: ApiKey, entry: TakeEntry, file: Path, show: Callable[[str, int, int], None]) -> None:
-        folder = file.parent
-        try:
-            if file.name == TABLE:
-                found = await run_take_tool("check", {"take": str(file), "cache": str(folder)}, show)
-                if not found["seconds"]:
-                    raise InputError(found["findings"][0]["message"])
-            else:
-                table, sound = folder / TABLE, folder / SOUND
-                order = {"take": str(file), "table": str(table), "sound": str(sound)}
-                found = await run_take_tool("capture", order, show)
+    async def _run(self, work: BackgroundWork) -> str:
+        folder = work.order.parent
+        entry = self.store.entry(work.owner, folder.name)
+        if work.content["task"] == MAKE_FILM:
+            sound = str(folder / SOUND) if entry.has_sound else None
+            order = {"take": str(folder / TABLE), "sound": sound, "out": str(folder / FILM)}
+            await run_take_tool("film", order, work.show)
+        else:
+            found = await self._read(folder / work.content["file"], work.show)
+            entry = self.store.entry(work.owner, folder.name)  # it may have another name now
             ready = replace(entry, state=READY, seconds=found["seconds"], has_sound=found.get("has_sound", False))
             self.store.write(ready)
-        except Tts2faceError as wrong:
-            self.store.write(replace(entry, state=FAILED, message=str(wrong)))
-        finally:
-            if file.name != TABLE:
-                file.unlink(missing_ok=True)  # nothing but the motion and the sound is kept
+        return ""
 
-    def _start(self, key: ApiKey, number: str, work: Callable[[Callable[[str, int, int], None]], Any]) -> None:
-        progress = self.progress(number)
-        if progress.task is not None:
-            raise InputError("the take is at work already; wait until it is done")
-        progress.error = ""
-        progress.show("waiting", 0, 0)
+    async def _read(self, file: Path, show: Callable[[str, int, int], None]) -> Mapping[str, Any]:
+        """What the tool says of a table, or of a video from which it makes one."""
+        if file.name != TABLE:
+            order = {"take": str(file), "table": str(file.with_name(TABLE)), "sound": str(file.with_name(SOUND))}
+            return await run_take_tool("capture", order, show)
+        found = await run_take_tool("check", {"take": str(file), "cache": str(file.parent)}, show)
+        if not found["seconds"]:
+            raise InputError(found["findings"][0]["message"])
+        return found
 
-        async def follow() -> None:
-            try:
-                async with self._turns.setdefault(key.name, asyncio.Lock()):
-                    await work(progress.show)
-            except Tts2faceError as wrong:
-                progress.error = str(wrong)
-            except TimeoutError:
-                progress.error = "the take needs too much time; record a shorter one"
-            finally:
-                progress.stage, progress.task = "", None
-
-        progress.task = asyncio.get_running_loop().create_task(follow())
+    def _end(self, work: BackgroundWork) -> None:
+        if work.content.get("task") == READ:
+            self.store.end_reading(work.order.parent, work.message)
 
 
 def take_bundle(described: dict[str, Any], content: bytes) -> bytes:

@@ -4,7 +4,7 @@ Control of jobs: list, show, cancel, retry, prune.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -28,7 +28,7 @@ from tts2face.serving.work.database import (
 )
 from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, enqueue, failure_reason, open_client
 from tts2face.serving.work.resource_check import TALKER
-from tts2face.serving.work.table import CANCELLED, JobRecord, JobTable, NewJob
+from tts2face.serving.work.table import CANCELLED, FAILED, JobRecord, JobTable, NewJob, State
 
 CONNECT_S = 2  # to PostgreSQL; then the request is refused
 SESSION_OPTIONS = "-c statement_timeout=10000 -c lock_timeout=8000"  # ms
@@ -182,7 +182,7 @@ class JobClient:
         return [one.workflow_id for one in found]
 
 
-STATES = {
+STATES: Mapping[str, State] = {
     "ENQUEUED": "waiting",
     "DELAYED": "waiting",
     "PENDING": "running",
@@ -263,7 +263,7 @@ def cancel_jobs(database: str, names: Sequence[str] = ()) -> int:
 
 def retry_jobs(database: str, names: Sequence[str] = (), priority: int | None = None) -> int:
     """Queue failed and cancelled jobs again by name, or all of them; their number."""
-    ended = frozenset(status for status, state in STATES.items() if state in ("failed", "cancelled"))
+    ended = frozenset(status for status, state in STATES.items() if state in (FAILED, CANCELLED))
     url = _prepared(database)
     with open_client(url) as client, Workers(url) as workers:
         chosen = [_find(client, name) for name in names] if names else _of_states(client, ended)
@@ -341,7 +341,7 @@ def _job(one: Any, places: dict[str, str]) -> QueuedSegment:
         str(content.get("request", {}).get("text", "")),
         places.get(str(one.executor_id), str(one.executor_id or "")),
         one.recovery_attempts or 0,
-        failure_reason(one) if state in ("failed", "cancelled") else "",
+        failure_reason(one) if state in (FAILED, CANCELLED) else "",
         (one.created_at or 0) / 1000.0,
         took,
     )

@@ -6,12 +6,13 @@ Jobs of the service as records: what was asked for, its state, its files.
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal, get_args
 
 from lexicon.errors import BackendError, InputError
 from tts2face.serving.work.connection import JobDatabase, Transaction, create_tables
 
-WAITING, RUNNING, DONE, FAILED, CANCELLED = STATES = ("waiting", "running", "done", "failed", "cancelled")
+State = Literal["waiting", "running", "done", "failed", "cancelled"]  # of jobs, and of the studio's background work
+WAITING, RUNNING, DONE, FAILED, CANCELLED = STATES = get_args(State)
 OPEN_STATES = (WAITING, RUNNING)
 INPUT, OUTPUT = "input", "output"  # roles of files
 COLUMNS = (

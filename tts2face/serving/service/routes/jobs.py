@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator, Mapping
 from contextlib import AsyncExitStack
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Query
 from fastapi import Path as PathParameter
@@ -38,7 +38,7 @@ from tts2face.serving.service.uploads import MAX_TEXT_BYTES, upload_folder
 from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.serving.work.run import media_type
-from tts2face.serving.work.table import JobEvent, JobFile, JobRecord, NewJob
+from tts2face.serving.work.table import JobEvent, JobFile, JobRecord, NewJob, State
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 
@@ -54,7 +54,6 @@ IdempotencyKey = Annotated[
     ),
 ]  # fmt: skip
 JobId = Annotated[str, PathParameter(description="Name of the job.", examples=[EXAMPLE_ID])]
-State = Literal["waiting", "running", "done", "failed", "cancelled"]
 
 
 @router.post(

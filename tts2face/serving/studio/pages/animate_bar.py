@@ -6,8 +6,10 @@ from fastapi import Request as HttpRequest
 from nicegui import ui
 
 from tts2face.serving.studio.pages.frame import OpenPage, dark_button, heading, icon_button, shown_errors
-from tts2face.serving.studio.renders import DONE, RUNNING, WAITING, Render, formats
+from tts2face.serving.studio.renders import RENDER, formats
+from tts2face.serving.studio.work import BackgroundWork
 from tts2face.serving.studio.workspace import Workspace
+from tts2face.serving.work.table import DONE, RUNNING
 
 CLOCK = 'import("tts2face-studio/clock.js").then((m) => '
 TOGGLE_SIDES = 'import("tts2face-studio/preview.js").then((m) => m.sides.toggle())'
@@ -73,7 +75,8 @@ class Bar:
         keys = {key: button for _, key, button, _ in SHORTCUTS}
         ui.run_javascript(KEYS_SCRIPT % str(keys))
         self._files: ui.element | None = None
-        page.studio.renders.listeners.add(self._show_files)
+        self._listeners = page.studio.work.listeners[RENDER, workspace.key.name]
+        self._listeners.add(self._show_files)
         self.refresh()
 
     def refresh(self) -> None:
@@ -97,7 +100,7 @@ class Bar:
 
     def leave(self) -> None:
         """End listening."""
-        self._page.studio.renders.listeners.discard(self._show_files)
+        self._listeners.discard(self._show_files)
 
     def _button(self, icon: str, name: str, number: str, on_click: Any) -> ui.button:
         return icon_button(icon, name, on_click).props(f"id={number}")
@@ -142,26 +145,25 @@ class Bar:
         workspace, renders = self._page.workspace, self._page.studio.renders
         self._files.clear()
         with self._page.client, self._files:
-            found = renders.of_project(workspace.id, workspace.key.name, workspace.folder)
+            found = renders.of_project(workspace.key.name, workspace.folder)
             if not found:
                 ui.label("No file has been made yet.").classes("quiet")
             for one in reversed(found):
                 self._row(one)
 
-    def _row(self, render: Render) -> None:
+    def _row(self, render: BackgroundWork) -> None:
         renders = self._page.studio.renders
         with ui.element("div").classes("project"):
             with ui.element("div").classes("grow"):
-                ui.label(render.name)
+                ui.label(render.title)
                 ui.label(render.message or f"{render.state}, {100 * render.share:.0f} %").classes("quiet")
                 if render.state == RUNNING:
-                    ui.linear_progress(render.share, show_value=False).props(f'aria-label="Progress of {render.name}"')
+                    ui.linear_progress(render.share, show_value=False).props(f'aria-label="Progress of {render.title}"')
             if render.state == DONE:
-                address = f"/api/projects/{render.project}/renders/{render.id}/file"
-                icon_button("download", f"Download {render.name}", lambda: ui.download(address))
-            is_open = render.state in {WAITING, RUNNING}
+                address = f"/api/projects/{self._page.workspace.id}/renders/{render.id}/file"
+                icon_button("download", f"Download {render.title}", lambda: ui.download(address))
             icon_button(
-                "close" if is_open else "delete", f"{'Cancel' if is_open else 'Delete'} {render.name}",
+                "close" if render.is_open else "delete", f"{'Cancel' if render.is_open else 'Delete'} {render.title}",
                 lambda: renders.cancel(render),
             )  # fmt: skip
 

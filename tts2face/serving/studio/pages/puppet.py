@@ -17,7 +17,8 @@ from tts2face.serving.studio.pages.frame import begin_page, confirm, heading, ic
 from tts2face.serving.studio.pages.styles import ANY_TAKE
 from tts2face.serving.studio.routes.recordings import MAX_TAKE_BYTES
 from tts2face.serving.studio.studio import Studio
-from tts2face.serving.studio.takes import FAILED, FILM, READING, SOUND, TABLE, TakeEntry
+from tts2face.serving.studio.takes import FILM, READING, SOUND, TABLE, TakeEntry
+from tts2face.serving.work.table import FAILED
 
 REFRESH_S = 0.5
 FILES = "/api/takes"  # below the address of the pages
@@ -102,9 +103,11 @@ class PuppetPage:
         entries = self._takes.store.entries(self._key.name)
         rows = []
         for one in entries:
-            work = self._takes.progress(one.id)
+            work = self._takes.work_on(self._key, one.id)
+            stage = f"{work.stage} {work.done}" if work is not None and work.is_open else ""
+            error = work.message if work is not None else ""
             film = (self._takes.store.folder(self._key.name, one.id) / FILM).is_file()
-            rows.append((one, work.stage, work.done, work.error, film))
+            rows.append((one, stage, error, film))
         if rows == self._shown:
             return
         self._shown = rows
@@ -115,8 +118,8 @@ class PuppetPage:
                     "There is no take yet. Start the camera and record one, or upload a Live Link Face table (.csv) "
                     "or a video: the head plays it."
                 ).classes("note")
-            for one, stage, done, error, film in rows:
-                self._row(one, f"{stage} {done}".strip() if stage else "", error, has_film=film)
+            for one, stage, error, film in rows:
+                self._row(one, stage, error, has_film=film)
 
     def _row(self, take: TakeEntry, stage: str, error: str, *, has_film: bool) -> None:
         address, name = f"{FILES}/{take.id}", take.name

@@ -27,17 +27,8 @@ REFRESH_S = 0.4
 FIRST_SENTENCE = "Hello, this is my own face."
 
 
-def add_record_page(app: FastAPI, folder: Path, owner: Owner) -> Recordings:
-    """Add the pages to NiceGUI, which is to be mounted at `PAGES`, and their routes to the application around it.
-
-    The caller calls ``checks.start`` of the returned recordings when the application begins, and ``stop`` when it ends.
-
-    Parameters
-    ----------
-    folder
-        Folder of the studio; recordings are in ``recordings/`` of it.
-    """
-    recordings = Recordings(folder)
+def add_record_page(app: FastAPI, recordings: Recordings, owner: Owner) -> None:
+    """Add the pages to NiceGUI, which is to be mounted at `PAGES`, and their routes to the application around it."""
     app.include_router(recording_router(recordings, owner))
 
     @ui.page(RECORD_PAGE, title="Record - tts2face studio", language="en-US")
@@ -60,8 +51,6 @@ def add_record_page(app: FastAPI, folder: Path, owner: Owner) -> Recordings:
             return
         with _page(request, f"Record {recordings.store.name(number)}", RECORDINGS_LIST):
             _RecordingPage(recordings, number, here).show()
-
-    return recordings
 
 
 @contextmanager
@@ -117,7 +106,7 @@ def _list_page(recordings: Recordings, owner: str) -> None:
             with tempfile.TemporaryDirectory() as folder:
                 path = Path(folder) / "text"
                 path.write_bytes(text[0] if text else b"")
-                prompts = await recordings.checks.prompts(
+                prompts = await recordings.prompts(
                     float(minutes.value), str(language.value), str(path) if text else None
                 )
             ui.navigate.to(f"{RECORD_PAGE}/{recordings.store.create(owner, name.value, prompts)}")
@@ -186,7 +175,7 @@ class _RecordingPage:
         with ui.row():
             self._build = ui.button(
                 "Build the talker",
-                on_click=_reporting(lambda: self._recordings.build(self._number, self._folder, consent.value or "")),
+                on_click=_reporting(lambda: self._recordings.build(self._number, consent.value or "")),
             )
             self._cancel = ui.button("Cancel", on_click=lambda: self._recordings.cancel(self._number))
             self._cancel.props("flat")
@@ -200,7 +189,7 @@ class _RecordingPage:
                 said = ui.input("First sentence", value=FIRST_SENTENCE).props("outlined dense").classes("record-wide")
                 ui.button(
                     "Speak",
-                    on_click=_reporting(lambda: self._recordings.speak(self._number, self._folder, said.value or "")),
+                    on_click=_reporting(lambda: self._recordings.speak(self._number, said.value or "")),
                 )
             self._clip = ui.element("video").props('controls aria-label="First sentence of the talker"')
             self._clip.classes("record-clip")
@@ -227,10 +216,10 @@ class _RecordingPage:
 
     def _refresh(self) -> None:
         """Show what has changed."""
-        progress = self._recordings.progress(self._number)
+        work = self._recordings.work_on(self._number)
         clip = self._folder / CLIP
         now = (
-            self._recordings.store.revision, progress and (progress.stage, progress.done, progress.is_running),
+            self._recordings.store.revision, work and (work.stage, work.done, work.state),
             clip.stat().st_mtime_ns if clip.is_file() else 0,
         )  # fmt: skip
         if now == self._shown or not self._folder.is_dir():
@@ -240,13 +229,13 @@ class _RecordingPage:
         self._recorder.set_takes(self._takes())
         self._map.set_accepted(accepted)
         self._count.text = f"{len(accepted)} of {len(self._content['prompts'])} prompts recorded and accepted."
-        is_running = progress is not None and progress.is_running
+        is_running = work is not None and work.is_open
         self._build.set_enabled(bool(accepted) and not is_running)
         self._cancel.set_visibility(is_running)
         self._bar.set_visibility(is_running)
-        if progress is not None:
-            self._bar.value = progress.done / progress.of if progress.of else 0
-            self._status.text = progress.stage if is_running else progress.error or progress.message
+        if work is not None:
+            self._bar.value = work.done / work.of if work.of else 0
+            self._status.text = work.stage if is_running else work.message or work.state
         self._finished.set_visibility((self._folder / TALKER).is_file())
         self._clip.set_visibility(bool(now[2]))
         if now[2]:

@@ -17,9 +17,10 @@ from tts2face.serving.studio.pages.frame import (
     page_bar,
     shown_errors,
 )
-from tts2face.serving.studio.renders import DONE, RUNNING, WAITING
-from tts2face.serving.studio.reports import KINDS, Report
+from tts2face.serving.studio.reports import KINDS, REPORT
 from tts2face.serving.studio.studio import Studio
+from tts2face.serving.studio.work import BackgroundWork
+from tts2face.serving.work.table import DONE, RUNNING
 
 ALL_REPORTS = ("All reports", "/reports")
 # Loads a report into its frame in the colours of the studio: a frame knows only those of the system.
@@ -97,8 +98,9 @@ class ReportsPage:
                 self._list = ui.element("div")
         await self._offer()
         self._show()
-        self._studio.reports.listeners.add(self._show)
-        self._client.on_delete(lambda: self._studio.reports.listeners.discard(self._show))
+        listeners = self._studio.work.listeners[REPORT, self._key.name]
+        listeners.add(self._show)
+        self._client.on_delete(lambda: listeners.discard(self._show))
 
     async def _offer(self) -> None:
         names = await models(self._studio.state.library, self._key, KINDS[str(self._kind.value)][0])
@@ -118,12 +120,14 @@ class ReportsPage:
             for one in found:
                 self._row(one)
 
-    def _row(self, report: Report) -> None:
+    def _row(self, report: BackgroundWork) -> None:
         with ui.element("div").classes("project"):
             with ui.element("div").classes("grow"):
                 if report.state == DONE:
                     ui.link(report.title, f"/reports/{report.id}").classes("open")
-                    ui.label(time.strftime("%Y-%m-%d %H:%M", time.localtime(report.created))).classes("quiet")
+                    ui.label(time.strftime("%Y-%m-%d %H:%M", time.localtime(report.content["created"]))).classes(
+                        "quiet"
+                    )
                 else:
                     ui.label(report.title)
                     said = f"{report.stage}, {100 * report.share:.0f} %" if report.of else report.stage
@@ -131,19 +135,18 @@ class ReportsPage:
                 if report.state == RUNNING:
                     progress = ui.linear_progress(report.share, show_value=False)
                     progress.props(f'aria-label="Progress of {escape(report.title)}"')
-            is_open = report.state in {WAITING, RUNNING}
             icon_button(
-                "close" if is_open else "delete", f"{'Cancel' if is_open else 'Delete'} {report.title}",
+                "close" if report.is_open else "delete", f"{'Cancel' if report.is_open else 'Delete'} {report.title}",
                 lambda: self._ask_remove(report),
             )  # fmt: skip
 
-    async def _ask_remove(self, report: Report) -> None:
+    async def _ask_remove(self, report: BackgroundWork) -> None:
         if report.state != DONE:
-            self._studio.reports.remove(report)
+            self._studio.work.remove(report)
             return
 
         async def remove() -> None:
             with shown_errors():
-                self._studio.reports.remove(report)
+                self._studio.work.remove(report)
 
         await confirm(f"Delete the report {report.title!r}? This cannot be undone.", "Delete", remove)

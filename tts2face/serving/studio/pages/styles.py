@@ -27,10 +27,11 @@ from tts2face.serving.studio.components.recorder import STYLE as RECORDER_STYLE
 from tts2face.serving.studio.components.recorder import Recorder
 from tts2face.serving.studio.importing import SAMPLE_TEXT
 from tts2face.serving.studio.pages.frame import begin_page, confirm, heading, icon_button, page_bar, shown_errors
+from tts2face.serving.studio.recordings import REFUSED
 from tts2face.serving.studio.routes.recordings import MAX_TAKE_BYTES
 from tts2face.serving.studio.store import FILE, SUFFIXES, shipped
 from tts2face.serving.studio.studio import Studio
-from tts2face.serving.studio.styles import CHECKING, MAKING, REFUSED, Styles, named
+from tts2face.serving.studio.styles import CHECKING, MAKING, Styles, named
 from tts2face.session import catalogue
 from tts2face.session.project import Project
 
@@ -253,7 +254,7 @@ class PalettePage:
         """Show what has changed."""
         path = self._styles.store.path(self._key.name)
         version = path.stat().st_mtime_ns if path.is_file() else 0
-        work = self._styles.work(self._key) if "build" in self._key.scopes else None
+        work = self._styles.take_state(self._key) if "build" in self._key.scopes else None
         now = (version, work and (work.doing, work.stage, work.done, work.state, work.advice))
         if now == self._shown:
             return
@@ -265,7 +266,7 @@ class PalettePage:
             self._show_take()
 
     def _show_take(self) -> None:
-        work, has_take = self._styles.work(self._key), self._styles.store.take(self._key.name) is not None
+        work, has_take = self._styles.take_state(self._key), self._styles.store.take(self._key.name) is not None
         is_busy = bool(work.doing)
         self._bar.set_visibility(is_busy)
         self._bar.value = work.done / work.of if work.of else 0

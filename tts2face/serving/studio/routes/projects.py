@@ -17,11 +17,12 @@ from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import PAGES
 from tts2face.serving.service.uploads import BLOCK_BYTES
 from tts2face.serving.studio.importing import import_file, import_text
-from tts2face.serving.studio.renders import DONE, Render
 from tts2face.serving.studio.requests import data_of, events_of
 from tts2face.serving.studio.store import archive
 from tts2face.serving.studio.studio import Studio, face_answer
+from tts2face.serving.studio.work import BackgroundWork
 from tts2face.serving.studio.workspace import Workspace
+from tts2face.serving.work.table import DONE
 from tts2face.session.project_file import project_json
 
 API = f"{PAGES}/api"
@@ -169,7 +170,7 @@ async def explanation(request: HttpRequest, project: str, time: float = Query(ge
 async def list_renders(request: HttpRequest, project: str) -> list[dict[str, Any]]:
     """Files of a project, and their progress."""
     async with opened(request, project) as workspace:
-        found = _studio(request).renders.of_project(project, workspace.key.name, workspace.folder)
+        found = _studio(request).renders.of_project(workspace.key.name, workspace.folder)
         return [render_state(one) for one in found]
 
 
@@ -186,9 +187,8 @@ async def start_render(
 async def cancel_render(request: HttpRequest, project: str, number: str) -> Response:
     """Cancel a file, or delete it."""
     async with opened(request, project) as workspace:
-        _studio(request).renders.cancel(
-            _studio(request).renders.find(project, workspace.key.name, workspace.folder, number)
-        )
+        renders = _studio(request).renders
+        renders.cancel(renders.find(workspace.key.name, workspace.folder, number))
     return Response(status_code=204)
 
 
@@ -196,10 +196,10 @@ async def cancel_render(request: HttpRequest, project: str, number: str) -> Resp
 async def download_render(request: HttpRequest, project: str, number: str) -> FileResponse:
     """A finished file."""
     async with opened(request, project) as workspace:
-        found = _studio(request).renders.find(project, workspace.key.name, workspace.folder, number)
+        found = _studio(request).renders.find(workspace.key.name, workspace.folder, number)
         if found.state != DONE:
-            raise InputError(f"the file {found.name} is {found.state}; wait until it is done")
-        return FileResponse(found.path, filename=found.name)
+            raise InputError(f"the file {found.title} is {found.state}; wait until it is done")
+        return FileResponse(found.files[0], filename=found.title)
 
 
 async def explain(studio: Studio, workspace: Workspace, time: float) -> dict[str, Any]:
@@ -210,10 +210,10 @@ async def explain(studio: Studio, workspace: Workspace, time: float) -> dict[str
     raise InputError("the clip has no phones; give a text, or the words of its recording")
 
 
-def render_state(render: Render) -> dict[str, Any]:
+def render_state(render: BackgroundWork) -> dict[str, Any]:
     """JSON of a render."""
     return {
-        "id": render.id, "name": render.name, "state": render.state, "share": round(render.share, 4),
+        "id": render.id, "name": render.title, "state": render.state, "share": round(render.share, 4),
         "message": render.message,
     }  # fmt: skip
 

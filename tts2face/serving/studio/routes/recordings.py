@@ -45,7 +45,7 @@ def recording_router(recordings: Recordings, owner: Owner) -> APIRouter:
                 upload.unlink(missing_ok=True)
         except Tts2faceError as error:
             return JSONResponse({"error": str(error)}, 422)
-        recordings.checks.add(number, at, take)
+        recordings.check(number, at, take)
         return JSONResponse({"state": take.state}, 201)
 
     @router.get(TAKE)

@@ -8,8 +8,9 @@ from fastapi.responses import FileResponse, Response
 
 from lexicon.errors import InputError
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.studio.reports import Report, Reports
+from tts2face.serving.studio.reports import Reports
 from tts2face.serving.studio.routes.projects import API
+from tts2face.serving.studio.work import BackgroundWork
 
 # A report holds names of a user's files and must not act as a page of this origin.
 HEADERS = {
@@ -25,7 +26,7 @@ def _reports(request: HttpRequest) -> Reports:
     return reports
 
 
-def _found(request: HttpRequest, number: str) -> Report:
+def _found(request: HttpRequest, number: str) -> BackgroundWork:
     try:
         return _reports(request).find(request.state.key.name, number)
     except InputError as wrong:
@@ -57,13 +58,13 @@ async def show_report(request: HttpRequest, number: str) -> FileResponse:
 @router.delete("/{number}", status_code=204)
 async def remove_report(request: HttpRequest, number: str) -> Response:
     """Cancel a report, or delete it."""
-    _reports(request).remove(_found(request, number))
+    request.app.state.studio.work.remove(_found(request, number))
     return Response(status_code=204)
 
 
-def report_state(report: Report) -> dict[str, Any]:
+def report_state(report: BackgroundWork) -> dict[str, Any]:
     """JSON of a report."""
     return {
-        "id": report.id, "kind": report.kind, "model": report.model, "created": report.created, "state": report.state,
+        "id": report.id, **report.content, "created": report.created, "state": report.state,
         "stage": report.stage, "share": round(report.share, 4), "message": report.message,
     }  # fmt: skip

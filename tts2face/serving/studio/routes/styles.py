@@ -1,6 +1,7 @@
 """Addresses of own styles: the take in work, moving pictures, derived styles, the palette file."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query
@@ -14,7 +15,7 @@ from tts2face.serving.service.exchange import STYLES
 from tts2face.serving.studio.recordings import SUFFIXES
 from tts2face.serving.studio.routes.recordings import NO_STORE, uploaded_take
 from tts2face.serving.studio.store import FILE
-from tts2face.serving.studio.styles import Styles, TakeWork
+from tts2face.serving.studio.styles import Styles
 from tts2face.session import catalogue
 
 router = APIRouter(prefix=STYLES, include_in_schema=False)
@@ -34,7 +35,7 @@ async def list_styles(request: HttpRequest) -> dict[str, Any]:
         {"name": one.name, "source": one.source, "summary": one.summary, "is_own": one.name in own}
         for one in catalogue.styles(styles.store.base(key.name))
     ]
-    return {"styles": listed, "take": take_state(styles.work(key))}
+    return {"styles": listed, "take": asdict(styles.take_state(key))}
 
 
 @router.post("", status_code=201)
@@ -123,8 +124,3 @@ def parse_mix(given: Mapping[str, Any]) -> StyleMix:
         return StyleMix(**given)
     except (TypeError, AttributeError) as wrong:
         raise InputError(f"the mix cannot be read ({wrong}); give source, shares, expressions, sizes, tempo") from wrong
-
-
-def take_state(work: TakeWork) -> dict[str, Any]:
-    """JSON of the work on a take."""
-    return {name: getattr(work, name) for name in ("doing", "stage", "done", "of", "state", "advice")}
