@@ -70,7 +70,7 @@ def _foreign(value: Any) -> Any:
 def _sentence(error: "ErrorDetails", kind: Any) -> str:
     """Error after its place: ``, spans[2]: start must be a number, not "x"``."""
     place: Place = error["loc"][1:]
-    if error["type"] == "value_error":
+    if error["type"] in {"value_error", "json_invalid"}:  # of a constructor, or half a surrogate pair
         return f"{_path(place)}: {error['ctx']['error']}"
     expected = EXPECTED.get(_TYPES.get(error["type"], object), error["msg"].removeprefix("Input should be "))
     is_short = error["type"] == "missing" and isinstance(place[-1], int)

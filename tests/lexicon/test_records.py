@@ -1,5 +1,6 @@
 """Records of contents: what is accepted, and the sentence about what is not."""
 
+import json
 import math
 from dataclasses import dataclass, field
 from datetime import date
@@ -49,6 +50,8 @@ def test_a_record_has_the_types_of_its_fields() -> None:
     ({"count": 1, "rate": math.nan}, "f: rate must be a number, not NaN"),
     ({"count": 1, "rate": math.inf}, "f: rate must be a number, not Infinity"),
     ({"count": 1, "rate": date(2026, 1, 2)}, 'f: rate must be a number, not {"date": "2026-01-02"}'),
+    ({"count": "\ud800"}, "f: unexpected end of hex escape at line 1 column 19"),
+    ({"count": json.loads("[" * 300 + "]" * 300)}, "f: recursion limit exceeded at line 1 column 211"),
     ({"count": 1, "on": 1}, "f: on must be true or false, not 1"),
     ({"count": 1, "muted": "a"}, 'f: muted must be a list in square brackets, not "a"'),
     ({"count": 1, "muted": [1]}, "f: muted[0] must be a text in quotes, not 1"),
