@@ -34,37 +34,6 @@ EXPECTED: Mapping[type, str] = MappingProxyType({
 })  # fmt: skip
 
 
-def check_mapping(content: Any) -> dict[str, Any]:
-    """A JSON object with any names.
-
-    Raises
-    ------
-    InputError
-        It is no object.
-    """
-    if not isinstance(content, dict):
-        raise InputError(f"give an object in curly brackets, not {format_value(content)}")
-    return content
-
-
-def check_object(content: Any, required: Mapping[str, type], optional: Mapping[str, Any]) -> dict[str, Any]:
-    """The parts of a JSON object: all that are required, of their type, and the others with their defaults.
-
-    Raises
-    ------
-    InputError
-        It is no object, has an unknown name, or lacks a required one, or that has another type.
-    """
-    parts = check_mapping(content)
-    for name in parts:
-        if name not in required and name not in optional:
-            raise InputError(f"there is no {name!r} here; choose {', '.join([*required, *optional])}")
-    for name in required:
-        if name not in parts:
-            raise InputError(f"{name} is missing")
-    return {**optional, **parts, **{name: check_type(name, parts[name], kind) for name, kind in required.items()}}
-
-
 def check_type(name: str, value: Any, kind: type) -> Any:
     """A value of a type of `EXPECTED`; whole numbers become floats where a float is expected, booleans are no numbers.
 

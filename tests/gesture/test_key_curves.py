@@ -156,12 +156,18 @@ def test_what_cannot_be_is_refused(make, reason: str) -> None:
         ('{"gaze": [{"down_deg": 1, "start": 0}]}', r"gaze\[0\]: left_deg is missing"),
         (
             '{"strengths": [{"feature": "head", "keys": 1}]}',
-            r"strengths\[0\]: keys must be a list of \[seconds, value\]",
+            r"strengths\[0\]: keys must be a list in square brackets, not 1",
         ),
-        ('{"curves": [{"expression": "sad", "keys": [[0]]}]}', r"curves\[0\]: keys must be a list"),
-        ('{"edits": [{"channel": "jawOpen", "keys": [[0, "a"]]}]}', r'a number of a key must be a number, not "a"'),
-        ('{"seeds": {"head": 1.5}}', r"seeds: the seed of head must be a whole number, not 1\.5"),
-        ('{"seeds": [1]}', r"seeds: give a seed for each feature, not \[1\]"),
+        (
+            '{"curves": [{"expression": "sad", "keys": [[0]]}]}',
+            r"curves\[0\]: keys\[0\] must be \[seconds, value\], not \[0\]",
+        ),
+        (
+            '{"edits": [{"channel": "jawOpen", "keys": [[0, "a"]]}]}',
+            r'edits\[0\]: keys\[0\]\[1\] must be a number, not "a"',
+        ),
+        ('{"seeds": {"head": 1.5}}', r"seeds: head must be a whole number, not 1\.5"),
+        ('{"seeds": [1]}', r"seeds: give an object in curly brackets, not \[1\]"),
     ],
 )
 def test_files_that_are_wrong_are_refused(content: str, reason: str) -> None:

@@ -260,7 +260,7 @@ def test_a_file_holds_a_timeline(tmp_path: Path) -> None:
         ('{"style": 1}', r"a\.json, style: give a name, or a style for each feature, not 1"),
         ('{"style": {"ears": "a"}}', r"a\.json, style: there is no feature 'ears'"),
         ('{"style": {"head": 1}}', r"a\.json, style: head must be a text in quotes, not 1"),
-        ('{"spans": {}}', r"a\.json, spans must be a list in square brackets, not \{\}"),
+        ('{"spans": {}}', r"a\.json, spans: give a list in square brackets, not \{\}"),
         ('{"spans": [1]}', r"a\.json, spans\[0\]: give an object in curly brackets, not 1"),
         ('{"spans": [{"style": "a", "start": 1}]}', r"spans\[0\]: feature is missing"),
         ('{"spans": [{"feature": "head", "style": "a", "start": "1"}]}', r'start must be a number, not "1"'),

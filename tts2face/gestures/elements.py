@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,7 +28,7 @@ CHANNEL_OFFSET_LIMITS = (-1000.0, 1000.0)  # weights lie within 2; the head's po
 MAX_KEYS = 100_000  # of one curve: a key at each frame of half an hour
 MAX_OVERRUN_S = 0.05  # tolerance for spans that end after the clip: times are often rounded to tenths of a second
 FloatArray = NDArray[np.float64]
-Keys = tuple[tuple[float, float], ...]  # seconds, value
+Keys = tuple[Annotated[tuple[float, float], "[seconds, value]"], ...]
 
 
 def span_weights(times: ArrayLike, start: float, end: float, ease_s: float) -> FloatArray:
@@ -124,7 +124,7 @@ class StyleSpan:
     feature: str
     style: str
     start: float
-    end: float
+    end: float = math.inf
 
     def __post_init__(self) -> None:
         """Refuse unknown features and times that do not run forward."""
@@ -139,8 +139,8 @@ class ExpressionSpan:
 
     expression: str
     weight: float
-    start: float
-    end: float
+    start: float = 0.0
+    end: float = math.inf
 
     def __post_init__(self) -> None:
         """Refuse unknown expressions, weights out of range, and times that do not run forward."""
@@ -158,8 +158,8 @@ class GazeTarget:
 
     down_deg: float
     left_deg: float
-    start: float
-    end: float
+    start: float = 0.0
+    end: float = math.inf
 
     def __post_init__(self) -> None:
         """Refuse directions beyond the eyes' range and times that do not run forward."""
@@ -258,15 +258,12 @@ class ElementKind:
     owner
         Field that tells lanes apart: spans of one lane may not overlap, and each lane has one curve. Empty where all
         elements are in one lane.
-    optional
-        Fields that files may omit, with their values then.
     """
 
     name: str
     record: type[Any]
     shape: Literal["span", "curve", "instant"]
     owner: str
-    optional: Mapping[str, Any]
 
     def lane(self, element: Any) -> str:
         """Lane of an element as messages name it."""
@@ -352,12 +349,12 @@ class ElementKind:
 KINDS: Mapping[str, ElementKind] = MappingProxyType({
     kind.name: kind
     for kind in (
-        ElementKind("spans", StyleSpan, "span", "feature", {"end": math.inf}),
-        ElementKind("expressions", ExpressionSpan, "span", "expression", {"start": 0.0, "end": math.inf}),
-        ElementKind("gaze", GazeTarget, "span", "", {"start": 0.0, "end": math.inf}),
-        ElementKind("nods", Nod, "instant", "", {"size": 1.0}),
-        ElementKind("strengths", StrengthCurve, "curve", "feature", {"keys": None}),
-        ElementKind("curves", ExpressionCurve, "curve", "expression", {"keys": None}),
-        ElementKind("edits", ChannelEdit, "curve", "channel", {"keys": None}),
+        ElementKind("spans", StyleSpan, "span", "feature"),
+        ElementKind("expressions", ExpressionSpan, "span", "expression"),
+        ElementKind("gaze", GazeTarget, "span", ""),
+        ElementKind("nods", Nod, "instant", ""),
+        ElementKind("strengths", StrengthCurve, "curve", "feature"),
+        ElementKind("curves", ExpressionCurve, "curve", "expression"),
+        ElementKind("edits", ChannelEdit, "curve", "channel"),
     )
 })  # fmt: skip

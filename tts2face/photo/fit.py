@@ -8,16 +8,17 @@ Landmarks of a photographed face on its vertices.
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_list, check_object, read_json
+from lexicon.inputs import read_json
+from lexicon.records import checked, errors_at
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
 from tts2face.photo.eyes import IRISES, EyePatch
 from tts2face.photo.lines import LID_MARGINS, N_LID, N_POINTS, InnerLips, LidLines
@@ -81,6 +82,15 @@ class PhotoFit:
         return content | {name: _rounded(point) for name, point in self.points.items()}
 
 
+_Point = Annotated[tuple[float, float], "[x, y] in pixels"]
+_Parts: dict[str, Any] = {
+    part: make_dataclass(part, [(edge, tuple[_Point, ...] | None, None) for edge in LINES[part]]) for part in LINES
+}
+_Written: Any = make_dataclass(
+    "_Written", [(part, _Parts.get(part, _Point) | None, None) for part in (*LINES, *POINTS)]
+)
+
+
 def _rounded(places: Floats) -> Any:
     return np.round(places, DIGITS).tolist()
 
@@ -93,30 +103,15 @@ def parse_fit(content: Any, name: str = "the fit") -> PhotoFit:
     DataError
         It is none; the message begins with `name`.
     """
-    try:
-        parts = check_object(content, {}, dict.fromkeys((*LINES, *POINTS)))
-        lines = {
-            (part, edge): _parse_line(f"{part}.{edge}", line)
-            for part, edges in LINES.items()
-            if parts[part] is not None
-            for edge, line in check_object(parts[part], {}, dict.fromkeys(edges)).items()
-            if line is not None
-        }
-        points = {one: _parse_point(one, parts[one]) for one in POINTS if parts[one] is not None}
-        return PhotoFit(lines, points, name)
-    except InputError as wrong:
-        raise DataError(f"{name}: {wrong}") from wrong
-
-
-def _parse_line(name: str, content: Any) -> Floats:
-    return np.array([_parse_point(f"a point of {name}", one) for one in check_list(name, content, list)]).reshape(-1, 2)
-
-
-def _parse_point(name: str, content: Any) -> Floats:
-    numbers = check_list(name, content, float)
-    if len(numbers) != 2:
-        raise InputError(f"{name} must be [x, y] in pixels, not {len(numbers)} numbers")
-    return np.array(numbers)
+    given = {part: value for part, value in vars(checked(_Written, content, name)).items() if value is not None}
+    lines = {
+        (part, edge): np.array(line).reshape(-1, 2)
+        for part in LINES
+        for edge, line in (vars(given[part]) if part in given else {}).items()
+        if line is not None
+    }
+    with errors_at(name):
+        return PhotoFit(lines, {point: np.array(given[point]) for point in POINTS if point in given}, name)
 
 
 def read_fit(path: Path) -> PhotoFit:

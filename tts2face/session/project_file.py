@@ -2,22 +2,14 @@
 
 import json
 import os
-from collections.abc import Callable
-from dataclasses import fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import (
-    LARGEST_JSON_BYTES,
-    check_list,
-    check_mapping,
-    check_object,
-    check_type,
-    is_file,
-    parse_json,
-    read_text,
-)
+from lexicon.inputs import LARGEST_JSON_BYTES, is_file, parse_json, read_text
+from lexicon.records import checked, errors_at
 from tts2face.gestures.timeline_file import parse_timeline_object, timeline_json
 from tts2face.lips.options import ExcludedToken
 from tts2face.picture.options import Picture
@@ -36,13 +28,31 @@ REQUEST_FILES, MODEL_FILES, PICTURE_FILES = (
     ("talker", "face", "palette"),
     ("background",),
 )
-KEYS = (
-    "format", "version", "name", "request", "models", "picture", "timeline", "pronunciations", "edges", "excluded",
-    "muted", "solo",
-)  # fmt: skip
-
 Options = TypeVar("Options", Request, Models, Picture)
-Made = TypeVar("Made")
+
+
+@dataclass(frozen=True, slots=True)
+class _Edges:
+    phones: tuple[str, ...]
+    edges: tuple[float, ...]
+    text: str = ""
+    occurrence: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Written:
+    format: str
+    version: Any
+    name: str = "untitled"
+    request: Mapping[str, Any] = field(default_factory=dict)
+    models: Mapping[str, Any] = field(default_factory=dict)
+    picture: Mapping[str, Any] = field(default_factory=dict)
+    timeline: Mapping[str, Any] = field(default_factory=dict)
+    pronunciations: Mapping[str, str] = field(default_factory=dict)
+    edges: tuple[_Edges, ...] = ()
+    excluded: tuple[ExcludedToken, ...] = ()
+    muted: frozenset[str] = frozenset()
+    solo: frozenset[str] = frozenset()
 
 
 def load_project(path: str | Path) -> Project:
@@ -71,30 +81,20 @@ def parse_project(content: Any, name: str, folder: Path) -> Project:
         raise DataError(
             f"{name} has version {content.get('version')!r}; this program reads version {VERSION}; update it"
         )
-    for key in content:
-        if key not in KEYS:
-            raise DataError(f"{name}: there is no {key!r} in a project; choose {', '.join(KEYS)}")
-
-    first = {"face": FIRST_FACE} if content["version"] == 1 else {}
-
-    def part(key: str, make: Callable[[Any], Made], empty: Any) -> Made:
-        try:
-            return make(content.get(key, empty))
-        except (InputError, DataError) as wrong:
-            raise DataError(f"{name}, {key}: {wrong}") from wrong
-
-    parts = (
-        part("request", lambda given: _options(Request, given, folder, REQUEST_FILES), {}),
-        part("models", lambda given: _options(Models, first | check_mapping(given), folder, MODEL_FILES), {}),
-        part("picture", lambda given: _options(Picture, given, folder, PICTURE_FILES), {}),
-        part("timeline", lambda given: parse_timeline_object(check_mapping(given)), {}),
-        part("pronunciations", _pronunciations, {}),
-        part("edges", lambda given: tuple(map(_sentence_edges, check_type("edges", given, list))), []),
-        part("excluded", lambda given: tuple(map(_excluded, check_type("excluded", given, list))), []),
-        part("muted", lambda given: frozenset(check_list("muted", given, str)), []),
-        part("solo", lambda given: frozenset(check_list("solo", given, str)), []),
-    )
-    return part("name", lambda title: Project(title, *parts), "untitled")
+    written = checked(_Written, content, name)
+    first = {"face": FIRST_FACE} if written.version == 1 else {}
+    with errors_at(f"{name}, request"):
+        request = _options(Request, written.request, folder, REQUEST_FILES)
+    with errors_at(f"{name}, models"):
+        models = _options(Models, first | dict(written.models), folder, MODEL_FILES)
+    with errors_at(f"{name}, picture"):
+        picture = _options(Picture, written.picture, folder, PICTURE_FILES)
+    with errors_at(f"{name}, edges"):
+        edges = tuple(SentenceEdges(one.text, one.occurrence, one.phones, one.edges) for one in written.edges)
+    timeline = parse_timeline_object(written.timeline, f"{name}, timeline")
+    parts = (written.pronunciations, edges, written.excluded, written.muted, written.solo)
+    with errors_at(name):
+        return Project(written.name, request, models, picture, timeline, *parts)
 
 
 def project_json(project: Project, folder: Path) -> dict[str, Any]:
@@ -134,9 +134,9 @@ def save_project(project: Project, path: str | Path) -> None:
     write_atomically(file, f"{content}\n".encode())
 
 
-def _options(kind: type[Options], given: Any, folder: Path, files: tuple[str, ...]) -> Options:
+def _options(kind: type[Options], given: Mapping[str, Any], folder: Path, files: tuple[str, ...]) -> Options:
     known = {option.name for option in fields(kind)}
-    chosen = dict(check_mapping(given))
+    chosen = dict(given)
     for name in chosen:
         if name not in known:
             raise InputError(f"there is no option {name!r}; choose {', '.join(sorted(known))}")
@@ -157,22 +157,3 @@ def _options_json(options: Options, default: Options, folder: Path, files: tuple
             value = os.path.relpath(value, folder)
         chosen[option.name] = str(value) if isinstance(value, Path) else value
     return chosen
-
-
-def _pronunciations(given: Any) -> dict[str, str]:
-    return {word: check_type(word, written, str) for word, written in check_mapping(given).items()}
-
-
-def _sentence_edges(given: Any) -> SentenceEdges:
-    parts = check_object(given, {"phones": list, "edges": list}, {"text": "", "occurrence": 0})
-    return SentenceEdges(
-        check_type("text", parts["text"], str),
-        check_type("occurrence", parts["occurrence"], int),
-        tuple(check_list("phones", parts["phones"], str)),
-        tuple(check_list("edges", parts["edges"], float)),
-    )
-
-
-def _excluded(given: Any) -> ExcludedToken:
-    parts = check_object(given, {"utterance": str, "start": float}, {})
-    return ExcludedToken(parts["utterance"], parts["start"])

@@ -161,7 +161,7 @@ def test_a_take_becomes_a_style_and_is_deleted(owned: httpx.Client, data: Path, 
     ("change", "reason"),
     [
         ({"name": "mine", "mix": {"source": "nobody"}}, "there is no recorded style 'nobody'"),
-        ({"name": "mine", "mix": {"source": "grid_s1", "speed": 2}}, "the mix cannot be read"),
+        ({"name": "mine", "mix": {"source": "grid_s1", "speed": 2}}, "the mix: there is no 'speed' here; choose"),
         ({"name": "a=b", "mix": MIX}, "a style cannot be called 'a=b'"),
         ({"name": "mine"}, "there is no checked take; record or upload one"),
     ],
@@ -179,7 +179,7 @@ def test_a_mix_is_seen_before_it_is_kept(owned: httpx.Client) -> None:
     annoyed = drawn({"source": "grid_s1", "shares": {"annoyed": 1}}).content
     assert annoyed == owned.get("/api/styles/annoyed/swatch.webp").content
     assert drawn(MIX).content != annoyed
-    assert "the mix cannot be read" in drawn([]).json()["error"]["message"]
+    assert "the mix: give an object in curly brackets" in drawn([]).json()["error"]["message"]
 
 
 def test_shipped_styles_stay(owned: httpx.Client) -> None:

@@ -4,12 +4,13 @@ import ipaddress
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, make_dataclass
 from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import EXPECTED, check_limits, check_list, check_type, format_value, parse_toml, read_text
+from lexicon.inputs import EXPECTED, check_limits, format_value, parse_toml, read_text
+from lexicon.records import checked
 from tts2face.storage.files import user_data
 
 PREFIX = "TTS2FACE_SERVE_"  # of environment variables: TTS2FACE_SERVE_PORT
@@ -154,6 +155,9 @@ class ServiceSettings:
         return "".join(lines)
 
 
+_Written: Any = make_dataclass("_Written", [(one.name, one.type, one.default) for one in fields(ServiceSettings)])
+
+
 def is_loopback(host: str) -> bool:
     """Whether an address reaches this machine only."""
     if host == "localhost":
@@ -199,7 +203,8 @@ def _read_file(path: Path) -> dict[str, Any]:
         raise InputError(str(wrong)) from wrong
     except OSError as refused:
         raise InputError(f"the settings file {path} cannot be read: {refused.strerror}; check the path") from refused
-    return {name: _convert(_field(name, f"file {path}"), value, str(path)) for name, value in content.items()}
+    written = checked(_Written, content, str(path), InputError)
+    return {name: getattr(written, name) for name in content}
 
 
 def _field(name: str, source: str) -> Any:
@@ -207,17 +212,6 @@ def _field(name: str, source: str) -> Any:
     if name not in known:
         raise InputError(f"the {source} has an unknown setting {name!r}; the settings are {', '.join(known)}")
     return known[name]
-
-
-def _convert(one: Any, value: Any, source: str) -> Any:
-    """A value of a TOML file in the type of its setting."""
-    kind = _kind(one)
-    try:
-        if kind is tuple:
-            return tuple(check_list(one.name, value, str))
-        return kind(check_type(one.name, value, str if kind is Path else kind))
-    except InputError as wrong:
-        raise InputError(f"{source}: {wrong}") from wrong
 
 
 def _parse(one: Any, text: str, source: str) -> Any:

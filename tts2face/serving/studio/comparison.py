@@ -16,7 +16,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from lexicon.errors import DataError, InputError, Tts2faceError
-from lexicon.inputs import LARGEST_JSON_BYTES, check_mapping, check_object, check_type, parse_json, read_text
+from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
+from lexicon.records import checked
 from tts2face.request import Request
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.messages import Work
@@ -82,6 +83,17 @@ class Reference:
         return self.kind in {RECORDING, TAKE}
 
 
+@dataclass(frozen=True, slots=True)
+class _Written:
+    kind: str
+    label: str = ""
+    project: Any = None
+    request: Mapping[str, Any] = field(default_factory=dict)
+    models: Mapping[str, Any] = field(default_factory=dict)
+    recording: str = ""
+    offset: float = 0.0
+
+
 def reference_project(reference: Reference, project: Project) -> Project:
     """The project whose clip is the A, given the project as it is now; for recorded motion, what that depends on.
 
@@ -122,25 +134,9 @@ def parse_reference(content: Any, folder: Path) -> Reference:
     InputError, DataError
         It is none, or damaged.
     """
-    optional: dict[str, Any] = {
-        "label": "",
-        "project": None,
-        "request": {},
-        "models": {},
-        "recording": "",
-        "offset": 0.0,
-    }
-    parts = check_object(content, {"kind": str}, optional)
-    kept = parts["project"]
-    return Reference(
-        parts["kind"],
-        check_type("label", parts["label"], str),
-        None if kept is None else parse_project(kept, "the kept project", folder),
-        check_mapping(parts["request"]),
-        check_mapping(parts["models"]),
-        check_type("recording", parts["recording"], str),
-        check_type("offset", parts["offset"], float),
-    )
+    given = checked(_Written, content, "the comparison", InputError)
+    kept = None if given.project is None else parse_project(given.project, "the kept project", folder)
+    return Reference(given.kind, given.label, kept, given.request, given.models, given.recording, given.offset)
 
 
 def _check_settings(request: Mapping[str, Any], models: Mapping[str, Any]) -> None:

@@ -1,6 +1,5 @@
 """Addresses of own styles: the take in work, moving pictures, derived styles, the palette file."""
 
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Annotated, Any
 
@@ -10,6 +9,7 @@ from fastapi.responses import FileResponse, Response
 
 from lexicon.errors import InputError
 from lexicon.inputs import parse_json
+from lexicon.records import checked
 from tts2face.models.palette_editing import StyleMix
 from tts2face.serving.service.exchange import STYLES
 from tts2face.serving.studio.recordings import SUFFIXES
@@ -47,7 +47,7 @@ async def make_style(
     if mix is None:
         await styles.make(key, name)
         return {"name": name}
-    return {"name": await styles.derive(key, name, parse_mix(mix))}
+    return {"name": await styles.derive(key, name, checked(StyleMix, mix, "the mix", InputError))}
 
 
 @router.put("/take/{number}", status_code=201)
@@ -87,7 +87,8 @@ def download_palette(request: HttpRequest) -> FileResponse:
 @router.get("/mix.webp")
 async def draw_mix(request: HttpRequest, mix: Annotated[str, Query(max_length=4000)]) -> Response:
     """Moving picture of a mix, an object of JSON, that is not kept."""
-    content = await _styles(request).draw_mix(request.state.key, parse_mix(parse_json(mix, "the mix")))
+    wanted = checked(StyleMix, parse_json(mix, "the mix"), "the mix", InputError)
+    content = await _styles(request).draw_mix(request.state.key, wanted)
     return Response(content, media_type="image/webp")
 
 
@@ -110,17 +111,3 @@ async def remove(request: HttpRequest, name: str) -> Response:
     """Delete an own style, and what is painted in it."""
     await _styles(request).remove(request.state.key, name)
     return Response(status_code=204)
-
-
-def parse_mix(given: Mapping[str, Any]) -> StyleMix:
-    """A mix from JSON.
-
-    Raises
-    ------
-    InputError
-        A field is unknown or has a value of the wrong kind.
-    """
-    try:
-        return StyleMix(**given)
-    except (TypeError, AttributeError) as wrong:
-        raise InputError(f"the mix cannot be read ({wrong}); give source, shares, expressions, sizes, tempo") from wrong
