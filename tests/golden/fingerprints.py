@@ -74,7 +74,11 @@ def _processor() -> str:
         return platform.processor()
     lines = dict(line.split(":", 1) for line in facts.read_text().splitlines() if ":" in line)
     named = {key.strip(): value.strip() for key, value in lines.items()}
-    wide = [flag for flag in ("avx2", "avx512f", "avx512_vnni") if flag in named.get("flags", "").split()]
+    wide = [
+        flag
+        for flag in ("avx2", "avx512f", "avx512_vnni", "avx512_bf16", "amx_tile")
+        if flag in named.get("flags", "").split()
+    ]
     return " ".join([named.get("vendor_id", ""), *wide])
 
 

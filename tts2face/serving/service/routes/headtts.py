@@ -15,9 +15,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from lexicon.errors import DataError
 from lexicon.inputs import parse_json
+from lexicon.marked_text import RATE_LIMITS
 from tts2face.interchange.exports.parts import Label
 from tts2face.picture.sound_stream import wav_header
-from tts2face.request import RATE_LIMITS
 from tts2face.serving.service.errors import ErrorBody, RefusedError
 from tts2face.serving.service.library import check_voice, resolve_dictionary
 from tts2face.serving.service.request_fields import described
