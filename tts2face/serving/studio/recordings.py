@@ -254,11 +254,10 @@ class RecordingStore:
 
     def unchecked(self) -> Sequence[tuple[str, int, Take]]:
         """Takes whose check did not end, of all recordings: id, index of the prompt, take."""
-        numbers = [folder.name for folder in self._recordings.of()]
         return [
-            (number, at, take)
-            for number in numbers
-            for at, take in self.takes(number).items()
+            (folder.name, at, take)
+            for folder in self._recordings.of()
+            for at, take in self.takes(folder.name).items()
             if take.state == CHECKING
         ]
 
