@@ -71,13 +71,11 @@ def build_appearance_recording(
         The video can no longer be read.
     """
     tracked = tracker.track(observation.video)
-    points, first = resample_to_grid(tracked.tracking.points, tracked.times, tracked.fps)
-    begin = observation.quality.cut
-    start = round(begin * tracked.fps) - first
-    here, _ = fill_gaps(points[start : start + len(observation.landmarks)], tracked.fps)
-    return AppearanceRecording(
-        observation.video, begin, tracked.fps, here[:, :, :2].copy(), observation.landmarks, shape
-    )
+    fps, begin = observation.fps, observation.quality.cut  # the rate that all recordings have, maybe not the video's
+    points, first = resample_to_grid(tracked.tracking.points, tracked.times, fps)
+    start = round(begin * fps) - first
+    here, _ = fill_gaps(points[start : start + len(observation.landmarks)], fps)
+    return AppearanceRecording(observation.video, begin, fps, here[:, :, :2].copy(), observation.landmarks, shape)
 
 
 MAX_PLATE_FRAMES = 250  # frames; played forwards and backwards its length is not noticeable

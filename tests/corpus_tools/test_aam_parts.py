@@ -1,5 +1,7 @@
 """Parts of appearance models against closed forms and independent implementations."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -17,11 +19,15 @@ from corpus_tools.appearance.frame import (
 )
 from corpus_tools.appearance.pca import IncrementalPca
 from corpus_tools.appearance.train import camera_axes, fit_lighting, speech_weights
-from corpus_tools.appearance.videos import AppearanceRecording
+from corpus_tools.appearance.videos import AppearanceRecording, build_appearance_recording
+from corpus_tools.recordings.observation import Observation, Quality
+from corpus_tools.recordings.video import TrackedVideo
 from lexicon.errors import InputError
+from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.consent import consent_record
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER
 from tts2face.picture.own_face import ring_triangles
+from tts2face.video.tracking import Tracking
 
 
 def transform(shape, angle, size, shift):
@@ -157,6 +163,20 @@ def test_pictures_come_at_the_instants_of_the_frames(tmp_path, monkeypatch):
     nothing = np.zeros((5, 478, 3), np.float32)
     film = AppearanceRecording(tmp_path / "x.mkv", 0.04, 25.0, nothing[:, :, :2], nothing, nothing[:, 0])
     assert [int(pixels[0, 0, 0]) for pixels in film.pictures()] == [1, 2, 2, 2, 3]
+
+
+def test_landmarks_in_the_picture_come_at_the_instants_of_the_observation():
+    """Videos of one person may have other rates than the one at which all of them are observed."""
+    times = np.arange(140) / 24.0
+    points = np.repeat(times[:, None, None], 478, axis=1).repeat(3, axis=2).astype(np.float32)
+    tracked = TrackedVideo(Tracking(points, np.ones(140)), times, 24.0, np.ones(140), np.zeros(140))
+    tracker = type("Tracker", (), {"track": lambda self, video: tracked})()
+    landmarks, one_phone = np.zeros((130, 478, 3), np.float32), PhoneSequence([SILENCE], [0.0, 5.2])
+    seen = Observation("a", 25.0, landmarks, landmarks[:, :2, 0], one_phone, (), landmarks[:, 0, 0],
+                       Quality(1.0, 1.0, 0, 0.4), Path("a.webm"))  # fmt: skip
+    film = build_appearance_recording(seen, landmarks[:, 0], tracker)
+    assert (film.fps, len(film.points)) == (25.0, 130)
+    assert np.abs(film.points[:, 0, 0] - (0.4 + np.arange(130) / 25.0)).max() < 1e-4
 
 
 @pytest.mark.parametrize("statement", [None, "", "yes"])
