@@ -244,14 +244,14 @@ def serve_twice(folder: Path, begin: Callable[[Host], Awaitable[None]], go_on: C
     async def first() -> None:
         host = Host(folder)
         await begin(host)
-        await until(lambda: any(one.state == RUNNING for one in host.work._works.values()))
+        await until(lambda: any(one.state == RUNNING for one in host.work._all.values()))
         await host.work.close()
 
     async def second() -> list[BackgroundWork]:
         host = Host(folder)
         go_on(host)
         await host.work.resume()
-        found = list(host.work._works.values())
+        found = list(host.work._all.values())
         await settle(*found)
         return found
 

@@ -22,7 +22,7 @@ from tts2face.serving.service.logs import log_event
 from tts2face.serving.work.table import CANCELLED, DONE, FAILED, OPEN_STATES, RUNNING, WAITING
 from tts2face.storage.files import translate_disk_errors, write_atomically
 
-MAX_TRIES = 3  # of a work by servers that ended meanwhile
+MAX_TRIES = 3  # of a piece of work by servers that ended meanwhile
 ID = 12 * "[0-9a-f]"  # pattern of the name of an order that has its folder with others
 
 
@@ -90,7 +90,7 @@ class WorkList:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._kinds: dict[str, WorkKind] = {}
-        self._works: dict[Path, BackgroundWork] = {}  # by their orders
+        self._all: dict[Path, BackgroundWork] = {}  # by their orders
         self._turns: dict[tuple[str, str], asyncio.Semaphore] = {}  # of kinds and owners
         self.listeners: defaultdict[tuple[str, str], set[Callable[[], None]]] = defaultdict(set)  # as `_turns`
 
@@ -99,7 +99,7 @@ class WorkList:
         self._kinds[kind.name] = kind
 
     def add(self, kind: str, owner: str, order: Path, content: Mapping[str, Any]) -> BackgroundWork:
-        """Queue a new work.
+        """Queue new work.
 
         Raises
         ------
@@ -128,42 +128,42 @@ class WorkList:
                 self._resume(kind, order)
 
     def get(self, order: Path) -> BackgroundWork | None:
-        """The work of an order, the last one since the server began; None if there is none."""
-        return self._works.get(order)
+        """The work of an order, the last since the server began; None if there is none."""
+        return self._all.get(order)
 
     def of(self, kind: str, owner: str) -> list[BackgroundWork]:
         """Work of a kind and an owner since the server began, the oldest first."""
-        return [one for one in self._works.values() if (one.kind, one.owner) == (kind, owner)]
+        return [one for one in self._all.values() if (one.kind, one.owner) == (kind, owner)]
 
     def cancel(self, work: BackgroundWork) -> None:
-        """Cancel a work that waits or runs."""
+        """Cancel work that waits or runs."""
         if work.is_open:
             self._end(work, CANCELLED)
             if work.task is not None:
                 work.task.cancel()
 
     def remove(self, work: BackgroundWork) -> None:
-        """Cancel a work that waits or runs; forget it, and remove what it has made."""
+        """Cancel work that waits or runs; forget it, and remove what it has made."""
         self.cancel(work)
-        self._works.pop(work.order, None)
+        self._all.pop(work.order, None)
         _remove(work.files)
         self._notify(work)
 
     async def forget(self, folder: Path) -> None:
         """Cancel and forget all work whose orders are in a folder, and wait until it has ended."""
-        found = [one for one in self._works.values() if one.order.is_relative_to(folder)]
+        found = [one for one in self._all.values() if one.order.is_relative_to(folder)]
         for one in found:
             self.cancel(one)
-            del self._works[one.order]
+            del self._all[one.order]
         await _wait_for(found)
 
     async def close(self) -> None:
         """End all; a later server does what is not done."""
-        works = list(self._works.values())
-        for one in works:
+        found = list(self._all.values())
+        for one in found:
             if one.task is not None:
                 one.task.cancel()
-        await _wait_for(works)
+        await _wait_for(found)
 
     def _resume(self, kind: WorkKind, order: Path) -> None:
         work = None
@@ -189,8 +189,8 @@ class WorkList:
         kind.prepare(work)
 
     def _begin(self, work: BackgroundWork) -> None:
-        self._works.pop(work.order, None)  # the newest is the last
-        self._works[work.order] = work
+        self._all.pop(work.order, None)  # the newest is the last
+        self._all[work.order] = work
         work.task = asyncio.get_running_loop().create_task(self._run(work))
         self._notify(work)
 
@@ -248,5 +248,5 @@ def _remove(files: Iterable[Path]) -> None:
             path.unlink(missing_ok=True)
 
 
-async def _wait_for(works: Iterable[BackgroundWork]) -> None:
-    await asyncio.gather(*(one.task for one in works if one.task is not None), return_exceptions=True)
+async def _wait_for(work: Iterable[BackgroundWork]) -> None:
+    await asyncio.gather(*(one.task for one in work if one.task is not None), return_exceptions=True)
