@@ -1,7 +1,7 @@
 """Two people in film light: a woman with hair to her shoulders, a man with short hair combed back.
 
 They have the proportions of people, painted brows and seams between their teeth; measures and rounds are in
-docs/decisions/170-people-in-film-light.md.
+docs/decisions/161-drawn.md.
 """
 
 from dataclasses import replace

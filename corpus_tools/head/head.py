@@ -5,7 +5,7 @@ A round-necked shirt: the shoulders, cut along a tilted plane and offset from th
 Proportions of people: weights of MakeHuman's modelling targets, by which a person differs from the macro targets.
 
 They were solved for nineteen proportions that the face tracker reads from rendered stills, as it reads them from filmed
-people, and then chosen by eye (docs/decisions/169-friendlier-identities.md).
+people, and then chosen by eye (docs/decisions/014-built-faces.md).
 """
 
 import csv

@@ -30,7 +30,7 @@ TRACKS = (
     "government): 68 landmarks of github.com/acvictor/Obama-Lip-Sync at cb89642, MIT licence, Copyright (c) 2018 "
     "Ankita Victor; only their influence on shared weights is kept, no likeness"
 )
-# Mouths whose fitted light was better than the baked one in poses that were not fitted (docs/decisions/165).
+# Mouths whose fitted light was better than the baked one in poses that were not fitted (docs/decisions/162).
 REFINED = ("ada", "ben", "zuri")
 
 

@@ -2,7 +2,7 @@
 
 The speed of the lips is correlated with the speed that a shipped talker shows for the phones aligned to the sound. For
 other people this separates right from wrong sound and finds lags far better than the change of loudness
-(docs/decisions/130-expected-lips.md).
+(docs/decisions/129-recording-limits.md).
 """
 
 from collections import Counter

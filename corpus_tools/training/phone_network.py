@@ -34,8 +34,8 @@ from tts2face.types import Progress
 
 SILENCE_MARGIN_S = 0.2  # of silence around speech in the training data
 TRAINING = TrainingOptions(hidden=(96, 96), n_epochs=10, weight_decay=1e-4)
-N_BY_LABEL, N_BY_FEATURES = 1, 3  # networks of one speaker; features are better on unseen words (decision 126)
-N_POOLED_BY_LABEL, N_POOLED_BY_FEATURES = 4, 4  # with pooled speech, which holds every phone (decision 126)
+N_BY_LABEL, N_BY_FEATURES = 1, 3  # networks of one speaker; features are better on unseen words (decision 124)
+N_POOLED_BY_LABEL, N_POOLED_BY_FEATURES = 4, 4  # with pooled speech, which holds every phone (decision 124)
 N_FOLLOWED = 2  # features that the parameters follow: opening and width; all eight cost more on held-out words
 FEATURE_NOISE = 0.1  # variance of the error of a predicted feature, of z-scored ones; .03 and 1 are similar
 LEAST_VARIANCE = 1e-9  # of the largest; a parameter that hardly varies explains no feature

@@ -37,7 +37,7 @@ RELEASE_FROM_S = 0.08  # distance from speech at which the transition to rest be
 REST_FROM_S = 0.20  # distance from speech at which the face is at rest; recorded lips settle within 0.2 s
 NETWORK_HZ = 50.0  # rate at which the networks are evaluated; their input changes in steps of 40 ms
 # Distances of contexts (largest score less the best token's) between which the networks take over from the exemplars;
-# learnt on held-out words and on held-out tracks of another speaker (docs/decisions/125-share-of-networks.md).
+# learnt on held-out words and on held-out tracks of another speaker (docs/decisions/039-phone-networks.md).
 NEAR_CONTEXT, FAR_CONTEXT = 0.2, 1.1
 MIN_EASE_S = 0.06  # transition from and to rest if a clip begins or ends within speech
 DEFAULT_OPTIONS = SynthesisOptions()

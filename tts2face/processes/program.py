@@ -18,7 +18,7 @@ from tts2face.plugins import TOOLS, declared, load_plugin
 
 NEW_USERS, NEW_NETWORK = 0x10000000, 0x40000000  # flags of unshare in Linux's sched.h
 
-# glibc returns blocks of 1 MiB and more to the system, instead of keeping those of each thread (decision 064).
+# glibc returns blocks of 1 MiB and more to the system, instead of keeping those of each thread (decision 073).
 RETURNED_BLOCKS = {"MALLOC_MMAP_THRESHOLD_": "1048576", "MALLOC_TRIM_THRESHOLD_": "1048576"}
 KEPT_VARIABLES = (
     "PATH", "HOME", "LANG", "LC_", "TMPDIR", "TEMP", "SYSTEMROOT", "LOCALAPPDATA", "XDG_", "PYTHON", "VIRTUAL_ENV",

@@ -125,9 +125,7 @@ def _trace_back(steps: NDArray[np.uint8], m: int, band: int) -> NDArray[np.int64
     return partner
 
 
-LEAST_CONFIDENCE = (
-    -6500.0
-)  # log likelihood per second of a whole utterance; docs/decisions/013-transcript-confidence.md
+LEAST_CONFIDENCE = -6500.0  # log likelihood per second of a whole utterance; docs/decisions/056-text-mismatch.md
 CONTEXT_S = 1.5  # context on either side of a span that is aligned a second time
 WINDOW_S = 1.0  # speech that is scored together, two to four words; scores of single words scatter 1.5 times as much
 # Log likelihood per second in the window; measured in docs/decisions/056-text-mismatch.md.

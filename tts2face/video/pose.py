@@ -17,7 +17,7 @@ from tts2face.numeric.arrays import interpolate_linear
 # Points that hardly move relative to the skull: right landmark, its left counterpart (itself on the midline), position
 # of the right one on the canonical face in mm (x to the person's left, y up, z out), weight. Source: MediaPipe's face
 # geometry (canonical face and its 33 alignment weights, Apache-2.0) without the points 136 and 365, which move with the
-# jaw: with them the estimated scale changes when the mouth opens (docs/decisions/011-head-pose.md).
+# jaw: with them the estimated scale changes when the mouth opens (docs/decisions/010-landmarks-two-passes.md).
 RIGID_POINTS = (
     (4, 4, 0, -4.632, 75.866, 0.07091),
     (6, 6, 0, 24.733, 57.886, 0.0321),

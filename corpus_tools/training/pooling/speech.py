@@ -3,7 +3,7 @@
 English phrases as the networks of a base talker articulate them: evidence of phones that a talker's recordings lack.
 
 The phrases are drawn from CMUdict and from frequent function words, always the same ones, so that the file of the base
-suffices: no recordings of the base's speakers are needed (docs/decisions/137-base-phrases.md).
+suffices: no recordings of the base's speakers are needed (docs/decisions/131-base.md).
 """
 
 from collections.abc import Callable, Sequence

@@ -97,7 +97,7 @@ def test_the_engine_still_has_the_events_whose_waiting_is_replaced() -> None:
     engine = DBOS(config={"name": "events", "system_database_url": "sqlite://", "run_migrations": False})
     reason = (
         "this release of dbos has no {}; tts2face.serving.work.engine needs another way to let the engine of an idle "
-        "worker sleep (decision 155)"
+        "worker sleep (decision 083)"
     )
     try:
         for name in ("background_thread_stop_events", "_background_jobs_stop_event"):

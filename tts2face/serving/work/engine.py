@@ -4,7 +4,7 @@ Pauses of the engine of a worker that has nothing to do.
 
 DBOS looks at each queue at a fixed interval, with about ten statements a look, whether there is work or not: 5 % of a
 core in a worker that waits. Here one short statement a look finds out whether work waits, and the engine sleeps until
-it does (decision 155). Nothing depends on the look for correctness: the engine also wakes every `IDLE_S` seconds.
+it does (decision 083). Nothing depends on the look for correctness: the engine also wakes every `IDLE_S` seconds.
 """
 
 import os
