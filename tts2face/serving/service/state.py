@@ -15,6 +15,7 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, gene
 from lexicon.errors import Tts2faceError
 from tts2face.processes.message import RESULT, Message
 from tts2face.serving.service.errors import RefusedError, as_refused
+from tts2face.serving.service.exchange import while_client_stays
 from tts2face.serving.service.job_service import JobService
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits, read_keys
 from tts2face.serving.service.library import Library
@@ -142,6 +143,8 @@ class ServiceState:
         ------
         RefusedError
             The work failed, or too many works wait.
+        ClientDisconnect
+            The client of the present request has left; the work no longer waits, or has been stopped.
         """
         if len(str(work.request.get("text", ""))) > self.settings.text_characters:
             raise RefusedError(
@@ -156,7 +159,9 @@ class ServiceState:
         try:
             check_words(str(work.request.get("text", "")))
             async with aclosing(self._stream(work, key, inputs, priority)) as stream:  # type: ignore[type-var]
-                async for message in stream:
+                while True:
+                    with while_client_stays():
+                        message = await anext(stream)
                     seconds = message.content["seconds"]
                     if message.kind == RESULT:
                         self.limits.add_speech(key, seconds - made)  # of parts without content
