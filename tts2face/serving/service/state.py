@@ -22,6 +22,7 @@ from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.messages import Work, check_words
 from tts2face.serving.service.pool import STREAM_PRIORITY, InputQueue, Pool, PoolSettings
+from tts2face.serving.service.readiness import Readiness
 from tts2face.serving.service.result_cache import CACHED_KINDS, ResultCache
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.tracing import tracing_from_environment
@@ -110,6 +111,7 @@ class ServiceState:
         self.limits, self.metrics = RateLimits(), Metrics(self.pool, self.jobs, self.cache)
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
+        self.readiness = Readiness(self)
         self.running: set[Exchange] = set()
 
     def reload_keys(self) -> None:
