@@ -1,11 +1,14 @@
 """What a short request of another key waits for while clients vanish, flood a live stream or fill the queue.
 
+The last line is the longest step of the server's event loop in seconds of its processor, after the first request.
+
 ``PYTHONPATH=. python tests/bench/bench_attacks.py --processes 2``
 """
 
 import argparse
 import asyncio
 import json
+import sys
 import tempfile
 import time
 from contextlib import suppress
@@ -15,6 +18,7 @@ from typing import Any
 import httpx
 import websockets
 
+from cli.main import run as run_command
 from tests.running import ServeProcess
 from tests.service.raw import connect, request
 from tts2face.serving.service.keys import add_key
@@ -22,6 +26,7 @@ from tts2face.serving.service.keys import add_key
 LONG = "We were away a year ago, but Bob may move five big maps. " * 40
 N_LOOKS = 40  # of /healthz, at 20 a second
 LOOK_S = 0.05
+LONG_STEP_S = 0.002
 
 
 class Attacked:
@@ -32,10 +37,17 @@ class Attacked:
         self.attacker = add_key(keys, "attacker", ["speak"])
         self.limited = add_key(keys, "limited", ["speak"], requests_per_minute=5, concurrent=1)
         self.other = {"authorization": f"Bearer {add_key(keys, 'other', ['speak'])}"}
+        self._steps = folder / "steps"
+        self._steps.touch()
+        environment = {"TTS2FACE_SERVE_WORKERS": "0"}
         self.running = ServeProcess(
-            "--keys", str(keys), processes=processes, environment={"TTS2FACE_SERVE_WORKERS": "0"}
-        )
+            "--keys", str(keys), program=(__file__, str(self._steps)), processes=processes, environment=environment
+        )  # fmt: skip
         self.running.wait_until_ready()
+
+    def long_steps(self) -> list[float]:
+        """Seconds of the processor of each step of the server's event loop above `LONG_STEP_S`."""
+        return [float(line) for line in self._steps.read_text().split()]
 
     async def speak(self, headers: dict[str, str] | None = None) -> str:
         """Seconds that a word of the other client, or of the one of the headers, takes."""
@@ -109,8 +121,9 @@ async def _read_all(connection: Any) -> None:
 
 
 async def run(attacked: Attacked, n_clients: int) -> None:
-    """Print a line for each attack."""
+    """Print a line for each attack, and the longest step."""
     print(f"idle: {await attacked.speak()}", flush=True)
+    n_before = len(attacked.long_steps())
     await asyncio.to_thread(attacked.vanish, n_clients, 4.0)
     same = {"authorization": f"Bearer {attacked.attacker}"}
     print(f"{n_clients} clients of the same key have left: {await attacked.speak(same)}", flush=True)
@@ -133,9 +146,27 @@ async def run(attacked: Attacked, n_clients: int) -> None:
     await asyncio.gather(*floods, return_exceptions=True)
     answered, refused = await attacked.ask_much(60)
     print(f"60 messages of a key with 5 a minute: {answered} answered, {refused} refused", flush=True)
+    print(f"longest step of the event loop: {max([LONG_STEP_S, *attacked.long_steps()[n_before:]]):.3f} s", flush=True)
+
+
+def serve(steps: Path, arguments: list[str]) -> int:
+    """Run the command line, and write the seconds of every long step of the event loop into a file."""
+    run_step = asyncio.Handle._run
+
+    def run_timed(handle: asyncio.Handle) -> None:
+        began = time.thread_time()
+        run_step(handle)
+        if (took := time.thread_time() - began) > LONG_STEP_S:
+            with steps.open("a") as file:
+                file.write(f"{took:.4f}\n")
+
+    asyncio.Handle._run = run_timed  # type: ignore[method-assign]
+    return run_command(arguments)
 
 
 def main() -> None:
+    if sys.argv[2:3] == ["serve"]:
+        sys.exit(serve(Path(sys.argv[1]), sys.argv[2:]))
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--clients", type=int, default=40)
