@@ -58,10 +58,10 @@ def ask(service: RunningService, path: str, body: bytes) -> socket.socket:
     ],
 )
 def test_requests_whose_client_has_left_do_not_wait(occupied: RunningService, path: str, body: dict[str, str]) -> None:
-    connections = [ask(occupied, path, json.dumps(body).encode()) for _ in range(N_CLIENTS)]
-    eventually(lambda: measure(occupied, WAITING) == N_CLIENTS)
-    for connection in connections:
-        connection.close()
+    with ExitStack() as connections:
+        for _ in range(N_CLIENTS):
+            connections.enter_context(closing(ask(occupied, path, json.dumps(body).encode())))
+        eventually(lambda: measure(occupied, WAITING) == N_CLIENTS)
     eventually(lambda: measure(occupied, WAITING) == 0.0, 10.0)
     assert measure(occupied, LOAD) == N_FULL  # none of them has run
     found = [one for one in occupied.events() if one["event"] == "request" and one["path"] == path]
@@ -100,9 +100,9 @@ def test_what_runs_for_clients_that_have_left_stops(running: RunningService) -> 
     """Clients that leave in the queue and in the middle of their clips: the next request finds a free process."""
     eventually(lambda: measure(running, LOAD) == 0.0)
     made = measure(running, "tts2face_speech_seconds_total")
-    connections = [ask(running, "/v1/clips", CLIP) for _ in range(40)]
-    eventually(lambda: measure(running, WAITING) == 40 - N_FULL)
-    for connection in connections:
-        connection.close()
+    with ExitStack() as connections:
+        for _ in range(40):
+            connections.enter_context(closing(ask(running, "/v1/clips", CLIP)))
+        eventually(lambda: measure(running, WAITING) == 40 - N_FULL)
     eventually(lambda: measure(running, LOAD) == 0.0 == measure(running, WAITING), 10.0)
     assert measure(running, "tts2face_speech_seconds_total") == made  # counted at the end of works: none was completed
