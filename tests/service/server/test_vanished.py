@@ -3,6 +3,7 @@
 import asyncio
 import json
 import socket
+import time
 from collections.abc import Iterator
 from contextlib import AsyncExitStack, ExitStack, closing
 
@@ -11,13 +12,14 @@ import pytest
 import websockets
 
 from tests.running import HostService, RunningService, eventually
-from tests.service.raw import connect, request
+from tests.service.raw import connect
 
 LONG = "We were away a year ago, but Bob may move five big maps. " * 100
 CLIP = json.dumps({"text": LONG}).encode()
 WAITING, LOAD = "tts2face_waiting", "tts2face_load"
 N_FULL = 2  # movies that occupy the one process
 N_CLIENTS = 5
+PAUSE_S = 0.1  # after which the server has read the request
 
 
 def measure(service: RunningService, name: str) -> float:
@@ -43,12 +45,17 @@ def occupied(running: RunningService) -> Iterator[RunningService]:
     eventually(lambda: measure(running, LOAD) == 0.0, 10.0)
 
 
-def ask(service: RunningService, path: str, body: bytes) -> socket.socket:
+def ask(service: RunningService, path: str, body: bytes, then: bytes = b"") -> socket.socket:
     connection = connect(service.url)
-    connection.sendall(request("POST", path, body))
+    connection.sendall(f"POST {path} HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n".encode())
+    connection.sendall(f"Content-Length: {len(body)}\r\n\r\n".encode() + body)
+    if then:
+        time.sleep(PAUSE_S)
+        connection.sendall(then)
     return connection
 
 
+@pytest.mark.parametrize("then", [b"", b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n" * 100], ids=["", "next"])
 @pytest.mark.parametrize(
     ("path", "body"),
     [
@@ -57,10 +64,12 @@ def ask(service: RunningService, path: str, body: bytes) -> socket.socket:
         ("/v1/synthesize", {"input": "Hello."}),
     ],
 )
-def test_requests_whose_client_has_left_do_not_wait(occupied: RunningService, path: str, body: dict[str, str]) -> None:
+def test_requests_whose_client_has_left_do_not_wait(
+    occupied: RunningService, path: str, body: dict[str, str], then: bytes
+) -> None:
     with ExitStack() as connections:
         for _ in range(N_CLIENTS):
-            connections.enter_context(closing(ask(occupied, path, json.dumps(body).encode())))
+            connections.enter_context(closing(ask(occupied, path, json.dumps(body).encode(), then)))
         eventually(lambda: measure(occupied, WAITING) == N_CLIENTS)
     eventually(lambda: measure(occupied, WAITING) == 0.0, 10.0)
     assert measure(occupied, LOAD) == N_FULL  # none of them has run

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 
 LINGER_S, LINGER_BYTES = 2.0, 8 << 20  # in which the rest of a refused body is read, so that its answer is read
+PIPELINED_BYTES = 64 << 10  # of further requests that wait until the present one is answered
 READ_BYTES = 8 << 10  # 2000 of the smallest frames, which take 10 ms
 REASONS = {
     400: "Bad Request",
@@ -87,6 +88,8 @@ class HttpConnection(H11Protocol):
         is_answered = self.cycle is not None and self.cycle.response_complete
         if not is_answered or self.conn.their_state is not h11.SEND_BODY:
             self._linger.stop()  # the rest has come
+        if self.conn.their_state is h11.DONE and len(self.conn.trailing_data[0]) < PIPELINED_BYTES:
+            self.flow.resume_reading()  # of a client that has sent a part of its next request: its leaving is noticed
         if self.conn.their_state is not h11.IDLE:
             self._head.stop()
         elif not self._head.is_running and self.conn.trailing_data[0]:
