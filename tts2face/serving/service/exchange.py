@@ -8,9 +8,12 @@ import json
 import re
 import time
 import uuid
-from collections.abc import Awaitable, Callable, MutableMapping
-from contextlib import suppress
-from typing import Any
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, MutableMapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextvars import ContextVar, copy_context
+from typing import Any, TypeVar
+
+from starlette.requests import ClientDisconnect
 
 from tts2face.serving.service.errors import RefusedError, error_body
 from tts2face.serving.service.logs import REQUEST_ID
@@ -55,6 +58,8 @@ HEADERS = ((b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-stor
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
 CLOSE_NORMAL, CLOSE_REFUSED, CLOSE_RESTART = 1000, 1008, 1012  # WebSocket: policy violation; service restart
 HTTP_FORM = "websocket.http.response"  # extension of ASGI: a refused WebSocket gets an HTTP answer
+LEFT = 499  # status, in the log and the metrics only, of a request whose client left before its answer began
+Item = TypeVar("Item")
 
 
 class Exchange:
@@ -74,6 +79,9 @@ class Exchange:
         self.first_byte_s: float | None = None
         self.stages: list[Stage] = []
         self.is_cut = False  # ended by the service before it was complete
+        self.is_answered = False  # all of its answer has been passed on
+        self.has_left = False  # its client has, before the answer was complete
+        self._watched: set[asyncio.Task[Any]] = set()
         self._is_closed = False
         self._task: asyncio.Task[Any] | None = None
         REQUEST_ID.set(self.id)
@@ -97,7 +105,7 @@ class Exchange:
 
     async def send(self, message: MutableMapping[str, Any]) -> None:
         """Send a message of the answer with the headers of the service."""
-        if self._is_closed:
+        if self._is_closed or (self.has_left and self.scope["type"] == "http"):
             return
         if message["type"] == "http.response.start":
             self.status = message["status"]
@@ -113,6 +121,8 @@ class Exchange:
             self.status = 101
         elif message["type"] == "websocket.close":
             self._is_closed = True
+        elif message["type"] == "http.response.body":
+            self.is_answered = not message.get("more_body", False)
         self._count(message)
         await self._send(message)
 
@@ -126,6 +136,39 @@ class Exchange:
                 raise
             assert self._task is not None
             self._task.uncancel()
+
+    def leave(self) -> None:
+        """Note that the client has left, and end what is waited for on its behalf."""
+        if self.is_answered or self.has_left:
+            return
+        self.has_left = True
+        if not self.status:
+            self.status, self.code = LEFT, "left"
+        for task in self._watched:
+            task.cancel()
+
+    @contextmanager
+    def watched(self) -> Iterator[None]:
+        """End what the block waits for as soon as the client leaves.
+
+        Raises
+        ------
+        ClientDisconnect
+            It has left.
+        """
+        if self.has_left:
+            raise ClientDisconnect
+        task = asyncio.current_task()
+        assert task is not None
+        self._watched.add(task)
+        try:
+            yield
+        except asyncio.CancelledError:
+            if self.has_left and task.uncancel() == 0:  # nobody else has cancelled it
+                raise ClientDisconnect from None
+            raise
+        finally:
+            self._watched.discard(task)
 
     async def refuse(self, refused: RefusedError) -> None:
         """Answer with an error, unless an answer has begun."""
@@ -183,3 +226,25 @@ class Exchange:
         now = time.monotonic()
         stages = durations(self.stages, now) | {"total": now - self.began}
         return ", ".join(f"{name};dur={1000 * seconds:.1f}" for name, seconds in stages.items())
+
+
+CLIENT: ContextVar[Exchange | None] = ContextVar("client", default=None)  # for whose request the present task works
+
+
+def while_client_stays() -> AbstractContextManager[None]:
+    """Block whose waiting ends as soon as the client of the present request, if there is one, leaves.
+
+    Raises
+    ------
+    ClientDisconnect
+        It has left.
+    """
+    client = CLIENT.get()
+    return nullcontext() if client is None else client.watched()
+
+
+def in_background(work: Coroutine[Any, Any, Item]) -> "asyncio.Task[Item]":
+    """Task that goes on when the client of the present request leaves."""
+    context = copy_context()
+    context.run(CLIENT.set, None)
+    return asyncio.get_running_loop().create_task(work, context=context)

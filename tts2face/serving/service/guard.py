@@ -8,6 +8,7 @@ What a key may do.
 import asyncio
 import logging
 import time
+from collections import deque
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping
 from http.cookies import CookieError, SimpleCookie
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,18 @@ from starlette.requests import ClientDisconnect
 from starlette.websockets import WebSocketDisconnect
 
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.exchange import PAGES, RECORDINGS, STYLES, TAKES, Exchange, Receive, Scope, Send, is_page
+from tts2face.serving.service.exchange import (
+    CLIENT,
+    PAGES,
+    RECORDINGS,
+    STYLES,
+    TAKES,
+    Exchange,
+    Receive,
+    Scope,
+    Send,
+    is_page,
+)
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, find_key
 from tts2face.serving.service.logs import log_event
 
@@ -78,6 +90,7 @@ VIDEO_PATH = "/v1/talkers/build"
 VIDEO_PUTS = (f"{RECORDINGS}/", f"{STYLES}/", f"{TAKES}/")
 DRAINING_PATHS = frozenset({"/healthz", "/readyz", "/metrics"})  # that are answered until the end
 CLOSE = {"Connection": "close"}
+READ_AHEAD_BYTES = 256 << 10  # of a client that wait for the application; then no more is read
 DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
 
 
@@ -107,6 +120,7 @@ class Guard:
             return self._state.record(request, key)
         if is_counted:
             self._state.running.add(request)
+            CLIENT.set(request)
         try:
             await request.run(self._answer(request, receive))
             await request.close()
@@ -122,10 +136,11 @@ class Guard:
     async def _answer(self, request: Exchange, receive: Receive) -> None:
         settings, scope = self._state.settings, request.scope
         size = settings.video_mb if _brings_video(scope) else settings.body_mb
-        body = _BoundedBody(receive, size * 1e6, settings.body_s * max(1.0, size / settings.body_mb))
+        longest_s = settings.body_s * max(1.0, size / settings.body_mb)
+        incoming = _Incoming(request, receive, size * 1e6, longest_s)
         try:
-            body.check(request.headers)
-            await self._app(scope, body.receive if scope["type"] == "http" else receive, request.send)
+            incoming.check()
+            await self._app(scope, incoming.receive, request.send)
         except RefusedError as refused:
             await request.refuse(refused)
         except (ClientDisconnect, WebSocketDisconnect):
@@ -134,6 +149,8 @@ class Guard:
             log_event("defect", level=logging.ERROR, error=defect)
             message = f"internal error: {type(defect).__name__}; the log has it under the id {request.id}"
             await request.refuse(RefusedError(500, "internal", message))
+        finally:
+            incoming.close()
 
     def _check_draining(self, path: str) -> None:
         if self._state.is_draining and path not in DRAINING_PATHS:
@@ -209,24 +226,79 @@ def _host_name(host: str) -> str:
         return ""
 
 
-class _BoundedBody:
-    """A request's body with limits of size and time."""
+class _Incoming:
+    """What a client sends, read ahead of the application, so that its leaving is noticed at once.
 
-    def __init__(self, receive: Receive, max_bytes: float, max_s: float) -> None:
-        self._receive, self._max_bytes, self._max_s = receive, max_bytes, max_s
-        self._n_bytes, self._is_complete = 0, False
-        self._deadline = time.monotonic() + max_s
+    A body has limits of size and time; it is read from the first time that the application asks for it, so that a
+    client which waits for ``100 Continue`` sends nothing that is refused. Everything else is read from the start.
+    """
 
-    def check(self, headers: dict[bytes, bytes]) -> None:
+    def __init__(self, request: Exchange, receive: Receive, max_bytes: float, max_s: float) -> None:
+        self._request, self._receive, self._max_bytes = request, receive, max_bytes
+        self._max_s, self._deadline = max_s, time.monotonic() + max_s
+        self._n_bytes, self._has_body = 0, False
+        self._messages: deque[MutableMapping[str, Any]] = deque()
+        self._n_waiting_bytes = 0  # of the messages
+        self._wrong: RefusedError | None = None
+        self._changed = asyncio.Event()  # a message has come, has been taken, or the end was reached
+        self._reading: asyncio.Task[None] | None = None
+
+    def check(self) -> None:
         """Refuse a body whose stated length is too large; what has none is complete, however late it is asked for."""
+        headers = self._request.headers
         length = headers.get(b"content-length", b"0")
-        self._is_complete = length == b"0" and b"transfer-encoding" not in headers
-        if not length.isdigit() or int(length) > self._max_bytes:
-            raise self._too_large()
+        if self._request.scope["type"] == "http":
+            self._has_body = length != b"0" or b"transfer-encoding" in headers
+            if not length.isdigit() or int(length) > self._max_bytes:
+                raise self._too_large()
+        if not self._has_body:
+            self._start()
 
     async def receive(self) -> MutableMapping[str, Any]:
-        """Next message of the request."""
-        if self._is_complete:
+        """Next message of the client; again and again the last one, which says that it has left."""
+        self._start()
+        while not self._messages:
+            if self._wrong is not None:
+                raise self._wrong
+            self._changed.clear()
+            await self._changed.wait()
+        message = self._messages[0]
+        if not _is_last(message):
+            self._messages.popleft()
+            self._n_waiting_bytes -= _n_bytes(message)
+            self._changed.set()
+        return message
+
+    def close(self) -> None:
+        """Read no more."""
+        if self._reading is not None:
+            self._reading.cancel()
+
+    def _start(self) -> None:
+        if self._reading is None:
+            self._reading = asyncio.create_task(self._read())
+
+    async def _read(self) -> None:
+        message: MutableMapping[str, Any] = {"type": ""}
+        while not _is_last(message):
+            try:
+                message = await self._next()
+            except RefusedError as wrong:
+                self._wrong = wrong
+            if self._wrong is None:
+                self._messages.append(message)
+                self._n_waiting_bytes += _n_bytes(message)
+            if _is_last(message):
+                self._request.leave()
+            self._changed.set()
+            if self._wrong is not None:
+                return
+            while self._n_waiting_bytes >= READ_AHEAD_BYTES:
+                self._changed.clear()
+                await self._changed.wait()
+
+    async def _next(self) -> MutableMapping[str, Any]:
+        if not self._has_body:
             return await self._receive()
         try:
             message = await asyncio.wait_for(self._receive(), max(0.0, self._deadline - time.monotonic()))
@@ -235,14 +307,23 @@ class _BoundedBody:
                 408, "too_slow", f"the body did not arrive within {self._max_s:g} s; send it faster"
             ) from late
         if message["type"] == "http.request":
-            self._n_bytes += len(message.get("body", b""))
-            self._is_complete = not message.get("more_body", False)
+            self._n_bytes += _n_bytes(message)
+            self._has_body = message.get("more_body", False)
             if self._n_bytes > self._max_bytes:
                 raise self._too_large()
         return message
 
     def _too_large(self) -> RefusedError:
         return RefusedError(413, "too_large", f"the body is larger than {self._max_bytes / 1e6:g} MB; send less")
+
+
+def _is_last(message: Mapping[str, Any]) -> bool:
+    return str(message["type"]).endswith(".disconnect")
+
+
+def _n_bytes(message: Mapping[str, Any]) -> int:
+    """Size of what a client has sent; of texts in characters."""
+    return len(message.get("body") or message.get("bytes") or message.get("text") or b"")
 
 
 def require_scope(request: HttpRequest, scope: str, what: str) -> ApiKey:

@@ -159,6 +159,7 @@ def make_server(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> "Dra
         loop="asyncio",  # whatever else is installed
         log_config=None, log_level="warning", access_log=False, server_header=False, proxy_headers=False,
         timeout_graceful_shutdown=CUT_S, ws_max_size=1024 * settings.message_kb, lifespan="on",
+        ws_per_message_deflate=False,  # a few bytes would become megabytes in one step of the event loop
         timeout_keep_alive=settings.keep_alive_s,  # type: ignore[arg-type]
         h11_max_incomplete_event_size=1024 * settings.head_kb,
     ), app.state.service)  # fmt: skip

@@ -74,6 +74,10 @@ class ServiceSettings:
     )
     webhook_secret: str = setting("", "Secret that signs webhooks; never shown.", is_secret=True)
     text_characters: int = setting(100_000, "Longest text of a request.", (1, 10_000_000))
+    live_characters: int = setting(1_000_000, "Text of a live stream over its life, in characters.", (1, 1_000_000_000))
+    live_characters_per_minute: int = setting(
+        20_000, "Text of a live stream in a minute, in characters; more is refused.", (1, 1_000_000_000)
+    )
     sound_s: float = setting(600.0, "Longest recording that a request may send.", (1, 86_400))
     body_mb: float = setting(20.0, "Largest body of a request in MB.", (0.01, 4096))
     body_s: float = setting(20.0, "Seconds within which the body of a request must arrive.", (0.1, 3600))

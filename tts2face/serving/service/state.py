@@ -15,12 +15,14 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, gene
 from lexicon.errors import Tts2faceError
 from tts2face.processes.message import RESULT, Message
 from tts2face.serving.service.errors import RefusedError, as_refused
+from tts2face.serving.service.exchange import while_client_stays
 from tts2face.serving.service.job_service import JobService
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits, read_keys
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.messages import Work, check_words
 from tts2face.serving.service.pool import STREAM_PRIORITY, InputQueue, Pool, PoolSettings
+from tts2face.serving.service.readiness import Readiness
 from tts2face.serving.service.result_cache import CACHED_KINDS, ResultCache
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.tracing import tracing_from_environment
@@ -109,6 +111,7 @@ class ServiceState:
         self.limits, self.metrics = RateLimits(), Metrics(self.pool, self.jobs, self.cache)
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
+        self.readiness = Readiness(self)
         self.running: set[Exchange] = set()
 
     def reload_keys(self) -> None:
@@ -142,6 +145,8 @@ class ServiceState:
         ------
         RefusedError
             The work failed, or too many works wait.
+        ClientDisconnect
+            The client of the present request has left; the work no longer waits, or has been stopped.
         """
         if len(str(work.request.get("text", ""))) > self.settings.text_characters:
             raise RefusedError(
@@ -156,7 +161,9 @@ class ServiceState:
         try:
             check_words(str(work.request.get("text", "")))
             async with aclosing(self._stream(work, key, inputs, priority)) as stream:  # type: ignore[type-var]
-                async for message in stream:
+                while True:
+                    with while_client_stays():
+                        message = await anext(stream)
                     seconds = message.content["seconds"]
                     if message.kind == RESULT:
                         self.limits.add_speech(key, seconds - made)  # of parts without content

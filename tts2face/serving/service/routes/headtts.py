@@ -13,13 +13,12 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import JSONResponse, PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from lexicon.errors import DataError
-from lexicon.inputs import parse_json
 from lexicon.marked_text import RATE_LIMITS
 from tts2face.interchange.exports.parts import Label
 from tts2face.picture.sound_stream import wav_header
 from tts2face.serving.service.errors import ErrorBody, RefusedError
 from tts2face.serving.service.library import check_voice, resolve_dictionary
+from tts2face.serving.service.live_text import REFUSED_S, parse_message
 from tts2face.serving.service.request_fields import described
 from tts2face.serving.service.routes.clips import service_state, timed_speech
 
@@ -108,49 +107,44 @@ async def synthesize(request: HttpRequest, body: HeadTtsRequest) -> JSONResponse
 @router.websocket("/")
 @router.websocket("/v1/headtts")
 async def socket(connection: WebSocket) -> None:
-    """Messages ``setup`` and ``synthesize``; answers ``audio``, followed by its sound, or ``error``."""
+    """Messages ``setup`` and ``synthesize``, one after another; answers ``audio`` and its sound, or ``error``."""
     await connection.accept()
     setup: dict[str, Any] = {}
-    lock = asyncio.Lock()
-    works: set[asyncio.Task[None]] = set()
     try:
         while True:
-            message = _read_message(await connection.receive_text())
+            try:
+                message = parse_message(await connection.receive_text())
+            except RefusedError as refused:
+                await _send_error(connection, None, refused.message)
+                continue
+            if not isinstance(message, dict):
+                continue
             if message.get("type") == "setup" and isinstance(message.get("data"), dict):
                 setup |= message["data"]
             elif message.get("type") == "synthesize":
-                work = asyncio.create_task(_answer(connection, lock, dict(setup), message))
-                works.add(work)
-                work.add_done_callback(works.discard)
+                await _answer(connection, setup, message)
     except (WebSocketDisconnect, KeyError):  # KeyError: a binary message
         return
-    finally:
-        for work in works:
-            work.cancel()
 
 
-def _read_message(text: str) -> dict[str, Any]:
-    try:
-        message = parse_json(text, "the message")
-    except DataError:
-        return {}
-    return message if isinstance(message, dict) else {}
+async def _send_error(connection: WebSocket, reference: Any, reason: str) -> None:
+    await connection.send_json({"type": "error", "ref": reference, "data": {"error": reason}})
+    await asyncio.sleep(REFUSED_S)
 
 
-async def _answer(connection: WebSocket, lock: asyncio.Lock, setup: dict[str, Any], message: dict[str, Any]) -> None:
-    """Answer one ``synthesize``; its two messages follow each other."""
+async def _answer(connection: WebSocket, setup: dict[str, Any], message: dict[str, Any]) -> None:
+    """Answer one ``synthesize``, which counts as a request."""
     reference = message.get("id")
     try:
+        service_state(connection).limits.count(connection.state.key)
         body = HeadTtsRequest(**(setup | (message.get("data") or {})))
         content, sound = await _speak(connection, body)
     except (RefusedError, ValueError, TypeError) as error:
         reason = error.message if isinstance(error, RefusedError) else "the request is invalid: " + str(error)[:200]
-        async with lock:
-            await connection.send_json({"type": "error", "ref": reference, "data": {"error": reason}})
+        await _send_error(connection, reference, reason)
         return
-    async with lock:
-        await connection.send_json({"type": "audio", "ref": reference, "data": content})
-        await connection.send_bytes(sound)
+    await connection.send_json({"type": "audio", "ref": reference, "data": content})
+    await connection.send_bytes(sound)
 
 
 async def _speak(request: HttpRequest | WebSocket, body: HeadTtsRequest) -> tuple[dict[str, Any], bytes]:
