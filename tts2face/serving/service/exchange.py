@@ -73,6 +73,7 @@ class Exchange:
         self.code: str | None = None  # of the error with which it was refused
         self.first_byte_s: float | None = None
         self.stages: list[Stage] = []
+        self.further: list[tuple[bytes, bytes]] = []  # headers of its answer, whatever answers it
         self.is_cut = False  # ended by the service before it was complete
         self._is_closed = False
         self._task: asyncio.Task[Any] | None = None
@@ -106,6 +107,7 @@ class Exchange:
             message["headers"] = [
                 *message["headers"],
                 *(header for header in own if header[0] not in given),
+                *self.further,
                 (b"x-request-id", self.id.encode()),
                 (b"server-timing", self._server_timing().encode()),
             ]
@@ -115,6 +117,12 @@ class Exchange:
             self._is_closed = True
         self._count(message)
         await self._send(message)
+
+    async def answer(self, status: int, headers: list[tuple[bytes, bytes]], body: bytes = b"") -> None:
+        """Answer it as a whole."""
+        lines = headers if status == 204 else [*headers, (b"content-length", str(len(body)).encode())]
+        await self.send({"type": "http.response.start", "status": status, "headers": lines})
+        await self.send({"type": "http.response.body", "body": body})
 
     async def run(self, work: Awaitable[None]) -> None:
         """Run what answers the request, until it ends or until `cut`."""
@@ -134,16 +142,15 @@ class Exchange:
             return
         body = json.dumps(error_body(refused.code, refused.message)).encode()
         headers = [(name.lower().encode(), value.encode("latin-1")) for name, value in refused.headers.items()]
-        headers += [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode())]
+        headers.append((b"content-type", b"application/json"))
         if self.scope["type"] == "http":
-            await self.send({"type": "http.response.start", "status": refused.status, "headers": headers})
-            await self.send({"type": "http.response.body", "body": body})
+            await self.answer(refused.status, headers, body)
             return
         self.status = refused.status
         if HTTP_FORM not in self.scope.get("extensions", {}):
             await self._send({"type": "websocket.close", "code": CLOSE_REFUSED, "reason": refused.message[:120]})
             return
-        headers.append((b"x-request-id", self.id.encode()))
+        headers += [(b"content-length", str(len(body)).encode()), (b"x-request-id", self.id.encode()), *self.further]
         await self._send({"type": f"{HTTP_FORM}.start", "status": refused.status, "headers": headers})
         await self._send({"type": f"{HTTP_FORM}.body", "body": body})
 

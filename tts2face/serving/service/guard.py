@@ -7,6 +7,7 @@ What a key may do.
 
 import asyncio
 import logging
+import re
 import time
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping
 from http.cookies import CookieError, SimpleCookie
@@ -21,6 +22,7 @@ from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import PAGES, RECORDINGS, STYLES, TAKES, Exchange, Receive, Scope, Send, is_page
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, find_key
 from tts2face.serving.service.logs import log_event
+from tts2face.serving.service.origins import answer_headers, check_origin, preflight_headers
 
 if TYPE_CHECKING:
     from tts2face.serving.service.exchange import Exchange
@@ -34,6 +36,7 @@ LOGIN_PATH = f"{PAGES}/login"
 STATIC_PATHS = (f"{PAGES}/_nicegui/", f"{PAGES}/_nicegui_ws/")  # libraries of a page, and its connection
 UPLOADS = f"{PAGES}/_nicegui/client/"
 COOKIE_S = 30 * 86_400
+BEARER = re.compile(r"^bearer\s+", re.IGNORECASE)  # names of schemes have no case: RFC 9110, 11.1
 
 
 def is_static(path: str) -> bool:
@@ -92,12 +95,16 @@ class Guard:
         if scope["type"] not in {"http", "websocket"}:
             return await self._app(scope, receive, send)
         request = Exchange(scope, receive, send)
+        request.further = answer_headers(request.headers, self._state.settings.origins)
         key: ApiKey | None = None
         is_counted = scope["path"] not in UNCOUNTED_PATHS and not is_static(scope["path"])
         try:
-            self._check_draining(scope["path"])
             self._check_head(request)
             self._check_host(request)
+            if allowed := preflight_headers(request.method, request.headers, self._state.settings.origins):
+                await request.answer(204, allowed)
+                return self._state.record(request, key)
+            self._check_draining(scope["path"])
             key = self._identify(request)
             scope["state"] = {**scope.get("state", {}), "key": key, "exchange": request}
             if is_counted:
@@ -158,19 +165,13 @@ class Guard:
             raise RefusedError(
                 421, "unknown_host", f"the host {name!r} is none of this service; add it to the setting hosts"
             )
-        origin = request.headers.get(b"origin", b"").decode("latin-1")
-        if origin and origin not in self._state.settings.origins and origin.partition("://")[2] != host:
-            raise RefusedError(
-                403,
-                "unknown_origin",
-                f"pages of {origin[:80]!r} may not use this service; add it to the setting origins",
-            )
+        check_origin(request.headers, self._state.settings.origins)
 
     def _identify(self, request: "Exchange") -> ApiKey:
         path = request.scope["path"]
         if path in OPEN_PATHS or path == LOGIN_PATH or not self._state.keys:
             return LOCAL_KEY
-        given = request.headers.get(b"authorization", b"").decode("latin-1").removeprefix("Bearer ").strip()
+        given = BEARER.sub("", request.headers.get(b"authorization", b"").decode("latin-1").strip())
         given = given or request.headers.get(b"x-api-key", b"").decode("latin-1")
         if not given and request.scope["type"] == "websocket":  # a browser cannot send headers with it
             given = parse_qs(request.scope["query_string"].decode("latin-1")).get("key", [""])[0]
