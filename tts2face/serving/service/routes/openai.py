@@ -27,7 +27,9 @@ OPENAI_VOICES = (
 )  # fmt: skip
 SAME_NAMES = {"language", "face", "palette", "dictionary"}  # of fields and of options of clips
 FORMATS = {"jsonl": "curves"}  # further names of formats
-Format = Literal["mp3", "opus", "aac", "flac", "wav", "pcm", "mp4", "webm", "glb", "jsonl", "curves", "oculus", "azure"]
+Format = Literal[
+    "mp3", "opus", "aac", "flac", "wav", "pcm", "weba", "mp4", "webm", "glb", "jsonl", "curves", "oculus", "azure"
+]
 
 
 class Speech(BaseModel):
