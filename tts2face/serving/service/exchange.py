@@ -17,6 +17,7 @@ from tts2face.serving.service.logs import REQUEST_ID
 from tts2face.serving.service.stages import STAGES, Stage, durations
 
 PAGES = "/studio"
+REFERENCE = "/docs"
 RECORDINGS = f"{PAGES}/api/recordings"
 STYLES = f"{PAGES}/api/styles"
 TAKES = f"{PAGES}/api/takes"

@@ -19,7 +19,18 @@ from starlette.requests import ClientDisconnect
 from starlette.websockets import WebSocketDisconnect
 
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.exchange import PAGES, RECORDINGS, STYLES, TAKES, Exchange, Receive, Scope, Send, is_page
+from tts2face.serving.service.exchange import (
+    PAGES,
+    RECORDINGS,
+    REFERENCE,
+    STYLES,
+    TAKES,
+    Exchange,
+    Receive,
+    Scope,
+    Send,
+    is_page,
+)
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, find_key
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.origins import answer_headers, check_origin, preflight_headers
@@ -75,7 +86,10 @@ def wants_login(request: "Exchange") -> bool:
 
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
-OPEN_PATHS = frozenset({"/healthz", "/readyz", "/docs", "/openapi.json"})
+OPEN_PATHS = frozenset({
+    "/healthz", "/readyz", "/openapi.json", REFERENCE,
+    *(f"{REFERENCE}/{name}" for name in ("swagger-ui-bundle.js", "swagger-ui.css", "start.js")),
+})  # fmt: skip
 UNCOUNTED_PATHS = frozenset({*OPEN_PATHS, "/metrics", "/v1/hello"})
 VIDEO_PATH = "/v1/talkers/build"
 VIDEO_PUTS = (f"{RECORDINGS}/", f"{STYLES}/", f"{TAKES}/")
