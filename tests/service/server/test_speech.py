@@ -210,6 +210,14 @@ def test_wrong_headtts_requests_are_refused(client: httpx.Client, body: dict[str
     assert reason in response.json()["error"]
 
 
+def test_letters_of_a_phonetic_item_are_no_words(client: httpx.Client) -> None:
+    """As HeadTTS, which shows the item's subtitles only."""
+    item = {"type": "phonetic", "value": "ˈɔɹɪnʤəz"}
+    answer = client.post("/v1/synthesize", json={"input": ["We saw ", item, "."]}).json()
+    assert answer["words"] == ["We ", "saw ", ""]
+    assert answer["wdurations"][2] > 200
+
+
 def test_metrics_count_what_was_made(client: httpx.Client) -> None:
     def value(name: str) -> float:
         return next(

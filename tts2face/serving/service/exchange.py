@@ -12,6 +12,8 @@ from collections.abc import Awaitable, Callable, MutableMapping
 from contextlib import suppress
 from typing import Any
 
+from starlette.requests import ClientDisconnect
+
 from tts2face.serving.service.errors import RefusedError, error_body
 from tts2face.serving.service.logs import REQUEST_ID
 from tts2face.serving.service.stages import STAGES, Stage, durations
@@ -67,6 +69,9 @@ class Exchange:
     def __init__(self, scope: Scope, receive: Receive, send: Send) -> None:
         self.scope, self._receive, self._send = scope, receive, send
         self.headers: dict[bytes, bytes] = dict(scope["headers"])
+        self._method = str(scope.get("method", "WS"))
+        if self._method == "HEAD":  # is answered as GET is, without the body
+            scope["method"] = "GET"
         given = self.headers.get(b"x-request-id", b"")
         self.id = given.decode() if REQUEST_ID_FORM.fullmatch(given) else uuid.uuid4().hex
         self.began = time.monotonic()
@@ -89,7 +94,7 @@ class Exchange:
     @property
     def method(self) -> str:
         """Method; ``WS`` of a WebSocket, ``OTHER`` if it is none of `METHODS`."""
-        method = str(self.scope.get("method", "WS"))
+        method = self._method
         return method if method in METHODS or self.scope["type"] == "websocket" else "OTHER"
 
     @property
@@ -112,6 +117,11 @@ class Exchange:
                 (b"x-request-id", self.id.encode()),
                 (b"server-timing", self._server_timing().encode()),
             ]
+            if self.method == "HEAD":
+                await self._send(message)
+                self._is_closed = True
+                await self._send({"type": "http.response.body"})
+                raise ClientDisconnect  # who wants nothing more
         elif message["type"] == "websocket.accept":
             self.status = 101
         elif message["type"] == "websocket.close":
@@ -122,8 +132,9 @@ class Exchange:
     async def answer(self, status: int, headers: list[tuple[bytes, bytes]], body: bytes = b"") -> None:
         """Answer it as a whole."""
         lines = headers if status == 204 else [*headers, (b"content-length", str(len(body)).encode())]
-        await self.send({"type": "http.response.start", "status": status, "headers": lines})
-        await self.send({"type": "http.response.body", "body": body})
+        with suppress(ClientDisconnect):
+            await self.send({"type": "http.response.start", "status": status, "headers": lines})
+            await self.send({"type": "http.response.body", "body": body})
 
     async def run(self, work: Awaitable[None]) -> None:
         """Run what answers the request, until it ends or until `cut`."""

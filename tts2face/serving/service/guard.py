@@ -152,6 +152,9 @@ class Guard:
         except (ClientDisconnect, WebSocketDisconnect):
             pass  # the client has left
         except Exception as defect:  # noqa: BLE001 - the one place where a defect becomes an answer
+            if isinstance(defect.__cause__, RefusedError) and request.status:  # Starlette's, of one that comes too late
+                request.code = defect.__cause__.code
+                return
             log_event("defect", level=logging.ERROR, error=defect)
             message = f"internal error: {type(defect).__name__}; the log has it under the id {request.id}"
             await request.refuse(RefusedError(500, "internal", message))

@@ -90,7 +90,7 @@ class LiveTask:
             content = self._inputs.popleft().content
             match content.get("type"):
                 case "text":
-                    self._sentences += self._text.add(str(content.get("text", "")))
+                    self._sentences += self._text.add(content["text"])
                 case "flush":
                     self._sentences += self._text.flush()
                 case "end":

@@ -8,9 +8,10 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
@@ -123,8 +124,16 @@ async def _answer_http(request: HttpRequest, error: Exception) -> JSONResponse:
 
 def _methods(request: HttpRequest) -> set[str]:
     """Methods of all routes of a path; Starlette names those of the first one only."""
-    routes = (one for one in request.app.routes if one.matches(request.scope)[0] != Match.NONE)
-    return {method for one in routes for method in getattr(one, "methods", None) or ()}
+    routes = (one for one in _routes(request.app.routes) if one.matches(request.scope)[0] != Match.NONE)
+    found = {method for one in routes for method in getattr(one, "methods", None) or ()}
+    return found | {"HEAD"} if "GET" in found else found
+
+
+def _routes(routes: Iterable[Any]) -> Iterator[Any]:
+    """All routes, those of included routers among them, which FastAPI keeps as one."""
+    for one in routes:
+        router = getattr(one, "original_router", None)
+        yield from (one,) if router is None else _routes(router.routes)
 
 
 SOCKET_GRACE_S = 3.0  # between the message to the clients of WebSockets and their end

@@ -191,8 +191,8 @@ def items_to_ssml(items: Sequence[str | dict[str, Any]]) -> tuple[str, dict[str,
         make = ITEMS.get(str(item.get("type", "text")))
         if make is None:
             raise RefusedError(400, "invalid_request", f"there is no item type {str(item.get('type'))[:40]!r}")
-        if item.get("subtitles"):
-            subtitles[name] = str(item["subtitles"])
+        if item.get("subtitles") or item.get("type") == "phonetic":  # whose letters are no words
+            subtitles[name] = str(item.get("subtitles") or "")
         parts.append(f"<mark name={quoteattr(name)}/>{make(value)} ")
     text = "".join(parts)
     if sum(len(str(item if isinstance(item, str) else item.get("value", ""))) for item in items) > MAX_CHARACTERS:

@@ -11,7 +11,7 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import Field, ValidationError
 
 from lexicon.errors import DataError
-from lexicon.inputs import parse_json
+from lexicon.inputs import format_value, parse_json
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.library import check_voice, resolve_dictionary, resolve_models
 from tts2face.serving.service.pool import InputQueue
@@ -183,7 +183,12 @@ def _read_message(message: Any, types: frozenset[str], *, has_sound: bool) -> tu
             f"a message must be {'16-bit samples, or ' if has_sound else ''}JSON with one of the types "
             f"{', '.join(sorted(types))}",
         )  # fmt: skip
-    return content, b""
+    text = content.get("text")
+    if content["type"] == "text" and not isinstance(text, str | None):
+        raise RefusedError(
+            400, "invalid_request", f"text must be a text, or null for none, not {format_value(text)}; send words"
+        )
+    return content | ({"text": text or ""} if content["type"] == "text" else {}), b""
 
 
 async def _send(connection: WebSocket, state: ServiceState, work: Any, inputs: InputQueue) -> None:

@@ -34,14 +34,14 @@ PAGE = """<!doctype html>
 CACHE = "private, max-age=86400"
 
 
-@router.api_route(REFERENCE, methods=["GET", "HEAD"])
+@router.get(REFERENCE)
 def show_reference() -> HTMLResponse:
     """The page."""
     return HTMLResponse(PAGE, headers={"Content-Security-Policy": POLICY, "Referrer-Policy": "no-referrer"})
 
 
 def _add_file(name: str, media_type: str) -> None:
-    @router.api_route(f"{REFERENCE}/{name}", methods=["GET", "HEAD"])
+    @router.get(f"{REFERENCE}/{name}")
     def send_file(request: HttpRequest) -> Response:
         content, headers = _compressed(name), {"Cache-Control": CACHE, "Vary": "Accept-Encoding"}
         if "gzip" in request.headers.get("accept-encoding", ""):
