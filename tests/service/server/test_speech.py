@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import av
 import httpx
@@ -71,11 +72,10 @@ def test_the_openai_client_lists_models(official: openai.OpenAI) -> None:
     [
         ({"voice": "nobody"}, "there is no voice 'nobody'; the voices are heart"),
         ({"voice": "../../etc/passwd"}, "there is no voice"),
-        ({"model": "/etc/passwd"}, "there is no talker '/etc/passwd'"),
-        ({"input": "漢字"}, "cannot read 漢字"),
+        ({"input": "漢字", "extra_body": {"language": "en"}}, "cannot read 漢字"),
     ],
 )
-def test_the_openai_client_is_told_what_is_wrong(official: openai.OpenAI, options: dict[str, str], reason: str) -> None:
+def test_the_openai_client_is_told_what_is_wrong(official: openai.OpenAI, options: dict[str, Any], reason: str) -> None:
     with pytest.raises(openai.BadRequestError, match=reason):
         official.audio.speech.create(**{"model": "tts-1", "voice": "alloy", "input": TEXT, **options})  # type: ignore[call-overload]
 

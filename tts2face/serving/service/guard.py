@@ -87,13 +87,13 @@ def wants_login(request: "Exchange") -> bool:
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 OPEN_PATHS = frozenset({
-    "/healthz", "/readyz", "/openapi.json", REFERENCE,
+    "/health", "/healthz", "/readyz", "/openapi.json", REFERENCE,
     *(f"{REFERENCE}/{name}" for name in ("swagger-ui-bundle.js", "swagger-ui.css", "start.js")),
 })  # fmt: skip
 UNCOUNTED_PATHS = frozenset({*OPEN_PATHS, "/metrics", "/v1/hello"})
 VIDEO_PATH = "/v1/talkers/build"
 VIDEO_PUTS = (f"{RECORDINGS}/", f"{STYLES}/", f"{TAKES}/")
-DRAINING_PATHS = frozenset({"/healthz", "/readyz", "/metrics"})  # that are answered until the end
+DRAINING_PATHS = frozenset({"/health", "/healthz", "/readyz", "/metrics"})  # that are answered until the end
 CLOSE = {"Connection": "close"}
 DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
 

@@ -30,7 +30,18 @@ from tts2face.serving.service.errors import DOCUMENTED, RefusedError, as_refused
 from tts2face.serving.service.exchange import PAGES
 from tts2face.serving.service.guard import Guard
 from tts2face.serving.service.logs import configure_logs, log_event
-from tts2face.serving.service.routes import clips, headtts, health, jobs, live, openai, reference, resources, results
+from tts2face.serving.service.routes import (
+    clips,
+    headtts,
+    health,
+    jobs,
+    kokoro,
+    live,
+    openai,
+    reference,
+    resources,
+    results,
+)
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 
@@ -82,7 +93,7 @@ def create_app(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> FastA
         telemetry=NO_TELEMETRY,
     )
     app.state.service = state
-    for part in (openai, clips, headtts, live, jobs, results, resources, health, reference):
+    for part in (openai, kokoro, clips, headtts, live, jobs, results, resources, health, reference):
         app.include_router(part.router)
     app.add_exception_handler(RefusedError, _answer_refused)
     app.add_exception_handler(Tts2faceError, _answer_error)
