@@ -48,7 +48,10 @@ def test_head_of_a_result_and_of_events(service: RunningService, client: httpx.C
 
 
 def test_a_method_that_a_path_does_not_have_is_refused_with_those_that_it_has(client: httpx.Client) -> None:
-    for method, path, allowed in (("HEAD", "/v1/clips", "POST"), ("PUT", "/v1/voices", "GET, HEAD")):
+    for method, path, allowed in (
+        ("HEAD", "/v1/clips", "POST"), ("PUT", "/v1/voices", "GET, HEAD"), ("PUT", "/v1/jobs", "GET, HEAD, POST"),
+        ("OPTIONS", "/v1/talkers/build", "POST"), ("PUT", "/v1/faces/anna", "DELETE, GET, HEAD"),
+    ):  # fmt: skip
         answer = client.request(method, path)
         assert (answer.status_code, answer.headers["allow"]) == (405, allowed)
 

@@ -134,9 +134,13 @@ async def _answer_http(request: HttpRequest, error: Exception) -> JSONResponse:
 
 
 def _methods(request: HttpRequest) -> set[str]:
-    """Methods of all routes of a path; Starlette names those of the first one only."""
-    routes = (one for one in _routes(request.app.routes) if one.matches(request.scope)[0] != Match.NONE)
-    found = {method for one in routes for method in getattr(one, "methods", None) or ()}
+    """Methods of all routes of a path, of several forms of paths the one with the fewest parameters.
+
+    Starlette names those of one route only.
+    """
+    routes = [one for one in _routes(request.app.routes) if one.matches(request.scope)[0] != Match.NONE]
+    form = min((one.path for one in routes), key=lambda path: path.count("{"), default="")
+    found = {method for one in routes if one.path == form for method in getattr(one, "methods", None) or ()}
     return found | {"HEAD"} if "GET" in found else found
 
 

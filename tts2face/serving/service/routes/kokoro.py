@@ -85,7 +85,9 @@ class PhonesRequest(BaseModel):
 class Phones(BaseModel):
     """Phones of a text."""
 
-    phonemes: Annotated[str, Field(description="Words in IPA, with stress marks and punctuation.")]
+    phonemes: Annotated[
+        str, Field(description="Words in IPA, with stress marks and punctuation.", examples=["həˈloʊ."])
+    ]
     tokens: Annotated[list[int], Field(description="Empty: the service has no tokens of Kokoro.")]
 
 

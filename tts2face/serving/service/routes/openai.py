@@ -56,13 +56,17 @@ class SpokenText(BaseModel):
     ] = "alloy"
     speed: Annotated[float, Field(ge=0.25, le=4.0, description="Speaking rate; limited to 0.5 to 2.")] = 1.0
     language: Annotated[
-        str | None, described("language", "Language of the text; by default guessed from it; not part of OpenAI's API.")
+        str | None,
+        described(
+            "language", "Language of the text; by default guessed from it; not part of OpenAI's API.", examples=["de"]
+        ),
     ] = None
     lang_code: Annotated[
         str | None, Field(description="The same, also as Kokoro's letter (a, b, e, ...).", examples=["a"])
     ] = None
     volume_multiplier: Annotated[
-        float | None, Field(ge=VOLUME_LIMITS[0], le=VOLUME_LIMITS[1], description="Factor of the loudness.")
+        float | None,
+        Field(ge=VOLUME_LIMITS[0], le=VOLUME_LIMITS[1], description="Factor of the loudness.", examples=[1.0]),
     ] = None
 
 
@@ -80,7 +84,10 @@ class Speech(SpokenText):
     ] = "audio"
     timestamps: Annotated[
         list[TimeName] | None,
-        Field(description="Times of words, phones: JSON with the sound, or an event before each sentence's sound."),
+        Field(
+            description="Times of words, phones: JSON with the sound, or an event before each sentence's sound.",
+            examples=[["word"]],
+        ),
     ] = None
     instructions: Annotated[str | None, Field(description="Accepted and not used.", examples=["Speak calmly."])] = None
     face: Annotated[
