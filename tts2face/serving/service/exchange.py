@@ -20,6 +20,7 @@ from tts2face.serving.service.logs import REQUEST_ID
 from tts2face.serving.service.stages import STAGES, Stage, durations
 
 PAGES = "/studio"
+REFERENCE = "/docs"
 RECORDINGS = f"{PAGES}/api/recordings"
 STYLES = f"{PAGES}/api/styles"
 TAKES = f"{PAGES}/api/takes"
@@ -71,6 +72,9 @@ class Exchange:
     def __init__(self, scope: Scope, receive: Receive, send: Send) -> None:
         self.scope, self._receive, self._send = scope, receive, send
         self.headers: dict[bytes, bytes] = dict(scope["headers"])
+        self._method = str(scope.get("method", "WS"))
+        if self._method == "HEAD":  # is answered as GET is, without the body
+            scope["method"] = "GET"
         given = self.headers.get(b"x-request-id", b"")
         self.id = given.decode() if REQUEST_ID_FORM.fullmatch(given) else uuid.uuid4().hex
         self.began = time.monotonic()
@@ -78,6 +82,7 @@ class Exchange:
         self.code: str | None = None  # of the error with which it was refused
         self.first_byte_s: float | None = None
         self.stages: list[Stage] = []
+        self.further: list[tuple[bytes, bytes]] = []  # headers of its answer, whatever answers it
         self.is_cut = False  # ended by the service before it was complete
         self.is_answered = False  # all of its answer has been passed on
         self.has_left = False  # its client has, before the answer was complete
@@ -95,7 +100,7 @@ class Exchange:
     @property
     def method(self) -> str:
         """Method; ``WS`` of a WebSocket, ``OTHER`` if it is none of `METHODS`."""
-        method = str(self.scope.get("method", "WS"))
+        method = self._method
         return method if method in METHODS or self.scope["type"] == "websocket" else "OTHER"
 
     @property
@@ -114,9 +119,15 @@ class Exchange:
             message["headers"] = [
                 *message["headers"],
                 *(header for header in own if header[0] not in given),
+                *self.further,
                 (b"x-request-id", self.id.encode()),
                 (b"server-timing", self._server_timing().encode()),
             ]
+            if self.method == "HEAD":
+                await self._send(message)
+                self._is_closed = True
+                await self._send({"type": "http.response.body"})
+                raise ClientDisconnect  # who wants nothing more
         elif message["type"] == "websocket.accept":
             self.status = 101
         elif message["type"] == "websocket.close":
@@ -125,6 +136,13 @@ class Exchange:
             self.is_answered = not message.get("more_body", False)
         self._count(message)
         await self._send(message)
+
+    async def answer(self, status: int, headers: list[tuple[bytes, bytes]], body: bytes = b"") -> None:
+        """Answer it as a whole."""
+        lines = headers if status == 204 else [*headers, (b"content-length", str(len(body)).encode())]
+        with suppress(ClientDisconnect):
+            await self.send({"type": "http.response.start", "status": status, "headers": lines})
+            await self.send({"type": "http.response.body", "body": body})
 
     async def run(self, work: Awaitable[None]) -> None:
         """Run what answers the request, until it ends or until `cut`."""
@@ -177,16 +195,15 @@ class Exchange:
             return
         body = json.dumps(error_body(refused.code, refused.message)).encode()
         headers = [(name.lower().encode(), value.encode("latin-1")) for name, value in refused.headers.items()]
-        headers += [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode())]
+        headers.append((b"content-type", b"application/json"))
         if self.scope["type"] == "http":
-            await self.send({"type": "http.response.start", "status": refused.status, "headers": headers})
-            await self.send({"type": "http.response.body", "body": body})
+            await self.answer(refused.status, headers, body)
             return
         self.status = refused.status
         if HTTP_FORM not in self.scope.get("extensions", {}):
             await self._send({"type": "websocket.close", "code": CLOSE_REFUSED, "reason": refused.message[:120]})
             return
-        headers.append((b"x-request-id", self.id.encode()))
+        headers += [(b"content-length", str(len(body)).encode()), (b"x-request-id", self.id.encode()), *self.further]
         await self._send({"type": f"{HTTP_FORM}.start", "status": refused.status, "headers": headers})
         await self._send({"type": f"{HTTP_FORM}.body", "body": body})
 

@@ -7,6 +7,7 @@ What a key may do.
 
 import asyncio
 import logging
+import re
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping
@@ -23,6 +24,7 @@ from tts2face.serving.service.exchange import (
     CLIENT,
     PAGES,
     RECORDINGS,
+    REFERENCE,
     STYLES,
     TAKES,
     Exchange,
@@ -33,6 +35,7 @@ from tts2face.serving.service.exchange import (
 )
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, find_key
 from tts2face.serving.service.logs import log_event
+from tts2face.serving.service.origins import answer_headers, check_origin, preflight_headers
 
 if TYPE_CHECKING:
     from tts2face.serving.service.exchange import Exchange
@@ -46,6 +49,7 @@ LOGIN_PATH = f"{PAGES}/login"
 STATIC_PATHS = (f"{PAGES}/_nicegui/", f"{PAGES}/_nicegui_ws/")  # libraries of a page, and its connection
 UPLOADS = f"{PAGES}/_nicegui/client/"
 COOKIE_S = 30 * 86_400
+BEARER = re.compile(r"^bearer\s+", re.IGNORECASE)  # names of schemes have no case: RFC 9110, 11.1
 
 
 def is_static(path: str) -> bool:
@@ -84,11 +88,14 @@ def wants_login(request: "Exchange") -> bool:
 
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
-OPEN_PATHS = frozenset({"/healthz", "/readyz", "/docs", "/openapi.json"})
+OPEN_PATHS = frozenset({
+    "/health", "/healthz", "/readyz", "/openapi.json", REFERENCE,
+    *(f"{REFERENCE}/{name}" for name in ("swagger-ui-bundle.js", "swagger-ui.css", "start.js")),
+})  # fmt: skip
 UNCOUNTED_PATHS = frozenset({*OPEN_PATHS, "/metrics", "/v1/hello"})
 VIDEO_PATH = "/v1/talkers/build"
 VIDEO_PUTS = (f"{RECORDINGS}/", f"{STYLES}/", f"{TAKES}/")
-DRAINING_PATHS = frozenset({"/healthz", "/readyz", "/metrics"})  # that are answered until the end
+DRAINING_PATHS = frozenset({"/health", "/healthz", "/readyz", "/metrics"})  # that are answered until the end
 CLOSE = {"Connection": "close"}
 READ_AHEAD_BYTES = 256 << 10  # of a client that wait for the application; then no more is read
 DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
@@ -105,12 +112,16 @@ class Guard:
         if scope["type"] not in {"http", "websocket"}:
             return await self._app(scope, receive, send)
         request = Exchange(scope, receive, send)
+        request.further = answer_headers(request.headers, self._state.settings.origins)
         key: ApiKey | None = None
         is_counted = scope["path"] not in UNCOUNTED_PATHS and not is_static(scope["path"])
         try:
-            self._check_draining(scope["path"])
             self._check_head(request)
             self._check_host(request)
+            if allowed := preflight_headers(request.method, request.headers, self._state.settings.origins):
+                await request.answer(204, allowed)
+                return self._state.record(request, key)
+            self._check_draining(scope["path"])
             key = self._identify(request)
             scope["state"] = {**scope.get("state", {}), "key": key, "exchange": request}
             if is_counted:
@@ -146,6 +157,9 @@ class Guard:
         except (ClientDisconnect, WebSocketDisconnect):
             pass  # the client has left
         except Exception as defect:  # noqa: BLE001 - the one place where a defect becomes an answer
+            if isinstance(defect.__cause__, RefusedError) and request.status:  # Starlette's, of one that comes too late
+                request.code = defect.__cause__.code
+                return
             log_event("defect", level=logging.ERROR, error=defect)
             message = f"internal error: {type(defect).__name__}; the log has it under the id {request.id}"
             await request.refuse(RefusedError(500, "internal", message))
@@ -175,19 +189,13 @@ class Guard:
             raise RefusedError(
                 421, "unknown_host", f"the host {name!r} is none of this service; add it to the setting hosts"
             )
-        origin = request.headers.get(b"origin", b"").decode("latin-1")
-        if origin and origin not in self._state.settings.origins and origin.partition("://")[2] != host:
-            raise RefusedError(
-                403,
-                "unknown_origin",
-                f"pages of {origin[:80]!r} may not use this service; add it to the setting origins",
-            )
+        check_origin(request.headers, self._state.settings.origins)
 
     def _identify(self, request: "Exchange") -> ApiKey:
         path = request.scope["path"]
         if path in OPEN_PATHS or path == LOGIN_PATH or not self._state.keys:
             return LOCAL_KEY
-        given = request.headers.get(b"authorization", b"").decode("latin-1").removeprefix("Bearer ").strip()
+        given = BEARER.sub("", request.headers.get(b"authorization", b"").decode("latin-1").strip())
         given = given or request.headers.get(b"x-api-key", b"").decode("latin-1")
         if not given and request.scope["type"] == "websocket":  # a browser cannot send headers with it
             given = parse_qs(request.scope["query_string"].decode("latin-1")).get("key", [""])[0]

@@ -17,6 +17,7 @@ PREFIX = "TTS2FACE_SERVE_"  # of environment variables: TTS2FACE_SERVE_PORT
 LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
 MAX_SETTINGS_BYTES = 100_000
 Limits = tuple[float, float]
+_ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[^/?#A-Z\s]+")  # as browsers send it; another one matches no page
 _PASSWORD = re.compile(r"(?<=://)([^/:@]*):[^/@]*@")  # in the URL of a database
 
 
@@ -122,6 +123,11 @@ class ServiceSettings:
                 f"the service would be open to everybody who reaches {self.host}; create a key with `tts2face keys add "
                 f"NAME --file keys.toml` and give --keys keys.toml"
             )
+        for origin in self.origins:
+            if not _ORIGIN.fullmatch(origin):
+                raise InputError(
+                    f"origins must be such as https://example.org, in small letters and without a path, not {origin!r}"
+                )
         if self.webhook_hosts and not self.webhook_secret:
             raise InputError("webhook_hosts needs webhook_secret, which signs the messages; give both or neither")
 

@@ -8,6 +8,7 @@ import os
 from collections.abc import AsyncIterator
 from contextlib import aclosing
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
@@ -176,7 +177,7 @@ class ServiceState:
                         _log_spoken(message)
                     yield message
         except Tts2faceError as error:
-            refused = as_refused(error)
+            refused = as_refused(error, _folders(work))
             self.metrics.failures.labels(refused.code).inc()
             raise refused from error
 
@@ -201,6 +202,12 @@ class ServiceState:
         )  # fmt: skip
         if self.tracing is not None:
             self.tracing.record(request)
+
+
+def _folders(work: Work) -> set[Path]:
+    """Folders of the files that a work reads, uploads among them."""
+    values = [value for fields in (work.models, work.request, work.picture) for value in fields.values()]
+    return {Path(value).parent for value in values if isinstance(value, str | Path) and Path(value).is_absolute()}
 
 
 def _log_spoken(message: Message) -> None:

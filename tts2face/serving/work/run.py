@@ -23,6 +23,7 @@ from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase, con
 from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, DatabaseEngine, failure_reason, open_client
 from tts2face.serving.work.table import DONE, FAILED, JobFile, JobRecord
 from tts2face.storage.bucket import StoreAwayError
+from tts2face.storage.files import without_folders
 from tts2face.storage.temporary import Temporary
 
 RUNNERS: Mapping[str, str] = {
@@ -306,9 +307,7 @@ class _JobEngine:
 
 def _without_folders(message: str, folder: Path) -> str:
     """A message without the paths of this machine."""
-    for path in sorted((folder / "inputs").glob("*"), reverse=True):
-        message = message.replace(f"{path}/", "")
-    return message.replace(f"{folder}/", "").replace(str(folder), "the job")
+    return without_folders(message, [*(folder / "inputs").glob("*"), folder]).replace(str(folder), "the job")
 
 
 def _ignore(_: str) -> None:

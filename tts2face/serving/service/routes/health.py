@@ -16,6 +16,12 @@ def healthz() -> dict[str, str]:
     return {"status": "ok"}
 
 
+@router.get("/health", summary="Whether the server runs, for clients of Kokoro-FastAPI")
+def health() -> dict[str, str]:
+    """The server answers."""
+    return {"status": "healthy"}
+
+
 @router.get("/readyz", summary="Whether requests would be served", responses={503: {"description": "Not ready."}})
 async def readyz(request: HttpRequest) -> JSONResponse:
     """Models, folders, database, workers, and whether the server is shutting down; 503 unless all are well.
