@@ -94,27 +94,28 @@ class HangingPool:
 def test_the_preview_ends_with_the_last_page_and_begins_again_with_the_next(store: FullDisk) -> None:
     number = store.create(LOCAL_KEY.name, Project(request=Request(text="Hello.")))
 
-    async def run() -> list[tuple[int, int]]:
-        state, pool, found = ServiceState(ServiceSettings(processes=1)), HangingPool(), []
+    async def run() -> None:
+        state, pool = ServiceState(ServiceSettings(processes=1)), HangingPool()
         state.pool = pool  # type: ignore[assignment]
         workspace = Workspace(state, store, LOCAL_KEY, number, PieceMemory(1000))
 
-        async def look() -> None:
-            await asyncio.sleep(0.1)
-            found.append((pool.n_begun, pool.n_running))
+        async def expect(n_begun: int, n_running: int) -> None:
+            async with asyncio.timeout(30):
+                while (pool.n_begun, pool.n_running) != (n_begun, n_running):
+                    await asyncio.sleep(0.01)
 
         pages: list[Listener] = [lambda _: None, lambda _: None]
         for page in pages:
             workspace.listeners.add(page)
             workspace.show()
-        await look()
-        for page in pages:
-            workspace.leave(page)
-            await look()
+        await expect(1, 1)
+        workspace.leave(pages[0])
+        assert workspace.preview.is_running
+        workspace.leave(pages[1])
+        await expect(1, 0)
         workspace.listeners.add(pages[0])
         workspace.show()
-        await look()
+        await expect(2, 1)
         await workspace.close()
-        return found
 
-    assert asyncio.run(run()) == [(1, 1), (1, 1), (1, 0), (2, 1)]
+    asyncio.run(run())
