@@ -165,7 +165,7 @@ def test_the_text_of_a_stream_is_limited(limits: tuple[int, int], texts: list[st
 
 @pytest.mark.parametrize("text", [5, {"a": 1}, ["Hello."], True])
 def test_what_is_no_text_is_refused(text: object) -> None:
-    with pytest.raises(RefusedError, match="text must be a string or null, not"):
+    with pytest.raises(RefusedError, match="text must be a text, or null for none, not"):
         follow(live(), [{"type": "text", "text": text}])
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from lexicon.errors import DataError
-from lexicon.inputs import parse_json
+from lexicon.inputs import format_value, parse_json
 from lexicon.spoken_words import GrowingText
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import MINUTE_S, Bucket
@@ -111,7 +111,10 @@ class LiveText:
         if text is None:  # as in the last part of what a language model writes
             return
         if not isinstance(text, str):
-            raise RefusedError(400, "invalid_request", f"text must be a string or null, not {str(text)[:40]!r}")
+            shown = format_value(text)
+            raise RefusedError(
+                400, "invalid_request", f"text must be a text, or null for none, not {shown}; send words"
+            )
         self._check(len(text))
         for at in range(0, len(text), PART_CHARACTERS):
             self._queue(self._growing.add(text[at : at + PART_CHARACTERS]))
