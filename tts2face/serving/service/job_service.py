@@ -25,12 +25,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from lexicon.errors import BackendError, Tts2faceError
 from tts2face import __version__
+from tts2face.serving.batch.engine import lack_of_room
 from tts2face.serving.batch.run import prune_unused
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.service.errors import RefusedError, as_refused
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
-from tts2face.serving.service.readiness import lack_of_room
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.work.blobs import open_blobs
 from tts2face.serving.work.client import JobClient, WebhookDelivery, prune_jobs, unfinished_segments

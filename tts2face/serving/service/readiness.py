@@ -4,43 +4,21 @@ import asyncio
 import tempfile
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from tts2face.serving.batch.engine import MIN_FREE_BYTES, free_bytes
-
-if TYPE_CHECKING:
-    from tts2face.serving.service.state import ServiceState
+from tts2face.serving.batch.engine import lack_of_folder
+from tts2face.serving.service.job_service import JobService
+from tts2face.serving.service.pool import Pool
+from tts2face.serving.service.settings import ServiceSettings
 
 LOOK_S = 1.0  # for which what was found is repeated, however often anybody asks
-MB = 1 << 20
-
-
-def lack_of_room(folder: Path, noun: str) -> str:
-    """Why work on the disk of a folder pauses; empty where it does not."""
-    try:
-        free = free_bytes(folder)
-    except OSError as refused:
-        return f"the {noun} cannot be read ({refused.strerror}); check its place and its rights"
-    if free >= MIN_FREE_BYTES:
-        return ""
-    return f"the disk of the {noun} has {free // MB} MB free, and work needs {MIN_FREE_BYTES // MB}; free some space"
-
-
-def lack_of_folder(folder: Path, noun: str) -> str:
-    """Why a folder cannot serve, which is found out by writing a file; empty if it can."""
-    try:
-        with tempfile.TemporaryFile(dir=folder) as file:
-            file.write(b"0")
-    except OSError as refused:
-        return f"the {noun} cannot be written ({refused.strerror}); check its place, its rights and its disk"
-    return lack_of_room(folder, noun)
 
 
 class Readiness:
     """Looks at processes, folders, database and workers; at most one look in `LOOK_S`."""
 
-    def __init__(self, state: "ServiceState") -> None:
-        self._state, self._looking = state, asyncio.Lock()
+    def __init__(self, pool: Pool, jobs: JobService, settings: ServiceSettings) -> None:
+        self._pool, self._jobs, self._settings = pool, jobs, settings
+        self._looking = asyncio.Lock()
         self._found: dict[str, str] = {}
         self._at = -LOOK_S
 
@@ -49,11 +27,10 @@ class Readiness:
         async with self._looking:
             if time.monotonic() >= self._at + LOOK_S:
                 self._found, self._at = await self._look(), time.monotonic()
-        draining = "the service is shutting down; ask another server" if self._state.is_draining else ""
-        return self._found | {"accepting": draining}
+        return dict(self._found)
 
     async def _look(self) -> dict[str, str]:
-        pool, jobs, settings = self._state.pool, self._state.jobs, self._state.settings
+        pool, jobs, settings = self._pool, self._jobs, self._settings
         is_reachable = await jobs.is_reachable()
         workers = jobs.n_workers > 0 or not settings.workers
         return {

@@ -112,7 +112,7 @@ class ServiceState:
         self.limits, self.metrics = RateLimits(), Metrics(self.pool, self.jobs, self.cache)
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
-        self.readiness = Readiness(self)
+        self.readiness = Readiness(self.pool, self.jobs, settings)
         self.running: set[Exchange] = set()
 
     def reload_keys(self) -> None:

@@ -28,7 +28,9 @@ async def readyz(request: HttpRequest) -> JSONResponse:
 
     ``missing`` says what is not, and what to do.
     """
-    found = await service_state(request).readiness.look()
+    state = service_state(request)
+    draining = "the service is shutting down; ask another server" if state.is_draining else ""
+    found = await state.readiness.look() | {"accepting": draining}
     missing = [reason for reason in found.values() if reason]
     checks = {name: not reason for name, reason in found.items()}
     content = {"status": "not ready" if missing else "ready", "checks": checks, "missing": missing}
