@@ -81,9 +81,10 @@ class BlobStore:
             else:
                 shutil.copyfile(content, draft.path)
             sha256 = content_hash(draft.path)
-            self._copies.keep(draft, divided(sha256))
+            name = divided(sha256)
+            self._copies.keep(draft, name)
         if self._store is not self._copies:
-            self._store.add(divided(sha256), self._local(sha256))
+            self._store.add(name, self._copies.path(name))
             self._limit(sha256)
         return sha256
 
