@@ -67,10 +67,13 @@ Cache = Annotated[Path | None, Parameter(help="Folder for intermediate results; 
 Model = Annotated[Path | None, Parameter(help="Path of face_landmarker.task; by default found or set up.")]
 
 
-def add_option_flags(*groups: tuple[str, type], without: frozenset[str] = frozenset()) -> Callable[..., Any]:
+def add_option_flags(
+    *groups: tuple[str, type], without: frozenset[str] = frozenset(), has_defaults: bool = True
+) -> Callable[..., Any]:
     """Give a command one keyword flag for each field of the option dataclasses, under a heading for each class.
 
-    The command takes them as ``**options``; `options_from_flags` turns them back into an instance.
+    The command takes them as ``**options``; `options_from_flags` turns them back into an instance. Without
+    `has_defaults`, those that are not given are None.
     """
     headed = [(Group.create_ordered(heading), options) for heading, options in groups]
 
@@ -81,7 +84,7 @@ def add_option_flags(*groups: tuple[str, type], without: frozenset[str] = frozen
             if parameter.kind is not inspect.Parameter.VAR_KEYWORD
         ]
         added = [
-            _option_parameter(option, get_type_hints(options)[option.name], heading)
+            _option_parameter(option, get_type_hints(options)[option.name], heading, has_defaults=has_defaults)
             for heading, options in headed
             for option in fields(options)
             if option.name not in without
@@ -93,10 +96,12 @@ def add_option_flags(*groups: tuple[str, type], without: frozenset[str] = frozen
     return decorate
 
 
-def _option_parameter(option: "Field[Any]", kind: Any, group: Group) -> inspect.Parameter:
+def _option_parameter(option: "Field[Any]", kind: Any, group: Group, *, has_defaults: bool) -> inspect.Parameter:
     default = inspect.Parameter.empty if option.default is MISSING else option.default
     converter = parse_whole_number if kind in (int, int | None) else None
-    negative = f"--no-{option.name}" if default is True else ""
+    negative = f"--no-{option.name.replace('_', '-')}" if default is True else ""
+    if not has_defaults:
+        kind, default = kind | None, None
     annotation = Annotated[
         kind, Parameter(help=option.metadata["help"], group=group, negative=negative, converter=converter)
     ]

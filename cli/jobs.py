@@ -7,19 +7,19 @@ import json
 import os
 import sys
 import time
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from cli.flags import switch, whole_number
+from cli.flags import add_option_flags, switch, whole_number
 from cli.lists import AsJson
 from cli.photo import YES, Yes, sets_up_model
 from cli.process import write_message
 from lexicon.errors import InputError
-from tts2face.serving.service.settings import read_settings
+from tts2face.serving.service.settings import ServiceSettings, read_settings
 
 if TYPE_CHECKING:
     from tts2face.serving.work.client import QueuedSegment
@@ -191,23 +191,18 @@ def _row(one: "QueuedSegment") -> tuple[str, ...]:
 keys = App(name="keys", help="API keys of the service.")
 
 
-def serve(  # noqa: PLR0913 - one parameter a flag
+SECRETS = frozenset(one.name for one in fields(ServiceSettings) if one.metadata["is_secret"])
+
+
+@add_option_flags(("Settings", ServiceSettings), without=SECRETS, has_defaults=False)  # lists of processes show flags
+def serve(
     *,
     settings: Annotated[Path | None, Parameter(help="TOML file of settings.")] = None,
-    host: Annotated[str | None, Parameter(help="Address to listen on (127.0.0.1).")] = None,
-    port: Annotated[int | None, whole_number("Port (8880); 0: a free one.")] = None,
-    keys: Annotated[Path | None, Parameter(help="File of API keys.")] = None,
-    processes: Annotated[int | None, whole_number("Synthesis processes; by default one for each core.")] = None,
-    data: Annotated[Path | None, Parameter(help="Folder of jobs, uploads and the studio's projects.")] = None,
-    no_studio: Annotated[bool, switch("Leave the studio out, which is at /studio if NiceGUI is installed.")] = False,
     show_config: Annotated[bool, switch("Print the settings and exit.")] = False,
     yes: Yes = False,
+    **flags: Any,
 ) -> None:
     """Serve speech, clips and curves over HTTP (docs/http.md)."""
-    flags = {
-        "host": host, "port": port, "keys": keys, "processes": processes, "data": data,
-        "studio": False if no_studio else None,
-    }  # fmt: skip
     chosen = read_settings(settings, flags)
     if show_config:
         sys.stdout.write(chosen.as_toml())

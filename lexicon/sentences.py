@@ -133,6 +133,7 @@ MAX_SENTENCE_CHARACTERS = 300  # longer sentences are split at a clause mark or 
 MAX_SPOKEN_LETTERS = 1000
 _DIGIT_LETTERS, _SYMBOL_LETTERS = 5, 10  # of the words that espeak-ng speaks for one in other languages than English
 FIRST_PIECE_CHARACTERS = 90  # of a text; its first sound and picture wait for this piece (docs/decisions)
+FIRST_SPOKEN_LETTERS = 270  # of this piece, which cannot be divided beside numbers otherwise; 18 s of English
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,7 +272,8 @@ def _pieces(placed: MarkedText, language: str, own: Mapping[str, tuple[IpaPhone,
             part = waiting.pop()
             end = begin + n_letters(part)
             given = phones[bisect_left(starts, begin) : bisect_left(starts, end)]
-            is_long = _spoken_letters(part, language, given, own) > MAX_SPOKEN_LETTERS
+            most = MAX_SPOKEN_LETTERS if begin else FIRST_SPOKEN_LETTERS
+            is_long = _spoken_letters(part, language, given, own) > most
             at = _dividing_place(part, begin, given) if is_long else 0
             if at > 0:
                 waiting += [part[at:], part[:at].rstrip()]

@@ -5,12 +5,16 @@ from collections.abc import Callable
 
 from lexicon.normalize import normalize
 from lexicon.pronounce import pronounce
+from lexicon.sentences import split_sentences
+from lexicon.ssml import parse_marks
 
 SENTENCE = (
     "We met Dr. Smith on March 3, 2024 at 10:30 pm in St. Paul; it cost $5.20 (about 5%), see www.example.com. "
     "The quick brown fox jumps over the lazy dog, and nobody cared at all. "
 )
 GERMAN = "Schöne Grüße aus München, zwölf Boxkämpfer jagen Viktor quer über den großen Sylter Deich. "
+# Texts of 100 KB whose first piece is hard to end: amounts, digits, symbols, letters, and abbreviations.
+HARD = ("$1,234,567.89 ", "1234567890", "👍🏽", "a", "Mr. ")
 
 
 def _report(name: str, text: str, work: Callable[[str], object]) -> None:
@@ -18,6 +22,10 @@ def _report(name: str, text: str, work: Callable[[str], object]) -> None:
     work(text)
     seconds = time.perf_counter() - began
     print(f"{name:36} {len(text):9,} characters {seconds:7.3f} s {len(text) / seconds / 1e3:9.0f} kB/s")
+
+
+def _first_piece(text: str) -> None:
+    next(split_sentences(parse_marks(text), "en-us"))
 
 
 def main() -> None:
@@ -28,6 +36,8 @@ def main() -> None:
     for piece in ("....", "a.", "1,", "- ", "Dr "):
         for size in (100_000, 1_000_000):
             _report(f"normalize, {piece!r} over and over", piece * (size // len(piece)), normalize)
+    for piece in HARD:
+        _report(f"first piece of {piece!r}", (piece * 100_000)[:100_000], _first_piece)
     pronounce("warm")
     for size in (200, 10_000, 100_000):
         _report("pronounce en-us", SENTENCE * max(1, size // len(SENTENCE)), pronounce)

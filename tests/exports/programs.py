@@ -75,13 +75,13 @@ def served(folder: Path) -> Iterator[str]:
         server.server_close()
 
 
-def page_content(address: str, done: str) -> str:
+def page_content(address: str, done: str, *flags: str) -> str:
     """Document of a page after its scripts have run: when it contains `done`, with more time on a busy machine."""
     command = [browser(), "--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     for budget_ms in (20_000, 60_000, 180_000):
         limit = f"--virtual-time-budget={budget_ms}"
         shown = subprocess.run(
-            [*command, limit, "--dump-dom", address], capture_output=True, text=True, check=True, timeout=120
+            [*command, *flags, limit, "--dump-dom", address], capture_output=True, text=True, check=True, timeout=120
         ).stdout
         if done in shown:
             return shown

@@ -2,12 +2,15 @@
 
 import random
 import string
+from itertools import islice
+
+import pytest
 
 from lexicon.dictionary import parse_dictionary
 from lexicon.g2p import segments_by_rules
 from lexicon.pronounce import spoken_form
 from lexicon.sentence_ends import split_chunks
-from lexicon.sentences import MAX_SPOKEN_LETTERS, Sentence, split_sentences
+from lexicon.sentences import FIRST_SPOKEN_LETTERS, MAX_SPOKEN_LETTERS, Sentence, split_sentences
 from lexicon.ssml import parse_marks, parse_ssml
 
 chance = random.Random(1)
@@ -83,3 +86,11 @@ def test_an_address_stays_whole_and_a_longer_word_is_cut() -> None:
     address = "https://example.com/" + "a" * 500
     assert list(split_chunks(f"See {address} for more.", 300)) == ["See", address, "for more."]
     assert list(map(len, split_chunks("x" * 601, 300))) == [300, 301]
+
+
+@pytest.mark.parametrize("unit", ["$1,234,567.89 ", "1234567890", "12345 ", "+1 (555) 123-4567 ", "👍🏽"])
+def test_the_first_piece_is_short_also_where_everything_is_a_number(unit: str) -> None:
+    text = (unit * 7000)[:100_000]
+    first, second = islice(split_sentences(parse_marks(text), "en-us"), 2)
+    assert len(first.utterances[0].text) <= FIRST_SPOKEN_LETTERS + 10
+    assert len(second.utterances[0].text) <= MOST_VOICED

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 import yaml
 
-from cli.flags import check_options
+from cli.flags import check_options, option_names
 from cli.main import app
 from tests.docs.blocks import DOCS, ROOT
 from tts2face.serving.service.settings import PREFIX, ServiceSettings, read_settings
@@ -167,6 +167,32 @@ def test_several_servers_and_workers_stand_behind_one_balancer() -> None:
     assert services["worker"]["deploy"]["replicas"] >= 2
     assert "proxy_buffering off" in compose()["configs"]["balancer"]["content"]
     assert [one["spec"]["replicas"] >= 2 for one in of_kind("Deployment")] == [True, True]
+
+
+def test_proxies_let_through_what_the_service_takes() -> None:
+    largest = f"{ServiceSettings().video_mb:g}m"
+    assert f"client_max_body_size {largest};" in compose()["configs"]["balancer"]["content"]
+    (ingress,) = of_kind("Ingress")
+    assert ingress["metadata"]["annotations"]["nginx.ingress.kubernetes.io/proxy-body-size"] == largest
+
+
+def test_the_image_gets_what_is_installed_and_no_more() -> None:
+    """All is left out but what the packages and their notices need."""
+    lines = [line for line in (ROOT / ".dockerignore").read_text().splitlines() if line and not line.startswith("#")]
+    assert lines[0] == "*"
+    kept = {line.removeprefix("!") for line in lines if line.startswith("!")}
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    packages = {one.removesuffix("*") for one in project["tool"]["setuptools"]["packages"]["find"]["include"]}
+    assert kept == {"pyproject.toml", project["project"]["readme"], *project["project"]["license-files"], *packages}
+    left_out = {line.replace("/", ".") for line in lines if "/" in line} - {"**.__pycache__"}
+    assert left_out <= {one.removesuffix("*") for one in project["tool"]["setuptools"]["packages"]["find"]["exclude"]}
+
+
+def test_every_setting_is_a_flag_but_secrets() -> None:
+    command = app.parse_commands(["serve"])[1][-1]
+    flags = {name.removeprefix("--").replace("-", "_") for name in option_names(command)}
+    assert flags >= NAMES - {"webhook_secret"}
+    assert "webhook_secret" not in flags
 
 
 def test_every_setting_is_documented() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
+from lexicon.errors import InputError
 from tts2face.serving.service.exchange import Receive, Scope, Send
 from tts2face.serving.service.guard import Guard
 from tts2face.serving.service.keys import add_key
@@ -98,6 +99,52 @@ def test_pages_of_other_origins_are_refused(make_client: Make) -> None:
     assert answer(allowed, headers={"origin": "https://a.example"}).status_code == 200
 
 
+PAGE = "https://a.example"
+PREFLIGHT = {
+    "origin": PAGE, "access-control-request-method": "POST",
+    "access-control-request-headers": "authorization,x-stainless-os",
+}  # fmt: skip
+
+
+def test_a_browser_asks_without_a_key_whether_a_page_may_send_a_request(make_client: Make, tmp_path: Path) -> None:
+    path = tmp_path / "keys.toml"
+    add_key(path, "a", ["speak"])
+    asked = answer(make_client(keys=path, origins=(PAGE,)), "OPTIONS", headers=PREFLIGHT)
+    assert (asked.status_code, asked.content) == (204, b"")
+    assert asked.headers["access-control-allow-origin"] == PAGE
+    assert asked.headers["access-control-allow-headers"] == PREFLIGHT["access-control-request-headers"]
+    assert {"POST", "DELETE"} <= set(asked.headers["access-control-allow-methods"].split(", "))
+    assert asked.headers["access-control-max-age"] == "600"
+    assert "access-control-allow-credentials" not in asked.headers
+    assert asked.headers["vary"].startswith("Access-Control-Request-Headers")
+    assert "Origin" in asked.headers.get_list("vary")
+    other = answer(
+        make_client(keys=path, origins=(PAGE,)), "OPTIONS", headers=PREFLIGHT | {"origin": "https://b.example"}
+    )
+    assert code(other) == (403, "unknown_origin")
+    assert "access-control-allow-origin" not in other.headers
+    assert code(answer(make_client(keys=path), "OPTIONS", headers=PREFLIGHT)) == (403, "unknown_origin")
+
+
+def test_answers_differ_by_origin_and_show_their_ids(make_client: Make, tmp_path: Path) -> None:
+    allowed = answer(make_client(origins=(PAGE,)), headers={"origin": PAGE})
+    assert (allowed.headers["access-control-allow-origin"], allowed.headers["vary"]) == (PAGE, "Origin")
+    assert {"X-Request-ID", "Location"} <= set(allowed.headers["access-control-expose-headers"].split(", "))
+    without = answer(make_client(origins=(PAGE,)))  # a cache must not give this answer to the page
+    assert ("access-control-allow-origin" in without.headers, without.headers["vary"]) == (False, "Origin")
+    path = tmp_path / "keys.toml"
+    add_key(path, "a", ["speak"])
+    refused = answer(make_client(keys=path, origins=(PAGE,)), headers={"origin": PAGE})
+    assert (refused.status_code, refused.headers["access-control-allow-origin"]) == (401, PAGE)
+    assert "vary" not in answer(make_client()).headers
+
+
+@pytest.mark.parametrize("given", ["https://a.example/", "a.example", "https://A.example", "*", "null"])
+def test_origins_that_no_browser_sends_are_refused(given: str) -> None:
+    with pytest.raises(InputError, match=r"origins must be such as https://example\.org"):
+        ServiceSettings(origins=(given,))
+
+
 def test_a_service_with_keys_needs_one(make_client: Make, tmp_path: Path) -> None:
     path = tmp_path / "keys.toml"
     secret = add_key(path, "studio", ["speak"])
@@ -108,7 +155,8 @@ def test_a_service_with_keys_needs_one(make_client: Make, tmp_path: Path) -> Non
     wrong = answer(make_client(keys=path), headers={"authorization": "Bearer t2f_wrong"})
     assert code(wrong) == (401, "unauthorized")
     assert "t2f_wrong" not in wrong.text
-    for headers in ({"authorization": f"Bearer {secret}"}, {"x-api-key": secret}):
+    named = [{"authorization": f"{scheme} {secret}"} for scheme in ("Bearer", "bearer", "BEARER ")]
+    for headers in (*named, {"x-api-key": secret}):
         assert answer(make_client(keys=path), headers=headers).json()["key"] == "studio"
     assert code(answer(make_client(keys=path), params={"key": secret})) == (401, "unauthorized")  # logs keep addresses
     assert answer(make_client(keys=path), "GET", "/healthz").status_code == 200

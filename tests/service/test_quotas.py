@@ -15,7 +15,7 @@ from tts2face.processes.message import EVENT, Message
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits, add_key, find_key, read_keys, remove_key
 from tts2face.serving.service.messages import Work
-from tts2face.serving.service.pool import Pool, PoolSettings
+from tts2face.serving.service.pool import BusyError, Pool, PoolSettings
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 
@@ -162,6 +162,60 @@ def test_keys_take_turns() -> None:
     served = asyncio.run(order())
     assert sorted(served) == ["greedy"] * 6 + ["modest"] * 2 + ["rare"]
     assert max(number for number, key in enumerate(served) if key != "greedy") <= 6
+
+
+def waiting_keys(asked: str, n_places: int) -> tuple[list[str], list[str]]:
+    """Keys whose works wait in the end, and those whose works were refused; of works that ask one after another.
+
+    Parameters
+    ----------
+    asked
+        A letter for each work: its key.
+    """
+
+    async def run() -> tuple[list[str], list[str]]:
+        pool = Pool(PoolSettings(n_processes=1, max_waiting=n_places))
+        pool.processes = [FakeProcess()]  # type: ignore[list-item]
+        pool.processes[0].load = 2.0
+        refused: list[str] = []
+
+        async def work(key: str) -> None:
+            try:
+                await pool._take(1.0, key, "")
+            except BusyError:
+                refused.append(key)
+
+        tasks = []
+        for key in asked:
+            tasks.append(asyncio.create_task(work(key)))
+            await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        found = [key for key, queue in pool._waiting.items() for _ in queue]
+        assert pool.n_waiting == len(found)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        assert pool.n_waiting == 0
+        return sorted(found), refused
+
+    return asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ("asked", "waiting", "refused"),
+    [
+        ("aaaaaaaaaa", "aaaaaaaa", "aa"),  # one key may have all places
+        ("aaaaaaaab", "aaaaaaab", "a"),  # until another one needs one
+        ("aaaaaaaabbbbbb", "aaaabbbb", "aaaabb"),  # and its share
+        ("aaaaaaaabbbbcccc", "aaabbbcc", "aaaaabcc"),
+        ("aaaaaaaabcdefgh", "abcdefgh", "aaaaaaa"),
+        ("abcdefghi", "abcdefgh", "i"),  # no key has more than one
+    ],
+)
+def test_keys_share_the_places_to_wait(asked: str, waiting: str, refused: str) -> None:
+    """The newest works of the key that has most give way to a key that has fewer."""
+    found, given_up = waiting_keys(asked, 8)
+    assert ("".join(found), "".join(sorted(given_up))) == (waiting, "".join(sorted(refused)))
 
 
 def test_the_load_of_no_work_is_zero() -> None:

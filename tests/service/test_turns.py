@@ -280,7 +280,7 @@ def test_a_call_that_is_stopped_while_it_waits_ends_what_it_waits_for(calls: Cal
 def test_an_interrupted_call_goes_on(calls: Calls) -> None:
     elsewhere = Elsewhere()
     calls.start(1, lambda: elsewhere.steps([]))
-    calls.control(1, MORE, type="interrupt")
+    calls.control(1, MORE, type="cancel")
     calls.end(1)
     assert payloads(calls, 1) == [b"before", b"interrupted"]
 

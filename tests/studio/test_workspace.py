@@ -1,11 +1,15 @@
-"""Saving of an open project while the disk refuses it."""
+"""Saving of an open project while the disk refuses it; its preview while pages come and go."""
 
 import asyncio
+from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from lexicon.errors import BackendError
+from tts2face.processes.message import EVENT, Message
+from tts2face.request import Request
 from tts2face.serving.service.keys import LOCAL_KEY
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
@@ -13,7 +17,7 @@ from tts2face.serving.studio import workspace as opened
 from tts2face.serving.studio.editing import History
 from tts2face.serving.studio.previews import PieceMemory
 from tts2face.serving.studio.store import ProjectStore
-from tts2face.serving.studio.workspace import Workspace
+from tts2face.serving.studio.workspace import Listener, Workspace
 from tts2face.session.project import Project
 
 
@@ -69,3 +73,49 @@ def test_closing_saves_at_once_and_survives_a_full_disk(store: FullDisk) -> None
     assert store.read(number, LOCAL_KEY.name).present.name == "First"
     rename(store, number, n_refused=0, closes_at_once=True)
     assert store.read(number, LOCAL_KEY.name).present.name == "Second"
+
+
+class HangingPool:
+    """A pool whose works never end."""
+
+    def __init__(self) -> None:
+        self.n_begun = self.n_running = 0
+
+    async def stream(self, *_: Any) -> AsyncIterator[Message]:
+        self.n_begun += 1
+        self.n_running += 1
+        try:
+            await asyncio.Event().wait()
+            yield Message(EVENT)
+        finally:
+            self.n_running -= 1
+
+
+def test_the_preview_ends_with_the_last_page_and_begins_again_with_the_next(store: FullDisk) -> None:
+    number = store.create(LOCAL_KEY.name, Project(request=Request(text="Hello.")))
+
+    async def run() -> None:
+        state, pool = ServiceState(ServiceSettings(processes=1)), HangingPool()
+        state.pool = pool  # type: ignore[assignment]
+        workspace = Workspace(state, store, LOCAL_KEY, number, PieceMemory(1000))
+
+        async def expect(n_begun: int, n_running: int) -> None:
+            async with asyncio.timeout(30):
+                while (pool.n_begun, pool.n_running) != (n_begun, n_running):
+                    await asyncio.sleep(0.01)
+
+        pages: list[Listener] = [lambda _: None, lambda _: None]
+        for page in pages:
+            workspace.listeners.add(page)
+            workspace.show()
+        await expect(1, 1)
+        workspace.leave(pages[0])
+        assert workspace.preview.is_running
+        workspace.leave(pages[1])
+        await expect(1, 0)
+        workspace.listeners.add(pages[0])
+        workspace.show()
+        await expect(2, 1)
+        await workspace.close()
+
+    asyncio.run(run())

@@ -93,3 +93,13 @@ def test_the_steps_of_a_long_sentence_are_short(session: tts2face.Session, turns
     first = len(turns.seconds) // len(pieces)
     after_voice = turns.seconds[-first + 2 :]
     assert max(after_voice) < MAX_SHARE * sum(after_voice), turns.seconds
+
+
+def test_options_of_speech_hold_in_live_speech_and_not_in_its_silence(session: tts2face.Session, turns: Turns) -> None:
+    turns.restart()
+    live = session.live(articulation="natural", rate=1.5, volume=0.5)
+    (spoken,) = live.say("We may.")
+    assert continue_idly(live).begin == pytest.approx(spoken.clip.motion.duration)
+    (plain,) = session.live(rate=1.5, volume=0.5).say("We may.")
+    assert len(spoken.clip.motion) == len(plain.clip.motion)
+    assert not np.array_equal(spoken.clip.motion.values, plain.clip.motion.values)

@@ -5,6 +5,7 @@ Movies that are sent while they are made: fragmented MP4, and WebM.
 Pictures of consecutive clips, each with the sound of its frame.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -73,6 +74,31 @@ STREAMED_WEBM = MovieKind(
 )  # fmt: skip
 
 
+def mux_pictures(container: Any, packets: Iterable[Any], sound: Any) -> None:
+    """Write packets of pictures; the blocks of a WebM file stand in the order of their times, as players demand.
+
+    The muxer orders packets by their decoding times, and then writes Opus later, by the samples that a decoder drops
+    (CodecDelay, RFC 7845): decoding times of pictures are earlier by as much, in the file's unit.
+    """
+    container.start_encoding()
+    head = bytes(sound.codec_context.extradata or b"")
+    if not head.startswith(b"OpusHead"):
+        container.mux(packets)
+        return
+    dropped = Fraction(int.from_bytes(head[10:12], "little"), SOUND_RATE)
+    for packet in packets:
+        unit = packet.stream.time_base
+        scale = packet.time_base / unit
+        packet.pts, packet.duration = _nearest(packet.pts * scale), _nearest(packet.duration * scale)
+        packet.dts, packet.time_base = packet.pts - _nearest(dropped / unit), unit
+        container.mux(packet)
+
+
+def _nearest(value: Fraction) -> int:
+    """The nearest integer as FFmpeg rounds it, a half upwards."""
+    return math.floor(value + Fraction(1, 2))
+
+
 class MovieWriter:
     """Sink that encodes pictures and sound; `finish` completes the file."""
 
@@ -134,7 +160,7 @@ class MovieWriter:
         )
         frame.pts, frame.time_base = self._n_frames, 1 / self._fps
         self._n_frames += 1
-        self._container.mux(self._video.encode(frame))
+        mux_pictures(self._container, self._video.encode(frame), self._audio)
 
     def _fill_transparent(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Pixels with empty ones filled by the mean colour of the head, so that coding does not darken its outline."""
@@ -157,7 +183,7 @@ class MovieWriter:
 
     def finish(self) -> None:
         """Flush the encoders and close the file."""
-        self._container.mux(self._video.encode(None))
+        mux_pictures(self._container, self._video.encode(None), self._audio)
         self._container.mux(self._audio.encode(None))
         self._container.close()
         append_to_mp4(self._path, self._notice)

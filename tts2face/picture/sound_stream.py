@@ -34,9 +34,14 @@ SOUND_KINDS = {
     "pcm": SoundKind("audio/pcm"),
     "mp3": SoundKind("audio/mpeg", "mp3", "libmp3lame", 64_000),
     "opus": SoundKind("audio/ogg", "ogg", "libopus", 48_000, OPUS_RATE),
+    "weba": SoundKind("audio/webm", "webm", "libopus", 48_000, OPUS_RATE),  # Opus for MediaSource, which takes no Ogg
     "aac": SoundKind("audio/aac", "adts", "aac", 96_000),
     "flac": SoundKind("audio/flac", "flac", "flac"),
 }
+_NO_RANDOM_IDS = {"fflags": "+bitexact"}
+_CONTAINER_OPTIONS = {
+    "ogg": _NO_RANDOM_IDS, "webm": {**_NO_RANDOM_IDS, "live": "1", "cluster_time_limit": "200"},
+}  # fmt: skip
 
 
 def encode_sound(sounds: Iterator[Waveform], format: str) -> Iterator[Chunk]:
@@ -112,7 +117,7 @@ class _CodecEncoder:
         import av
 
         self._buffer, self._rate, self._n_samples = WriteBuffer(), rate, 0
-        options = {"flush_packets": "1"} | ({"fflags": "+bitexact"} if kind.container == "ogg" else {})  # no random id
+        options = {"flush_packets": "1"} | _CONTAINER_OPTIONS.get(kind.container, {})
         self._container: Any = av.open(self._buffer, "w", format=kind.container, options=options)
         self._stream: Any = self._container.add_stream(kind.codec, rate=kind.rate or rate, layout="mono")
         if kind.bits:

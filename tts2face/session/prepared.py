@@ -234,9 +234,8 @@ def prepare(request: Request) -> PreparedRequest:
 
 def idle_request(request: Request, seconds: float) -> Request:
     """The request with idle animation in place of its speech."""
-    return replace(
-        request, text="", audio=None, audio_map=None, voice=None, rate=1.0, volume=1.0, dictionary=None, idle=seconds
-    )
+    silent = replace(request, text="", audio=None, audio_map=None, voice=None, rate=1.0, volume=1.0, dictionary=None)
+    return replace(silent, articulation=None, idle=seconds)
 
 
 def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:

@@ -96,6 +96,7 @@ def given_starts(given: Sequence[str], reported: Sequence[str], starts: Sequence
 CHILD = Path(__file__).with_name("espeak_child.py")
 WORD_EVENT, PHONEME_EVENT = 1, 7
 ANY_GENDER, FEMALE = 0, 2  # espeak_VOICE.gender; ANY_GENDER selects the male voice if a language has both
+_WORDS = re.compile(r"\w+(?:[ '’-]\w+)*")
 LANGUAGE_SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks where a foreign word begins and ends: (en)...(fr)
 DEFAULT_WORDS_PER_MINUTE = 175  # espeak-ng's default; the times of its events are wrong above 400
 CHILD_TIMEOUT_S = 60.0  # a sentence takes about 50 ms
@@ -195,9 +196,10 @@ class EspeakVoice:
     ) -> tuple[list[_PhonemeEvent], list[str]]:
         found: list[_PhonemeEvent] = []
         names: list[str] = []
+        starts = iter([value[0] for kind, _, value in header["events"] if kind == WORD_EVENT][1:])
         for kind, sample, value in header["events"]:
             if kind == WORD_EVENT:
-                names.append(text[value[0] : value[0] + value[1]])
+                names.append(_word_at(text, value[0], value[1], next(starts, len(text))))
                 continue
             ipa = LANGUAGE_SWITCH.sub("", value)
             phones = tuple(segment.phone for segment in parse_espeak_word(ipa, self._language)) if ipa else ()
@@ -207,6 +209,12 @@ class EspeakVoice:
                 start = _closure_start(sound, at, self._rate)
             found.append(_PhonemeEvent(phones or (SILENCE,), start, len(names) - 1))
         return _drop_false_silences(found, sound, self._rate), names
+
+
+def _word_at(text: str, start: int, length: int, following: int) -> str:
+    """A word as it is written; where espeak-ng speaks several as one (tout le monde, 你好), it names the first only."""
+    run = _WORDS.match(text, start, max(following, start))
+    return text[start : max(start + length, run.end() if run else start)]
 
 
 def _assign_written_words(found: Sequence[_PhonemeEvent], header: Mapping[str, Any], text: str) -> list[_PhonemeEvent]:

@@ -12,7 +12,7 @@ import logging
 import os
 import re
 import sys
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -233,3 +233,10 @@ def user_data() -> Path:
     else:
         base = os.environ.get("XDG_DATA_HOME") or str(Path.home() / ".local" / "share")
     return Path(base) / "tts2face"
+
+
+def without_folders(message: str, folders: Iterable[Path]) -> str:
+    """A message that names files of these folders by their names alone, for readers on other machines."""
+    for folder in sorted(folders, reverse=True):  # a folder after those within it
+        message = message.replace(f"{folder}/", "")
+    return message

@@ -33,7 +33,8 @@ def test_jobs_wait_for_the_database_and_streams_go_on(postgres: Postgres, tmp_pa
                 stopped = time.monotonic()
                 eventually(lambda: api.get("/readyz").status_code == 503)
                 assert api.get("/readyz").json()["checks"] == {
-                    "models": True, "disk": True, "database": False, "accepting": True,
+                    "models": True, "data": True, "temporary": True, "database": False, "workers": True,
+                    "accepting": True,
                 }  # fmt: skip
                 assert api.get("/healthz").status_code == 200
                 refused = submit(api, {**CLIP, "text": "Now."})

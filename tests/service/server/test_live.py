@@ -103,6 +103,22 @@ def test_a_living_face_fills_the_silence_in_real_time(service: RunningService) -
     assert np.ptp(np.concatenate([one["head"] for _, one in idle]), axis=0)[:3].max() > 0.001  # radians
 
 
+@pytest.mark.parametrize("wrong", [7, {"a": 1}, ["Hello."], True], ids=str)
+def test_null_is_no_text_and_other_types_are_refused(service: RunningService, wrong: Any) -> None:
+    async def talk(live: Live) -> None:
+        for text in ("Hello there. ", None, wrong, "Good bye."):
+            await live.send(type="text", text=text)
+        await live.send(type="text")
+        await live.send(type="end")
+        await live.receive_until("done")
+
+    live = converse(service, talk, with_idle=False)
+    assert [one["text"] for one in live.events("speech")] == ["Hello there.", "Good bye."]
+    assert [one["message"] for one in live.events("error")] == [
+        f"text must be a text, or null for none, not {json.dumps(wrong)}; send words"
+    ]
+
+
 def test_cancel_forgets_the_text_that_waits(service: RunningService) -> None:
     async def talk(live: Live) -> None:
         await live.send(type="text", text="One sentence. " * 30)

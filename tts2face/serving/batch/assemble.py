@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError
 from tts2face.picture.film import MOV, MP4, WEBM, make_temporary, move_into_place
-from tts2face.picture.movie import MOV_MOVIE, MP4_MOVIE, SOUND_RATE, WEBM_MOVIE, MovieKind
+from tts2face.picture.movie import MOV_MOVIE, MP4_MOVIE, SOUND_RATE, WEBM_MOVIE, MovieKind, mux_pictures
 from tts2face.picture.provenance import append_to_mp4
 from tts2face.serving.batch.output import Sound
 from tts2face.serving.batch.segment import open_track
@@ -111,7 +111,7 @@ class _Joined:
             packet.pts += round(offset)
             packet.dts += round(offset) + earlier
             packet.stream = self._video
-            self._target.mux(packet)
+            mux_pictures(self._target, [packet], self._audio)
             n_frames += 1
         source.seek(0)
         begin = first_sample(self.n_frames, SOUND_RATE, self._fps)

@@ -3,6 +3,7 @@
 import os
 import queue
 import shutil
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -171,3 +172,24 @@ def wait_for_space(folder: Path, on_message: Message) -> None:
         time.sleep(PAUSE_S)
     if is_waiting:
         on_message(f"continued: the disk of {folder} has space again")
+
+
+def lack_of_room(folder: Path, noun: str) -> str:
+    """Why work on the disk of a folder pauses; empty where it does not."""
+    try:
+        free = free_bytes(folder)
+    except OSError as refused:
+        return f"the {noun} cannot be read ({refused.strerror}); check its place and its rights"
+    if free >= MIN_FREE_BYTES:
+        return ""
+    return f"the disk of the {noun} has {free >> 20} MB free, and work needs {MIN_FREE_BYTES >> 20}; free some space"
+
+
+def lack_of_folder(folder: Path, noun: str) -> str:
+    """Why a folder cannot serve, which is found out by writing a file; empty if it can."""
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(b"0")
+    except OSError as refused:
+        return f"the {noun} cannot be written ({refused.strerror}); check its place, its rights and its disk"
+    return lack_of_room(folder, noun)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 
 LINGER_S, LINGER_BYTES = 2.0, 8 << 20  # in which the rest of a refused body is read, so that its answer is read
+PIPELINED_BYTES = 64 << 10  # of further requests that wait until the present one is answered
+READ_BYTES = 8 << 10  # 2000 of the smallest frames, which take 10 ms
 REASONS = {
     400: "Bad Request",
     408: "Request Timeout",
@@ -86,6 +88,8 @@ class HttpConnection(H11Protocol):
         is_answered = self.cycle is not None and self.cycle.response_complete
         if not is_answered or self.conn.their_state is not h11.SEND_BODY:
             self._linger.stop()  # the rest has come
+        if self.conn.their_state is h11.DONE and len(self.conn.trailing_data[0]) < PIPELINED_BYTES:
+            self.flow.resume_reading()  # of a client that has sent a part of its next request: its leaving is noticed
         if self.conn.their_state is not h11.IDLE:
             self._head.stop()
         elif not self._head.is_running and self.conn.trailing_data[0]:
@@ -139,11 +143,27 @@ class HttpConnection(H11Protocol):
 
 
 class SocketConnection(WebSocketsSansIOProtocol):
-    """A WebSocket whose client must read within `stall_s`; nothing is read from it while it does not."""
+    """A WebSocket whose client must read within `stall_s`; nothing is read from it while it does not.
+
+    `READ_BYTES` at most are read in one step of the event loop.
+    """
 
     def __init__(self, settings: ServiceSettings, **options: Any) -> None:
         super().__init__(**options)
         self._settings, self._stall = settings, _Timer(self._abort)
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Read in small parts from now on."""
+        super().connection_made(transport)
+        transport.max_size = READ_BYTES  # type: ignore[attr-defined]  # of asyncio's transports: bytes of one read
+
+    def keepalive_timeout(self) -> None:
+        """End a connection that does not answer a ping, unless its answer may be among what is not read now."""
+        if self.read_paused:
+            self.pong_timer = self.pending_ping_payload = None
+            self.schedule_ping()
+        else:
+            super().keepalive_timeout()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Stop the timer."""

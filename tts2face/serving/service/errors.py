@@ -1,6 +1,7 @@
 """Errors of the service as answers."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, Field
@@ -9,6 +10,7 @@ from starlette.exceptions import HTTPException
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from tts2face.serving.service.messages import DefectError
 from tts2face.serving.service.pool import BusyError
+from tts2face.storage.files import without_folders
 
 
 class RefusedError(HTTPException):
@@ -45,11 +47,11 @@ STATUS: Mapping[type[Tts2faceError], tuple[int, str]] = {
 }
 
 
-def as_refused(error: Tts2faceError) -> RefusedError:
-    """Answer to an error of the synthesis."""
+def as_refused(error: Tts2faceError, folders: Iterable[Path] = ()) -> RefusedError:
+    """Answer to an error of the synthesis; it does not name the `folders` of the files concerned."""
     status, code = next(found for kind, found in STATUS.items() if isinstance(error, kind))
     headers = {"Retry-After": str(BusyError.retry_after_s)} if status in {429, 503} else {}
-    return RefusedError(status, code, " ".join(str(error).split()), headers)
+    return RefusedError(status, code, without_folders(" ".join(str(error).split()), folders), headers)
 
 
 class ErrorDetail(BaseModel):

@@ -8,15 +8,19 @@ import json
 import re
 import time
 import uuid
-from collections.abc import Awaitable, Callable, MutableMapping
-from contextlib import suppress
-from typing import Any
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, MutableMapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextvars import ContextVar, copy_context
+from typing import Any, TypeVar
+
+from starlette.requests import ClientDisconnect
 
 from tts2face.serving.service.errors import RefusedError, error_body
 from tts2face.serving.service.logs import REQUEST_ID
 from tts2face.serving.service.stages import STAGES, Stage, durations
 
 PAGES = "/studio"
+REFERENCE = "/docs"
 RECORDINGS = f"{PAGES}/api/recordings"
 STYLES = f"{PAGES}/api/styles"
 TAKES = f"{PAGES}/api/takes"
@@ -55,6 +59,8 @@ HEADERS = ((b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-stor
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
 CLOSE_NORMAL, CLOSE_REFUSED, CLOSE_RESTART = 1000, 1008, 1012  # WebSocket: policy violation; service restart
 HTTP_FORM = "websocket.http.response"  # extension of ASGI: a refused WebSocket gets an HTTP answer
+LEFT = 499  # status, in the log and the metrics only, of a request whose client left before its answer began
+Item = TypeVar("Item")
 
 
 class Exchange:
@@ -66,6 +72,9 @@ class Exchange:
     def __init__(self, scope: Scope, receive: Receive, send: Send) -> None:
         self.scope, self._receive, self._send = scope, receive, send
         self.headers: dict[bytes, bytes] = dict(scope["headers"])
+        self._method = str(scope.get("method", "WS"))
+        if self._method == "HEAD":  # is answered as GET is, without the body
+            scope["method"] = "GET"
         given = self.headers.get(b"x-request-id", b"")
         self.id = given.decode() if REQUEST_ID_FORM.fullmatch(given) else uuid.uuid4().hex
         self.began = time.monotonic()
@@ -73,7 +82,11 @@ class Exchange:
         self.code: str | None = None  # of the error with which it was refused
         self.first_byte_s: float | None = None
         self.stages: list[Stage] = []
+        self.further: list[tuple[bytes, bytes]] = []  # headers of its answer, whatever answers it
         self.is_cut = False  # ended by the service before it was complete
+        self.is_answered = False  # all of its answer has been passed on
+        self.has_left = False  # its client has, before the answer was complete
+        self._watched: set[asyncio.Task[Any]] = set()
         self._is_closed = False
         self._task: asyncio.Task[Any] | None = None
         REQUEST_ID.set(self.id)
@@ -87,7 +100,7 @@ class Exchange:
     @property
     def method(self) -> str:
         """Method; ``WS`` of a WebSocket, ``OTHER`` if it is none of `METHODS`."""
-        method = str(self.scope.get("method", "WS"))
+        method = self._method
         return method if method in METHODS or self.scope["type"] == "websocket" else "OTHER"
 
     @property
@@ -97,7 +110,7 @@ class Exchange:
 
     async def send(self, message: MutableMapping[str, Any]) -> None:
         """Send a message of the answer with the headers of the service."""
-        if self._is_closed:
+        if self._is_closed or (self.has_left and self.scope["type"] == "http"):
             return
         if message["type"] == "http.response.start":
             self.status = message["status"]
@@ -106,15 +119,30 @@ class Exchange:
             message["headers"] = [
                 *message["headers"],
                 *(header for header in own if header[0] not in given),
+                *self.further,
                 (b"x-request-id", self.id.encode()),
                 (b"server-timing", self._server_timing().encode()),
             ]
+            if self.method == "HEAD":
+                await self._send(message)
+                self._is_closed = True
+                await self._send({"type": "http.response.body"})
+                raise ClientDisconnect  # who wants nothing more
         elif message["type"] == "websocket.accept":
             self.status = 101
         elif message["type"] == "websocket.close":
             self._is_closed = True
+        elif message["type"] == "http.response.body":
+            self.is_answered = not message.get("more_body", False)
         self._count(message)
         await self._send(message)
+
+    async def answer(self, status: int, headers: list[tuple[bytes, bytes]], body: bytes = b"") -> None:
+        """Answer it as a whole."""
+        lines = headers if status == 204 else [*headers, (b"content-length", str(len(body)).encode())]
+        with suppress(ClientDisconnect):
+            await self.send({"type": "http.response.start", "status": status, "headers": lines})
+            await self.send({"type": "http.response.body", "body": body})
 
     async def run(self, work: Awaitable[None]) -> None:
         """Run what answers the request, until it ends or until `cut`."""
@@ -127,6 +155,39 @@ class Exchange:
             assert self._task is not None
             self._task.uncancel()
 
+    def leave(self) -> None:
+        """Note that the client has left, and end what is waited for on its behalf."""
+        if self.is_answered or self.has_left:
+            return
+        self.has_left = True
+        if not self.status:
+            self.status, self.code = LEFT, "left"
+        for task in self._watched:
+            task.cancel()
+
+    @contextmanager
+    def watched(self) -> Iterator[None]:
+        """End what the block waits for as soon as the client leaves.
+
+        Raises
+        ------
+        ClientDisconnect
+            It has left.
+        """
+        if self.has_left:
+            raise ClientDisconnect
+        task = asyncio.current_task()
+        assert task is not None
+        self._watched.add(task)
+        try:
+            yield
+        except asyncio.CancelledError:
+            if self.has_left and task.uncancel() == 0:  # nobody else has cancelled it
+                raise ClientDisconnect from None
+            raise
+        finally:
+            self._watched.discard(task)
+
     async def refuse(self, refused: RefusedError) -> None:
         """Answer with an error, unless an answer has begun."""
         self.code = refused.code
@@ -134,16 +195,15 @@ class Exchange:
             return
         body = json.dumps(error_body(refused.code, refused.message)).encode()
         headers = [(name.lower().encode(), value.encode("latin-1")) for name, value in refused.headers.items()]
-        headers += [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode())]
+        headers.append((b"content-type", b"application/json"))
         if self.scope["type"] == "http":
-            await self.send({"type": "http.response.start", "status": refused.status, "headers": headers})
-            await self.send({"type": "http.response.body", "body": body})
+            await self.answer(refused.status, headers, body)
             return
         self.status = refused.status
         if HTTP_FORM not in self.scope.get("extensions", {}):
             await self._send({"type": "websocket.close", "code": CLOSE_REFUSED, "reason": refused.message[:120]})
             return
-        headers.append((b"x-request-id", self.id.encode()))
+        headers += [(b"content-length", str(len(body)).encode()), (b"x-request-id", self.id.encode()), *self.further]
         await self._send({"type": f"{HTTP_FORM}.start", "status": refused.status, "headers": headers})
         await self._send({"type": f"{HTTP_FORM}.body", "body": body})
 
@@ -183,3 +243,25 @@ class Exchange:
         now = time.monotonic()
         stages = durations(self.stages, now) | {"total": now - self.began}
         return ", ".join(f"{name};dur={1000 * seconds:.1f}" for name, seconds in stages.items())
+
+
+CLIENT: ContextVar[Exchange | None] = ContextVar("client", default=None)  # for whose request the present task works
+
+
+def while_client_stays() -> AbstractContextManager[None]:
+    """Block whose waiting ends as soon as the client of the present request, if there is one, leaves.
+
+    Raises
+    ------
+    ClientDisconnect
+        It has left.
+    """
+    client = CLIENT.get()
+    return nullcontext() if client is None else client.watched()
+
+
+def in_background(work: Coroutine[Any, Any, Item]) -> "asyncio.Task[Item]":
+    """Task that goes on when the client of the present request leaves."""
+    context = copy_context()
+    context.run(CLIENT.set, None)
+    return asyncio.get_running_loop().create_task(work, context=context)

@@ -7,7 +7,9 @@ What a key may do.
 
 import asyncio
 import logging
+import re
 import time
+from collections import deque
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping
 from http.cookies import CookieError, SimpleCookie
 from typing import TYPE_CHECKING, Any
@@ -18,9 +20,22 @@ from starlette.requests import ClientDisconnect
 from starlette.websockets import WebSocketDisconnect
 
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.exchange import PAGES, RECORDINGS, STYLES, TAKES, Exchange, Receive, Scope, Send, is_page
+from tts2face.serving.service.exchange import (
+    CLIENT,
+    PAGES,
+    RECORDINGS,
+    REFERENCE,
+    STYLES,
+    TAKES,
+    Exchange,
+    Receive,
+    Scope,
+    Send,
+    is_page,
+)
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, find_key
 from tts2face.serving.service.logs import log_event
+from tts2face.serving.service.origins import answer_headers, check_origin, preflight_headers
 
 if TYPE_CHECKING:
     from tts2face.serving.service.exchange import Exchange
@@ -34,6 +49,7 @@ LOGIN_PATH = f"{PAGES}/login"
 STATIC_PATHS = (f"{PAGES}/_nicegui/", f"{PAGES}/_nicegui_ws/")  # libraries of a page, and its connection
 UPLOADS = f"{PAGES}/_nicegui/client/"
 COOKIE_S = 30 * 86_400
+BEARER = re.compile(r"^bearer\s+", re.IGNORECASE)  # names of schemes have no case: RFC 9110, 11.1
 
 
 def is_static(path: str) -> bool:
@@ -72,12 +88,16 @@ def wants_login(request: "Exchange") -> bool:
 
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
-OPEN_PATHS = frozenset({"/healthz", "/readyz", "/docs", "/openapi.json"})
+OPEN_PATHS = frozenset({
+    "/health", "/healthz", "/readyz", "/openapi.json", REFERENCE,
+    *(f"{REFERENCE}/{name}" for name in ("swagger-ui-bundle.js", "swagger-ui.css", "start.js")),
+})  # fmt: skip
 UNCOUNTED_PATHS = frozenset({*OPEN_PATHS, "/metrics", "/v1/hello"})
 VIDEO_PATH = "/v1/talkers/build"
 VIDEO_PUTS = (f"{RECORDINGS}/", f"{STYLES}/", f"{TAKES}/")
-DRAINING_PATHS = frozenset({"/healthz", "/readyz", "/metrics"})  # that are answered until the end
+DRAINING_PATHS = frozenset({"/health", "/healthz", "/readyz", "/metrics"})  # that are answered until the end
 CLOSE = {"Connection": "close"}
+READ_AHEAD_BYTES = 256 << 10  # of a client that wait for the application; then no more is read
 DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
 
 
@@ -92,12 +112,16 @@ class Guard:
         if scope["type"] not in {"http", "websocket"}:
             return await self._app(scope, receive, send)
         request = Exchange(scope, receive, send)
+        request.further = answer_headers(request.headers, self._state.settings.origins)
         key: ApiKey | None = None
         is_counted = scope["path"] not in UNCOUNTED_PATHS and not is_static(scope["path"])
         try:
-            self._check_draining(scope["path"])
             self._check_head(request)
             self._check_host(request)
+            if allowed := preflight_headers(request.method, request.headers, self._state.settings.origins):
+                await request.answer(204, allowed)
+                return self._state.record(request, key)
+            self._check_draining(scope["path"])
             key = self._identify(request)
             scope["state"] = {**scope.get("state", {}), "key": key, "exchange": request}
             if is_counted:
@@ -107,6 +131,7 @@ class Guard:
             return self._state.record(request, key)
         if is_counted:
             self._state.running.add(request)
+            CLIENT.set(request)
         try:
             await request.run(self._answer(request, receive))
             await request.close()
@@ -122,18 +147,24 @@ class Guard:
     async def _answer(self, request: Exchange, receive: Receive) -> None:
         settings, scope = self._state.settings, request.scope
         size = settings.video_mb if _brings_video(scope) else settings.body_mb
-        body = _BoundedBody(receive, size * 1e6, settings.body_s * max(1.0, size / settings.body_mb))
+        longest_s = settings.body_s * max(1.0, size / settings.body_mb)
+        incoming = _Incoming(request, receive, size * 1e6, longest_s)
         try:
-            body.check(request.headers)
-            await self._app(scope, body.receive if scope["type"] == "http" else receive, request.send)
+            incoming.check()
+            await self._app(scope, incoming.receive, request.send)
         except RefusedError as refused:
             await request.refuse(refused)
         except (ClientDisconnect, WebSocketDisconnect):
             pass  # the client has left
         except Exception as defect:  # noqa: BLE001 - the one place where a defect becomes an answer
+            if isinstance(defect.__cause__, RefusedError) and request.status:  # Starlette's, of one that comes too late
+                request.code = defect.__cause__.code
+                return
             log_event("defect", level=logging.ERROR, error=defect)
             message = f"internal error: {type(defect).__name__}; the log has it under the id {request.id}"
             await request.refuse(RefusedError(500, "internal", message))
+        finally:
+            incoming.close()
 
     def _check_draining(self, path: str) -> None:
         if self._state.is_draining and path not in DRAINING_PATHS:
@@ -158,19 +189,13 @@ class Guard:
             raise RefusedError(
                 421, "unknown_host", f"the host {name!r} is none of this service; add it to the setting hosts"
             )
-        origin = request.headers.get(b"origin", b"").decode("latin-1")
-        if origin and origin not in self._state.settings.origins and origin.partition("://")[2] != host:
-            raise RefusedError(
-                403,
-                "unknown_origin",
-                f"pages of {origin[:80]!r} may not use this service; add it to the setting origins",
-            )
+        check_origin(request.headers, self._state.settings.origins)
 
     def _identify(self, request: "Exchange") -> ApiKey:
         path = request.scope["path"]
         if path in OPEN_PATHS or path == LOGIN_PATH or not self._state.keys:
             return LOCAL_KEY
-        given = request.headers.get(b"authorization", b"").decode("latin-1").removeprefix("Bearer ").strip()
+        given = BEARER.sub("", request.headers.get(b"authorization", b"").decode("latin-1").strip())
         given = given or request.headers.get(b"x-api-key", b"").decode("latin-1")
         if not given and request.scope["type"] == "websocket":  # a browser cannot send headers with it
             given = parse_qs(request.scope["query_string"].decode("latin-1")).get("key", [""])[0]
@@ -209,24 +234,79 @@ def _host_name(host: str) -> str:
         return ""
 
 
-class _BoundedBody:
-    """A request's body with limits of size and time."""
+class _Incoming:
+    """What a client sends, read ahead of the application, so that its leaving is noticed at once.
 
-    def __init__(self, receive: Receive, max_bytes: float, max_s: float) -> None:
-        self._receive, self._max_bytes, self._max_s = receive, max_bytes, max_s
-        self._n_bytes, self._is_complete = 0, False
-        self._deadline = time.monotonic() + max_s
+    A body has limits of size and time; it is read from the first time that the application asks for it, so that a
+    client which waits for ``100 Continue`` sends nothing that is refused. Everything else is read from the start.
+    """
 
-    def check(self, headers: dict[bytes, bytes]) -> None:
+    def __init__(self, request: Exchange, receive: Receive, max_bytes: float, max_s: float) -> None:
+        self._request, self._receive, self._max_bytes = request, receive, max_bytes
+        self._max_s, self._deadline = max_s, time.monotonic() + max_s
+        self._n_bytes, self._has_body = 0, False
+        self._messages: deque[MutableMapping[str, Any]] = deque()
+        self._n_waiting_bytes = 0  # of the messages
+        self._wrong: RefusedError | None = None
+        self._changed = asyncio.Event()  # a message has come, has been taken, or the end was reached
+        self._reading: asyncio.Task[None] | None = None
+
+    def check(self) -> None:
         """Refuse a body whose stated length is too large; what has none is complete, however late it is asked for."""
+        headers = self._request.headers
         length = headers.get(b"content-length", b"0")
-        self._is_complete = length == b"0" and b"transfer-encoding" not in headers
-        if not length.isdigit() or int(length) > self._max_bytes:
-            raise self._too_large()
+        if self._request.scope["type"] == "http":
+            self._has_body = length != b"0" or b"transfer-encoding" in headers
+            if not length.isdigit() or int(length) > self._max_bytes:
+                raise self._too_large()
+        if not self._has_body:
+            self._start()
 
     async def receive(self) -> MutableMapping[str, Any]:
-        """Next message of the request."""
-        if self._is_complete:
+        """Next message of the client; again and again the last one, which says that it has left."""
+        self._start()
+        while not self._messages:
+            if self._wrong is not None:
+                raise self._wrong
+            self._changed.clear()
+            await self._changed.wait()
+        message = self._messages[0]
+        if not _is_last(message):
+            self._messages.popleft()
+            self._n_waiting_bytes -= _n_bytes(message)
+            self._changed.set()
+        return message
+
+    def close(self) -> None:
+        """Read no more."""
+        if self._reading is not None:
+            self._reading.cancel()
+
+    def _start(self) -> None:
+        if self._reading is None:
+            self._reading = asyncio.create_task(self._read())
+
+    async def _read(self) -> None:
+        message: MutableMapping[str, Any] = {"type": ""}
+        while not _is_last(message):
+            try:
+                message = await self._next()
+            except RefusedError as wrong:
+                self._wrong = wrong
+            if self._wrong is None:
+                self._messages.append(message)
+                self._n_waiting_bytes += _n_bytes(message)
+            if _is_last(message):
+                self._request.leave()
+            self._changed.set()
+            if self._wrong is not None:
+                return
+            while self._n_waiting_bytes >= READ_AHEAD_BYTES:
+                self._changed.clear()
+                await self._changed.wait()
+
+    async def _next(self) -> MutableMapping[str, Any]:
+        if not self._has_body:
             return await self._receive()
         try:
             message = await asyncio.wait_for(self._receive(), max(0.0, self._deadline - time.monotonic()))
@@ -235,14 +315,23 @@ class _BoundedBody:
                 408, "too_slow", f"the body did not arrive within {self._max_s:g} s; send it faster"
             ) from late
         if message["type"] == "http.request":
-            self._n_bytes += len(message.get("body", b""))
-            self._is_complete = not message.get("more_body", False)
+            self._n_bytes += _n_bytes(message)
+            self._has_body = message.get("more_body", False)
             if self._n_bytes > self._max_bytes:
                 raise self._too_large()
         return message
 
     def _too_large(self) -> RefusedError:
         return RefusedError(413, "too_large", f"the body is larger than {self._max_bytes / 1e6:g} MB; send less")
+
+
+def _is_last(message: Mapping[str, Any]) -> bool:
+    return str(message["type"]).endswith(".disconnect")
+
+
+def _n_bytes(message: Mapping[str, Any]) -> int:
+    """Size of what a client has sent; of texts in characters."""
+    return len(message.get("body") or message.get("bytes") or message.get("text") or b"")
 
 
 def require_scope(request: HttpRequest, scope: str, what: str) -> ApiKey:

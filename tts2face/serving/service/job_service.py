@@ -25,6 +25,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from lexicon.errors import BackendError, Tts2faceError
 from tts2face import __version__
+from tts2face.serving.batch.engine import lack_of_room
 from tts2face.serving.batch.run import prune_unused
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.service.errors import RefusedError, as_refused
@@ -89,7 +90,9 @@ class Job(BaseModel):
     started: Annotated[float | None, Field(description="When a worker took it.", examples=[1790000001.0])]
     finished: Annotated[float | None, Field(description="When it ended.", examples=[1790000009.0])]
     progress: Annotated[Progress, Field(description="How many of its parts are done.")]
-    error: Annotated[str | None, Field(description="Why it failed, or why some results are missing.", examples=[None])]
+    error: Annotated[
+        str | None, Field(description="Why it failed, why some results are missing, or why it waits.", examples=[None])
+    ]
     webhook: Annotated[WebhookState | None, Field(description="The message about its end.")]
 
 
@@ -242,6 +245,7 @@ class JobService:
         self._tasks: list[asyncio.Task[None]] = []
         self._stopped = threading.Event()
         self._supervisor: threading.Thread | None = None
+        self.n_workers = 0  # local ones that are alive
         self.counts, self.oldest_waiting_s = dict.fromkeys(STATES, 0), 0.0
 
     def start(self) -> None:
@@ -271,7 +275,7 @@ class JobService:
             The database has not been opened yet.
         """
         if self._client is None:
-            raise _unavailable()
+            raise self._unavailable()
         return self._client
 
     async def call(self, function: Callable[[JobClient], Value], threads: ThreadPoolExecutor | None = None) -> Value:
@@ -288,7 +292,7 @@ class JobService:
             value = await asyncio.get_running_loop().run_in_executor(threads or self._threads, function, client)
         except away_errors as away:
             self._note_away(str(away))
-            raise _unavailable() from away
+            raise self._unavailable() from away
         except OtherBodyError as other:
             raise RefusedError(422, "idempotency_conflict", str(other)) from other
         except QueueFullError as full:
@@ -297,6 +301,14 @@ class JobService:
             raise as_refused(error) from error
         self._note_away("")
         return value
+
+    def _unavailable(self) -> RefusedError:
+        """Refusal of a request of jobs; a full disk, on which a database cannot write, is named."""
+        folder = self._settings.data_folder
+        reason = lack_of_room(folder, "data folder") if folder.exists() else ""
+        what = reason or "as their database cannot be reached; repeat the request later"
+        message = f"the jobs are not available now{':' if reason else ','} {what}"
+        return RefusedError(503, "unavailable", message, {"Retry-After": str(RETRY_AFTER_S)})
 
     def _note_away(self, reason: str) -> None:
         """Write once to the log that the database cannot be reached, and once that it can be reached again."""
@@ -347,7 +359,8 @@ class JobService:
         while not self._stopped.is_set():
             with suppress(BackendError), local_workers(engine) as supervise:
                 while not self._stopped.wait(SUPERVISE_S):
-                    supervise()
+                    self.n_workers = supervise()
+            self.n_workers = 0
             self._stopped.wait(RESTART_S)  # the workers cannot start now, such as while the database is away
 
     async def _repeat(self, action: Callable[[], Awaitable[None]], pause_s: float) -> None:
@@ -386,11 +399,6 @@ class JobService:
         pruned = prune_unused(open_store(self._settings.store_place), unfinished_segments(database), age_s)
         prune_jobs(database, age_s)
         return pruned.n_removed
-
-
-def _unavailable() -> RefusedError:
-    message = "the jobs are not available now, as their database cannot be reached; repeat the request later"
-    return RefusedError(503, "unavailable", message, {"Retry-After": str(RETRY_AFTER_S)})
 
 
 def _log_worker(message: str) -> None:

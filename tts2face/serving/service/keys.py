@@ -159,7 +159,7 @@ PHOTOS_AT_ONCE = 1  # of a key; those that wait would take the turns of other ke
 
 
 @dataclass(slots=True)
-class _Bucket:
+class Bucket:
     """What is left of a period's most; it comes back evenly over the period, and is full at first."""
 
     left: float = 0.0
@@ -174,9 +174,9 @@ class _Bucket:
 
 @dataclass(slots=True)
 class _Usage:
-    requests: _Bucket = field(default_factory=_Bucket)
-    speech_s: _Bucket = field(default_factory=_Bucket)
-    photos: _Bucket = field(default_factory=_Bucket)
+    requests: Bucket = field(default_factory=Bucket)
+    speech_s: Bucket = field(default_factory=Bucket)
+    photos: Bucket = field(default_factory=Bucket)
     n_running: int = 0
     n_photos: int = 0
 
@@ -200,16 +200,24 @@ class RateLimits:
         RefusedError
             The key has no request left; with the seconds to wait.
         """
-        per_minute, usage = key.requests_per_minute, self._of(key)
+        usage = self._of(key)
         if key.concurrent is not None and usage.n_running >= key.concurrent:
             raise _refused(f"the key {key.name} has {usage.n_running} requests running, its limit", 1.0)
+        self.count(key)
+        usage.n_running += 1
+
+    def count(self, key: ApiKey) -> None:
+        """Count a message of an open WebSocket that costs synthesis, as a request; raises as `begin`.
+
+        The socket is one of the requests that run: its messages are worked on one after another.
+        """
+        per_minute, usage = key.requests_per_minute, self._of(key)
         if per_minute is not None:
             left = usage.requests.refill(self.clock(), per_minute, MINUTE_S)
             if left < 1.0:
                 wait_s = (1.0 - left) * MINUTE_S / per_minute
                 raise _refused(f"the key {key.name} has used its {per_minute} requests a minute", wait_s)
             usage.requests.left -= 1.0
-        usage.n_running += 1
 
     def end(self, key: ApiKey) -> None:
         """Count the end of a request."""

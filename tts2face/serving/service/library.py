@@ -43,9 +43,10 @@ from tts2face.storage.files import FORMER, find_file, translate_disk_errors
 from tts2face.storage.temporary import Temporary
 
 NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,39}")
-OPENAI_MODELS = ("tts-1", "tts-1-hd", "gpt-4o-mini-tts")  # names that clients send; all are the service's talker
+# Names of models that clients of OpenAI and Kokoro send; all are the service's talker.
+CLIENT_MODELS = ("tts-1", "tts-1-hd", "gpt-4o-mini-tts", "kokoro", "tts2face")
 MAX_FETCHED = 1000  # contents whose files are remembered
-RESERVED = {FACE: (OWN_FACE,), TALKER: OPENAI_MODELS}
+RESERVED = {FACE: (OWN_FACE,), TALKER: CLIENT_MODELS}
 
 
 def shipped_names(kind: str) -> tuple[str, ...]:

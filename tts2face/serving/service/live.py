@@ -5,14 +5,14 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import Tts2faceError
-from lexicon.spoken_words import GrowingText
-from tts2face.serving.service.messages import CANCELS, Event, Inputs, Step, Wait, Work, check_words
+from tts2face.serving.service.messages import Event, Inputs, Step, Wait, Work, check_words
 from tts2face.serving.service.scheduler import InterruptedTaskError
 from tts2face.types import Chunk, Clip, Trajectory
 
@@ -23,11 +23,14 @@ if TYPE_CHECKING:
 
 
 IDLE_S = 0.2  # of idle motion at a time, so that speech can begin soon
+MAX_FRAMES = 200  # of an event, whose writing is one step of the server's event loop, of some 5 ms
 LEAD_S = 0.3  # by which idle motion is ahead of the clock
 
 
 class LiveTask:
-    """One live stream: inputs are ``text``, ``flush``, ``cancel`` and ``end``; results are events and sound.
+    """One live stream: inputs are ``say``, ``cancel`` and ``end``; results are events and sound.
+
+    The text of ``say`` is a sentence; ``said`` with their number ``n`` tells which ones are spoken or forgotten.
 
     Parameters
     ----------
@@ -41,7 +44,6 @@ class LiveTask:
         self._speech: LiveSpeech = session.live(**options)
         self._curves = _Curves(session)
         self._inputs, self._clock = inputs, clock
-        self._text = GrowingText(str(options.get("language", "en-us")))
         self._sentences: deque[str] = deque()
         self._is_ended = False
         self._began: float | None = None  # of the stream on the clock
@@ -55,6 +57,7 @@ class LiveTask:
                 self._began = self._clock() - self._speech.seconds
             if self._sentences:
                 yield from self._say(self._sentences.popleft())
+                yield _said(1)
                 continue
             if self._is_ended:
                 return
@@ -67,7 +70,7 @@ class LiveTask:
                 continue
             with suppress(InterruptedTaskError):  # by a message that is read next
                 for piece in self._speech.idle(IDLE_S):
-                    yield self._curves.event(piece.clip, piece.begin)
+                    yield from self._curves.events(piece.clip, piece.begin)
 
     def _say(self, sentence: str) -> Iterator[Event | Chunk]:
         n_cancels = self._n_cancels
@@ -76,7 +79,7 @@ class LiveTask:
             for piece in self._speech.say(sentence):
                 yield _speech_event(piece)
                 yield _sound(piece.clip)
-                yield self._curves.event(piece.clip, piece.begin)
+                yield from self._curves.events(piece.clip, piece.begin)
                 yield from self._read_inputs()
                 if self._n_cancels != n_cancels:
                     return
@@ -88,22 +91,24 @@ class LiveTask:
     def _read_inputs(self) -> Iterator[Event]:
         while self._inputs:
             content = self._inputs.popleft().content
-            match content.get("type"):
-                case "text":
-                    self._sentences += self._text.add(str(content.get("text", "")))
-                case "flush":
-                    self._sentences += self._text.flush()
+            match content["type"]:
+                case "say":
+                    self._sentences.append(content["text"])
                 case "end":
-                    self._sentences += self._text.flush()
                     self._is_ended = True
-                case kind if kind in CANCELS:
-                    self._sentences.clear()
-                    self._text.clear()
+                case "cancel":
+                    if self._sentences:
+                        yield _said(len(self._sentences))
+                        self._sentences.clear()
                     self._n_cancels += 1
                     self._began = self._clock() - self._speech.seconds  # what follows is due now
                     after_ms = 1000 * (self._clock() - content["arrived"])
                     cancelled = {"at": round(self._speech.seconds, 4), "after_ms": round(after_ms, 1)}
                     yield Event({"type": "cancelled", **cancelled})
+
+
+def _said(n_sentences: int) -> Event:
+    return Event({"type": "said", "n": n_sentences})
 
 
 def live(session: "Session", work: Work, inputs: Inputs) -> Iterator[Step]:
@@ -137,9 +142,13 @@ class _Curves:
         self._session = session
         self._projection: Any = None
 
-    def event(self, clip: Clip, begin: float) -> Event:
-        """Weights and head pose of all frames of a clip."""
-        return self.of_motion(clip.motion, begin, clip.head)
+    def events(self, clip: Clip, begin: float) -> Iterator[Event]:
+        """Weights and head pose of all frames of a clip, at most `MAX_FRAMES` in an event."""
+        motion, head = clip.motion, clip.head
+        for at in range(0, len(motion), MAX_FRAMES):
+            part = slice(at, at + MAX_FRAMES)
+            some, turned = replace(motion, values=motion.values[part]), replace(head, values=head.values[part])
+            yield self.of_motion(some, begin + at / motion.fps, turned)
 
     def of_motion(self, motion: Trajectory, begin: float, head: Trajectory | None = None) -> Event:
         """Weights of all frames of a motion, and the head pose if there is one."""

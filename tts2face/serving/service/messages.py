@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Inputs = deque[Message]  # that a task has not read yet
 SYNTHESISE, SERVE = "synthesise", "serve"  # calls of a synthesis process
-CANCELS = frozenset({"cancel", "interrupt"})  # two names of one input of live streams
+CANCEL = "cancel"  # input of live streams
 
 
 class DefectError(BackendError):

@@ -170,7 +170,9 @@ def work_cost(work: Work) -> float:
 class Pool:
     """Distributes works over synthesis processes.
 
-    While all processes are occupied, works wait in one queue for each key, and the keys take turns.
+    While all processes are occupied, works wait in one queue for each key, and the keys take turns. The places to wait
+    are shared likewise: when all are taken, a key that has fewer of them gets one of the key that has most
+    (decision 180).
     """
 
     def __init__(self, settings: PoolSettings) -> None:
@@ -257,17 +259,33 @@ class Pool:
             found.load += cost
             return found
         if self.n_waiting >= self.settings.max_waiting:
-            raise BusyError(f"{self.n_waiting} requests are waiting already; repeat the request later")
+            self._make_room(key)
         future: asyncio.Future[WarmProcess] = asyncio.get_running_loop().create_future()
         self._waiting.setdefault(key, deque()).append((cost, time.monotonic(), future))
         try:
             return await future
         except asyncio.CancelledError:
-            if future.done() and not future.cancelled():
+            if future.done() and not future.cancelled() and future.exception() is None:
                 self._release(future.result(), cost)
             raise
         finally:
             self._forget(key, future)
+
+    def _make_room(self, key: str) -> None:
+        """Refuse the newest waiting work of the key that has most, unless that gives this key as many.
+
+        Raises
+        ------
+        BusyError
+            This key has its share of the places.
+        """
+        waits = {name: sum(not one[2].done() for one in queue) for name, queue in self._waiting.items()}
+        largest = max(waits, key=lambda name: waits[name], default=key)
+        if waits.get(largest, 0) <= waits.get(key, 0) + 1:
+            raise BusyError(f"{self.n_waiting} requests are waiting already; repeat the request later")
+        newest = next(one[2] for one in reversed(self._waiting[largest]) if not one[2].done())
+        newest.set_exception(BusyError("other keys need the places to wait; repeat the request later"))
+        self._forget(largest, newest)
 
     def _release(self, process: WarmProcess, cost: float) -> None:
         process.load = round(process.load - cost, 6)  # sums of tenths are not exact: the load of no work is zero

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from tts2face.processes.child import Call, StoppedError
-from tts2face.serving.service.messages import CANCELS, Event, Step, Wait
+from tts2face.serving.service.messages import CANCEL, Event, Step, Wait
 from tts2face.types import Chunk
 
 Result = TypeVar("Result")
@@ -41,7 +41,7 @@ class _Task:
     def is_urgent(self) -> bool:
         """Whether something is to be ended by an input that the task has not read yet."""
         with self.call.changed:
-            return any(one.content.get("type") in CANCELS for one in self.call.inputs)
+            return any(one.content.get("type") == CANCEL for one in self.call.inputs)
 
     def lead(self, now: float) -> float:
         """Seconds by which the result is ahead of a listener who began at the request."""

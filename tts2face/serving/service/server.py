@@ -8,9 +8,10 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
@@ -29,7 +30,18 @@ from tts2face.serving.service.errors import DOCUMENTED, RefusedError, as_refused
 from tts2face.serving.service.exchange import PAGES
 from tts2face.serving.service.guard import Guard
 from tts2face.serving.service.logs import configure_logs, log_event
-from tts2face.serving.service.routes import clips, headtts, health, jobs, live, openai, resources, results
+from tts2face.serving.service.routes import (
+    clips,
+    headtts,
+    health,
+    jobs,
+    kokoro,
+    live,
+    openai,
+    reference,
+    resources,
+    results,
+)
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 
@@ -74,13 +86,14 @@ def create_app(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> FastA
         title="tts2face",
         version=__version__,
         lifespan=lifespan,
+        docs_url=None,
         redoc_url=None,
         description="Text to talking face.",
         responses=DOCUMENTED,
         telemetry=NO_TELEMETRY,
     )
     app.state.service = state
-    for part in (openai, clips, headtts, live, jobs, results, resources, health):
+    for part in (openai, kokoro, clips, headtts, live, jobs, results, resources, health, reference):
         app.include_router(part.router)
     app.add_exception_handler(RefusedError, _answer_refused)
     app.add_exception_handler(Tts2faceError, _answer_error)
@@ -121,9 +134,21 @@ async def _answer_http(request: HttpRequest, error: Exception) -> JSONResponse:
 
 
 def _methods(request: HttpRequest) -> set[str]:
-    """Methods of all routes of a path; Starlette names those of the first one only."""
-    routes = (one for one in request.app.routes if one.matches(request.scope)[0] != Match.NONE)
-    return {method for one in routes for method in getattr(one, "methods", None) or ()}
+    """Methods of all routes of a path, of several forms of paths the one with the fewest parameters.
+
+    Starlette names those of one route only.
+    """
+    routes = [one for one in _routes(request.app.routes) if one.matches(request.scope)[0] != Match.NONE]
+    form = min((one.path for one in routes), key=lambda path: path.count("{"), default="")
+    found = {method for one in routes if one.path == form for method in getattr(one, "methods", None) or ()}
+    return found | {"HEAD"} if "GET" in found else found
+
+
+def _routes(routes: Iterable[Any]) -> Iterator[Any]:
+    """All routes, those of included routers among them, which FastAPI keeps as one."""
+    for one in routes:
+        router = getattr(one, "original_router", None)
+        yield from (one,) if router is None else _routes(router.routes)
 
 
 SOCKET_GRACE_S = 3.0  # between the message to the clients of WebSockets and their end
@@ -159,6 +184,7 @@ def make_server(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> "Dra
         loop="asyncio",  # whatever else is installed
         log_config=None, log_level="warning", access_log=False, server_header=False, proxy_headers=False,
         timeout_graceful_shutdown=CUT_S, ws_max_size=1024 * settings.message_kb, lifespan="on",
+        ws_per_message_deflate=False,  # a few bytes would become megabytes in one step of the event loop
         timeout_keep_alive=settings.keep_alive_s,  # type: ignore[arg-type]
         h11_max_incomplete_event_size=1024 * settings.head_kb,
     ), app.state.service)  # fmt: skip

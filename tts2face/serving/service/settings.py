@@ -17,6 +17,7 @@ PREFIX = "TTS2FACE_SERVE_"  # of environment variables: TTS2FACE_SERVE_PORT
 LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
 MAX_SETTINGS_BYTES = 100_000
 Limits = tuple[float, float]
+_ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[^/?#A-Z\s]+")  # as browsers send it; another one matches no page
 _PASSWORD = re.compile(r"(?<=://)([^/:@]*):[^/@]*@")  # in the URL of a database
 
 
@@ -74,6 +75,10 @@ class ServiceSettings:
     )
     webhook_secret: str = setting("", "Secret that signs webhooks; never shown.", is_secret=True)
     text_characters: int = setting(100_000, "Longest text of a request.", (1, 10_000_000))
+    live_characters: int = setting(1_000_000, "Text of a live stream over its life, in characters.", (1, 1_000_000_000))
+    live_characters_per_minute: int = setting(
+        20_000, "Text of a live stream in a minute, in characters; more is refused.", (1, 1_000_000_000)
+    )
     sound_s: float = setting(600.0, "Longest recording that a request may send.", (1, 86_400))
     body_mb: float = setting(20.0, "Largest body of a request in MB.", (0.01, 4096))
     body_s: float = setting(20.0, "Seconds within which the body of a request must arrive.", (0.1, 3600))
@@ -118,6 +123,11 @@ class ServiceSettings:
                 f"the service would be open to everybody who reaches {self.host}; create a key with `tts2face keys add "
                 f"NAME --file keys.toml` and give --keys keys.toml"
             )
+        for origin in self.origins:
+            if not _ORIGIN.fullmatch(origin):
+                raise InputError(
+                    f"origins must be such as https://example.org, in small letters and without a path, not {origin!r}"
+                )
         if self.webhook_hosts and not self.webhook_secret:
             raise InputError("webhook_hosts needs webhook_secret, which signs the messages; give both or neither")
 

@@ -8,6 +8,7 @@ import os
 from collections.abc import AsyncIterator
 from contextlib import aclosing
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
@@ -15,12 +16,14 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, gene
 from lexicon.errors import Tts2faceError
 from tts2face.processes.message import RESULT, Message
 from tts2face.serving.service.errors import RefusedError, as_refused
+from tts2face.serving.service.exchange import while_client_stays
 from tts2face.serving.service.job_service import JobService
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits, read_keys
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.messages import Work, check_words
 from tts2face.serving.service.pool import STREAM_PRIORITY, InputQueue, Pool, PoolSettings
+from tts2face.serving.service.readiness import Readiness
 from tts2face.serving.service.result_cache import CACHED_KINDS, ResultCache
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.tracing import tracing_from_environment
@@ -109,6 +112,7 @@ class ServiceState:
         self.limits, self.metrics = RateLimits(), Metrics(self.pool, self.jobs, self.cache)
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
+        self.readiness = Readiness(self.pool, self.jobs, settings)
         self.running: set[Exchange] = set()
 
     def reload_keys(self) -> None:
@@ -142,6 +146,8 @@ class ServiceState:
         ------
         RefusedError
             The work failed, or too many works wait.
+        ClientDisconnect
+            The client of the present request has left; the work no longer waits, or has been stopped.
         """
         if len(str(work.request.get("text", ""))) > self.settings.text_characters:
             raise RefusedError(
@@ -156,7 +162,9 @@ class ServiceState:
         try:
             check_words(str(work.request.get("text", "")))
             async with aclosing(self._stream(work, key, inputs, priority)) as stream:  # type: ignore[type-var]
-                async for message in stream:
+                while True:
+                    with while_client_stays():
+                        message = await anext(stream)
                     seconds = message.content["seconds"]
                     if message.kind == RESULT:
                         self.limits.add_speech(key, seconds - made)  # of parts without content
@@ -169,7 +177,7 @@ class ServiceState:
                         _log_spoken(message)
                     yield message
         except Tts2faceError as error:
-            refused = as_refused(error)
+            refused = as_refused(error, _folders(work))
             self.metrics.failures.labels(refused.code).inc()
             raise refused from error
 
@@ -194,6 +202,12 @@ class ServiceState:
         )  # fmt: skip
         if self.tracing is not None:
             self.tracing.record(request)
+
+
+def _folders(work: Work) -> set[Path]:
+    """Folders of the files that a work reads, uploads among them."""
+    values = [value for fields in (work.models, work.request, work.picture) for value in fields.values()]
+    return {Path(value).parent for value in values if isinstance(value, str | Path) and Path(value).is_absolute()}
 
 
 def _log_spoken(message: Message) -> None:

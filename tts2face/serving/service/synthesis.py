@@ -21,10 +21,11 @@ from tts2face.serving.service.scheduler import OneAtATime, Turns
 from tts2face.session.functions import SessionCache
 from tts2face.session.named_models import Models
 from tts2face.sound.voice_pool import VoicePool
-from tts2face.types import Chunk
+from tts2face.types import Chunk, Waveform
 
 if TYPE_CHECKING:
     from tts2face.session.session import Session
+    from tts2face.session.speech_stream import Piece
 
 
 def stream_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
@@ -34,27 +35,55 @@ def stream_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
 
 
 def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk]:
-    """For each sentence an event with its words, phones and visemes in seconds of the whole, then its sound (PCM)."""
+    """For each sentence an event with its words, phones and visemes in seconds of the whole, then its sound.
+
+    The format of a work without one is PCM.
+    """
+    from tts2face.picture.sound_stream import encode_sound
+
+    events: list[Event] = []
+
+    def sounds() -> Iterator[Waveform]:
+        for timed in session.stream_speech(Request(**work.request)):
+            events.append(_timed_event(timed))
+            yield timed.speech.waveform
+
+    for chunk in encode_sound(sounds(), work.format or "pcm"):
+        yield from events
+        events.clear()
+        yield chunk
+
+
+def _timed_event(timed: "Piece") -> Event:
     from tts2face.interchange.exports.parts import Label
     from tts2face.interchange.exports.visemes import viseme_labels
-    from tts2face.storage.media_files import pcm_bytes
 
-    for timed in session.stream_speech(Request(**work.request)):
-        spoken, phones, begin = timed.speech, timed.speech.phones, timed.begin
-        times = [(float(a) + begin, float(b) + begin) for a, b in zip(phones.edges, phones.edges[1:], strict=False)]
-        labels = [Label(phone, *span) for phone, span in zip(phones.phones, times, strict=True)]
-        yield Event({
-            "rate": spoken.waveform.rate,
-            "marks": [[mark.name, mark.seconds] for mark in timed.marks],
-            "words": [[word.text, times[word.first][0], times[word.last - 1][1]] for word in spoken.words],
-            "visemes": [[viseme.text, viseme.start, viseme.end, label.text]
-                        for label in labels for viseme in viseme_labels(label, "oculus")],
-        })  # fmt: skip
-        yield Chunk(pcm_bytes(spoken.waveform.samples), spoken.waveform.duration)
+    spoken, phones, begin = timed.speech, timed.speech.phones, timed.begin
+    times = [(float(a) + begin, float(b) + begin) for a, b in zip(phones.edges, phones.edges[1:], strict=False)]
+    labels = [Label(phone, *span) for phone, span in zip(phones.phones, times, strict=True)]
+    return Event({
+        "rate": spoken.waveform.rate,
+        "marks": [[mark.name, mark.seconds] for mark in timed.marks],
+        "words": [[word.text, times[word.first][0], times[word.last - 1][1]] for word in spoken.words],
+        "phones": [[label.text, label.start, label.end] for label in labels],
+        "visemes": [[viseme.text, viseme.start, viseme.end, label.text]
+                    for label in labels for viseme in viseme_labels(label, "oculus")],
+    })  # fmt: skip
+
+
+def pronounce(_: "Session", work: Work, __: Inputs) -> Iterator[Event]:
+    """One event with the words of a text in IPA."""
+    from lexicon.spoken_words import pronounce_marked
+    from lexicon.ssml import parse_marks
+
+    text, language = str(work.request["text"]), str(work.request["language"])
+    yield Event(
+        {"words": [word.ipa + word.mark for word in pronounce_marked(parse_marks(text, language), language).words]}
+    )
 
 
 TASKS: Mapping[str, Task] = MappingProxyType({
-    "file": stream_file, "speech": timed_speech, "live": live, "listen": listen,
+    "file": stream_file, "speech": timed_speech, "phones": pronounce, "live": live, "listen": listen,
 })  # fmt: skip
 
 

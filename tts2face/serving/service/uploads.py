@@ -32,6 +32,7 @@ from tts2face.processes.parent import ChildEndedError, call_once
 from tts2face.processes.program import ProcessLimits, Program
 from tts2face.processes.tools import LOW_PRIORITY, run_take_tool
 from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.exchange import while_client_stays
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.work import resource_check
 from tts2face.serving.work.resource_check import (
@@ -66,7 +67,8 @@ class Checks:
             )
         self._n_waiting += 1
         try:
-            await self._turns.acquire()
+            with while_client_stays():
+                await self._turns.acquire()
         finally:
             self._n_waiting -= 1
 

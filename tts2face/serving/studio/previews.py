@@ -22,6 +22,7 @@ from lexicon.sequence import PhoneSequence
 from tts2face.processes.message import Message
 from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.exchange import in_background
 from tts2face.serving.service.messages import Work
 from tts2face.serving.studio.requests import events_of
 from tts2face.types import HEAD_CHANNELS
@@ -240,6 +241,7 @@ class ProjectPreview:
         self._changed = asyncio.Event()
         self._ask: Ask | None = None
         self.current = Preview()
+        self.is_made = False  # the current one is that of the last `start`, and was neither given up nor refused
 
     @property
     def is_running(self) -> bool:
@@ -249,8 +251,8 @@ class ProjectPreview:
     def start(self, ask: Ask) -> None:
         """Make the preview of a changed project; one that is being made is given up."""
         self.cancel()
-        self._ask = ask
-        self._task = asyncio.get_running_loop().create_task(self._run(ask))
+        self._ask, self.is_made = ask, False
+        self._task = in_background(self._run(ask))
 
     def cancel(self) -> None:
         """Give up the preview that is being made."""
@@ -277,7 +279,9 @@ class ProjectPreview:
         try:
             for number in range(MAX_TRIES):
                 try:
-                    return await self._make(await ask(self._kept()))
+                    await self._make(await ask(self._kept()))
+                    self.is_made = True
+                    return None
                 except (RefusedError, Tts2faceError) as wrong:
                     if not _has_ended(wrong) or number == MAX_TRIES - 1:
                         return self._fail(wrong)

@@ -18,6 +18,7 @@ from typing import Any
 from lexicon.errors import InputError, Tts2faceError
 from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
 from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.exchange import in_background
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.work.table import CANCELLED, DONE, FAILED, OPEN_STATES, RUNNING, WAITING
 from tts2face.storage.files import translate_disk_errors, write_atomically
@@ -191,7 +192,7 @@ class WorkList:
     def _begin(self, work: BackgroundWork) -> None:
         self._all.pop(work.order, None)  # the newest is the last
         self._all[work.order] = work
-        work.task = asyncio.get_running_loop().create_task(self._run(work))
+        work.task = in_background(self._run(work))
         self._notify(work)
 
     async def _run(self, work: BackgroundWork) -> None:

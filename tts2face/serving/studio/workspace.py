@@ -129,8 +129,17 @@ class Workspace:
     def show(self) -> None:
         """Begin the preview unless it is there."""
         self.used_at = self._now()
-        if not self.preview.current.pieces and not self.preview.is_running:
+        if not self.preview.is_made and not self.preview.is_running:
             self._start_preview()
+        elif self.preview.is_made:
+            self.comparison.follow()
+
+    def leave(self, listener: Listener) -> None:
+        """Tell a page nothing more; without any page no preview is made."""
+        self.listeners.discard(listener)
+        if not self.listeners:
+            self.preview.cancel()
+            self.comparison.preview.cancel()
 
     async def work(self, kind: str, **more: Any) -> Work:
         """A work of the project as it is now; see `project_work`."""

@@ -71,6 +71,14 @@ class JobChanges:
                 self.table.add_event(change, job_id, content)
         return bool(n_open)
 
+    def pause(self, job_id: str, reason: str | None) -> None:
+        """Note why an open job waits, as its error and an event; None: it goes on."""
+        event: dict[str, Any] = {"type": "continued"} if reason is None else {"type": "paused", "reason": reason}
+        with self._database.transaction(is_change=True) as change:
+            query = f"UPDATE tts2face_jobs SET error = :reason WHERE id = :id AND {IS_OPEN}"
+            if change.run(query, id=job_id, reason=reason):
+                self.table.add_event(change, job_id, event)
+
     def end(
         self,
         job_id: str,

@@ -231,8 +231,8 @@ def failure_reason(job: Any) -> str:
 
 
 @contextmanager
-def local_workers(engine: DatabaseEngine) -> Iterator[Callable[[], None]]:
-    """Workers on this machine; the value starts those that have ended or have not been started."""
+def local_workers(engine: DatabaseEngine) -> Iterator[Callable[[], int]]:
+    """Workers on this machine; the value starts those that have ended or have not been started, and counts the rest."""
     workers = _LocalWorkers(engine)
     try:
         yield workers.supervise
@@ -278,24 +278,29 @@ class _LocalWorkers:
         self._workers: dict[int, LocalWorker] = {}
         self._n_quick = 0
 
-    def supervise(self) -> None:
-        """Start the workers that do not run.
+    def supervise(self) -> int:
+        """Start the workers that do not run; the number of those that do.
+
+        After one that could not start, those that have just been started do not count.
 
         Raises
         ------
         BackendError
             They end as soon as they start.
         """
+        n_alive = 0
         for number in range(self._engine.n_workers):
             worker = self._workers.get(number)
             if worker is not None:
                 lived_s = time.monotonic() - worker.began
                 if not worker.reason or lived_s < RESTART_S:
+                    n_alive += not worker.reason and (lived_s >= QUICK_END_S or not self._n_quick)
                     continue
                 self._note_end(number, worker, lived_s)
             is_bound = self._engine.n_workers > 1 and len(self._cores) > 0
             core = self._cores[number % len(self._cores)] if is_bound else None
             self._workers[number] = LocalWorker(self._engine, core)
+        return n_alive
 
     def end(self) -> None:
         """End all workers."""

@@ -14,7 +14,7 @@ from tempfile import gettempdir
 from typing import Any
 
 from lexicon.errors import DataError, Tts2faceError
-from tts2face.serving.batch.engine import Engine, Rendered
+from tts2face.serving.batch.engine import MIN_FREE_BYTES, Engine, Rendered, free_bytes
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import Store, wait_for_store
 from tts2face.serving.work.blobs import BlobStore, open_blobs, place_file, place_models
@@ -23,6 +23,7 @@ from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase, con
 from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, DatabaseEngine, failure_reason, open_client
 from tts2face.serving.work.table import DONE, FAILED, JobFile, JobRecord
 from tts2face.storage.bucket import StoreAwayError
+from tts2face.storage.files import without_folders
 from tts2face.storage.temporary import Temporary
 
 RUNNERS: Mapping[str, str] = {
@@ -121,6 +122,7 @@ BLOBS, RESOURCES = "results", "resources"  # kinds of files in a store: of jobs,
 MODEL_SECTIONS = ("models", "request")  # parts of a job's JSON that may name uploads
 PAUSE_S = 2.0  # before another try while the database or the store cannot be reached
 CHECK_S = 1.0  # between two looks whether a job is still wanted
+FULL = f"waits: the disk of the worker has less than {MIN_FREE_BYTES >> 20} MB free; it goes on when there is room"
 REPORT_S = 0.5  # between two notes of its progress
 SMALLEST_PRIORITY, LARGEST_PRIORITY, SEGMENTS_PER_STEP = 10, 100, 20  # small jobs overtake large ones
 
@@ -185,8 +187,8 @@ class JobRunner:
             database.close()
 
     def _execute(self, job: JobRecord, changes: JobChanges) -> str:
-        watch = _Watch(job.id, changes)
         scratch = self._store.scratch() or Path(gettempdir())
+        watch = JobWatch(job, changes, scratch)
         with Temporary(scratch / "job", is_folder=True) as folder:
             try:
                 inputs = self._inputs(job, folder.path)
@@ -206,7 +208,7 @@ class JobRunner:
             self._end(changes, job, ending, paths)
         return ending.state
 
-    def _engine(self, watch: "_Watch") -> "_JobEngine":
+    def _engine(self, watch: "JobWatch") -> "_JobEngine":
         return _JobEngine(watch, partial(DatabaseEngine, self._url, self._place, 0))
 
     def _request(self, job: JobRecord) -> dict[str, Any]:
@@ -250,19 +252,33 @@ class JobRunner:
         changes.forget_inputs(job.id, store.delete)
 
 
-class _Watch:
-    """Progress of a job, and whether it is still wanted."""
+class JobWatch:
+    """Progress of a job, why it waits, and whether it is still wanted.
 
-    def __init__(self, job_id: str, changes: JobChanges) -> None:
-        self.job_id, self.changes = job_id, changes
+    Parameters
+    ----------
+    folder
+        On the disk on which it works.
+    """
+
+    def __init__(self, job: JobRecord, changes: JobChanges, folder: Path) -> None:
+        self.job_id, self.changes, self._folder = job.id, changes, folder
         self._checked_at = self._reported_at = 0.0
+        self._is_paused = job.error is not None  # by a worker that has died since
 
     def check(self) -> None:
-        """Raise `JobCancelledError` if the job has ended or was deleted; looks at most once in `CHECK_S`."""
+        """Raise `JobCancelledError` if the job has ended or was deleted; looks at most once in `CHECK_S`.
+
+        It also notes in the job that the disk has less than `MIN_FREE_BYTES`, where the rendering waits for room.
+        """
         if time.monotonic() - self._checked_at > CHECK_S:
             self._checked_at = time.monotonic()
             if not self.changes.is_open(self.job_id):
                 raise JobCancelledError
+            is_full = free_bytes(self._folder) < MIN_FREE_BYTES
+            if is_full != self._is_paused:
+                self.changes.pause(self.job_id, FULL if is_full else None)
+                self._is_paused = is_full
 
     def report(self, content: dict[str, Any]) -> None:
         """Add an event; of progress only some."""
@@ -278,7 +294,7 @@ class _Watch:
 class _JobEngine:
     """Queues the segments of a job for all workers."""
 
-    watch: _Watch
+    watch: JobWatch
     make: Callable[..., DatabaseEngine]
 
     def render(self, segments: Mapping[str, Segment], store: Store) -> Iterator[Rendered]:
@@ -291,9 +307,7 @@ class _JobEngine:
 
 def _without_folders(message: str, folder: Path) -> str:
     """A message without the paths of this machine."""
-    for path in sorted((folder / "inputs").glob("*"), reverse=True):
-        message = message.replace(f"{path}/", "")
-    return message.replace(f"{folder}/", "").replace(str(folder), "the job")
+    return without_folders(message, [*(folder / "inputs").glob("*"), folder]).replace(str(folder), "the job")
 
 
 def _ignore(_: str) -> None:

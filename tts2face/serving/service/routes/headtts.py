@@ -13,20 +13,18 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import JSONResponse, PlainTextResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from lexicon.errors import DataError
-from lexicon.inputs import parse_json
-from lexicon.marked_text import RATE_LIMITS
 from tts2face.interchange.exports.parts import Label
 from tts2face.picture.sound_stream import wav_header
+from tts2face.serving.service.client_names import Adjustments, choose_voice, limited_rate
 from tts2face.serving.service.errors import ErrorBody, RefusedError
-from tts2face.serving.service.library import check_voice, resolve_dictionary
+from tts2face.serving.service.library import resolve_dictionary
+from tts2face.serving.service.live_text import REFUSED_S, parse_message
 from tts2face.serving.service.request_fields import described
 from tts2face.serving.service.routes.clips import service_state, timed_speech
 
 router = APIRouter(tags=["headtts"])
 
 MAX_CHARACTERS = 500  # of a text, as in HeadTTS
-KOKORO_VOICE = re.compile(r"[a-z][fm]_[a-z0-9]+")  # names that clients send; all are the service's default voice
 DELTA_START_MS, DELTA_END_MS = -10, 10  # by which HeadTTS widens words and visemes
 SILENT_VISEME = "sil"
 
@@ -43,9 +41,7 @@ class HeadTtsRequest(BaseModel):
             examples=["Hello there."],
         ),
     ]
-    voice: Annotated[str, Field(description="A voice of GET /v1/voices, or one of Kokoro for the default.")] = (
-        "af_bella"
-    )
+    voice: Annotated[str, Field(description="A voice of GET /v1/voices; for one of Kokoro, the nearest.")] = "af_bella"
     language: Annotated[str, described("language")] = "en-us"
     speed: Annotated[float, Field(ge=0.25, le=4.0, description="Speaking rate; limited to 0.5 to 2.")] = 1.0
     dictionary: Annotated[
@@ -98,72 +94,68 @@ OWN_ERRORS: dict[int | str, dict[str, Any]] = {
 )
 async def synthesize(request: HttpRequest, body: HeadTtsRequest) -> JSONResponse:
     """Sound as base64, words and Oculus visemes with times in milliseconds."""
+    adjustments = Adjustments()
     try:
-        content, sound = await _speak(request, body)
+        content, sound = await _speak(request, body, adjustments)
     except RefusedError as refused:
         return JSONResponse({"error": refused.message}, refused.status, refused.headers)
-    return JSONResponse(content | {"audio": base64.b64encode(sound).decode()})
+    return adjustments.on(JSONResponse(content | {"audio": base64.b64encode(sound).decode()}))
 
 
 @router.websocket("/")
 @router.websocket("/v1/headtts")
 async def socket(connection: WebSocket) -> None:
-    """Messages ``setup`` and ``synthesize``; answers ``audio``, followed by its sound, or ``error``."""
+    """Messages ``setup`` and ``synthesize``, one after another; answers ``audio`` and its sound, or ``error``."""
     await connection.accept()
     setup: dict[str, Any] = {}
-    lock = asyncio.Lock()
-    works: set[asyncio.Task[None]] = set()
     try:
         while True:
-            message = _read_message(await connection.receive_text())
+            try:
+                message = parse_message(await connection.receive_text())
+            except RefusedError as refused:
+                await _send_error(connection, None, refused.message)
+                continue
+            if not isinstance(message, dict):
+                continue
             if message.get("type") == "setup" and isinstance(message.get("data"), dict):
                 setup |= message["data"]
             elif message.get("type") == "synthesize":
-                work = asyncio.create_task(_answer(connection, lock, dict(setup), message))
-                works.add(work)
-                work.add_done_callback(works.discard)
+                await _answer(connection, setup, message)
     except (WebSocketDisconnect, KeyError):  # KeyError: a binary message
         return
-    finally:
-        for work in works:
-            work.cancel()
 
 
-def _read_message(text: str) -> dict[str, Any]:
-    try:
-        message = parse_json(text, "the message")
-    except DataError:
-        return {}
-    return message if isinstance(message, dict) else {}
+async def _send_error(connection: WebSocket, reference: Any, reason: str) -> None:
+    await connection.send_json({"type": "error", "ref": reference, "data": {"error": reason}})
+    await asyncio.sleep(REFUSED_S)
 
 
-async def _answer(connection: WebSocket, lock: asyncio.Lock, setup: dict[str, Any], message: dict[str, Any]) -> None:
-    """Answer one ``synthesize``; its two messages follow each other."""
+async def _answer(connection: WebSocket, setup: dict[str, Any], message: dict[str, Any]) -> None:
+    """Answer one ``synthesize``, which counts as a request."""
     reference = message.get("id")
     try:
+        service_state(connection).limits.count(connection.state.key)
         body = HeadTtsRequest(**(setup | (message.get("data") or {})))
-        content, sound = await _speak(connection, body)
+        content, sound = await _speak(connection, body, Adjustments())
     except (RefusedError, ValueError, TypeError) as error:
         reason = error.message if isinstance(error, RefusedError) else "the request is invalid: " + str(error)[:200]
-        async with lock:
-            await connection.send_json({"type": "error", "ref": reference, "data": {"error": reason}})
+        await _send_error(connection, reference, reason)
         return
-    async with lock:
-        await connection.send_json({"type": "audio", "ref": reference, "data": content})
-        await connection.send_bytes(sound)
+    await connection.send_json({"type": "audio", "ref": reference, "data": content})
+    await connection.send_bytes(sound)
 
 
-async def _speak(request: HttpRequest | WebSocket, body: HeadTtsRequest) -> tuple[dict[str, Any], bytes]:
+async def _speak(
+    request: HttpRequest | WebSocket, body: HeadTtsRequest, adjustments: Adjustments
+) -> tuple[dict[str, Any], bytes]:
     """Fields of an audio message, and the sound."""
     items = body.input if isinstance(body.input, list) else [body.input]
     text, subtitles = items_to_ssml(items)
     fields: dict[str, Any] = {
-        "text": text, "language": body.language, "rate": min(max(body.speed, RATE_LIMITS[0]), RATE_LIMITS[1]),
+        "text": text, "language": body.language, "rate": limited_rate(body.speed, adjustments),
         "gestures": "none", "dictionary": body.dictionary,
     }  # fmt: skip
-    if not KOKORO_VOICE.fullmatch(body.voice):
-        check_voice(body.voice)
-        fields["voice"] = body.voice
+    fields["voice"], _ = await asyncio.to_thread(choose_voice, body.voice, body.language, text, adjustments)
     state = service_state(request)
     fields = await resolve_dictionary(state.library, request.state.key, fields)
     events, pcm = await timed_speech(request, state.work(kind="speech", request=fields))
@@ -191,8 +183,8 @@ def items_to_ssml(items: Sequence[str | dict[str, Any]]) -> tuple[str, dict[str,
         make = ITEMS.get(str(item.get("type", "text")))
         if make is None:
             raise RefusedError(400, "invalid_request", f"there is no item type {str(item.get('type'))[:40]!r}")
-        if item.get("subtitles"):
-            subtitles[name] = str(item["subtitles"])
+        if item.get("subtitles") or item.get("type") == "phonetic":  # whose letters are no words
+            subtitles[name] = str(item.get("subtitles") or "")
         parts.append(f"<mark name={quoteattr(name)}/>{make(value)} ")
     text = "".join(parts)
     if sum(len(str(item if isinstance(item, str) else item.get("value", ""))) for item in items) > MAX_CHARACTERS:

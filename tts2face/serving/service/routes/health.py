@@ -1,14 +1,9 @@
 """Health, readiness and metrics."""
 
-import shutil
-import tempfile
-from typing import Any
-
 from fastapi import APIRouter
 from fastapi import Request as HttpRequest
 from fastapi.responses import JSONResponse, Response
 
-from tts2face.serving.batch.engine import MIN_FREE_BYTES
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.routes.clips import service_state
 
@@ -21,18 +16,25 @@ def healthz() -> dict[str, str]:
     return {"status": "ok"}
 
 
+@router.get("/health", summary="Whether the server runs, for clients of Kokoro-FastAPI")
+def health() -> dict[str, str]:
+    """The server answers."""
+    return {"status": "healthy"}
+
+
 @router.get("/readyz", summary="Whether requests would be served", responses={503: {"description": "Not ready."}})
 async def readyz(request: HttpRequest) -> JSONResponse:
-    """Processes, disk, database, and whether the server is shutting down; 503 unless all are well."""
+    """Models, folders, database, workers, and whether the server is shutting down; 503 unless all are well.
+
+    ``missing`` says what is not, and what to do.
+    """
     state = service_state(request)
-    checks: dict[str, Any] = {
-        "models": state.pool.n_ready > 0,
-        "disk": shutil.disk_usage(tempfile.gettempdir()).free > MIN_FREE_BYTES,
-        "database": await state.jobs.is_reachable(),
-        "accepting": not state.is_draining,
-    }
-    is_ready = all(checks.values())
-    return JSONResponse({"status": "ready" if is_ready else "not ready", "checks": checks}, 200 if is_ready else 503)
+    draining = "the service is shutting down; ask another server" if state.is_draining else ""
+    found = await state.readiness.look() | {"accepting": draining}
+    missing = [reason for reason in found.values() if reason]
+    checks = {name: not reason for name, reason in found.items()}
+    content = {"status": "not ready" if missing else "ready", "checks": checks, "missing": missing}
+    return JSONResponse(content, 503 if missing else 200)
 
 
 @router.get("/metrics", response_class=Response, summary="Prometheus metrics")

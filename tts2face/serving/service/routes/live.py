@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import Mapping
+from collections.abc import AsyncIterator, Mapping
 from contextlib import aclosing, suppress
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import Field, ValidationError
 
-from lexicon.errors import DataError
-from lexicon.inputs import parse_json
+from tts2face.processes.message import Message
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.library import check_voice, resolve_dictionary, resolve_models
+from tts2face.serving.service.live_text import REFUSED_S, LiveText, parse_message
 from tts2face.serving.service.pool import InputQueue
 from tts2face.serving.service.request_fields import MODEL_FIELDS, PICTURE_FIELDS, StrictModel, options_model
 from tts2face.serving.service.state import ServiceState
@@ -23,6 +23,7 @@ router = APIRouter(tags=["live"])
 TEXT_TYPES = frozenset({"text", "flush", "cancel", "interrupt", "end"})  # of messages of a stream of text
 AUDIO_TYPES = frozenset({"end"})  # of a stream of sound, besides the sound
 MAX_BLOCK_BYTES = 1 << 16  # of sound in one message
+MAX_BLOCKS = 16  # that wait for the task
 MAX_AHEAD_S = 5.0  # by which a client's sound is read ahead of real time
 SAMPLE_BYTES = 2
 INVALID = 1007  # WebSocket close code: a message is not what it should be
@@ -80,10 +81,16 @@ async def stream(connection: WebSocket) -> None:
         return
     except (WebSocketDisconnect, KeyError):
         return
-    inputs: InputQueue = asyncio.Queue(1000)
-    work = state.work(kind="live" if isinstance(options, TextOptions) else "listen", models=models, request=given)
-    sending = asyncio.create_task(_send(connection, state, work, inputs))
-    receiving = asyncio.create_task(_receive(connection, inputs, options))
+    receiver: LiveText | _Sound
+    if isinstance(options, AudioOptions):
+        receiver = _Sound(options.rate)
+    else:
+        limits = state.settings.live_characters, state.settings.live_characters_per_minute
+        receiver = LiveText(str(given.get("language", "en-us")), limits, lambda: state.limits.count(key))
+    kind = "listen" if isinstance(receiver, _Sound) else "live"
+    work = state.work(kind=kind, models=models, request=given)
+    sending = asyncio.create_task(_send(connection, state.messages(work, key, receiver.inputs), receiver))
+    receiving = asyncio.create_task(_receive(connection, receiver))
     try:
         await asyncio.wait({sending, receiving}, return_when=asyncio.FIRST_COMPLETED)
         if receiving.done() and receiving.exception() is None and receiving.result():
@@ -113,30 +120,40 @@ async def _first_message(connection: WebSocket, seconds: float) -> str:
 
 
 def _read_options(message: str) -> TextOptions | AudioOptions:
-    with suppress(DataError):
-        content = parse_json(message, "the message")
-        if isinstance(content, dict) and content.get("input") == "audio":
-            return AudioOptions.model_validate_json(message)
-    return TextOptions.model_validate_json(message)
+    content = parse_message(message)
+    kind = AudioOptions if isinstance(content, dict) and content.get("input") == "audio" else TextOptions
+    return kind.model_validate_json(message)
 
 
-async def _receive(connection: WebSocket, inputs: InputQueue, options: TextOptions | AudioOptions) -> bool:
+async def _receive(connection: WebSocket, receiver: "LiveText | _Sound") -> bool:
     """Pass the client's messages on; True after ``end``, False when the client has left."""
-    types = TEXT_TYPES if isinstance(options, TextOptions) else AUDIO_TYPES
-    pace = None if isinstance(options, TextOptions) else _Pace(SAMPLE_BYTES * options.rate)
     while True:
         try:
-            content, samples = _read_message(await connection.receive(), types, has_sound=pace is not None)
+            content, samples = _read_message(await connection.receive(), has_sound=isinstance(receiver, _Sound))
+            await receiver.receive(content, samples)
         except WebSocketDisconnect:
             return False
         except RefusedError as wrong:
             await connection.send_json({"type": "error", "message": wrong.message})
+            await asyncio.sleep(REFUSED_S)
             continue
-        if pace is not None:
-            await pace.add(len(samples))
-        await inputs.put((content | {"arrived": time.monotonic()}, samples))
         if content["type"] == "end":
             return True
+
+
+class _Sound:
+    """Sound of a client on its way to the task, not far ahead of real time."""
+
+    def __init__(self, rate: int) -> None:
+        self.inputs: InputQueue = asyncio.Queue(MAX_BLOCKS)
+        self._pace = _Pace(SAMPLE_BYTES * rate)
+
+    async def receive(self, content: dict[str, Any], samples: bytes) -> None:
+        await self._pace.add(len(samples))
+        await self.inputs.put((content, samples))
+
+    def is_note(self, _: Mapping[str, Any]) -> bool:
+        return False
 
 
 class _Pace:
@@ -154,7 +171,7 @@ class _Pace:
             await asyncio.sleep(ahead - MAX_AHEAD_S)
 
 
-def _read_message(message: Any, types: frozenset[str], *, has_sound: bool) -> tuple[dict[str, Any], bytes]:
+def _read_message(message: Any, *, has_sound: bool) -> tuple[dict[str, Any], bytes]:
     """Content and sound of a message.
 
     Raises
@@ -174,9 +191,7 @@ def _read_message(message: Any, types: frozenset[str], *, has_sound: bool) -> tu
                 f"a block of sound has {len(samples)} bytes; send 16-bit samples in up to {MAX_BLOCK_BYTES} bytes",
             )  # fmt: skip
         return {"type": "audio"}, samples
-    content: Any = None
-    with suppress(DataError):
-        content = parse_json(message.get("text") or "", "the message")
+    content, types = parse_message(message.get("text") or ""), AUDIO_TYPES if has_sound else TEXT_TYPES
     if not isinstance(content, dict) or content.get("type") not in types:
         raise RefusedError(
             400, "invalid_request",
@@ -186,15 +201,16 @@ def _read_message(message: Any, types: frozenset[str], *, has_sound: bool) -> tu
     return content, b""
 
 
-async def _send(connection: WebSocket, state: ServiceState, work: Any, inputs: InputQueue) -> None:
+async def _send(connection: WebSocket, results: AsyncIterator[Message], receiver: "LiveText | _Sound") -> None:
     """Pass the results on: events as text, sound as binary messages."""
     try:
-        async with aclosing(state.messages(work, connection.state.key, inputs)) as messages:  # type: ignore[type-var]
+        async with aclosing(results) as messages:  # type: ignore[type-var]
             async for message in messages:
-                if "event" in message.content:
-                    await connection.send_json(message.content["event"])
-                else:
+                event = message.content.get("event")
+                if event is None:
                     await connection.send_bytes(message.payload)
+                elif not receiver.is_note(event):
+                    await connection.send_json(event)
         await connection.send_json({"type": "done"})
     except RefusedError as refused:
         await connection.send_json({"type": "error", "message": refused.message})

@@ -16,6 +16,7 @@ from tts2face.serving.work.table import JobFile
 router = APIRouter(prefix="/v1", tags=["jobs"])
 
 SHA256 = re.compile(r"[0-9a-f]{64}")
+RANGE = re.compile(r"(?P<first>\d{1,18})-(?P<last>\d{0,18})|(?P<suffix>-\d{1,18})")
 CACHE = "private, max-age=31536000, immutable"
 ANSWERS: dict[int | str, dict[str, Any]] = {
     200: {"content": {"application/octet-stream": {}}, "description": "The file, with its media type."},
@@ -46,7 +47,19 @@ async def fetch_result(
     if if_none_match is not None and _matches(if_none_match, sha256):
         return Response(status_code=304, headers=headers)
     path = await jobs.call(lambda client: _fetch(client, found))
+    if not _names_ranges(request.headers.get("range", "")):
+        request.scope["headers"] = [one for one in request.scope["headers"] if one[0] != b"range"]
     return FileResponse(path, headers=headers, media_type=found.media_type, filename=found.name)
+
+
+def _names_ranges(header: str) -> bool:
+    """Whether a header Range has a valid form; any other one is ignored (RFC 9110, 14.2)."""
+    unit, _, listed = header.partition("=")
+    ranges = [RANGE.fullmatch(one.strip()) for one in listed.split(",")]
+    return unit.strip().lower() == "bytes" and all(
+        one is not None and (one["suffix"] or not one["last"] or int(one["first"]) <= int(one["last"]))
+        for one in ranges
+    )
 
 
 def _fetch(client: JobClient, found: JobFile) -> str:

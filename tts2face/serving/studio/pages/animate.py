@@ -242,7 +242,7 @@ class AnimatePage:
             self.workspace.claim(self.tab)
 
     async def _leave(self) -> None:
-        self.workspace.listeners.discard(self._on_change)
+        self.workspace.leave(self._on_change)
         self.bar.leave()
         self.workspace.release(self.tab)
         await self.workspace.save()

@@ -1,0 +1,170 @@
+"""What clients of OpenAI and Kokoro call voices, models and speeds, and the nearest that the service has.
+
+Whatever is replaced is named in the header `ADJUSTED` of the answer.
+"""
+
+import asyncio
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+from fastapi.responses import Response
+
+from lexicon.g2p import DEFAULT_LANGUAGE
+from lexicon.languages import language_code
+from lexicon.marked_text import RATE_LIMITS
+from lexicon.text_language import guess_language
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.keys import ApiKey
+from tts2face.serving.service.library import CLIENT_MODELS, check_voice, resolve_models
+from tts2face.serving.service.state import ServiceState
+from tts2face.session import catalogue
+
+ADJUSTED = "X-Tts2face-Adjusted"
+FEMALE, MALE = "female", "male"
+OPENAI_VOICES: Mapping[str, str] = MappingProxyType({
+    "alloy": FEMALE, "ash": MALE, "ballad": MALE, "cedar": MALE, "coral": FEMALE, "echo": MALE, "fable": MALE,
+    "marin": FEMALE, "nova": FEMALE, "onyx": MALE, "sage": FEMALE, "shimmer": FEMALE, "verse": MALE,
+})  # fmt: skip
+# Kokoro's voices are named by language, sex and a name: af_bella; several with weights: af_bella(2)+am_adam.
+KOKORO_LANGUAGES: Mapping[str, str] = MappingProxyType({
+    "a": "en-us", "b": "en-gb", "e": "es", "f": "fr-fr", "h": "hi", "i": "it", "j": "ja", "p": "pt-br", "z": "cmn",
+})  # fmt: skip
+KOKORO_EXAMPLES = ("af_bella", "af_heart", "am_adam", "bf_emma", "bm_george")  # of the names that lists show
+_KOKORO = re.compile(rf"(?P<language>[{''.join(KOKORO_LANGUAGES)}])(?P<sex>[fm])(_[a-z0-9]{{1,30}})?")
+_WEIGHTED = re.compile(r"(?P<name>[a-z0-9_]{1,40})(?:[(:](?P<weight>\d{0,6}(?:\.\d{1,6})?)\)?)?")
+_UNSAFE = re.compile(r"[^A-Za-z0-9._+()/-]")
+_MODEL = re.compile(rf"({'|'.join(CLIENT_MODELS)})(-\d{{4}}(-\d\d-\d\d)?)?")  # dated ones too: tts-1-hd-1106
+Answer = TypeVar("Answer", bound=Response)
+MAX_SHOWN = 60  # characters of a client's name in the header
+
+
+@dataclass(slots=True)
+class Adjustments:
+    """What was replaced by what."""
+
+    made: list[str] = field(default_factory=list)
+
+    def note(self, what: str, given: object, used: object) -> None:
+        """Note that something else is used than what was given; a client's characters cannot end the header."""
+        if given != used:
+            self.made.append(f"{what} {_UNSAFE.sub('_', str(given))[:MAX_SHOWN]} is {used}")
+
+    def note_language(self, language: str) -> None:
+        """Note the language that a text is taken for, unless it is the default one."""
+        if language != DEFAULT_LANGUAGE:
+            self.made.append(f"the language is {language}")
+
+    def on(self, response: Answer) -> Answer:
+        """An answer with the header that names them, if there are any."""
+        if self.made:
+            response.headers[ADJUSTED] = "; ".join(self.made)
+        return response
+
+
+def is_client_model(name: str) -> bool:
+    """Whether clients name the default talker so, perhaps with a date."""
+    return _MODEL.fullmatch(name) is not None
+
+
+def limited_rate(speed: float, adjustments: Adjustments) -> float:
+    """A speed of 0.25 to 4 within the limits of the speaking rate."""
+    rate = min(max(speed, RATE_LIMITS[0]), RATE_LIMITS[1])
+    adjustments.note("speed", f"{speed:g}", f"{rate:g}")
+    return rate
+
+
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """Language and sex that the name of a voice promises."""
+
+    language: str
+    sex: str
+
+
+def voice_kind(name: str) -> _Kind | None:
+    """Language and sex of a voice of OpenAI or Kokoro, of several the one of most weight; None: it is none of theirs.
+
+    Examples
+    --------
+    >>> voice_kind("bf_emma"), voice_kind("af_bella(1)+am_adam(2)").sex, voice_kind("heart")
+    (_Kind(language='en-gb', sex='female'), 'male', None)
+    """
+    if name in OPENAI_VOICES:
+        return _Kind("en-gb" if name == "fable" else DEFAULT_LANGUAGE, OPENAI_VOICES[name])
+    parts = [_WEIGHTED.fullmatch(one.strip()) for one in re.split(r"[+-]", name[:400])]
+    kinds = [None if one is None else _KOKORO.fullmatch(one["name"]) for one in parts]
+    heaviest: tuple[float, _Kind] | None = None
+    for part, kind in zip(parts, kinds, strict=True):
+        if part is None or kind is None:
+            return None
+        weight = float(part["weight"] or 1)
+        if heaviest is None or weight > heaviest[0]:
+            sex = FEMALE if kind["sex"] == "f" else MALE
+            heaviest = weight, _Kind(KOKORO_LANGUAGES[kind["language"]], sex)
+    return heaviest[1] if heaviest else None
+
+
+def nearest_voice(kind: _Kind, language: str) -> str:
+    """The installed voice that speaks a language, of the sex if there is one; neural ones come first."""
+    spoken = [one for one in catalogue.voices() if one.is_installed and language in one.languages]
+    return min(spoken, key=lambda one: one.sex != kind.sex).name if spoken else "espeak"
+
+
+def choose_voice(name: str, language: str | None, text: str, adjustments: Adjustments) -> tuple[str, str]:
+    """Voice and language of a text.
+
+    Parameters
+    ----------
+    name
+        A voice of the service, of OpenAI, or of Kokoro.
+    language
+        As the client gives it, also Kokoro's letter; None: that of the text, else of the voice.
+
+    Raises
+    ------
+    RefusedError
+        There is no such voice.
+    InputError
+        There is no such language.
+    """
+    kind = voice_kind(name)
+    if kind is None:
+        check_voice(name)
+        spoken = next(one.languages for one in catalogue.voices() if one.name == name)
+        if language is None:
+            guessed = guess_language(text)
+            language = guessed if guessed in spoken else DEFAULT_LANGUAGE
+            adjustments.note_language(language)
+        return name, KOKORO_LANGUAGES.get(language, language)
+    if language is None:
+        language = guess_language(text, kind.language)
+        adjustments.note_language(language)
+    language = KOKORO_LANGUAGES.get(language, language)
+    voice = nearest_voice(kind, language_code(language))
+    adjustments.note("voice", name, voice)
+    return voice, language
+
+
+async def choose_talker(state: ServiceState, key: ApiKey, model: str, adjustments: Adjustments) -> str | None:
+    """A talker of this name; None, the default one, for any other name of a model."""
+    if is_client_model(model):
+        return None
+    try:
+        await resolve_models(state.library, key, {"talker": model})
+    except RefusedError:
+        adjustments.note("model", model, state.settings.talker)
+        return None
+    return model
+
+
+async def spoken_fields(state: ServiceState, key: ApiKey, asked: Any, adjustments: Adjustments) -> dict[str, Any]:
+    """Options of a clip for a request with OpenAI's fields: input, model, voice, speed, language, volume."""
+    voice = asked.voice if isinstance(asked.voice, str) else str(asked.voice.get("id", ""))
+    language = asked.language or asked.lang_code
+    name, code = await asyncio.to_thread(choose_voice, voice, language, asked.input, adjustments)
+    talker = await choose_talker(state, key, asked.model, adjustments)
+    given = {"text": asked.input, "rate": limited_rate(asked.speed, adjustments), "voice": name, "language": code}
+    return given | ({} if talker is None else {"talker": talker})

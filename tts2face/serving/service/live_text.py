@@ -1,0 +1,163 @@
+"""Text of a live stream on its way to a synthesis process: within limits, sentence by sentence, never far ahead."""
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from lexicon.errors import DataError
+from lexicon.inputs import format_value, parse_json
+from lexicon.spoken_words import GrowingText
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.keys import MINUTE_S, Bucket
+from tts2face.serving.service.pool import InputQueue
+
+MAX_MESSAGE_CHARACTERS = 32_768  # of JSON, whose reading is one step of the event loop, of at most 5 ms
+PART_CHARACTERS = 1000  # that are divided into sentences in one step of the event loop: some milliseconds
+MAX_WAITING_CHARACTERS = 65_536  # of sentences that have not been given; then the client is not read from
+MAX_CANCELS = 8  # that have not been answered; likewise
+N_GIVEN = 2  # sentences that a task has: one is spoken, the next one waits
+REFUSED_S = 0.1  # for which a client that sends what is refused is not read from
+
+Count = Callable[[], None]  # counts a sentence as a request of its key, or raises its refusal
+
+
+def parse_message(text: str) -> Any:
+    """Content of a message of a WebSocket; None where it is no JSON.
+
+    Raises
+    ------
+    RefusedError
+        It is longer than `MAX_MESSAGE_CHARACTERS`.
+    """
+    if len(text) > MAX_MESSAGE_CHARACTERS:
+        raise RefusedError(
+            413, "too_large", f"a message has {len(text)} characters; send at most {MAX_MESSAGE_CHARACTERS}, in parts"
+        )
+    try:
+        return parse_json(text, "the message")
+    except DataError:
+        return None
+
+
+class LiveText:
+    """The text of one stream.
+
+    Parameters
+    ----------
+    language
+        Of the text.
+    limits
+        Characters of the whole stream, and of each minute.
+    count
+        Counts a sentence.
+
+    Attributes
+    ----------
+    inputs
+        Of the task: ``say`` with one sentence, ``cancel`` and ``end``.
+    """
+
+    def __init__(self, language: str, limits: tuple[int, int], count: Count) -> None:
+        self.inputs: InputQueue = asyncio.Queue()
+        self._growing, self._count = GrowingText(language), count
+        self._most, self._most_a_minute = limits
+        self._n_characters, self._minute = 0, Bucket()
+        self._sentences: deque[str] = deque()
+        self._n_given, self._n_cancels, self._is_ended = 0, 0, False
+        self._has_room = asyncio.Event()
+        self._has_room.set()
+
+    async def receive(self, content: Mapping[str, Any], _: bytes = b"") -> None:
+        """Follow a message of the client, as soon as there is room for its text.
+
+        Raises
+        ------
+        RefusedError
+            It has too much text, or sentences that the key may not have spoken now; the rest of it is dropped.
+        """
+        try:
+            await self._follow(content)
+        finally:
+            self._give()
+        await self._has_room.wait()
+
+    async def _follow(self, content: Mapping[str, Any]) -> None:
+        match content["type"]:
+            case "text":
+                await self._add(content.get("text"))
+            case "flush":
+                self._queue(self._growing.flush())
+            case "end":
+                self._is_ended = True
+                self._queue(self._growing.flush())
+            case _:
+                self._sentences.clear()
+                self._growing.clear()
+                self._n_cancels += 1
+                self.inputs.put_nowait(({"type": "cancel", "arrived": time.monotonic()}, b""))
+
+    def is_note(self, event: Mapping[str, Any]) -> bool:
+        """Follow an event of the task; whether it is for this object alone."""
+        if event["type"] == "said":
+            self._n_given -= event["n"]
+        elif event["type"] == "cancelled":
+            self._n_cancels -= 1
+        self._give()
+        return bool(event["type"] == "said")
+
+    async def _add(self, text: Any) -> None:
+        if text is None:  # as in the last part of what a language model writes
+            return
+        if not isinstance(text, str):
+            shown = format_value(text)
+            raise RefusedError(
+                400, "invalid_request", f"text must be a text, or null for none, not {shown}; send words"
+            )
+        self._check(len(text))
+        for at in range(0, len(text), PART_CHARACTERS):
+            self._queue(self._growing.add(text[at : at + PART_CHARACTERS]))
+            await asyncio.sleep(0)
+
+    def _check(self, n_characters: int) -> None:
+        if self._n_characters + n_characters > self._most:
+            raise _refused(f"the stream has sent its {self._most} characters; begin another one")
+        left = self._minute.refill(time.monotonic(), self._most_a_minute, MINUTE_S)
+        if n_characters > self._most_a_minute:
+            raise _refused(f"the text has more than {self._most_a_minute} characters; divide it")
+        if n_characters > left:
+            wait_s = (n_characters - left) * MINUTE_S / self._most_a_minute
+            raise _refused(
+                f"the stream has sent its {self._most_a_minute} characters a minute; wait {int(wait_s) + 1} s and send "
+                f"the text again"
+            )
+        self._minute.left -= n_characters
+        self._n_characters += n_characters
+
+    def _queue(self, sentences: list[str]) -> None:
+        for sentence in sentences:
+            try:
+                self._count()
+            except RefusedError as refused:
+                message = f"{sentence[:40]!r} and what follows it in the message is not spoken: {refused.message}"
+                raise RefusedError(refused.status, refused.code, message) from refused
+            self._sentences.append(sentence)
+
+    def _give(self) -> None:
+        """Give sentences to the task, and its end after the last one."""
+        while self._sentences and self._n_given < N_GIVEN:
+            self._n_given += 1
+            self.inputs.put_nowait(({"type": "say", "text": self._sentences.popleft()}, b""))
+        if self._is_ended and not self._sentences:
+            self._is_ended = False
+            self.inputs.put_nowait(({"type": "end"}, b""))
+        n_waiting = sum(map(len, self._sentences))
+        if n_waiting < MAX_WAITING_CHARACTERS and self._n_cancels < MAX_CANCELS:
+            self._has_room.set()
+        else:
+            self._has_room.clear()
+
+
+def _refused(message: str) -> RefusedError:
+    return RefusedError(413, "too_long", message)

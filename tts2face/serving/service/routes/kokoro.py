@@ -1,0 +1,100 @@
+"""What Kokoro-FastAPI has beyond OpenAI's interface: captioned speech, and phones of a text."""
+
+import base64
+import json
+from collections.abc import AsyncIterator
+from typing import Annotated, Any
+
+from fastapi import APIRouter
+from fastapi import Request as HttpRequest
+from fastapi.responses import Response, StreamingResponse
+from pydantic import BaseModel, ConfigDict, Field
+
+from lexicon.languages import language_code
+from tts2face.processes.message import Message
+from tts2face.serving.service.client_names import KOKORO_LANGUAGES, Adjustments
+from tts2face.serving.service.request_fields import described
+from tts2face.serving.service.routes.clips import service_state, stream_work, timed_speech
+from tts2face.serving.service.routes.openai import SoundFormat, SpokenText, TimedJson, speech_work, timed
+from tts2face.session.outputs import media_types
+
+router = APIRouter(prefix="/dev", tags=["kokoro"])
+
+
+class CaptionedSpeech(SpokenText):
+    """A text to speak with the times of its words."""
+
+    model: Annotated[str, Field(description="A talker; any other name is the default talker.")] = "kokoro"
+    voice: Annotated[str, Field(description="A voice of GET /v1/voices; for one of Kokoro, the nearest.")] = "af_heart"
+    response_format: Annotated[SoundFormat, Field(description="Sound.")] = "mp3"
+    stream: Annotated[bool, Field(description="A JSON object on a line for each part, else one object.")] = True
+    return_timestamps: Annotated[bool, Field(description="With times of words.")] = True
+
+
+def _timestamps(words: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [{"word": one["word"], "start_time": one["start"], "end_time": one["end"]} for one in words]
+
+
+class _Captioned(TimedJson):
+    """One object, whose list of times has Kokoro-FastAPI's name."""
+
+    def listed(self, lists: dict[str, list[Any]]) -> dict[str, list[Any]]:
+        return {"timestamps": _timestamps(lists.get("words", []))}
+
+
+class _CaptionedLines:
+    """An object on a line for each part of the sound, with the words that begin in it."""
+
+    def __init__(self, format: str, names: tuple[str, ...]) -> None:
+        self._format, self._names = format, names
+
+    async def __call__(self, messages: AsyncIterator[Message]) -> AsyncIterator[bytes]:
+        """The lines."""
+        due: list[dict[str, Any]] = []
+        async for message in messages:
+            if "event" in message.content and self._names:
+                due += timed(message.content["event"], self._names)["words"]
+            if message.payload:
+                part = {
+                    "audio": base64.b64encode(message.payload).decode(), "audio_format": media_types()[self._format],
+                    "timestamps": _timestamps(due),
+                }  # fmt: skip
+                yield json.dumps(part, ensure_ascii=False).encode() + b"\n"
+                due = []
+
+
+@router.post("/captioned_speech", response_class=StreamingResponse, summary="Speak a text with the times of its words")
+async def captioned_speech(request: HttpRequest, speech: CaptionedSpeech) -> Response:
+    """Sound in base64 with the times of its words in seconds."""
+    adjustments, format = Adjustments(), speech.response_format
+    names = ("word",) if speech.return_timestamps else ()
+    work = await speech_work(request, speech, {}, adjustments, kind="speech", format=format)
+    convert = _CaptionedLines(format, names) if speech.stream else _Captioned(format, names)
+    return adjustments.on(await stream_work(request, work, "application/json", convert=convert))
+
+
+class PhonesRequest(BaseModel):
+    """A text and its language."""
+
+    model_config = ConfigDict(extra="ignore", strict=True)
+
+    text: Annotated[str, described("text", "Text, with marks or SSML.", min_length=1)]
+    language: Annotated[str, Field(description="A language, or Kokoro's letter of one.", examples=["a"])] = "a"
+
+
+class Phones(BaseModel):
+    """Phones of a text."""
+
+    phonemes: Annotated[
+        str, Field(description="Words in IPA, with stress marks and punctuation.", examples=["həˈloʊ."])
+    ]
+    tokens: Annotated[list[int], Field(description="Empty: the service has no tokens of Kokoro.")]
+
+
+@router.post("/phonemize", summary="Phones of a text", response_model=Phones)
+async def phonemize(request: HttpRequest, asked: PhonesRequest) -> dict[str, Any]:
+    """The phones that a voice of the language speaks."""
+    language = language_code(KOKORO_LANGUAGES.get(asked.language, asked.language))
+    work = service_state(request).work(kind="phones", request={"text": asked.text, "language": language})
+    (event,), _ = await timed_speech(request, work)
+    return {"phonemes": " ".join(event["words"]), "tokens": []}
