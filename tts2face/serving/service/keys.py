@@ -294,6 +294,7 @@ class RateLimits:
         try:
             found = await exchange(spent, running)
         except BaseException:
+            self._elsewhere = {}
             for taken in spent:
                 self._buckets[taken.name].spent += taken.amount
             raise
