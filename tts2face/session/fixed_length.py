@@ -17,7 +17,7 @@ from tts2face.session.speech_stream import Piece
 from tts2face.types import Clip, Speech
 
 EASE_S = 0.25  # from and to rest; a head turns back within a quarter of a second
-OPENING_S = 0.05  # after the lead, within which a face is fully there: its lips speak
+OPENING_S = 0.03  # after the lead, within which a face is fully there: its lips speak
 MARGIN_FRAMES = 0.25  # by which a padded sound ends before its last frame does, so that rounding adds no frame
 MIN_PHONE_S = 0.005  # shorter rests of a phone that is cut are dropped
 Stream = Callable[[PreparedRequest], Iterator[Piece]]

@@ -47,7 +47,7 @@ def speech_onset(sound: Waveform) -> float:
     Levels are relative to the loudest window, and to the noise. Clicks, and breaths that silence follows, are passed.
     """
     windows = sound_windows(sound, ONSET_WINDOW_S)
-    levels = 10.0 * np.log10(np.maximum(windows.var(axis=1, dtype=np.float64), 1e-12))
+    levels = 10.0 * np.log10(np.maximum(np.square(windows, dtype=np.float64).mean(axis=1), 1e-12))
     if not len(levels) or levels.max() <= -120.0:
         return 0.0
     relative = levels - levels.max()
