@@ -90,15 +90,15 @@ def test_silence_shows_a_living_face(plan_of: Planner, voices: list[FakeVoice], 
 @pytest.mark.smoke
 def test_cues_become_clips_of_their_length(plan_of: Planner, voices: list[FakeVoice], tmp_path: Path) -> None:
     out = tmp_path / "out"
-    run_batch(plan_of(max_rate=1.2, overflow="report"), out)
+    run_batch(plan_of(max_rate=1.1, overflow="report"), out)
     rows = list(csv.DictReader((out / "manifest.csv").read_text().splitlines()))
     assert [row["file"] for row in rows] == ["one-0001.mp4", "one-0002.mp4", "one-0003.mp4"]
     assert [row["n_frames"] for row in rows] == [
         "16",
-        "17",
+        "19",
         "16",
-    ]  # one frame before the cue, and 1.9 / 1.2 s in a cue of 1.5 s
-    assert [float(row["rate"]) for row in rows] == [1.0, 1.2, 1.0]
+    ]  # one frame before the cue, and 1.9 / 1.1 s in a cue of 1.5 s
+    assert [float(row["rate"]) for row in rows] == [1.0, 1.1, 1.0]
     assert "longer than its cue" in rows[1]["warnings"]
     for row in rows:
         assert len(decoded(out / row["file"])[0]) == int(row["n_frames"])
