@@ -20,7 +20,7 @@ from tests.running import eventually
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.work.client import cancel_jobs, list_jobs, prune_jobs
-from tts2face.serving.work.database import BEAT_S, Workers, database_url, prepare_database
+from tts2face.serving.work.database import BEAT_S, DEAD_AFTER_S, Workers, database_url, prepare_database
 from tts2face.serving.work.engine import JOBS_PER_QUERY, DatabaseEngine, enqueue, open_client
 from tts2face.serving.work.worker import MAX_LOOKS_PER_S, POLL_S, Worker, poll_interval
 
@@ -49,6 +49,19 @@ def test_a_silent_worker_is_reported_until_it_is_forgotten(database: str) -> Non
         assert set(workers.alive()) == {"b"}
         workers.forget({"a"})
         assert workers.beat("b", "there") == set()
+
+
+def test_heartbeats_of_a_clock_that_was_set_back_count_as_of_now(database: str) -> None:
+    """A worker that died before would be taken for alive until the clock is there again."""
+    url = database_url(database)
+    prepare_database(url)
+    with Workers(url) as workers:
+        workers.beat("a", "here")
+        workers._now = f"({workers._now} - 3600.0)"
+        assert workers.beat("b", "there") == set()
+        assert set(workers.alive()) == {"a", "b"}
+        workers._now = f"({workers._now} + {DEAD_AFTER_S + 1.0})"
+        assert workers.beat("b", "there") == {"a"}
 
 
 def test_work_of_an_owner_that_is_not_in_the_table_is_returned(

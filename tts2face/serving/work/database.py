@@ -38,6 +38,7 @@ CREATE TABLE IF NOT EXISTS tts2face_workers (
 _BEAT = """
 INSERT INTO tts2face_workers (executor_id, beat, place) VALUES (:id, {now}, :place)
 ON CONFLICT (executor_id) DO UPDATE SET beat = {now}"""
+_FROM_LATER = "UPDATE tts2face_workers SET beat = {now} WHERE beat > {now} + 1"  # by a clock that was set back since
 
 
 def database_url(where: str | Path) -> str:
@@ -158,10 +159,14 @@ class Workers:
             return float(connection.execute(self._sql(f"SELECT {self._now}")).scalar() or 0.0)
 
     def beat(self, executor_id: str, place: str) -> set[str]:
-        """Note that a worker is alive; the ids of workers without a heartbeat."""
+        """Note that a worker is alive; the ids of workers without a heartbeat.
+
+        Heartbeats of a clock that has been set back since count as of now: a dead worker has none after it.
+        """
         query = f"SELECT executor_id FROM tts2face_workers WHERE beat <= {self._now} - :age"
         with self._engine.begin() as connection:
             connection.execute(self._sql(_BEAT.format(now=self._now)), {"id": executor_id, "place": place[:200]})
+            connection.execute(self._sql(_FROM_LATER.format(now=self._now)))
             return {str(row[0]) for row in connection.execute(self._sql(query), {"age": DEAD_AFTER_S})}
 
     def has_waiting(self) -> bool:
