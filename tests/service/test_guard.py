@@ -1,6 +1,7 @@
 """What is refused before any work; a tiny application stands behind the guard."""
 
 import asyncio
+import errno
 import json
 import logging
 from collections.abc import AsyncIterator, Callable
@@ -74,6 +75,21 @@ def test_an_answer_may_take_longer_than_a_body_that_there_is_not() -> None:
     state = ServiceState(ServiceSettings(processes=1, body_s=0.1))
     client = httpx.AsyncClient(transport=httpx.ASGITransport(Guard(slow, state)), base_url="http://localhost:8880")
     assert answer(client, "GET").json() == {"size": 0, "key": "local"}
+
+
+def test_a_full_disk_is_no_defect(caplog: pytest.LogCaptureFixture) -> None:
+    async def save(scope: Scope, receive: Receive, send: Send) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", "/srv/data/x")
+
+    state = ServiceState(ServiceSettings(processes=1))
+    client = httpx.AsyncClient(transport=httpx.ASGITransport(Guard(save, state)), base_url="http://localhost:8880")
+    with caplog.at_level(logging.ERROR):
+        response = answer(client)
+    assert code(response) == (503, "unavailable")
+    assert response.headers["retry-after"]
+    assert "is full, /readyz names its folder" in response.text
+    assert "/srv" not in response.text
+    assert not caplog.records
 
 
 @pytest.mark.parametrize("given", ["a b", "x" * 65, "é"])

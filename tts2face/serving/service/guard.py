@@ -6,6 +6,7 @@ What a key may do.
 """
 
 import asyncio
+import errno
 import logging
 import re
 import time
@@ -88,6 +89,7 @@ def wants_login(request: "Exchange") -> bool:
 
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
+RETRY_S = 30  # for clients, while a disk is full
 OPEN_PATHS = frozenset({
     "/health", "/healthz", "/readyz", "/openapi.json", REFERENCE,
     *(f"{REFERENCE}/{name}" for name in ("swagger-ui-bundle.js", "swagger-ui.css", "start.js")),
@@ -159,6 +161,10 @@ class Guard:
         except Exception as defect:  # noqa: BLE001 - the one place where a defect becomes an answer
             if isinstance(defect.__cause__, RefusedError) and request.status:  # Starlette's, of one that comes too late
                 request.code = defect.__cause__.code
+                return
+            if isinstance(defect, OSError) and defect.errno in {errno.ENOSPC, errno.EDQUOT}:
+                message = "a disk of the service is full, /readyz names its folder; repeat the request later"
+                await request.refuse(RefusedError(503, "unavailable", message, {"Retry-After": str(RETRY_S)}))
                 return
             log_event("defect", level=logging.ERROR, error=defect)
             message = f"internal error: {type(defect).__name__}; the log has it under the id {request.id}"
