@@ -23,7 +23,7 @@ from tts2face.photo.photograph import split_number
 from tts2face.picture.occlusion import bake_occlusion
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw
-from tts2face.picture.scene import available_cores
+from tts2face.numeric.reuse import available_cores
 from tts2face.storage.files import find_file
 from tts2face.video.pose import remove_pose
 from tts2face.video.tracking import FaceTracker

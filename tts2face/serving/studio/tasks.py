@@ -135,7 +135,7 @@ def picture(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
 def project_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
     """Bytes of a project's clip in a format of `Session.stream_file`."""
     project = read_project(work)
-    return session.stream_file(project.prepare(), work.format, picture=project.picture, threads=1)
+    return session.stream_file(project.prepare(), work.format, picture=project.picture, threads=DRAWING_THREADS)
 
 
 def project_export(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
