@@ -20,6 +20,8 @@ IDLE_LIMITS_S = (0.1, 3600.0)
 NATURAL, CLEAR = 1.0, 1.5  # factors of articulation
 ARTICULATIONS = {"natural": NATURAL, "clear": CLEAR}
 ARTICULATION_LIMITS = (0.5, 2.0)
+LEAD_S = 0.1  # from the start of a clip to its first sound: three frames at 30 Hz, in which the lips open
+LEAD_LIMITS_S = (0.0, 1.0)
 OWN_FACE = "self"  # name of the talker's own face
 DRAWN_FACE, REALISTIC_FACE = "ada", "head"  # the shipped face that is shown by default, and the one with identities
 
@@ -45,6 +47,7 @@ class Request:
     """Options of a clip: text or recording, voice, lip motion and gestures.
 
     If ``audio`` is given, the clip uses the sound of that recording, and ``text`` is its transcript or empty.
+    ``lead`` is None where the voice's own silence is kept.
     ``language`` is converted to an espeak-ng code (`lexicon.languages.language_code`).
 
     Raises
@@ -75,6 +78,10 @@ class Request:
         None, "Voice: heart or joe (English), espeak or espeak-female (every language), or a Piper voice (x.onnx)."
     )
     rate: float = option(1.0, "Speaking rate as a factor, 0.5 to 2.", limits=RATE_LIMITS)
+    lead: float | None = option(
+        LEAD_S, "Seconds from the start of the clip to the first sound, in which the lips open, 0 to 1.",
+        limits=LEAD_LIMITS_S,
+    )  # fmt: skip
     plain_delivery: bool = option(
         False, "Keep the voice's rate and loudness under every style; --rate and --volume do so for themselves."
     )
@@ -152,8 +159,8 @@ class Request:
             raise InputError(f"seed must be 0 or more, not {self.seed}")
         if self.audio_map is not None:
             _check_audio_map(self)
-        if self.audio is not None and (self.voice is not None or self.rate != 1.0):
-            raise InputError("--voice and --rate have no effect on a recording; remove them or --audio")
+        if self.audio is not None and (self.voice, self.rate, self.lead) != (None, 1.0, LEAD_S):
+            raise InputError("--voice, --rate and --lead have no effect on a recording; remove them or --audio")
         if self.idle is not None:
             _check_idle(self)
         _check_gestures(self)
@@ -212,5 +219,5 @@ def _check_gestures(request: Request) -> None:
 def _check_idle(request: Request) -> None:
     if request.text.strip() or request.audio is not None:
         raise InputError("--idle cannot be combined with text or --audio; remove one of them")
-    if (request.voice, request.rate, request.volume) != (None, 1.0, 1.0):
-        raise InputError("--voice, --rate and --volume have no effect with --idle; remove them")
+    if (request.voice, request.rate, request.volume, request.lead) != (None, 1.0, 1.0, LEAD_S):
+        raise InputError("--voice, --rate, --volume and --lead have no effect with --idle; remove them")

@@ -22,7 +22,7 @@ from corpus_tools.decomposition.blend_weights import Estimator, moving_average
 from corpus_tools.decomposition.capture import FaceRecording, resample_to_gesture_rate
 from lexicon.errors import DataError, InputError
 from tts2face.face.deformation import axis_ratios
-from tts2face.gestures.presentation import SILENT_PROSODY, prosody_features
+from tts2face.gestures.presentation import SILENT_PROSODY, prosody_features, speech_intensity
 from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION, N_LANDMARKS, eye_aperture
 from tts2face.models.palette import (
     FEATURES,
@@ -106,7 +106,7 @@ def decompose(captured: FaceRecording, basis: ExpressionBasis, estimator: Estima
     times = np.arange(len(moved)) / GESTURE_FPS
     prosody = np.tile(SILENT_PROSODY, (len(times), 1))
     if recorded.sound is not None:
-        prosody = prosody_features(recorded.sound, times, with_pitch=True)
+        prosody = prosody_features(recorded.sound, times, speech_intensity(recorded.sound), with_pitch=True)
     return Decomposition(
         recorded.name,
         {name: motion[name] for name in FEATURES if name not in recorded.missing_features},

@@ -32,7 +32,7 @@ rate = 1.1
 def test_a_clip_for_each_spoken_cue(plan_of: Planner) -> None:
     plan = plan_of(SRT + "\n4\n00:00:12,000 --> 00:00:13,000\n[silence]\n")
     assert [output.name for output in plan.outputs] == ["one-0001.mp4", "one-0002.mp4", "one-0003.mp4"]
-    assert [one.segments[0].window_frames for one in plan.outputs] == [15, 15, 15]
+    assert [one.segments[0].window_frames for one in plan.outputs] == [16, 16, 16]  # one in which the lips open
     assert (plan.n_cues, plan.n_silent) == (4, 1)
     assert [cue.speaker for output in plan.outputs for cue in output.cues] == ["ANN", "", ""]
 
@@ -41,7 +41,7 @@ def test_speakers_of_one_cue_have_their_own_clips_and_divide_its_time(plan_of: P
     (tmp_path / "cast.toml").write_text(CAST)
     text = "1\n00:00:01,000 --> 00:00:04,000\n- JOHN: Good.\n- ANN: Hello there.\n"
     plan = plan_of(text, cast=read_cast(tmp_path / "cast.toml"))
-    assert [(one.name, one.begin_s) for one in plan.outputs] == [("one-0001.mp4", 1.0), ("one-0001-2.mp4", 1.9)]
+    assert [(one.name, one.begin_s) for one in plan.outputs] == [("one-0001.mp4", 0.9), ("one-0001-2.mp4", 1.9)]
     assert [one.segments[0].models.face for one in plan.outputs] == ["head", "ada"]
     assert [cue.speaker for one in plan.outputs for cue in one.cues] == ["JOHN", "ANN"]
     assert [(one.line, one.message) for one in plan.warnings] == [
@@ -63,7 +63,7 @@ def test_a_recording_of_two_speakers_shows_one_face(plan_of: Planner, tmp_path: 
 
 def test_scenes_files_and_films_fill_all_frames(plan_of: Planner) -> None:
     scenes = plan_of(per="scene").outputs
-    assert [(one.name, one.begin_s) for one in scenes] == [("one-scene-001.mp4", 0.5), ("one-scene-002.mp4", 10.0)]
+    assert [(one.name, one.begin_s) for one in scenes] == [("one-scene-001.mp4", 0.4), ("one-scene-002.mp4", 9.9)]
     (file,) = plan_of(per="file").outputs
     assert sum(one.slot_frames or 0 for one in file.segments) == 125  # the last cue ends at 11.5 s, and 1 s more
     assert [cue.begin_s for cue in file.cues] == [0.5, 2.5, 10.0]

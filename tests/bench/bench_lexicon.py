@@ -28,6 +28,11 @@ def _first_piece(text: str) -> None:
     next(split_sentences(parse_marks(text), "en-us"))
 
 
+def _all_pieces(text: str) -> None:
+    for _ in split_sentences(parse_marks(text), "en-us"):
+        pass
+
+
 def main() -> None:
     """Print one line a measurement."""
     normalize("warm")
@@ -37,7 +42,9 @@ def main() -> None:
         for size in (100_000, 1_000_000):
             _report(f"normalize, {piece!r} over and over", piece * (size // len(piece)), normalize)
     for piece in HARD:
-        _report(f"first piece of {piece!r}", (piece * 100_000)[:100_000], _first_piece)
+        for size in (10_000, 30_000, 100_000):
+            _report(f"first piece of {piece!r}", (piece * size)[:size], _first_piece)
+            _report(f"all pieces of {piece!r}", (piece * size)[:size], _all_pieces)
     pronounce("warm")
     for size in (200, 10_000, 100_000):
         _report("pronounce en-us", SENTENCE * max(1, size // len(SENTENCE)), pronounce)

@@ -233,8 +233,8 @@ def test_files_without_sound_are_refused(session: Session, here: Path) -> None:
         ({"audio_map": "magic"}, "no audio map 'magic'; choose linear or network"),
         ({"audio_map": "linear", "audio": None, "text": "Hi."}, "--audio-map needs a recording"),
         ({"audio_map": "linear", "text": "Hi."}, "remove --audio-map or the text"),
-        ({"voice": "espeak"}, "--voice and --rate have no effect on a recording"),
-        ({"rate": 1.5}, "--voice and --rate have no effect on a recording"),
+        ({"voice": "espeak"}, "--voice, --rate and --lead have no effect on a recording"),
+        ({"rate": 1.5}, "--voice, --rate and --lead have no effect on a recording"),
     ],
 )
 def test_options_that_exclude_each_other_are_refused(options: dict, reason: str) -> None:

@@ -24,6 +24,7 @@ CHANGES = {
     "voice": "espeak",
     "rate": 1.3,
     "volume": 0.5,
+    "lead": 0.0,
     "seed": 7,
     "synthesis": "theobald2007",
     "context": 1,
@@ -133,7 +134,7 @@ def test_pieces_end_on_frames_at_any_rate(fps: float, session: Session) -> None:
 
 def test_lips_rest_in_silence_and_at_both_ends(session: Session) -> None:
     """They begin to move 0.2 s before the first sound; when that is differs a little between processors."""
-    spoken = session.clip(Request(text=TEXT, gestures="none"))
+    spoken = session.clip(Request(text=TEXT, gestures="none", lead=0.4))
     weights, first_sound_s = spoken.motion.values, spoken.speech.phones.edges[1]
     n_resting = int((first_sound_s - 0.2) * spoken.motion.fps) + 1
     assert n_resting >= 3
@@ -183,7 +184,7 @@ def test_requests_that_cannot_be_spoken_are_refused(change: dict, reason: str, s
         ({"idle": 5.0}, "--idle cannot be combined with text or --audio; remove one of them"),
         (
             {"idle": 5.0, "text": "", "voice": "espeak"},
-            "--volume have no effect with --idle; remove them",
+            "--volume and --lead have no effect with --idle; remove them",
         ),
         ({"idle": 0.0, "text": ""}, "idle must lie between 0.1 and 3600, not 0"),
         ({"gestures": "none", "style": "calm"}, "have no effect with --gestures none"),

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -175,6 +176,16 @@ def test_gestures_become_the_brow_shapes_that_move_the_same_way():
     assert np.array_equal(jaw, [0.5, 0.5, 0.5])
     assert weights.max() <= 1.0
     assert inner[2] == 1.0  # 2.8 is beyond the limit
+
+
+def test_clips_of_a_face_share_the_inner_products_of_its_shapes():
+    face = _face_with_gestures()
+    target = Target(None, "a.csv", Fraction(30), Fraction(30), 16_000, face.shape_names, face)
+    first, second = build_arkit_projection(target), build_arkit_projection(target)
+    assert first.curvature is second.curvature
+    assert first.cross is second.cross
+    renamed = replace(target, channels=(*face.shape_names[:-1], "brows1"))
+    assert build_arkit_projection(renamed).cross is not first.cross
 
 
 def test_a_stream_of_captures_is_continuous(tmp_path):

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
+from tts2face.gestures import presentation, stream
 from tts2face.gestures.elements import ExpressionSpan, Gains, Nod, StyleSpan
 from tts2face.gestures.field import FieldOptions
 from tts2face.gestures.noise import NoiseStream, blink_closure, blinks_per_second, perlin_noise
 from tts2face.gestures.stream import GestureFields, GestureStream, style_median
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import EXPRESSIONS, FEATURES
+from tts2face.sound.features import intensity_track
 from tts2face.types import Waveform
 
 FPS = 30.0
@@ -31,8 +33,7 @@ def fields(palette) -> GestureFields:
 
 
 def _made(fields, timeline=PLAIN, *, style="calm", seed=0, seconds=6.0, fps=FPS, kind=GestureStream):  # noqa: PLR0913 - a clip's choices
-    stream = kind(fields, style=style, seed=seed, fps=fps)
-    return stream.next(_sound(seconds), round(seconds * fps), timeline)
+    return kind(fields, style=style, seed=seed, fps=fps).next(_sound(seconds), round(seconds * fps), timeline)
 
 
 @pytest.mark.parametrize("kind", [GestureStream, NoiseStream])
@@ -94,6 +95,15 @@ def test_a_derived_style_is_its_source_changed_as_stated(fields, palette):
     happy = EXPRESSIONS.index("happy")
     np.testing.assert_allclose(double["expression"][:, happy], plain["expression"][:, happy] + 0.5, atol=1e-6)
     np.testing.assert_array_equal(double["cheeks"], plain["cheeks"])
+
+
+def test_a_piece_measures_its_sound_once_and_no_median_again(fields, monkeypatch):
+    _made(fields, style="double")
+    heard = []
+    monkeypatch.setattr(presentation, "intensity_track", lambda sound: heard.append(sound) or intensity_track(sound))
+    monkeypatch.setattr(stream, "style_median", lambda style, feature: pytest.fail(f"median of {feature}"))
+    _made(fields, style="double")  # some features have another tempo, so other times
+    assert len(heard) == 1
 
 
 def test_tempo_is_speed(fields):

@@ -8,7 +8,14 @@ import pytest
 from corpus_tools.studies.gestures.measures import find_blinks, wasserstein
 from tts2face.gestures.blinks import PAUSE_DB
 from tts2face.gestures.elements import Gains, StyleSpan
-from tts2face.gestures.presentation import LowPass, filtered_spread, find_accents, prosody_features, slow_scales
+from tts2face.gestures.presentation import (
+    LowPass,
+    filtered_spread,
+    find_accents,
+    prosody_features,
+    slow_scales,
+    speech_intensity,
+)
 from tts2face.gestures.stream import GestureFields, GestureStream
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import FEATURES, GESTURE_FPS, Palette, load_palette
@@ -81,7 +88,7 @@ def test_an_idle_face_blinks(idle) -> None:
 
 def test_most_blinks_begin_at_pauses(neutral) -> None:
     times = np.arange(len(neutral[0]["blink"])) / FPS
-    is_paused = prosody_features(phrases(), times, with_pitch=False)[:, 0] < PAUSE_DB
+    is_paused = prosody_features(phrases(), times, speech_intensity(phrases()), with_pitch=False)[:, 0] < PAUSE_DB
     onsets = [np.flatnonzero(np.diff((clip["blink"].mean(axis=1) > 0.5).astype(int)) > 0) for clip in neutral]
     within = np.concatenate([is_paused[at] for at in onsets])
     assert is_paused.mean() < 0.25
@@ -151,7 +158,7 @@ def test_presented_heads_have_no_more_jitter_than_recordings(neutral, starter: P
 
 
 def test_nods_follow_loud_syllables(fields: GestureFields, neutral, measured) -> None:
-    accents = find_accents(phrases())
+    accents = find_accents(phrases(), speech_intensity(phrases()))
     loud = (np.floor(accents[:, 0] * 4) % 6 == 3) & (accents[:, 1] >= 0.5)
     assert loud.sum() >= 8
     frames = np.round(accents[loud, 0] * FPS).astype(int)

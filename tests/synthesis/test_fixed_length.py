@@ -5,6 +5,7 @@ import pytest
 
 import tts2face
 from tests.synthesis.fake_voice import LEAD, LETTER, TRAIL, FakeVoice
+from tts2face.session.fixed_length import OPENING_S, ease_weights
 from tts2face.sound import voice_pool
 from tts2face.types import concatenate_clips
 
@@ -18,7 +19,7 @@ def ready(monkeypatch: pytest.MonkeyPatch) -> tts2face.Session:
 
 
 def test_the_span_of_speech_is_measured_without_motion(ready: tts2face.Session) -> None:
-    span = ready.measure_speech("Hello. Bob.", fps=FPS)
+    span = ready.measure_speech("Hello. Bob.", fps=FPS, lead=LEAD)
     first = LEAD + 5 * LETTER + TRAIL  # a whole number of frames
     assert span.begin == pytest.approx(LEAD)
     assert span.end == pytest.approx(first + LEAD + 3 * LETTER)
@@ -33,6 +34,16 @@ def test_a_clip_has_the_frames_asked_for_and_rests_at_both_ends(n_frames: int, r
     for clip, frame in ((clips[0], 0), (clips[-1], -1)):
         assert not clip.motion.values[frame].any()
         assert not clip.head.values[frame].any()
+
+
+@pytest.mark.parametrize(("lead", "weights"), [(0.1, [0.0, 0.16, 0.5, 0.84, 1.0]), (0.0, [0.0, 0.5, 1.0])])
+def test_a_face_that_speaks_at_once_is_there_within_two_frames_of_its_first_sound(
+    lead: float, weights: list[float]
+) -> None:
+    found = ease_weights(60, 30.0, lead + OPENING_S)
+    assert found[: len(weights)] == pytest.approx(weights, abs=0.01)
+    assert found[-1] == 0.0
+    assert ease_weights(1, 30.0, lead)[0] == 0.0
 
 
 def test_silence_after_the_speech_moves(ready: tts2face.Session) -> None:

@@ -30,7 +30,7 @@ from tts2face.sound.voice_pool import load_voice
 
 
 def synthesise_sentences(text: str, voice: object | None = None, **options: object) -> list[SpokenSentence]:
-    request = Request(text=text, **options)
+    request = Request(text=text, lead=None, **options)
     return [
         speak_sentence(voice or FakeVoice(), part, request)
         for part in split_sentences(parse_marks(text), request.language)

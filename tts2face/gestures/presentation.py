@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from tts2face.models.palette import GESTURE_FPS, Style
 from tts2face.numeric.arrays import smooth_gaussian, smoothstep
-from tts2face.sound.features import intensity, pitch, speech_level
+from tts2face.sound.features import IntensityTrack, intensity_track, pitch, speech_level
 from tts2face.storage.tensors import computed_once
 from tts2face.types import HEAD_CHANNELS, Waveform
 
@@ -32,21 +32,27 @@ MIN_PITCH_SOUND_S = 0.1  # shorter sounds have no pitch
 Float32Array = NDArray[np.float32]
 
 
-def prosody_features(sound: Waveform, times: NDArray[np.float64], *, with_pitch: bool) -> Float32Array:
+def speech_intensity(sound: Waveform) -> IntensityTrack | None:
+    """Intensity of a sound for `prosody_features` and `find_accents`; None for a sound too short to have a pitch."""
+    return intensity_track(sound) if sound.duration >= MIN_PITCH_SOUND_S else None
+
+
+def prosody_features(
+    sound: Waveform, times: NDArray[np.float64], track: IntensityTrack | None, *, with_pitch: bool
+) -> Float32Array:
     """(T, 1 or 2) intensity in dB relative to the mean level of speech, and pitch in semitones relative to the median.
 
-    Times (T,) are in seconds; those outside the sound count as silence.
+    Times (T,) are in seconds; those outside the sound count as silence. `track` is its `speech_intensity`.
     """
     features = np.tile(SILENT_PROSODY[: 2 if with_pitch else 1], (len(times), 1))
-    if sound.duration < MIN_PITCH_SOUND_S:
+    if track is None:
         return features
-    grid = np.arange(0.0, sound.duration, 0.02)
+    levels = track.at(np.arange(0.0, sound.duration, 0.02))
     inside = (times >= 0.0) & (times < sound.duration)
-    levels, levels_inside = np.split(intensity(sound, np.concatenate([grid, times[inside]])), [len(grid)])
     if levels.max() < AUDIBLE_DB:
         return features
     level = speech_level(levels[:, None])
-    features[inside, 0] = np.clip(levels_inside - level, QUIET_DB, PROSODY_LOUD_DB)
+    features[inside, 0] = np.clip(track.at(times[inside]) - level, QUIET_DB, PROSODY_LOUD_DB)
     if with_pitch:
         features[inside, 1] = np.clip(pitch(sound, times[inside]), -HIGH_SEMITONES, HIGH_SEMITONES)
     return features
@@ -183,8 +189,10 @@ ACCENT_RANGE_DB = 6.0  # from the weakest to the strongest accent
 CACHE_KIND, CACHE_VERSION = "head-spread", 1  # raised when the spread of the same recordings changes
 
 
-def find_accents(sound: Waveform) -> FloatArray:
+def find_accents(sound: Waveform, track: IntensityTrack | None) -> FloatArray:
     """Seconds and strength (0 to 1) of the accents of a sound (m, 2): its loudest long syllables.
+
+    `track` is its `speech_intensity`.
 
     Peaks of the smoothed intensity, the highest first, at least `ACCENT_GAP_S` apart. Smoothing favours long syllables,
     so that both correlates of stress that do not need pitch, loudness and duration, count.
@@ -192,7 +200,7 @@ def find_accents(sound: Waveform) -> FloatArray:
     times = np.arange(0.0, sound.duration, ACCENT_STEP_S)
     if len(times) < 3:
         return np.zeros((0, 2))
-    level = prosody_features(sound, times, with_pitch=False)[:, 0].astype(np.float64)
+    level = prosody_features(sound, times, track, with_pitch=False)[:, 0].astype(np.float64)
     spread = ACCENT_SMOOTHING_S / ACCENT_STEP_S
     smooth = smooth_gaussian(level, spread, round(3 * spread))
     inner = smooth[1:-1]

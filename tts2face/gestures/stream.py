@@ -7,6 +7,7 @@ from bisect import bisect_right
 from collections.abc import Mapping
 from copy import copy, deepcopy
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
 from zlib import crc32
@@ -24,10 +25,12 @@ from tts2face.gestures.presentation import (
     find_accents,
     prosody_features,
     slow_scales,
+    speech_intensity,
 )
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import FEATURES, GESTURE_FPS, FeatureChange, Palette, Style
 from tts2face.numeric.arrays import interpolate_cubic
+from tts2face.sound.features import IntensityTrack
 from tts2face.types import Waveform, YieldTurn, keep_on
 
 N_LOOKAHEAD_FRAMES = 2  # frames after a time that cubic interpolation needs
@@ -68,6 +71,7 @@ class GestureFields:
     _made: dict[tuple[str, str, bool], Field] = field(default_factory=dict)
     _profiles: dict[str, tuple[NDArray[np.float64], ...]] = field(default_factory=dict)
     _scales: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    _middles: dict[tuple[str, str], Float32Array] = field(default_factory=dict)
 
     def of(self, source: str, feature: str, *, has_blinks: bool = True) -> Field:
         """Field of a feature of a recorded style; without ``has_blinks``, of its lids between blinks."""
@@ -79,6 +83,13 @@ class GestureFields:
             motion = style.motion[feature] if has_blinks else lids_without_blinks(style)
             self._made[key] = build_field(motion, prosody, style.lengths, options)
         return self._made[key]
+
+    def middle(self, source: str, feature: str) -> Float32Array:
+        """`style_median` of a feature of a recorded style."""
+        key = (source, feature)
+        if key not in self._middles:
+            self._middles[key] = style_median(self.palette.styles[source], feature)
+        return self._middles[key]
 
     def presents(self, style: str) -> bool:
         """Whether a style is shown retimed and scaled for viewers: a derived one, unless motion is as published."""
@@ -96,7 +107,7 @@ class GestureFields:
         if feature == "head":
             if source not in self._scales:
                 self._scales[source] = slow_scales(style)
-            return HeadPresentation(style_median(style, feature), self._scales[source], key)
+            return HeadPresentation(self.middle(source, feature), self._scales[source], key)
         return None
 
     def source(self, style: str, feature: str) -> str:
@@ -116,7 +127,7 @@ class GestureFields:
     ) -> Float32Array:
         """Apply the gain of a style, and its offset times `emphasis` (T,), to values (T, k) of its source."""
         change = self.change(style, feature)
-        middle = style_median(self.palette.styles[self.source(style, feature)], feature)
+        middle = self.middle(self.source(style, feature), feature)
         offset = np.array([change.offset.get(channel, 0.0) for channel in self.palette.channels(feature)], np.float32)
         offsets = offset if emphasis is None else emphasis[:, None] * offset
         return np.asarray(middle + np.float32(change.gain) * (values - middle) + offsets, np.float32)
@@ -191,20 +202,23 @@ class _SoundFeatures:
     def __init__(self, sound: Waveform, begin: float, *, with_pitch: bool) -> None:
         self._sound, self._begin, self._with_pitch = sound, begin, with_pitch
         self._found: dict[bytes, Float32Array] = {}
-        self._accents: NDArray[np.float64] | None = None
 
-    @property
+    @cached_property
+    def _intensity(self) -> IntensityTrack | None:
+        return speech_intensity(self._sound)
+
+    @cached_property
     def accents(self) -> NDArray[np.float64]:
         """Seconds of the whole clip and strength of the accents (m, 2)."""
-        if self._accents is None:
-            self._accents = find_accents(self._sound) + np.array([self._begin, 0.0])
-        return self._accents
+        return np.add(find_accents(self._sound, self._intensity), [self._begin, 0.0])
 
     def at(self, times: NDArray[np.float64]) -> Float32Array:
         """(T, 1 or 2) as `prosody_features`."""
         key = times.tobytes()
         if key not in self._found:
-            self._found[key] = prosody_features(self._sound, times - self._begin, with_pitch=self._with_pitch)
+            self._found[key] = prosody_features(
+                self._sound, times - self._begin, self._intensity, with_pitch=self._with_pitch
+            )
         return self._found[key]
 
 
@@ -233,17 +247,14 @@ class _FeatureTrack:
 
     def extend(self, sound: "_SoundFeatures", end: float, timeline: Timeline) -> None:
         """Generate frames up to `N_LOOKAHEAD_FRAMES` after `end` seconds."""
-        first = len(self._times)
+        first, style_of = len(self._times), timeline.style_finder(self._feature, default=self._style)
         while len(self._times) <= N_LOOKAHEAD_FRAMES or self._times[-1 - N_LOOKAHEAD_FRAMES] <= end:
-            tempo = 1.0
-            if self._times:
-                (style,) = timeline.style_at(self._feature, self._times[-1], default=self._style)
-                tempo = self._fields.change(style, self._feature).tempo
+            tempo = self._fields.change(style_of(self._times[-1]), self._feature).tempo if self._times else 1.0
             self._times.append(self._times[-1] + 1.0 / (GESTURE_FPS * tempo) if self._times else 0.0)
         new = np.array(self._times[first:])
         if not len(new):
             return
-        styles = timeline.style_at(self._feature, new, default=self._style)
+        styles = [style_of(second) for second in self._times[first:]]
         sources = [self._source_of(style) for style in styles]
         prosody = sound.at(new)
         chances = self._generator.random(len(new))

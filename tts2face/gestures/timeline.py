@@ -6,6 +6,7 @@ Parsers of styles, gains and expressions: ``brows=annoyed,head=delighted``, ``ha
 """
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -107,14 +108,20 @@ class Timeline:
 
     def style_at(self, feature: str, times: ArrayLike, *, default: str) -> tuple[str, ...]:
         """Style of a feature at each of T times, without blending; `default` if none is requested."""
-        seconds = np.atleast_1d(np.asarray(times, np.float64))
+        find = self.style_finder(feature, default=default)
+        return tuple(find(second) for second in np.atleast_1d(np.asarray(times, np.float64)).tolist())
+
+    def style_finder(self, feature: str, *, default: str) -> Callable[[float], str]:
+        """Function that returns the style of a feature at a time, as `style_at`, for times that are not yet known."""
         base = self.style.get(check_feature(feature), default)
         spans = [span for span in self.spans if span.feature == feature]
-        at = np.searchsorted([span.start for span in spans], seconds, side="right") - 1
-        return tuple(
-            spans[k].style if k >= 0 and second < spans[k].end else base
-            for k, second in zip(at.tolist(), seconds.tolist(), strict=True)
-        )
+        starts = [span.start for span in spans]
+
+        def find(second: float) -> str:
+            at = bisect_right(starts, second) - 1
+            return spans[at].style if at >= 0 and second < spans[at].end else base
+
+        return find
 
     def style_shares(self, feature: str, times: ArrayLike, *, default: str) -> dict[str, FloatArray]:
         """(T,) weights of each style of a feature at T times, with sum 1.

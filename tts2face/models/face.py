@@ -136,7 +136,7 @@ class PhotoView:
         return np.array([*turns, *(SHIFT_GAIN * np.asarray(head[3:5], np.float64)), 0.0], np.float32)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Face:
     """A linear face model with everything needed to draw it.
 

@@ -17,6 +17,7 @@ from tts2face.session.speech_stream import Piece
 from tts2face.types import Clip, Speech
 
 EASE_S = 0.25  # from and to rest; a head turns back within a quarter of a second
+OPENING_S = 0.03  # after the lead, within which a face is fully there: its lips speak
 MARGIN_FRAMES = 0.25  # by which a padded sound ends before its last frame does, so that rounding adds no frame
 MIN_PHONE_S = 0.005  # shorter rests of a phone that is cut are dropped
 Stream = Callable[[PreparedRequest], Iterator[Piece]]
@@ -53,7 +54,8 @@ def clips_of_length(
     if prepared.request.audio is not None:
         recorded = list(clips)
         clips, n_speech = iter(recorded), min(left, sum(len(clip.motion) for clip in recorded))
-    for clip in _eased(clips, n_speech, length.first_channel):
+    opening_s = EASE_S if prepared.request.idle is not None else (prepared.request.lead or 0.0) + OPENING_S
+    for clip in _eased(clips, n_speech, length.first_channel, opening_s):
         rate = clip.speech.waveform.rate
         done += len(clip.motion)
         yield clip
@@ -90,30 +92,35 @@ def first_frames(clip: Clip, n_frames: int) -> Clip:
     return Clip(clip.motion.part(0, n_frames), clip.head.part(0, n_frames), speech)
 
 
-def ease_weights(n_frames: int, fps: float) -> NDArray[np.float32]:
-    """(n_frames,) weights that rise from 0 at the first frame and fall to 0 at the last one within `EASE_S`."""
-    n_ease = max(1, min(round(EASE_S * fps), (n_frames - 1) // 2)) if n_frames > 1 else 1
-    to_edge = np.minimum(np.arange(n_frames), np.arange(n_frames)[::-1])
-    return smoothstep(to_edge / n_ease).astype(np.float32)
+def ease_weights(n_frames: int, fps: float, opening_s: float = EASE_S) -> NDArray[np.float32]:
+    """(n_frames,) weights that rise from 0 at the first frame in `opening_s`, and fall to 0 at the last in `EASE_S`.
+
+    They rise within two frames at least, and within `EASE_S` and half of the frames at most.
+    """
+    longest = max(1, min(round(EASE_S * fps), (n_frames - 1) // 2))
+    n_opening = min(max(round(opening_s * fps), 2), longest)
+    to_edge = np.minimum(np.arange(n_frames) / n_opening, np.arange(n_frames)[::-1] / longest)
+    return smoothstep(to_edge).astype(np.float32)
 
 
-def _eased(clips: Iterator[Clip], n_frames: int, first_channel: int) -> Iterator[Clip]:
+def _eased(clips: Iterator[Clip], n_frames: int, first_channel: int, opening_s: float = EASE_S) -> Iterator[Clip]:
     """Clips cut to `n_frames` in total, with head and face at rest in the first and last frame."""
     at = 0
-    weights: NDArray[np.float32] | None = None
+    weights: tuple[NDArray[np.float32], NDArray[np.float32]] | None = None
     for whole in clips:
         if at >= n_frames:
             return
         clip = first_frames(whole, n_frames - at)
-        weights = ease_weights(n_frames, clip.fps) if weights is None else weights
-        part = weights[at : at + len(clip.motion), None]
+        if weights is None:
+            weights = ease_weights(n_frames, clip.fps, opening_s), ease_weights(n_frames, clip.fps)
+        face, head = (one[at : at + len(clip.motion), None] for one in weights)
         at += len(clip.motion)
         values = clip.motion.values.copy()
-        values[:, first_channel:] *= part
+        values[:, first_channel:] *= face
         yield replace(
             clip,
             motion=replace(clip.motion, values=values),
-            head=replace(clip.head, values=clip.head.values * part),
+            head=replace(clip.head, values=clip.head.values * head),
         )
 
 

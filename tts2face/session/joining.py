@@ -14,6 +14,7 @@ from lexicon.pronounce import spoken_form
 from lexicon.sentences import n_letters, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.sound.alignment import enforce_increasing
+from tts2face.sound.pauses import speech_onset
 from tts2face.types import Speech, Waveform, concatenate_speech, first_sample
 
 CUT_SILENCE_S = 0.05  # after a phrase within a sentence; with the silence before the next one a pause as at a comma
@@ -66,28 +67,39 @@ def trim_silence(speech: Speech, *, before: float, behind: float) -> tuple[Speec
     cut
         Seconds removed from the start.
     """
-    sound, phones = speech.waveform, speech.phones
+    sound = speech.waveform
     lead, trail = _silence_at_ends(speech)
     begin = round(max(lead - before, 0.0) * sound.rate)
     end = len(sound.samples) - round(max(trail - behind, 0.0) * sound.rate)
-    if (begin, end) == (0, len(sound.samples)):
-        return speech, 0.0
-    samples = sound.samples[begin:end] * _fade_gains(end - begin, sound.rate, begin > 0, end < len(sound.samples))
-    edges = phones.edges - begin / sound.rate
-    edges[0], edges[-1] = 0.0, len(samples) / sound.rate
-    return Speech(Waveform(samples, sound.rate), PhoneSequence(phones.phones, edges), speech.words), begin / sound.rate
+    return _part(speech, begin, end), begin / sound.rate
+
+
+def lead_in(speech: Speech, lead: float) -> Speech:
+    """Speech whose first sound (`speech_onset`) is at `lead` seconds: its start is cut, or silence precedes it."""
+    rate = speech.waveform.rate
+    cut = round((speech_onset(speech.waveform) - lead) * rate)
+    if cut < 0:
+        return concatenate_speech([silent_speech(-cut / rate, rate), speech])
+    return _part(speech, cut, len(speech.waveform.samples))
 
 
 def trim_end(speech: Speech) -> Speech:
     """Speech with at most `CUT_SILENCE_S` of silence after its last audible sample, whatever its phones."""
-    sound, phones = speech.waveform, speech.phones
+    sound = speech.waveform
     level = np.abs(sound.samples)
     audible = np.flatnonzero(level > AUDIBLE_SHARE * level.max(initial=0.0))
     end = int(audible[-1]) + 1 + round(CUT_SILENCE_S * sound.rate) if len(audible) else len(level)
-    if end >= len(level):
+    return _part(speech, 0, min(end, len(level)))
+
+
+def _part(speech: Speech, begin: int, end: int) -> Speech:
+    """Samples [begin, end) of speech, faded at the cuts, with all its phones and words: none is shorter than 5 ms."""
+    sound, phones = speech.waveform, speech.phones
+    if (begin, end) == (0, len(sound.samples)):
         return speech
-    short = Waveform(sound.samples[:end] * _fade_gains(end, sound.rate, False, True), sound.rate)
-    edges = enforce_increasing(np.minimum(phones.edges, short.duration))
+    gains = _fade_gains(end - begin, sound.rate, begin > 0, end < len(sound.samples))
+    short = Waveform(sound.samples[begin:end] * gains, sound.rate)
+    edges = enforce_increasing(np.clip(phones.edges - begin / sound.rate, 0.0, short.duration))
     return Speech(short, PhoneSequence(phones.phones, edges), speech.words)
 
 

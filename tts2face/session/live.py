@@ -255,7 +255,7 @@ class LiveSpeech:
             raise InputError("a live request has options only; send its text in parts")
         self._request, self._models = request, models
         self._layer = models.gesture_layer(prepare(idle_request(request, UNUSED_IDLE_S)))
-        self._n_frames = 0
+        self._n_frames, self._is_speaking = 0, False
 
     @property
     def seconds(self) -> float:
@@ -264,11 +264,18 @@ class LiveSpeech:
 
     def say(self, text: str) -> Iterator[Piece]:
         """Append the sentences of a text; errors as `Session.stream`."""
-        yield from self._append(replace(self._request, text=text))
+        request = replace(self._request, text=text)
+        yield from self._append(replace(request, lead=None) if self._is_speaking else request)
+        self._is_speaking = True
 
     def idle(self, seconds: float) -> Iterator[Piece]:
         """Append silence."""
+        self.rest()
         yield from self._append(idle_request(self._request, seconds))
+
+    def rest(self) -> None:
+        """What is said next begins with the ``lead`` of the request, without a pause after the sentence before it."""
+        self._is_speaking = False
 
     def _append(self, request: Request) -> Iterator[Piece]:
         prepared = prepare(request)

@@ -15,14 +15,14 @@ from lexicon.ipa import IpaPhone
 from lexicon.languages import check_readable, language_code
 from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS, MarkedText
 from lexicon.sentences import Sentence, split_sentences
-from lexicon.sequence import PhoneSequence
+from lexicon.sequence import SILENCE, PhoneSequence
 from lexicon.ssml import parse_marks
 from tts2face.gestures.elements import Gains
 from tts2face.gestures.timeline import Timeline, parse_expressions, parse_gains, parse_style
 from tts2face.gestures.timeline_file import read_timeline
 from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
 from tts2face.picture.options import Picture
-from tts2face.request import Request
+from tts2face.request import LEAD_S, Request
 from tts2face.storage.files import AnyPath
 from tts2face.types import exact_rate
 
@@ -81,6 +81,7 @@ def _primary(language: str) -> str:
 
 RECORDING = ""  # text of the one sentence of a recording
 MAX_END_CHANGE_S = 0.05  # the last edge is the end of the sound, padded to a whole number of frames
+EQUAL_EDGES_S = 1e-3  # by which edges of one sound differ, as its start is cut at a sample
 
 
 class StaleEdgesError(InputError):
@@ -125,10 +126,24 @@ class SentenceEdges:
             raise InputError(f"the occurrence of a sentence must be 0 or more, not {self.occurrence}")
         PhoneSequence(self.phones, self.edges)
 
-    def fits(self, phones: PhoneSequence) -> bool:
-        """Whether a sentence has these phones and this duration."""
-        has_end = abs(phones.end - self.edges[-1]) <= MAX_END_CHANGE_S and self.edges[-2] < phones.end
-        return has_end and phones.phones == self.phones
+    def applied(self, phones: PhoneSequence) -> PhoneSequence | None:
+        """The phones of a sentence at the corrected edges; None if it has other phones or another sound.
+
+        The first sentence of a clip has less silence before it than the same one elsewhere: edges move with the sound,
+        which is the same where at least half of them were not corrected.
+        """
+        if phones.phones != self.phones:
+            return None
+        own = np.array(self.edges)
+        later = phones.edges[1:-1] - own[1:-1]
+        if abs(phones.end - own[-1]) > MAX_END_CHANGE_S and len(later) and phones.phones[0] == SILENCE:
+            shift = float(np.median(later))
+            if 2 * np.count_nonzero(np.abs(later - shift) <= EQUAL_EDGES_S) >= len(later):
+                own[1:] += shift
+        if abs(phones.end - own[-1]) > MAX_END_CHANGE_S or own[-2] >= phones.end or own[1] <= 0.0:
+            return None
+        own[-1] = phones.end
+        return PhoneSequence(phones.phones, own)
 
 
 def correct_phones(
@@ -143,9 +158,10 @@ def correct_phones(
     """
     for one in corrections:
         if (one.text, one.occurrence) == (text, occurrence):
-            if not one.fits(phones):
+            corrected = one.applied(phones)
+            if corrected is None:
                 raise StaleEdgesError(text, occurrence)
-            return PhoneSequence(phones.phones, np.concatenate([one.edges[:-1], [phones.end]]))
+            return corrected
     return phones
 
 
@@ -235,7 +251,7 @@ def prepare(request: Request) -> PreparedRequest:
 def idle_request(request: Request, seconds: float) -> Request:
     """The request with idle animation in place of its speech."""
     silent = replace(request, text="", audio=None, audio_map=None, voice=None, rate=1.0, volume=1.0, dictionary=None)
-    return replace(silent, articulation=None, idle=seconds)
+    return replace(silent, articulation=None, lead=LEAD_S, idle=seconds)
 
 
 def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:

@@ -151,7 +151,7 @@ def _phones_within(
     words = tuple(
         WordSpan(word.text, word.first - first, min(word.last, last) - first)
         for word in transcript.words
-        if first <= word.first < last
+        if first <= word.first < last and edges[word.first] > -1e-6  # else it began in the span before
     )
     return PhoneSequence(transcript.phones.phones[first:last], cut), words
 

@@ -24,6 +24,7 @@ from tts2face.session.joining import (
     SentenceTimes,
     WordTimes,
     join_utterances,
+    lead_in,
     resampled_speech,
     silent_frames,
     silent_speech,
@@ -129,6 +130,8 @@ def speak_sentence(
     ----------
     voice
         Voice of the request.
+    request
+        Options of the clip; its ``lead`` is None for a sentence after another one, whose pause is that of the voice.
     voices
         Returns the voice of a name and a language, for spans in another voice or language; their sound is resampled to
         the sample rate of `voice`.
@@ -149,7 +152,7 @@ def speak_sentence(
         delivery = delivery_of(part, sentence.runs, request, deliveries)
         rate = request.rate * part.rate * delivery.rate
         speech = speaker.speak(phrase_content(part), rate=rate, seed=request.seed)
-        speech = _ended(resampled_speech(speech, voice.sample_rate), sentence, part)
+        speech = _trimmed(resampled_speech(speech, voice.sample_rate), sentence, part, request)
         language = part.language or request.language
         times_of_part = WordTimes(part.source, speech.phones, speech.words, language=language, first=part.first)
         spoken.append(speech)
@@ -183,13 +186,18 @@ def sentence_sound(
     delivery = delivery_of(part, sentence.runs, request, deliveries)
     rate = request.rate * part.rate * delivery.rate
     sound = speaker.sound(phrase_content(part), rate=rate, seed=request.seed)
-    whole = _ended(resampled_speech(Speech.without_phones(sound), voice.sample_rate), sentence, part)
+    whole = _trimmed(resampled_speech(Speech.without_phones(sound), voice.sample_rate), sentence, part, request)
     levelled = level_speech([whole], [request.volume * delivery.volume * np.ones(1)])
     return _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
 
 
-def _ended(speech: Speech, sentence: Sentence, part: Phrase) -> Speech:
-    """Speech of a phrase with little silence after it if the written sentence continues after its last phrase."""
+def _trimmed(speech: Speech, sentence: Sentence, part: Phrase, request: Request) -> Speech:
+    """Speech of a phrase with the request's silence before the first one of a sentence.
+
+    Little silence follows the last one if the written sentence continues after it.
+    """
+    if request.lead is not None and part is sentence.utterances[0]:
+        speech = lead_in(speech, request.lead)
     return trim_end(speech) if sentence.is_cut and part is sentence.utterances[-1] else speech
 
 

@@ -186,14 +186,16 @@ def speak_sentences(
     voices, said = cache(models.voice), Counter[str]()
     voice = voices(request.voice, request.language)
     spoken_with = cache(lambda: (replace(request, text="", **NOT_SPOKEN), frozenset(prepared.dictionary.items())))
+    following = cache(lambda: replace(request, lead=None))  # sentences after the first keep the voice's pause
 
     def speak(sentence: Sentence) -> SpokenSentence:
+        given = following() if said else request
         if not has_phones:
-            sound = sentence_sound(voice, sentence, request, voices, deliveries=models.deliveries)
+            sound = sentence_sound(voice, sentence, given, voices, deliveries=models.deliveries)
             return SpokenSentence(Speech.without_phones(sound), Timeline(), (), sound)
         return models.memory.recall(
-            lambda: ("speech", sentence.relative(), spoken_with()),
-            lambda: speak_sentence(voice, sentence, request, voices, models.yield_turn, deliveries=models.deliveries),
+            lambda: ("speech", sentence.relative(), given.lead, spoken_with()),
+            lambda: speak_sentence(voice, sentence, given, voices, models.yield_turn, deliveries=models.deliveries),
             lambda made: made.sound.samples.nbytes + made.speech.waveform.samples.nbytes,
         )
 

@@ -7,6 +7,7 @@ Intensity and pitch of a voice over time, as Praat defines them.
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -227,8 +228,25 @@ PITCH_RANGE_HZ = (75.0, 600.0)  # Praat's default
 SEMITONES_PER_OCTAVE = 12.0
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class IntensityTrack:
+    """Intensity of a sound in dB relative to 20 micropascals: `levels` (n,) at `centres` (n,) in seconds."""
+
+    centres: NDArray[np.float64]
+    levels: NDArray[np.float64]
+
+    def at(self, times: NDArray[np.float64]) -> NDArray[np.float32]:
+        """(T,) intensity at times (T,) in seconds."""
+        return np.interp(times, self.centres, self.levels).astype(np.float32)
+
+
 def intensity(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(T,) intensity of a sound in dB relative to 20 micropascals, at times (T,) in seconds.
+    """(T,) `intensity_track` of a sound at times (T,) in seconds."""
+    return intensity_track(sound).at(times)
+
+
+def intensity_track(sound: Waveform) -> IntensityTrack:
+    """Intensity of a sound.
 
     Raises
     ------
@@ -249,7 +267,7 @@ def intensity(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32
     place = np.arange(-half, half + 1) * period / (LOUDNESS_WINDOW_S / 2)
     window = _bessel_i0((2 * np.pi**2 + 0.5) * np.sqrt(np.maximum(1.0 - place**2, 0.0)))
     first = 0.5 * duration - 0.5 * (n_frames * STEP_S) + 0.5 * STEP_S
-    centres = first + np.arange(n_frames) * STEP_S
+    centres = np.asarray(first + np.arange(n_frames) * STEP_S, np.float64)
     nearest = np.floor((centres - 0.5 * period) / period + 1.5) - 1.0  # rounds ties as Praat does
     samples = sound.samples.astype(np.float64)
     powers = np.zeros(n_frames)
@@ -258,8 +276,8 @@ def intensity(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32
         part, weights = samples[begin:end], window[begin - centre + half : end - centre + half]
         powers[frame] = np.square(part - part.mean()) @ weights / weights.sum()
     levels = 10.0 * np.log10(np.maximum(powers / THRESHOLD_POWER, 10 ** (MIN_INTENSITY_DB / 10)))
-    at_times: NDArray[np.float64] = np.interp(times, centres, levels)
-    return at_times.astype(np.float32)
+    levels = 10.0 * np.log10(np.maximum(powers / THRESHOLD_POWER, 10 ** (MIN_INTENSITY_DB / 10)))
+    return IntensityTrack(centres, levels)
 
 
 def pitch(sound: Waveform, times: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -1,4 +1,4 @@
-"""Detection of pauses in speech, and division of long recordings at pauses."""
+"""Detection of the first sound of speech and of its pauses, and division of long recordings at pauses."""
 
 from itertools import pairwise
 
@@ -14,6 +14,12 @@ QUIET_SHARE = 0.3  # threshold of pauses: share of the range in dB from noise to
 NOISE_QUANTILE, SPEECH_QUANTILE = 0.05, 0.95
 MIN_CONTRAST_DB = 6.0  # least range from noise to speech in which pauses can be detected
 MIN_PAUSE_S = 0.2  # longer than the closure of any stop (Crystal and House 1988)
+ONSET_WINDOW_S = 0.005  # an onset is exact to this
+ONSET_DB = -40.0  # of the loudest window: weak fricatives (five, thick) begin at -38, what is lower is not heard
+ONSET_ABOVE_NOISE_DB = 10.0  # in noise, the onset is where the sound exceeds the quietest twentieth by this
+LATEST_ONSET_DB = -20.0  # of the loudest window: speech without silence has no such twentieth
+MAX_CLOSURE_S = 0.025  # quiet within a sound that begins: between the burst of a stop and its vowel, within a trill
+MIN_SOUND_S, BREATH_DB = 0.02, -25.0  # what is shorter is a click; a weak sound before silence is a breath
 MIN_STRETCH_SHARE = 0.5  # least length of a part, relative to the largest one; the last part may be shorter
 
 Span = tuple[float, float]
@@ -31,6 +37,30 @@ def find_pauses(sound: Waveform) -> tuple[Span, ...]:
     borders = np.flatnonzero(np.diff(np.concatenate([[False], quiet, [False]]).astype(np.int8)))
     spans = (borders.reshape(-1, 2) * LEVEL_WINDOW_S).tolist()
     return tuple((begin, end) for begin, end in spans if end - begin >= MIN_PAUSE_S)
+
+
+def speech_onset(sound: Waveform) -> float:
+    """Seconds from the start of a sound to the first speech in it; 0.0 if it is silent.
+
+    Notes
+    -----
+    Levels are relative to the loudest window, and to the noise. Clicks, and breaths that silence follows, are passed.
+    """
+    windows = sound_windows(sound, ONSET_WINDOW_S)
+    levels = 10.0 * np.log10(np.maximum(np.square(windows, dtype=np.float64).mean(axis=1), 1e-12))
+    if not len(levels) or levels.max() <= -120.0:
+        return 0.0
+    relative = levels - levels.max()
+    threshold = np.quantile(relative, NOISE_QUANTILE) + ONSET_ABOVE_NOISE_DB
+    loud = relative > np.clip(threshold, ONSET_DB, LATEST_ONSET_DB)
+    closure, shortest = round(MAX_CLOSURE_S / ONSET_WINDOW_S), round(MIN_SOUND_S / ONSET_WINDOW_S)
+    begins, ends = np.flatnonzero(np.diff(np.concatenate([[False], loud, [False]]).astype(np.int8))).reshape(-1, 2).T
+    is_new = np.concatenate([[True], begins[1:] - ends[:-1] > closure])
+    begins, ends = begins[is_new], ends[np.concatenate([is_new[1:], [True]])]
+    for begin, end in zip(begins, ends, strict=True):
+        if end - begin >= shortest and relative[begin:end].max() > BREATH_DB:
+            return float(begin * ONSET_WINDOW_S)
+    return float(begins[0] * ONSET_WINDOW_S)
 
 
 def cut_at_pauses(sound: Waveform, longest: float) -> tuple[Span, ...]:

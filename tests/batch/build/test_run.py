@@ -16,7 +16,7 @@ import pytest
 from cli.main import run
 from lexicon.errors import BackendError, InputError
 from tests.batch.conftest import FPS, SRT, Planner
-from tests.synthesis.fake_voice import LEAD, LETTER, FakeVoice
+from tests.synthesis.fake_voice import LETTER, FakeVoice
 from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.batch import engine as engines
 from tts2face.serving.batch.engine import LocalEngine, Rendered
@@ -74,8 +74,8 @@ def test_a_file_is_in_sync_at_every_cue(plan_of: Planner, voices: list[FakeVoice
     heard = spans(samples, rate)
     assert len(heard) == 3
     for (begin, end), cue, letters in zip(heard, entry["cues"], (10, 19, 10), strict=True):
-        assert abs(begin - cue["begin_s"] - LEAD) < AAC_SMEAR_S
-        assert abs(end - cue["begin_s"] - LEAD - letters * LETTER / cue["rate"]) < AAC_SMEAR_S
+        assert abs(begin - cue["begin_s"]) < AAC_SMEAR_S
+        assert abs(end - cue["begin_s"] - letters * LETTER / cue["rate"]) < AAC_SMEAR_S
         assert abs(end - cue["begin_s"] - cue["speech_s"]) < HALF_FRAME_S
     assert [cue["rate"] > 1.0 for cue in entry["cues"]] == [False, True, False]
 
@@ -90,11 +90,15 @@ def test_silence_shows_a_living_face(plan_of: Planner, voices: list[FakeVoice], 
 @pytest.mark.smoke
 def test_cues_become_clips_of_their_length(plan_of: Planner, voices: list[FakeVoice], tmp_path: Path) -> None:
     out = tmp_path / "out"
-    run_batch(plan_of(max_rate=1.2, overflow="report"), out)
+    run_batch(plan_of(max_rate=1.1, overflow="report"), out)
     rows = list(csv.DictReader((out / "manifest.csv").read_text().splitlines()))
     assert [row["file"] for row in rows] == ["one-0001.mp4", "one-0002.mp4", "one-0003.mp4"]
-    assert [row["n_frames"] for row in rows] == ["15", "18", "15"]  # 0.2 + 1.9 / 1.2 s in a cue of 1.5 s
-    assert [float(row["rate"]) for row in rows] == [1.0, 1.2, 1.0]
+    assert [row["n_frames"] for row in rows] == [
+        "16",
+        "19",
+        "16",
+    ]  # one frame before the cue, and 1.9 / 1.1 s in a cue of 1.5 s
+    assert [float(row["rate"]) for row in rows] == [1.0, 1.1, 1.0]
     assert "longer than its cue" in rows[1]["warnings"]
     for row in rows:
         assert len(decoded(out / row["file"])[0]) == int(row["n_frames"])

@@ -186,7 +186,7 @@ def test_margins_share_gaps() -> None:
     cues = [
         Cue(number, begin, end, "abc", 1) for number, (begin, end) in enumerate([(0.2, 1), (1.5, 2), (2, 3), (9, 10)])
     ]
-    found = [(one.begin, one.end, one.cue_begin, one.cue_end) for one in cue_windows(cues, exact_rate(10), 5)]
+    found = [(one.begin, one.end, one.cue_begin, one.cue_end) for one in cue_windows(cues, exact_rate(10), (5, 5))]
     assert found == [(0, 12, 2, 10), (12, 20, 15, 20), (20, 35, 20, 30), (85, 105, 90, 100)]
 
 

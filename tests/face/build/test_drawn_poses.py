@@ -68,7 +68,11 @@ def outline(face: Face, points: np.ndarray, rows: list[int]) -> np.ndarray:
     pen = ImageDraw.Draw(picture)
     pen.polygon(places, fill=255)
     pen.line([*places, places[0]], fill=255)  # a polygon without a height has no filling
-    return np.asarray(maximum_filter(np.asarray(picture), 2 * OUTLINE_PX + 1)) > 0
+    left, top, right, bottom = picture.getbbox() or (0, 0, 0, 0)
+    near = np.s_[max(top - OUTLINE_PX, 0) : bottom + OUTLINE_PX, max(left - OUTLINE_PX, 0) : right + OUTLINE_PX]
+    around = np.asarray(picture) > 0
+    around[near] = maximum_filter(around[near], 2 * OUTLINE_PX + 1)
+    return around
 
 
 def triangle_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ import websockets
 import tts2face
 from tests.running import RunningService, eventually
 from tts2face.interchange.exports.curves import arkit_projection
-from tts2face.serving.service.live import LEAD_S
+from tts2face.serving.service.live import AHEAD_S
 
 WORDS = ["Hello", "there,", "how", "are", "you?", "I", "am", "well.", "And"]
 
@@ -99,7 +99,7 @@ def test_a_living_face_fills_the_silence_in_real_time(service: RunningService) -
     ends = [one["begin"] + len(one["weights"]) / one["fps"] for one in curves]
     assert [one["begin"] for one in curves[1:]] == pytest.approx(ends[:-1], abs=1e-3)  # without a gap
     idle = [(at - live.began, one) for at, one in live.came if isinstance(one, dict) and one["type"] == "curves"][:-1]
-    assert all(one["begin"] < at + LEAD_S + 1e-3 for at, one in idle)  # never far ahead of the clock
+    assert all(one["begin"] < at + AHEAD_S + 1e-3 for at, one in idle)  # never far ahead of the clock
     assert np.ptp(np.concatenate([one["head"] for _, one in idle]), axis=0)[:3].max() > 0.001  # radians
 
 

@@ -10,6 +10,7 @@ ARKit weights and head pose as JSON lines, one for each frame.
 import json
 from dataclasses import dataclass
 from fractions import Fraction
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,8 +119,15 @@ def arkit_projection(channels: tuple[str, ...], face: Face | None, name: str) ->
     ])  # fmt: skip
     if not len(helpers):
         return ArkitProjection(columns, others, helpers, none, none)
-    curvature, cross = _inner_products(face, columns[helpers], others)
-    return ArkitProjection(columns, others, helpers, curvature, cross)
+    products = _PRODUCTS.setdefault(face, {})
+    if channels not in products:
+        products[channels] = _inner_products(face, columns[helpers], others)
+    return ArkitProjection(columns, others, helpers, *products[channels])
+
+
+# By face and channels: they take a tenth of a second, and every clip of lines needs them.
+_PRODUCTS: WeakKeyDictionary[Face, dict[tuple[str, ...], tuple[NDArray[np.float64], NDArray[np.float64]]]]
+_PRODUCTS = WeakKeyDictionary()
 
 
 def _inner_products(

@@ -39,7 +39,7 @@ PATTERN_NAMES = ("speaker", "subtitle_style", "file")
 NOT_IN_CAST: Mapping[str, str] = MappingProxyType({  # options, with the reason
     "text": "the cues have it", "audio": "that of the file", "audio_map": "the words are given", "idle": "cues speak",
     "fps": "one of all clips", "timeline": "its times are those of one clip",
-    "expression": "its times are those of one clip",
+    "expression": "its times are those of one clip", "lead": "the cues have their time",
 })  # fmt: skip
 REQUEST_NAMES = tuple(option.name for option in fields(Request) if option.name not in NOT_IN_CAST)
 PATH_NAMES = ("talker", "face", "palette", "voice", "dictionary")

@@ -82,8 +82,9 @@ def find_recordings(folder: Path, subtitles: Path, names: Sequence[str]) -> Reco
 
 MAX_IDLE_S = 20.0  # of one segment of silence
 MARGIN_S = 0.5  # around a cue, for speech of a dubbing track that begins early or ends late; half of shorter gaps
-NOT_WHEN_SILENT = ("text", "audio", "audio_map", "voice", "rate", "volume", "plain_delivery", "dictionary", "language")
-NOT_WITH_AUDIO = ("voice", "rate", "plain_delivery")
+NOT_WHEN_SILENT = ("text", "audio", "audio_map", "voice", "rate", "volume", "plain_delivery", "lead", "dictionary",
+                   "language")  # fmt: skip
+NOT_WITH_AUDIO = ("voice", "rate", "plain_delivery", "lead")
 
 
 def plan_batch(
@@ -172,8 +173,9 @@ class _FilePlan:
             names = (self.name, self.path.stem, *([""] if self.base.n_files == 1 else []))
             self.recordings = find_recordings(self.base.options.audio, self.path, names)
         spoken = [self._divide(cue) for cue in spoken]
-        margin = MARGIN_S if self.recordings.track else 0.0
-        windows = cue_windows(spoken, fps, round(margin * fps))
+        margins = (MARGIN_S, MARGIN_S) if self.recordings.track else (self.base.request.lead or 0.0, 0.0)
+        before, after = (round(margin * fps) for margin in margins)
+        windows = cue_windows(spoken, fps, (before, after))
         per = self.base.options.per
         if per == "cue":
             for window in windows:
@@ -298,6 +300,7 @@ class _FilePlan:
             self.base.options.overflow,
             self.base.options.max_rate,
             audio_begin=first_sample(window.begin, SOUND_RATE, fps) if is_excerpt else None,
+            lead_frames=None if is_excerpt or "idle" in request else window.margin_begin,
             medium=ALPHA_MOVIE if self.base.options.format == "webm" else MOVIE,
         )
         return replace(segment, file_hashes=self._file_hashes(segment))

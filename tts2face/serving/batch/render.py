@@ -15,9 +15,12 @@ from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from lexicon.errors import DataError
 from tts2face.interchange.exports.writer import ExportWriter, plan_exports
 from tts2face.picture.film import MKV, ClipWriter
+from tts2face.picture.movie import SOUND_RATE
 from tts2face.picture.options import Picture
 from tts2face.picture.own_face import OwnFaceRenderer
 from tts2face.picture.renderer import FrameRenderer
@@ -38,20 +41,36 @@ from tts2face.serving.batch.segment import (
 from tts2face.serving.batch.windows import Fit, Limits, fit_speech
 from tts2face.session.functions import SessionCache
 from tts2face.session.session import Session
+from tts2face.sound.pauses import speech_onset
 from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.temporary import Temporary
-from tts2face.types import exact_rate, frame_count
+from tts2face.types import Waveform, exact_rate, first_sample, frame_count
+
+ONSET_S = 60  # of a recording of a cue, within which its first sound lies
 
 
 @contextmanager
 def excerpt_of(segment: Segment, request: Request) -> Iterator[Request]:
-    """The request of a segment, with its excerpt of a recording as a temporary file if it has one."""
-    if segment.audio_begin is None or request.audio is None:
+    """The request of a segment, with its lead, or with its part of a recording as a temporary file."""
+    fps = exact_rate(request.fps)
+    if request.audio is None:
+        yield request if segment.lead_frames is None else replace(request, lead=float(segment.lead_frames / fps))
+        return
+    if segment.audio_begin is None and segment.lead_frames is None:
         yield request
         return
+    track = open_track(request.audio)
+    begin, end = segment.audio_begin, segment.audio_end
+    if begin is None:
+        heard = Waveform(track.read(0, min(track.n_samples, ONSET_S * SOUND_RATE)) / np.float32(32768), SOUND_RATE)
+        begin = round(speech_onset(heard) * SOUND_RATE) - first_sample(segment.lead_frames or 0, SOUND_RATE, fps)
+        end = track.n_samples
+        if not heard.samples.any():  # it is refused by its name
+            yield request
+            return
     with TemporaryDirectory(prefix="tts2face-") as folder:
         path = Path(folder) / f"{request.audio.stem}.wav"
-        open_track(request.audio).write_excerpt(path, segment.audio_begin, segment.audio_end)
+        track.write_excerpt(path, begin, end)
         yield replace(request, audio=path)
 
 
@@ -175,7 +194,7 @@ def _fit(session: Session, request: Request, segment: Segment) -> tuple[Request,
         n_frames,
         float(fps),
         fit.rate,
-        round(fit.speech_s, 4),
+        round(max(fit.speech_s - (segment.lead_frames or 0) / float(fps), 0.0), 4),
         round(fit.overflow_s, 4),
         round(cut, 4),
         (*heard, *warnings),

@@ -46,7 +46,7 @@ class SegmentResult:
     rate
         Speaking rate of the fit; 1 for silence and recordings.
     speech_s
-        Seconds from its begin to the end of its last word; 0 without words.
+        Seconds from its cue to the end of its last word, of an excerpt from its begin; 0 without words.
     overflow_s
         Seconds by which the speech ends after its cue.
     cut_s
@@ -78,7 +78,7 @@ def result_from_json(content: Mapping[str, Any]) -> SegmentResult:
     return SegmentResult(**{**found, "warnings": tuple(found.get("warnings", ()))})
 
 
-SEGMENT_FORMAT = 2  # raised when equal requests give other segments
+SEGMENT_FORMAT = 3  # raised when equal requests give other segments
 VOICE_PACKAGES = ("hibari-tts", "onnxruntime", "espeakng-loader", "piper-tts", "pocketsphinx", "pyopenjtalk-plus", "av")
 
 
@@ -149,6 +149,9 @@ class Segment:
     audio_begin
         Sample, at `SOUND_RATE`, at which the segment begins in the recording of a whole file; None: the recording is
         one of this segment.
+    lead_frames
+        Frames before the cue, after which its first sound is heard: silence of the voice or of a recording of the cue
+        is cut or added; None: nothing is.
     medium
         What is stored: `MOVIE` (H.264), `ALPHA_MOVIE` (VP9), `TRACK`, a lossless track for exports, or a whole clip:
         `FILE_PREFIX` and a format; its lengths have no effect.
@@ -164,6 +167,7 @@ class Segment:
     max_rate: float = 1.4
     file_hashes: Mapping[str, str] = field(default_factory=dict)
     audio_begin: int | None = None
+    lead_frames: int | None = None
     medium: str = MOVIE
 
     @cached_property
@@ -191,6 +195,7 @@ class Segment:
             "max_rate": self.max_rate,
             "file_hashes": dict(self.file_hashes),
             "audio_begin": self.audio_begin,
+            "lead_frames": self.lead_frames,
             "medium": self.medium,
         }
 

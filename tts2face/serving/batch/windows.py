@@ -50,11 +50,11 @@ class Window:
         return self.end - self.margin_end
 
 
-def cue_windows(cues: Sequence[Cue], fps: Fraction, margin: int = 0) -> tuple[Window, ...]:
+def cue_windows(cues: Sequence[Cue], fps: Fraction, margins: tuple[int, int] = (0, 0)) -> tuple[Window, ...]:
     """Windows of spoken cues in order of time; overlapping ones end where the next one begins.
 
     Cues that begin at the same frame, and speakers of one cue, divide their time by their letters. Windows are longer
-    than their cues by `margin` frames at both ends, or by half of a gap that is shorter than two margins.
+    than their cues by `margins` frames before and after them, or by half of a gap that is shorter than two margins.
     """
     windows: list[Window] = []
     for begin, group in groupby(cues, key=lambda cue: round(Fraction(cue.begin_s) * fps)):
@@ -69,7 +69,7 @@ def cue_windows(cues: Sequence[Cue], fps: Fraction, margin: int = 0) -> tuple[Wi
             until = max(until, at + 1)
             windows.append(Window(cue, at, until, until, part=part))
             at = until
-    return tuple(_with_slots(_with_margins(windows, margin), fps))
+    return tuple(_with_slots(_with_margins(windows, *margins), fps))
 
 
 def _parts(cue: Cue) -> list[tuple[Cue, int]]:
@@ -82,16 +82,14 @@ def _parts(cue: Cue) -> list[tuple[Cue, int]]:
     ]
 
 
-def _with_margins(windows: Sequence[Window], margin: int) -> list[Window]:
+def _with_margins(windows: Sequence[Window], longest_before: int, longest_after: int) -> list[Window]:
     """Windows with margins in the gaps between them."""
-    if margin == 0:
-        return list(windows)
     longer: list[Window] = []
     for number, window in enumerate(windows):
         before = window.begin if number == 0 else max(window.begin - windows[number - 1].end, 0)
-        after = windows[number + 1].begin - window.end if number + 1 < len(windows) else 2 * margin
-        first = min(margin, before if number == 0 else before - before // 2)
-        last = min(margin, max(after, 0) // 2)
+        after = windows[number + 1].begin - window.end if number + 1 < len(windows) else 2 * longest_after
+        first = min(longest_before, before if number == 0 else before - before // 2)
+        last = min(longest_after, max(after, 0) // 2)
         longer.append(
             replace(window, begin=window.begin - first, end=window.end + last, margin_begin=first, margin_end=last)
         )

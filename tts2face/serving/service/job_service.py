@@ -14,6 +14,7 @@ import json
 import logging
 import threading
 import time
+import uuid
 from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -29,6 +30,7 @@ from tts2face.serving.batch.engine import lack_of_room
 from tts2face.serving.batch.run import prune_unused
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.service.errors import RefusedError, as_refused
+from tts2face.serving.service.keys import RateLimits
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.settings import ServiceSettings
@@ -217,7 +219,7 @@ NICENESS = 10  # of the workers, so that streams go first
 RETRY_S = 2.0  # between two tries to open the database
 RETRY_AFTER_S = 5  # for clients, while the database cannot be reached
 SUPERVISE_S, RESTART_S = 0.5, 10.0  # between two looks at the workers, and after they ended again and again
-WEBHOOK_S, STATISTICS_S, SWEEP_S = 1.0, 5.0, 3600.0  # between two looks
+WEBHOOK_S, SHARE_S, STATISTICS_S, SWEEP_S = 1.0, 0.5, 5.0, 3600.0  # between two looks
 PROBE_S = 3.0  # of the database for /readyz
 DAY_S = 86_400.0
 MIN_AGE_S = DAY_S  # of files and segments: a younger one may belong to a job that is being queued or planned
@@ -234,10 +236,13 @@ class JobService:
         Settings of the service.
     library
         Uploaded models.
+    limits
+        Of the keys, which servers of one database share.
     """
 
-    def __init__(self, settings: ServiceSettings, library: Library) -> None:
-        self._settings, self._library = settings, library
+    def __init__(self, settings: ServiceSettings, library: Library, limits: RateLimits) -> None:
+        self._settings, self._library, self._limits = settings, library, limits
+        self._name = uuid.uuid4().hex  # of this server
         self._client: JobClient | None = None
         self._reason = ""  # why the database cannot be reached
         self._threads = ThreadPoolExecutor(N_THREADS, thread_name_prefix="jobs")
@@ -337,7 +342,10 @@ class JobService:
         if self._settings.workers:
             self._supervisor = threading.Thread(target=self._supervise, name="supervisor", daemon=True)
             self._supervisor.start()
-        for action, pause_s in ((self._send_webhooks, WEBHOOK_S), (self._count, STATISTICS_S), (self._sweep, SWEEP_S)):
+        for action, pause_s in (
+            (self._send_webhooks, WEBHOOK_S), (self._share_limits, SHARE_S), (self._count, STATISTICS_S),
+            (self._sweep, SWEEP_S),
+        ):  # fmt: skip
             task = asyncio.create_task(self._repeat(action, pause_s))
             task.add_done_callback(_log_defect)
             self._tasks.append(task)
@@ -377,11 +385,17 @@ class JobService:
             *(self.call(partial(deliver, delivery=one, settings=self._settings), self._senders) for one in due)
         )
 
+    async def _share_limits(self) -> None:
+        if self._settings.keys is not None:
+            name = self._name
+            await self._limits.share(lambda *used: self.call(lambda client: client.usage.exchange(name, *used)))
+
     async def _count(self) -> None:
         self.counts, self.oldest_waiting_s = await self.call(lambda client: client.table.counts())
 
     async def _sweep(self) -> None:
         """Remove files that nothing has, and jobs, results and segments older than the setting `results_days`."""
+        await self.call(lambda client: client.usage.forget_old())
         n_files = await self.call(lambda client: client.remove_unused_files(MIN_AGE_S))
         n_files += await self.call(lambda _: self._library.remove_unused_files(MIN_AGE_S))
         old: list[str] = []

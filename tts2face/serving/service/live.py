@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 IDLE_S = 0.2  # of idle motion at a time, so that speech can begin soon
 MAX_FRAMES = 200  # of an event, whose writing is one step of the server's event loop, of some 5 ms
-LEAD_S = 0.3  # by which idle motion is ahead of the clock
+AHEAD_S = 0.3  # by which idle motion is ahead of the clock
 
 
 class LiveTask:
@@ -64,9 +64,9 @@ class LiveTask:
             if not self._has_idle or self._began is None:
                 yield Wait()
                 continue
-            lead = self._speech.seconds - (self._clock() - self._began)
-            if lead > LEAD_S:
-                yield Wait(lead - LEAD_S)
+            ahead = self._speech.seconds - (self._clock() - self._began)
+            if ahead > AHEAD_S:
+                yield Wait(ahead - AHEAD_S)
                 continue
             with suppress(InterruptedTaskError):  # by a message that is read next
                 for piece in self._speech.idle(IDLE_S):
@@ -74,6 +74,8 @@ class LiveTask:
 
     def _say(self, sentence: str) -> Iterator[Event | Chunk]:
         n_cancels = self._n_cancels
+        if self._clock() - (self._began or 0.0) > self._speech.seconds:
+            self._speech.rest()  # the sentence before it has been heard
         try:
             check_words(sentence)
             for piece in self._speech.say(sentence):
@@ -102,6 +104,7 @@ class LiveTask:
                         self._sentences.clear()
                     self._n_cancels += 1
                     self._began = self._clock() - self._speech.seconds  # what follows is due now
+                    self._speech.rest()
                     after_ms = 1000 * (self._clock() - content["arrived"])
                     cancelled = {"at": round(self._speech.seconds, 4), "after_ms": round(after_ms, 1)}
                     yield Event({"type": "cancelled", **cancelled})

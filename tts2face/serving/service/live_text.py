@@ -132,7 +132,7 @@ class LiveText:
                 f"the stream has sent its {self._most_a_minute} characters a minute; wait {int(wait_s) + 1} s and send "
                 f"the text again"
             )
-        self._minute.left -= n_characters
+        self._minute.take(n_characters)
         self._n_characters += n_characters
 
     def _queue(self, sentences: list[str]) -> None:

@@ -105,11 +105,12 @@ class ServiceState:
              "memory_mb": settings.memory_mb, "sentences_mb": settings.sentences_mb, "tasks": tasks},
         ))  # fmt: skip
         self.library, self.checks, self.video_checks = Library(settings), Checks(), Checks()
-        self.jobs = JobService(settings, self.library)
+        self.limits = RateLimits()
+        self.jobs = JobService(settings, self.library, self.limits)
         self.cache: ResultCache | None = None
         if settings.cache_mb:
             self.cache = ResultCache(settings.data_folder / "cache", settings.cache_mb * 1_000_000)
-        self.limits, self.metrics = RateLimits(), Metrics(self.pool, self.jobs, self.cache)
+        self.metrics = Metrics(self.pool, self.jobs, self.cache)
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
         self.readiness = Readiness(self.pool, self.jobs, settings)

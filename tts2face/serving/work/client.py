@@ -29,6 +29,7 @@ from tts2face.serving.work.database import (
 from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, enqueue, failure_reason, open_client
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.serving.work.table import CANCELLED, FAILED, JobRecord, JobTable, NewJob, State
+from tts2face.serving.work.usage import UsageTable
 
 CONNECT_S = 2  # to PostgreSQL; then the request is refused
 SESSION_OPTIONS = "-c statement_timeout=10000 -c lock_timeout=8000"  # ms
@@ -67,6 +68,7 @@ class JobClient:
         )
         self.blobs = blobs
         self.table, self._changes = JobTable(self._database), JobChanges(self._database)
+        self.usage = UsageTable(self._database)
 
     def close(self) -> None:
         """Close all connections."""

@@ -18,6 +18,7 @@ from tts2face.serving.work.connection import (
     repeat_creation,
 )
 from tts2face.serving.work.table import JobTable
+from tts2face.serving.work.usage import UsageTable
 
 DEFAULT_DATABASE = "tts2face-jobs.sqlite"
 QUEUE = "tts2face-segments"
@@ -83,6 +84,7 @@ def prepare_database(url: str) -> None:
         jobs = JobDatabase(url)
         try:
             JobTable(jobs).create()
+            UsageTable(jobs).create()
         finally:
             jobs.close()
     except (sqlite3.Error, sqlalchemy.exc.SQLAlchemyError, ModuleNotFoundError) as error:
