@@ -209,7 +209,7 @@ class OwnFaceRenderer:
         return draw_video_frame(self, self._motion(clip)[number], self.plate_frame(position / clip.fps))
 
     def with_fewest_samples(self) -> "OwnFaceRenderer":
-        """This renderer: it takes one sample a pixel."""
+        """The same renderer: it takes one sample a pixel."""
         return self
 
     def _positions(self, frames: NDArray[np.int64], fps: float) -> NDArray[np.float64]:

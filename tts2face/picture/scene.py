@@ -47,7 +47,8 @@ class Scene:
 
     def with_picture(self, picture: Picture) -> "Scene":
         """The same scene with another number of samples a pixel."""
-        return replace(self, picture=picture, optics=self.optics.scaled(picture.samples_per_side / self.picture.samples_per_side))
+        share = picture.samples_per_side / self.picture.samples_per_side
+        return replace(self, picture=picture, optics=self.optics.scaled(share))
 
     def pose(self, weights: NDArray[np.float32], head: NDArray[np.float32]) -> Pose:
         """The face with shape weights (K,) and a head pose (6,), lit."""

@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import BackendError, InputError
+from tts2face.numeric.reuse import available_cores
 from tts2face.processes.message import Message
 from tts2face.types import Chunk
 
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
 Inputs = deque[Message]  # that a task has not read yet
 SYNTHESISE, SERVE = "synthesise", "serve"  # calls of a synthesis process
+DRAWING_THREADS = min(
+    4, available_cores()
+)  # of a process, for all its movies: drawing takes 4 times as long as encoding
 CANCEL = "cancel"  # input of live streams
 QUALITY = "quality"  # type of an event: the pictures have another one from here on
 

@@ -10,7 +10,6 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import Tts2faceError
-from tts2face.numeric.reuse import available_cores
 from tts2face.picture.options import Picture
 from tts2face.picture.pace import Pace
 from tts2face.processes.child import Call, Handler
@@ -20,6 +19,7 @@ from tts2face.serving.service.aligner import RemoteAligner
 from tts2face.serving.service.live import listen, live
 from tts2face.serving.service.logs import configure_logs, log_event
 from tts2face.serving.service.messages import (
+    DRAWING_THREADS,
     QUALITY,
     SERVE,
     SYNTHESISE,
@@ -39,9 +39,6 @@ from tts2face.types import Chunk, Waveform
 if TYPE_CHECKING:
     from tts2face.session.session import Session
     from tts2face.session.speech_stream import Piece
-
-# Of each process, for all its movies: drawing takes four times as long as encoding, and a thread 20 MB.
-DRAWING_THREADS = min(4, available_cores())
 
 
 def stream_file(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk]:

@@ -171,7 +171,5 @@ async def _answer(
     picture = fields.picture | {name: files[name] for name in ("background",) if name in files}
     spoken = fields.request | {name: files[name] for name in ("audio", "timeline") if name in files}
     keeps_pace = format in MOVIE_KINDS and not clip.model_fields_set & {"quality", "supersampling"}
-    work = state.work(
-        models=fields.models, request=spoken, picture=picture, format=format, keeps_pace=keeps_pace
-    )
+    work = state.work(models=fields.models, request=spoken, picture=picture, format=format, keeps_pace=keeps_pace)
     return await stream_work(request, work, media_types()[format], resources=resources)
