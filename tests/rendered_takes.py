@@ -75,7 +75,7 @@ def render_takes(folder: Path) -> None:
         marked = f"[pause {LEAD_S}]{spoken}.[pause {TAIL_S}]"
         # Gestures of the same sound would be alike in every take: each take has a seed and a mood of its own. Head and
         # blinks are those of a person who is recorded.
-        clip = session.clip(marked, fps=FPS, seed=number, style="measured", **MOODS[number % 3])
+        clip = session.clip(marked, fps=FPS, lead=None, seed=number, style="measured", **MOODS[number % 3])
         write_clips(folder / f"{name}.mp4", [in_a_room(clip, number)], renderer)
         _remux(folder / f"{name}.mp4", folder / "clips" / f"{name}.mkv")
         times = word_times(clip)

@@ -2,7 +2,7 @@
 
 ``PYTHONPATH=. python tests/bench/bench_soak.py --requests 20000``, as root on Linux for all disturbances: synthesis
 processes and workers are killed, the data folder is filled (it lies on a file system of its own), the clock of the
-server goes back by an hour (with libfaketime), the database is away for a while (with ``--database postgresql://...``
+server goes back by an hour (with a C compiler), the database is away for a while (with ``--database postgresql://...``
 and ``--stop``, ``--start``: commands that stop and start it). What cannot be done here is said and left out.
 
 Memory, threads, descriptors and temporary files at the end are compared with those after a twentieth of the requests;
@@ -36,7 +36,6 @@ from tests.started import children, running_processes
 SEED, AT_ONCE, MAX_GROWTH = 1, 24, 0.05
 KEEP_ALIVE_S = 1.0
 DISK_MB, AWAY_S = 700, 60.0
-FAKETIME = sorted(Path("/usr/lib").glob("*/faketime/libfaketime.so.1"))
 ALLOWED = {200, 202, 400, 404, 422, 429, 503}  # 503 while the disk is full or the database away
 Client = httpx.AsyncClient
 
@@ -191,11 +190,61 @@ async def take_away(commands: Sequence[str], soak: Soak, n: int) -> str:
     return f"away for {time.monotonic() - began:.0f} s"
 
 
-def turn_back(clock: Path) -> str:
+# Of the clock that can be set, and not of the monotonic one; libfaketime makes sleeping fail where that one goes on.
+SHIFTED_CLOCK = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <stdlib.h>
+#include <sys/mman.h>
+#include <sys/time.h>
+#include <time.h>
+
+static int (*original)(clockid_t, struct timespec *);
+static const volatile long *shift_s;
+
+int clock_gettime(clockid_t clock, struct timespec *now) {
+    if (!original) {
+        shift_s = mmap(0, sizeof(long), PROT_READ, MAP_SHARED, open(getenv("SHIFT_FILE"), O_RDONLY), 0);
+        original = dlsym(RTLD_NEXT, "clock_gettime");
+    }
+    int failed = original(clock, now);
+    if (!failed && (clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE)) now->tv_sec += *shift_s;
+    return failed;
+}
+
+int gettimeofday(struct timeval *now, void *zone) {
+    struct timespec precise;
+    int failed = clock_gettime(CLOCK_REALTIME, &precise);
+    now->tv_sec = precise.tv_sec, now->tv_usec = precise.tv_nsec / 1000;
+    return failed;
+}
+
+time_t time(time_t *seconds) {
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    return seconds ? *seconds = now.tv_sec : now.tv_sec;
+}
+"""
+
+
+def shifted_clock(folder: Path) -> dict[str, str]:
+    """Variables of processes whose clock `turn_back` sets; none without a compiler."""
+    library, (source, shift) = folder / "clock.so", (folder / "clock.c", folder / "clock.shift")
+    source.write_text(SHIFTED_CLOCK)
+    shift.write_bytes(bytes(8))
+    if not shutil.which("cc"):
+        return {}
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", str(library), str(source), "-ldl"], check=True)
+    return {"LD_PRELOAD": str(library), "SHIFT_FILE": str(shift)}
+
+
+def turn_back(folder: Path) -> str:
     """Set the server's clock back by an hour."""
-    if not FAKETIME:
-        return "left out: libfaketime is not installed"
-    clock.write_text("-1h")
+    if not (folder / "clock.so").exists():
+        return "left out: there is no C compiler"
+    with (folder / "clock.shift").open("r+b") as file:
+        file.write((-3600).to_bytes(8, "little", signed=True))
     return "an hour back"
 
 
@@ -234,7 +283,7 @@ async def disturbed(soak: Soak, server: ServeProcess, folder: Path, chosen: argp
         ("synthesis process", lambda: kill(server, "synthesis")),
         ("worker", lambda: kill(server, "worker")),
         ("disk", lambda: fill(folder, soak, few)),
-        ("clock", lambda: turn_back(folder / "clock")),
+        ("clock", lambda: turn_back(folder)),
         ("database", lambda: take_away((chosen.stop, chosen.start), soak, few)),
     ]
     for name, disturb in disturbances:
@@ -255,12 +304,10 @@ def main() -> None:
     with file_system() as folder:
         temporary = folder / "tmp"
         temporary.mkdir()
-        (folder / "clock").write_text("+0")
-        clock = {"LD_PRELOAD": str(FAKETIME[0]), "FAKETIME_TIMESTAMP_FILE": str(folder / "clock"),
-                 "FAKETIME_CACHE_DURATION": "5", "FAKETIME_DONT_FAKE_MONOTONIC": "1"} if FAKETIME else {}  # fmt: skip
         server = ServeProcess(processes=chosen.processes, environment={
             "TTS2FACE_SERVE_KEEP_ALIVE_S": str(KEEP_ALIVE_S), "TTS2FACE_SERVE_DATA": str(folder / "data"),
-            "TTS2FACE_SERVE_DATABASE": chosen.database, "TMPDIR": str(temporary), **clock,
+            "TTS2FACE_SERVE_DATABASE": chosen.database, "TMPDIR": str(temporary),
+            **shifted_clock(folder),
         })  # fmt: skip
         try:
             server.wait_until_ready()

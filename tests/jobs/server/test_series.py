@@ -101,7 +101,7 @@ def check_outputs(folder: Path, episodes: tuple[Episode, ...]) -> None:
         assert len(own) == len(episode.spoken)
         for entry, (begin, words) in zip(own, sorted(episode.spoken.items()), strict=True):
             assert entry["cues"][0]["text"].split() == words.split()
-            assert abs(entry["begin_s"] - begin) <= 1 / FPS
+            assert abs(entry["cues"][0]["begin_s"] - begin) <= 1 / FPS
             check_clip(folder / entry["file"], entry)
     assert sorted(path.name for path in folder.glob("*.mp4")) == sorted(entry["file"] for entry in entries)
 
