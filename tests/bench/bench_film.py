@@ -15,9 +15,10 @@ from bench_renderers import clip_of
 from lexicon.errors import BackendError
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
+from tts2face.numeric.reuse import available_cores
 from tts2face.picture.baked import scene as film
 from tts2face.picture.options import PYVISTA, Picture
-from tts2face.picture.renderer import MeshRenderer, available_cores, mesh_renderer
+from tts2face.picture.renderer import MeshRenderer, mesh_renderer
 
 STAGES = {  # of a frame, and the functions of `tts2face.picture.baked.scene` that it calls
     "pose": ("LitScene.deform", "LitScene.move"),

@@ -2,6 +2,7 @@
 
 import asyncio
 import hmac
+from collections import Counter
 from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from tts2face.processes.message import EVENT, Message
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits, add_key, find_key, read_keys, remove_key
 from tts2face.serving.service.messages import Work
-from tts2face.serving.service.pool import BusyError, Pool, PoolSettings
+from tts2face.serving.service.pool import MOVIE_COST, PLACES, SOUND_COST, BusyError, Pool, PoolSettings
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 
@@ -132,10 +133,10 @@ def test_long_words_are_refused_before_any_work() -> None:
 
 
 class FakeProcess:
-    """A process that is ready; tests set what it is given."""
+    """A process that is ready and works on some movies."""
 
-    def __init__(self) -> None:
-        self.is_ready, self.load = True, 0.0
+    def __init__(self, n_movies: int = 0) -> None:
+        self.is_ready, self.tasks = True, Counter({MOVIE_COST: n_movies})
 
 
 def test_keys_take_turns() -> None:
@@ -143,20 +144,20 @@ def test_keys_take_turns() -> None:
 
     async def order() -> list[str]:
         pool = Pool(PoolSettings(n_processes=1))
-        pool.processes = [FakeProcess()]  # type: ignore[list-item]
+        pool.processes = [FakeProcess(PLACES[MOVIE_COST] - 1)]  # type: ignore[list-item]
         served: list[str] = []
 
         async def work(key: str) -> None:
-            process = await pool._take(2.0, key, "")
+            process = await pool._take(MOVIE_COST, key, "")
             served.append(key)
             await asyncio.sleep(0)
-            pool._release(process, 2.0)
+            pool._release(process, MOVIE_COST)
 
         greedy = [asyncio.create_task(work("greedy")) for _ in range(6)]
         await asyncio.sleep(0)
         modest = [asyncio.create_task(work(key)) for key in ("modest", "modest", "rare")]
         await asyncio.gather(*greedy, *modest)
-        assert pool.processes[0].load == 0.0
+        assert pool.processes[0].tasks[MOVIE_COST] == PLACES[MOVIE_COST] - 1
         return served
 
     served = asyncio.run(order())
@@ -175,13 +176,12 @@ def waiting_keys(asked: str, n_places: int) -> tuple[list[str], list[str]]:
 
     async def run() -> tuple[list[str], list[str]]:
         pool = Pool(PoolSettings(n_processes=1, max_waiting=n_places))
-        pool.processes = [FakeProcess()]  # type: ignore[list-item]
-        pool.processes[0].load = 2.0
+        pool.processes = [FakeProcess(PLACES[MOVIE_COST])]  # type: ignore[list-item]
         refused: list[str] = []
 
         async def work(key: str) -> None:
             try:
-                await pool._take(1.0, key, "")
+                await pool._take(MOVIE_COST, key, "")
             except BusyError:
                 refused.append(key)
 
@@ -218,18 +218,25 @@ def test_keys_share_the_places_to_wait(asked: str, waiting: str, refused: str) -
     assert ("".join(found), "".join(sorted(given_up))) == (waiting, "".join(sorted(refused)))
 
 
-def test_the_load_of_no_work_is_zero() -> None:
-    """Sums of tenths are not exact; a rest would refuse a process its last movie for ever."""
-
-    async def load() -> float:
+def test_short_works_do_not_wait_for_movies() -> None:
+    async def run() -> list[str]:
         pool = Pool(PoolSettings(n_processes=1))
-        pool.processes = [FakeProcess()]  # type: ignore[list-item]
-        taken = [await pool._take(0.1, "a", "") for _ in range(7)]
-        for process in taken:
-            pool._release(process, 0.1)
-        return pool.processes[0].load
+        pool.processes = [FakeProcess(PLACES[MOVIE_COST])]  # type: ignore[list-item]
+        served: list[str] = []
 
-    assert asyncio.run(load()) == 0.0
+        async def work(name: str, cost: float) -> None:
+            await pool._take(cost, "a", "")
+            served.append(name)
+
+        tasks = [asyncio.create_task(work(*one)) for one in (("movie", MOVIE_COST), ("sound", SOUND_COST))]
+        await asyncio.sleep(0.01)
+        assert served == ["sound"]
+        pool._release(pool.processes[0], MOVIE_COST)
+        await asyncio.gather(*tasks)
+        assert pool.n_waiting == 0
+        return served
+
+    assert asyncio.run(run()) == ["sound", "movie"]
 
 
 def test_all_hashes_are_compared_in_constant_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

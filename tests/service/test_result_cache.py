@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import aclosing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import pytest
 
 from lexicon.errors import BackendError
 from tts2face.processes.message import EVENT, RESULT, Message
-from tts2face.serving.service.messages import Work
+from tts2face.serving.service.messages import QUALITY, Work
 from tts2face.serving.service.result_cache import ResultCache, work_hash
 from tts2face.storage.temporary import NAME_INFIX
 
@@ -72,6 +73,18 @@ def test_a_result_that_is_not_complete_is_not_kept(tmp_path: Path, how: str) -> 
     maker = Maker(result())
     read(cache, HELLO, maker)
     assert maker.n_made == 1
+
+
+def test_a_movie_of_less_quality_is_not_kept_and_what_is_kept_serves_all(tmp_path: Path) -> None:
+    cache = ResultCache(tmp_path, 4000)
+    lowered = Message(EVENT, {"seconds": 0.0, "event": {"type": QUALITY, "has_all_samples": False, "frame_step": 1}})
+    first, *rest = result()
+    assert read(cache, HELLO, Maker([first, lowered, *rest])) == [first, lowered, *rest]
+    assert list(tmp_path.iterdir()) == []
+    read(cache, HELLO, Maker(result()))
+    maker = Maker(result())
+    assert read(cache, replace(HELLO, keeps_pace=True), maker) == result()
+    assert maker.n_made == 0
 
 
 def test_the_least_recently_used_entries_are_removed(tmp_path: Path) -> None:

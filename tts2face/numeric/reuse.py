@@ -4,11 +4,13 @@ Results of finished sentences, kept so that a request that is made again repeats
 """
 
 import contextlib
+import os
 import queue
 import threading
 from collections import OrderedDict, deque
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import cache
 from types import TracebackType
 from typing import Any, Generic, TypeVar
 
@@ -80,20 +82,39 @@ class Prefetch(Generic[Item]):
                 return self._queue.put(item, timeout=POLL_INTERVAL_S)
 
 
-def map_in_order(function: Callable[[Item], Result], items: Iterable[Item], threads: int) -> Iterator[Result]:
-    """Yield `function` of each item in order; up to `threads` results are computed in advance."""
-    with ThreadPoolExecutor(threads, "map") as pool:
-        ahead: deque[Future[Result]] = deque()
-        try:
-            for item in items:
-                ahead.append(pool.submit(function, item))
-                if len(ahead) > threads:
-                    yield ahead.popleft().result()
-            while ahead:
+def available_cores() -> int:
+    """Number of processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads, "map")
+
+
+def map_in_order(
+    function: Callable[[Item], Result], items: Iterable[Item], threads: int | None = None
+) -> Iterator[Result]:
+    """Yield `function` of each item in order.
+
+    Parameters
+    ----------
+    threads
+        Number of results that are computed in advance, in as many threads, which all maps of this number share; None:
+        one for each core.
+    """
+    n_ahead, ahead = threads or available_cores(), deque[Future[Result]]()
+    pool = _pool(n_ahead)
+    try:
+        for item in items:
+            ahead.append(pool.submit(function, item))
+            if len(ahead) > n_ahead:
                 yield ahead.popleft().result()
-        finally:
-            for pending in ahead:
-                pending.cancel()
+        while ahead:
+            yield ahead.popleft().result()
+    finally:
+        for pending in ahead:
+            pending.cancel()
 
 
 Value = TypeVar("Value")

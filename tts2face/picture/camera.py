@@ -33,6 +33,10 @@ class CameraMatrices:
     view: NDArray[np.float64]
     lens: NDArray[np.float64]
 
+    def scaled(self, share: float) -> "CameraMatrices":
+        """The same camera for a picture of `share` times as many samples on each side."""
+        return CameraMatrices(self.view, self.lens * [share, share, share, 1.0])
+
 
 def camera_matrices(camera: CameraView, face: Face, size: tuple[int, int]) -> CameraMatrices:
     """Camera matrices that frame a face in a picture of `size` (width, height) in samples.

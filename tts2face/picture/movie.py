@@ -6,6 +6,7 @@ Pictures of consecutive clips, each with the sound of its frame.
 """
 
 import math
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.picture.options import Picture
+from tts2face.picture.pace import Pace
 from tts2face.picture.provenance import WriteBuffer, append_to_mp4
 from tts2face.picture.renderer import FrameRenderer
 from tts2face.types import Chunk, Clip, exact_rate, first_sample
@@ -100,7 +102,13 @@ def _nearest(value: Fraction) -> int:
 
 
 class MovieWriter:
-    """Sink that encodes pictures and sound; `finish` completes the file."""
+    """Sink that encodes pictures and sound; `finish` completes the file.
+
+    Attributes
+    ----------
+    n_frames
+        Frame of the next picture; the one before it is shown until then.
+    """
 
     def __init__(
         self,
@@ -122,7 +130,7 @@ class MovieWriter:
         self._fps, self._rate = clock
         self._path, self._notice = path, notice if kind.container == "mp4" else ""
         fps = self._fps
-        self._n_frames = self._n_samples = 0
+        self.n_frames = self._n_samples = 0
         self._fill_colour: NDArray[np.uint8] | None = None
         target = str(path) if isinstance(path, Path) else path
         self._container: Any = av.open(target, "w", format=kind.container, options=dict(kind.container_options))
@@ -158,8 +166,8 @@ class MovieWriter:
             src_color_range=ColorRange.JPEG,
             dst_color_range=ColorRange.MPEG,
         )
-        frame.pts, frame.time_base = self._n_frames, 1 / self._fps
-        self._n_frames += 1
+        frame.pts, frame.time_base = self.n_frames, 1 / self._fps
+        self.n_frames += 1
         mux_pictures(self._container, self._video.encode(frame), self._audio)
 
     def _fill_transparent(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -208,11 +216,13 @@ class ClipFrames:
         Renderer of the clips' frames.
     threads
         Number of frames drawn in advance; None for one on each core.
+    pace
+        Of a movie that is seen while it is made: frames may have fewer samples, or none. None: all are drawn.
     """
 
-    def __init__(self, renderer: FrameRenderer, threads: int | None = None) -> None:
+    def __init__(self, renderer: FrameRenderer, threads: int | None = None, pace: Pace | None = None) -> None:
         self.n_frames = self.n_added = 0
-        self._renderer, self._threads = renderer, threads
+        self._renderer, self._threads, self._pace = renderer, threads, pace
         self._n_samples = 0
         self._clock: tuple[float, int] | None = None
 
@@ -222,7 +232,8 @@ class ClipFrames:
         Yields
         ------
         pixels : (H, W, 3 or 4) or None
-            Picture; None for the first item, which is the silence up to the clip's first frame.
+            Picture; None for the first item, which is the silence up to the clip's first frame, and for frames that
+            are not drawn.
         samples : (n,)
             Sound of the frame.
 
@@ -235,16 +246,44 @@ class ClipFrames:
             self._clock = (clip.fps, clip.speech.waveform.rate)
         if self._clock != (clip.fps, clip.speech.waveform.rate):
             raise InputError(f"clips of one file must share fps and sound rate; this one has {clip.fps:g} fps")
-        begin = self._first_sample(self.n_frames)
+        first = self.n_frames
+        begin = self._first_sample(first)
         yield None, np.zeros(begin - self._n_samples, np.float32)  # the previous clip ended within a frame
         self.n_added += len(clip.motion)
         at, samples = 0, clip.speech.waveform.samples
-        for pixels in self._renderer.frames(clip, threads=self._threads, first=self.n_frames):
-            self.n_frames += 1
-            until = min(self._first_sample(self.n_frames) - begin, len(samples))
-            yield pixels, samples[at:until]
-            at = until
+        for number, pixels in self._pictures(clip):
+            while self.n_frames <= first + number:
+                is_drawn = self.n_frames == first + number
+                self.n_frames += 1
+                until = min(self._first_sample(self.n_frames) - begin, len(samples))
+                yield pixels if is_drawn else None, samples[at:until]
+                at = until
+                if self._pace is not None:
+                    self._pace.advance(clip.fps)
         self._n_samples = begin + at
+
+    def _pictures(self, clip: Clip) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+        """Numbers of the frames that are drawn, the first and the last among them, and their pictures."""
+        pace, n_frames, first = self._pace, len(clip.motion), self.n_frames
+        if pace is None:
+            yield from enumerate(self._renderer.frames(clip, threads=self._threads, first=first))
+            return
+        pace.begin()
+        at, begun = 0, deque[int]()
+
+        def choose(*, has_all_samples: bool) -> Iterator[int]:
+            nonlocal at
+            while at < n_frames and pace.quality.has_all_samples == has_all_samples:
+                begun.append(at)
+                yield at
+                at = at + 1 if at == n_frames - 1 else min(at + pace.quality.frame_step, n_frames - 1)
+
+        while at < n_frames:
+            has_all_samples = pace.quality.has_all_samples
+            renderer = self._renderer if has_all_samples else self._renderer.with_fewest_samples()
+            chosen = choose(has_all_samples=has_all_samples)
+            for pixels in renderer.frames(clip, chosen, threads=self._threads, first=first):
+                yield begun.popleft(), pixels
 
     def _first_sample(self, frame: int) -> int:
         fps, rate = self._clock or (1.0, 1)
@@ -267,8 +306,9 @@ MOVIE_KINDS = {
 
 
 def encode_movie(
-    clips: Iterable[Clip], renderer: FrameRenderer, format: str, *, threads: int | None = None
-) -> Iterator[Chunk]:
+    clips: Iterable[Clip], renderer: FrameRenderer, format: str, *, threads: int | None = None,
+    pace: Pace | None = None,
+) -> Iterator[Chunk]:  # fmt: skip
     """Draw and encode consecutive clips; yields a chunk of the movie after each frame.
 
     Fragments of a fifth of a second can be played when they arrive.
@@ -277,25 +317,28 @@ def encode_movie(
     ----------
     format
         One of `MOVIE_KINDS`.
-    threads
-        Number of frames drawn in advance; None for one on each core.
+    threads, pace
+        As for `ClipFrames`.
 
     Raises
     ------
     InputError
         The format is unknown or cannot be transparent, or the clips differ in fps, sound rate or channels.
     """
-    kind, frames = find_movie_kind(format, renderer.picture), ClipFrames(renderer, threads)
-    buffer, writer = WriteBuffer(), None
+    kind, frames = find_movie_kind(format, renderer.picture), ClipFrames(renderer, threads, pace)
+    buffer, writer, n_frames = WriteBuffer(), None, 0
     try:
         for clip in clips:
             writer = writer or _open_movie(buffer, kind, clip, renderer)
             for pixels, samples in frames.add(clip):
+                seconds = (frames.n_frames - n_frames) / clip.fps
+                n_frames = frames.n_frames
                 if pixels is not None:
+                    writer.n_frames = n_frames - 1
                     writer.picture(pixels)
                 if len(samples):
                     writer.sound(samples)
-                yield Chunk(buffer.take(), 0.0 if pixels is None else 1.0 / clip.fps)
+                yield Chunk(buffer.take(), seconds)
         if writer is not None:
             writer.finish()
             writer = None

@@ -11,7 +11,7 @@ Pixel coordinates have their origin at the centre of the top left pixel. Every k
 and runs on one thread.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,7 +34,6 @@ from tts2face.picture.plate import (
     fit_background_video,
     texture_samples,
 )
-from tts2face.picture.scene import available_cores
 from tts2face.types import Clip
 
 Array = NDArray[Any]
@@ -186,7 +185,9 @@ class OwnFaceRenderer:
         """Number of speech and appearance channels."""
         return self.shapes.n_speech + len(self.appearance.channels)
 
-    def frames(self, clip: Clip, *, threads: int | None = None, first: int = 0) -> Iterator[NDArray[np.uint8]]:
+    def frames(
+        self, clip: Clip, numbers: Iterable[int] | None = None, *, threads: int | None = None, first: int = 0
+    ) -> Iterator[NDArray[np.uint8]]:
         """Pictures (H, W, 3) of a clip's frames; frame i shows the video at ``(first + i) / fps`` seconds.
 
         Raises
@@ -200,12 +201,16 @@ class OwnFaceRenderer:
         def draw_one(number: int) -> NDArray[np.uint8]:
             return draw_video_frame(self, values[number], self.plate_frame(float(instants[number])))
 
-        yield from map_in_order(draw_one, range(len(instants)), threads or available_cores())
+        yield from map_in_order(draw_one, range(len(instants)) if numbers is None else numbers, threads)
 
     def frame(self, clip: Clip, number: int) -> NDArray[np.uint8]:
         """Picture (H, W, 3) of one frame of a clip."""
         position = float(self._positions(np.array([number]), clip.fps)[0])
         return draw_video_frame(self, self._motion(clip)[number], self.plate_frame(position / clip.fps))
+
+    def with_fewest_samples(self) -> "OwnFaceRenderer":
+        """The same renderer: it takes one sample a pixel."""
+        return self
 
     def _positions(self, frames: NDArray[np.int64], fps: float) -> NDArray[np.float64]:
         """Positions in the video, in frames of the clip, at frames of the clip.

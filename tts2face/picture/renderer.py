@@ -6,8 +6,8 @@ A small label in the corner of pictures, which says that they are synthetic.
 """
 
 from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -21,8 +21,8 @@ from tts2face.picture import vtk_renderer
 from tts2face.picture.baked.photo_scene import build_photo_scene
 from tts2face.picture.baked.scene import LitScene, build_lit_scene
 from tts2face.picture.camera import camera_matrices
-from tts2face.picture.options import PYVISTA, Picture
-from tts2face.picture.scene import Scene, available_cores, build_scene, draw_background
+from tts2face.picture.options import PYVISTA, STANDARD, Picture
+from tts2face.picture.scene import Scene, build_scene, draw_background
 from tts2face.types import Clip
 
 
@@ -40,11 +40,13 @@ class FrameRenderer(Protocol):
     def notice(self) -> str:
         """Comment for every file with these frames; empty unless they show a real person."""
 
-    def frames(self, clip: Clip, *, threads: int | None = None, first: int = 0) -> Iterator[NDArray[np.uint8]]:
+    def frames(
+        self, clip: Clip, numbers: Iterable[int] | None = None, *, threads: int | None = None, first: int = 0
+    ) -> Iterator[NDArray[np.uint8]]:
         """Pictures (H, W, 3), or (H, W, 4) with coverage, of a clip's frames in order.
 
-        At most `threads` frames are drawn in advance; `first` is the index of the clip's first frame in a stream of
-        clips.
+        `numbers` names frames, each when its drawing begins; None: all. At most `threads` frames are drawn in advance;
+        `first` is the index of the clip's first frame in a stream of clips.
 
         Raises
         ------
@@ -54,6 +56,9 @@ class FrameRenderer(Protocol):
 
     def frame(self, clip: Clip, number: int) -> NDArray[np.uint8]:
         """Picture of one frame of a clip."""
+
+    def with_fewest_samples(self) -> "FrameRenderer":
+        """Renderer with one sample a pixel, which draws faster where samples cost time."""
 
 
 TEXT = "synthetic"
@@ -79,13 +84,19 @@ class MarkedRenderer:
         """Comment for every file with these frames."""
         return self.renderer.notice
 
-    def frames(self, clip: Clip, *, threads: int | None = None, first: int = 0) -> Iterator[NDArray[np.uint8]]:
+    def frames(
+        self, clip: Clip, numbers: Iterable[int] | None = None, *, threads: int | None = None, first: int = 0
+    ) -> Iterator[NDArray[np.uint8]]:
         """Pictures (H, W, 3 or 4) of a clip's frames in order; errors as of the renderer."""
-        return map(self._marked, self.renderer.frames(clip, threads=threads, first=first))
+        return map(self._marked, self.renderer.frames(clip, numbers, threads=threads, first=first))
 
     def frame(self, clip: Clip, number: int) -> NDArray[np.uint8]:
         """Picture of one frame of a clip."""
         return self._marked(self.renderer.frame(clip, number))
+
+    def with_fewest_samples(self) -> FrameRenderer:
+        """Renderer with one sample a pixel."""
+        return MarkedRenderer(self.renderer.with_fewest_samples(), self.label)
 
     def _marked(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
         return _with_label(pixels, self.label)
@@ -130,9 +141,13 @@ def _label(width: int, height: int) -> NDArray[np.float32]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshRenderer:
-    """Renderer of a mesh face; implements `tts2face.picture.renderer.FrameRenderer`."""
+    """Renderer of a mesh face; implements `tts2face.picture.renderer.FrameRenderer`.
+
+    ``buffers`` are those that no frame is drawn into at the moment.
+    """
 
     scene: Scene | LitScene
+    buffers: deque[Any] = field(default_factory=deque)
 
     @property
     def picture(self) -> Picture:
@@ -144,7 +159,9 @@ class MeshRenderer:
         """Comment for every written file; empty unless the face is the likeness of a real person."""
         return self.scene.face.synthetic_notice
 
-    def frames(self, clip: Clip, *, threads: int | None = None, first: int = 0) -> Iterator[NDArray[np.uint8]]:
+    def frames(
+        self, clip: Clip, numbers: Iterable[int] | None = None, *, threads: int | None = None, first: int = 0
+    ) -> Iterator[NDArray[np.uint8]]:
         """Pictures (H, W, 3 or 4) of a clip's frames in order.
 
         The clip's channels are the first shapes of the face; weights of further shapes are 0.
@@ -156,21 +173,12 @@ class MeshRenderer:
         """
         del first  # a mesh has no background video
         values = self._weights(clip)
-        poses = zip(values, clip.head.values, strict=True)
+        chosen = range(len(values)) if numbers is None else numbers
+        poses = ((values[number], clip.head.values[number]) for number in chosen)
         if self.picture.renderer == PYVISTA and isinstance(self.scene, Scene):
             yield from vtk_renderer.render_frames(self.scene, poses)
             return
-        n_threads = threads or available_cores()
-        free_buffers = deque(self.scene.allocate_buffers() for _ in range(n_threads))
-
-        def draw_one(pose: tuple[NDArray[np.float32], NDArray[np.float32]]) -> NDArray[np.uint8]:
-            buffers = free_buffers.popleft()
-            try:
-                return self._draw(*pose, buffers)
-            finally:
-                free_buffers.append(buffers)
-
-        yield from map_in_order(draw_one, poses, n_threads)
+        yield from map_in_order(lambda pose: self._draw(*pose), poses, threads)
 
     def frame(self, clip: Clip, number: int) -> NDArray[np.uint8]:
         """Picture (H, W, 3 or 4) of one frame of a clip."""
@@ -191,7 +199,14 @@ class MeshRenderer:
         if self.picture.renderer == PYVISTA and isinstance(self.scene, Scene):
             (pixels,) = vtk_renderer.render_frames(self.scene, [pose])
             return pixels
-        return self._draw(*pose, self.scene.allocate_buffers())
+        return self._draw(*pose)
+
+    def with_fewest_samples(self) -> "MeshRenderer":
+        """Renderer with one sample a pixel."""
+        fewest = replace(self.picture, supersampling=1, quality=STANDARD)
+        if self.picture.renderer == PYVISTA or fewest.samples == self.picture.samples:
+            return self
+        return MeshRenderer(self.scene.with_picture(fewest))
 
     def _weights(self, clip: Clip) -> NDArray[np.float32]:
         names = self.scene.face.shape_names
@@ -204,11 +219,16 @@ class MeshRenderer:
             return clip.motion.values
         return np.pad(clip.motion.values, ((0, 0), (0, len(names) - n_channels)))
 
-    def _draw(self, weights: NDArray[np.float32], head: NDArray[np.float32], buffers: Any) -> NDArray[np.uint8]:
+    def _draw(self, weights: NDArray[np.float32], head: NDArray[np.float32]) -> NDArray[np.uint8]:
         picture, background = self.picture, self.scene.background
         pixels = np.zeros((picture.height, picture.width, picture.channels), np.uint8)
         pixels[:, :, : background.shape[2]] = background
+        try:
+            buffers = self.buffers.pop()
+        except IndexError:
+            buffers = self.scene.allocate_buffers()
         self.scene.draw(weights, head, buffers, pixels)
+        self.buffers.append(buffers)
         return pixels
 
 

@@ -1,6 +1,5 @@
 """Scene of a mesh face: everything that is constant over the frames of a clip, including the background."""
 
-import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.face.deformation import head_transform
 from tts2face.models.face import Face
+from tts2face.numeric.reuse import available_cores
 from tts2face.picture.camera import CameraMatrices, camera_matrices
 from tts2face.picture.kernels.picture import (
     DrawingBuffers,
@@ -44,6 +44,11 @@ class Scene:
     lights: NDArray[np.float32]
     exposure: Exposure
     background: NDArray[np.uint8]
+
+    def with_picture(self, picture: Picture) -> "Scene":
+        """The same scene with another number of samples a pixel."""
+        share = picture.samples_per_side / self.picture.samples_per_side
+        return replace(self, picture=picture, optics=self.optics.scaled(share))
 
     def pose(self, weights: NDArray[np.float32], head: NDArray[np.float32]) -> Pose:
         """The face with shape weights (K,) and a head pose (6,), lit."""
@@ -103,11 +108,6 @@ def without_hidden_backs(face: Face, surface: Surface, view: CameraView) -> Surf
     phase = surface.phase.copy()
     phase[is_closed, 1] = NOT_DRAWN
     return replace(surface, phase=phase)
-
-
-def available_cores() -> int:
-    """Number of processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def draw_background(picture: Picture, studio: NDArray[np.uint8] | None = None) -> NDArray[np.uint8]:

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, InputError
 from tts2face.models.face import Face
+from tts2face.numeric.reuse import available_cores
 from tts2face.picture.camera import CameraMatrices, camera_matrices
 from tts2face.picture.kernels.tables import lamp_directions, light_table
 from tts2face.picture.light import compute_exposure
 from tts2face.picture.options import Picture, parse_background
-from tts2face.picture.scene import available_cores
 from tts2face.picture.surface import build_surface
 from tts2face.picture.vtk_renderer import (
     ON_SCREEN,

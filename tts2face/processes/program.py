@@ -20,6 +20,7 @@ NEW_USERS, NEW_NETWORK = 0x10000000, 0x40000000  # flags of unshare in Linux's s
 
 # glibc returns blocks of 1 MiB and more to the system, instead of keeping those of each thread (decision 073).
 RETURNED_BLOCKS = {"MALLOC_MMAP_THRESHOLD_": "1048576", "MALLOC_TRIM_THRESHOLD_": "1048576"}
+ONE_THREAD = {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}  # for each library
 KEPT_VARIABLES = (
     "PATH", "HOME", "LANG", "LC_", "TMPDIR", "TEMP", "SYSTEMROOT", "LOCALAPPDATA", "XDG_", "PYTHON", "VIRTUAL_ENV",
     "NUMBA_", "TTS2FACE_FACE_MODEL",
@@ -49,16 +50,15 @@ def limit_process(limits: ProcessLimits) -> None:
         ctypes.CDLL(None).unshare(NEW_USERS | NEW_NETWORK)  # refused in some containers
 
 
-def child_environment(core: int | None) -> dict[str, str]:
-    """Variables of a child that is bound to a core, or to none."""
-    threads = {} if core is None else {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    return dict(os.environ) | RETURNED_BLOCKS | threads
+def child_environment(*, has_own_threads: bool) -> dict[str, str]:
+    """Variables of a child; the libraries of one that has threads of its own, or one core, have one each."""
+    return dict(os.environ) | RETURNED_BLOCKS | (ONE_THREAD if has_own_threads else {})
 
 
 def bare_environment() -> dict[str, str]:
     """Variables of a process that reads uploads: no credentials, one thread for each library."""
     kept = {name: value for name, value in os.environ.items() if name.startswith(KEPT_VARIABLES)}
-    return {**kept, "NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    return kept | ONE_THREAD
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,9 @@ class Program:
 
     def environment(self) -> dict[str, str]:
         """Variables of the child."""
-        return child_environment(self.core) if self.limits is None else bare_environment()
+        if self.limits is not None:
+            return bare_environment()
+        return child_environment(has_own_threads=self.core is not None or self.at_once > 1)
 
     def load(self) -> Mapping[str, Any]:
         """The handlers by name.

@@ -24,6 +24,7 @@ from tts2face.numeric.reuse import Prefetch
 from tts2face.picture.film import ClipWriter, check_output
 from tts2face.picture.movie import MOVIE_KINDS, encode_movie, find_movie_kind
 from tts2face.picture.options import Picture
+from tts2face.picture.pace import Pace
 from tts2face.picture.renderer import FrameRenderer
 from tts2face.picture.sound_stream import SOUND_KINDS, encode_sound
 from tts2face.session.animated_face import AnimatedFace
@@ -262,8 +263,8 @@ class StreamFormat:
 
     Parameters
     ----------
-    threads
-        Number of frames drawn in advance; None for one on each core.
+    threads, pace
+        As for `tts2face.picture.movie.ClipFrames`.
 
     Raises
     ------
@@ -274,6 +275,7 @@ class StreamFormat:
     name: str
     picture: Picture
     threads: int | None = None
+    pace: Pace | None = None
 
     def __post_init__(self) -> None:
         """Check the format."""
@@ -289,7 +291,7 @@ def encode_stream(prepared: PreparedRequest, models: SessionModels, format: Stre
     if name in MOVIE_KINDS:
         renderer = models.renderer(format.picture, has_gestures=request.has_gestures)
         clips = (piece.clip for piece in models.pieces(prepared))
-        return encode_movie(clips, renderer, name, threads=format.threads)
+        return encode_movie(clips, renderer, name, threads=format.threads, pace=format.pace)
     if name in SOUND_KINDS:
         if request.audio is None:
             pieces = spoken_pieces(prepared, models.for_request(prepared).speech, has_phones=False)

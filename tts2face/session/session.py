@@ -11,6 +11,7 @@ from tts2face.models.palette import Derivation, Palette
 from tts2face.models.talker import Talker
 from tts2face.numeric.reuse import SentenceMemory
 from tts2face.picture.options import Picture
+from tts2face.picture.pace import Pace
 from tts2face.picture.renderer import FrameRenderer
 from tts2face.request import Request
 from tts2face.session.animated_face import AnimatedFace
@@ -192,6 +193,7 @@ class Session:
         *,
         picture: Picture | None = None,
         threads: int | None = None,
+        pace: Pace | None = None,
         **options: Any,
     ) -> Iterator[Chunk]:
         """Synthesise and encode the clip of a text or request; yields the file in chunks while it is made.
@@ -206,6 +208,9 @@ class Session:
             lips nor phones, and starts sooner.
         threads
             Number of frames drawn in advance; None for one on each core.
+        pace
+            Lowers the quality of a movie that is made more slowly than it is seen; None: the quality is that of
+            `picture`.
 
         Raises
         ------
@@ -214,7 +219,7 @@ class Session:
         """
         picture, options = split_picture(picture, options)
         prepared = prepare_request(text, options)
-        return encode_stream(prepared, self._models, StreamFormat(format, picture, threads))
+        return encode_stream(prepared, self._models, StreamFormat(format, picture, threads, pace))
 
     def write(
         self,

@@ -27,12 +27,13 @@ from tts2face.interchange.exports.surfaces import (
 )
 from tts2face.interchange.gltf.container import INDICES, VERTICES, GltfBuffer
 from tts2face.models.face import HEAD_LIMIT_RAD, SHIFT_GAIN, Face, Texture
+from tts2face.numeric.reuse import available_cores
 from tts2face.picture.camera import FIELD_OF_VIEW_RAD, framing_box
 from tts2face.picture.kernels import tables
 from tts2face.picture.kernels.tables import DARK_GLOSS, GLOSS, OPEN_SURFACE, ROUGHNESS, SECOND_LOBE, WRAP
 from tts2face.picture.light import light_fields, lip_opening
 from tts2face.picture.options import NAMED_VIEWS
-from tts2face.picture.scene import STUDIO_BRIGHT, STUDIO_CENTRE, STUDIO_DARK, available_cores
+from tts2face.picture.scene import STUDIO_BRIGHT, STUDIO_CENTRE, STUDIO_DARK
 from tts2face.picture.surface import SKULL_CENTRE_MM, STRANDS, Surface, build_surface
 from tts2face.types import HEAD_CHANNELS
 

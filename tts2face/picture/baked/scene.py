@@ -5,7 +5,7 @@ Interpolation of baked light between turns of the head and between cameras.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -170,6 +170,11 @@ class LitScene:
     answers: tuple[Any, ...]
     turns: Cardinal
     wall: NDArray[np.uint8] | None = None
+
+    def with_picture(self, picture: Picture) -> "LitScene":
+        """The same scene with another number of samples a pixel."""
+        optics = self.optics.scaled(picture.samples_per_side / self.picture.samples_per_side)
+        return replace(self, picture=picture, optics=optics, camera=_camera(optics))
 
     def allocate_buffers(self) -> LitBuffers:
         """Buffers for pictures of this scene."""
@@ -349,16 +354,13 @@ def build_lit_scene(
     surface = build_surface(face, light)
     level = _level(surface, optics, side)
     texels, size = stack_pages(light.pages, level, covers)
-    axes = optics.view[:, :3]
-    place = -axes.T @ optics.view[:, 3]
-    camera = np.concatenate([place, axes.ravel(), optics.lens[:3]]).astype(np.float32)
     return LitScene(
         face=face,
         picture=picture,
         background=background,
         surface=surface,
         optics=optics,
-        camera=camera,
+        camera=_camera(optics),
         texels=texels,
         texture_size=size,
         from_camera=_from_camera(light, picture.view.yaw_deg),
@@ -373,6 +375,13 @@ def build_lit_scene(
         turns=turn_weights(light.turns_deg),
         wall=None if covers is None else background,
     )
+
+
+def _camera(optics: CameraMatrices) -> Float32Array:
+    """Place, axes and lens of a camera, as kernels read them."""
+    axes = optics.view[:, :3]
+    place = -axes.T @ optics.view[:, 3]
+    return np.concatenate([place, axes.ravel(), optics.lens[:3]]).astype(np.float32)
 
 
 def _planes(base: NDArray[np.generic]) -> Float32Array:

@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import BackendError, InputError
+from tts2face.numeric.reuse import available_cores
 from tts2face.processes.message import Message
 from tts2face.types import Chunk
 
@@ -19,7 +20,11 @@ if TYPE_CHECKING:
 
 Inputs = deque[Message]  # that a task has not read yet
 SYNTHESISE, SERVE = "synthesise", "serve"  # calls of a synthesis process
+DRAWING_THREADS = min(
+    4, available_cores()
+)  # of a process, for all its movies: drawing takes 4 times as long as encoding
 CANCEL = "cancel"  # input of live streams
+QUALITY = "quality"  # type of an event: the pictures have another one from here on
 
 
 class DefectError(BackendError):
@@ -42,6 +47,8 @@ class Work:
         Format of `Session.stream_file`; empty: the result is not such a file.
     owner
         For whom finished sentences are kept in memory (`SessionCache.get`); empty: none are.
+    keeps_pace
+        A movie has pictures of less quality rather than falling behind who sees it (`tts2face.picture.pace.Pace`).
     affinity
         Works of equal affinity run in the same process if it is free, which keeps their sentences; empty: any.
     """
@@ -52,6 +59,7 @@ class Work:
     picture: Mapping[str, Any] = field(default_factory=dict)
     format: str = ""
     owner: str = ""
+    keeps_pace: bool = False
     affinity: str = ""
 
     def as_json(self) -> dict[str, Any]:

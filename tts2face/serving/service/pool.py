@@ -4,16 +4,16 @@ The server's side of one synthesis process.
 """
 
 import asyncio
-import os
 import time
 import zlib
-from collections import OrderedDict, deque
+from collections import Counter, OrderedDict, deque
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import aclosing, suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 from lexicon.errors import BackendError, Tts2faceError
+from tts2face.numeric.reuse import available_cores
 from tts2face.picture.movie import MOVIE_KINDS
 from tts2face.picture.sound_stream import SOUND_KINDS
 from tts2face.processes.message import Message
@@ -40,21 +40,18 @@ class WarmProcess:
         Works, as `Work.as_json`, that load models and compile kernels before the process is ready.
     on_change
         Called whenever the process becomes ready or ends.
-    core
-        Core to which it is bound; None: all.
     """
 
     def __init__(
-        self, settings: Mapping[str, Any], warm: Sequence[Mapping[str, Any]], on_change: Callable[[], None],
-        core: int | None = None,
-    ) -> None:  # fmt: skip
-        program = Program(PROGRAM, core=core, at_once=AT_ONCE, settings=settings, has_log=True)
+        self, settings: Mapping[str, Any], warm: Sequence[Mapping[str, Any]], on_change: Callable[[], None]
+    ) -> None:
+        program = Program(PROGRAM, at_once=AT_ONCE, settings=settings, has_log=True)
         self._child = AsyncChild(program, self._note_released)
         self._warm, self._on_change = warm, on_change
         self.is_ready = False
         self.is_closed = False
         self.on_cancelled: Callable[[float], None] = _ignore  # called with the seconds until a task was released
-        self.load = 0.0  # sum of the costs of its tasks
+        self.tasks: Counter[float] = Counter()  # their number, by their cost
 
     @property
     def pid(self) -> int | None:
@@ -124,7 +121,7 @@ def _ignore(_: float) -> None:
 
 
 MOVIE_COST, LINES_COST, SOUND_COST = 1.0, 0.2, 0.1  # shares of a core of a stream in real time, rounded up
-CAPACITY = 2.0  # cost of the tasks that one process takes at a time
+PLACES = {MOVIE_COST: 8, LINES_COST: 10, SOUND_COST: 20}  # tasks of each cost that one process takes at a time
 MAX_TRIES = 2  # of a request whose process ended before anything was sent
 STREAM_PRIORITY = 0
 
@@ -145,7 +142,7 @@ class PoolSettings:
     Parameters
     ----------
     n_processes
-        Number of synthesis processes, each bound to a core; 0: one for each core.
+        Number of synthesis processes; 0: one for each core.
     max_waiting
         Requests that may wait; further ones are refused.
     warm
@@ -158,6 +155,10 @@ class PoolSettings:
     max_waiting: int = 64
     warm: tuple[dict[str, Any], ...] = ()
     handlers: Mapping[str, Any] = field(default_factory=dict)
+
+
+def _load(process: WarmProcess) -> float:
+    return sum(cost * number for cost, number in process.tasks.items())
 
 
 def work_cost(work: Work) -> float:
@@ -177,12 +178,8 @@ class Pool:
 
     def __init__(self, settings: PoolSettings) -> None:
         self.settings = settings
-        cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
-        count = settings.n_processes or len(cores) or os.cpu_count() or 1
-        self.processes = [
-            WarmProcess(settings.handlers, settings.warm, self._wake, cores[number % len(cores)] if cores else None)
-            for number in range(count)
-        ]
+        count = settings.n_processes or available_cores()
+        self.processes = [WarmProcess(settings.handlers, settings.warm, self._wake) for _ in range(count)]
         self._waiting: OrderedDict[str, deque[_Waiting]] = OrderedDict()
         self._runs: list[asyncio.Task[None]] = []
 
@@ -205,7 +202,7 @@ class Pool:
     @property
     def load(self) -> float:
         """Cost of all running works."""
-        return sum(process.load for process in self.processes)
+        return sum(_load(process) for process in self.processes)
 
     def start(self) -> None:
         """Start the processes in the running event loop."""
@@ -254,9 +251,10 @@ class Pool:
                 self._release(process, cost)
 
     async def _take(self, cost: float, key: str, affinity: str) -> WarmProcess:
-        found = None if self._waiting else self._free_process(cost, affinity)
+        is_first = all(one[0] != cost for queue in self._waiting.values() for one in queue)
+        found = self._free_process(cost, affinity) if is_first else None
         if found is not None:
-            found.load += cost
+            found.tasks[cost] += 1
             return found
         if self.n_waiting >= self.settings.max_waiting:
             self._make_room(key)
@@ -288,35 +286,27 @@ class Pool:
         self._forget(largest, newest)
 
     def _release(self, process: WarmProcess, cost: float) -> None:
-        process.load = round(process.load - cost, 6)  # sums of tenths are not exact: the load of no work is zero
+        process.tasks[cost] -= 1
         self._wake()
 
     def _free_process(self, cost: float, affinity: str = "") -> WarmProcess | None:
-        free = [one for one in self.processes if one.is_ready and (one.load == 0 or one.load + cost <= CAPACITY)]
+        free = [one for one in self.processes if one.is_ready and one.tasks[cost] < PLACES[cost]]
         usual = self.processes[zlib.crc32(affinity.encode()) % len(self.processes)] if affinity else None
         if usual in free:
             return usual
-        return min(free, key=lambda one: one.load, default=None)
+        return min(free, key=_load, default=None)
 
     def _wake(self) -> None:
-        """Give free processes to waiting works, one key after the other."""
+        """Give free processes to waiting works, one key after the other; those of one cost do not wait for others."""
         for key in list(self._waiting):
-            queue = self._waiting[key]
-            while queue and queue[0][2].done():
-                queue.popleft()
-            if not queue:
-                del self._waiting[key]
-                continue
-            cost, _, future = queue[0]
-            process = self._free_process(cost)
-            if process is None:
-                return
-            process.load += cost
-            queue.popleft()
-            future.set_result(process)
-            self._waiting.move_to_end(key)
-            if not queue:
-                del self._waiting[key]
+            for cost, _, future in list(self._waiting[key]):
+                process = None if future.done() else self._free_process(cost)
+                if process is not None:
+                    process.tasks[cost] += 1
+                    future.set_result(process)
+                    self._waiting.move_to_end(key)
+                    self._forget(key, future)
+                    break
 
     def _forget(self, key: str, future: "asyncio.Future[WarmProcess]") -> None:
         queue = self._waiting.get(key)

@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 
 from tts2face import __version__
 from tts2face.processes.message import RESULT, Message, read_message
-from tts2face.serving.service.messages import Work
+from tts2face.serving.service.messages import QUALITY, Work
 from tts2face.storage.content_store import FolderStore, content_hash
 from tts2face.storage.temporary import Temporary
 
@@ -27,6 +27,7 @@ FILE_FIELDS = ("audio", "timeline", "dictionary", "background")  # whose files a
 def work_hash(work: Work) -> str:
     """SHA-256 of a work with the contents of its files, of the version of the program, and of the format of entries."""
     described = work.as_json()
+    del described["keeps_pace"]  # what is kept has the full quality
     described["request"] = _with_contents(work.request)
     described["picture"] = _with_contents(work.picture)
     described["models"] = {name: _file_state(value) for name, value in work.models.items()}
@@ -85,6 +86,8 @@ class ResultCache:
         try:
             async with aclosing(made):  # type: ignore[type-var]
                 async for message in made:
+                    if message.content.get("event", {}).get("type") == QUALITY:
+                        draft.close()
                     await asyncio.to_thread(draft.add, message)
                     if message.kind == RESULT:
                         await asyncio.to_thread(self._keep, name, draft)

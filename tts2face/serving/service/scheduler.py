@@ -24,16 +24,16 @@ class _Task:
 
     Parameters
     ----------
-    begin
-        Second of the clock.
+    dry_at
+        Second of the clock at which a listener, who waits for what is not made yet, has heard all of the result.
     seconds
-        Of the clip made so far.
+        Of the result made so far.
     """
 
     turns: "Turns"
     call: Call
     priority: int
-    begin: float
+    dry_at: float
     seconds: float = 0.0
     cpu_s: float = 0.0
 
@@ -43,16 +43,19 @@ class _Task:
         with self.call.changed:
             return any(one.content.get("type") == CANCEL for one in self.call.inputs)
 
-    def lead(self, now: float) -> float:
-        """Seconds by which the result is ahead of a listener who began at the request."""
-        return self.seconds - (now - self.begin)
+    def add(self, seconds: float, now: float) -> None:
+        """Note that the result has become longer."""
+        self.seconds += seconds
+        if seconds:
+            self.dry_at = max(self.dry_at, now) + seconds
 
 
 class Turns:
     """Gives turns of some hundredths of a second to calls that run at once in the threads of one process.
 
     A stopped call goes first, to release what it holds; then one with an urgent input; then by priority, a higher one
-    when no other can run; then whichever is nearest to running dry. A paused call waits.
+    when no other can run; then whichever runs dry first, or has been dry longest: a new one counts from its request.
+    So none waits longer than it takes all others to have a part made (decision 182). A paused call waits.
 
     Parameters
     ----------
@@ -65,6 +68,11 @@ class Turns:
         self._waiting: list[_Task] = []
         self._holder: _Task | None = None
         self._taken_at = 0.0
+
+    @property
+    def now(self) -> float:
+        """Second of the clock."""
+        return self._clock()
 
     def run(self, call: Call, make: Callable[[], Iterator[Step]], priority: int = 0) -> dict[str, float]:
         """Send the parts of a result; its seconds and those of the turns.
@@ -88,6 +96,7 @@ class Turns:
                 if isinstance(step, Wait):
                     self._wait(task, lambda: bool(call.inputs), step.seconds)
                 else:
+                    task.add(step.seconds, self._clock())
                     _send(task, step)
                     self._release(task)
                 self._take(task)
@@ -118,20 +127,22 @@ class Turns:
     def _take(self, task: _Task) -> None:
         """Wait for the turn of a task; one that is stopped gets it with a `StoppedError`."""
         with task.call.changed:
+            paused_at = self._clock() if task.call.is_paused else None
             self._waiting.append(task)
             task.call.changed.wait_for(lambda: self._is_next(task))
             self._waiting.remove(task)
             self._holder, self._taken_at = task, self._clock()
+            if paused_at is not None:  # who does not read has enough to hear
+                task.dry_at += self._taken_at - paused_at
         if task.call.is_stopped:
             raise StoppedError
 
     def _is_next(self, task: _Task) -> bool:
         if self._holder is not None:
             return False
-        now = self._clock()
         ready = [one for one in self._waiting if one.call.is_stopped or not one.call.is_paused]
         first = min(
-            ready, key=lambda one: (not one.call.is_stopped, not one.is_urgent, one.priority, one.lead(now)),
+            ready, key=lambda one: (not one.call.is_stopped, not one.is_urgent, one.priority, one.dry_at),
             default=None,
         )  # fmt: skip
         return first is task
@@ -150,7 +161,6 @@ class Turns:
 
 
 def _send(task: _Task, step: Chunk | Event) -> None:
-    task.seconds += step.seconds
     if isinstance(step, Event):
         task.call.event({"seconds": step.seconds, "event": step.content})
     elif step.content:
@@ -169,6 +179,12 @@ class OneAtATime:
 
 
 _CURRENT = threading.local()
+
+
+def lead() -> float:
+    """Seconds that a listener can go on hearing or seeing what the present task has made; negative: has waited."""
+    task: _Task = _CURRENT.task
+    return task.dry_at - task.turns.now
 
 
 def wait_elsewhere(future: Future[Result], end: Callable[[], None] = lambda: None) -> Result:

@@ -21,7 +21,7 @@ from tts2face.serving.service.job_service import JobService
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits, read_keys
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
-from tts2face.serving.service.messages import Work, check_words
+from tts2face.serving.service.messages import QUALITY, Work, check_words
 from tts2face.serving.service.pool import STREAM_PRIORITY, InputQueue, Pool, PoolSettings
 from tts2face.serving.service.readiness import Readiness
 from tts2face.serving.service.result_cache import CACHED_KINDS, ResultCache
@@ -54,6 +54,10 @@ class Metrics:
         self.failures = Counter("tts2face_failures", "Failed works by kind.", ["kind"], registry=self.registry)
         self.speech = Counter("tts2face_speech_seconds", "Seconds of speech made.", registry=self.registry)
         self.cpu = Counter("tts2face_synthesis_seconds", "Seconds that processes spent on it.", registry=self.registry)
+        self.quality = Counter(
+            "tts2face_quality_changes", "Changes of the quality of movies in work, by the one that follows.",
+            ["samples", "frames"], registry=self.registry,
+        )  # fmt: skip
         self.cancel = Histogram(
             "tts2face_cancel_seconds", "Seconds until a cancelled work had released what it held.",
             buckets=LATENCY_BUCKETS_S, registry=self.registry,
@@ -176,11 +180,19 @@ class ServiceState:
                     self.limits.add_speech(key, seconds)
                     if self.settings.log_text and work.kind == "live" and "event" in message.content:
                         _log_spoken(message)
+                    self._note_quality(message)
                     yield message
         except Tts2faceError as error:
             refused = as_refused(error, _folders(work))
             self.metrics.failures.labels(refused.code).inc()
             raise refused from error
+
+    def _note_quality(self, message: Message) -> None:
+        event = message.content.get("event", {})
+        if event.get("type") == QUALITY:
+            samples, frames = "all" if event["has_all_samples"] else "one a pixel", f"1 of {event['frame_step']}"
+            self.metrics.quality.labels(samples, frames).inc()
+            log_event("quality", samples=samples, frames=frames)
 
     def _stream(self, work: Work, key: ApiKey, inputs: InputQueue | None, priority: int) -> AsyncIterator[Message]:
         """Messages of a work from the cache, or from a process."""

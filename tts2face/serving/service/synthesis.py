@@ -5,19 +5,32 @@ Tasks of the service: each makes a result step by step with a session.
 
 import logging
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import Tts2faceError
 from tts2face.picture.options import Picture
+from tts2face.picture.pace import Pace
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.program import Program
 from tts2face.request import Request
 from tts2face.serving.service.aligner import RemoteAligner
 from tts2face.serving.service.live import listen, live
 from tts2face.serving.service.logs import configure_logs, log_event
-from tts2face.serving.service.messages import SERVE, SYNTHESISE, DefectError, Event, Inputs, Step, Task, Work
-from tts2face.serving.service.scheduler import OneAtATime, Turns
+from tts2face.serving.service.messages import (
+    DRAWING_THREADS,
+    QUALITY,
+    SERVE,
+    SYNTHESISE,
+    DefectError,
+    Event,
+    Inputs,
+    Step,
+    Task,
+    Work,
+)
+from tts2face.serving.service.scheduler import OneAtATime, Turns, lead
 from tts2face.session.functions import SessionCache
 from tts2face.session.named_models import Models
 from tts2face.sound.voice_pool import VoicePool
@@ -28,10 +41,16 @@ if TYPE_CHECKING:
     from tts2face.session.speech_stream import Piece
 
 
-def stream_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
-    """Bytes of a movie, of sound, or of lines."""
+def stream_file(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk]:
+    """Bytes of a movie, of sound, or of lines; an event with each change of the quality of pictures."""
     request, picture = Request(**work.request), Picture(**work.picture)
-    return session.stream_file(request, work.format, picture=picture, threads=1)
+    pace = Pace(lead) if work.keeps_pace else None
+    quality = pace.quality if pace is not None else None
+    for chunk in session.stream_file(request, work.format, picture=picture, threads=DRAWING_THREADS, pace=pace):
+        yield chunk
+        if pace is not None and pace.quality != quality:
+            quality = pace.quality
+            yield Event({"type": QUALITY, **asdict(quality)})
 
 
 def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk]:

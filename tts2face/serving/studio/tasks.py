@@ -20,7 +20,7 @@ from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence
 from tts2face.lips.explanation import N_INSTANTS, LipOutline, PhoneExplanation, lip_outlines, token_outlines
 from tts2face.models.talker import Talker
-from tts2face.serving.service.messages import Event, Inputs, Task, Work
+from tts2face.serving.service.messages import DRAWING_THREADS, Event, Inputs, Task, Work
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.prepared import StaleEdgesError
 from tts2face.session.project import Project, cut_timeline, is_too_long, without_edges
@@ -135,7 +135,7 @@ def picture(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
 def project_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
     """Bytes of a project's clip in a format of `Session.stream_file`."""
     project = read_project(work)
-    return session.stream_file(project.prepare(), work.format, picture=project.picture, threads=1)
+    return session.stream_file(project.prepare(), work.format, picture=project.picture, threads=DRAWING_THREADS)
 
 
 def project_export(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:

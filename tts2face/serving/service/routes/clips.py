@@ -14,6 +14,7 @@ from fastapi.responses import StreamingResponse
 from pydantic import ValidationError
 from starlette.datastructures import FormData
 
+from tts2face.picture.movie import MOVIE_KINDS
 from tts2face.processes.message import Message
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.messages import Work
@@ -169,5 +170,6 @@ async def _answer(
     fields = await divide_options(state, request.state.key, given)
     picture = fields.picture | {name: files[name] for name in ("background",) if name in files}
     spoken = fields.request | {name: files[name] for name in ("audio", "timeline") if name in files}
-    work = state.work(models=fields.models, request=spoken, picture=picture, format=format)
+    keeps_pace = format in MOVIE_KINDS and not clip.model_fields_set & {"quality", "supersampling"}
+    work = state.work(models=fields.models, request=spoken, picture=picture, format=format, keeps_pace=keeps_pace)
     return await stream_work(request, work, media_types()[format], resources=resources)

@@ -12,6 +12,7 @@ from fastapi.responses import Response, StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from lexicon.marked_text import VOLUME_LIMITS
+from tts2face.picture.movie import MOVIE_KINDS
 from tts2face.picture.sound_stream import SOUND_KINDS
 from tts2face.processes.message import Message
 from tts2face.serving.service.client_names import (
@@ -110,7 +111,7 @@ async def speak(request: HttpRequest, speech: Speech) -> Response:
     adjustments = Adjustments()
     work = await speech_work(
         request, speech, speech.model_dump(include=SAME_NAMES, exclude_none=True), adjustments,
-        kind="speech" if names else "file", format=format,
+        kind="speech" if names else "file", format=format, keeps_pace=format in MOVIE_KINDS,
     )  # fmt: skip
     if speech.stream_format == "sse" and format in SOUND_KINDS:
         answer = await stream_work(request, work, "text/event-stream", convert=_Events(names))
@@ -122,7 +123,7 @@ async def speak(request: HttpRequest, speech: Speech) -> Response:
 
 
 async def speech_work(
-    request: HttpRequest, asked: SpokenText, more: dict[str, Any], adjustments: Adjustments, **fields: str
+    request: HttpRequest, asked: SpokenText, more: dict[str, Any], adjustments: Adjustments, **fields: Any
 ) -> Work:
     """Work that speaks a text; `more` are further options of a clip, `fields` those of the work."""
     state, key = service_state(request), request.state.key
