@@ -4,6 +4,7 @@ It runs in a checkout of the repository. Steps that are named run alone, on what
 ``--out``; with the path tracer's part, all of them take some four hours on two cores.
 
 ======= ============================================= ==========================================================
+phones  ``heart.phones``                              speech of the voice, aligned by PocketSphinx
 talker  ``grid_s1.talker``                            recordings of GRID's talker s1, lip tracks of free English
 heads   ``head.face`` with identities, nine haircuts  MakeHuman's data, released under CC0
 palette ``starter.palette``                           recordings of GRID's talker s1, ``derived_styles.tsv``
@@ -62,6 +63,15 @@ class Making:
         """Callback of a stage, of which only the start is told."""
         self.report(name)
         return lambda done, of: None
+
+
+def make_phones(making: Making) -> None:
+    """What finds the phones in the sound of the voice ``heart``: ten minutes."""
+    from corpus_tools.training.phone_classifier import train_phone_classifier
+    from tts2face.models.phone_classifier import write_phone_classifier
+
+    classifier = train_phone_classifier(on_progress=making.stage("the voice speaks"), report=making.report)
+    write_phone_classifier(making.out / "heart.phones", classifier)
 
 
 def make_talker(making: Making) -> None:
@@ -138,6 +148,7 @@ def make_mouths(making: Making) -> None:
 
 
 STEPS: Mapping[str, Callable[[Making], None]] = {
+    "phones": make_phones,
     "talker": make_talker,
     "heads": make_heads,
     "palette": make_palette,

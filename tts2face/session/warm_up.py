@@ -111,17 +111,21 @@ def compile_motion() -> None:
 
 
 def compile_gestures() -> None:
-    """Compile the kernels of gestures and of the level of sound by three frames of gestures."""
+    """Compile the kernels of gestures, of the level of sound and of edges by three frames of gestures."""
     from tts2face.gestures.stream import GestureFields, GestureStream
     from tts2face.gestures.timeline import Timeline
     from tts2face.models.palette import load_palette
+    from tts2face.models.phone_classifier import load_phone_classifier
     from tts2face.sound.level import block_powers
+    from tts2face.sound.segments import StatedPhone, find_edges
     from tts2face.types import Waveform
 
     gestures = GestureStream(GestureFields(load_palette("starter")), style="grid_s1", seed=0, fps=30.0)
     sound = Waveform(np.zeros(1600), 16_000)
     gestures.next(sound, 3, Timeline())
     block_powers(sound)
+    stated = [StatedPhone(SILENCE, 0.0), StatedPhone("ə", 0.03, 0.03), StatedPhone(SILENCE, 0.06)]
+    find_edges(sound, stated, load_phone_classifier("heart"))
 
 
 def _handler(work: Callable[[], None]) -> Handler:

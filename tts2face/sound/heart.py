@@ -1,10 +1,12 @@
-"""The neural English voice ``heart`` of hibari-tts, with phone edges by forced alignment of its sound.
+"""The neural English voice ``heart`` of hibari-tts, with phone edges from its own durations and its sound.
 
 The alphabet of the neural voice: letters of misaki, in which Kokoro and its students are trained, for phones.
 """
 
-from collections.abc import Iterator, Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -12,12 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, DataError
+from lexicon.errors import BackendError
 from lexicon.phones import PHONES, nearest_phones
-from lexicon.pronounce import Word
+from lexicon.pronounce import PAUSES_S, Word
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.models.phone_classifier import PhoneClassifier, load_phone_classifier
 from tts2face.numeric.kernels import disable_telemetry
-from tts2face.sound.alignment import Aligner, SpeechAligner, enforce_increasing
+from tts2face.sound.segments import StatedPhone, find_edges
 from tts2face.sound.voice import (
     NativeRun,
     PronunciationMap,
@@ -98,9 +101,10 @@ def _variant(pairs: Sequence[tuple[str, int]], at: int) -> str:
 
 LANGUAGE = "en-us"
 CLAUSE_MARKS = frozenset({",", ";", ":"})
+MARKS = "".join(PAUSES_S)  # punctuation among the letters
 MAX_LETTERS = 400  # the model accepts at most this many letters in one call
 DURATION_STEP_S = 0.025  # length of one step of the model's durations
-BOUNDARY_DELAY_S = 0.045  # delay of the model's own boundaries against its sound (41-51 ms)
+BOUNDARY_DELAY_S = 0.061  # delay of the model's own boundaries against its sound (56 ms when fast, 71 when slow)
 DURATION_TENSOR = "/Cast_32_output_0"  # internal tensor of the ONNX graph: steps of 25 ms for each letter
 # A network that returns its input: Hibari's constructor loads one, with an arena, and loading the voice's takes 0.1 s.
 IDENTITY_NETWORK = (
@@ -110,7 +114,7 @@ IDENTITY_NETWORK = (
 
 
 @dataclass(frozen=True, slots=True)
-class _Token:
+class LetteredWord:
     """A spoken word with its phones, and its letters in the voice's alphabet with the punctuation after it."""
 
     text: str
@@ -124,15 +128,11 @@ class NeuralVoice:
 
     Parameters
     ----------
-    aligner
-        Aligns its sound with its phones; None for an aligner of its own.
     run
         Runs the model; None: within the call.
     """
 
-    def __init__(
-        self, own_words: PronunciationMap, aligner: SpeechAligner | None = None, run: NativeRun | None = None
-    ) -> None:
+    def __init__(self, own_words: PronunciationMap, run: NativeRun | None = None) -> None:
         self._own_words = own_words
         disable_telemetry()
         try:
@@ -140,12 +140,14 @@ class NeuralVoice:
             from hibari.voices import voice_path
         except ImportError as missing:
             raise BackendError("the voice heart needs hibari-tts; run: pip install hibari-tts") from missing
-        self._path = Path(voice_path("heart"))
         self._model: Any = Hibari(voice="heart", model=IDENTITY_NETWORK, threads=1)
-        session = _session_without_arena(str(self._path))
-        self._model.sess = session if run is None else _OwnRun(session, run)
-        self._aligner: SpeechAligner = aligner or Aligner()
+        self._network = _Network(_session_without_arena(Path(voice_path("heart")).read_bytes()), run)
+        self._model.sess = self._network
         pronounce_content("Hello.", LANGUAGE, {})  # reads the dictionary while other models are loaded
+
+    @cached_property
+    def _classifier(self) -> PhoneClassifier:
+        return load_phone_classifier("heart")
 
     @property
     def sample_rate(self) -> int:
@@ -154,74 +156,73 @@ class NeuralVoice:
 
     def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
         """Synthesise a sentence; see `tts2face.sound.voice.Voice`."""
-        return concatenate_speech([self._speak_tokens(part, rate, seed) for part in self._spoken_parts(content)])
+        return concatenate_speech([self._with_edges(*part) for part in self.parts(content, rate=rate, seed=seed)])
+
+    def parts(
+        self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0
+    ) -> Iterator[tuple[Waveform, Sequence[LetteredWord], Sequence[StatedPhone]]]:
+        """Sound, words and stated phones of each part that the model synthesises in one call."""
+        for words in self._spoken_parts(content):
+            sound = self._sound_of(words, rate, seed)
+            yield sound, words, stated_phones(words, self._network.steps)
 
     def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
         """Sound without the alignment of its phones, which takes most of the time."""
         sounds = [self._sound_of(part, rate, seed).samples for part in self._spoken_parts(content)]
         return Waveform(np.concatenate(sounds), self.sample_rate)
 
-    def _spoken_parts(self, content: SpeechInput) -> list[list[_Token]]:
+    def _spoken_parts(self, content: SpeechInput) -> list[list[LetteredWord]]:
         """Tokens of each part that the model synthesises in one call."""
         words = pronounce_content(content, LANGUAGE, self._own_words)
         return [part for sentence in split_spoken_sentences(words) for part in _cut_tokens([*map(_token, sentence)])]
 
-    def _speak_tokens(self, tokens: Sequence[_Token], rate: float, seed: int) -> Speech:
-        sound = self._sound_of(tokens, rate, seed)
-        try:
-            phones, spans = self._align(tokens, sound)
-        except DataError:
-            phones, spans = self._predict_phones(tokens, _joined_letters(tokens), rate, sound)
-        return Speech(sound, phones, spans)
+    def _with_edges(self, sound: Waveform, words: Sequence[LetteredWord], stated: Sequence[StatedPhone]) -> Speech:
+        edges = find_edges(sound, stated, self._classifier)
+        spoken = [at for at, one in enumerate(stated) if not one.may_be_skipped or edges[at + 1] > edges[at]]
+        spans, first = [], 1  # stated phones of a word
+        for word in words:
+            begin = bisect_left(spoken, first)
+            spans.append(WordSpan(word.text, begin, begin + len(word.phones)))
+            first += len(word.phones) + 1
+        labels = [stated[at].label for at in spoken]
+        return Speech(sound, PhoneSequence(labels, [*edges[spoken], sound.duration]), tuple(spans))
 
-    def _sound_of(self, tokens: Sequence[_Token], rate: float, seed: int) -> Waveform:
+    def _sound_of(self, tokens: Sequence[LetteredWord], rate: float, seed: int) -> Waveform:
         samples = self._model.from_phonemes(_joined_letters(tokens), speed=rate, seed=seed)
         return Waveform(apply_volume(samples), self.sample_rate)
 
-    def _align(self, tokens: Sequence[_Token], sound: Waveform) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
-        found = self._aligner.align(sound, [(token.text, [token.phones]) for token in tokens])
-        return found.phones, found.words
 
-    def _predict_phones(
-        self, tokens: Sequence[_Token], letters: str, rate: float, sound: Waveform
-    ) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
-        """Phone edges from the model's durations, corrected for its delay, for sound that cannot be aligned."""
-        begins = np.concatenate([[0.0], np.cumsum(self._durations(letters, rate) * DURATION_STEP_S)])[1:]
-        labels, starts, spans, at = [SILENCE], [0.0], [], 0
-        for token in tokens:
-            spans.append(WordSpan(token.text, len(labels), len(labels) + len(token.phones)))
-            labels += token.phones
-            starts += [float(begins[at + place]) - BOUNDARY_DELAY_S for place in token.places]
-            at += len(token.letters) + 1
-        labels.append(SILENCE)
-        starts.append(min(float(begins[len(letters)]) - BOUNDARY_DELAY_S, sound.duration))
-        edges = enforce_increasing(np.array([*starts, sound.duration]))
-        return PhoneSequence(labels, edges), tuple(spans)
+def stated_phones(tokens: Sequence[LetteredWord], steps: NDArray[np.integer]) -> list[StatedPhone]:
+    """Phones as the model states them, with a silence before each word, which may lack, and one at the end.
 
-    def _durations(self, letters: str, rate: float) -> NDArray[np.float64]:
-        """(L + 2,) durations in steps of `DURATION_STEP_S` of L letters and the padding at both ends."""
-        disable_telemetry()
-        import onnxruntime
-
-        graph = add_graph_output(self._path.read_bytes(), DURATION_TENSOR)
-        session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
-        inputs = {
-            "ids": np.array([self._model.ids(letters)], np.int64),
-            "speed": np.array([rate], np.float32),
-        }
-        steps: NDArray[np.float64] = np.asarray(session.run([DURATION_TENSOR], inputs)[0], np.float64).ravel()
-        return steps
+    Parameters
+    ----------
+    steps : (L + 2,)
+        Durations of the L letters and of the padding at both ends, in steps of `DURATION_STEP_S`.
+    """
+    begins = np.cumsum(steps)[:-1] * DURATION_STEP_S - BOUNDARY_DELAY_S
+    found, at, is_marked = [StatedPhone(SILENCE, 0.0)], 0, False
+    for token in tokens:
+        if at:
+            found.append(StatedPhone(SILENCE, begins[at - 1], may_be_skipped=True, is_marked=is_marked))
+        ends = [*token.places[1:], len(token.letters.rstrip(MARKS))]
+        found += [
+            StatedPhone(phone, begins[at + place], begins[at + end] - begins[at + place])
+            for phone, place, end in zip(token.phones, token.places, ends, strict=True)
+        ]
+        at, is_marked = at + len(token.letters) + 1, token.letters[-1] in MARKS
+    return [*found, StatedPhone(SILENCE, begins[at - 1])]
 
 
-@dataclass(frozen=True, slots=True)
-class _OwnRun:
-    """An ONNX session whose runs can be ended."""
+class _Network:
+    """The model's ONNX session, whose runs can be ended; it keeps the durations of the last one, ``steps``."""
 
-    session: Any
-    native_run: NativeRun
+    def __init__(self, session: Any, run: NativeRun | None) -> None:
+        self._session, self._run = session, run or _run_within
+        self.steps: NDArray[np.integer] = np.zeros(0, np.int64)
 
-    def run(self, names: Any, inputs: Any) -> Any:
-        """Outputs of the model."""
+    def run(self, _: None, inputs: Any) -> Any:
+        """Outputs of the model but the durations."""
         import onnxruntime
 
         options = onnxruntime.RunOptions()
@@ -230,14 +231,20 @@ class _OwnRun:
         def end() -> None:
             options.terminate = True
 
-        return self.native_run(lambda: self.session.run(names, inputs, options), end)
+        *outputs, steps = self._run(lambda: self._session.run(None, inputs, options), end)
+        self.steps = np.ravel(steps)
+        return outputs
 
     def __getattr__(self, name: str) -> Any:
         """Other attributes of the session."""
-        return getattr(self.session, name)
+        return getattr(self._session, name)
 
 
-def _session_without_arena(path: str) -> Any:
+def _run_within(run: Callable[[], Any], _: Callable[[], None]) -> Any:
+    return run()
+
+
+def _session_without_arena(model: bytes) -> Any:
     """ONNX session that frees its memory after each sentence; an arena would retain up to 100 MB."""
     import onnxruntime
 
@@ -245,21 +252,23 @@ def _session_without_arena(path: str) -> Any:
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 3  # errors
     options.enable_cpu_mem_arena = options.enable_mem_pattern = False
-    return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+    return onnxruntime.InferenceSession(
+        add_graph_output(model, DURATION_TENSOR), options, providers=["CPUExecutionProvider"]
+    )
 
 
-def _joined_letters(tokens: Sequence[_Token]) -> str:
+def _joined_letters(tokens: Sequence[LetteredWord]) -> str:
     return " ".join(token.letters for token in tokens)
 
 
-def _token(word: Word) -> _Token:
+def _token(word: Word) -> LetteredWord:
     letters, places = word_letters(word.phones, word.stress)
-    return _Token(word.text, tuple(voice_phones(word.phones)), letters + word.mark, places)
+    return LetteredWord(word.text, tuple(voice_phones(word.phones)), letters + word.mark, places)
 
 
-def _cut_tokens(tokens: Sequence[_Token]) -> Iterator[list[_Token]]:
+def _cut_tokens(tokens: Sequence[LetteredWord]) -> Iterator[list[LetteredWord]]:
     """Divide tokens into parts of at most `MAX_LETTERS` letters, after a clause mark if the part has one."""
-    part: list[_Token] = []
+    part: list[LetteredWord] = []
     length = 0
     for token in tokens:
         if part and length + len(token.letters) + 1 > MAX_LETTERS:

