@@ -40,5 +40,5 @@ def test_an_unknown_step_is_refused(capsys: pytest.CaptureFixture[str], monkeypa
     with pytest.raises(SystemExit, match="2"):
         make_models.main()
     assert (
-        "there is no step 'lips'; give talker, heads, palette, cast, light, mouths, styles" in capsys.readouterr().err
+        "there is no step 'lips'; give phones, talker, heads, palette, cast, light, mouths, styles" in capsys.readouterr().err
     )

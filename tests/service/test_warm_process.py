@@ -48,7 +48,6 @@ def test_the_end_of_a_process_is_not_taken_from_asyncio(caplog: pytest.LogCaptur
 
 def test_processes_have_the_tasks_of_what_is_mounted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(SessionCache, "get", lambda *_: None)
-    monkeypatch.setattr(synthesis.RemoteAligner, "start", lambda _: None)
     monkeypatch.setattr(synthesis, "configure_logs", lambda *_, **__: None)
     mount, order = Mount(lambda *_: None, (f"{__name__}:GIVEN",)), {"work": Work("given").as_json(), "priority": 0}
     last = []
