@@ -1,8 +1,8 @@
 """Latency and throughput of a running `tts2face serve`: first bytes, live curves, lateness, cancelling.
 
-Run: ``python tests/bench/bench_service.py [--quick]``. It starts a server of its own on this machine, with one process
-for each core, and prints the figures that docs/performance.md sums up. As a reference it measures the same synthesis
-in this process before and after, so that the load of the machine shows.
+Run: ``python tests/bench/bench_service.py [--quick | --start]``. It starts a server of its own on this machine, with
+one process for each core, and prints the figures that docs/performance.md sums up. As a reference it measures the same
+synthesis in this process before and after, so that the load of the machine shows. ``--start`` measures starts only.
 """
 
 import argparse
@@ -34,25 +34,44 @@ LIVE_S = 20.0
 Measure = Callable[[str], Awaitable[float]]
 
 
-def start_server() -> tuple[subprocess.Popen[bytes], str]:
-    """A server and its address, when it is ready."""
-    folder = tempfile.mkdtemp(prefix="tts2face-bench-")
+def start_server(**variables: str) -> tuple[subprocess.Popen[bytes], str]:
+    """A server and its address, when all its processes are ready; it prints when it and they were."""
+    folder, began = tempfile.mkdtemp(prefix="tts2face-bench-"), time.monotonic()
     command = [sys.executable, "-m", "tts2face", "serve", "--port", "0"]
     settings = {"TTS2FACE_SERVE_WAITING": "256", "TTS2FACE_SERVE_DATA": folder, "TTS2FACE_SERVE_WORKERS": "0"}
     log = Path(folder, "log")
     with log.open("w") as file:
-        server = subprocess.Popen(command, stderr=file, env=os.environ | settings)
+        server = subprocess.Popen(command, stderr=file, env=os.environ | settings | variables)
     found: list[str] = []
     while not found:
         time.sleep(0.1)
         found = re.findall(r'"url": ?"(http[^"]+)"', log.read_text())
         assert server.poll() is None, log.read_text()
-    url = found[0]
+    url, seconds = found[0], [time.monotonic() - began]
     while httpx.get(f"{url}/readyz").status_code != 200:
         time.sleep(0.1)
+    seconds.append(time.monotonic() - began)
     while measure(url, "tts2face_processes_ready") < (os.cpu_count() or 1):
         time.sleep(0.1)
+    seconds.append(time.monotonic() - began)
+    row("start: listening, ready, all processes; processor time", *seconds, family_cpu_s(server.pid))
     return server, url
+
+
+def family_cpu_s(pid: int) -> float:
+    """Seconds of processor time of a process and its descendants that live, and of those that have been waited for."""
+    children = [int(one) for file in Path(f"/proc/{pid}/task").glob("*/children") for one in file.read_text().split()]
+    ticks = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:15]
+    return sum(map(int, ticks)) / os.sysconf("SC_CLK_TCK") + sum(family_cpu_s(child) for child in children)
+
+
+def starts() -> None:
+    """Print the seconds of the first start on a machine, which compiles all kernels, and of two later ones."""
+    with tempfile.TemporaryDirectory() as kernels:
+        for _ in range(3):
+            server, _ = start_server(NUMBA_CACHE_DIR=kernels, TTS2FACE_SERVE_WORKERS="1")
+            server.terminate()
+            server.wait()
 
 
 def measure(url: str, name: str) -> float:
@@ -189,55 +208,65 @@ def reference() -> float:
     return statistics.median(found[1:])
 
 
+def figures(url: str, rounds: int) -> None:
+    """Print the figures of a running server."""
+    speech = {"input": VOICE_TEXT, "voice": "alloy", "model": "tts-1"}
+    kinds: dict[str, Measure] = {
+        "voice, 5 s (wav)": first_byte("/v1/audio/speech", speech | {"response_format": "wav"}),
+        "voice, 5 s (mp3)": first_byte("/v1/audio/speech", speech),
+        "clip, 5 s (mp4)": first_byte("/v1/clips", {"text": VOICE_TEXT, "size": "256x256"}),
+        "clip of an unseen sentence (mp4)": first_byte("/v1/clips", {"text": UNSEEN_TEXT, "size": "256x256"}),
+        "unseen sentence (curves)": first_byte("/v1/clips", {"text": UNSEEN_TEXT, "format": "curves"}),
+        "live curves after the last word": live_curves,
+    }
+    row("first bytes", "clients", "p50", "p95", "p99", "max")
+    row(*["---"] * 6)
+    for name, one in kinds.items():
+        repeat(url, one, 2, 2)  # the first picture of a size takes 0.7 s in each process
+        for clients in CLIENTS if not name.startswith("clip") else CLIENTS[:2]:
+            row(name, clients, *percentiles(repeat(url, one, clients, max(1, 4 * rounds // clients))))
+    for format in ("wav", "curves", "mp4"):
+        one = first_byte("/v1/clips", {"text": LONG_TEXT, "format": format, "size": "64x64", "supersampling": 1})
+        repeat(url, one, 2, 2)
+        row(f"200 words without a point ({format})", 1, *percentiles(repeat(url, one, 1, rounds)))
+    for streams in (1, 8):
+        found = asyncio.run(_gather_lateness(url, streams))
+        row("lateness of live curves", streams, *percentiles(found))
+    for name, one in {"process": cancel, "client": functools.partial(cancel, at_client=True)}.items():
+        row(f"cancel in a sentence, at the {name}", 1, *percentiles(repeat(url, one, 1, 8 * rounds)))
+        row(f"cancel in a sentence, at the {name}", 8, *percentiles(repeat(url, one, 8, rounds)))
+    repeat(url, leave, 4, 4 * rounds)
+    time.sleep(5.0)
+    for bound in ("0.025", "0.05", "0.1"):
+        share = measure(url, f'tts2face_cancel_seconds_bucket{{le="{bound}"}}')
+        print(f"clients that left: {share:g} of {measure(url, 'tts2face_cancel_seconds_count'):g} within {bound} s")
+    for name, body in {
+        "voice": {"format": "wav"},
+        "curves": {"format": "curves"},
+        "movie": {"size": "256x256"},
+    }.items():
+        repeat(url, first_byte("/v1/clips", {"text": VOICE_TEXT} | body), 2, 1)
+        before, begin = measure(url, "tts2face_speech_seconds_total"), time.perf_counter()
+        repeat(url, first_byte("/v1/clips", {"text": VOICE_TEXT} | body), 8, 1 if rounds < 5 else 2)
+        seconds = time.perf_counter() - begin
+        made = measure(url, "tts2face_speech_seconds_total") - before
+        print(f"{name}: {made / seconds / (os.cpu_count() or 1):.2f} streams in real time per core", flush=True)
+
+
 def main() -> None:
     """Print the figures that docs/performance.md sums up."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer rounds")
-    rounds = 2 if parser.parse_args().quick else 5
+    parser.add_argument("--start", action="store_true", help="only the first and later starts")
+    arguments = parser.parse_args()
+    if arguments.start:
+        starts()
+        return
+    rounds = 2 if arguments.quick else 5
     print(f"in this process: {reference():.3f} s for 5 s of speech, load {os.getloadavg()[0]:.1f}", flush=True)
     server, url = start_server()
     try:
-        speech = {"input": VOICE_TEXT, "voice": "alloy", "model": "tts-1"}
-        kinds: dict[str, Measure] = {
-            "voice, 5 s (wav)": first_byte("/v1/audio/speech", speech | {"response_format": "wav"}),
-            "voice, 5 s (mp3)": first_byte("/v1/audio/speech", speech),
-            "clip, 5 s (mp4)": first_byte("/v1/clips", {"text": VOICE_TEXT, "size": "256x256"}),
-            "clip of an unseen sentence (mp4)": first_byte("/v1/clips", {"text": UNSEEN_TEXT, "size": "256x256"}),
-            "unseen sentence (curves)": first_byte("/v1/clips", {"text": UNSEEN_TEXT, "format": "curves"}),
-            "live curves after the last word": live_curves,
-        }
-        row("first bytes", "clients", "p50", "p95", "p99", "max")
-        row(*["---"] * 6)
-        for name, one in kinds.items():
-            repeat(url, one, 2, 2)  # the first picture of a size takes 0.7 s in each process
-            for clients in CLIENTS if not name.startswith("clip") else CLIENTS[:2]:
-                row(name, clients, *percentiles(repeat(url, one, clients, max(1, 4 * rounds // clients))))
-        for format in ("wav", "curves", "mp4"):
-            one = first_byte("/v1/clips", {"text": LONG_TEXT, "format": format, "size": "64x64", "supersampling": 1})
-            repeat(url, one, 2, 2)
-            row(f"200 words without a point ({format})", 1, *percentiles(repeat(url, one, 1, rounds)))
-        for streams in (1, 8):
-            found = asyncio.run(_gather_lateness(url, streams))
-            row("lateness of live curves", streams, *percentiles(found))
-        for name, one in {"process": cancel, "client": functools.partial(cancel, at_client=True)}.items():
-            row(f"cancel in a sentence, at the {name}", 1, *percentiles(repeat(url, one, 1, 8 * rounds)))
-            row(f"cancel in a sentence, at the {name}", 8, *percentiles(repeat(url, one, 8, rounds)))
-        repeat(url, leave, 4, 4 * rounds)
-        time.sleep(5.0)
-        for bound in ("0.025", "0.05", "0.1"):
-            share = measure(url, f'tts2face_cancel_seconds_bucket{{le="{bound}"}}')
-            print(f"clients that left: {share:g} of {measure(url, 'tts2face_cancel_seconds_count'):g} within {bound} s")
-        for name, body in {
-            "voice": {"format": "wav"},
-            "curves": {"format": "curves"},
-            "movie": {"size": "256x256"},
-        }.items():
-            repeat(url, first_byte("/v1/clips", {"text": VOICE_TEXT} | body), 2, 1)
-            before, begin = measure(url, "tts2face_speech_seconds_total"), time.perf_counter()
-            repeat(url, first_byte("/v1/clips", {"text": VOICE_TEXT} | body), 8, 1 if rounds < 5 else 2)
-            seconds = time.perf_counter() - begin
-            made = measure(url, "tts2face_speech_seconds_total") - before
-            print(f"{name}: {made / seconds / (os.cpu_count() or 1):.2f} streams in real time per core", flush=True)
+        figures(url, rounds)
     finally:
         server.terminate()
         server.wait()

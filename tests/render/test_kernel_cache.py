@@ -14,14 +14,19 @@ import pytest
 from numba.core.dispatcher import Dispatcher
 
 from cli.process import COMPILATION, compilation_messages, progress_bar
+from tests.processes.answered import answered
 from tests.render.film.lit_face import lit_tiny_face
-from tts2face.lips import tokens
+from tts2face.gestures import field_kernels
+from tts2face.lips import contacts
 from tts2face.numeric import kernels as compilation
 from tts2face.numeric.kernels import CACHE_VARIABLE, cache_folder
 from tts2face.picture.baked import surface
 from tts2face.picture.kernels import raster, shade, strands
 from tts2face.picture.kernels import strands as strand_light
+from tts2face.request import OWN_FACE
 from tts2face.serving.service.logs import LineFormatter
+from tts2face.session import warm_up
+from tts2face.session.named_models import Models
 from tts2face.session.warm_up import kernels_are_compiled
 from tts2face.sound.level import filter_biquad
 
@@ -73,9 +78,11 @@ def indexes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> dict[str, Path]:
     stats = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path)))
     monkeypatch.setattr(raster, "draw_band", stats)
     monkeypatch.setattr(surface, "find_nearest", stats)
-    monkeypatch.setattr(tokens, "sample_tokens", stats)
+    monkeypatch.setattr(contacts, "_closest_rows", stats)
+    monkeypatch.setattr(field_kernels, "generate_frames", stats)
     names = {
-        "motion": "tokens.sample_tokens",
+        "motion": "contacts._closest_rows",
+        "gestures": "field_kernels.generate_frames",
         "lamps": "raster.draw_band",
         "baked": "surface.find_nearest",
     }
@@ -91,6 +98,28 @@ def test_kernels_count_as_compiled_once_they_lie_on_disk(indexes):
         assert not kernels_are_compiled(face)
         indexes[kind].write_bytes(b"")
         assert kernels_are_compiled(face)
+
+
+def test_kernels_on_disk_are_not_compiled_again(indexes, monkeypatch):
+    """Neither by a command's child nor by a process of a server; those of one part do not stand for another's."""
+    made = []
+    monkeypatch.setattr(Models, "shown_face", lambda _: lit_tiny_face())
+    monkeypatch.setattr(warm_up, "compile_pictures", made.append)
+    for part in ("compile_motion", "compile_gestures"):
+        monkeypatch.setattr(warm_up, part, lambda part=part: made.append(part))
+    parts = {"motion": "compile_motion", "gestures": "compile_gestures", "baked": "compile_pictures"}
+    for index, part in parts.items():
+        answered(warm_up.HANDLERS[part], {})
+        assert len(made) == 1
+        indexes[index].write_bytes(b"")
+        answered(warm_up.HANDLERS[part], {})
+        assert len(made) == 1
+        made.clear()
+
+
+def test_a_face_without_mesh_has_no_pictures_to_compile(monkeypatch):
+    monkeypatch.setattr(warm_up, "compile_pictures", pytest.fail)
+    answered(warm_up.HANDLERS["compile_pictures"], {"face": OWN_FACE})
 
 
 CALLER = """

@@ -18,6 +18,7 @@ from typing import Any
 
 from tts2face.numeric.kernels import disable_telemetry
 from tts2face.serving.service import job_service
+from tts2face.serving.service import pool as service_pool
 from tts2face.serving.service import state as service_state
 from tts2face.serving.service.logs import configure_logs, log_event
 from tts2face.serving.service.pool import Pool, PoolSettings
@@ -52,7 +53,9 @@ class Host:
         self._servers: dict[int, tuple[DrainingServer, asyncio.Task[None]]] = {}
         self._pool: SharedPool | None = None
         service_state.Pool = self._shared_pool  # type: ignore[misc, assignment]
-        job_service.NICENESS = 0  # jobs do not wait for the other tests of the run
+        job_service.NICENESS = service_pool.NICENESS = (
+            0  # jobs and the studio's face do not wait for the other tests of the run
+        )
 
     def _shared_pool(self, settings: PoolSettings) -> SharedPool:
         if self._pool is None:

@@ -11,6 +11,7 @@ from tests.running import eventually
 from tts2face.processes.message import RESULT, Message
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.pool import WarmProcess
+from tts2face.serving.service.preparation import Preparation
 from tts2face.serving.service.server import create_app
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.synthesis import Synthesis
@@ -23,7 +24,7 @@ class SessionProcess(WarmProcess):
     """Executes works with sessions of this process, one after the other and in the thread of the server."""
 
     def __init__(self, sessions: SessionCache) -> None:
-        super().__init__({}, (), lambda: None)
+        super().__init__({}, Preparation((), 1), lambda: None)
         self._synthesis, self.is_ready = Synthesis(sessions), True
 
     async def run(self) -> None:

@@ -1,5 +1,6 @@
 """What /readyz finds missing, and what a running job says while its disk is full."""
 
+import asyncio
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ from starlette.testclient import TestClient
 from tests.running import eventually
 from tests.service.in_process import service_client
 from tts2face.serving.service import readiness
+from tts2face.serving.service.preparation import Preparation, Step
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.work.changes import JobChanges
 from tts2face.serving.work.connection import JobDatabase
@@ -78,11 +80,25 @@ def test_a_data_folder_that_is_gone_is_named(client: TestClient, tmp_path: Path)
     assert str(tmp_path) not in reasons[0]
 
 
-def test_models_that_are_not_loaded_are_named(client: TestClient) -> None:
-    client.app.state.service.pool.processes[0].is_ready = False  # type: ignore[attr-defined]
-    assert ready(client) == (
-        503, ["models"], ["no synthesis process has loaded its models yet; wait, or see the log"]
-    )  # fmt: skip
+def test_what_is_still_prepared_is_named(client: TestClient) -> None:
+    pool = client.app.state.service.pool  # type: ignore[attr-defined]
+    pool.processes[0].is_ready = False
+    pool.preparation = Preparation([Step("kernels of motion", "", {}, is_shared=True), Step("voice", "", {})], 2)
+    seen = []
+
+    async def call(*_: object) -> None:
+        pool.processes[0].is_ready = len(seen) > 1  # at last another one is ready
+        seen.append((*ready(client), client.get("/readyz").json()["preparing"]))
+
+    asyncio.run(pool.preparation.run(call, 0))
+    asyncio.run(pool.preparation.run(call, 1))
+    assert seen[:2] == [
+        (503, ["models"], [f"the service prepares {part} ({done} of 3 steps are done); wait, or see the log"],
+         {"parts": [part], "done": done, "of": 3})
+        for done, part in enumerate(["kernels of motion", "voice"])
+    ]  # fmt: skip
+    assert seen[2] == (200, [], [], {"parts": ["voice"], "done": 2, "of": 3})
+    assert client.get("/readyz").json()["preparing"] == {"parts": [], "done": 3, "of": 3}
 
 
 def test_workers_that_have_ended_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

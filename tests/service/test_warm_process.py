@@ -13,6 +13,7 @@ from tts2face.serving.service import synthesis
 from tts2face.serving.service.logs import JSON_LINES
 from tts2face.serving.service.messages import SYNTHESISE, Work
 from tts2face.serving.service.pool import LINES_COST, MOVIE_COST, SOUND_COST, WarmProcess, work_cost
+from tts2face.serving.service.preparation import Preparation
 from tts2face.serving.service.server import Mount, create_app
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.session.functions import SessionCache
@@ -27,7 +28,7 @@ def test_the_end_of_a_process_is_not_taken_from_asyncio(caplog: pytest.LogCaptur
 
     async def run() -> None:
         settings = {"n_sessions": 1, "log_format": JSON_LINES, "log_text": False, "memory_mb": 0, "sentences_mb": 0}
-        process = WarmProcess(settings, (), lambda: None)
+        process = WarmProcess(settings, Preparation((), 1), lambda: None)
         running = asyncio.create_task(process.run())
         async with asyncio.timeout(READY_TIMEOUT_S):
             for number in range(3):
@@ -54,6 +55,7 @@ def test_processes_have_the_tasks_of_what_is_mounted(tmp_path: Path, monkeypatch
     for mounts in ([], [mount]):
         settings = create_app(ServiceSettings(processes=1, data=tmp_path), mounts).state.service.pool.settings
         handlers = synthesis.handlers(**settings.handlers)
+        assert {step.call for step in settings.steps} <= set(handlers)
         last.append(answered(handlers[SYNTHESISE], order | {"id": None})[-1])
     assert [one.kind for one in last] == [ERROR, RESULT]
     assert last[0].content["message"].startswith("internal error: KeyError")

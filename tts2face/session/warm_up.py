@@ -1,11 +1,11 @@
 """Compilation of all kernels at the first run on a machine; later runs load them from the disk cache.
 
-The kernels of motion, of gestures and of strands are compiled in child processes while this process compiles the
-other drawing kernels, because numba compiles one kernel at a time in each process.
+numba compiles one kernel at a time in each process. So a command compiles the kernels of motion, of gestures and of
+strands in child processes, beside the other drawing kernels; a server divides them among its synthesis processes.
 """
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -15,7 +15,8 @@ import numpy as np
 
 from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence
-from tts2face.lips import tokens
+from tts2face.gestures import field_kernels
+from tts2face.lips import contacts
 from tts2face.models.face import Face, keep_parts
 from tts2face.models.face_loading import load_face
 from tts2face.models.talker import load_talker
@@ -23,8 +24,12 @@ from tts2face.picture.options import Picture
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.parent import Child
 from tts2face.processes.program import Program
+from tts2face.session.named_models import Models
 
 COMPILE_TIMEOUT_S = 120.0
+Kernel = tuple[ModuleType, str]
+MOTION: Kernel = (contacts, "_closest_rows")  # one of the last that `compile_motion` compiles, and nothing else needs
+GESTURES: Kernel = (field_kernels, "generate_frames")
 
 
 def kernels_are_compiled(drawn: Face | None) -> bool:
@@ -32,13 +37,19 @@ def kernels_are_compiled(drawn: Face | None) -> bool:
 
     Compiling them delays the first result by some seconds.
     """
-    kernels: list[tuple[ModuleType, str]] = [(tokens, "sample_tokens")]
-    if drawn is not None:
-        from tts2face.picture.baked import surface
-        from tts2face.picture.kernels import raster
+    return _is_compiled(*MOTION) and (drawn is None or _is_compiled(*_drawing_kernel(drawn)))
 
-        kernels.append((surface, "find_nearest") if drawn.light else (raster, "draw_band"))
-    return all(_index_files(module, name) for module, name in kernels)
+
+def _drawing_kernel(drawn: Face) -> "Kernel":
+    from tts2face.picture.baked import surface
+    from tts2face.picture.kernels import raster
+
+    return (surface, "find_nearest") if drawn.light else (raster, "draw_band")
+
+
+def _is_compiled(module: ModuleType, name: str) -> bool:
+    folder = Path(str(getattr(module, name).stats.cache_path))
+    return any(folder.glob(f"{module.__name__.rpartition('.')[2]}.{name}-*.nbi"))
 
 
 def compile_kernels(drawn: Face | None) -> None:
@@ -46,8 +57,6 @@ def compile_kernels(drawn: Face | None) -> None:
 
     If a child process fails, its kernels are compiled at their first use.
     """
-    from tts2face.face.deformation import REST_HEAD
-    from tts2face.picture.renderer import draw
     from tts2face.picture.surface import STRANDS
 
     has_strands = drawn is not None and not drawn.light
@@ -61,9 +70,7 @@ def compile_kernels(drawn: Face | None) -> None:
         thread.start()
     try:
         if drawn is not None:
-            face = keep_parts(drawn, lambda part: part.kind != STRANDS) if has_strands else drawn
-            head = np.full(len(REST_HEAD), 0.01, np.float32)
-            draw(face, np.zeros(len(face.shape_names), np.float32), head, picture=Picture(size="64x64"))
+            compile_pictures(keep_parts(drawn, lambda part: part.kind != STRANDS) if has_strands else drawn)
         for thread in threads:
             thread.join()
     finally:
@@ -76,9 +83,13 @@ def _compile(child: Child, work: str) -> None:
         child.call(work, {}, timeout_s=COMPILE_TIMEOUT_S)
 
 
-def _index_files(module: ModuleType, name: str) -> list[Path]:
-    folder = Path(str(getattr(module, name).stats.cache_path))
-    return list(folder.glob(f"{module.__name__.rpartition('.')[2]}.{name}-*.nbi"))
+def compile_pictures(face: Face) -> None:
+    """Compile the kernels that draw a face, those of its strands included, by one small picture."""
+    from tts2face.face.deformation import REST_HEAD
+    from tts2face.picture.renderer import draw
+
+    head = np.full(len(REST_HEAD), 0.01, np.float32)
+    draw(face, np.zeros(len(face.shape_names), np.float32), head, picture=Picture(size="64x64"))
 
 
 def compile_strands() -> None:
@@ -128,14 +139,32 @@ def compile_gestures() -> None:
     find_edges(sound, stated, load_phone_classifier("heart"))
 
 
-def _handler(work: Callable[[], None]) -> Handler:
-    def handle(_: Call) -> dict[str, Any]:
-        work()
-        return {}
-
-    return handle
+def _motion(_: Call) -> dict[str, Any]:
+    if not _is_compiled(*MOTION):
+        compile_motion()
+    return {}
 
 
-HANDLERS: Mapping[str, Handler] = MappingProxyType(
-    {work.__name__: _handler(work) for work in (compile_motion, compile_gestures, compile_strands)}
-)
+def _gestures(_: Call) -> dict[str, Any]:
+    if not _is_compiled(*GESTURES):
+        compile_gestures()
+    return {}
+
+
+def _strands(_: Call) -> dict[str, Any]:
+    compile_strands()
+    return {}
+
+
+def _pictures(call: Call) -> dict[str, Any]:
+    """The kernels that draw the face of the fields of `Models`."""
+    face = Models(**call.content).shown_face()
+    if face is not None and not _is_compiled(*_drawing_kernel(face)):
+        compile_pictures(face)
+    return {}
+
+
+HANDLERS: Mapping[str, Handler] = MappingProxyType({
+    "compile_motion": _motion, "compile_gestures": _gestures, "compile_strands": _strands,
+    "compile_pictures": _pictures,
+})  # fmt: skip

@@ -20,6 +20,9 @@ def test_every_line_of_a_request_has_its_id_and_none_its_text(service: RunningSe
 
 def test_the_log_says_when_a_process_can_serve(service: RunningService) -> None:
     assert service.host.wait_for_event("synthesis process ready")["seconds"] > 0.0
+    before = service.host.wait_for_event("preparing", part="models")
+    found = httpx.get(f"{service.url}/readyz").json()["preparing"]
+    assert before["done"] < found["done"] == found["of"] == before["of"]
 
 
 def test_server_timing_names_the_stages(client: httpx.Client) -> None:

@@ -33,6 +33,7 @@ from tts2face.serving.service.errors import RefusedError, as_refused
 from tts2face.serving.service.keys import RateLimits
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
+from tts2face.serving.service.pool import NICENESS
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.work.blobs import open_blobs
 from tts2face.serving.work.client import JobClient, WebhookDelivery, prune_jobs, unfinished_segments
@@ -215,7 +216,6 @@ def deliver(client: JobClient, delivery: WebhookDelivery, settings: ServiceSetti
 
 Value = TypeVar("Value")
 
-NICENESS = 10  # of the workers, so that streams go first
 RETRY_S = 2.0  # between two tries to open the database
 RETRY_AFTER_S = 5  # for clients, while the database cannot be reached
 SUPERVISE_S, RESTART_S = 0.5, 10.0  # between two looks at the workers, and after they ended again and again

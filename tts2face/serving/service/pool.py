@@ -7,7 +7,7 @@ import asyncio
 import time
 import zlib
 from collections import Counter, OrderedDict, deque
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import aclosing, suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,16 +17,23 @@ from tts2face.numeric.reuse import available_cores
 from tts2face.picture.movie import MOVIE_KINDS
 from tts2face.picture.sound_stream import SOUND_KINDS
 from tts2face.processes.message import Message
-from tts2face.processes.parent import AsyncChild, ChildEndedError
+from tts2face.processes.parent import AsyncChild, ChildEndedError, started
 from tts2face.processes.program import Program
 from tts2face.serving.service.logs import REQUEST_ID, log_event
 from tts2face.serving.service.messages import SERVE, SYNTHESISE, Work
+from tts2face.serving.service.preparation import Preparation, Step
 from tts2face.serving.service.stages import stage
 
 PROGRAM = "tts2face.serving.service.synthesis:handlers"
 AT_ONCE = 64  # more calls than the pool gives to one process
+NICENESS = 10  # of processes for which nobody waits, so that streams go first
 
 InputQueue = asyncio.Queue[tuple[Mapping[str, Any], bytes]]  # contents and payloads
+
+
+def work_call(work: Work, priority: int = 0) -> dict[str, Any]:
+    """Content of the call `SYNTHESISE` for a work of the present request."""
+    return {"work": work.as_json(), "priority": priority, "id": REQUEST_ID.get()}
 
 
 class WarmProcess:
@@ -36,18 +43,16 @@ class WarmProcess:
     ----------
     settings
         As for `tts2face.serving.service.synthesis.handlers`.
-    warm
-        Works, as `Work.as_json`, that load models and compile kernels before the process is ready.
+    preparation
+        In which it takes part before it is ready.
     on_change
         Called whenever the process becomes ready or ends.
     """
 
-    def __init__(
-        self, settings: Mapping[str, Any], warm: Sequence[Mapping[str, Any]], on_change: Callable[[], None]
-    ) -> None:
+    def __init__(self, settings: Mapping[str, Any], preparation: Preparation, on_change: Callable[[], None]) -> None:
         program = Program(PROGRAM, at_once=AT_ONCE, settings=settings, has_log=True)
         self._child = AsyncChild(program, self._note_released)
-        self._warm, self._on_change = warm, on_change
+        self._preparation, self._on_change = preparation, on_change
         self.is_ready = False
         self.is_closed = False
         self.on_cancelled: Callable[[float], None] = _ignore  # called with the seconds until a task was released
@@ -75,8 +80,7 @@ class WarmProcess:
         began = time.monotonic()
         async with aclosing(self._child.stream(SERVE, {})) as served:
             async for _ in served:  # once, as soon as it has loaded
-                for work in self._warm:
-                    await self._child.call(SYNTHESISE, {"work": work, "priority": 0, "id": None})
+                await self._preparation.run(self._child.call, self)
                 self.is_ready = True
                 log_event("synthesis process ready", process=self.pid, seconds=round(time.monotonic() - began, 3))
                 self._on_change()
@@ -96,7 +100,7 @@ class WarmProcess:
         ChildEndedError
             The process ended before the task did.
         """
-        content = {"work": work.as_json(), "priority": priority, "id": REQUEST_ID.get()}
+        content = work_call(work, priority)
         given = None if inputs is None else _items(inputs)
         async with aclosing(self._child.stream(SYNTHESISE, content, inputs=given)) as messages:
             async for message in messages:
@@ -145,15 +149,15 @@ class PoolSettings:
         Number of synthesis processes; 0: one for each core.
     max_waiting
         Requests that may wait; further ones are refused.
-    warm
-        Works that each process executes before it is ready, as `Work.as_json`.
+    steps
+        What is prepared before a process is ready.
     handlers
         Settings of `tts2face.serving.service.synthesis.handlers`.
     """
 
     n_processes: int = 0
     max_waiting: int = 64
-    warm: tuple[dict[str, Any], ...] = ()
+    steps: tuple[Step, ...] = ()
     handlers: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -179,7 +183,9 @@ class Pool:
     def __init__(self, settings: PoolSettings) -> None:
         self.settings = settings
         count = settings.n_processes or available_cores()
-        self.processes = [WarmProcess(settings.handlers, settings.warm, self._wake) for _ in range(count)]
+        self.preparation = Preparation(settings.steps, count)
+        self.processes = [WarmProcess(settings.handlers, self.preparation, self._wake) for _ in range(count)]
+        self.is_prepared = asyncio.Event()  # all processes have been ready
         self._waiting: OrderedDict[str, deque[_Waiting]] = OrderedDict()
         self._runs: list[asyncio.Task[None]] = []
 
@@ -213,6 +219,20 @@ class Pool:
         for process in self.processes:
             await process.close()
         await asyncio.gather(*self._runs, return_exceptions=True)
+
+    async def make_aside(self, work: Work) -> bytes:
+        """All bytes of a long work that nobody waits for, made by a process of its own once all others are ready.
+
+        Raises
+        ------
+        Tts2faceError
+            As the work.
+        """
+        await self.is_prepared.wait()
+        content = bytearray()
+        async with started(Program(PROGRAM, niceness=NICENESS, settings=self.settings.handlers, has_log=True)) as child:
+            await child.call(SYNTHESISE, work_call(work), on_event=lambda message: content.extend(message.payload))
+        return bytes(content)
 
     async def stream(
         self,
@@ -298,6 +318,8 @@ class Pool:
 
     def _wake(self) -> None:
         """Give free processes to waiting works, one key after the other; those of one cost do not wait for others."""
+        if self.n_ready == len(self.processes):
+            self.is_prepared.set()
         for key in list(self._waiting):
             for cost, _, future in list(self._waiting[key]):
                 process = None if future.done() else self._free_process(cost)

@@ -34,7 +34,7 @@ class Readiness:
         is_reachable = await jobs.is_reachable()
         workers = jobs.n_workers > 0 or not settings.workers
         return {
-            "models": "" if pool.n_ready else "no synthesis process has loaded its models yet; wait, or see the log",
+            "models": "" if pool.n_ready else f"{pool.preparation}; wait, or see the log",
             "data": await asyncio.to_thread(lack_of_folder, settings.data_folder, "data folder"),
             "temporary": await asyncio.to_thread(lack_of_folder, Path(tempfile.gettempdir()), "temporary folder"),
             "database": "" if is_reachable else "the database of the jobs does not answer; check it",

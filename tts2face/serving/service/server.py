@@ -24,7 +24,6 @@ from starlette.routing import Match
 
 from lexicon.errors import Tts2faceError
 from tts2face import __version__
-from tts2face.numeric.kernels import disable_telemetry
 from tts2face.serving.service.connections import connection_classes
 from tts2face.serving.service.errors import DOCUMENTED, RefusedError, as_refused, error_body
 from tts2face.serving.service.exchange import PAGES
@@ -166,7 +165,6 @@ def serve(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> None:
     BackendError
         Traces are asked for and their libraries are missing.
     """
-    disable_telemetry()
     configure_logs(settings.log_format, with_text=settings.log_text)
     _allow_files(settings.connections)
     server = make_server(settings, mounts)

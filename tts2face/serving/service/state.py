@@ -21,8 +21,9 @@ from tts2face.serving.service.job_service import JobService
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits, read_keys
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
-from tts2face.serving.service.messages import QUALITY, Work, check_words
-from tts2face.serving.service.pool import STREAM_PRIORITY, InputQueue, Pool, PoolSettings
+from tts2face.serving.service.messages import QUALITY, SYNTHESISE, Work, check_words
+from tts2face.serving.service.pool import STREAM_PRIORITY, InputQueue, Pool, PoolSettings, work_call
+from tts2face.serving.service.preparation import Step
 from tts2face.serving.service.readiness import Readiness
 from tts2face.serving.service.result_cache import CACHED_KINDS, ResultCache
 from tts2face.serving.service.settings import ServiceSettings
@@ -92,7 +93,7 @@ def _count(jobs: "JobService", state: str) -> float:
     return jobs.counts[state]
 
 
-WARM_TEXT = "Hello there."
+WARM_TEXT = "Hi."
 
 
 class ServiceState:
@@ -102,9 +103,7 @@ class ServiceState:
         self.settings = settings
         self.keys = read_keys(settings.keys) if settings.keys is not None else ()
         self.pool = Pool(PoolSettings(
-            settings.processes, settings.waiting,
-            (self.work(format="mp4", request={"text": WARM_TEXT}).as_json(),
-             self.work(kind="speech", request={"text": WARM_TEXT}).as_json()),
+            settings.processes, settings.waiting, self._steps(),
             {"n_sessions": settings.sessions, "log_format": settings.log_format, "log_text": settings.log_text,
              "memory_mb": settings.memory_mb, "sentences_mb": settings.sentences_mb, "tasks": tasks},
         ))  # fmt: skip
@@ -134,6 +133,16 @@ class ServiceState:
         """A work with the models of the settings unless it names others."""
         defaults = {"talker": self.settings.talker, "face": self.settings.face, "palette": self.settings.palette}
         return Work(models=defaults | (models or {}), owner=self.common_owner, **fields)
+
+    def _steps(self) -> tuple[Step, ...]:
+        """What synthesis processes prepare: the longest compilation first, then the voice and the models of a movie."""
+        works = {"voice": self.work(kind="speech", request={"text": WARM_TEXT}),
+                 "models": self.work(format="mp4", request={"text": WARM_TEXT})}  # fmt: skip
+        kernels = {f"kernels of {part}": f"compile_{part}" for part in ("pictures", "motion", "gestures")}
+        return (
+            *(Step(name, call, works["models"].models, is_shared=True) for name, call in kernels.items()),
+            *(Step(name, SYNTHESISE, work_call(work)) for name, work in works.items()),
+        )
 
     @property
     def common_owner(self) -> str:

@@ -31,6 +31,7 @@ from tts2face.serving.service.messages import (
     Work,
 )
 from tts2face.serving.service.scheduler import OneAtATime, Turns, lead
+from tts2face.session import warm_up
 from tts2face.session.functions import SessionCache
 from tts2face.session.named_models import Models
 from tts2face.sound.voice_pool import VoicePool
@@ -159,4 +160,4 @@ def handlers(
     known = dict(TASKS)
     for table in tasks:
         known |= Program(table).load()
-    return {SYNTHESISE: Synthesis(sessions, known).synthesise, SERVE: serve}
+    return {SYNTHESISE: Synthesis(sessions, known).synthesise, SERVE: serve, **warm_up.HANDLERS}

@@ -7,17 +7,19 @@ import asyncio
 import gzip
 import hashlib
 import json
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 
 from fastapi import Request as HttpRequest
 from fastapi.responses import Response
 
-from lexicon.errors import InputError
+from lexicon.errors import InputError, Tts2faceError
 from tts2face import __version__
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.keys import LOCAL_KEY, ApiKey
+from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio.previews import PieceMemory
@@ -123,10 +125,11 @@ class Studio:
             self._preparing = asyncio.get_running_loop().create_task(self._prepare())
 
     async def _prepare(self) -> None:
+        """Make the face in a process of its own: it takes seconds, in which one of the service would answer nobody."""
         project = Project()
         work = self.state.work(kind="face", models=asdict(project.models), request={"has_gestures": True})
-        with suppress(RefusedError):  # the first page says why
-            await self._face_file(project, work, LOCAL_KEY)
+        with suppress(RefusedError, Tts2faceError):  # the first page says why
+            await self._face_file(project, work, self.state.pool.make_aside)
 
     async def face(self, workspace: Workspace) -> tuple[str, Path]:
         """Look of a project and the file of its face, compressed by gzip; made at its first use, and kept.
@@ -141,7 +144,7 @@ class Studio:
             work = await workspace.work("face", has_gestures=project.request.has_gestures)
             try:
                 # In any process: making a face takes seconds, in which the project's own process makes its preview.
-                return look, await self._face_file(project, replace(work, affinity=""), workspace.key)
+                return look, await self._face_file(project, replace(work, affinity=""), self._maker(workspace.key))
             except RefusedError:
                 if look == workspace.look:
                     raise
@@ -152,9 +155,12 @@ class Studio:
         project = Project()
         project = replace(project, request=replace(project.request, gestures="none"))
         work = self.state.work(kind="face", models=asdict(project.models), request={"has_gestures": False})
-        return await self._face_file(project, work, key)
+        return await self._face_file(project, work, self._maker(key))
 
-    async def _face_file(self, project: Project, work: Work, key: ApiKey) -> Path:
+    def _maker(self, key: ApiKey) -> Callable[[Work], Awaitable[bytes]]:
+        return partial(data_of, self.state, key)
+
+    async def _face_file(self, project: Project, work: Work, make: Callable[[Work], Awaitable[bytes]]) -> Path:
         looks = [asdict(project.models), dict(work.models), project.request.has_gestures, __version__]
         name = hashlib.sha256(json.dumps(looks, default=str, sort_keys=True).encode()).hexdigest()[:24]
         path = self._folder / "faces" / f"{name}.glb.gz"
@@ -162,7 +168,7 @@ class Studio:
             if not path.is_file():
                 with translate_disk_errors(path):
                     path.parent.mkdir(parents=True, exist_ok=True)
-                content = await data_of(self.state, key, work)
+                content = await make(work)
                 await asyncio.to_thread(lambda: write_atomically(path, gzip.compress(content, mtime=0)))
                 await asyncio.to_thread(_keep_last, path.parent, MAX_FACES)
         return path

@@ -26,14 +26,18 @@ def health() -> dict[str, str]:
 async def readyz(request: HttpRequest) -> JSONResponse:
     """Models, folders, database, workers, and whether the server is shutting down; 503 unless all are well.
 
-    ``missing`` says what is not, and what to do.
+    ``missing`` says what is not, and what to do; ``preparing``, what synthesis processes that have started do until
+    they are ready.
     """
     state = service_state(request)
     draining = "the service is shutting down; ask another server" if state.is_draining else ""
     found = await state.readiness.look() | {"accepting": draining}
     missing = [reason for reason in found.values() if reason]
     checks = {name: not reason for name, reason in found.items()}
-    content = {"status": "not ready" if missing else "ready", "checks": checks, "missing": missing}
+    content = {
+        "status": "not ready" if missing else "ready", "checks": checks, "missing": missing,
+        "preparing": state.pool.preparation.as_json(),
+    }  # fmt: skip
     return JSONResponse(content, 503 if missing else 200)
 
 
