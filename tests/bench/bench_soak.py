@@ -1,137 +1,73 @@
-"""A month of a service in an hour: mixed requests at the limit, clients that vanish, and disturbances.
+"""A month of a service in an hour: mixed requests at the limit, clients that vanish, and attacks on what it needs.
 
-``PYTHONPATH=. python tests/bench/bench_soak.py --requests 20000``, as root on Linux for all disturbances: synthesis
+``PYTHONPATH=. python tests/bench/bench_soak.py --requests 20000``, as root on Linux for all attacks: synthesis
 processes and workers are killed, the data folder is filled (it lies on a file system of its own), the clock of the
-server goes back by an hour (with a C compiler), the database is away for a while (with ``--database postgresql://...``
-and ``--stop``, ``--start``: commands that stop and start it). What cannot be done here is said and left out.
+server goes back by an hour (with a C compiler), the database is away for a minute (with PostgreSQL). What cannot be
+done here is said and left out. `tests/jobs/server/test_soak.py` is a short run of the same.
 
-Memory, threads, descriptors and temporary files at the end are compared with those after a twentieth of the requests;
-every job that was accepted must have ended, and no log line may be a defect.
+Memory, threads, descriptors and temporary files at the end are compared with those after 1,000 requests, before the
+attacks; every job that was accepted has ended once and its webhook has come, and no log line is a defect.
 """
 
 import argparse
 import asyncio
-import base64
-import json
 import os
-import random
 import shutil
 import signal
 import subprocess
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import httpx
-import websockets
+import pytest
 
-from tests.running import ServeProcess
-from tests.service.server.test_load import LONG, Usage, usage, wait_until_idle
-from tests.started import children, running_processes
+from tests.bench.soak_traffic import AT_ONCE, CUT, KINDS, LONG, Soak, client_of, drive
+from tests.jobs.conftest import Postgres
+from tests.jobs.watch import StoreWatch, ends_of_jobs
+from tests.running import ServeProcess, eventually
+from tests.service.receiver import Receiver
+from tests.started import children
 
-SEED, AT_ONCE, MAX_GROWTH = 1, 24, 0.05
-KEEP_ALIVE_S = 1.0
+MAX_GROWTH = 0.05
+KEEP_ALIVE_S, WAIT_S = 1.0, 240.0
 DISK_MB, AWAY_S = 700, 60.0
-ALLOWED = {200, 202, 400, 404, 422, 429, 503}  # 503 while the disk is full or the database away
-Client = httpx.AsyncClient
+N_WARM = 1_000
+CLOCK = Path(__file__).with_name("shifted_clock.c")
 
 
-@dataclass(slots=True)
-class Soak:
-    """A run: the server, what it answered, and the jobs that it has accepted."""
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """What a server and its processes hold."""
 
-    url: str
-    rng: random.Random = field(default_factory=lambda: random.Random(SEED))
-    statuses: Counter[tuple[str, int]] = field(default_factory=Counter)
-    jobs: list[str] = field(default_factory=list)
-
-    async def one(self, client: Client) -> None:
-        """One request, drawn from `KINDS`; a client that vanishes has the status 0."""
-        name = self.rng.choices(list(KINDS), [share for share, _ in KINDS.values()])[0]
-        try:
-            status = await KINDS[name][1](self, client)
-        except (httpx.HTTPError, OSError, websockets.WebSocketException) as error:
-            status = -1
-            print(f"  {name}: {type(error).__name__}", flush=True)
-        self.statuses[name, status] += 1
+    server_bytes: int
+    process_bytes: int
+    n_threads: int
+    n_descriptors: int
+    n_processes: int
+    n_temporary: int
 
 
-async def _speech(soak: Soak, client: Client) -> int:
-    body = {"input": soak.rng.choice(["Yes.", "Hello there.", "We may."]), "model": "tts-1", "voice": "alloy"}
-    return (await client.post("/v1/audio/speech", json=body)).status_code
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What a run has found."""
 
+    statuses: Counter[tuple[str, int]]
+    states: Counter[str]  # of the jobs, with their errors
+    found: dict[str, str]  # by attack
+    before: Usage
+    after: Usage
 
-async def _curves(soak: Soak, client: Client) -> int:
-    text = f"Number {soak.rng.randrange(10**6)} is here."  # not one that the server remembers
-    return (await client.post("/v1/clips", json={"text": text, "format": "curves"})).status_code
-
-
-async def _film(soak: Soak, client: Client) -> int:
-    return (await client.post("/v1/clips", json={"text": "We may.", "size": "64x64"})).status_code
-
-
-async def _headtts(soak: Soak, client: Client) -> int:
-    return (await client.post("/v1/synthesize", json={"input": "Hello.", "voice": "af_bella"})).status_code
-
-
-async def _wrong(soak: Soak, client: Client) -> int:
-    body = soak.rng.choice([b"{", b'{"text": 3}', b'{"text": "a", "rate": 9}', b"\xff"])
-    return (await client.post("/v1/clips", content=body, headers={"content-type": "application/json"})).status_code
-
-
-async def _vanish(soak: Soak, client: Client) -> int:
-    with suppress(TimeoutError):
-        async with asyncio.timeout(soak.rng.uniform(0.05, 1.5)):
-            await client.post("/v1/clips", json={"text": LONG, "size": "128x128"})
-    return 0
-
-
-async def _live(soak: Soak, client: Client) -> int:
-    async with websockets.connect(soak.url.replace("http", "ws", 1) + "/v1/stream", max_size=None) as socket:
-        await socket.send(json.dumps({"type": "start"}))
-        await socket.send(json.dumps({"type": "text", "text": "We may."}))
-        with suppress(TimeoutError):
-            async with asyncio.timeout(soak.rng.uniform(0.2, 2.0)):
-                async for _ in socket:
-                    pass
-    return 200
-
-
-async def _job(soak: Soak, client: Client) -> int:
-    subtitles = base64.b64encode(b"1\n00:00:00,500 --> 00:00:02,000\nWe may.\n").decode()
-    request = {"text": "We may.", "format": "mp3"} if soak.rng.random() < 0.7 else {"subtitles": subtitles}
-    if "subtitles" in request:
-        files = {"subtitles": ("a.srt", base64.b64decode(subtitles))}
-        order = {"kind": "subtitles", "request": {"format": "mp4", "size": "64x64"}}
-        answer = await client.post("/v1/jobs", data={"job": json.dumps(order)}, files=files)
-    else:
-        answer = await client.post("/v1/jobs", json={"kind": "clip", "request": request})
-    if answer.status_code == 202:
-        soak.jobs.append(answer.json()["id"])
-    return answer.status_code
-
-
-KINDS: Mapping[str, tuple[float, Callable[[Soak, Client], Awaitable[int]]]] = {  # shares of the requests
-    "speech": (0.4, _speech), "curves": (0.15, _curves), "film": (0.05, _film), "headtts": (0.1, _headtts),
-    "wrong": (0.1, _wrong), "vanish": (0.1, _vanish), "live": (0.05, _live), "job": (0.05, _job),
-}  # fmt: skip
-
-
-async def drive(soak: Soak, n: int) -> None:
-    """Make some requests, `AT_ONCE` of them at the same time."""
-    limits = httpx.Limits(max_connections=AT_ONCE, max_keepalive_connections=0)
-    async with Client(base_url=soak.url, limits=limits, timeout=300) as client:
-        left = iter(range(n))
-
-        async def go_on() -> None:
-            for _ in left:
-                await soak.one(client)
-
-        await asyncio.gather(*(go_on() for _ in range(AT_ONCE)))
+    def rows(self) -> Iterator[tuple[str, float, float]]:
+        """Name of a quantity, its value after the warm part, and at the end."""
+        for one in fields(Usage):
+            scale = 1e-6 if one.name.endswith("_bytes") else 1
+            yield one.name, scale * getattr(self.before, one.name), scale * getattr(self.after, one.name)
 
 
 @contextmanager
@@ -148,192 +84,263 @@ def file_system() -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def processes(server: ServeProcess, word: str) -> list[int]:
-    """Processes of the server with a word in their command line."""
-    found = []
-    for pid in children(server.process.pid):
-        with suppress(OSError):
-            found += [pid] if word in Path(f"/proc/{pid}/cmdline").read_text() else []
-    return found
-
-
-def kill(server: ServeProcess, word: str) -> str:
-    """Kill one of these processes."""
-    found = processes(server, word)
-    for pid in found[:1]:
-        os.kill(pid, signal.SIGKILL)
-    return f"killed {len(found[:1])} of {len(found)}"
-
-
-async def fill(folder: Path, soak: Soak, n: int) -> str:
-    """Fill the file system, make some requests, and free it."""
-    if not folder.is_mount():
-        return "left out: it needs the right to mount"
-    path = folder / "full"
-    with path.open("wb") as file, suppress(OSError):
-        while True:
-            file.write(bytes(1 << 20))
-    await drive(soak, n)
-    path.unlink()
-    return f"full for {n} requests"
-
-
-async def take_away(commands: Sequence[str], soak: Soak, n: int) -> str:
-    """Stop the database, make some requests, and start it again."""
-    if not all(commands):
-        return "left out: give --stop and --start"
-    subprocess.run(commands[0], shell=True, check=True)
-    began = time.monotonic()
-    await drive(soak, n)
-    await asyncio.sleep(max(AWAY_S - (time.monotonic() - began), 0.0))
-    subprocess.run(commands[1], shell=True, check=True)
-    return f"away for {time.monotonic() - began:.0f} s"
-
-
-# Of the clock that can be set, and not of the monotonic one; libfaketime makes sleeping fail where that one goes on.
-SHIFTED_CLOCK = """
-#define _GNU_SOURCE
-#include <dlfcn.h>
-#include <fcntl.h>
-#include <stdlib.h>
-#include <sys/mman.h>
-#include <sys/time.h>
-#include <time.h>
-
-static int (*original)(clockid_t, struct timespec *);
-static const volatile long *shift_s;
-
-int clock_gettime(clockid_t clock, struct timespec *now) {
-    if (!original) {
-        shift_s = mmap(0, sizeof(long), PROT_READ, MAP_SHARED, open(getenv("SHIFT_FILE"), O_RDONLY), 0);
-        original = dlsym(RTLD_NEXT, "clock_gettime");
-    }
-    int failed = original(clock, now);
-    if (!failed && (clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE)) now->tv_sec += *shift_s;
-    return failed;
-}
-
-int gettimeofday(struct timeval *now, void *zone) {
-    struct timespec precise;
-    int failed = clock_gettime(CLOCK_REALTIME, &precise);
-    now->tv_sec = precise.tv_sec, now->tv_usec = precise.tv_nsec / 1000;
-    return failed;
-}
-
-time_t time(time_t *seconds) {
-    struct timespec now;
-    clock_gettime(CLOCK_REALTIME, &now);
-    return seconds ? *seconds = now.tv_sec : now.tv_sec;
-}
-"""
-
-
 def shifted_clock(folder: Path) -> dict[str, str]:
     """Variables of processes whose clock `turn_back` sets; none without a compiler."""
-    library, (source, shift) = folder / "clock.so", (folder / "clock.c", folder / "clock.shift")
-    source.write_text(SHIFTED_CLOCK)
+    library, shift = folder / "clock.so", folder / "clock.shift"
     shift.write_bytes(bytes(8))
     if not shutil.which("cc"):
         return {}
-    subprocess.run(["cc", "-shared", "-fPIC", "-o", str(library), str(source), "-ldl"], check=True)
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", str(library), str(CLOCK), "-ldl"], check=True)
     return {"LD_PRELOAD": str(library), "SHIFT_FILE": str(shift)}
 
 
-def turn_back(folder: Path) -> str:
+async def until(condition: Callable[[], Any], what: str) -> None:
+    await asyncio.to_thread(eventually, condition, WAIT_S, what)
+
+
+def kill(server: ServeProcess, word: str) -> str:
+    """Kill the processes of the server with a word in their command line."""
+    n_killed = 0
+    for pid in children(server.process.pid):
+        with suppress(OSError):
+            if word in Path(f"/proc/{pid}/cmdline").read_text():
+                os.kill(pid, signal.SIGKILL)
+                n_killed += 1
+    return f"killed {n_killed}"
+
+
+async def kill_synthesis(soak: Soak, _: int) -> str:
+    """Kill the synthesis processes in the middle of a clip, whose client sees that it is incomplete."""
+    body = {"text": LONG, "size": "128x128"}
+    async with client_of(soak) as client, client.stream("POST", "/v1/clips", json=body) as answer:
+        parts = answer.aiter_bytes()
+        await anext(parts)
+        found = kill(soak.server, "synthesis")
+        with pytest.raises(httpx.RemoteProtocolError):
+            async for _ in parts:
+                pass
+    await until(lambda: not _missing(soak), "ready again")
+    return found
+
+
+async def fill_disk(soak: Soak, n: int) -> str:
+    """Fill the file system, make some requests, and free it."""
+    if not soak.folder.is_mount():
+        return "left out: it needs the right to mount"
+    path = soak.folder / "full"
+    with path.open("wb") as file, suppress(OSError):
+        while True:
+            file.write(bytes(1 << 20))
+    await until(lambda: _missing(soak) >= {"data", "temporary"}, "missing the disk")
+    await drive(soak, n)
+    path.unlink()
+    await until(lambda: not _missing(soak), "ready again")
+    return "full"
+
+
+async def turn_back(soak: Soak, _: int) -> str:
     """Set the server's clock back by an hour."""
-    if not (folder / "clock.so").exists():
+    if not (soak.folder / "clock.so").exists():
         return "left out: there is no C compiler"
-    with (folder / "clock.shift").open("r+b") as file:
+    with (soak.folder / "clock.shift").open("r+b") as file:
         file.write((-3600).to_bytes(8, "little", signed=True))
     return "an hour back"
 
 
-def end_of_jobs(soak: Soak, seconds: float) -> Counter[str]:
-    """States and errors of all accepted jobs when none is open any more."""
-    deadline, states = time.monotonic() + seconds, Counter[str]()
-    with httpx.Client(base_url=soak.url, timeout=60) as client:
-        while time.monotonic() < deadline:
-            found = [client.get(f"/v1/jobs/{job}").json() for job in soak.jobs]
-            states = Counter(f"{one['state']}: {one['error']}" if one["error"] else one["state"] for one in found)
-            if not {one["state"] for one in found} & {"waiting", "running"}:
-                break
-            time.sleep(2.0)
+async def kill_worker(soak: Soak, _: int) -> str:
+    """Kill the worker while it has a job."""
+    async with client_of(soak) as client:
+        while not (await client.get("/v1/jobs", params={"state": "running"})).json()["jobs"]:
+            await soak.one(client, "job")
+    return kill(soak.server, "tts2face.serving.work.worker")
+
+
+async def stop_database(soak: Soak, n: int) -> str:
+    """Stop the database while jobs wait: streams go on, jobs are refused, and those that wait end well."""
+    postgres = soak.postgres
+    if postgres is None:
+        return "left out: it needs PostgreSQL"
+    async with client_of(soak) as client:
+        for _ in range(6):
+            await soak.one(client, "job")
+        job = f"/v1/jobs/{soak.jobs[-1]}"
+        async with client.stream("GET", f"{job}/events") as events:
+            await asyncio.to_thread(postgres.stop)
+            began = time.monotonic()
+            await until(lambda: _missing(soak) == {"database"}, "missing the database")
+            assert (await client.get("/healthz")).status_code == 200
+            refused = await client.post("/v1/jobs", json={"kind": "clip", "request": {"text": "Now."}})
+            assert (refused.status_code, refused.json()["error"]["code"]) == (503, "unavailable")
+            assert int(refused.headers["retry-after"]) > 0
+            assert "127.0.0.1" not in refused.text
+            assert (await client.post(f"{job}/cancel")).status_code == (await client.get("/v1/jobs")).status_code == 503
+            while time.monotonic() < began + soak.away_s:
+                assert (await client.post("/v1/clips", json={"text": "A stream."})).status_code == 200
+                await drive(soak, n)
+            await asyncio.to_thread(postgres.start)
+            seconds = time.monotonic() - began
+            assert '"state": "done"' in "".join([line async for line in events.aiter_lines()])
+    await until(lambda: not _missing(soak), "ready again")
+    return f"away for {seconds:.0f} s"
+
+
+ATTACKS: Mapping[str, Callable[[Soak, int], Awaitable[str]]] = {  # on a soak, with a number of requests meanwhile
+    "synthesis processes": kill_synthesis, "disk": fill_disk, "clock": turn_back, "worker": kill_worker,
+    "database": stop_database,
+}  # fmt: skip
+
+
+def _missing(soak: Soak) -> set[str]:
+    """What `/readyz` names as missing; it answers 200 where there is nothing."""
+    answer = httpx.get(f"{soak.server.url}/readyz", timeout=60)
+    missing = {name for name, is_there in answer.json()["checks"].items() if not is_there}
+    assert (answer.status_code == 200) == (not missing)
+    return missing
+
+
+def states_of_jobs(soak: Soak) -> Counter[str]:
+    """States and errors of all accepted jobs when none is open any more, and their webhooks have come."""
+    states, left = Counter[str](), set(soak.jobs)
+    with httpx.Client(base_url=soak.server.url, timeout=60) as client:
+
+        def have_ended() -> bool:
+            for job in sorted(left):
+                one = client.get(f"/v1/jobs/{job}").json()
+                if one["state"] not in {"waiting", "running"}:
+                    states[f"{one['state']}: {one['error']}" if one["error"] else one["state"]] += 1
+                    left.remove(job)
+            return not left
+
+        eventually(have_ended, WAIT_S, lambda: f"jobs have not ended: {left}")
+    told = soak.receiver.messages
+    eventually(lambda: {name for name, _ in told} >= set(soak.jobs), WAIT_S, "webhooks have not come")
+    assert soak.receiver.wrong == []
     return states
 
 
-def settled(server: ServeProcess, temporary: Path) -> tuple[Usage, int]:
-    """What the server holds when it is idle, and the number of its temporary files."""
-    wait_until_idle(server)
-    time.sleep(KEEP_ALIVE_S + 2.0)
-    return usage(server), sum(len(files) for _, _, files in os.walk(temporary))
+def usage(soak: Soak) -> Usage:
+    """What the server holds when no work runs or waits, and connections and their threads have ended."""
+    quiet = {"tts2face_waiting 0.0", "tts2face_load 0.0"}
+    eventually(lambda: quiet <= set(httpx.get(f"{soak.server.url}/metrics").text.splitlines()), 120.0)
+    time.sleep(KEEP_ALIVE_S)
+    looks: list[Usage] = []
+
+    def is_steady() -> bool:
+        looks.append(_look(soak))
+        return len(looks) > 4 and all(_counts(one) == _counts(looks[-1]) for one in looks[-4:])
+
+    eventually(is_steady, 60.0, "numbers of threads and descriptors are not steady")
+    return looks[-1]
 
 
-def row(name: str, before: float, after: float) -> str:
-    grown = (after - before) / before if before else float(after > 0)
-    return (
-        f"| {name} | {before:.0f} | {after:.0f} | {100 * grown:+.0f} % |{'' if grown <= MAX_GROWTH else ' **grown**'}"
-    )
+def _counts(one: Usage) -> tuple[int, ...]:
+    return (one.n_threads, one.n_descriptors, one.n_processes, one.n_temporary)
 
 
-async def disturbed(soak: Soak, server: ServeProcess, folder: Path, chosen: argparse.Namespace) -> None:
-    """The requests in six parts, with a disturbance after each of the first five."""
-    part = chosen.requests // 6
-    few = max(part // 10, AT_ONCE)
-    disturbances: list[tuple[str, Callable[[], Awaitable[str] | str]]] = [
-        ("synthesis process", lambda: kill(server, "synthesis")),
-        ("worker", lambda: kill(server, "worker")),
-        ("disk", lambda: fill(folder, soak, few)),
-        ("clock", lambda: turn_back(folder)),
-        ("database", lambda: take_away((chosen.stop, chosen.start), soak, few)),
-    ]
-    for name, disturb in disturbances:
-        await drive(soak, part)
-        found = disturb()
-        print(f"  {name}: {found if isinstance(found, str) else await found}", flush=True)
+def _look(soak: Soak) -> Usage:
+    own = children(soak.server.process.pid)
+    every = [Path(f"/proc/{pid}") for pid in (soak.server.process.pid, *own)]
+    pages = [int((one / "statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") for one in every]
+    return Usage(
+        pages[0], sum(pages[1:]), sum(len(os.listdir(one / "task")) for one in every),
+        sum(len(os.listdir(one / "fd")) for one in every), len(own),
+        sum(len(folders) + len(files) for _, folders, files in os.walk(soak.folder / "tmp")),
+    )  # fmt: skip
+
+
+async def attacked(soak: Soak, n: int) -> dict[str, str]:
+    """Make requests in equal parts, each with an attack meanwhile; what became of the attacks."""
+    found = {}
+    for name, attack in ATTACKS.items():
+        part = n // (len(ATTACKS) + 1)
+        found[name], _ = await asyncio.gather(attack(soak, max(part // 10, len(KINDS))), drive(soak, part))
+        print(f"  {name}: {found[name]}", flush=True)
     await drive(soak, part)
+    return found
+
+
+def run_soak(
+    n_requests: int, *, n_warm: int, postgres: Postgres | None, processes: int = 1, away_s: float = AWAY_S
+) -> Report:
+    """Make mixed requests, attack the service meanwhile, and look whether it has kept its word."""
+    with ExitStack() as stack:
+        folder, receiver = stack.enter_context(file_system()), stack.enter_context(Receiver(n_refused=1))
+        (folder / "tmp").mkdir()
+        database = str(folder / "jobs.sqlite") if postgres is None else postgres.database()
+        settings = {"KEEP_ALIVE_S": str(KEEP_ALIVE_S), "DATA": str(folder / "data"), "DATABASE": database,
+                    "STORE": str(folder / "store")}  # fmt: skip
+        environment = receiver.environment | {f"TTS2FACE_SERVE_{name}": value for name, value in settings.items()}
+        server = ServeProcess(
+            processes=processes, environment=environment | {"TMPDIR": str(folder / "tmp")} | shifted_clock(folder)
+        )
+        stack.callback(server.close)
+        server.wait_until_ready()
+        watch = stack.enter_context(StoreWatch(folder / "store"))
+        soak = Soak(server, folder, receiver, postgres, away_s)
+        asyncio.run(drive(soak, n_warm))
+        states_of_jobs(soak)
+        before = usage(soak)
+        found = asyncio.run(attacked(soak, n_requests))
+        states = states_of_jobs(soak)
+        after = usage(soak)
+        assert watch.n_twice == 0
+        check_ends(soak, *ends_of_jobs(database))
+    check_log(server, postgres)
+    return Report(soak.statuses, states, found, before, after)
+
+
+def check_ends(soak: Soak, ends: Mapping[str, int], results: Mapping[str, int]) -> None:
+    """Each job that was accepted, and no other one, has ended once and has its results."""
+    assert {job: n for job, n in ends.items() if n != 1} == {}
+    assert set(soak.jobs) - ends.keys() == set()
+    assert ends.keys() - set(soak.jobs) == set(), soak.statuses["job", 503]
+    assert results.keys() == ends.keys()
+
+
+def check_log(server: ServeProcess, postgres: Postgres | None) -> None:
+    """No line is a defect; the outage of the database is two lines, and the incomplete clip one with its reason."""
+    names = [event["event"] for event in server.events()]
+    assert "defect" not in names
+    assert "Traceback" not in "".join(server.lines)
+    if postgres is not None:
+        assert [one for one in names if one.startswith("jobs ")] == ["jobs not available", "jobs available"]
+    ends = [(one["status"], one["code"]) for one in server.events() if one["event"] == "request"]
+    assert (200, "unavailable") in ends
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--requests", type=int, default=20_000)
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--database", default="", help="PostgreSQL in place of SQLite")
-    parser.add_argument("--stop", default="", help="command that stops the database")
-    parser.add_argument("--start", default="", help="command that starts it")
     chosen = parser.parse_args()
-    with file_system() as folder:
-        temporary = folder / "tmp"
-        temporary.mkdir()
-        server = ServeProcess(processes=chosen.processes, environment={
-            "TTS2FACE_SERVE_KEEP_ALIVE_S": str(KEEP_ALIVE_S), "TTS2FACE_SERVE_DATA": str(folder / "data"),
-            "TTS2FACE_SERVE_DATABASE": chosen.database, "TMPDIR": str(temporary),
-            **shifted_clock(folder),
-        })  # fmt: skip
-        try:
-            server.wait_until_ready()
-            soak, began = Soak(server.url), time.monotonic()
-            asyncio.run(drive(soak, chosen.requests // 20))
-            before, n_before = settled(server, temporary)
-            asyncio.run(disturbed(soak, server, folder, chosen))
-            states = end_of_jobs(soak, 600.0)
-            after, n_after = settled(server, temporary)
-            defects = [event for event in server.events() if event["event"] == "defect"]
-        finally:
-            server.close()
-    seconds = time.monotonic() - began
-    print(f"\n{sum(soak.statuses.values())} requests in {seconds:.0f} s; {len(running_processes())} processes here")
-    print("statuses:", {f"{name} {status}": n for (name, status), n in sorted(soak.statuses.items())})
-    print("jobs:", dict(states), "defects:", len(defects))
-    print("\n| quantity | after a twentieth | at the end | change |\n| --- | --- | --- | --- |")
-    print(row("server MB", before.server_bytes / 1e6, after.server_bytes / 1e6))
-    print(row("synthesis and workers MB", before.synthesis_bytes / 1e6, after.synthesis_bytes / 1e6))
-    for name in ("n_threads", "n_files", "n_children"):
-        print(row(name.removeprefix("n_"), getattr(before, name), getattr(after, name)))
-    print(row("temporary files", n_before, n_after))
-    wrong = {status for _, status in soak.statuses} - ALLOWED - {0}
+    postgres, began = None, time.monotonic()
+    with suppress(pytest.skip.Exception):
+        postgres = Postgres()
+    try:
+        report = run_soak(
+            chosen.requests, n_warm=min(N_WARM, chosen.requests // 2), postgres=postgres, processes=chosen.processes
+        )
+    finally:
+        if postgres is not None:
+            postgres.remove()
+    print(f"\n{sum(report.statuses.values())} requests in {time.monotonic() - began:.0f} s")
+    print("statuses:", {f"{name} {status}": n for (name, status), n in sorted(report.statuses.items())})
+    print("jobs:", dict(report.states))
+    print("\n| quantity | before the attacks | at the end | change |\n| --- | --- | --- | --- |")
+    for name, before, after in report.rows():
+        change = (after - before) / before if before else float(after > 0)
+        print(f"| {name} | {before:.0f} | {after:.0f} | {100 * change:+.1f} % |{' **grown**' * (change > MAX_GROWTH)}")
+    check(report)
+
+
+def check(report: Report) -> None:
+    """Every answer is one of the expected ones, and every job is done."""
+    allowed = {name: statuses for name, (_, _, statuses) in KINDS.items()}
+    wrong = {(name, status) for name, status in report.statuses if status not in allowed[name] | {CUT}}
     assert not wrong, wrong
-    assert states.keys() == {"done"}, states
-    assert not defects, defects[:3]
+    n_cut = sum(n for (_, status), n in report.statuses.items() if status == CUT)
+    assert n_cut <= AT_ONCE, "more were cut than ran when the synthesis processes were killed"
+    assert report.states.keys() == {"done"}, report.states
 
 
 if __name__ == "__main__":

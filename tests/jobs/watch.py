@@ -1,9 +1,12 @@
-"""A watch over a folder store: segments that were rendered although they were stored, and renderings cut off."""
+"""What must not happen twice: a watch over a folder store, and the ends of jobs in the database."""
 
 import threading
+from collections.abc import Mapping
 from pathlib import Path
 
 from tts2face.serving.batch.segment import SEGMENT_SUFFIX
+from tts2face.serving.work.connection import JobDatabase
+from tts2face.serving.work.database import database_url
 
 INTERVAL_S = 0.5
 
@@ -53,3 +56,17 @@ class StoreWatch:
         self._ended.set()
         self._thread.join()
         self.look()
+
+
+def ends_of_jobs(database: str) -> tuple[Mapping[str, int], Mapping[str, int]]:
+    """How often each job of the service was done, and its number of results."""
+    opened = JobDatabase(database_url(database))
+    try:
+        with opened.transaction() as look:
+            done = '%"state": "done"%'
+            count = "SELECT job_id, count(*) FROM"
+            ends = look.rows(f"{count} tts2face_job_events WHERE content LIKE :done GROUP BY job_id", done=done)
+            results = look.rows(f"{count} tts2face_job_files WHERE role = 'output' GROUP BY job_id")
+    finally:
+        opened.close()
+    return dict(map(tuple, ends)), dict(map(tuple, results))

@@ -1,4 +1,4 @@
-"""Three subtitle files, two workers, kill -9 every few seconds: every clip is there, once, and in sync.
+"""Three subtitle files, two workers: all is killed, then a worker now and then; each clip is there once, in sync.
 
 `TTS2FACE_SERIES_CUES` is the number of cues of a file (12). For the figures in docs/performance.md:
 ``TTS2FACE_SERIES_CUES=400 pytest -n 0 --log-cli-level=INFO tests/jobs/server/test_series.py``.
@@ -20,14 +20,17 @@ import pytest
 
 pytest.importorskip("dbos", reason="needs the extra [batch]")
 
+from tests.jobs.conftest import Postgres
 from tests.jobs.series import Episode, make_series
 from tests.jobs.watch import StoreWatch
+from tests.running import eventually
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.work.client import list_jobs
 
 N_CUES = int(os.environ.get("TTS2FACE_SERIES_CUES", "12"))
 FPS = 10
 TIMEOUT_S = 240 + 6 * N_CUES
+N_STORED = 6  # when everything is killed
 FIRST_KILL_S, KILL_INTERVAL_S = 3.0, (4.0, 12.0)
 LOG = logging.getLogger(__name__)
 COMMAND = [sys.executable, "-m", "tts2face"]
@@ -106,31 +109,50 @@ def check_outputs(folder: Path, episodes: tuple[Episode, ...]) -> None:
     assert sorted(path.name for path in folder.glob("*.mp4")) == sorted(entry["file"] for entry in entries)
 
 
-def test_a_series_survives_kills(database: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("kind", ["sqlite", "postgres"])
+def test_a_series_survives_kills(kind: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    server: Postgres | None = request.getfixturevalue("postgres") if kind == "postgres" else None
+    database = str(tmp_path / "jobs.sqlite") if server is None else server.database()
     episodes = make_series(tmp_path, N_CUES)
-    store, out = tmp_path / "store", tmp_path / "clips"
+    n_clips = sum(len(episode.spoken) for episode in episodes)
+    store, out, log = tmp_path / "store", tmp_path / "clips", tmp_path / "workers.log"
     files = [str(episode.path) for episode in episodes]
     batch = [*COMMAND, "batch", *files, "--out", str(out), "--database", database, "--store", str(store), *DRAFT]
+    batch += ["--jobs", "0"]
     began = time.perf_counter()
-    with StoreWatch(store) as watch, Killer(database, store, tmp_path / "workers.log", watch) as killer:
-        done = subprocess.run(
-            [*batch, "--jobs", "0", "--quiet"], capture_output=True, text=True, check=False, timeout=TIMEOUT_S
-        )
-        if not killer.n_kills:
-            pytest.fail(f"the series was done after {time.perf_counter() - began:.0f} s, before the first kill")
+    with StoreWatch(store) as watch:
+        first = [subprocess.Popen([*batch, "--quiet"]), *(start_worker(database, store, log) for _ in range(2))]
+        try:
+            eventually(lambda: len(watch.stored) >= N_STORED, TIMEOUT_S)
+        finally:
+            for one in first:
+                one.kill()
+            if server is not None:
+                server.kill()
+            for one in first:
+                one.wait()
+        watch.look()
+        assert len(watch.stored) < n_clips - 2, "all was done before everything was killed"
+        if server is not None:
+            server.start()
+        with Killer(database, store, log, watch) as killer:
+            done = subprocess.run([*batch, "--quiet"], capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
+            if not killer.n_kills:
+                pytest.fail(
+                    f"the series was done after {time.perf_counter() - began:.0f} s, before a worker was killed"
+                )
     assert done.returncode == 0, done.stderr
     check_outputs(out, episodes)
-    n_clips = sum(len(episode.spoken) for episode in episodes)
     stored = sorted(open_store(store).addresses())  # equal cues share a segment
     assert stored == sorted({job.name.partition(".")[0] for job in list_jobs(database)})
     assert 0.9 * n_clips < len(stored) <= n_clips
     assert {job.state for job in list_jobs(database)} == {"done"}
     assert watch.n_twice == 0
-    assert watch.cut_off() <= killer.n_kills + 2  # the last two workers are killed, too
+    assert watch.cut_off() <= killer.n_kills + 4  # the first two and the last two workers are killed, too
     LOG.info(
         "%d clips, %d segments, %d kills; %d renderings were cut off and repeated, %d stored segments rendered again; "
         "%.0f s",
         n_clips, len(stored), killer.n_kills, watch.cut_off(), watch.n_twice, time.perf_counter() - began,
     )  # fmt: skip
-    again = subprocess.run([*batch, "--jobs", "0"], capture_output=True, text=True, check=True)
+    again = subprocess.run(batch, capture_output=True, text=True, check=True)
     assert f"{n_clips} clips were up to date" in again.stdout + again.stderr

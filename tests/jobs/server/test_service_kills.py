@@ -15,13 +15,12 @@ import pytest
 pytest.importorskip("dbos", reason="needs the extra [batch]")
 pytest.importorskip("fastapi", reason="needs the extra [service]")
 
-from tests.jobs.watch import StoreWatch
+from tests.jobs.watch import StoreWatch, ends_of_jobs
 from tests.running import ServeProcess, eventually
 from tests.service.job_requests import wait_for_database
 from tests.service.receiver import Receiver
 from tests.started import running_processes
 from tts2face.serving.work.client import list_jobs
-from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url
 from tts2face.serving.work.engine import DatabaseEngine, LocalWorker, open_client
 
@@ -136,18 +135,9 @@ def check_jobs(machines: Machines, names: list[str]) -> None:
     found = machines.jobs()
     assert sorted(job["id"] for job in found) == sorted(names)
     assert Counter(job["state"] for job in found) == {"done": N_JOBS}
-    url = database_url(machines.database)
-    database = JobDatabase(url)
-    try:
-        with database.transaction() as look:
-            done = '%"state": "done"%'
-            count = "SELECT job_id, count(*) FROM"
-            ends = look.rows(f"{count} tts2face_job_events WHERE content LIKE :done GROUP BY job_id", done=done)
-            results = look.rows(f"{count} tts2face_job_files WHERE role = 'output' GROUP BY job_id")
-    finally:
-        database.close()
-    assert dict(map(tuple, ends)) == dict(map(tuple, results)) == dict.fromkeys(names, 1)
-    with open_client(url) as client:
+    once = dict.fromkeys(names, 1)
+    assert ends_of_jobs(machines.database) == (once, once)
+    with open_client(database_url(machines.database)) as client:
         eventually(lambda: {one.status for one in client.list_workflows(name="run_job")} == {"SUCCESS"})
     for name in names[:: max(1, N_JOBS // 5)]:
         (result,) = machines.api.get(f"/v1/jobs/{name}").json()["results"]

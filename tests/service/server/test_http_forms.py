@@ -2,18 +2,15 @@
 
 import io
 import json
-import os
-import signal
 import tempfile
 import wave
 
 import httpx
 import pytest
 
-from tests.running import RunningService, eventually, serve_process
+from tests.running import RunningService
 from tests.service import raw
 from tests.service.job_requests import CLIP, finished, submit
-from tests.started import running_processes
 
 RESULT = {**CLIP, "format": "wav"}
 
@@ -102,26 +99,3 @@ def test_refusals_show_no_path_of_the_server(
     assert "/" not in message.replace("and/or", "")
     assert tempfile.gettempdir() not in message
     assert service.data.name not in message
-
-
-def test_a_killed_synthesis_process_is_no_defect() -> None:
-    """The clip that it made ends incomplete, which is logged with its reason; the next one is made by its successor."""
-    with serve_process(environment={"TTS2FACE_SERVE_WORKERS": "0"}) as own:
-        body = {"text": "We were away a year ago. " * 40, "size": "128x128"}
-        with httpx.stream("POST", f"{own.url}/v1/clips", json=body, timeout=60) as answer:
-            parts = answer.iter_bytes()
-            next(parts)
-            pid = own.wait_for_event("synthesis process ready")["process"]
-            assert pid in running_processes()
-            os.kill(pid, signal.SIGKILL)
-            with pytest.raises(httpx.RemoteProtocolError):
-                for _ in parts:
-                    pass
-        request = own.wait_for_event("request", path="/v1/clips")
-        assert (request["status"], request["code"]) == (200, "unavailable")
-        eventually(lambda: httpx.get(f"{own.url}/readyz").status_code == 200)
-        assert (
-            httpx.post(f"{own.url}/v1/clips", json={"text": "Hello.", "format": "wav"}, timeout=60).status_code == 200
-        )
-        assert {event["event"] for event in own.events()} & {"defect"} == set()
-        assert "Traceback" not in "".join(own.lines)
