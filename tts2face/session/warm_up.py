@@ -131,12 +131,12 @@ def compile_gestures() -> None:
     from tts2face.sound.segments import StatedPhone, find_edges
     from tts2face.types import Waveform
 
-    gestures = GestureStream(GestureFields(load_palette("starter")), style="grid_s1", seed=0, fps=30.0)
     sound = Waveform(np.zeros(1600), 16_000)
-    gestures.next(sound, 3, Timeline())
     block_powers(sound)
     stated = [StatedPhone(SILENCE, 0.0), StatedPhone("ə", 0.03, 0.03), StatedPhone(SILENCE, 0.06)]
     find_edges(sound, stated, load_phone_classifier("heart"))
+    gestures = GestureStream(GestureFields(load_palette("starter")), style="grid_s1", seed=0, fps=30.0)
+    gestures.next(sound, 3, Timeline())  # the last one: `GESTURES` tells that all are compiled
 
 
 def _motion(_: Call) -> dict[str, Any]:
