@@ -20,7 +20,6 @@ SMALL = {
 }  # fmt: skip
 # Meaning is checked after form: a text may be empty, so that requests of the right form may be refused.
 OPTIONS = (
-    "--phases", "examples,coverage,fuzzing,stateful",
     "--max-examples", "8", "--request-timeout", "300", "--no-color", "--workers", "2", "--generation-database", "none",
     "--exclude-path-regex", "/events$",  # of a job that nobody works on: they never end
     "--suppress-health-check", "all", "--seed", "7", "--exclude-checks", "positive_data_acceptance",
@@ -34,12 +33,19 @@ def small(host: HostService) -> Iterator[RunningService]:
         yield running
 
 
-def test_requests_made_from_the_schema_get_documented_answers(small: RunningService, tmp_path: Path) -> None:
-    """All routes; data at the edges of the schema, random data, and sequences of calls that use earlier answers."""
-    command = [sys.executable, "-m", "schemathesis.cli", "run", f"{small.url}/openapi.json", *OPTIONS]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=900, check=False, cwd=tmp_path)
+def run_schemathesis(service: RunningService, folder: Path, *options: str) -> None:
+    command = [sys.executable, "-m", "schemathesis.cli", "run", f"{service.url}/openapi.json", *OPTIONS, *options]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=900, check=False, cwd=folder)
     assert done.returncode == 0, done.stdout[-6000:]
-    assert not [event for event in small.events() if event["event"] == "defect"]
+    assert not [event for event in service.events() if event["event"] == "defect"]
+
+
+@pytest.mark.parametrize("phase", ["examples,coverage", "fuzzing,stateful"])
+def test_requests_made_from_the_schema_get_documented_answers(
+    small: RunningService, tmp_path: Path, phase: str
+) -> None:
+    """All routes; data at the edges of the schema, random data, and sequences of calls that use earlier answers."""
+    run_schemathesis(small, tmp_path, "--phases", phase)
     assert httpx.get(f"{small.url}/readyz").status_code == 200
 
 
