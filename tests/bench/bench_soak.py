@@ -290,10 +290,13 @@ def run_soak(
 
 
 def check_ends(soak: Soak, ends: Mapping[str, int], results: Mapping[str, int]) -> None:
-    """Each job that was accepted, and no other one, has ended once and has its results."""
+    """Each job that was accepted has ended once and has its results.
+
+    There may be others: the database may stop between the entry of a job and the answer, which is 503 then.
+    """
     assert {job: n for job, n in ends.items() if n != 1} == {}
     assert set(soak.jobs) - ends.keys() == set()
-    assert ends.keys() - set(soak.jobs) == set(), soak.statuses["job", 503]
+    assert len(ends.keys() - set(soak.jobs)) <= soak.statuses["job", 503]
     assert results.keys() == ends.keys()
 
 

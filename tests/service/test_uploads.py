@@ -1,5 +1,7 @@
 """Uploaded files: decoded elsewhere, within limits."""
 
+import asyncio
+import errno
 import io
 import wave
 import zlib
@@ -10,6 +12,7 @@ import pytest
 from PIL import Image
 
 from tests.processes.answered import refusal
+from tts2face.serving.service.uploads import PICTURE, SOUND, SUBTITLES, decode_file
 
 RATE = 16_000
 
@@ -95,3 +98,17 @@ def test_a_decoder_cannot_take_the_memory_of_the_machine(tmp_path: Path) -> None
     message, _ = decode("picture", png_bomb(30_000), tmp_path, 1e9)
     assert message
     assert "Traceback" not in message
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize(
+    ("kind", "content"),
+    [(SUBTITLES, b"1\n00:00:01,000 --> 00:00:02,000\nHello.\n"), (PICTURE, png(64, 64)), (SOUND, wav())],
+    ids=["subtitles", "picture", "sound"],
+)
+def test_a_full_disk_is_not_a_fault_of_the_file(kind: str, content: bytes, tmp_path: Path) -> None:
+    """The guard answers this error; a refusal would tell the client to send another file."""
+    (tmp_path / "given").write_bytes(content)
+    with pytest.raises(OSError, match="No space left") as full:
+        asyncio.run(decode_file((kind, tmp_path / "given", Path("/dev/full"), 1e6), "it", 60.0))
+    assert full.value.errno == errno.ENOSPC

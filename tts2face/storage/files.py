@@ -8,6 +8,7 @@ Folders of the current user for cached files and for data.
 """
 
 import contextlib
+import errno
 import logging
 import os
 import re
@@ -92,6 +93,11 @@ def translate_disk_errors(path: Path) -> Iterator[None]:
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
         raise BackendError(f"cannot write {path}: {reason}; free some space or choose another folder") from error
+
+
+def is_disk_full(error: BaseException) -> bool:
+    """Whether an error says that a disk, or the share of it that a user may have, is full."""
+    return isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}
 
 
 MOVIE_SUFFIXES = (".mp4", ".webm", ".mov", ".gif")

@@ -15,6 +15,7 @@ import pytest
 from PIL import Image
 
 from cli.main import run
+from corpus_tools.studies.gestures import moods
 from tests.characters.made import write_character_file, write_landmarks
 from tests.docs.blocks import (
     EXECUTED_PAGES,
@@ -134,6 +135,8 @@ def test_command_lines_of_readme_and_cli_page_work(
         words += ["--halves", "2"]
     if words[:2] == ["report", "moods"]:
         words += ["--size", "160"]
+        few = functools.partial(moods.MoodOptions, frames=2, sentences=("Bob may.",))
+        monkeypatch.setattr(moods, "MoodOptions", few)
     if words[:2] == ["face", "calibrate"]:  # takes minutes with the poses that a face needs
         monkeypatch.setattr("corpus_tools.training.calibrate_face.N_POSES", 40)
         monkeypatch.setattr("corpus_tools.training.calibrate_face.N_DRAWN", ((2, 2),))

@@ -11,11 +11,11 @@ from tests.bench.bench_soak import check, run_soak
 from tests.jobs.conftest import Postgres
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="needs /proc")
-N_WARM, N_REQUESTS = 60, 120
+N_WARM, N_REQUESTS = 40, 60
 AWAY_S = 10.0  # several tries of the worker and of the server to reach the database
-# In N_REQUESTS each thing that a request leaves behind, be it of one kind of them, is counted nine times or more. Pools
-# of threads and of connections grow to their sizes once. Allocators keep some memory; a synthesis process that is
-# started again and then makes movies holds up to 180 MB more, and the pictures of one clip whose client leaves 60 MB.
+# Pools of threads and of connections grow to their sizes once; a thread or a descriptor of each client that leaves are
+# 16 and more. Allocators keep some memory, and a synthesis process that was started again and has made movies has
+# up to 180 MB more; the pictures of one clip whose client leaves are 60 MB.
 MOST_GROWTH = {
     "server_bytes": 30.0, "process_bytes": 300.0, "n_threads": 12, "n_descriptors": 12, "n_processes": 0,
     "n_temporary": 0,

@@ -121,28 +121,29 @@ def test_streams_that_take_too_long_are_cut(tmp_path: Path) -> None:
         own.process.kill()
 
 
-@pytest.mark.parametrize("path", ["/v1/stream", "/"])
-def test_websockets_get_a_message_and_the_code_of_a_restart(own: RunningService, path: str) -> None:
-    async def run() -> tuple[list[object], int | None]:
-        address = own.url.replace("http", "ws", 1) + path
-        async with websockets.connect(address, max_size=None) as connection:
-            if path == "/v1/stream":
-                await connection.send(json.dumps({"type": "start"}))
-                await connection.recv()
-            os.kill(own.process.pid, signal.SIGTERM)
-            came: list[object] = []
-            try:
-                while True:
-                    message = await asyncio.wait_for(connection.recv(), 60)
-                    came.append(json.loads(message) if isinstance(message, str) else message)
-            except websockets.ConnectionClosed as closed:
-                return came, closed.rcvd.code if closed.rcvd else None
+def test_websockets_get_a_message_and_the_code_of_a_restart(own: RunningService) -> None:
+    async def open_socket(path: str) -> websockets.ClientConnection:
+        connection = await websockets.connect(own.url.replace("http", "ws", 1) + path, max_size=None)
+        if path == "/v1/stream":
+            await connection.send(json.dumps({"type": "start"}))
+            await connection.recv()
+        return connection
 
-    came, code = asyncio.run(run())
-    errors = [one for one in came if isinstance(one, dict) and one["type"] == "error"]
-    assert [(one["code"], one["message"]) for one in errors] == [
-        ("draining", "the service is shutting down; connect again")
-    ]
-    assert code == 1012
+    async def errors_and_code(connection: websockets.ClientConnection) -> tuple[list[object], int | None]:
+        errors: list[object] = []
+        try:
+            while True:
+                message = await asyncio.wait_for(connection.recv(), 60)
+                came = json.loads(message) if isinstance(message, str) else {"type": "bytes"}
+                errors += [(came["code"], came["message"])] if came["type"] == "error" else []
+        except websockets.ConnectionClosed as closed:
+            return errors, closed.rcvd.code if closed.rcvd else None
+
+    async def run() -> list[tuple[list[object], int | None]]:
+        sockets = [await open_socket(path) for path in ("/v1/stream", "/")]
+        os.kill(own.process.pid, signal.SIGTERM)
+        return list(await asyncio.gather(*map(errors_and_code, sockets)))
+
+    assert asyncio.run(run()) == [([("draining", "the service is shutting down; connect again")], 1012)] * 2
     assert own.process.wait(60) == 0
     assert not any(event["event"] == "defect" for event in own.events())

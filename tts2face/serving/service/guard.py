@@ -6,7 +6,6 @@ What a key may do.
 """
 
 import asyncio
-import errno
 import logging
 import re
 import time
@@ -37,6 +36,7 @@ from tts2face.serving.service.exchange import (
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, find_key
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.origins import answer_headers, check_origin, preflight_headers
+from tts2face.storage.files import is_disk_full
 
 if TYPE_CHECKING:
     from tts2face.serving.service.exchange import Exchange
@@ -162,7 +162,7 @@ class Guard:
             if isinstance(defect.__cause__, RefusedError) and request.status:  # Starlette's, of one that comes too late
                 request.code = defect.__cause__.code
                 return
-            if isinstance(defect, OSError) and defect.errno in {errno.ENOSPC, errno.EDQUOT}:
+            if is_disk_full(defect):
                 message = "a disk of the service is full, /readyz names its folder; repeat the request later"
                 await request.refuse(RefusedError(503, "unavailable", message, {"Retry-After": str(RETRY_S)}))
                 return

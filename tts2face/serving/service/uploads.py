@@ -12,7 +12,9 @@ or size in bytes.
 """
 
 import asyncio
+import errno
 import json
+import os
 import shutil
 import tempfile
 from collections.abc import AsyncIterator, Iterator, Mapping
@@ -43,6 +45,7 @@ from tts2face.serving.work.resource_check import (
     draw_resource,
     find_places,
 )
+from tts2face.storage.files import is_disk_full
 
 MAX_CHECKS, MAX_WAITING = 2, 8  # uploads that are checked, and that wait for it
 
@@ -98,6 +101,8 @@ def _decoding(kind: str, *errors: type[Exception]) -> Iterator[None]:
     except RefusedFileError:
         raise
     except errors as error:
+        if is_disk_full(error):
+            raise
         raise RefusedFileError(f"it is no {kind} that can be decoded") from error
 
 
@@ -242,8 +247,13 @@ def decode(kind: str, source: Path, target: Path, limit: float) -> None:
 
 def _decode(call: Call) -> dict[str, Any]:
     asked = call.content
-    decode(asked["kind"], Path(asked["source"]), Path(asked["target"]), float(asked["limit"]))
-    return {}
+    try:
+        decode(asked["kind"], Path(asked["source"]), Path(asked["target"]), float(asked["limit"]))
+    except OSError as error:
+        if not is_disk_full(error):
+            raise
+        return {"is_full": True}
+    return {"is_full": False}
 
 
 def program(kind: str) -> Program:
@@ -391,11 +401,13 @@ async def decode_file(arguments: tuple[str, Path, Path, float], name: str, timeo
     ------
     RefusedError
         The file is refused, or takes too much memory or time.
+    OSError
+        The disk is full.
     """
     kind, source, target, limit = arguments
     order = {"kind": kind, "source": str(source), "target": str(target), "limit": limit}
     try:
-        await call_once(program(kind), DECODE, order, timeout_s=timeout_s)
+        answer = await call_once(program(kind), DECODE, order, timeout_s=timeout_s)
     except TimeoutError as late:
         raise RefusedError(
             422, "invalid_data", f"{name} took more than {timeout_s:g} s to decode; send a simpler file"
@@ -404,6 +416,8 @@ async def decode_file(arguments: tuple[str, Path, Path, float], name: str, timeo
         raise _refused(name, str(refused)) from refused
     except ChildEndedError as ended:
         raise _refused(name, "it needs too much memory or time") from ended
+    if answer["is_full"]:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def _refused(name: str, reason: str) -> RefusedError:
