@@ -1,6 +1,6 @@
 """kill -9 of the server and of workers in the middle of many jobs: all finish, none twice.
 
-`TTS2FACE_KILLED_JOBS` is their number (12).
+`TTS2FACE_KILLED_JOBS` is their number (20).
 """
 
 import os
@@ -24,7 +24,7 @@ from tts2face.serving.work.client import list_jobs
 from tts2face.serving.work.database import database_url
 from tts2face.serving.work.engine import DatabaseEngine, LocalWorker, open_client
 
-N_JOBS = int(os.environ.get("TTS2FACE_KILLED_JOBS", "12"))
+N_JOBS = int(os.environ.get("TTS2FACE_KILLED_JOBS", "20"))
 TIMEOUT_S = 240.0 + 4 * N_JOBS
 CLIP = {"voice": "espeak", "format": "oculus", "fps": 5}
 
