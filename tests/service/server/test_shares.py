@@ -14,11 +14,12 @@ import websockets
 from tests.running import HostService, RunningService, eventually
 from tests.service.raw import connect, request
 from tts2face.serving.service.keys import add_key
+from tts2face.serving.service.pool import MOVIE_COST, PLACES
 
 N_PLACES = 64  # as by default: the services of a run of the tests share one pool
-N_ASKED, N_RUNNING = 80, 2  # movies
+N_ASKED, N_RUNNING = 80, PLACES[MOVIE_COST]  # movies
 LONG = "We were away a year ago, but Bob may move five big maps. " * 100
-PERSON = {"input": "Yes.", "model": "tts-1", "voice": "alloy"}
+PERSON = {"text": "Yes.", "size": "64x64", "format": "mp4"}
 Keys = dict[str, str]
 
 
@@ -98,7 +99,7 @@ def test_a_key_cannot_take_all_places_to_wait(running: RunningService, keys: tup
 
     async def ask(connections: ExitStack) -> list[int]:
         async with httpx.AsyncClient(timeout=120, headers=headers) as client:
-            sent = [client.post(f"{running.url}/v1/audio/speech", json=PERSON) for _ in range(2)]
+            sent = [client.post(f"{running.url}/v1/clips", json=PERSON) for _ in range(2)]
             asking = [asyncio.create_task(one) for one in sent]
             n_refused = N_ASKED - N_RUNNING - N_PLACES
             await asyncio.to_thread(eventually, lambda: refused_of(running, "greedy") == n_refused + 2)

@@ -13,11 +13,15 @@ import websockets
 
 from tests.running import HostService, RunningService, eventually
 from tests.service.raw import connect
+from tts2face.serving.service.pool import LINES_COST, MOVIE_COST, PLACES, SOUND_COST
 
 LONG = "We were away a year ago, but Bob may move five big maps. " * 100
 CLIP = json.dumps({"text": LONG}).encode()
+SOUND, LINES = (json.dumps({"text": LONG, "format": format}).encode() for format in ("mp3", "curves"))
 WAITING, LOAD = "tts2face_waiting", "tts2face_load"
-N_FULL = 2  # movies that occupy the one process
+N_MOVIES = PLACES[MOVIE_COST]
+OCCUPYING = [*[SOUND] * PLACES[SOUND_COST], *[LINES] * PLACES[LINES_COST]]  # all places but those of movies
+FULL = pytest.approx(PLACES[SOUND_COST] * SOUND_COST + PLACES[LINES_COST] * LINES_COST)
 N_CLIENTS = 5
 PAUSE_S = 0.1  # after which the server has read the request
 
@@ -36,12 +40,12 @@ def running(host: HostService) -> Iterator[RunningService]:
 
 @pytest.fixture
 def occupied(running: RunningService) -> Iterator[RunningService]:
-    """A service whose process makes as many movies as it takes."""
+    """A service whose process makes as much sound, and as many lines, as it takes."""
     eventually(lambda: measure(running, LOAD) == 0.0)
     with ExitStack() as stack:
-        for _ in range(N_FULL):
-            stack.enter_context(closing(ask(running, "/v1/clips", CLIP)))
-        eventually(lambda: measure(running, LOAD) == N_FULL)
+        for body in OCCUPYING:
+            stack.enter_context(closing(ask(running, "/v1/clips", body)))
+        eventually(lambda: measure(running, LOAD) == FULL)
         yield running
     eventually(lambda: measure(running, LOAD) == 0.0, 30.0)
 
@@ -73,7 +77,7 @@ def test_requests_whose_client_has_left_do_not_wait(
             connections.enter_context(closing(ask(occupied, path, json.dumps(body).encode(), then)))
         eventually(lambda: measure(occupied, WAITING) == N_CLIENTS)
     eventually(lambda: measure(occupied, WAITING) == 0.0, 30.0)
-    assert measure(occupied, LOAD) == N_FULL  # none of them has run
+    assert measure(occupied, LOAD) == FULL  # none of them has run
     found = [one for one in occupied.events() if one["event"] == "request" and one["path"] == path]
     assert [(one["status"], one["code"]) for one in found[-N_CLIENTS:]] == [(499, "left")] * N_CLIENTS
 
@@ -103,7 +107,7 @@ def test_sockets_whose_client_has_left_do_not_wait(
 
     asyncio.run(leave())
     eventually(lambda: measure(occupied, WAITING) == 0.0, 30.0)
-    assert measure(occupied, LOAD) == N_FULL
+    assert measure(occupied, LOAD) == FULL
 
 
 def test_what_runs_for_clients_that_have_left_stops(running: RunningService) -> None:
@@ -113,6 +117,6 @@ def test_what_runs_for_clients_that_have_left_stops(running: RunningService) -> 
     with ExitStack() as connections:
         for _ in range(40):
             connections.enter_context(closing(ask(running, "/v1/clips", CLIP)))
-        eventually(lambda: measure(running, WAITING) == 40 - N_FULL)
+        eventually(lambda: measure(running, WAITING) == 40 - N_MOVIES)
     eventually(lambda: measure(running, LOAD) == 0.0 == measure(running, WAITING), 30.0)
     assert measure(running, "tts2face_speech_seconds_total") == made  # counted at the end of works: none was completed
