@@ -1,8 +1,9 @@
 """Latency and throughput of a running `tts2face serve`: first bytes, live curves, lateness, cancelling.
 
-Run: ``python tests/bench/bench_service.py [--quick | --start]``. It starts a server of its own on this machine, with
-one process for each core, and prints the figures that docs/performance.md sums up. As a reference it measures the same
-synthesis in this process before and after, so that the load of the machine shows. ``--start`` measures starts only.
+Run: ``python tests/bench/bench_service.py [--quick] [--start | --clients]``. It starts a server of its own on this
+machine, with one process for each core, and prints the figures that docs/performance.md sums up. As a reference it
+measures the same synthesis in this process before and after, so that the load of the machine shows. ``--start``
+measures starts only, ``--clients`` first bytes.
 """
 
 import argparse
@@ -208,23 +209,27 @@ def reference() -> float:
     return statistics.median(found[1:])
 
 
-def figures(url: str, rounds: int) -> None:
-    """Print the figures of a running server."""
+def first_bytes(url: str, rounds: int) -> None:
+    """Print the first bytes of 1, 4, 16 and 64 clients at once."""
     speech = {"input": VOICE_TEXT, "voice": "alloy", "model": "tts-1"}
     kinds: dict[str, Measure] = {
         "voice, 5 s (wav)": first_byte("/v1/audio/speech", speech | {"response_format": "wav"}),
         "voice, 5 s (mp3)": first_byte("/v1/audio/speech", speech),
-        "clip, 5 s (mp4)": first_byte("/v1/clips", {"text": VOICE_TEXT, "size": "256x256"}),
-        "clip of an unseen sentence (mp4)": first_byte("/v1/clips", {"text": UNSEEN_TEXT, "size": "256x256"}),
         "unseen sentence (curves)": first_byte("/v1/clips", {"text": UNSEEN_TEXT, "format": "curves"}),
+        "unseen sentence (mp4)": first_byte("/v1/clips", {"text": UNSEEN_TEXT, "size": "256x256"}),
         "live curves after the last word": live_curves,
     }
     row("first bytes", "clients", "p50", "p95", "p99", "max")
     row(*["---"] * 6)
     for name, one in kinds.items():
         repeat(url, one, 2, 2)  # the first picture of a size takes 0.7 s in each process
-        for clients in CLIENTS if not name.startswith("clip") else CLIENTS[:2]:
+        for clients in CLIENTS:
             row(name, clients, *percentiles(repeat(url, one, clients, max(1, 4 * rounds // clients))))
+
+
+def figures(url: str, rounds: int) -> None:
+    """Print the figures of a running server."""
+    first_bytes(url, rounds)
     for format in ("wav", "curves", "mp4"):
         one = first_byte("/v1/clips", {"text": LONG_TEXT, "format": format, "size": "64x64", "supersampling": 1})
         repeat(url, one, 2, 2)
@@ -258,6 +263,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer rounds")
     parser.add_argument("--start", action="store_true", help="only the first and later starts")
+    parser.add_argument("--clients", action="store_true", help="only the first bytes of many clients")
     arguments = parser.parse_args()
     if arguments.start:
         starts()
@@ -266,7 +272,7 @@ def main() -> None:
     print(f"in this process: {reference():.3f} s for 5 s of speech, load {os.getloadavg()[0]:.1f}", flush=True)
     server, url = start_server()
     try:
-        figures(url, rounds)
+        (first_bytes if arguments.clients else figures)(url, rounds)
     finally:
         server.terminate()
         server.wait()

@@ -6,6 +6,7 @@ import av
 import numpy as np
 import pytest
 
+from tests.render.film.lit_face import lit_tiny_face
 from tests.render.test_encode import clip_of
 from tests.render.tiny_face import tiny_face
 from tts2face.picture.movie import encode_movie
@@ -77,3 +78,12 @@ def test_pictures_with_fewest_samples_show_the_same_view() -> None:
     pictures = [next(iter(one.frames(clip, [3]))).astype(float) for one in (fine, coarse)]
     assert 0.0 < np.abs(pictures[0] - pictures[1]).mean() < 3.0  # of 255: edges alone differ
     assert coarse.with_fewest_samples() is coarse
+
+
+def test_a_movie_is_the_same_with_any_number_of_threads() -> None:
+    renderer = mesh_renderer(lit_tiny_face(), Picture(size="64x48"))
+    one, two, four = (
+        b"".join(chunk.content for chunk in encode_movie([clip_of(0.5, fps=FPS)], renderer, "mp4", threads=threads))
+        for threads in (1, 2, 4)
+    )
+    assert one == two == four
