@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tts2face.gestures.stream import NO_SEEDS, GestureFields, GestureValues, apply_timeline, style_median
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS
-from tts2face.types import Waveform, YieldTurn, keep_on
+from tts2face.types import Waveform
 
 OCTAVES_HZ = (0.5, 1.0, 2.0)  # each half as strong as the last (Perlin 1985)
 NOISE_STANDARD_DEVIATION = 0.164  # standard deviation of the octaves' sum, over two hours of it
@@ -40,10 +40,8 @@ class NoiseStream:
         """A stream that continues as this one, independently of it."""
         return copy(self)
 
-    def next(
-        self, sound: Waveform, n_frames: int, timeline: Timeline, yield_turn: YieldTurn = keep_on
-    ) -> GestureValues:
-        """Values (n_frames, k) of each feature for the next frames; neither the sound nor `yield_turn` is used."""
+    def next(self, sound: Waveform, n_frames: int, timeline: Timeline) -> GestureValues:
+        """Values (n_frames, k) of each feature for the next frames; the sound is not used."""
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
         return {

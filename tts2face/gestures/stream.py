@@ -31,7 +31,7 @@ from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import FEATURES, GESTURE_FPS, FeatureChange, Palette, Style
 from tts2face.numeric.arrays import interpolate_cubic
 from tts2face.sound.features import IntensityTrack
-from tts2face.types import Waveform, YieldTurn, keep_on
+from tts2face.types import Waveform
 
 N_LOOKAHEAD_FRAMES = 2  # frames after a time that cubic interpolation needs
 NO_CHANGE = FeatureChange()
@@ -159,9 +159,7 @@ class GestureStream:
         new._tracks = {name: track.copy() for name, track in self._tracks.items()}
         return new
 
-    def next(
-        self, sound: Waveform, n_frames: int, timeline: Timeline, yield_turn: YieldTurn = keep_on
-    ) -> GestureValues:
+    def next(self, sound: Waveform, n_frames: int, timeline: Timeline) -> GestureValues:
         """Values (n_frames, k) of each feature for the next frames.
 
         Parameters
@@ -170,8 +168,6 @@ class GestureStream:
             Sound of these frames.
         timeline
             Styles, expressions, nods and gains, in seconds of the whole clip; all of them are applied.
-        yield_turn
-            Called after each feature. After an exception that it raises, the stream cannot be continued.
         """
         begin = self._n_frames / self._fps
         times = (self._n_frames + np.arange(n_frames)) / self._fps
@@ -180,7 +176,6 @@ class GestureStream:
         for name, track in self._tracks.items():
             track.extend(prosody, float(times[-1]), timeline)
             values[name] = apply_timeline(name, track.at(times, timeline), times, timeline)
-            yield_turn()
         return values
 
 

@@ -5,7 +5,7 @@ recording. What a step keeps for the next request, and by which key, is its meth
 """
 
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from hashlib import blake2b
 from pathlib import Path
@@ -47,6 +47,8 @@ TRANSCRIPT_BYTES = 10_000  # of a transcript besides its phones
 DEFAULT_STYLE = "neutral"
 REACH_S = 2.0  # s around a piece within which elements of the timeline affect it: nods last .6 s, fades .6 s
 STATE_BYTES = 200_000  # of a stream between two pieces
+POLL_S = 0.005  # between turns of other requests, while gestures are drawn
+Drawn = tuple[GestureValues, GestureStream | NoiseStream]  # gestures of a piece, and the stream for the piece after it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,6 +88,8 @@ def pieces_from(
     else:
         started, steps = spoken_pieces(prepared, models.speech, first_frame), (lips, *steps)
     for piece in started:
+        if gestures is not None:
+            gestures.begin(piece)
         for step in steps:
             models.speech.yield_turn()
             piece = step(piece)  # noqa: PLW2901 - it gains from step to step
@@ -205,7 +209,7 @@ class GestureLayer:
     Parameters
     ----------
     yield_turn
-        Called while the gestures of a piece are drawn.
+        Called while gestures are waited for.
     memory
         Keeps the motion of pieces, so that a changed timeline repeats only the pieces from the change on.
 
@@ -235,8 +239,9 @@ class GestureLayer:
         self._seed, self._options = request.seed, (request.seed, request.gestures, request.pitch)
         self._has_microsaccades = request.gestures == FIELDS  # other methods are as they were published
         kind: type[NoiseStream] | type[GestureStream] = NoiseStream if request.gestures == "noise" else GestureStream
-        executor = ThreadPoolExecutor(1)  # building the fields takes 0.5 s, in parallel with loading the voice
-        self._first: Future[GestureStream | NoiseStream] = executor.submit(
+        self._thread = ThreadPoolExecutor(1, "gestures")
+        # Building the fields takes 0.5 s, in parallel with loading the voice.
+        self._first: Future[GestureStream | NoiseStream] = self._thread.submit(
             kind,
             fields,
             style=default_style(palette),
@@ -244,30 +249,44 @@ class GestureLayer:
             fps=float(prepared.fps),
             seeds=self._requested.seeds,
         )
-        executor.shutdown(wait=False)
         self._now = self._next = _Progress()
+        self._drawn: Future[tuple[bytes, Timeline, Drawn]] = Future()
+
+    def begin(self, piece: Piece) -> None:
+        """Draw the gestures of the next piece in a thread, while its lips are made."""
+        self._drawn = self._thread.submit(self._recall, piece, self._now)
 
     def __call__(self, piece: Piece) -> Piece:
         """The piece with gestures, which follow the loudness of its voice and the timelines of request and marks."""
-        lips, now = piece.clip.motion, self._now
-        sound = piece.speech.waveform if piece.voice_sound is None else piece.voice_sound
-        recent = now.marked.restrict(now.seconds - 1.0, np.inf)  # a nod of the last piece lasts half a second
-        marked = recent.merge(piece.timeline)
-        timeline = self._requested.merge(marked)
-        times = now.seconds + lips.times
-        history = self.key(times, sound, timeline) if self._memory.is_used else now.history
-        gestures, stream = self._memory.recall(
-            lambda: history,
-            lambda: self._draw(sound, times, timeline),
-            lambda made: STATE_BYTES + sum(values.nbytes for values in made[0].values()),
-        )
+        lips = piece.clip.motion
+        while not wait([self._drawn], POLL_S).done:
+            self._yield_turn()
+        history, timeline, (gestures, stream) = self._drawn.result()
         moved = self._memory.recall(
             lambda: (history, lips.values.tobytes()),
             lambda: self._face.add_gestures(lips, gestures, {name: timeline.gains.of(name) for name in SPEECH_GAINS}),
             lambda made: made.face.values.nbytes + lips.values.nbytes,
         )
-        self._next = _Progress(history, stream, marked, now.seconds + lips.duration)
+        self._next = _Progress(history, stream, self._marked(piece, self._now), self._now.seconds + lips.duration)
         return replace(piece, clip=Clip(moved.face, moved.head, piece.speech))
+
+    @staticmethod
+    def _marked(piece: Piece, now: _Progress) -> Timeline:
+        """Gestures of the marks of a piece, and of those before it: a nod of the last piece lasts half a second."""
+        return now.marked.restrict(now.seconds - 1.0, np.inf).merge(piece.timeline)
+
+    def _recall(self, piece: Piece, now: _Progress) -> tuple[bytes, Timeline, Drawn]:
+        """Gestures of a piece with their key, after those before it, and the timelines of request and marks."""
+        sound = piece.speech.waveform if piece.voice_sound is None else piece.voice_sound
+        timeline = self._requested.merge(self._marked(piece, now))
+        times = now.seconds + piece.clip.motion.times
+        history = self.key(times, sound, timeline) if self._memory.is_used else now.history
+        drawn = self._memory.recall(
+            lambda: history,
+            lambda: self._draw(sound, times, timeline),
+            lambda made: STATE_BYTES + sum(values.nbytes for values in made[0].values()),
+        )
+        return history, timeline, drawn
 
     def key(self, times: NDArray[np.float64], sound: Waveform, timeline: Timeline) -> bytes:
         """Digest of everything on which the gestures of a piece, after those before it, depend."""
@@ -283,12 +302,10 @@ class GestureLayer:
         found.update(sound.samples.tobytes())
         return found.digest()
 
-    def _draw(
-        self, sound: Waveform, times: NDArray[np.float64], timeline: Timeline
-    ) -> tuple[GestureValues, GestureStream | NoiseStream]:
+    def _draw(self, sound: Waveform, times: NDArray[np.float64], timeline: Timeline) -> Drawn:
         """Gestures of a piece, and the stream for the piece after it."""
         stream = (self._now.stream or self._first.result()).copy()
-        gestures = _gaze_relative_to_head(stream.next(sound, len(times), timeline, self._yield_turn))
+        gestures = _gaze_relative_to_head(stream.next(sound, len(times), timeline))
         if "gaze" in gestures and self._has_microsaccades:
             seed = self._requested.seeds.get("gaze", self._seed)
             gestures = {**gestures, "gaze": gestures["gaze"] + microsaccades(times, seed).astype(np.float32)}
