@@ -1,14 +1,15 @@
 """Latency and throughput of a running `tts2face serve`: first bytes, live curves, lateness, cancelling.
 
-Run: ``python tests/bench/bench_service.py [--quick] [--start | --clients]``. It starts a server of its own on this
-machine, with one process for each core, and prints the figures that docs/performance.md sums up. As a reference it
-measures the same synthesis in this process before and after, so that the load of the machine shows. ``--start``
-measures starts only, ``--clients`` first bytes.
+Run: ``python tests/bench/bench_service.py [--quick] [--start | --clients | --streams]``. It starts a server of its
+own on this machine, with one process for each core, and prints the figures that docs/performance.md sums up. As a
+reference it measures the same synthesis in this process before and after, so that the load of the machine shows.
+``--start`` measures starts only, ``--clients`` first bytes, ``--streams`` movies.
 """
 
 import argparse
 import asyncio
 import functools
+import io
 import json
 import os
 import random
@@ -21,6 +22,7 @@ import time
 from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 
+import av
 import httpx
 import numpy as np
 import websockets
@@ -28,7 +30,8 @@ import websockets
 VOICE_TEXT = "We were away a year ago, but Bob may move five big maps before we go."  # 5 s of speech
 UNSEEN_TEXT = "We were away YEARS years ago, but Bob may move five big maps before we go."
 LONG_TEXT = " ".join(["the garden behind the old house near the river had been green for years and nobody knew"] * 12)
-CLIENTS = (1, 4, 16, 64)
+AFTER_TEXT = "The garden behind the old house near the river had been green for years."
+CLIENTS, STREAMS = (1, 4, 16, 64), (1, 2, 4)
 LEAVE_AFTER_S = 2.0  # clients leave at a random time until then
 CANCEL_AFTER_S = 6.0  # the same for `cancel`: within the first sentence or a later one, which is longer
 LIVE_S = 20.0
@@ -227,16 +230,52 @@ def first_bytes(url: str, rounds: int) -> None:
             row(name, clients, *percentiles(repeat(url, one, clients, max(1, 4 * rounds // clients))))
 
 
+def streams(url: str, rounds: int) -> None:
+    """Print how fast movies are made that are seen at once, and for how long the slowest one stalls."""
+    row("streams of 512 x 512", "of real time", "longest stall", "first byte")
+    row(*["---"] * 4)
+    for number in STREAMS:
+        for _ in range(rounds):
+            found = asyncio.run(_watch(url, number))
+            row(number, *(f(column) for f, column in zip((min, max, max), zip(*found, strict=True), strict=True)))
+
+
+async def _watch(url: str, number: int) -> list[tuple[float, float, float]]:
+    return await asyncio.gather(*(watch(url) for _ in range(number)))
+
+
+async def watch(url: str) -> tuple[float, float, float]:
+    """Seconds of a movie by those until its end; its longest stall; its first byte."""
+    begin, arrivals, content = time.perf_counter(), [], b""
+    body = unseen({"text": f"{UNSEEN_TEXT} {AFTER_TEXT}", "size": "512x512"})
+    async with client().stream("POST", f"{url}/v1/clips", json=body) as answer:
+        assert answer.status_code == 200, await answer.aread()
+        async for chunk in answer.aiter_raw():
+            content += chunk
+            arrivals.append((time.perf_counter() - begin, len(content)))
+    with av.open(io.BytesIO(content)) as movie:
+        ends = [(one.pos + one.size, float((one.pts + one.duration) * one.time_base))
+                for one in movie.demux(video=0) if one.pts is not None]  # fmt: skip
+    dry_at, stall, shown = arrivals[0][0], 0.0, 0.0
+    for second, n_bytes in arrivals:
+        here = max((end for place, end in ends if place <= n_bytes), default=0.0)
+        if here > shown:
+            stall = max(stall, second - dry_at if shown else 0.0)
+            dry_at, shown = max(dry_at, second) + here - shown, here
+    return shown / arrivals[-1][0], stall, arrivals[0][0]
+
+
 def figures(url: str, rounds: int) -> None:
     """Print the figures of a running server."""
     first_bytes(url, rounds)
+    streams(url, rounds)
     for format in ("wav", "curves", "mp4"):
         one = first_byte("/v1/clips", {"text": LONG_TEXT, "format": format, "size": "64x64", "supersampling": 1})
         repeat(url, one, 2, 2)
         row(f"200 words without a point ({format})", 1, *percentiles(repeat(url, one, 1, rounds)))
-    for streams in (1, 8):
-        found = asyncio.run(_gather_lateness(url, streams))
-        row("lateness of live curves", streams, *percentiles(found))
+    for number in (1, 8):
+        found = asyncio.run(_gather_lateness(url, number))
+        row("lateness of live curves", number, *percentiles(found))
     for name, one in {"process": cancel, "client": functools.partial(cancel, at_client=True)}.items():
         row(f"cancel in a sentence, at the {name}", 1, *percentiles(repeat(url, one, 1, 8 * rounds)))
         row(f"cancel in a sentence, at the {name}", 8, *percentiles(repeat(url, one, 8, rounds)))
@@ -264,6 +303,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="fewer rounds")
     parser.add_argument("--start", action="store_true", help="only the first and later starts")
     parser.add_argument("--clients", action="store_true", help="only the first bytes of many clients")
+    parser.add_argument("--streams", action="store_true", help="only movies that are seen at once")
     arguments = parser.parse_args()
     if arguments.start:
         starts()
@@ -272,7 +312,8 @@ def main() -> None:
     print(f"in this process: {reference():.3f} s for 5 s of speech, load {os.getloadavg()[0]:.1f}", flush=True)
     server, url = start_server()
     try:
-        (first_bytes if arguments.clients else figures)(url, rounds)
+        part = first_bytes if arguments.clients else streams if arguments.streams else figures
+        part(url, rounds)
     finally:
         server.terminate()
         server.wait()
