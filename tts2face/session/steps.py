@@ -254,7 +254,7 @@ class GestureLayer:
 
     def begin(self, piece: Piece) -> None:
         """Draw the gestures of the next piece in a thread, while its lips are made."""
-        self._drawn = self._thread.submit(self._recall, piece, self._now)
+        self._drawn = self._thread.submit(self._recall, piece)
 
     def __call__(self, piece: Piece) -> Piece:
         """The piece with gestures, which follow the loudness of its voice and the timelines of request and marks."""
@@ -267,20 +267,19 @@ class GestureLayer:
             lambda: self._face.add_gestures(lips, gestures, {name: timeline.gains.of(name) for name in SPEECH_GAINS}),
             lambda made: made.face.values.nbytes + lips.values.nbytes,
         )
-        self._next = _Progress(history, stream, self._marked(piece, self._now), self._now.seconds + lips.duration)
+        self._next = _Progress(history, stream, self._marked(piece), self._now.seconds + lips.duration)
         return replace(piece, clip=Clip(moved.face, moved.head, piece.speech))
 
-    @staticmethod
-    def _marked(piece: Piece, now: _Progress) -> Timeline:
+    def _marked(self, piece: Piece) -> Timeline:
         """Gestures of the marks of a piece, and of those before it: a nod of the last piece lasts half a second."""
-        return now.marked.restrict(now.seconds - 1.0, np.inf).merge(piece.timeline)
+        return self._now.marked.restrict(self._now.seconds - 1.0, np.inf).merge(piece.timeline)
 
-    def _recall(self, piece: Piece, now: _Progress) -> tuple[bytes, Timeline, Drawn]:
+    def _recall(self, piece: Piece) -> tuple[bytes, Timeline, Drawn]:
         """Gestures of a piece with their key, after those before it, and the timelines of request and marks."""
         sound = piece.speech.waveform if piece.voice_sound is None else piece.voice_sound
-        timeline = self._requested.merge(self._marked(piece, now))
-        times = now.seconds + piece.clip.motion.times
-        history = self.key(times, sound, timeline) if self._memory.is_used else now.history
+        timeline = self._requested.merge(self._marked(piece))
+        times = self._now.seconds + piece.clip.motion.times
+        history = self.key(times, sound, timeline) if self._memory.is_used else self._now.history
         drawn = self._memory.recall(
             lambda: history,
             lambda: self._draw(sound, times, timeline),

@@ -83,7 +83,7 @@ def find_edges(sound: Waveform, stated: Sequence[StatedPhone], classifier: Phone
     score, before = (np.full((n_stated + 1, n_frames + 1), value) for value in (-np.inf, 0))
     score[0, 0] = 0.0
     is_silence = np.array([one.label == SILENCE for one in stated])
-    costs = (*_costs(stated, is_silence), BEGIN_SPREAD_S * slowness / STEP_S)
+    costs = (*_costs(stated, durations, is_silence), BEGIN_SPREAD_S * slowness / STEP_S)
     _search(sums, (labels, is_silence, frames, bounds), costs, (score, before))
     if not np.isfinite(score[-1, -1]):  # fewer frames than phones need
         return enforce_increasing(np.append(begins, sound.duration))
@@ -94,17 +94,19 @@ def find_edges(sound: Waveform, stated: Sequence[StatedPhone], classifier: Phone
     return edges
 
 
-def _costs(stated: Sequence[StatedPhone], is_silence: NDArray[np.bool_]) -> tuple[Floats, Floats, NDArray[np.int64]]:
+def _costs(
+    stated: Sequence[StatedPhone], durations: Floats, is_silence: NDArray[np.bool_]
+) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Log probabilities (N, D) of durations in frames, that of being (N, 2) skipped and not, and least frames (N,)."""
-    expected = np.maximum([one.duration for one in stated], STEP_S)
+    expected = np.maximum(durations, STEP_S)
     seconds = np.maximum(np.arange(round(LONGEST_SHARE * expected.max() / STEP_S) + 1), 1) * STEP_S
-    durations = -0.5 * np.square(np.log(seconds / expected[:, None]) / DURATION_SPREAD)
+    likely = -0.5 * np.square(np.log(seconds / expected[:, None]) / DURATION_SPREAD)
     skipped = [
         [0.0, 0.0 if one.is_marked else UNMARKED_PAUSE] if one.may_be_skipped else [-np.inf, 0.0] for one in stated
     ]
     shortest = np.where(is_silence, SHORTEST_SILENCE, SHORTEST)
     shortest[[0, -1]] = 1
-    return durations, np.array(skipped), shortest
+    return likely, np.array(skipped), shortest
 
 
 @kernel
