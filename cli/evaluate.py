@@ -80,8 +80,8 @@ class SplitFlags:
         chosen = (self.recordings, *self._other_selections())
         if comparison.own_durations or comparison.pool is not None or any(value is not None for value in chosen):
             raise InputError(
-                "--people tests a finished talker and can be combined only with --talker, --tracks and --out; "
-                "remove the other flags"
+                "--people tests a finished talker and can be combined only with --talker, --tracks, --sounds and "
+                "--out; remove the other flags"
             )
 
     def curve_recordings(self, comparison: "ComparisonFlags") -> Path:
@@ -120,6 +120,10 @@ class ComparisonFlags:
     tracks: Annotated[
         Path | None,
         Parameter(help="Also evaluate external trajectories: CSV with utterance, time and one column per channel."),
+    ] = None
+    sounds: Annotated[
+        Path | None,
+        Parameter(help="With --people: also lips from their sounds in this folder (NAME.flac), as a user gets them."),
     ] = None
     pool: Annotated[
         Path | None, Parameter(help="Train the networks also with lip tracks of this folder, as `corpus pool` does.")
@@ -164,7 +168,8 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
     """Compare synthesised lip motion with held-out recordings."""
     del yes  # read where the model is missing
     inputs = {"--recordings": split.recordings, "--train": split.train, "--test": split.test}
-    inputs |= {"--cross-talker": split.cross_talker, "--tracks": comparison.tracks, "--model": model}
+    inputs |= {"--cross-talker": split.cross_talker, "--tracks": comparison.tracks, "--sounds": comparison.sounds}
+    inputs |= {"--model": model}
     refuse_overwriting({"--out": out}, inputs)
     if learning_curve is not None and not people and talker is None:
         run_learning_curve(learning_curve, split, comparison, base, out, (cache, jobs, model))
@@ -174,7 +179,7 @@ def evaluate(  # noqa: PLR0913 - one parameter a flag
         raise InputError(f"{reason}; remove it")
     if people or talker is not None:
         split.check_people(people or [], comparison)
-        run_people_evaluation(talker or DEFAULT_TALKER, people or [], comparison.tracks, out)
+        run_people_evaluation(talker or DEFAULT_TALKER, people or [], comparison, out)
         return
     run_evaluation(split, comparison, out, (cache, jobs, model))
 
@@ -342,20 +347,25 @@ DEFAULT_METHOD = "exemplar"
 SHOWN_METHODS = (DEFAULT_METHOD, "networks alone")  # in the table by phone
 
 
-def run_people_evaluation(talker: str, people: list[Path], tracks: Path | None, out: Path | None) -> None:
+def run_people_evaluation(talker: str, people: list[Path], comparison: ComparisonFlags, out: Path | None) -> None:
     """Evaluate every method of a talker on the people's tracks; print the tables, and write them to `out`."""
     if out is not None:
         check_file_name(out, "an evaluation of people", PEOPLE_SUFFIXES)
     if len({folder.resolve() for folder in people}) < len(people):
         raise InputError("--people names a folder twice; remove one")
+    from corpus_tools.studies.evaluation.heard import find_sounds, with_hand_edges
     from corpus_tools.studies.evaluation.people import difference_table, evaluate_people, people_table, phone_table
     from corpus_tools.studies.evaluation.tracks import read_person, read_tracks
     from corpus_tools.training.train_talker import correct_pose
     from tts2face.models.talker import load_talker
 
     tests = [correct_pose(read_person(folder)) for folder in people]
-    external = read_tracks(tracks) if tracks is not None else None
-    found = evaluate_people(load_talker(talker), tests, external)
+    external = read_tracks(comparison.tracks) if comparison.tracks is not None else None
+    sounds = None
+    if comparison.sounds is not None:
+        sounds = find_sounds(comparison.sounds, [one for person in tests for one in person])
+        tests = [with_hand_edges(person, sounds) for person in tests]
+    found = evaluate_people(load_talker(talker), tests, external, sounds)
     for warning in found.warnings:
         write_message(f"warning: {warning}")
     methods = [name for name in SHOWN_METHODS if name in found.figures]

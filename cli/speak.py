@@ -28,12 +28,16 @@ if TYPE_CHECKING:
     from tts2face.session.prepared import PreparedRequest
     from tts2face.session.session import Session
     from tts2face.session.speech_stream import Piece
-    from tts2face.sound.transcript import TextMismatch
+    from tts2face.sound.alignment import TextMismatch
     from tts2face.sound.voice_pool import VoicePool
     from tts2face.types import Progress
 
 
 EXPLANATION_SUFFIXES = (".json", ".txt")
+WITHOUT_WORDS = (
+    "the words are not given: lips follow the English phones that are heard; with the words (--text) they agree better "
+    "with the person's (r of the opening .74 in place of .63)"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +87,7 @@ def _make(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions) 
 
 
 def _write_clip(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions, voices: "VoicePool") -> None:
+    _tell_what_is_heard(prepared.request, options)
     session = _open_session(options, voices)
     explanations: list[PhoneExplanation] = []
 
@@ -112,8 +117,9 @@ def _check_options(request: Request, picture: Picture, options: SpeakOptions) ->
         check_file_name(options.explain, "an explanation", EXPLANATION_SUFFIXES)
     _check_overwriting(request, picture, options)
     _check_exports(options)
-    is_silent = request.audio is not None or request.idle is not None
-    if not request.text.strip() and (not is_silent or options.explain is not None):
+    has_phones = request.has_phones and request.idle is None
+    needs_text = request.audio is None and request.idle is None
+    if not request.text.strip() and (needs_text or (options.explain is not None and not has_phones)):
         raise InputError("the text is empty; add words to speak, or the words of --audio")
     if options.view:
         if options.models.face == OWN_FACE:
@@ -199,6 +205,12 @@ def _report_writing(write: "Callable[[Progress | None], WrittenClip]", options: 
     )
     for mark in written.marks:
         write_message(f"{mark.seconds:.2f} s: {mark.name}")
+
+
+def _tell_what_is_heard(request: Request, options: SpeakOptions) -> None:
+    """Say what to expect of a recording without words."""
+    if not options.quiet and request.audio is not None and not request.text.strip() and request.has_phones:
+        write_message(WITHOUT_WORDS)
 
 
 def _warn_mismatches(mismatches: "Sequence[TextMismatch]") -> None:

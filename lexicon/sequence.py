@@ -7,7 +7,7 @@ durations of the voice or of an alignment are used instead.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -18,6 +18,7 @@ from lexicon.phones import PHONES
 from lexicon.pronounce import Pronunciation
 
 SILENCE = "sil"  # label of segments without speech
+DOUBTFUL = 0.5  # words below this confidence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,11 +86,21 @@ class PhoneSequence:
 
 @dataclass(frozen=True, slots=True)
 class WordSpan:
-    """A written word and its half-open range of phones, ``[first, last)``."""
+    """A written word, its half-open range of phones, ``[first, last)``, and the probability that it is said there."""
 
     text: str
     first: int
     last: int
+    confidence: float = 1.0
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether the word is probably not said there."""
+        return self.confidence < DOUBTFUL
+
+    def shift(self, phones: int) -> "WordSpan":
+        """The same word, later by a number of phones."""
+        return replace(self, first=self.first + phones, last=self.last + phones)
 
     def __post_init__(self) -> None:
         """Refuse an empty or reversed range."""
@@ -119,10 +130,30 @@ def concatenate_phones(
         if phones and phones[-1] == SILENCE == part.phones[0]:
             phones.pop()
             edges.pop()
-        spans += [WordSpan(word.text, word.first + len(phones), word.last + len(phones)) for word in part_words]
+        spans += [word.shift(len(phones)) for word in part_words]
         phones += part.phones
         edges += [offset + float(end) for end in part.edges[1:]]
     return PhoneSequence(phones, edges), tuple(spans)
+
+
+MIN_PHONE_S = 0.005  # shorter phones and silences cannot be resolved
+
+
+def enforce_increasing(edges: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Move (N + 1,) edges so that successive ones differ by at least `MIN_PHONE_S`; the first and last are fixed.
+
+    Phones that are too short are lengthened at the cost of their neighbours. If the total duration is less than
+    `MIN_PHONE_S` for each phone, all phones get equal durations.
+    """
+    n = len(edges) - 1
+    first, last = float(edges[0]), float(edges[-1])
+    if (last - first) <= n * MIN_PHONE_S:
+        return np.linspace(first, last, n + 1)
+    room = np.arange(n + 1) * MIN_PHONE_S
+    slack = np.clip(np.maximum.accumulate(edges - room), first, last - n * MIN_PHONE_S)
+    moved: NDArray[np.float64] = slack + room
+    moved[0], moved[-1] = first, last
+    return moved
 
 
 NOMINAL_S = MappingProxyType({

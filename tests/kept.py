@@ -22,7 +22,7 @@ from tests.api.test_import_graph import ROOT, imports, modules
 from tts2face.storage.files import user_cache
 
 Value = TypeVar("Value")
-COMPUTES = ("numpy", "scipy", "numba", "av", "onnxruntime", "hibari-tts", "espeakng-loader", "pocketsphinx", "soxr")
+COMPUTES = ("numpy", "scipy", "numba", "av", "onnxruntime", "hibari-tts", "espeakng-loader", "hama", "soxr")
 UNUSED_S = 30 * 86_400.0  # after which an entry is removed
 
 

@@ -12,7 +12,8 @@ from lexicon.inputs import check_fields, check_limits, is_number
 from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS
 
 FPS_LIMITS = (1.0, 120.0)
-AUDIO_MAP_NAMES = ("linear", "network")
+RECOGNISED = "phones"
+AUDIO_MAP_NAMES = (RECOGNISED, "linear", "network")
 SYNTHESIS_METHODS = ("exemplar", "theobald2007")
 FIELDS = "fields"
 GESTURES = (FIELDS, "ju2008", "noise", "none")
@@ -65,8 +66,8 @@ class Request:
     )
     audio_map: str | None = option(
         None,
-        "Map from sound to lip motion for a recording without a transcript: network (default, most accurate for the "
-        "talker's own voice) or linear (smaller movements, less sensitive to other voices).",
+        "How a recording without a transcript moves the lips: phones (default: English phones are recognised and "
+        "spoken as those of a text), or the talker's map from sound: network (for its own voice) or linear.",
         choices=AUDIO_MAP_NAMES,
     )
     language: str = option(
@@ -127,6 +128,11 @@ class Request:
     timeline: Path | None = option(None, "JSON file with styles, expressions, nods and gains over time.")
     pitch: bool = option(False, "Gestures follow the pitch of the voice in addition to its loudness.")
     idle: float | None = option(None, "Seconds of idle animation instead of speech.", limits=IDLE_LIMITS_S)
+
+    @property
+    def has_phones(self) -> bool:
+        """Whether lips follow phones: of the text, or recognised in a recording."""
+        return bool(self.text.strip()) or self.audio_map in {None, RECOGNISED}
 
     @property
     def articulation_factor(self) -> float | None:
@@ -190,13 +196,13 @@ def _check_articulation(request: Request) -> None:
     parse_articulation(request.articulation)
     if request.idle is not None:
         raise InputError("--articulation has no effect with --idle; remove one of them")
-    if request.audio is not None and not request.text.strip():
-        raise InputError("--articulation needs the phones of a recording; give its words as text, or remove it")
+    if request.audio is not None and not request.has_phones:
+        raise InputError("--articulation needs the phones of a recording; remove it, or --audio-map")
 
 
 def _check_audio_map(request: Request) -> None:
     if request.audio_map not in AUDIO_MAP_NAMES:
-        raise InputError(f"there is no audio map {request.audio_map!r}; choose {' or '.join(AUDIO_MAP_NAMES)}")
+        raise InputError(f"there is no audio map {request.audio_map!r}; choose {', '.join(AUDIO_MAP_NAMES)}")
     if request.audio is None:
         raise InputError("--audio-map needs a recording; add --audio or remove --audio-map")
     if request.text.strip():

@@ -4,7 +4,7 @@ It runs in a checkout of the repository. Steps that are named run alone, on what
 ``--out``; with the path tracer's part, all of them take some four hours on two cores.
 
 ======= ============================================= ==========================================================
-phones  ``heart.phones``                              speech of the voice, aligned by PocketSphinx
+phones  ``heart.phones``, ``recordings.phones``       speech of two voices, recordings of GRID's talker s1
 talker  ``grid_s1.talker``                            recordings of GRID's talker s1, lip tracks of free English
 heads   ``head.face`` with identities, nine haircuts  MakeHuman's data, released under CC0
 palette ``starter.palette``                           recordings of GRID's talker s1, ``derived_styles.tsv``
@@ -66,12 +66,16 @@ class Making:
 
 
 def make_phones(making: Making) -> None:
-    """What finds the phones in the sound of the voice ``heart``: ten minutes."""
-    from corpus_tools.training.phone_classifier import train_phone_classifier
+    """What finds the phones in the sound of the voice ``heart``, and in recordings: half an hour."""
+    from corpus_tools.training.phone_classifier import train_recording_classifier, train_voice_classifier
     from tts2face.models.phone_classifier import write_phone_classifier
 
-    classifier = train_phone_classifier(on_progress=making.stage("the voice speaks"), report=making.report)
-    write_phone_classifier(making.out / "heart.phones", classifier)
+    voice = train_voice_classifier(on_progress=making.stage("the voice speaks"), report=making.report)
+    write_phone_classifier(making.out / "heart.phones", voice)
+    recordings = train_recording_classifier(
+        making.recordings / GRID, on_progress=making.stage("damaged speech is heard"), report=making.report
+    )
+    write_phone_classifier(making.out / "recordings.phones", recordings)
 
 
 def make_talker(making: Making) -> None:

@@ -15,8 +15,8 @@ from corpus_tools.recordings.video import MEASURES, NOT_COUNTED
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, lip_opening
+from tts2face.sound.alignment import LEAST_FIT
 from tts2face.sound.pauses import sound_windows
-from tts2face.sound.transcript import LEAST_CONFIDENCE
 from tts2face.types import Waveform
 
 WARNING, REFUSAL = "warning", "refusal"  # severities
@@ -24,7 +24,7 @@ UNUSABLE, OUT_OF_SYNC = "unusable", "out_of_sync"  # codes of findings without a
 CLIPPED_LEVEL = 0.999  # amplitude from which a sample counts as clipped
 MIN_PICTURE_CHANGE = 0.02  # of an 8-bit step: frames that differ by less are equal; camera noise is above
 NOISE_QUANTILE = 0.1  # of the windows without speech; excludes footsteps and breaths
-NOISY_DB = 20.0  # ratio of speech to noise below which alignment fits worse although the words are right
+NOISY_DB = 20.0  # ratio of speech to noise below which lips are learnt worse
 MEDIAN_TO_DEVIATION = 1.4826  # of a normal distribution
 SECOND_DIFFERENCE_GAIN = np.sqrt(6.0)  # of white noise: 1 + 4 + 1 variances
 
@@ -45,9 +45,9 @@ class Limit:
         return self.sentence.format(value=value, bound=bound) if is_broken else None
 
 
-WORDS = "the sound does not match the transcript (confidence {value:.0f}, limit {bound:.0f}); correct the words"
+WORDS = "the sound does not match the transcript ({value:.0%} of it is heard, limit {bound:.0%}); correct the words"
 PHONES = (
-    "its phones could not be recognised well (confidence {value:.0f}, limit {bound:.0f}); "
+    "its phones could not be recognised well ({value:.0%} of them are sure, limit {bound:.0%}); "
     "write the transcript into a .txt beside it"
 )
 LIPS = (
@@ -55,11 +55,8 @@ LIPS = (
     "give the original sound or record it again"
 )
 LIMITS = (
-    # The median is -7300 for other sentences of GRID's small grammar, -10500 for unrelated text if it aligns at all.
-    Limit("confidence", -6000.0, LEAST_CONFIDENCE, True, WORDS),
-    Limit("confidence_in_noise", LEAST_CONFIDENCE, -8500.0, True, WORDS),
-    Limit("recognised", -6000.0, LEAST_CONFIDENCE, True, PHONES),
-    Limit("recognised_in_noise", LEAST_CONFIDENCE, -8500.0, True, PHONES),
+    Limit("fit", 0.75, LEAST_FIT, True, WORDS),
+    Limit("recognised", 0.75, LEAST_FIT, True, PHONES),
     Limit(
         "clipped",
         0.005,
@@ -191,12 +188,6 @@ def limit_warnings(measured: Mapping[str, float]) -> tuple[str, ...]:
     """Messages about the measures that exceed the limits of warnings."""
     found = (limit.message(measured[limit.measure], limit.warning) for limit in LIMITS if limit.measure in measured)
     return tuple(message for message in found if message)
-
-
-def confidence_measure(confidence: float, snr_db: float, *, is_recognised: bool) -> dict[str, float]:
-    """The confidence of an alignment under the name of the limit that applies to it."""
-    name = "recognised" if is_recognised else "confidence"
-    return {name if snr_db >= NOISY_DB else f"{name}_in_noise": confidence}
 
 
 def sound_measures(sound: Waveform, phones: PhoneSequence) -> dict[str, float]:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from corpus_tools.recordings.folder import Recording, pronounce_recording
 from corpus_tools.recordings.limits import (
     check_limits,
-    confidence_measure,
     head_turn_deg,
     landmark_measures,
     light_measures,
@@ -52,15 +51,15 @@ class Timing:
 class Quality:
     """Quality measures of a recording.
 
-    ``confidence`` of the alignment (0 is perfect, log likelihood per second), lowest face ``score``, ``n_filled``
-    interpolated frames, seconds ``cut`` from the video's start, corrected ``lag`` in seconds, share of ``clipped``
-    speech, ``snr_db`` of speech over noise, share of ``crowded`` frames, ``turn_deg`` away from the camera,
-    ``frozen_s`` without a change, pictures a second (``frame_rate``), median distance ``eye_px`` of the outer eye
-    corners, ``jitter`` of the lip opening relative to its deviation; ``brightness``, ``glare``, ``contrast`` and
-    ``sharpness`` as `corpus_tools.recordings.video.face_light` returns them.
+    ``fit`` of the words (`tts2face.sound.alignment.Fit`), lowest face ``score``, ``n_filled`` interpolated frames,
+    seconds ``cut`` from the video's start, corrected ``lag`` in seconds, share of ``clipped`` speech, ``snr_db`` of
+    speech over noise, share of ``crowded`` frames, ``turn_deg`` away from the camera, ``frozen_s`` without a change,
+    pictures a second (``frame_rate``), median distance ``eye_px`` of the outer eye corners, ``jitter`` of the lip
+    opening relative to its deviation; ``brightness``, ``glare``, ``contrast`` and ``sharpness`` as
+    `corpus_tools.recordings.video.face_light` returns them.
     """
 
-    confidence: float
+    fit: float
     score: float
     n_filled: int
     cut: float
@@ -93,6 +92,8 @@ class Observation:
         Level of the sound in dB.
     is_recognised
         There is no transcript: the phones were recognised automatically and contain errors.
+    mismatches
+        What in the words and the sound does not fit, one sentence each.
     """
 
     name: str
@@ -105,14 +106,14 @@ class Observation:
     quality: Quality
     video: Path
     is_recognised: bool = False
+    mismatches: tuple[str, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Messages about measures beyond the limits of warnings."""
         quality = self.quality
-        measured = {field.name: getattr(quality, field.name) for field in fields(quality) if field.name != "confidence"}
-        fit = confidence_measure(quality.confidence, quality.snr_db, is_recognised=self.is_recognised)
-        return limit_warnings({**measured, **fit})
+        measured = {field.name: getattr(quality, field.name) for field in fields(quality) if field.name != "fit"}
+        return (*limit_warnings({**measured, _fit_name(self): quality.fit}), *self.mismatches)
 
 
 def observe_recording(
@@ -138,7 +139,7 @@ def observe_recording(
     sound = aligner.align(recording.video, pronounce_recording(recording), recording.span)
     measures = sound_measures(sound.sound, sound.phones)
     judge(measures)
-    judge(confidence_measure(sound.confidence, measures["snr_db"], is_recognised=sound.is_recognised))
+    judge({_fit_name(sound): sound.fit})
     tracked = tracker.track(recording.video)
     filled, first, n_filled = _span_landmarks(tracked, recording.span, timing)
     fps = timing.fps or tracked.fps
@@ -161,7 +162,7 @@ def observe_recording(
         words=spans,
         intensity=intensity(sound.sound, start + np.arange(len(filled)) / fps),
         quality=Quality(
-            confidence=sound.confidence,
+            fit=sound.fit,
             score=_lowest_score(tracked, here),
             n_filled=n_filled,
             cut=begin,
@@ -170,6 +171,7 @@ def observe_recording(
         ),
         video=recording.video,
         is_recognised=sound.is_recognised,
+        mismatches=tuple(one.sentence for one in sound.mismatches),
     )
 
 
@@ -224,8 +226,13 @@ def trim_to_picture(sound: AlignedSpeech, begin: float, stop: float) -> tuple[Ph
         edges[0] = begin
     elif edges[0] > begin:  # the sound starts after the picture
         phones, edges, lead = [SILENCE, *phones], np.concatenate([[begin], edges]), lead - 1
-    words = tuple(WordSpan(word.text, word.first - lead, word.last - lead) for word in sound.words)
+    words = tuple(word.shift(-lead) for word in sound.words)
     return PhoneSequence(phones, edges - begin), words
+
+
+def _fit_name(spoken: AlignedSpeech | Observation) -> str:
+    """Name of the limit of the fit."""
+    return "recognised" if spoken.is_recognised else "fit"
 
 
 def head_motion(posed: PoseFreeLandmarks) -> NDArray[np.float32]:

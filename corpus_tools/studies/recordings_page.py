@@ -31,7 +31,7 @@ TICK_S = 0.5
 GAP_RANGE = (0.0, 0.35)  # of the eye distance: up to a mouth wide open in speech
 DB_RANGE = (25.0, 85.0)
 MEASURES = {
-    "confidence": ("fit of the words", "log likelihood / s", 1.0),
+    "fit": ("fit of the words", "%", 100.0),
     "score": ("lowest face score", "", 1.0),
     "n_filled": ("interpolated frames", "", 1.0),
     "lag": ("audio delay, corrected", "ms", 1000.0),
@@ -144,7 +144,7 @@ def _kept_item(observation: Observation, picture: NDArray[np.uint8] | None) -> s
     texts = []
     for measure, (label, unit, factor) in MEASURES.items():
         value = factor * getattr(observation.quality, measure)
-        if measure in {"confidence", "snr_db", "turn_deg"} or (value != 0 and measure != "score"):
+        if measure in {"fit", "snr_db", "turn_deg"} or (value != 0 and measure != "score"):
             texts.append(f"{label} {value:.3g} {unit}".strip())
     how = " (phones recognised)" if observation.is_recognised else ""
     return _item(observation.name, note_paragraph("; ".join(texts) + how) + utterance_curves(observation), picture)

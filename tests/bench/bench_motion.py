@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lexicon.sequence import SILENCE, PhoneSequence
+from lexicon.sequence import SILENCE, PhoneSequence, enforce_increasing
 from tts2face.lips.exemplar import (
     DEFAULT_OPTIONS,
     ExemplarModel,
@@ -22,7 +22,6 @@ from tts2face.lips.exemplar import (
 )
 from tts2face.lips.options import THEOBALD_2007
 from tts2face.models.talker import Talker, Utterance, read_talker
-from tts2face.sound.alignment import enforce_increasing
 from tts2face.types import frame_count
 
 FPS = 30.0

@@ -1,4 +1,5 @@
-"""How fast the neural voice is, and how exact its edges are: as it states them, and found in its sound in two ways.
+"""How fast the neural voice is, and how exact its edges are: as it states them, and found in its sound in two ways:
+those of the voice, and those of the aligner of recordings.
 
 Run: ``python tests/bench/bench_voice.py``. Edges are compared with landmarks of the sound that no aligner had a part
 in: the instant at which the energy above 4 kHz rises or falls most steeply where a sibilant meets a vowel, and the
@@ -15,9 +16,9 @@ from scipy.signal import butter, sosfiltfilt
 from sentences import sentences
 
 from lexicon.phones import PHONES
-from lexicon.sequence import SILENCE, PhoneSequence
+from lexicon.sequence import SILENCE, PhoneSequence, enforce_increasing
 from tts2face.sound import heart
-from tts2face.sound.alignment import Aligner, enforce_increasing
+from tts2face.sound.alignment import Aligner
 from tts2face.sound.segments import StatedPhone
 from tts2face.types import Waveform
 
@@ -68,9 +69,9 @@ def main() -> None:
     parser.add_argument("-n", type=int, default=100, help="sentences")
     n = parser.parse_args().n
     voice, aligner = heart.NeuralVoice({}), Aligner()
-    errors: dict[str, list[float]] = {"stated": [], "PocketSphinx": [], "segments": []}
+    errors: dict[str, list[float]] = {"stated": [], "recordings": [], "segments": []}
     ends: dict[str, list[float]] = {name: [] for name in errors}
-    seconds = dict.fromkeys(("voice", "PocketSphinx", "voice and segments"), 0.0)
+    seconds = dict.fromkeys(("voice", "recordings", "voice and segments"), 0.0)
     length = 0.0
     voice.speak("Hello.")
     for text in sentences(n):
@@ -81,12 +82,12 @@ def main() -> None:
         done = time.perf_counter()
         speech = voice.speak(text)
         seconds["voice"] += spoken - began
-        seconds["PocketSphinx"] += done - spoken
+        seconds["recordings"] += done - spoken
         seconds["voice and segments"] += time.perf_counter() - done
         length += sound.duration
         ways = {
             "stated": stated(words, phones, sound.duration),
-            "PocketSphinx": sounding(aligned.phones),
+            "recordings": sounding(aligned.phones),
             "segments": sounding(speech.phones),
         }
         energy = high_energy(sound)
@@ -96,7 +97,7 @@ def main() -> None:
         for name, found in ways.items():
             ends[name] += [found.start - audible[0], found.end - audible[-1]]
         for at, sign in landmarks(ways["segments"]):
-            middle = (ways["PocketSphinx"].edges[at] + ways["segments"].edges[at]) / 2
+            middle = (ways["recordings"].edges[at] + ways["segments"].edges[at]) / 2
             first = max(0, round((middle - SEARCH_S) / STEP_S))
             true = (first + int(np.argmax(sign * slope[first : round((middle + SEARCH_S) / STEP_S)]))) * STEP_S
             for name, found in ways.items():

@@ -6,7 +6,6 @@ import pytest
 from corpus_tools.recordings.limits import (
     LIMITS,
     check_limits,
-    confidence_measure,
     head_turn_deg,
     landmark_measures,
     light_measures,
@@ -20,7 +19,7 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.types import Waveform
 
 GOOD = {
-    "confidence": -3700.0, "clipped": 0.0, "snr_db": 30.0, "crowded": 0.0, "turn_deg": 6.0, "frozen_s": 0.04,
+    "fit": 0.98, "clipped": 0.0, "snr_db": 30.0, "crowded": 0.0, "turn_deg": 6.0, "frozen_s": 0.04,
     "frame_rate": 25.0, "eye_px": 65.0, "jitter": 0.1, "sync": 0.7, "sync_of_short": 0.6,
     "brightness": 120.0, "glare": 0.0, "contrast": 90.0, "sharpness": 0.04,
 }  # fmt: skip
@@ -40,10 +39,8 @@ def test_good_measures_pass() -> None:
 @pytest.mark.parametrize(
     ("measure", "value", "reason"),
     [
-        ("confidence", -7300.0, r"does not match the transcript \(confidence -7300, limit -6500\)"),
-        ("confidence_in_noise", -9000.0, r"does not match the transcript \(confidence -9000, limit -8500\)"),
-        ("recognised", -7300.0, r"could not be recognised well \(confidence -7300, limit -6500\)"),
-        ("recognised_in_noise", -9000.0, r"could not be recognised well \(confidence -9000, limit -8500\)"),
+        ("fit", 0.41, r"does not match the transcript \(41% of it is heard, limit 60%\)"),
+        ("recognised", 0.41, r"could not be recognised well \(41% of them are sure, limit 60%\)"),
         ("clipped", 0.35, r"35\.0% of the speech is clipped, limit 30\.0%"),
         ("snr_db", 4.0, "speech is 4 dB above the noise, limit 6 dB"),
         ("crowded", 0.5, "50% of the frames show more than one face, limit 25%"),
@@ -80,13 +77,8 @@ def test_a_measure_between_its_limits_is_a_warning(measure: str, value: float, r
 
 
 def test_every_limit_is_checked_and_warns_before_it_refuses() -> None:
-    assert {limit.measure for limit in LIMITS} == {*GOOD, "recognised", "confidence_in_noise", "recognised_in_noise"}
+    assert {limit.measure for limit in LIMITS} == {*GOOD, "recognised"}
     assert all((limit.warning > limit.refusal) == limit.is_minimum for limit in LIMITS)
-
-
-def test_noise_lowers_the_confidence_that_is_expected() -> None:
-    assert confidence_measure(-7000.0, 12.0, is_recognised=False) == {"confidence_in_noise": -7000.0}
-    assert confidence_measure(-7000.0, 25.0, is_recognised=True) == {"recognised": -7000.0}
 
 
 def test_jitter_is_the_noise_over_the_motion() -> None:

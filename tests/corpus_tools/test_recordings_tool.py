@@ -23,9 +23,7 @@ def asked(tmp_path, monkeypatch, *findings):
 
 
 def test_findings_say_what_a_person_in_front_of_the_camera_can_do(tmp_path, monkeypatch):
-    words = Finding(
-        REFUSAL, "confidence", "the sound does not match the transcript; correct the words", -7000.0, -6500.0
-    )
+    words = Finding(REFUSAL, "fit", "the sound does not match the transcript; correct the words", 0.4, 0.6)
     broken = Finding(REFUSAL, UNUSABLE, f"{tmp_path}/take-0001.webm is empty; record it again")
     found = asked(tmp_path, monkeypatch, words, broken)
     assert [one["message"] for one in found["findings"]] == [

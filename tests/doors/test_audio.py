@@ -1,5 +1,6 @@
 """Lip motion from recordings: with their words, by their sound alone; refusal of silent recordings."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,8 +22,7 @@ from tts2face.types import Trajectory, concatenate_clips, frame_count
 from tts2face.video.media import read_media_info, read_sound, sound_blocks
 
 TEXT = "bin blue at F two now"
-REAL_TOLERANCE_S = 0.02  # of the phones of the talker's training data
-TOLERANCE_S = 0.08  # of the takes' own word times, which are automatic as well
+TOLERANCE_S = 0.04  # of the takes' own word times, which are automatic as well
 LEARNT_FROM = 60  # utterances: enough to be far better than nothing
 SUFFIXES = {".wav": "pcm_s16le", ".flac": "flac", ".mp3": "libmp3lame", ".m4a": "aac", ".ogg": "libopus"}
 
@@ -105,21 +105,15 @@ def test_lips_open_with_the_sound_of_a_rendered_take(audio_map: str, rendered_ta
     assert np.median(found[spoken]) > 2 * np.median(found[~spoken])
 
 
-def test_with_a_transcript_lips_close_at_the_bilabials(
-    takes: Path, film: Path, session: Session, talker: Talker
-) -> None:
+def test_with_a_transcript_lips_close_at_the_bilabials(takes: Path, film: Path, session: Session) -> None:
     clip = session.clip(Request(audio=film, text=TEXT, fps=25.0))
     assert [word.text for word in clip.speech.words] == TEXT.split()
     words = [line.split() for line in (takes / "align" / "bbaf2n.align").read_text().splitlines()]
     (begin,) = (int(begin) / 25_000 for begin, _, word in words if word == "bin")
-    tolerance = TOLERANCE_S
-    if takes.name == "grid_s1":  # its word times are not those of the talker's phones
-        (recorded,) = (one.phones for one in talker.utterances if one.name == "bbaf2n")
-        begin, tolerance = float(recorded.edges[recorded.phones.index("b")]), REAL_TOLERANCE_S
     said = [phone for phone in clip.speech.phones.phones if phone != "sil"]
     assert said[:3] == ["b", "ɪ", "n"]
     starts = clip.speech.phones.edges[clip.speech.phones.phones.index("b")]
-    assert abs(starts - begin) < tolerance
+    assert abs(starts - begin) < TOLERANCE_S
 
 
 @ONLY_RENDERED
@@ -132,7 +126,8 @@ def test_audio_maps_and_words_give_different_lips(film: Path, session: Session) 
         Request(audio=film, volume=0.5),
     )
     default, network, linear, words, quiet = (session.clip(one) for one in requests)
-    np.testing.assert_array_equal(default.motion.values, network.motion.values)
+    assert not np.array_equal(default.motion.values, network.motion.values)
+    assert len(default.speech.phones) > 10
     assert not np.array_equal(network.motion.values, linear.motion.values)
     assert not np.array_equal(network.motion.values, words.motion.values)
     np.testing.assert_allclose(quiet.speech.waveform.samples, 0.5 * default.speech.waveform.samples, atol=1e-6)
@@ -230,7 +225,7 @@ def test_files_without_sound_are_refused(session: Session, here: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        ({"audio_map": "magic"}, "no audio map 'magic'; choose linear or network"),
+        ({"audio_map": "magic"}, "no audio map 'magic'; choose phones, linear, network"),
         ({"audio_map": "linear", "audio": None, "text": "Hi."}, "--audio-map needs a recording"),
         ({"audio_map": "linear", "text": "Hi."}, "remove --audio-map or the text"),
         ({"voice": "espeak"}, "--voice, --rate and --lead have no effect on a recording"),
@@ -249,7 +244,8 @@ def test_a_missing_recording_and_a_talker_without_audio_maps_are_refused(
     with pytest.raises(InputError, match=r"there is no recording none\.wav"):
         session.clip(Request(audio=Path("none.wav")))
     with pytest.raises(InputError, match="has no network audio map"):
-        Session(replace(talker, audio_maps={}), "head").clip(Request(audio=film))
+        Session(replace(talker, audio_maps={}), "head").clip(Request(audio=film, audio_map="network"))
+    assert Session(replace(talker, audio_maps={}), "head").clip(Request(audio=film)).speech.words == ()
 
 
 def test_the_text_is_given_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -258,9 +254,12 @@ def test_the_text_is_given_once(here: Path, capsys: pytest.CaptureFixture[str]) 
 
 
 @ONLY_RENDERED
-def test_an_explanation_needs_words(film: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["--audio", str(film), "--explain", "why.json"]) == 2
+def test_an_explanation_needs_phones(film: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--audio", str(film), "--audio-map", "network", "--explain", "why.json"]) == 2
     assert "or the words of --audio" in capsys.readouterr().err
+    assert run(["--audio", str(film), "--explain", str(here / "why.json")]) == 0
+    assert "the words are not given" in capsys.readouterr().err
+    assert len(json.loads((here / "why.json").read_text())) > 5
 
 
 @ONLY_RENDERED

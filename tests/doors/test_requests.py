@@ -178,8 +178,8 @@ def test_requests_that_cannot_be_spoken_are_refused(change: dict, reason: str, s
         ({"articulation": "nan"}, "articulation must lie between 0.5 and 2"),
         ({"articulation": "clear", "idle": 2.0, "text": ""}, "--articulation has no effect with --idle; remove one"),
         (
-            {"articulation": "clear", "audio": Path("speech.wav"), "text": ""},
-            "--articulation needs the phones of a recording; give its words as text, or remove it",
+            {"articulation": "clear", "audio": Path("speech.wav"), "text": "", "audio_map": "network"},
+            "--articulation needs the phones of a recording; remove it, or --audio-map",
         ),
         ({"idle": 5.0}, "--idle cannot be combined with text or --audio; remove one of them"),
         (

@@ -14,7 +14,7 @@ from tts2face.types import Clip
 
 KEPT = Path(__file__).with_name("requests.json")
 DECIDES = (
-    "numpy", "scipy", "numba", "onnxruntime", "hibari-tts", "espeakng-loader", "pocketsphinx", "pillow", "soxr", "av",
+    "numpy", "scipy", "numba", "onnxruntime", "hibari-tts", "espeakng-loader", "hama", "pillow", "soxr", "av",
     "scikit-learn",
 )  # fmt: skip
 MEANS = 0.15  # share: libraries and processors differ in the last bits, which a field's draw amplifies (decision 159)

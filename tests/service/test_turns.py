@@ -10,19 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lexicon.errors import DataError, InputError
+from lexicon.errors import InputError
 from tests.processes.answered import answered
 from tests.running import eventually
 from tts2face.processes.child import Call, StoppedError
 from tts2face.processes.message import ERROR, GO, MORE, PAUSE, STOP, Message, read_message
-from tts2face.processes.parent import ChildEndedError
-from tts2face.serving.service.aligner import RemoteAligner
 from tts2face.serving.service.messages import Event, Step, Wait, Work
 from tts2face.serving.service.scheduler import InterruptedTaskError, OneAtATime, Turns, wait_elsewhere
 from tts2face.serving.service.synthesis import Synthesis
 from tts2face.session.functions import SessionCache
 from tts2face.sound.alignment import Aligner
-from tts2face.sound.voice_pool import load_voice
+from tts2face.sound.voice_pool import VoicePool, load_voice
 from tts2face.types import Chunk
 
 WAIT_S = 60.0
@@ -324,52 +322,16 @@ def test_calls_run_models_one_after_another(calls: Calls) -> None:
     assert order == [1, 3]
 
 
-@pytest.fixture
-def aligner() -> Iterator[RemoteAligner]:
-    made = RemoteAligner()
-    yield made
-    made.close()
+def test_voices_of_a_pool_share_an_aligner_whose_work_is_done_in_turn() -> None:
+    run: list[str] = []
 
+    def count(compute: Callable[[], Any], end: Callable[[], None]) -> Any:
+        run.append(threading.current_thread().name)
+        return compute()
 
-WORDS = [("Bob", [("b", "ɑ", "b")]), ("may", [("m", "eɪ")]), ("read.", [("ɹ", "i", "d")])]
-
-
-def test_another_process_aligns_as_this_one(aligner: RemoteAligner) -> None:
+    setting = VoicePool(count)._aligner
+    assert setting is not None
     sound = load_voice("heart", "en-us").speak("Bob may read.").waveform
-    found, expected = aligner.align(sound, WORDS), Aligner().align(sound, WORDS)
-    assert found.phones.phones == expected.phones.phones
-    np.testing.assert_array_equal(found.phones.edges, expected.phones.edges)
-    np.testing.assert_array_equal(found.scores, expected.scores)
-    assert (found.words, found.confidence) == (expected.words, expected.confidence)
-    with pytest.raises(DataError, match="there is no word to align"):
-        aligner.align(sound, [])
-
-
-def test_an_alignment_that_is_not_needed_leaves_the_next_one_alone(aligner: RemoteAligner, calls: Calls) -> None:
-    sound = load_voice("heart", "en-us").speak("Bob may read.").waveform
-    expected = aligner.align(sound, WORDS).phones.edges
-
-    def align(number: int) -> Iterator[Step]:
-        yield Chunk(b"begun")
-        found = aligner.align(sound, WORDS[:number])
-        yield Chunk(str(len(found.words)).encode())
-
-    for number in (1, 2):  # in the process, and before it
-        calls.start(number, partial(align, number))
-    for number in (1, 2):
-        calls.control(number, STOP)
-        assert isinstance(calls.end(number), StoppedError)
-    np.testing.assert_array_equal(aligner.align(sound, WORDS).phones.edges, expected)
-
-
-def test_a_process_that_ended_is_started_again(aligner: RemoteAligner) -> None:
-    sound = load_voice("heart", "en-us").speak("Bob may read.").waveform
-    expected = aligner.align(sound, WORDS).phones.edges
-    first = aligner.pid
-    aligner._child.kill()
-    try:
-        again = aligner.align(sound, WORDS)
-    except ChildEndedError:  # it was about to end
-        again = aligner.align(sound, WORDS)
-    np.testing.assert_array_equal(again.phones.edges, expected)
-    assert aligner.pid != first
+    words = [("Bob", [("b", "ɑ", "b")]), ("may", [("m", "eɪ")]), ("read.", [("ɹ", "i", "d")])]
+    np.testing.assert_array_equal(setting.align(sound, words).phones.edges, Aligner().align(sound, words).phones.edges)
+    assert len(run) == 1

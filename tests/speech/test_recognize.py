@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from corpus_tools.recordings.folder import Recording, pronounce_recording
-from lexicon.errors import InputError
 from tests.rendered_takes import manifest_rows
-from tts2face.sound.alignment import acoustic_phones
-from tts2face.sound.listener import MAX_SOUND_S, PhoneRecogniser
+from tts2face.sound.recogniser import ENGLISH, FRAME_S, PART_S, PhoneRecogniser
+from tts2face.sound.voice_pool import load_voice
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 
@@ -18,7 +17,6 @@ EDITED = 0.4  # of the phones: 0.285 over 100 sentences of this talker (docs/dec
 
 @pytest.fixture(scope="module")
 def recogniser() -> PhoneRecogniser:
-    pytest.importorskip("hama", reason="needs `pip install 'tts2face[capture]'`")
     return PhoneRecogniser()
 
 
@@ -40,16 +38,22 @@ def test_most_phones_of_sentences_are_recognised(recogniser: PhoneRecogniser, ta
         video = takes / "clips" / f"{row['clip']}.mkv"
         words = pronounce_recording(Recording(row["clip"], video, row["transcript"], is_spelling=True))
         assert words is not None
-        written = acoustic_phones([phone for _, ways in words for phone in ways[0]])
-        recognised = acoustic_phones([phone for word in recogniser.words(read_sound(video, 16_000)) for phone in word])
+        written = [phone for _, ways in words for phone in ways[0]]
+        recognised = [phone for word in recogniser.hear(read_sound(video, 16_000)).words() for phone in word]
         wrong, total = wrong + edits(written, recognised), total + len(written)
     assert wrong / total < EDITED
 
 
 def test_silence_holds_no_word(recogniser: PhoneRecogniser) -> None:
-    assert recogniser.words(Waveform(np.zeros(0), 16_000)) == ()
+    assert recogniser.hear(Waveform(np.zeros(0), 16_000)).words() == ()
 
 
-def test_a_sound_that_is_too_long(recogniser: PhoneRecogniser) -> None:
-    with pytest.raises(InputError, match="in sounds of at most 30 s"):
-        recogniser.words(Waveform(np.zeros(round((MAX_SOUND_S + 1) * 16_000)), 16_000))
+def test_a_long_sound_is_heard_as_its_parts(recogniser: PhoneRecogniser) -> None:
+    voice = load_voice("heart", "en-us")
+    spoken = voice.speak("Nobody saw the dog again.").waveform.samples
+    long = Waveform(np.concatenate([spoken] * int(1.5 * PART_S / (len(spoken) / voice.sample_rate))), voice.sample_rate)
+    heard = recogniser.hear(long)
+    assert len(heard.log_probabilities(tuple(ENGLISH))) == pytest.approx(long.duration / FRAME_S, abs=3)
+    once = recogniser.hear(Waveform(spoken, voice.sample_rate)).words()
+    words = heard.words()
+    assert len(words) == pytest.approx(len(once) * len(long.samples) / len(spoken), abs=2)

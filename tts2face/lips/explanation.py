@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from lexicon.sequence import SILENCE, PhoneSequence
+from lexicon.sequence import DOUBTFUL, SILENCE, PhoneSequence
 from tts2face.lips.blending import exemplar_weights, frame_distances, path_cost, warp_path
 from tts2face.lips.exemplar import ExemplarModel, TokenSelection
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, OUTER_LIP_LOWER, OUTER_LIP_UPPER
@@ -42,7 +42,7 @@ class PhoneExplanation:
     """A phone, the recorded phone used for it, its context, and the tokens used, best first.
 
     ``shown`` differs from ``phone`` if the talker's recordings lack the phone. Phones without a lip shape (h) and
-    silence far from speech use no token and are omitted.
+    silence far from speech use no token and are omitted. ``confidence`` is that of the word in a recording.
     """
 
     phone: str
@@ -52,6 +52,7 @@ class PhoneExplanation:
     left: tuple[str, ...]
     right: tuple[str, ...]
     tokens: tuple[UsedToken, ...]
+    confidence: float = 1.0
 
 
 def explain_selection(selection: TokenSelection, exemplars: ExemplarModel) -> tuple[PhoneExplanation, ...]:
@@ -92,7 +93,8 @@ def explanation_text(shown: tuple[PhoneExplanation, ...], *, n_tokens: int = 5) 
     for phone in shown:
         name = phone.phone if phone.phone == phone.shown else f"{phone.phone} (shown by {phone.shown})"
         around = f"{' '.join(phone.left)} [{phone.shown}] {' '.join(phone.right)}"
-        lines.append(f"{phone.start:8.3f}-{phone.end:.3f} s  {name}  in  {around}")
+        doubt = "" if phone.confidence >= DOUBTFUL else f"  doubtful ({phone.confidence:.2f})"
+        lines.append(f"{phone.start:8.3f}-{phone.end:.3f} s  {name}  in  {around}{doubt}")
         lines += [
             f"    {used.score:6.3f} x {used.weight:.2f}  {used.utterance} {used.start:.2f}-{used.end:.2f} s  "
             f"{' '.join(used.left)} [{phone.shown}] {' '.join(used.right)}"

@@ -1,7 +1,8 @@
-"""Network that tells to which phone each frame of a voice's sound belongs.
+"""Network that tells to which phone each frame of a sound belongs, and how long phones last.
 
-One hidden layer of rectified linear units over the spectrum in a window around each frame.
-`corpus_tools.training.phone_classifier` trains it.
+One hidden layer of rectified linear units over features of a window around each frame: of the spectrum for a voice
+(``heart``), also of what a recogniser hears for recordings of anybody (``recordings``).
+`corpus_tools.training.phone_classifier` trains both.
 """
 
 from dataclasses import dataclass
@@ -14,11 +15,11 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.numeric.arrays import ordered_product
 from tts2face.storage.files import find_file
-from tts2face.storage.schema import Contents, Tensor, free, list_of, text
+from tts2face.storage.schema import Contents, Tensor, list_of, text
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 KIND, VERSION = "phones", 1
-MAX_VALUE = 1e4
+MAX_VALUE, MAX_DELAY_S = 1e4, 1.0
 Floats = NDArray[np.float32]
 
 
@@ -36,6 +37,10 @@ class PhoneClassifier:
         Of both layers.
     biases : (H,), (P,)
         Of both layers.
+    durations : (P, 2)
+        Mean and standard deviation of the logarithm of the seconds that phones last.
+    delays : (P,)
+        Seconds from the middles of phones to the instants at which the recogniser says them.
     """
 
     inventory: tuple[str, ...]
@@ -43,6 +48,8 @@ class PhoneClassifier:
     scale: Floats
     weights: tuple[Floats, Floats]
     biases: tuple[Floats, Floats]
+    durations: Floats
+    delays: Floats
 
     def log_probabilities(self, features: Floats) -> NDArray[np.float64]:
         """Log probabilities (T, P) of the phones in frames with features (T, K)."""
@@ -60,8 +67,10 @@ def write_phone_classifier(path: Path, classifier: PhoneClassifier) -> None:
         "scale": classifier.scale,
         **{f"weights{at}": layer.astype(np.float16) for at, layer in enumerate(classifier.weights)},
         **{f"biases{at}": layer for at, layer in enumerate(classifier.biases)},
+        "durations": classifier.durations,
+        "delays": classifier.delays,
     }
-    write_tensors(path, KIND, VERSION, arrays, {"inventory": list(classifier.inventory), "metadata": {}})
+    write_tensors(path, KIND, VERSION, arrays, {"inventory": list(classifier.inventory)})
 
 
 def load_phone_classifier(name: str) -> PhoneClassifier:
@@ -77,7 +86,7 @@ def load_phone_classifier(name: str) -> PhoneClassifier:
     path = find_file(name, KIND)
     arrays, header = read_tensors(path, KIND, VERSION)
     contents = Contents(path, KIND, arrays, header)
-    contents.metadata({"inventory": list_of(text), "metadata": free})
+    contents.metadata({"inventory": list_of(text)})
     n_phones = len(header["inventory"])
     contents.tensors(
         {
@@ -87,6 +96,8 @@ def load_phone_classifier(name: str) -> PhoneClassifier:
             "biases0": Tensor("float32", ("units",), -MAX_VALUE, MAX_VALUE),
             "weights1": Tensor("float16", ("units", n_phones), -MAX_VALUE, MAX_VALUE),
             "biases1": Tensor("float32", (n_phones,), -MAX_VALUE, MAX_VALUE),
+            "durations": Tensor("float32", (n_phones, 2), -MAX_VALUE, MAX_VALUE),
+            "delays": Tensor("float32", (n_phones,), -MAX_DELAY_S, MAX_DELAY_S),
         }
     )
     contents.only_known()
@@ -94,4 +105,5 @@ def load_phone_classifier(name: str) -> PhoneClassifier:
         raise DataError(f"{path}: a phone is listed twice; train the file again")
     layers = [(arrays[f"weights{at}"].astype(np.float32), arrays[f"biases{at}"]) for at in range(2)]
     weights, biases = zip(*layers, strict=True)
-    return PhoneClassifier(tuple(header["inventory"]), arrays["mean"], arrays["scale"], weights, biases)
+    kept = {name: arrays[name] for name in ("mean", "scale", "durations", "delays")}
+    return PhoneClassifier(inventory=tuple(header["inventory"]), weights=weights, biases=biases, **kept)

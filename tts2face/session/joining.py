@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from lexicon.normalize import canonical_text
 from lexicon.pronounce import spoken_form
 from lexicon.sentences import n_letters, text_prefix
-from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.sound.alignment import enforce_increasing
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, enforce_increasing
 from tts2face.sound.pauses import speech_onset
 from tts2face.types import Speech, Waveform, concatenate_speech, first_sample
 

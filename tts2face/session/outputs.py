@@ -32,7 +32,7 @@ from tts2face.session.models import SessionModels
 from tts2face.session.prepared import PreparedRequest, marked_styles
 from tts2face.session.speech import MarkTime
 from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces
-from tts2face.sound.transcript import TextMismatch
+from tts2face.sound.alignment import TextMismatch
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.storage.files import AnyPath, refuse_overwriting
 from tts2face.types import Chunk, Clip, Progress

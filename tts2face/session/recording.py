@@ -5,7 +5,7 @@ use is bounded.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -16,13 +16,15 @@ from lexicon.dictionary import Dictionary
 from lexicon.errors import DataError, InputError
 from lexicon.ipa import IpaPhone
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from tts2face.lips.explanation import PhoneExplanation
 from tts2face.models.audio_map import AudioMap
 from tts2face.models.talker import Talker, speech_channels
 from tts2face.numeric.arrays import interpolate_cubic
-from tts2face.request import Request
+from tts2face.request import RECOGNISED, Request
+from tts2face.sound.alignment import TextMismatch
 from tts2face.sound.features import FEATURE_RATE, speech_level
 from tts2face.sound.listener import StreamingFeatures
-from tts2face.sound.transcript import TextMismatch, align_recording, pronounce_transcript
+from tts2face.sound.transcript import align_recording, pronounce_transcript, recognise_phones
 from tts2face.types import Clip, Speech, Trajectory, Waveform, exact_rate, first_sample, frame_count, resting_head
 from tts2face.video.media import sound_blocks
 
@@ -49,9 +51,15 @@ class TimedTranscript:
         """Duration in seconds."""
         return self.phones.end
 
+    def with_confidence(self, phone: PhoneExplanation) -> PhoneExplanation:
+        """The explanation of a phone with the confidence of its word."""
+        at = self.phones.index_at((phone.start + phone.end) / 2)
+        sure = next((word.confidence for word in self.words if word.first <= at < word.last), 1.0)
+        return replace(phone, confidence=sure)
+
 
 def select_audio_map(request: Request, talker: Talker) -> AudioMap:
-    """Audio map of a talker chosen by a request; `DEFAULT_AUDIO_MAP` if the request names none.
+    """Audio map of a talker chosen by a request; `DEFAULT_AUDIO_MAP` if the request names none, as live sound does.
 
     Raises
     ------
@@ -59,10 +67,14 @@ def select_audio_map(request: Request, talker: Talker) -> AudioMap:
         The talker has no such audio map.
     """
     name = request.audio_map or DEFAULT_AUDIO_MAP
+    if name == RECOGNISED:
+        raise InputError(
+            "phones are recognised in whole recordings; for live sound choose the audio map network or linear"
+        )
     if name not in talker.audio_maps:
         raise InputError(
             f"the talker {talker.metadata.get('name', '')} has no {name} audio map because its recordings were too few "
-            "to learn one; give the words of the recording with --text, or choose another talker"
+            "to learn one; leave out --audio-map, or choose another talker"
         )
     return talker.audio_maps[name]
 
@@ -77,11 +89,27 @@ def align_transcript(
     InputError, DataError
         The recording cannot be read, is silent or too short, or does not contain the words.
     BackendError
-        The recording is longer than a minute and the phone recogniser is not installed.
+        The phone recogniser does not run on this machine.
     """
     words = pronounce_transcript(text, language, Dictionary(dictionary) if dictionary else None)
-    sound = Waveform(np.concatenate(list(_read_audible_blocks(path))), FEATURE_RATE)
-    return TimedTranscript(*align_recording(sound, words, is_english=language.startswith("en")))
+    return TimedTranscript(*align_recording(_sound_of(path), words))
+
+
+def recognise_transcript(path: Path) -> TimedTranscript:
+    """Phones that are heard in a recording; its words are not known.
+
+    Raises
+    ------
+    InputError, DataError
+        The recording cannot be read, is silent or too short.
+    BackendError
+        The phone recogniser does not run on this machine.
+    """
+    return TimedTranscript(recognise_phones(_sound_of(path)), ())
+
+
+def _sound_of(path: Path) -> Waveform:
+    return Waveform(np.concatenate(list(_read_audible_blocks(path))), FEATURE_RATE)
 
 
 def map_audio_to_motion(
@@ -149,7 +177,7 @@ def _phones_within(
     cut = edges[first : last + 1].copy()
     cut[0], cut[-1] = 0.0, duration
     words = tuple(
-        WordSpan(word.text, word.first - first, min(word.last, last) - first)
+        replace(word.shift(-first), last=min(word.last, last) - first)
         for word in transcript.words
         if first <= word.first < last and edges[word.first] > -1e-6  # else it began in the span before
     )

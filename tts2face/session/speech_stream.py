@@ -25,7 +25,7 @@ from tts2face.session.speech import (
     silent_sentences,
     speak_sentence,
 )
-from tts2face.sound.transcript import TextMismatch
+from tts2face.sound.alignment import TextMismatch
 from tts2face.types import (
     Clip,
     Speech,

@@ -33,6 +33,7 @@ from tts2face.session.recording import (
     TimedTranscript,
     align_transcript,
     map_audio_to_motion,
+    recognise_transcript,
     recording_clips,
     select_audio_map,
 )
@@ -166,7 +167,7 @@ def _recording_motion(
     prepared: PreparedRequest, audio: Path, models: SynthesisModels, lips: Lips
 ) -> tuple[TimedTranscript, Trajectory, Explain]:
     fps, request = float(prepared.fps), prepared.request
-    if not request.text.strip():
+    if not request.has_phones:
         audio_map = select_audio_map(request, models.talker)
         transcript, parameters = map_audio_to_motion(audio, audio_map, models.talker, fps)
         return transcript, models.face.motion_of_parameters(parameters), tuple
@@ -176,14 +177,19 @@ def _recording_motion(
         file = (str(audio.resolve()), found.st_mtime_ns, found.st_size)
         return ("transcript", file, prepared.text.text, request.language, frozenset(prepared.dictionary.items()))
 
+    def find() -> TimedTranscript:
+        if not request.text.strip():
+            return recognise_transcript(audio)
+        return align_transcript(prepared.text.text, request.language, audio, prepared.dictionary)
+
     transcript = models.speech.memory.recall(
         key,
-        lambda: align_transcript(prepared.text.text, request.language, audio, prepared.dictionary),
+        find,
         lambda made: TRANSCRIPT_BYTES + made.phones.edges.nbytes * 8,
     )
     transcript = replace(transcript, phones=correct_phones(transcript.phones, RECORDING, 0, prepared.edges))
     selection, motion = lips.motion(transcript.phones, frame_count(transcript.duration, fps))
-    return transcript, motion, lips.explanation(selection, 0.0)
+    return transcript, motion, lambda: tuple(map(transcript.with_confidence, lips.explanation(selection, 0.0)()))
 
 
 def default_style(palette: Palette) -> str:

@@ -1,36 +1,78 @@
-"""Forced alignment of the phones of a known text with a recording.
+"""Forced alignment of the phones of a known text with a recording of it.
 
-Acoustic model and two-pass state alignment are those of PocketSphinx (Huggins-Daines et al. 2006), whose wheel includes
-the model. An `Aligner` is not thread-safe.
+A phone recogniser tells when each phone is heard (`tts2face.sound.spikes`), and a classifier to which phone each frame
+of 5 ms belongs. A search over all divisions of the sound (`tts2face.sound.segments`) adds to both how long phones last.
+Words that are not said are left out, and sounds that are not written are stepped over.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from lexicon.phones import ARPABET, PHONES, nearest_phones
-from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.sound.pauses import sound_windows
+from lexicon.sequence import DOUBTFUL, SILENCE, PhoneSequence, WordSpan, concatenate_phones, enforce_increasing
+from tts2face.models.phone_classifier import PhoneClassifier, load_phone_classifier
+from tts2face.sound.pauses import Span
+from tts2face.sound.recogniser import FRAME_S, LEAST_PEAK, PEAK, PhoneRecogniser
+from tts2face.sound.segments import STEP_S, divide, frame_features
+from tts2face.sound.spikes import NEVER, UNSAID, find_spikes
+from tts2face.sound.word_lattice import PlacedPhone, Pronunciations, place_phones, sounding, word_segments
 from tts2face.types import Waveform
 
-MODEL_RATE = 16000  # Hz, sample rate of the acoustic model's training data
-FRAME_RATE = 200  # Hz; 100 halves the run time and doubles the edge error
-# The model's frames are early by this time; measured on the TIMIT sample, confirmed on an Australian voice.
-MODEL_DELAY_S = 0.009
-PADDING_S = 0.1  # low noise at both ends, as silence before the first and after the last phone
-MARGIN_S = 0.15  # silence retained at both ends; more of it would shift the mean by which the model normalises
-AUDIBLE_SHARE = 0.01  # relative to the level of the loudest window
-LEVEL_WINDOW_S = 0.01
-NOISE_LEVEL = 1e-4  # relative to full scale; digital silence has no logarithm
-PEAK_LEVEL = 0.7  # peak amplitude of the model's input
-MIN_PHONE_S = 0.005  # one frame; shorter phones and silences cannot be resolved
+CONTEXT_S = (-0.12, -0.08, -0.05, -0.03, -0.015, 0.0, 0.015, 0.03, 0.045, 0.06, 0.08, 0.11, 0.15, 0.19)
+LEAST_LOG, LOG_SPREAD = -10.0, 5.0  # log probabilities of the recogniser as features
+# Chosen on a voice that the classifier has not heard, in noise; docs/decisions/193-alignment.md
+FRAME_WEIGHT = 0.15  # of log probabilities of frames: neighbouring ones are not independent
+LEAST_FRAME, PASSED_OVER = -12.0, -6.0  # of a frame; of one of a silence in which something else is heard
+PADDING_S, PADDING_LEVEL = 0.1, 3e-4
+USUAL_DELAY_S = 0.035  # of spikes behind the middles of phones
+LEAST_FIT = 0.6  # of a right text; docs/decisions/193-alignment.md
+LEFT_OUT, LEAST_SAID, N_LEFT_OUT = 0.1, 0.8, 6  # confidence of words and of all others, phones of those together
+N_UNWRITTEN = 5  # phones heard in a silence
+WORDS_SHOWN = 8
+Floats = NDArray[np.float64]
 
-Pronunciations = Sequence[tuple[str, ...]]  # alternatives of one word, in phones of the table
+
+@dataclass(frozen=True, slots=True)
+class TextMismatch:
+    """Words that a recording probably does not contain and the seconds where they would be, or speech without words."""
+
+    begin: float
+    end: float
+    words: tuple[str, ...]
+
+    @property
+    def sentence(self) -> str:
+        """Warning for the user, one line."""
+        where = f"from {self.begin:.1f} to {self.end:.1f} s"
+        if not self.words:
+            return f"speech {where} is not in the text; add its words"
+        return f"the text does not fit the recording {where} ({_shown(self.words)}); check the words"
+
+    def shift(self, seconds: float) -> "TextMismatch":
+        """The same mismatch, later by `seconds`."""
+        return replace(self, begin=self.begin + seconds, end=self.end + seconds)
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Numbers of phones: ``written`` in the text, of which are ``said``; and all ``heard``."""
+
+    written: float = 0.0
+    said: float = 0.0
+    heard: float = 0.0
+
+    @property
+    def share(self) -> float:
+        """Of the text that is said, or of what is heard that is written, whichever is more.
+
+        In noise little is heard, and of an incomplete text much is not written; of a wrong one both are low.
+        """
+        return max(self.said / max(self.written, 1.0), min(self.said / max(self.heard, 1.0), 1.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,212 +82,267 @@ class Alignment:
     Parameters
     ----------
     phones
-        N phones from 0 s to the end of the sound.
+        Phones from 0 s to the end of the sound.
     words
-        One span of phones for each word.
-    confidence
-        Mean log likelihood per second of speech, relative to the best fitting state of the acoustic model in each
-        frame: at most 0, and much lower for a wrong text than for the right one.
-    scores : (N,)
-        Log likelihoods of the phones; 0 for silences.
+        Spans of phones of the words that are said, with the probability that they are.
+    fit
+        How much of the text is said, and of the sound written.
+    mismatches
+        Words that are not said, and speech that is not written.
     """
 
     phones: PhoneSequence
     words: tuple[WordSpan, ...]
-    confidence: float
-    scores: NDArray[np.float64]
+    fit: Fit
+    mismatches: tuple[TextMismatch, ...]
+
+    def check(self) -> None:
+        """Raise DataError if the recording does not contain the text."""
+        if self.fit.share < LEAST_FIT:
+            missing = [word for mismatch in self.mismatches for word in mismatch.words]
+            raise DataError(
+                "the recording does not contain this text: "
+                f"{self.fit.said / max(self.fit.written, 1):.0%} of its phones "
+                f"are heard (not: {_shown(missing) or 'single words'}); check the words"
+            )
+
+
+def join_alignments(parts: Sequence[Alignment]) -> Alignment:
+    """Alignment of a sound from those of its parts, one after another."""
+    phones, words = concatenate_phones([part.phones for part in parts], [part.words for part in parts])
+    begins = np.cumsum([0.0, *(part.phones.end for part in parts)])
+    fit = Fit(*(sum(getattr(part.fit, field.name) for part in parts) for field in fields(Fit)))
+    mismatches = [
+        one.shift(float(begin)) for part, begin in zip(parts, begins, strict=False) for one in part.mismatches
+    ]
+    return Alignment(phones, words, fit, tuple(mismatches))
+
+
+def unwritten_part(sound: Waveform, n_heard: int) -> Alignment:
+    """Alignment of a sound of which no word is written, in which a number of phones are heard."""
+    mismatches = (TextMismatch(0.0, sound.duration, ()),) if n_heard >= N_UNWRITTEN else ()
+    return Alignment(PhoneSequence([SILENCE], [0.0, sound.duration]), (), Fit(heard=float(n_heard)), mismatches)
 
 
 class SpeechAligner(Protocol):
-    """Whatever aligns as `Aligner` does, for instance in another process."""
+    """Whatever aligns as `Aligner` does, for instance in turn with other tasks."""
 
     def align(self, sound: Waveform, words: Sequence[tuple[str, Pronunciations]]) -> Alignment:
         """As `Aligner.align`."""
 
 
 class Aligner:
-    """Forced aligner, whose acoustic model is loaded when it is first used; not thread-safe."""
+    """Forced aligner, whose models are loaded when they are first used; thread-safe.
 
-    def __init__(self) -> None:
-        self._names: dict[tuple[tuple[str, ...], ...], str] = {}
+    Parameters
+    ----------
+    classifier
+        None: the shipped one.
+    """
+
+    def __init__(self, classifier: PhoneClassifier | None = None) -> None:
+        self._given = classifier
 
     def load(self) -> None:
-        """Load the acoustic model, for instance before a process forks."""
-        _ = self._decoder
+        """Load the models, for instance before a process forks."""
+        _ = self.recogniser, self._classifier
 
     @cached_property
-    def _decoder(self) -> Any:
-        from pocketsphinx import Decoder
+    def recogniser(self) -> PhoneRecogniser:
+        """Recogniser of phones."""
+        return PhoneRecogniser()
 
-        return Decoder(
-            lm=None,
-            dict=None,  # each word is added with its pronunciations; the package's 130,000 words take 0.1 s to read
-            loglevel="FATAL",
-            bestpath=False,
-            frate=FRAME_RATE,
-            beam=1e-100,
-            wbeam=1e-80,
-            pbeam=1e-100,
-        )
+    @cached_property
+    def _classifier(self) -> PhoneClassifier:
+        return self._given or load_phone_classifier("recordings")
 
-    def align(self, sound: Waveform, words: Sequence[tuple[str, Pronunciations]]) -> Alignment:
+    def align(
+        self,
+        sound: Waveform,
+        words: Sequence[tuple[str, Pronunciations]] | None,
+        times: Sequence[Span] | None = None,
+        *,
+        may_lack: bool = False,
+    ) -> Alignment:
         """Align the phones of words with a sound.
 
         Parameters
         ----------
         words
-            Each written word with its alternative pronunciations, of which the best fitting one is chosen.
+            Each written word with its alternative pronunciations, of which the best fitting one is chosen; None: what
+            is heard, as phones between slashes.
+        times
+            Begins and ends of the words in seconds, if they are known.
+        may_lack
+            Whether the sound may lack words, which are then left out; a voice says all of them.
 
         Raises
         ------
         DataError
-            There is no word, or the sound does not contain these words.
+            There is no word, the sound is too short for them, or no speech is heard.
         """
-        if not words:
+        if words is not None and not words:
             raise DataError("there is no word to align; give a transcript")
-        names = [self._word_name(tuple(tuple(phones) for phones in alternatives)) for _, alternatives in words]
-        part, begin = _trim_to_audible(sound)
-        entries = self._decode(_pcm_bytes(part), " ".join(names))
-        if [entry.name.split("(")[0] for entry in entries] != names:
-            found = len(entries)
-            raise DataError(f"only {found} of {len(names)} words could be aligned; check the transcript")
-        return _build_alignment(entries, words, sound.duration, begin)
+        duration, inventory = sound.duration, sounding(self._classifier)
+        sound = _padded(levelled(sound))
+        hearing = self.recogniser.hear(sound)
+        if words is None:
+            words = [(f"/{''.join(word)}/", [word]) for word in hearing.words()]
+        if not words:
+            raise DataError("the sound contains no speech; give a recording of a person who speaks")
+        labels = (*inventory, *sorted(_phones_in(words) - {*inventory}))
+        heard = hearing.log_probabilities(labels)
+        known = heard[:, [*range(len(inventory)), len(labels)]]
+        frames = self._classifier.log_probabilities(recording_features(sound, known))[:-1]
+        number = {label: at for at, label in enumerate(labels)}
+        columns = [[[number[phone] for phone in phones] for phones in alternatives] for _, alternatives in words]
+        confidence = _confidence(find_spikes(heard, columns, UNSAID), words)
+        kept = _is_kept(confidence, words) if may_lack else np.ones(len(words), bool)
+        said = [word for word, is_said in zip(words, kept, strict=True) if is_said]
+        spikes = find_spikes(heard, [one for one, is_said in zip(columns, kept, strict=True) if is_said], NEVER)
+        chosen = self._choose(frames, [alternatives for _, alternatives in said], spikes, times)
+        if not chosen:
+            raise DataError(f"the sound of {duration:.2f} s is too short for {len(words)} words; check the words")
+        phones, spans = _sequence(chosen, [text for text, _ in said], confidence[kept], duration)
+        places = spike_times(heard) - PADDING_S
+        lengths = np.array([len(alternatives[0]) for _, alternatives in words])
+        fit = Fit(float(lengths.sum()), float(lengths @ confidence), float(len(places)))
+        found = (*_unheard(words, confidence, kept, phones, spans), *_unwritten(phones, places))
+        return Alignment(phones, spans, fit, tuple(sorted(found, key=lambda one: one.begin)))
 
-    def _word_name(self, pronunciations: tuple[tuple[str, ...], ...]) -> str:
-        """Name of a word with these pronunciations in the decoder's dictionary."""
-        if pronunciations not in self._names:
-            name = f"w{len(self._names)}x"
-            for number, phones in enumerate(pronunciations):
-                label = name if number == 0 else f"{name}({number + 1})"
-                self._decoder.add_word(label, " ".join(acoustic_phones(phones)), number == len(pronunciations) - 1)
-            self._names[pronunciations] = name
-        return self._names[pronunciations]
-
-    def _decode(self, pcm: bytes, text: str) -> "list[_DecodedWord]":
-        decoder = self._decoder
-        decoder.reinit_feat()  # resets the running level normalisation: equal sounds give equal edges
-        decoder.set_align_text(text)
-        for second_pass in (False, True):
-            try:
-                if second_pass:
-                    decoder.set_alignment()
-                decoder.start_utt()
-                decoder.process_raw(pcm, full_utt=True)
-                decoder.end_utt()
-            except RuntimeError as failed:
-                raise DataError("the sound does not contain these words; check the transcript") from failed
-        found = decoder.get_alignment()
-        if found is None:
-            raise DataError("the sound does not contain these words; check the transcript")
-        entries = []
-        for word in found:
-            phones = [(phone.name, phone.start, phone.duration, phone.score) for phone in word]
-            if not word.name.startswith(("<", "[")):
-                entries.append(_DecodedWord(word.name, phones))
-        return entries
-
-
-@dataclass(frozen=True, slots=True)
-class _DecodedWord:
-    """A decoded word: name, first frame, number of frames and score of each phone."""
-
-    name: str
-    phones: list[tuple[str, int, int, int]]
-
-    @property
-    def pronunciation(self) -> int:
-        """Index of the chosen pronunciation."""
-        return int(self.name[self.name.index("(") + 1 : -1]) - 1 if "(" in self.name else 0
+    def _choose(
+        self, frames: Floats, words: Sequence[Pronunciations], spikes: Floats, times: Sequence[Span] | None
+    ) -> list[tuple[PlacedPhone | None, float, float]]:
+        """Phones of the best division of a sound, None for silences, each with its begin and end in seconds."""
+        silence = self._classifier.inventory.index(SILENCE)
+        frames = np.maximum(frames, LEAST_FRAME)
+        frames[:, silence] = np.maximum(frames[:, silence], PASSED_OVER)
+        placed, padding = place_phones(self._classifier, words, spikes), PADDING_S
+        known = times and [(begin + padding, end + padding) for begin, end in times]
+        segments, phones = word_segments(self._classifier, placed, len(frames), known)
+        found = divide(FRAME_WEIGHT * frames, segments)
+        end = len(frames) * STEP_S - 2 * padding
+        seconds = [(phones[at], _seconds(begin), _seconds(last)) for at, begin, last in found]
+        return [one for one in seconds if one[0] is not None or (one[2] > STEP_S and one[1] < end - STEP_S)]
 
 
-def acoustic_phones(phones: Sequence[str]) -> list[str]:
-    """ARPABET names of the acoustic model's phones nearest to given phones."""
-    names = []
-    for phone in phones:
-        nearest = nearest_phones(phone, _MODEL_PHONES)[0]
-        names.append(PHONES[nearest].arpabet.removesuffix("0"))
-    return names
+def _phones_in(words: Sequence[tuple[str, Pronunciations]]) -> set[str]:
+    return {phone for _, alternatives in words for phones in alternatives for phone in phones}
 
 
-_MODEL_PHONES = frozenset(ARPABET.values())
+def levelled(sound: Waveform) -> Waveform:
+    """The sound at the level of the training data."""
+    factor = np.float32(PEAK / max(float(np.abs(sound.samples).max(initial=0.0)), LEAST_PEAK))
+    return Waveform(sound.samples * factor, sound.rate)
 
 
-def _trim_to_audible(sound: Waveform) -> tuple[Waveform, float]:
-    """Audible part of a sound with a margin of `MARGIN_S` at both ends, and its start in seconds."""
-    windows = sound_windows(sound, LEVEL_WINDOW_S)
-    levels, window = np.abs(windows).max(axis=1, initial=0.0), windows.shape[1]
-    loud = np.flatnonzero(levels > AUDIBLE_SHARE * levels.max(initial=0.0))
-    if not len(loud):
-        return sound, 0.0
-    margin = round(MARGIN_S * sound.rate)
-    first = max(0, int(loud[0]) * window - margin)
-    last = min(len(sound.samples), (int(loud[-1]) + 1) * window + margin)
-    return sound.part(first, last), first / sound.rate
+def _padded(sound: Waveform) -> Waveform:
+    """The sound with quiet noise before and after it: an abrupt begin is heard as a stop."""
+    quiet = np.random.default_rng(0).normal(0.0, PADDING_LEVEL, round(PADDING_S * sound.rate)).astype(np.float32)
+    return Waveform(np.concatenate([quiet, sound.samples, quiet]), sound.rate)
 
 
-def _pcm_bytes(sound: Waveform) -> bytes:
-    """16-bit samples at `MODEL_RATE`, padded with noise and normalised to `PEAK_LEVEL`."""
-    import soxr
-
-    samples = sound.samples
-    if sound.rate != MODEL_RATE:
-        samples = soxr.resample(samples, sound.rate, MODEL_RATE)
-    level = PEAK_LEVEL / max(float(np.abs(samples).max(initial=0.0)), 1e-3)
-    n_padding = round(PADDING_S * MODEL_RATE)
-    padded = np.random.default_rng(0).normal(0.0, NOISE_LEVEL, len(samples) + 2 * n_padding)
-    padded[n_padding : n_padding + len(samples)] += samples * level
-    pcm: NDArray[np.int16] = np.clip(padded * 32767, -32768, 32767).astype(np.int16)
-    return pcm.tobytes()
+def recording_features(sound: Waveform, heard: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Features (T, K) of frames of `STEP_S`: the spectrum, and what the recogniser hears (T', P + 1) around them."""
+    spectrum = frame_features(sound)
+    places = np.arange(len(spectrum))[:, None] * (STEP_S / FRAME_S) + np.array(CONTEXT_S) / FRAME_S - 0.5
+    lows = np.clip(np.floor(places).astype(np.int64), 0, len(heard) - 1)
+    shares = np.clip(places - lows, 0.0, 1.0)[..., None].astype(np.float32)
+    scaled = np.maximum(heard, LEAST_LOG) / np.float32(LOG_SPREAD) + 1.0
+    around = scaled[lows] * (1.0 - shares) + scaled[np.minimum(lows + 1, len(heard) - 1)] * shares
+    return np.concatenate([spectrum, around.reshape(len(spectrum), -1)], axis=1, dtype=np.float32)
 
 
-def _build_alignment(
-    entries: Sequence[_DecodedWord], words: Sequence[tuple[str, Pronunciations]], duration: float, begin: float
-) -> Alignment:
-    """Alignment of a whole sound of `duration` seconds, whose decoded part starts at `begin` seconds."""
-    labels: list[str] = []
-    starts: list[float] = []
-    spans: list[WordSpan] = []
-    end = 0.0
-    scores: dict[int, float] = {}  # by phone
-    n_frames = 0
-    for entry, (text, pronunciations) in zip(entries, words, strict=True):
-        onset = begin + _frame_to_seconds(entry.phones[0][1])
-        if onset - end >= MIN_PHONE_S:  # a silence, also before the first word
-            labels.append(SILENCE)
-            starts.append(end)
-        spans.append(WordSpan(text, len(labels), len(labels) + len(entry.phones)))
-        for phone, (_, first, count, score) in zip(pronunciations[entry.pronunciation], entry.phones, strict=True):
-            scores[len(labels)] = float(score)
-            labels.append(phone)
-            starts.append(begin + _frame_to_seconds(first))
-            end = begin + _frame_to_seconds(first + count)
-            n_frames += count
-    if duration - end >= MIN_PHONE_S:
-        labels.append(SILENCE)
-        starts.append(end)
-    edges = np.array([*starts, duration])
-    edges[0] = 0.0
-    confidence = sum(scores.values()) / max(n_frames, 1) * FRAME_RATE
-    by_phone = np.array([scores.get(at, 0.0) for at in range(len(labels))])
-    return Alignment(PhoneSequence(labels, enforce_increasing(edges)), tuple(spans), confidence, by_phone)
+def spike_times(heard: NDArray[np.float32]) -> Floats:
+    """Seconds at which the most probable phones begin in log probabilities (T, P + 1)."""
+    best = heard.argmax(axis=1)
+    is_new = (best != heard.shape[1] - 1) & (best != np.concatenate([[-1], best[:-1]]))
+    return np.flatnonzero(is_new).astype(np.float64) * FRAME_S + FRAME_S / 2 - USUAL_DELAY_S
 
 
-def _frame_to_seconds(frame: int) -> float:
-    return frame / FRAME_RATE + MODEL_DELAY_S - PADDING_S
+def _confidence(spikes: Floats, words: Sequence[tuple[str, Pronunciations]]) -> Floats:
+    """Probabilities (W,) that words are said: the sums of those of their pronunciations."""
+    totals, at = spikes.sum(axis=0), 0
+    found: Floats = np.zeros(len(words))
+    for word, (_, alternatives) in enumerate(words):
+        for phones in alternatives:
+            found[word] += totals[at]
+            at += len(phones)
+    sure: Floats = np.minimum(found, 1.0)
+    return sure
 
 
-def enforce_increasing(edges: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Move (N + 1,) edges so that successive ones differ by at least `MIN_PHONE_S`; the first and last are fixed.
+def _runs(chosen: NDArray[np.bool_], words: Sequence[tuple[str, Pronunciations]], least: int) -> list[tuple[int, int]]:
+    """Ranges of successive chosen words that have at least so many phones together."""
+    borders = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8))).reshape(-1, 2)
+    lengths = [len(alternatives[0]) for _, alternatives in words]
+    return [(int(first), int(last)) for first, last in borders if sum(lengths[first:last]) >= least]
 
-    Phones that are too short are lengthened at the cost of their neighbours. If the total duration is less than
-    `MIN_PHONE_S` for each phone, all phones get equal durations.
-    """
-    n = len(edges) - 1
-    first, last = float(edges[0]), float(edges[-1])
-    if (last - first) <= n * MIN_PHONE_S:
-        return np.linspace(first, last, n + 1)
-    room = np.arange(n + 1) * MIN_PHONE_S
-    slack = np.clip(np.maximum.accumulate(edges - room), first, last - n * MIN_PHONE_S)
-    moved: NDArray[np.float64] = slack + room
-    moved[0], moved[-1] = first, last
-    return moved
+
+def _is_kept(confidence: Floats, words: Sequence[tuple[str, Pronunciations]]) -> NDArray[np.bool_]:
+    """Whether words (W,) are said; a short word alone is easily misheard, and so are all words in noise."""
+    kept = np.ones(len(words), bool)
+    for first, last in _runs(confidence < LEFT_OUT, words, N_LEFT_OUT):
+        kept[first:last] = False
+    if not kept.any() or confidence[kept].mean() < LEAST_SAID:
+        kept[:] = True
+    return kept
+
+
+def _sequence(
+    chosen: "Sequence[tuple[PlacedPhone | None, float, float]]",
+    texts: Sequence[str],
+    confidence: Floats,
+    duration: float,
+) -> tuple[PhoneSequence, tuple[WordSpan, ...]]:
+    """Phones from 0 s to the end, and the words of them."""
+    labels = [SILENCE if phone is None else phone.label for phone, *_ in chosen]
+    edges = np.array([*(max(begin, 0.0) for _, begin, _ in chosen), duration])
+    of_word: list[list[int]] = [[] for _ in texts]
+    for at, (phone, *_) in enumerate(chosen):
+        if phone is not None:
+            of_word[phone.word].append(at)
+    spans = (
+        WordSpan(text, places[0], places[-1] + 1, float(value))
+        for text, places, value in zip(texts, of_word, confidence, strict=True)
+    )
+    return PhoneSequence(labels, enforce_increasing(edges)), tuple(spans)
+
+
+def _unheard(
+    words: Sequence[tuple[str, Pronunciations]],
+    confidence: Floats,
+    kept: NDArray[np.bool_],
+    phones: PhoneSequence,
+    spans: Sequence[WordSpan],
+) -> list[TextMismatch]:
+    """Successive words that are probably not said, and where they would be."""
+    places = np.concatenate([[0], np.cumsum(kept)])  # of the said words before each word
+    found = []
+    for first, last in _runs(confidence < DOUBTFUL, words, N_LEFT_OUT):
+        before, behind = int(places[first]), int(places[last])
+        if before < behind:  # some of them have been placed
+            begin, end = phones.edges[spans[before].first], phones.edges[spans[behind - 1].last]
+        else:
+            begin = phones.edges[spans[before - 1].last] if before else phones.start
+            end = phones.edges[spans[behind].first] if behind < len(spans) else phones.end
+        found.append(TextMismatch(float(begin), float(end), tuple(text for text, _ in words[first:last])))
+    return found
+
+
+def _unwritten(phones: PhoneSequence, heard: Floats) -> list[TextMismatch]:
+    """Silences of an alignment in which speech is heard."""
+    counts = np.histogram(heard, phones.edges)[0]
+    return [
+        TextMismatch(float(phones.edges[at]), float(phones.edges[at + 1]), ())
+        for at, label in enumerate(phones.phones)
+        if label == SILENCE and counts[at] >= N_UNWRITTEN
+    ]
+
+
+def _seconds(frame: int) -> float:
+    return (frame - 0.5) * STEP_S - PADDING_S
+
+
+def _shown(words: Sequence[str]) -> str:
+    return " ".join(words if len(words) <= WORDS_SHOWN else (*words[:4], "...", *words[-3:]))

@@ -25,8 +25,7 @@ from lexicon.ipa import IpaPhone
 from lexicon.languages import check_script, language_code
 from lexicon.phones import PHONES, nearest_phones, phone_distance
 from lexicon.pronounce import Word
-from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.sound.alignment import enforce_increasing
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, enforce_increasing
 from tts2face.sound.voice import (
     PronunciationMap,
     SpeechInput,

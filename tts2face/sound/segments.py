@@ -14,11 +14,10 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from lexicon.sequence import SILENCE
+from lexicon.sequence import SILENCE, enforce_increasing
 from tts2face.models.phone_classifier import PhoneClassifier
 from tts2face.numeric.arrays import ordered_product
 from tts2face.numeric.kernels import kernel
-from tts2face.sound.alignment import enforce_increasing
 from tts2face.types import Waveform
 
 RATE, STEP, WINDOW, TRANSFORM = 16_000, 80, 320, 512  # Hz; samples between frames, of a frame, of its spectrum
@@ -36,6 +35,7 @@ LONGEST_SHARE = 5  # of the longest stated duration
 REACH = 80  # frames around the stated begin, at the usual rate
 USUAL_DURATION_S = 0.08  # of phones; what is stated for slower speech is less exact
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +59,125 @@ class StatedPhone:
     is_marked: bool = False
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Segments:
+    """N segments of which a sound may consist, in the order of time, between J joints.
+
+    Parameters
+    ----------
+    labels : (N,)
+        Columns of the frames' log probabilities.
+    joints : (N, 2)
+        Joints at which each segment begins and ends. The first joint is the begin of the sound, the last one its end.
+    shortest : (N,)
+        Least frames of each segment.
+    passed, taken : (N,)
+        Log probabilities that a segment is missing, and that it is there.
+    durations : (N, D)
+        Log probabilities of durations of 0 to D - 1 frames; there is no limit where the first one is above zero.
+    bounds : (J, 2)
+        Earliest and latest frame of each joint.
+    begins, ends : (N, W)
+        Log probabilities that a segment begins and ends in each frame after the earliest one of its joint.
+    """
+
+    labels: Ints
+    joints: Ints
+    shortest: Ints
+    passed: Floats
+    taken: Floats
+    durations: Floats
+    bounds: Ints
+    begins: Floats
+    ends: Floats
+
+
+def divide(log_probabilities: NDArray[np.floating], segments: Segments) -> list[tuple[int, int, int]]:
+    """The most probable division of a sound: each segment that is there, with its first frame and that after its last.
+
+    Parameters
+    ----------
+    log_probabilities : (T, P)
+        Of labels in each frame.
+
+    Returns
+    -------
+    divisions
+        Empty if there are fewer frames than the segments need.
+    """
+    sums = np.zeros((len(log_probabilities) + 1, log_probabilities.shape[1]))
+    np.cumsum(log_probabilities, axis=0, out=sums[1:])
+    bounds = segments.bounds
+    shape = (len(bounds), int((bounds[:, 1] - bounds[:, 0]).max()) + 1)
+    score, entered, before = np.full(shape, -np.inf), np.full(shape, -1), np.zeros(shape, np.int64)
+    score[0, 0] = 0.0
+    costs = segments.passed, segments.taken, segments.durations, segments.begins, segments.ends
+    _search(sums, (segments.labels, segments.joints, segments.shortest, bounds), costs, (score, entered, before))
+    joint, frame, found = len(bounds) - 1, int(bounds[-1, 1]), []
+    while joint > 0:
+        segment = int(entered[joint, frame - bounds[joint, 0]])
+        if segment < 0:
+            return []
+        begin = int(before[joint, frame - bounds[joint, 0]])
+        if begin < frame:
+            found.append((segment, begin, frame))
+        joint, frame = int(segments.joints[segment, 0]), begin
+    return found[::-1]
+
+
+@kernel
+def _search(sums, segments, costs, found):  # type: ignore[no-untyped-def]
+    """Write the score (J, W) of the best division up to each joint at each frame, its last segment, and its begin."""
+    labels, joints, shortest, bounds = segments
+    passed, taken, durations, begins, ends = costs
+    score, entered, before = found
+    for n in range(len(labels)):
+        label, source, target = labels[n], joints[n, 0], joints[n, 1]
+        (earliest, latest), (low, high) = bounds[source], bounds[target]
+        so_far = score[source, : latest - earliest + 1]
+        starts = so_far + taken[n] + begins[n, : latest - earliest + 1] - sums[earliest : latest + 1, label]
+        if durations[n, 0] > 0.0:
+            reached, begin = _end_unlimited(starts, (earliest, low, high), shortest[n])
+        else:
+            reached, begin = _end_limited(starts, (earliest, low, high), shortest[n], durations[n])
+        for end in range(low, high + 1):
+            at = end - low
+            value, start = reached[at] + sums[end, label] + ends[n, at], begin[at]
+            if earliest <= end <= latest and so_far[end - earliest] + passed[n] > value:
+                value, start = so_far[end - earliest] + passed[n], end
+            if value > score[target, at]:
+                score[target, at], entered[target, at], before[target, at] = value, n, start
+
+
+@kernel
+def _end_limited(starts, frames, shortest, durations):  # type: ignore[no-untyped-def]
+    """Best score of a segment that ends in each frame from `low` to `high`, and its begin, by scores of its begins."""
+    earliest, low, high = frames
+    reached, begin = np.full(high - low + 1, -np.inf), np.zeros(high - low + 1, np.int64)
+    for end in range(low, high + 1):
+        first, last = max(end - len(durations) + 1, earliest), min(end - shortest, earliest + len(starts) - 1)
+        for at in range(first, last + 1):
+            value = starts[at - earliest] + durations[end - at]
+            if value > reached[end - low]:
+                reached[end - low], begin[end - low] = value, at
+    return reached, begin
+
+
+@kernel
+def _end_unlimited(starts, frames, shortest):  # type: ignore[no-untyped-def]
+    """As `_end_limited`, of a segment of any duration."""
+    earliest, low, high = frames
+    reached, begin = np.full(high - low + 1, -np.inf), np.zeros(high - low + 1, np.int64)
+    best, best_at, at = -np.inf, earliest, earliest
+    for end in range(low, high + 1):
+        while at <= min(end - shortest, earliest + len(starts) - 1):
+            if starts[at - earliest] > best:
+                best, best_at = starts[at - earliest], at
+            at += 1
+        reached[end - low], begin[end - low] = best, best_at
+    return reached, begin
+
+
 def find_edges(sound: Waveform, stated: Sequence[StatedPhone], classifier: PhoneClassifier) -> Floats:
     """(N + 1,) begins of N stated phones in seconds, and the end of the sound; a skipped one begins with the next one.
 
@@ -68,68 +187,52 @@ def find_edges(sound: Waveform, stated: Sequence[StatedPhone], classifier: Phone
         The first and the last one are silences.
     """
     probabilities = classifier.log_probabilities(frame_features(sound))[:-1]
-    n_frames, n_stated = len(probabilities), len(stated)
-    sums = np.zeros((n_frames + 1, probabilities.shape[1]))
-    np.cumsum(SCORE_WEIGHT * probabilities, axis=0, out=sums[1:])
-    number = {label: at for at, label in enumerate(classifier.inventory)}
-    labels = np.array([number[one.label] for one in stated])
     begins = np.array([0.0, *(one.begin for one in stated[1:])])
+    found = divide(SCORE_WEIGHT * probabilities, _stated_segments(stated, begins, len(probabilities), classifier))
+    if not found:
+        return enforce_increasing(np.append(begins, sound.duration))
+    edges = np.full(len(stated) + 1, sound.duration)
+    for segment, begin, _ in found:
+        edges[segment] = max((begin - 0.5) * STEP_S, 0.0)
+    for segment in range(len(stated) - 1, 0, -1):
+        if stated[segment].may_be_skipped and segment not in {one for one, *_ in found}:
+            edges[segment] = edges[segment + 1]
+    return edges
+
+
+def _stated_segments(
+    stated: Sequence[StatedPhone], begins: Floats, n_frames: int, classifier: PhoneClassifier
+) -> Segments:
+    """Segments one after another, near the stated begins and durations."""
+    number = {label: at for at, label in enumerate(classifier.inventory)}
     durations = np.array([one.duration for one in stated])
+    is_silence = np.array([one.label == SILENCE for one in stated])
     slowness = max(1.0, float(durations[durations > 0].mean()) / USUAL_DURATION_S)
     reach = round(REACH * slowness)
     frames = np.clip(np.round(begins / STEP_S).astype(np.int64), 0, n_frames)
     bounds = np.stack([np.maximum(frames - reach, 0), np.minimum(frames + reach, n_frames)], axis=1)
-    bounds[0] = 0
-    score, before = (np.full((n_stated + 1, n_frames + 1), value) for value in (-np.inf, 0))
-    score[0, 0] = 0.0
-    is_silence = np.array([one.label == SILENCE for one in stated])
-    costs = (*_costs(stated, durations, is_silence), BEGIN_SPREAD_S * slowness / STEP_S)
-    _search(sums, (labels, is_silence, frames, bounds), costs, (score, before))
-    if not np.isfinite(score[-1, -1]):  # fewer frames than phones need
-        return enforce_increasing(np.append(begins, sound.duration))
-    edges, at = np.full(n_stated + 1, sound.duration), n_frames
-    for n in range(n_stated - 1, -1, -1):
-        at = int(before[n + 1, at])
-        edges[n] = max((at - 0.5) * STEP_S, 0.0)
-    return edges
-
-
-def _costs(
-    stated: Sequence[StatedPhone], durations: Floats, is_silence: NDArray[np.bool_]
-) -> tuple[Floats, Floats, NDArray[np.int64]]:
-    """Log probabilities (N, D) of durations in frames, that of being (N, 2) skipped and not, and least frames (N,)."""
+    bounds = np.concatenate([[[0, 0]], bounds[1:], [[n_frames, n_frames]]])
     expected = np.maximum(durations, STEP_S)
     seconds = np.maximum(np.arange(round(LONGEST_SHARE * expected.max() / STEP_S) + 1), 1) * STEP_S
     likely = -0.5 * np.square(np.log(seconds / expected[:, None]) / DURATION_SPREAD)
-    skipped = [
-        [0.0, 0.0 if one.is_marked else UNMARKED_PAUSE] if one.may_be_skipped else [-np.inf, 0.0] for one in stated
-    ]
+    likely[is_silence, 0] = 1.0
+    times = bounds[:-1, :1] + np.arange((bounds[:, 1] - bounds[:, 0]).max() + 1)
+    apart = (times - frames[:, None]) / (BEGIN_SPREAD_S * slowness / STEP_S)
+    near = np.where(is_silence[:, None], 0.0, -np.log1p(0.5 * apart * apart))
     shortest = np.where(is_silence, SHORTEST_SILENCE, SHORTEST)
     shortest[[0, -1]] = 1
-    return likely, np.array(skipped), shortest
-
-
-@kernel
-def _search(sums, stated, costs, found):  # type: ignore[no-untyped-def]
-    """Write the score (N + 1, T + 1) of the best division of the first t frames into n segments, and where n begins."""
-    labels, is_silence, frames, bounds = stated
-    durations, skipped, shortest, spread = costs
-    score, before = found
-    n_frames, longest = sums.shape[0] - 1, durations.shape[1] - 1
-    for n in range(len(labels)):
-        label = labels[n]
-        for begin in range(bounds[n, 0], bounds[n, 1] + 1):
-            if score[n, begin] == -np.inf:
-                continue
-            distance = 0.0 if is_silence[n] else (begin - frames[n]) / spread
-            entered = score[n, begin] + skipped[n, 1] - np.log1p(0.5 * distance * distance) - sums[begin, label]
-            last = n_frames if is_silence[n] else min(begin + longest, n_frames)
-            for end in range(begin + shortest[n], last + 1):
-                reached = entered + sums[end, label] + (0.0 if is_silence[n] else durations[n, end - begin])
-                if reached > score[n + 1, end]:
-                    score[n + 1, end], before[n + 1, end] = reached, begin
-            if score[n, begin] + skipped[n, 0] > score[n + 1, begin]:
-                score[n + 1, begin], before[n + 1, begin] = score[n, begin] + skipped[n, 0], begin
+    numbers = np.arange(len(stated))
+    return Segments(
+        np.array([number[one.label] for one in stated]),
+        np.stack([numbers, numbers + 1], axis=1),
+        shortest,
+        np.array([0.0 if one.may_be_skipped else -np.inf for one in stated]),
+        np.array([UNMARKED_PAUSE if one.may_be_skipped and not one.is_marked else 0.0 for one in stated]),
+        likely,
+        bounds,
+        near,
+        np.zeros_like(near),
+    )
 
 
 def frame_features(sound: Waveform) -> NDArray[np.float32]:

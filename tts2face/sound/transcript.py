@@ -4,14 +4,9 @@ Assignment of the words of a long text to the parts of a long recording.
 
 Recognised phones and phones of the text are matched by least edit distance (Wagner and Fischer 1974) within a band, so
 that an hour of speech takes seconds and little memory.
-
-Detection of words that a recording does not contain, by the log likelihoods of their forced alignment.
-
-Forced alignment assigns times to all words of a text, whether the recording contains them or not.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
@@ -20,9 +15,9 @@ from numpy.typing import NDArray
 from lexicon.dictionary import Dictionary, cmudict_lookup
 from lexicon.errors import DataError, InputError
 from lexicon.pronounce import Word, pronounce
-from lexicon.sequence import PhoneSequence, WordSpan, concatenate_phones
+from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.numeric.kernels import kernel
-from tts2face.sound.alignment import Aligner, Alignment
+from tts2face.sound.alignment import Aligner, TextMismatch, join_alignments, unwritten_part
 from tts2face.sound.pauses import cut_at_pauses, cut_sound
 from tts2face.types import Waveform
 
@@ -125,106 +120,6 @@ def _trace_back(steps: NDArray[np.uint8], m: int, band: int) -> NDArray[np.int64
     return partner
 
 
-LEAST_CONFIDENCE = -6500.0  # log likelihood per second of a whole utterance; docs/decisions/056-text-mismatch.md
-CONTEXT_S = 1.5  # context on either side of a span that is aligned a second time
-WINDOW_S = 1.0  # speech that is scored together, two to four words; scores of single words scatter 1.5 times as much
-# Log likelihood per second in the window; measured in docs/decisions/056-text-mismatch.md.
-LEAST_LOCAL_CONFIDENCE = -7000.0
-LEAST_FOREIGN_CONFIDENCE = -9000.0  # the acoustic model is English: correct texts of other languages reach -8200
-LONGEST_GAP_S = 1.0  # spans with a smaller gap are merged
-
-
-@dataclass(frozen=True, slots=True)
-class TextMismatch:
-    """Words that a recording probably does not contain, and the times in seconds to which they were aligned."""
-
-    begin: float
-    end: float
-    words: tuple[str, ...]
-    confidence: float
-
-    @property
-    def sentence(self) -> str:
-        """Warning for the user, one line."""
-        shown = " ".join(self.words if len(self.words) <= 8 else (*self.words[:4], "...", *self.words[-3:]))
-        return (
-            f"the text does not fit the recording from {self.begin:.1f} to {self.end:.1f} s ({shown}); check the words"
-        )
-
-    def shift(self, seconds: float) -> "TextMismatch":
-        """The same mismatch, later by `seconds`."""
-        return replace(self, begin=self.begin + seconds, end=self.end + seconds)
-
-
-def find_misfits(alignment: Alignment, *, is_english: bool) -> list[tuple[int, int]]:
-    """Half-open ranges of words whose log likelihood lies below that of correct texts."""
-    least = LEAST_LOCAL_CONFIDENCE if is_english else LEAST_FOREIGN_CONFIDENCE
-    edges, words, sums = alignment.phones.edges, alignment.words, _sums(alignment)
-    misfits: list[tuple[int, int]] = []
-    for first, last in _windows(sums):
-        seconds, score = sums[first:last].sum(axis=0)
-        if score / seconds >= least:
-            continue
-        if misfits and edges[words[first].first] - edges[words[misfits[-1][1] - 1].last] < LONGEST_GAP_S:
-            misfits[-1] = (misfits[-1][0], max(last, misfits[-1][1]))
-        else:
-            misfits.append((first, last))
-    fits = [bool(score / seconds >= least) for seconds, score in sums]
-    return [_trim_range(fits, *misfit) for misfit in misfits]
-
-
-def _trim_range(fits: Sequence[bool], first: int, last: int) -> tuple[int, int]:
-    """Remove words at the ends of a range that fit on their own, since windows reach beyond the wrong words."""
-    while last - first > 1 and fits[first]:
-        first += 1
-    while last - first > 1 and fits[last - 1]:
-        last -= 1
-    return first, last
-
-
-def mismatch_of(alignment: Alignment, first: int, last: int) -> TextMismatch:
-    """Mismatch of a range of an alignment's words; times are those of the alignment."""
-    edges, words, sums = alignment.phones.edges, alignment.words[first:last], _sums(alignment)[first:last]
-    begin, end = float(edges[words[0].first]), float(edges[words[-1].last])
-    return TextMismatch(begin, end, tuple(word.text for word in words), float(sums[:, 1].sum() / sums[:, 0].sum()))
-
-
-def extend_range(alignment: Alignment, first: int, last: int) -> tuple[int, int, float, float]:
-    """Extend a range of words by all words within `CONTEXT_S`; returns first, last, start and end in seconds."""
-    edges, words = alignment.phones.edges, alignment.words
-    begin, end = edges[words[first].first] - CONTEXT_S, edges[words[last - 1].last] + CONTEXT_S
-    while first > 0 and edges[words[first - 1].first] >= begin:
-        first -= 1
-    while last < len(words) and edges[words[last].last] <= end:
-        last += 1
-    before = edges[words[first - 1].last] if first > 0 else alignment.phones.start
-    behind = edges[words[last].first] if last < len(words) else alignment.phones.end
-    return first, last, float(edges[words[first].first] + before) / 2, float(edges[words[last - 1].last] + behind) / 2
-
-
-def _sums(alignment: Alignment) -> NDArray[np.float64]:
-    """(W, 2) seconds and log likelihood of each word."""
-    lengths, scores = np.diff(alignment.phones.edges), alignment.scores
-    sums = [[lengths[word.first : word.last].sum(), scores[word.first : word.last].sum()] for word in alignment.words]
-    return np.array(sums).reshape(-1, 2)
-
-
-def _windows(sums: NDArray[np.float64]) -> list[tuple[int, int]]:
-    """For each word the range of words around it that lasts `WINDOW_S`, or all words; grows at the nearer side."""
-    ends = np.concatenate([[0.0], np.cumsum(sums[:, 0])])
-    ranges = []
-    for at in range(len(sums)):
-        first, last = at, at + 1
-        while ends[last] - ends[first] < WINDOW_S and last - first < len(sums):
-            is_before_nearer = ends[at] - ends[first] <= ends[last] - ends[at + 1]
-            if last == len(sums) or (first > 0 and is_before_nearer):
-                first -= 1
-            else:
-                last += 1
-        ranges.append((first, last))
-    return ranges
-
-
 Pronunciations = tuple[tuple[str, ...], ...]  # alternative pronunciations of one word
 PronouncedTranscript = tuple[tuple[str, Pronunciations], ...]
 
@@ -264,7 +159,7 @@ def _pronunciations(word: Word, language: str, own: Dictionary | None) -> Pronun
 
 
 def align_recording(
-    sound: Waveform, words: PronouncedTranscript, *, is_english: bool = True
+    sound: Waveform, words: PronouncedTranscript
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...], tuple[TextMismatch, ...]]:
     """Align words with a sound of any length.
 
@@ -273,74 +168,49 @@ def align_recording(
     phones
         Phones from 0 s to the end of the sound.
     words
-        One span of phones for each word.
+        Spans of phones of the words that are said.
     mismatches
-        Words that the sound probably does not contain.
+        Words that the sound probably does not contain, and speech that is not in the text.
 
     Raises
     ------
     DataError
         The sound does not contain these words.
     BackendError
-        The sound is longer than `MAX_ALIGNED_S` and the phone recogniser, which assigns words to its parts, is not
-        installed.
+        The phone recogniser does not run on this machine.
     """
     aligner = Aligner()
     if sound.duration <= MAX_ALIGNED_S:
-        found = aligner.align(sound, words)
-        return found.phones, found.words, _mismatches(aligner, sound, words, found, is_english=is_english)
+        found = aligner.align(sound, words, may_lack=True)
+        found.check()
+        return found.phones, found.words, found.mismatches
     parts = [cut_sound(sound, span) for span in cut_at_pauses(sound, MAX_STRETCH_S)]
-    phones: list[PhoneSequence] = []
-    spans: list[tuple[WordSpan, ...]] = []
-    mismatches: list[TextMismatch] = []
-    begin = 0.0
-    for part, part_words in zip(parts, _words_by_part(parts, words), strict=True):
-        if part_words:
-            found = aligner.align(part, part_words)
-            phones.append(found.phones)
-            spans.append(found.words)
-            part_mismatches = _mismatches(aligner, part, part_words, found, is_english=is_english)
-            mismatches += [mismatch.shift(begin) for mismatch in part_mismatches]
-        else:
-            phones.append(PhoneSequence(["sil"], [0.0, part.duration]))
-            spans.append(())
-        begin += part.duration
-    return *concatenate_phones(phones, spans), tuple(mismatches)
-
-
-def _mismatches(
-    aligner: Aligner, sound: Waveform, words: PronouncedTranscript, alignment: Alignment, *, is_english: bool
-) -> tuple[TextMismatch, ...]:
-    """Mismatches of an alignment, each confirmed by a second alignment of the span and its context.
-
-    The acoustic model normalises by the mean of its input, so that pauses lower all scores of a long recording; they
-    affect a short excerpt less.
-    """
-    confirmed: list[TextMismatch] = []
-    last_end = 0.0  # end of the last confirmed span
-    for misfit in find_misfits(alignment, is_english=is_english):
-        first, last, begin, end = extend_range(alignment, *misfit)
-        if last - first == len(words):  # the excerpt would be the whole recording
-            return (mismatch_of(alignment, *misfit),)
-        try:
-            excerpt = aligner.align(cut_sound(sound, (begin, end)), words[first:last])
-        except DataError:  # the excerpt does not contain the words
-            mismatches = [mismatch_of(alignment, *misfit)]
-        else:
-            misfits = find_misfits(excerpt, is_english=is_english)
-            mismatches = [mismatch_of(excerpt, *span).shift(begin) for span in misfits]
-        confirmed += [mismatch for mismatch in mismatches if mismatch.begin >= last_end]
-        last_end = max([last_end, *(mismatch.end for mismatch in mismatches)])
-    return tuple(confirmed)
-
-
-def _words_by_part(parts: Sequence[Waveform], words: PronouncedTranscript) -> list[PronouncedTranscript]:
-    """Words of each part, assigned by phone recognition."""
-    from tts2face.sound.listener import PhoneRecogniser
-
-    recogniser = PhoneRecogniser()
-    recognised = [[phone for word in recogniser.words(part) for phone in word] for part in parts]
+    recognised = [[phone for word in aligner.recogniser.hear(part).words() for phone in word] for part in parts]
     if not any(recognised):
         raise DataError("the recording contains no speech; give another recording")
     places = assign_words([alternatives[0] for _, alternatives in words], recognised)
-    return [tuple(word for word, place in zip(words, places, strict=True) if place == at) for at in range(len(parts))]
+    aligned = []
+    for at, part in enumerate(parts):
+        said = [word for word, place in zip(words, places, strict=True) if place == at]
+        aligned.append(aligner.align(part, said, may_lack=True) if said else unwritten_part(part, len(recognised[at])))
+    joined = join_alignments(aligned)
+    joined.check()
+    return joined.phones, joined.words, joined.mismatches
+
+
+def recognise_phones(sound: Waveform) -> PhoneSequence:
+    """Phones that are heard in a sound of any length, from 0 s to its end.
+
+    Raises
+    ------
+    BackendError
+        The phone recogniser does not run on this machine.
+    """
+    aligner, found = Aligner(), []
+    for span in cut_at_pauses(sound, MAX_STRETCH_S):
+        part = cut_sound(sound, span)
+        try:
+            found.append(aligner.align(part, None))
+        except DataError:  # nobody speaks
+            found.append(unwritten_part(part, 0))
+    return join_alignments(found).phones

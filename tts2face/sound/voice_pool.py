@@ -6,7 +6,7 @@ Choice and loading of a voice by name and language: those of tts2face, of other 
 import importlib.util
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,8 +16,9 @@ from types import MappingProxyType
 from lexicon.errors import BackendError, InputError
 from lexicon.languages import language_code
 from tts2face.plugins import VOICES, declared, load_plugin
-from tts2face.sound.alignment import SpeechAligner
+from tts2face.sound.alignment import Aligner, Alignment, SpeechAligner
 from tts2face.sound.voice import NativeRun, PronunciationMap, SpeechInput, Voice, VoiceInfo, VoiceSetting
+from tts2face.sound.word_lattice import Pronunciations
 from tts2face.types import Speech, Waveform
 
 ENGLISH_CODES = ("en", "en-us", "en-gb")
@@ -168,15 +169,13 @@ class VoicePool:
 
     Parameters
     ----------
-    aligner
-        Thread-safe aligner of all voices, during whose work other requests may use the same voice: they take turns, and
-        only this wait, and runs of models, lie within a call. None: each voice has its own.
     run
-        Runs the models of voices.
+        Runs the models of voices and their aligner, during which other requests have their turns and may use the same
+        voice.
     """
 
-    def __init__(self, aligner: SpeechAligner | None = None, run: NativeRun | None = None) -> None:
-        self._aligner, self._native_run = aligner, run
+    def __init__(self, run: NativeRun | None = None) -> None:
+        self._aligner, self._native_run = None if run is None else _SharedAligner(Aligner(), run), run
         self._lock = threading.Lock()
         self._unused: list[tuple[Hashable, Voice]] = []  # the newest at the end
         self._kept: OrderedDict[Hashable, Speech] = OrderedDict()
@@ -261,6 +260,18 @@ class VoicePool:
 
 def _nothing() -> None:
     pass
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _SharedAligner:
+    """Aligner of all voices of a pool, which take turns."""
+
+    aligner: Aligner
+    run: NativeRun
+
+    def align(self, sound: Waveform, words: Sequence[tuple[str, Pronunciations]]) -> Alignment:
+        found: Alignment = self.run(lambda: self.aligner.align(sound, words), _nothing)
+        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,12 +9,14 @@ Results of an evaluation on test people as Markdown tables and as rows for a CSV
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.recordings.observation import Observation
+from corpus_tools.studies.evaluation.heard import heard_phones, mapped_motion
 from corpus_tools.studies.evaluation.methods import SynthesisMethod, build_methods
 from corpus_tools.studies.evaluation.reference import LipCurves, ReferenceUtterance
 from corpus_tools.studies.evaluation.scores import IntervalEstimate, PairedCurves, estimate, estimate_difference
@@ -28,7 +30,7 @@ from tts2face.models.networks import PhoneNetwork
 from tts2face.models.talker import ShapeModel, Talker
 
 FIGURE_HEADS = (("r_opening", "r opening"), ("r_width", "r width"), ("dtw_cost", "DTW cost"))
-NETWORKS_METHOD, TRACKS_METHOD = "networks alone", "tracks"
+DEFAULT_METHOD, NETWORKS_METHOD, TRACKS_METHOD = "exemplar", "networks alone", "tracks"
 Floats = NDArray[np.float64]
 
 
@@ -117,11 +119,15 @@ class PeopleEvaluation:
 
 
 def evaluate_people(
-    talker: Talker, people: Sequence[Sequence[Observation]], tracks: Mapping[str, ExternalTrack] | None = None
+    talker: Talker,
+    people: Sequence[Sequence[Observation]],
+    tracks: Mapping[str, ExternalTrack] | None = None,
+    sounds: Mapping[str, Path] | None = None,
 ) -> PeopleEvaluation:
-    """Figures of a finished talker's methods, and of external tracks, on test people.
+    """Figures of a finished talker's methods, of external tracks, and of what is heard in sounds, on test people.
 
-    Tracks are mapped to the talker's parameters by a regression on those of its own utterances that they hold.
+    Tracks are mapped to the talker's parameters by a regression on those of its own utterances that they hold. Of the
+    sounds, by the utterances' names, lips are made with their words and without.
 
     Raises
     ------
@@ -139,8 +145,28 @@ def evaluate_people(
         real = [ReferenceUtterance.of(one.observation, talker.model) for one in tests]
         mapped = iter(map_tracks(tracks, talker, real))
         curves |= synthesise_people(talker, {TRACKS_METHOD: lambda *_: next(mapped)}, tests)
+    if sounds is not None:
+        curves |= _heard_curves(talker, methods[DEFAULT_METHOD], tests, sounds)
     heard = {label for one in talker.utterances for label in one.phones.phones}
     return replace(compare_people(tests, curves, n_people=len(people), heard=heard), warnings=warnings)
+
+
+def _heard_curves(
+    talker: Talker, method: SynthesisMethod, tests: Sequence[TestUtterance], sounds: Mapping[str, Path]
+) -> dict[str, tuple[Floats, ...]]:
+    """Curves of the default on phones that are found in the sounds, and of the audio maps."""
+    seen = [one.observation for one in tests]
+    curves: dict[str, tuple[Floats, ...]] = {}
+    for name, phones in heard_phones(seen, sounds).items():
+        spoken = [
+            replace(one, observation=replace(one.observation, phones=found))
+            for one, found in zip(tests, phones, strict=True)
+        ]
+        curves |= synthesise_people(talker, {name: method}, spoken)
+    for name in talker.audio_maps:
+        mapped = iter(mapped_motion(talker, name, seen, sounds))
+        curves |= synthesise_people(talker, {f"audio map {name}": lambda *_, mapped=mapped: next(mapped)}, tests)
+    return curves
 
 
 def _networks_method(network: PhoneNetwork) -> SynthesisMethod:

@@ -110,7 +110,7 @@ def map_tracks(
 TRACK_SUFFIX = ".npz"
 SILENCE_NAMES = frozenset({"sil", "SIL", SILENCE})
 ARRAYS = ("landmarks", "fps", "phones", "edges")  # required; head, words with word_first and word_last, intensity
-TRACKED = Quality(confidence=0.0, score=1.0, n_filled=0, cut=0.0)  # tracks carry no measures of their recording
+TRACKED = Quality(fit=1.0, score=1.0, n_filled=0, cut=0.0)  # tracks carry no measures of their recording
 
 
 def read_person(folder: Path) -> tuple[Observation, ...]:
@@ -224,7 +224,7 @@ def _build_observation(
         phones,
         words,
         intensity(speech.sound, np.arange(len(landmarks)) / fps),
-        Quality(speech.confidence, 1.0, 0, cut=span[0]),
+        Quality(speech.fit, 1.0, 0, cut=span[0]),
         sound,
         is_recognised=True,
     )

@@ -87,7 +87,6 @@ def test_landmarks_of_a_face_are_its_own_at_rest_and_follow_its_shapes() -> None
 
 def test_a_capture_closes_its_lips_at_recognised_bilabials(shared_recordings: Path, tmp_path: Path) -> None:
     capture = shared_recordings / "livelink" / "testset_arkit61_60fps.csv"
-    pytest.importorskip("hama", reason="needs the extra [capture]")
     found = observe_livelink(capture, RunOptions(tmp_path))
     assert len(found) >= 4
     assert all(one.fps == 60.0 and one.is_recognised for one in found)

@@ -120,7 +120,7 @@ def test_the_command_says_what_is_wrong_and_builds_nothing(
     assert sorted(path for path in tmp_path.iterdir() if path.name != "cache") == before
     findings = check_recording(dark, "My elephants remembered nothing.", run_options=RunOptions(tmp_path / "cache", 1))
     assert findings[0].severity == REFUSAL
-    assert {"confidence", "unusable"} & {finding.code for finding in findings}
+    assert {"fit", "unusable"} & {finding.code for finding in findings}
 
 
 def test_a_text_for_a_folder_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

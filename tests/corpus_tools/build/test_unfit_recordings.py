@@ -16,7 +16,7 @@ REASONS = {
     "frozen": "the picture is frozen for",
     "noisy": "dB above the noise, limit 6 dB",
     "away": "no face is visible",
-    "wrong": "check the transcript",
+    "wrong": "does not match the transcript",
     "dark": "no frame shows a face",
 }
 

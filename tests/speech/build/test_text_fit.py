@@ -7,18 +7,8 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError
-from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.sound.alignment import Alignment
-from tts2face.sound.transcript import (
-    LEAST_FOREIGN_CONFIDENCE,
-    LEAST_LOCAL_CONFIDENCE,
-    TextMismatch,
-    align_recording,
-    extend_range,
-    find_misfits,
-    mismatch_of,
-    pronounce_transcript,
-)
+from tts2face.sound.alignment import TextMismatch
+from tts2face.sound.transcript import align_recording, pronounce_transcript
 from tts2face.sound.voice_pool import load_voice
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
@@ -30,52 +20,13 @@ WRONG = (
     "Children like to jump over puddles.",
     "The judge read the letter twice.",
 )
-WORD_S = 0.4
-
-
-def alignment(*confidences: float) -> Alignment:
-    """Words of 0.4 s with a silence of 0.1 s after each, and their log likelihoods per second."""
-    phones = [phone for _ in confidences for phone in ("a", SILENCE)]
-    edges = np.concatenate([[0.0], np.cumsum([WORD_S, 0.1] * len(confidences))])
-    words = tuple(WordSpan(f"w{at}", 2 * at, 2 * at + 1) for at in range(len(confidences)))
-    scores = np.array([score for value in confidences for score in (value * WORD_S, 0.0)])
-    return Alignment(PhoneSequence(phones, edges), words, float(np.mean(confidences)), scores)
-
-
-@pytest.mark.smoke
-def test_consecutive_words_with_low_likelihood_are_found() -> None:
-    found = alignment(*[-4000.0] * 6, *[-11000.0] * 4, *[-4000.0] * 6)
-    (misfit,) = find_misfits(found, is_english=True)
-    assert misfit == (6, 10)
-    mismatch = mismatch_of(found, *misfit)
-    assert mismatch.words == ("w6", "w7", "w8", "w9")
-    assert (mismatch.begin, mismatch.end, mismatch.confidence) == pytest.approx((3.0, 4.9, -11000.0))
-
-
-@pytest.mark.smoke
-def test_a_single_word_is_not_enough() -> None:
-    assert find_misfits(alignment(*[-3000.0] * 4, -9000.0, *[-3000.0] * 4), is_english=True) == []
-
-
-@pytest.mark.smoke
-def test_other_languages_have_another_limit() -> None:
-    found = alignment(*[(LEAST_LOCAL_CONFIDENCE + LEAST_FOREIGN_CONFIDENCE) / 2] * 5)
-    assert find_misfits(found, is_english=True) == [(0, 5)]
-    assert find_misfits(found, is_english=False) == []
-
-
-@pytest.mark.smoke
-def test_what_surrounds_a_span_is_cut_between_words() -> None:
-    first, last, begin, end = extend_range(alignment(*[-4000.0] * 20), 8, 10)
-    assert (first, last) == (5, 13)
-    assert (begin, end) == pytest.approx((2.45, 6.45))
 
 
 @pytest.mark.smoke
 def test_a_mismatch_has_its_time_and_words() -> None:
-    mismatch = TextMismatch(1.0, 2.5, ("one", "two"), -9000.0).shift(2.0)
+    mismatch = TextMismatch(1.0, 2.5, ("one", "two")).shift(2.0)
     assert mismatch.sentence == ("the text does not fit the recording from 3.0 to 4.5 s (one two); check the words")
-    long = TextMismatch(0.0, 9.0, tuple("abcdefghij"), -9000.0)
+    long = TextMismatch(0.0, 9.0, tuple("abcdefghij"))
     assert "(a b c d ... h i j)" in long.sentence
 
 
@@ -83,11 +34,8 @@ def test_a_mismatch_has_its_time_and_words() -> None:
 def test_another_text_for_the_project_s_own_voice() -> None:
     speech = load_voice("heart", "en-us").speak(RIGHT[1])
     assert align_recording(speech.waveform, pronounce_transcript(RIGHT[1], "en-us"))[2] == ()
-    (mismatch,) = align_recording(
-        speech.waveform, pronounce_transcript("Please wait for the beep, then say your name.", "en-us")
-    )[2]
-    assert len(mismatch.words) >= 6
-    assert mismatch.end - mismatch.begin > 1.0
+    with pytest.raises(DataError, match=r"the recording does not contain this text: \d+% .*wait.*; check the words"):
+        align_recording(speech.waveform, pronounce_transcript(RIGHT[0], "en-us"))
 
 
 def test_wrong_sentences_among_right_ones() -> None:
@@ -104,7 +52,7 @@ def test_wrong_sentences_among_right_ones() -> None:
             found = align_recording(sound, pronounce_transcript(text, "en-us"))[2]
             assert all(one.begin < begin + sounds[at].duration and one.end > begin for one in found)
             n_found += bool({word for one in found for word in one.words} & set(wrong.rstrip(".").split()))
-    assert n_found >= 6  # of 8
+    assert n_found == 8
 
 
 @pytest.mark.parametrize("n_sentences", [1, 6])
@@ -124,6 +72,6 @@ def test_real_recordings(n_sentences: int, shared_recordings: Path) -> None:
     try:
         found = align_recording(sound, pronounce_transcript(". ".join(texts), "en-us"))[2]
     except DataError:
-        assert n_sentences == 1  # the words are not found at all
+        assert n_sentences == 1
     else:
         assert any("usually" in one.words and begin - 1.5 < one.begin and one.end < end + 1.5 for one in found)

@@ -7,6 +7,7 @@ The sound of a clip as a 16-bit .wav file.
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -98,7 +99,9 @@ def _tier(number: int, name: str, intervals: Sequence[Interval]) -> Iterator[str
 
 
 def textgrid(phones: "PhoneSequence", words: Sequence["WordSpan"], *, note: str = "") -> str:
-    """Praat TextGrid with the tiers ``words`` and ``phones``, and ``note`` if a note is given; to be saved as UTF-8.
+    """Praat TextGrid with the tiers ``words`` and ``phones``; to be saved as UTF-8.
+
+    A tier ``confidence`` tells how probably the words of a recording are said, a tier ``note`` holds a given note.
 
     Raises
     ------
@@ -109,6 +112,9 @@ def textgrid(phones: "PhoneSequence", words: Sequence["WordSpan"], *, note: str 
         (float(phones.edges[at]), float(phones.edges[at + 1]), label) for at, label in enumerate(phones.phones)
     ]
     tiers = [("words", list(_word_intervals(phones, words))), ("phones", intervals)]
+    if any(word.confidence < 1.0 for word in words):
+        sure = [replace(word, text=f"{word.confidence:.2f}") for word in words]
+        tiers.append(("confidence", list(_word_intervals(phones, sure))))
     if note:
         tiers.append(("note", [(phones.start, phones.end, note)]))
     lines = ['File type = "ooTextFile"', 'Object class = "TextGrid"', "", f"xmin = {phones.start!r}"]
@@ -138,7 +144,7 @@ class TextGridWriter:
         for word in self._labels.words:
             first = sequence.index_at(word.start + sequence.durations.min() / 4)
             last = sequence.index_at(word.end - sequence.durations.min() / 4) + 1
-            words.append(WordSpan(word.text, first, last))
+            words.append(WordSpan(word.text, first, last, word.confidence))
         self._path.write_text(textgrid(sequence, words), encoding="utf-8", newline="\n")
 
     def close(self) -> None:

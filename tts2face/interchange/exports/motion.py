@@ -114,6 +114,7 @@ class NpzWriter:
             "phones": np.array([phone.text for phone in phones], dtype=str),
             "phone_edges": np.array([phone.start for phone in phones] + [self._labels.duration], np.float64),
             "words": np.array([word.text for word in words], dtype=str),
+            "word_confidence": np.array([word.confidence for word in words], np.float64),
             "word_times": np.array([(word.start, word.end) for word in words], np.float64).reshape(-1, 2),
         }
 

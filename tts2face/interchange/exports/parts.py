@@ -167,11 +167,12 @@ def frame_rows(values: Float32Array, decimals: str) -> Iterator[str]:
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A phone or word from `start` to `end`, in seconds of the whole."""
+    """A phone or word from `start` to `end`, in seconds of the whole, and the probability that it is said there."""
 
     text: str
     start: float
     end: float
+    confidence: float = 1.0
 
 
 @dataclass(slots=True)
@@ -220,7 +221,7 @@ def part_words(part: Part) -> list[Label]:
         return []
     edges = part.clip.speech.phones.edges
     return [
-        Label(word.text, part.begin + float(edges[word.first]), part.begin + float(edges[word.last]))
+        Label(word.text, part.begin + float(edges[word.first]), part.begin + float(edges[word.last]), word.confidence)
         for word in part.clip.speech.words
     ]
 

@@ -82,7 +82,7 @@ class TrackWriter:
         labels = {
             "phones": list(speech.phones.phones),
             "edges": speech.phones.edges.tolist(),
-            "words": [[word.text, word.first, word.last] for word in speech.words],
+            "words": [[word.text, word.first, word.last, word.confidence] for word in speech.words],
             "text": text,
         }
         self._file.write(f"], {json.dumps(labels, ensure_ascii=False)[1:-1]}, ")
@@ -196,9 +196,12 @@ def _parse_piece(piece: Any, header: Mapping[str, Any], name: str) -> TrackPiece
         raise DataError(f"{name}: {wrong}; export the track again") from wrong
 
 
-def _word(text: Any, first: Any, last: Any) -> WordSpan:
+def _word(text: Any, first: Any, last: Any, confidence: Any = 1.0) -> WordSpan:
     return WordSpan(
-        check_type("a word", text, str), *(check_type("a phone of a word", at, int) for at in (first, last))
+        check_type("a word", text, str),
+        check_type("a phone of a word", first, int),
+        check_type("a phone of a word", last, int),
+        check_type("the confidence of a word", confidence, float),
     )
 
 

@@ -79,7 +79,7 @@ def result_from_json(content: Mapping[str, Any]) -> SegmentResult:
 
 
 SEGMENT_FORMAT = 3  # raised when equal requests give other segments
-VOICE_PACKAGES = ("hibari-tts", "onnxruntime", "espeakng-loader", "piper-tts", "pocketsphinx", "pyopenjtalk-plus", "av")
+VOICE_PACKAGES = ("hibari-tts", "onnxruntime", "espeakng-loader", "piper-tts", "hama", "pyopenjtalk-plus", "av")
 
 
 def content_address(content: Mapping[str, Any]) -> str:

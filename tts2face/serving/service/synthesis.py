@@ -15,7 +15,6 @@ from tts2face.picture.pace import Pace
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.program import Program
 from tts2face.request import Request
-from tts2face.serving.service.aligner import RemoteAligner
 from tts2face.serving.service.live import listen, live
 from tts2face.serving.service.logs import configure_logs, log_event
 from tts2face.serving.service.messages import (
@@ -154,7 +153,7 @@ def handlers(
     """
     configure_logs(log_format, with_text=log_text)
     sessions = SessionCache(
-        n_sessions, voices=VoicePool(RemoteAligner(), OneAtATime()), max_bytes=memory_mb * 1_000_000 or None,
+        n_sessions, voices=VoicePool(OneAtATime()), max_bytes=memory_mb * 1_000_000 or None,
         memory_mb=sentences_mb,
     )  # fmt: skip
     known = dict(TASKS)

@@ -195,7 +195,10 @@ def _timing(preview: Preview) -> dict[str, Any]:
                     zip(timed["phones"], timed["edges"], timed["edges"][1:], strict=False)
                 )
             ]
-        words += [[text, round(begin + a, 6), round(begin + b, 6), len(sentences) - 1] for text, a, b in piece["words"]]
+        words += [
+            [text, round(begin + a, 6), round(begin + b, 6), len(sentences) - 1, is_doubtful]
+            for text, a, b, is_doubtful in piece["words"]
+        ]
     return {"words": words, "phones": phones, "sentences": sentences}
 
 

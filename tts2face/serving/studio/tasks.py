@@ -106,7 +106,10 @@ def _timing(piece: "Piece") -> dict[str, Any]:
     edges = phones.edges
     return {
         **_phones(phones),
-        "words": [[word.text, round(float(edges[word.first]), 6), round(float(edges[word.last]), 6)] for word in words],
+        "words": [
+            [word.text, round(float(edges[word.first]), 6), round(float(edges[word.last]), 6), word.is_doubtful]
+            for word in words
+        ],
     }
 
 

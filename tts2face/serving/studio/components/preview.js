@@ -12,7 +12,7 @@ export class Preview {
   pcm = new Int16Array(0);
   rate = 24000;
   duration = 0;
-  words = []; // [text, begin, end, sentence]
+  words = []; // [text, begin, end, sentence, is doubtful]
   phones = []; // [label, begin, end, sentence, index]
   sentences = []; // [text, occurrence, begin, end]
   notes = [];

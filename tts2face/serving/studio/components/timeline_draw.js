@@ -96,13 +96,14 @@ export class Painter {
   #labels(row, items) {
     const { context: c } = this, { view, colors } = this.state, middle = row.y + row.height / 2;
     for (let i = firstAfter(items, view.start, (item) => item[2]); i < items.length && items[i][1] < view.end; i++) {
-      const [text, begin, end] = items[i], x = view.x(begin), width = view.x(end) - x;
+      const [text, begin, end] = items[i], x = view.x(begin), width = view.x(end) - x, isDoubtful = row.id === "words" && items[i][4];
       if (width < 1.5) continue;
       c.fillStyle = colors.line;
       c.fillRect(Math.round(x), row.y + 2, 1, row.height - 5);
       c.fillRect(Math.round(x + width), row.y + 2, 1, row.height - 5);
       c.fillStyle = row.id === "words" ? colors.text : colors.quiet;
-      if (width > 9) this.#text(text, x + 4, middle, width - 6);
+      if (width > 9) this.#text(isDoubtful ? `${text}?` : text, x + 4, middle, width - 6);
+      if (isDoubtful) c.fillRect(Math.round(x) + 3, row.y + row.height - 4, Math.max(1, width - 5), 1);
     }
   }
 

@@ -9,7 +9,7 @@ const HIT_PX = 6;
 export function rowItems(row, state) {
   const { model, preview, chosen } = state;
   const make = {
-    words: () => preview.words.map(([text, begin, end], index) => ({ kind: "word", begin, end, index, name: text, label: `word ${text}` })),
+    words: () => preview.words.map(([text, begin, end, , isDoubtful], index) => ({ kind: "word", begin, end, index, name: text, label: `${isDoubtful ? "doubtful " : ""}word ${text}` })),
     phones: () => state.phones.map((phone, index) => ({ kind: "phone", begin: phone[1], end: phone[2], index, name: phone[0], label: `phone ${phone[0]}` })),
     nods: () => model.nods.map((nod) => ({ kind: "nod", begin: nod.time, end: nod.time, nod, label: `nod of size ${nod.size}` })),
     targets: () => model.gaze.map((gaze) => ({ kind: "gaze", begin: gaze.start, end: gaze.end, gaze, label: `eyes look ${describeGaze(gaze)}` })),
