@@ -15,7 +15,14 @@ from lexicon.sequence import SILENCE
 from tts2face.lips.cloning import UNBOUNDED_MM, face_size, facing_gaps, nearest_valid_parameters
 from tts2face.lips.exemplar import DEFAULT_OPTIONS, ExemplarModel, build_exemplar_model, speech_trajectory
 from tts2face.lips.retargeting import inner_product_map
-from tts2face.models.landmarks import MOUTH_REGION, N_LANDMARKS
+from tts2face.models.landmarks import (
+    LOWER_LIP_INNER_MID,
+    MOUTH_CORNER_LEFT,
+    MOUTH_CORNER_RIGHT,
+    MOUTH_REGION,
+    N_LANDMARKS,
+    UPPER_LIP_INNER_MID,
+)
 from tts2face.models.talker import ShapeModel, Talker, Utterance
 from tts2face.numeric.arrays import fix_signs, interpolate_columns, principal_axes
 
@@ -31,12 +38,13 @@ Floats = NDArray[np.float64]
 class Adaptation:
     """How own material changes a base: arguments of `fit_base_map`; with a `NO_CHANGE` penalty only the mean pose.
 
-    ``gain`` multiplies the motion about the mean pose, because predictions by regression are smaller than the motion.
+    ``gain`` multiplies the motion of opening and width about the mean pose: predictions by regression are smaller than
+    the motion, and people's lips move over other ranges.
     """
 
     trust: float
     penalty: float
-    gain: float = 1.0
+    gain: tuple[float, float] = (1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +112,23 @@ def learn_base_map(
     penalty = adaptation.penalty * observations[0].fps / REFERENCE_FPS
     own = np.concatenate(targets)
     mapped = fit_base_map(together, own, prior, (scales[0], scales[1]), trust=adaptation.trust, penalty=penalty)
-    return mapped.amplified(adaptation.gain, own.mean(axis=0)).before_amplification(amplitude, together)
+    return mapped.amplified(lip_gain(model, adaptation.gain), own.mean(axis=0)).before_amplification(
+        amplitude, together
+    )
+
+
+def lip_gain(model: ShapeModel, gain: tuple[float, float]) -> Floats:
+    """(D, D) matrix by which opening and width in speech parameters are multiplied, by the least motion.
+
+    Motion is measured in units of its spread; what changes neither of the two remains.
+    """
+    n_speech = model.n_speech
+    basis, variance = model.basis[:n_speech].astype(np.float64), model.spread[:n_speech].astype(np.float64) ** 2
+    opening = basis[:, UPPER_LIP_INNER_MID, 1] - basis[:, LOWER_LIP_INNER_MID, 1]
+    width = basis[:, MOUTH_CORNER_LEFT, 0] - basis[:, MOUTH_CORNER_RIGHT, 0]
+    shown = np.stack([opening, width])
+    change = np.linalg.pinv((variance * shown) @ shown.T) @ (variance * shown)
+    return np.asarray(np.eye(n_speech) + change.T @ ((np.array(gain)[:, None] - 1.0) * shown))
 
 
 def map_inventory(base: Base, observations: Sequence[Observation]) -> tuple[str, ...]:

@@ -67,11 +67,10 @@ class BaseMap:
             part += self.window[offset, terms.labels[:, offset]]
         return part
 
-    def amplified(self, gain: float, about: Floats) -> "BaseMap":
-        """The map with its motion about a pose (D,) multiplied by `gain`."""
-        return BaseMap(
-            self.inventory, gain * self.matrix, gain * self.offset + (1.0 - gain) * about, gain * self.window
-        )
+    def amplified(self, gain: Floats, about: Floats) -> "BaseMap":
+        """The map with its motion about a pose (D,) multiplied by a matrix (D, D)."""
+        offset = gain @ (self.offset - about) + about
+        return BaseMap(self.inventory, gain @ self.matrix, offset, self.window @ gain.T)
 
     def before_amplification(self, amplitude: float, terms: FrameTerms) -> "BaseMap":
         """The map for motion that synthesis multiplies by `amplitude` later; same mean over the given frames.

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.studies.evaluation.evaluate import SpeakerScale
 from corpus_tools.studies.evaluation.methods import build_methods
+from corpus_tools.studies.evaluation.people import CurveScale
 from corpus_tools.studies.evaluation.reference import LipCurves
 from corpus_tools.studies.evaluation.splits import find_same, fingerprint_observations, fingerprint_talker
 from corpus_tools.training.adapt_talker import (
@@ -34,19 +35,18 @@ from tts2face.models.talker import NOT_STATED, ShapeModel, Talker, load_talker
 from tts2face.types import Progress
 
 MAX_FOLDS = 5
-# Wanted deviation of the opening over the real one: larger motion costs little up to here (docs/decisions/131-base.md).
-RANGE_RATIO = 0.85
-MAX_GAIN = 1.5
-# Power of the gain: maps of the folds are learnt from fewer sentences than the final one and move less; with the whole
-# gain, talkers of 10 to 25 s cost more than the base alone (docs/decisions/131-base.md).
-GAIN_POWER = 0.5
+# Wanted deviation of opening and width over the real ones, about that of the shipped talker for other people, and the
+# power of the gain, whose estimate from few sentences errs; by warping cost (docs/decisions/191-few-sentences.md).
+RANGE_RATIO, GAIN_POWER = 0.77, 0.75
+GAIN_LIMITS = (0.5, 2.0)
 BASE_ONLY = Adaptation(trust=1.0, penalty=NO_CHANGE)
-# Trust and penalty that were best from 10 s on in another speaker's learning curve, and more careful ones
-# (docs/decisions/131-base.md).
+# The usual one is better than the base in nearly all choices of three sentences and more; held-out sentences of so
+# few have to show that another one is better (docs/decisions/191-few-sentences.md).
+USUAL = Adaptation(trust=0.6, penalty=60.0)
 ADAPTATIONS = (
     BASE_ONLY,
-    Adaptation(trust=1.0, penalty=300.0),
-    Adaptation(trust=0.6, penalty=60.0),
+    Adaptation(trust=1.0, penalty=100.0),
+    USUAL,
     Adaptation(trust=0.3, penalty=60.0),
     Adaptation(trust=0.3, penalty=30.0),
 )
@@ -62,20 +62,24 @@ Learner = Callable[[Sequence[Observation]], Synthesis]
 class HeldOutScore:
     """Correlations of opening and width with held-out sentences, and their warping cost; all of z-scored curves.
 
-    ``range_ratio`` is the deviation of the synthesised opening over that of the real one, ``costs`` are those of the
-    single sentences.
+    ``ranges`` are the deviations of the synthesised opening and width over those of the real ones, ``costs`` those of
+    the single sentences.
     """
 
     opening: float
     width: float
     cost: float
-    range_ratio: float
+    ranges: tuple[float, float]
     costs: tuple[float, ...]
 
     def is_surely_better(self, other: "HeldOutScore") -> bool:
         """Whether the costs are lower by more than the standard error of the differences, sentence by sentence."""
         gains = np.subtract(other.costs, self.costs)
         return bool(gains.mean() > gains.std(ddof=1) / np.sqrt(len(gains)))
+
+    def gain(self) -> tuple[float, float]:
+        """By which opening and width are multiplied towards `RANGE_RATIO`."""
+        return _limited_gain(RANGE_RATIO / np.maximum(self.ranges, 1e-9))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,14 +105,14 @@ class ChosenAdaptation:
 def choose_adaptation(
     base: Base, observations: Sequence[Observation], *, on_progress: Progress | None = None
 ) -> ChosenAdaptation:
-    """The adaptation with the least warping cost on held-out sentences of the person.
+    """`USUAL`, unless another adaptation has surely less warping cost on held-out sentences of the person.
 
-    The base alone for one sentence, or if no adaptation is better by more than the standard error.
+    The base alone for one sentence, with the range of motion of the person.
 
     The cost of exemplars is not included: the map alone is applied to what the base synthesises.
     """
     if len(observations) < 2:
-        return ChosenAdaptation(BASE_ONLY, None, {})
+        return ChosenAdaptation(_base_in_range(base, observations), None, {})
     lips = {one.name: base_lips(base, one) for one in observations}
     models: dict[tuple[str, ...], ShapeModel] = {}  # of each fold
     learners: dict[str, Learner] = {
@@ -122,11 +126,22 @@ def choose_adaptation(
         if on_progress:
             on_progress(done, len(learners))
     best = min(ADAPTATIONS, key=lambda adaptation: scores[_name(adaptation)].cost)
-    if not scores[_name(best)].is_surely_better(scores[_name(BASE_ONLY)]):
-        return ChosenAdaptation(BASE_ONLY, scores[_name(BASE_ONLY)], scores)
+    if not scores[_name(best)].is_surely_better(scores[_name(USUAL)]):
+        best = USUAL
     score = scores[_name(best)]
-    gain = float(np.clip(RANGE_RATIO / max(score.range_ratio, 1e-9), 1.0, MAX_GAIN)) ** GAIN_POWER
-    return ChosenAdaptation(replace(best, gain=gain), score, scores)
+    chosen = _base_in_range(base, observations) if best == BASE_ONLY else replace(best, gain=score.gain())
+    return ChosenAdaptation(chosen, score, scores)
+
+
+def _base_in_range(base: Base, observations: Sequence[Observation]) -> Adaptation:
+    """The base alone; opening and width are multiplied by the person's deviations over those of its recordings."""
+    ratios = SpeakerScale.of(observations).spread / CurveScale.of_talker(base.talker).spread
+    return replace(BASE_ONLY, gain=_limited_gain(ratios))
+
+
+def _limited_gain(ratios: Floats) -> tuple[float, float]:
+    opening, width = np.clip(ratios, *GAIN_LIMITS) ** GAIN_POWER
+    return float(opening), float(width)
 
 
 def cross_validate(learner: Learner, observations: Sequence[Observation]) -> HeldOutScore:
@@ -144,8 +159,8 @@ def cross_validate(learner: Learner, observations: Sequence[Observation]) -> Hel
             costs.append(warping_cost(real[-1], made[-1], np.ones(2), round(DTW_BAND_S * one.fps)))
     pooled, predicted = np.concatenate(real), np.concatenate(made)
     opening, width = (correlation(pooled[:, at], predicted[:, at]) for at in range(2))
-    ratio = range_ratio(pooled[:, 0], predicted[:, 0])
-    return HeldOutScore(opening, width, float(np.mean(costs)), ratio, tuple(costs))
+    ranges = range_ratio(pooled[:, 0], predicted[:, 0]), range_ratio(pooled[:, 1], predicted[:, 1])
+    return HeldOutScore(opening, width, float(np.mean(costs)), ranges, tuple(costs))
 
 
 def _name(adaptation: Adaptation) -> str:
@@ -304,6 +319,6 @@ def _base_metadata(base: Base, chosen: ChosenAdaptation) -> dict[str, Any]:
         "name": base.talker.metadata.get("name", NOT_STATED),
         "trust": chosen.adaptation.trust,
         "penalty": chosen.adaptation.penalty,
-        "gain": round(chosen.adaptation.gain, 4),
+        "gain": [round(one, 4) for one in chosen.adaptation.gain],
         "held_out": held_out,
     }

@@ -5,10 +5,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from corpus_tools.training.adapt_talker import lip_gain
 from corpus_tools.training.base_map import N_OFFSETS, BaseMap, FrameTerms, fit_base_map, frame_terms
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.audio_map import AudioMap
+from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.networks import N_PHONES_SEEN, N_PLACE, PhoneNetwork
+from tts2face.models.talker import ShapeModel
 
 INVENTORY = ("a", "b", "i", SILENCE, "ʃ")
 PHONES = PhoneSequence([SILENCE, "a", "ʃ", "i", "b", SILENCE], [0.0, 0.3, 0.5, 0.6, 0.8, 0.9, 1.2])
@@ -102,8 +105,21 @@ def test_the_resting_position_of_single_utterances_is_no_evidence() -> None:
 
 def test_a_gain_multiplies_the_motion_about_a_pose() -> None:
     terms, mapped, pose = many_frames(100), made_map(), np.array([1.0, -2.0])
-    expected = pose + 1.3 * (mapped.parameters(terms) - pose)
-    assert mapped.amplified(1.3, pose).parameters(terms) == pytest.approx(expected, abs=1e-9)
+    gain = np.array([[1.3, 0.1], [-0.2, 0.9]])
+    expected = pose + (mapped.parameters(terms) - pose) @ gain.T
+    assert mapped.amplified(gain, pose).parameters(terms) == pytest.approx(expected, abs=1e-9)
+
+
+def test_opening_and_width_have_gains_of_their_own() -> None:
+    stream = np.random.default_rng(0)
+    spread = np.array([3.0, 2.0, 1.0, 0.5], np.float32)
+    basis = stream.normal(size=(4, N_LANDMARKS, 3)).astype(np.float32)
+    model = ShapeModel(np.zeros((N_LANDMARKS, 3), np.float32), basis, spread, 3, np.zeros(4, np.float32))
+    gain, moved = lip_gain(model, (1.5, 0.7)), stream.normal(size=(20, 3))
+    opening, width = (basis[:3, 13, 1] - basis[:3, 14, 1]), (basis[:3, 291, 0] - basis[:3, 61, 0])
+    assert moved @ gain.T @ opening == pytest.approx(1.5 * moved @ opening, abs=1e-6)
+    assert moved @ gain.T @ width == pytest.approx(0.7 * moved @ width, abs=1e-6)
+    assert lip_gain(model, (1.0, 1.0)) == pytest.approx(np.eye(3), abs=1e-9)
 
 
 def test_motion_that_is_amplified_later_is_the_same_after_it() -> None:

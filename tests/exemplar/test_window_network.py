@@ -8,6 +8,7 @@ import pytest
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips.exemplar import (
+    BREAK_S,
     FAR_CONTEXT,
     NEAR_CONTEXT,
     ExemplarModel,
@@ -157,3 +158,28 @@ def test_time_that_belongs_to_no_target_is_silence() -> None:
     shown = target_phones(Targets(("b", "i", "p"), spans, np.arange(3)))
     assert shown.phones == (SILENCE, "b", "i", SILENCE, "p")
     np.testing.assert_allclose(shown.edges, [0.0, 0.2, 0.4, 0.5, 0.9, 1.0])
+
+
+def paused(pause_s: float) -> PhoneSequence:
+    return PhoneSequence([SILENCE, "b", "i", SILENCE, "p", SILENCE], np.cumsum([0.0, 0.3, 0.1, 0.2, pause_s, 0.1, 0.3]))
+
+
+@pytest.mark.parametrize(("pause_s", "share"), [(0.52, 1.0), (BREAK_S - 0.04, 1.0), (BREAK_S + 0.04, 0.0)])
+def test_lips_rest_in_a_pause_as_the_networks_learnt_and_in_a_break_as_at_the_end(
+    voice: ExemplarModel, pause_s: float, share: float
+) -> None:
+    """A pause is one silence for the networks, however it is cut for the search."""
+    network = random_network(len(voice.spread))
+    knowing = replace(voice, network=network)
+    phones, at = paused(pause_s), round(100 * (0.6 + pause_s / 2))
+    options = SynthesisOptions(smoothing_s=0.0, contacts=False)
+    n_frames = round(100 * phones.end)
+
+    def made(share_of_networks: float) -> np.ndarray:
+        chosen = replace(options, network=share_of_networks)
+        return speech_trajectory(phones, knowing, fps=100.0, n_frames=n_frames, options=chosen).values
+
+    learnt = network.parameters(phones, np.array([at / 100]))[0]
+    np.testing.assert_allclose(made(0.5)[at], share * learnt + (1 - share) * voice.rest, atol=2e-3)
+    np.testing.assert_array_equal(made(0.5)[[0, -1]], np.stack([voice.rest] * 2))
+    np.testing.assert_array_equal(made(0.0)[at], voice.rest)

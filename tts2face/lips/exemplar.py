@@ -35,6 +35,8 @@ from tts2face.types import Trajectory, YieldTurn, keep_on
 
 RELEASE_FROM_S = 0.08  # distance from speech at which the transition to rest begins
 REST_FROM_S = 0.20  # distance from speech at which the face is at rest; recorded lips settle within 0.2 s
+# Shorter silence between phones is a pause, in which lips stay half open as the networks have learnt (decision 190).
+BREAK_S = 2.0
 NETWORK_HZ = 50.0  # rate at which the networks are evaluated; their input changes in steps of 40 ms
 # Distances of contexts (largest score less the best token's) between which the networks take over from the exemplars;
 # learnt on held-out words and on held-out tracks of another speaker (docs/decisions/039-phone-networks.md).
@@ -168,25 +170,27 @@ def blend_trajectory(
     -----
     Time and memory grow linearly with the number of phones. The motion is computed at `CLOCK_HZ` and interpolated at
     the frames, so that it does not depend on the frame rate. In silence farther than `REST_FROM_S` from speech the face
-    is at rest.
+    is at rest; in pauses within speech the networks, if there are any, tell how the lips rest.
     """
     frame_times = np.arange(n_frames) / fps
     n_instants = int(np.ceil(max(selection.phones.end, frame_times[-1]) * blending.CLOCK_HZ)) + 2
     motion = _blend_motion(selection, exemplars, n_instants, yield_turn)
-    return Trajectory(exemplars.channels, read_at_frames(motion, selection.phones, frame_times, exemplars.rest), fps)
+    pull = rest_weights(selection.phones, frame_times)
+    if _used_network(selection, exemplars) is not None:
+        pull[is_pause(selection.phones, frame_times)] = 0.0
+    return Trajectory(exemplars.channels, read_at_frames(motion, frame_times, pull, exemplars.rest), fps)
 
 
 def read_at_frames(
-    motion: NDArray[np.float32], phones: PhoneSequence, times: NDArray[np.float64], rest: NDArray[np.float32]
+    motion: NDArray[np.float32], times: NDArray[np.float64], pull: NDArray[np.float64], rest: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Resample motion (n, D) at `CLOCK_HZ` to T times (T, D), blended with the rest pose in silence."""
+    """Resample motion (n, D) at `CLOCK_HZ` to T times (T, D), blended with the rest pose by weights `pull` (T,)."""
     at = times * blending.CLOCK_HZ
     low = at.astype(np.int64)
     part = (at - low)[:, None].astype(np.float32)
     values = (1 - part) * motion[low] + part * motion[low + 1]
-    pull = rest_weights(phones, times)[:, None].astype(np.float32)
-    drawn: NDArray[np.float32] = (1 - pull) * values + pull * rest
-    return drawn
+    share = pull[:, None].astype(np.float32)
+    return np.asarray((1 - share) * values + share * rest)
 
 
 def _blend_motion(
@@ -199,12 +203,18 @@ def _blend_motion(
     joined, is_covered = blending.join_averages(pieces, targets, n_instants, options)
     speech = joined * exemplars.spread
     yield_turn()
-    if exemplars.network is not None and options.network > 0:
+    about, network = exemplars.mean_speaking_pose, _used_network(selection, exemplars)
+    if network is None:
+        speech = about + options.amplitude * (speech - about)
+    else:
         farness = interpolated_farness(targets, context_farness(selection), n_instants)[:, None]
-        predicted = _network_motion(exemplars.network, selection.phones, n_instants)
+        predicted = _network_motion(network, selection.phones, n_instants)
         speech = speech + (options.network + (1 - options.network) * farness) * (predicted - speech)
+        clock = np.arange(n_instants) / blending.CLOCK_HZ
+        pausing = np.where(is_pause(selection.phones, clock), rest_weights(selection.phones, clock), 0.0)[:, None]
+        speech = (1 - pausing) * (about + options.amplitude * (speech - about)) + pausing * predicted
+        is_covered |= pausing[:, 0] > 0
         yield_turn()
-    speech = exemplars.mean_speaking_pose + options.amplitude * (speech - exemplars.mean_speaking_pose)
     motion = np.where(is_covered[:, None], speech, exemplars.rest).astype(np.float32)
     motion = blending.gaussian_smooth(motion, options.smoothing_s, blending.CLOCK_HZ)
     if not options.contacts:
@@ -216,6 +226,11 @@ def _blend_motion(
     kept = [rule for rule in rules if rule is not None]
     contacts = find_contacts(chosen, exemplars.lip_gap, targets.spans[touching, 1:3], kept)
     return enforce_contacts(motion, contacts, exemplars.lip_gap, blending.CLOCK_HZ)
+
+
+def _used_network(selection: TokenSelection, exemplars: ExemplarModel) -> PhoneNetwork | None:
+    """The networks of the talker, if the options use them."""
+    return exemplars.network if selection.options.network > 0 else None
 
 
 def _network_motion(network: PhoneNetwork, phones: PhoneSequence, n_instants: int) -> NDArray[np.float32]:
@@ -247,11 +262,9 @@ def interpolated_farness(targets: Targets, farness: NDArray[np.float64], n_insta
 
 def rest_weights(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[np.float64]:
     """(T,) weights of the rest pose at T times in seconds: 0 in speech, 1 in silence and at both ends."""
-    sounding = np.array([label != SILENCE for label in phones.phones])
-    if not sounding.any():
+    starts, ends, next_start = _speech_around(phones, times)
+    if not len(starts):
         return np.ones(len(times))
-    starts, ends = phones.edges[:-1][sounding], phones.edges[1:][sounding]
-    next_start = np.searchsorted(starts, times, side="right")
     ahead = np.append(starts, np.inf)[next_start] - times
     behind = times - np.concatenate([[-np.inf], ends])[next_start]
     distance = np.minimum(ahead, np.maximum(behind, 0.0))
@@ -264,6 +277,22 @@ def rest_weights(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[n
     if offset < REST_FROM_S:
         pull = np.maximum(pull, 1.0 - smoothstep(last - times, 0.0, offset))
     return pull
+
+
+def is_pause(phones: PhoneSequence, times: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(T,) whether T times in seconds lie in silence between phones that is shorter than `BREAK_S`."""
+    starts, ends, next_start = _speech_around(phones, times)
+    begins, ended = np.append(starts, np.inf)[next_start], np.concatenate([[-np.inf], ends])[next_start]
+    return np.asarray((ended <= times) & (begins - ended < BREAK_S))
+
+
+def _speech_around(
+    phones: PhoneSequence, times: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
+    """Starts and ends (N,) of the phones but silence, and the number (T,) of them that have begun at T times."""
+    sounding = np.array([label != SILENCE for label in phones.phones])
+    starts = phones.edges[:-1][sounding]
+    return starts, phones.edges[1:][sounding], np.searchsorted(starts, times, side="right")
 
 
 N_BLENDED_APPEARANCES = 3  # exemplars; more of them blur teeth and tongue (docs/decisions/032-own-face.md)
@@ -313,9 +342,8 @@ def build_appearance_exemplars(talker: Talker, exemplars: ExemplarModel) -> Appe
     )
     still = frames[silent] if silent.any() else frames
     rest = np.median(still, axis=0).astype(np.float32)
-    return AppearanceExemplars(
-        replace(exemplars.tokens, frames=frames.astype(np.float32)), spread, rest, appearance.channels
-    )
+    tokens = replace(exemplars.tokens, frames=frames.astype(np.float32))
+    return AppearanceExemplars(tokens, spread, rest, appearance.channels)
 
 
 def appearance_trajectory(
@@ -332,7 +360,8 @@ def appearance_trajectory(
     joined, is_covered = blending.join_averages(pieces, targets, n_instants, options)
     values = np.where(is_covered[:, None], joined * appearance.spread, appearance.rest)
     values = blending.gaussian_smooth(values, options.smoothing_s, blending.CLOCK_HZ)
-    return Trajectory(appearance.channels, read_at_frames(values, phones, frame_times, appearance.rest), fps)
+    pull = rest_weights(phones, frame_times)
+    return Trajectory(appearance.channels, read_at_frames(values, frame_times, pull, appearance.rest), fps)
 
 
 def _silent_frames(phones: PhoneSequence, n_frames: int, fps: float) -> NDArray[np.bool_]:

@@ -218,15 +218,21 @@ def build_targets(phones: PhoneSequence, inventory: tuple[str, ...]) -> Targets:
 
 
 def target_phones(targets: Targets) -> PhoneSequence:
-    """The targets as phones in time from 0 s on, with silence where there is none."""
+    """The targets as phones in time from 0 s on, with silence where there is none; a pause is one phone."""
     labels: list[str] = []
     edges = [0.0]
+
+    def extend(label: str, end: float) -> None:
+        if labels and label == labels[-1] == SILENCE:
+            edges[-1] = end
+            return
+        labels.append(label)
+        edges.append(end)
+
     for label, (start, end) in zip(targets.labels, targets.spans[:, 1:3], strict=True):
         if start - edges[-1] > MIN_TARGET_GAP_S:
-            labels.append(SILENCE)
-            edges.append(float(start))
-        labels.append(label)
-        edges.append(float(end))
+            extend(SILENCE, float(start))
+        extend(label, float(end))
     return PhoneSequence(labels, edges)
 
 

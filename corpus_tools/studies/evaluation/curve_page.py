@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 
 WIDTH, HEIGHT = 960, 320  # px of the picture
+N_DRAWN = 3  # figures of the picture; those within sentences are only in the tables
 BAND = 0.15  # opacity of the intervals
 FLAT = MEAN_FACE  # r 0 and a DTW cost far above the others: only in the tables
 MIN_S, MINUTE_S = 100.0, 60.0  # ticks from here on are labelled in minutes
@@ -45,8 +46,8 @@ def learning_curve_page(curve: LearningCurve) -> str:
 
 def _draw(curve: LearningCurve) -> "Callable[[Figure], tuple[()]]":
     def draw(figure: "Figure") -> tuple[()]:
-        for at, (name, head) in enumerate(FIGURE_HEADS, start=1):
-            axes = figure.add_subplot(1, len(FIGURE_HEADS), at)
+        for at, (name, head) in enumerate(FIGURE_HEADS[:N_DRAWN], start=1):
+            axes = figure.add_subplot(1, N_DRAWN, at)
             _draw_figure(axes, curve, name)
             axes.set(title=head, xlabel="own material", xscale="log")
             _label_seconds(axes, [point.seconds for point in curve.points])

@@ -29,7 +29,10 @@ from tts2face.lips.explanation import DTW_BAND_S, speech_frames, warping_cost
 from tts2face.models.networks import PhoneNetwork
 from tts2face.models.talker import ShapeModel, Talker
 
-FIGURE_HEADS = (("r_opening", "r opening"), ("r_width", "r width"), ("dtw_cost", "DTW cost"))
+FIGURE_HEADS = (
+    ("r_opening", "r opening"), ("r_width", "r width"), ("dtw_cost", "DTW cost"),
+    ("r_opening_within", "r opening within"), ("r_width_within", "r width within"),
+)  # fmt: skip
 DEFAULT_METHOD, NETWORKS_METHOD, TRACKS_METHOD = "exemplar", "networks alone", "tracks"
 Floats = NDArray[np.float64]
 

@@ -26,7 +26,8 @@ N_DRAWS = 1000  # of utterances, with replacement (Efron 1979)
 CONFIDENCE = 0.95
 # In the order of tables: name, its head, digits.
 FIGURES = (
-    ("r_opening", "r opening", 3), ("r_width", "r width", 3), ("rmse_z", "RMSE z", 3), ("dtw_cost", "DTW cost", 3),
+    ("r_opening", "r opening", 3), ("r_width", "r width", 3), ("r_opening_within", "r opening within", 3),
+    ("r_width_within", "r width within", 3), ("rmse_z", "RMSE z", 3), ("dtw_cost", "DTW cost", 3),
     ("free_cost", "DTW cost, free", 3), ("range_ratio", "range ratio", 2), ("closure", "closure", 2),
     ("false_closure", "false closure", 2),
     ("labiodental", "labiodental", 2), ("rounding", "rounding", 2), ("peak_offset_ms", "peak offset (ms)", 0),
@@ -75,7 +76,8 @@ class ClassScore:
 class Scores:
     """Scores of a method over all held-out utterances: r and range of pooled frames, means or shares otherwise.
 
-    ``figures`` are those of `FIGURES` by name, ``free_cost`` only with a voice's own durations;
+    r *within* is that of curves without the mean of their utterance, which no text tells (a smile). ``figures`` are
+    those of `FIGURES` by name, ``free_cost`` only with a voice's own durations;
     ``real_time_factor`` is the synthesis time divided by the duration of the utterances.
     """
 
@@ -231,11 +233,10 @@ def _curve_moments(a: Floats, b: Floats) -> Floats:
 def _estimate_figures(tallies: Sequence[UtteranceStatistics]) -> dict[str, IntervalEstimate]:
     draws = np.random.default_rng(0).multinomial(len(tallies), np.full(len(tallies), 1 / len(tallies)), N_DRAWS)
     weights = np.concatenate([np.ones((1, len(tallies))), draws])  # the first row: each utterance once
+    moments = np.array([[one.opening, one.width] for one in tallies])
     rows = {
-        **dict(
-            zip(("r_opening", "range_ratio"), _curve_figures(weights, [one.opening for one in tallies]), strict=True)
-        ),
-        "r_width": _curve_figures(weights, [one.width for one in tallies])[0],
+        **_correlations(weights, moments),
+        "range_ratio": _range_ratio(weights @ moments[:, 0]),
         "rmse_z": weights @ [one.rmse_z for one in tallies] / weights.sum(axis=1),
         "dtw_cost": weights @ [one.dtw_cost for one in tallies] / weights.sum(axis=1),
         "peak_offset_ms": 1000 * _weighted_medians(weights, [one.offsets for one in tallies]),
@@ -254,13 +255,10 @@ def _estimate_figures(tallies: Sequence[UtteranceStatistics]) -> dict[str, Inter
     }
 
 
-def _curve_figures(weights: Floats, moments: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Pearson's r and the ratio of spreads for each row of weights (W, U)."""
-    n, a, b, aa, bb, ab = (weights @ np.array(moments)).T
-    real, synthesised = np.maximum(aa - a * a / n, 0.0), np.maximum(bb - b * b / n, 0.0)
-    moves = np.sqrt(real * synthesised) > 1e-9 * n
-    r = np.where(moves, (ab - a * b / n) / np.where(moves, np.sqrt(real * synthesised), 1.0), 0.0)
-    return r, np.sqrt(synthesised / np.maximum(real, 1e-12))
+def _range_ratio(moments: Floats) -> Floats:
+    """(W,) ratio of the synthesised spread to the real one for moments (W, 6)."""
+    n, a, b, aa, bb, _ = moments.T
+    return np.asarray(np.sqrt(np.maximum(bb - b * b / n, 0.0) / np.maximum(aa - a * a / n, 1e-12)))
 
 
 def _weighted_medians(weights: Floats, offsets: Sequence[Floats]) -> Floats:
@@ -337,9 +335,8 @@ class PairedCurves:
         return cls(np.array(moments), np.asarray(costs, np.float64))
 
     def figures(self, weights: Floats) -> Mapping[str, Floats]:
-        """Correlations of opening and width and mean cost for each row of utterance weights (W, U)."""
-        opening, width = (_pooled_correlation(weights @ self.moments[:, at]) for at in range(2))
-        return {"r_opening": opening, "r_width": width, "dtw_cost": weights @ self.costs / weights.sum(axis=1)}
+        """Correlations of opening and width, pooled and within, and mean cost for each row of weights (W, U)."""
+        return {**_correlations(weights, self.moments), "dtw_cost": weights @ self.costs / weights.sum(axis=1)}
 
 
 def draw_weights(n_utterances: int) -> Floats:
@@ -373,6 +370,20 @@ def interval_of(values: Floats) -> IntervalEstimate:
     """The first of (W,) values, with the interval that holds `CONFIDENCE` of the others."""
     low, high = np.quantile(values[1:], (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2))
     return IntervalEstimate(float(values[0]), float(low), float(high))
+
+
+def _correlations(weights: Floats, moments: Floats) -> dict[str, Floats]:
+    """Correlations of opening and width by name, pooled and within utterances, for moments (U, 2, 6)."""
+    n, a, b, aa, bb, ab = np.moveaxis(moments, -1, 0)
+    left, zero = [(aa - a * a / n, aa), (bb - b * b / n, bb)], np.zeros_like(n)
+    spreads = (np.where(spread > ROUNDING * whole, spread, 0.0) for spread, whole in left)
+    within = np.stack([n, zero, zero, *spreads, ab - a * b / n], axis=-1)
+    names = {"": moments, "_within": within}
+    return {
+        f"r_{name}{suffix}": _pooled_correlation(weights @ kept[:, at])
+        for suffix, kept in names.items()
+        for at, name in enumerate(("opening", "width"))
+    }
 
 
 def _pooled_correlation(moments: Floats) -> Floats:

@@ -30,6 +30,7 @@ from corpus_tools.studies.evaluation.learning_curve import (
     choose_material,
     measure_learning_curve,
 )
+from corpus_tools.studies.evaluation.people import FIGURE_HEADS
 from corpus_tools.training.adapt_talker import Base
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import InputError
@@ -141,7 +142,7 @@ def test_recordings_in_both_parts_are_refused() -> None:
 
 def test_a_point_has_the_mean_and_deviation_of_its_choices() -> None:
     stream = np.random.default_rng(0)
-    values = [{name: stream.normal(one, 0.1, 2001) for name in ("r_opening", "r_width", "dtw_cost")} for one in (1, 3)]
+    values = [{name: stream.normal(one, 0.1, 2001) for name, _ in FIGURE_HEADS} for one in (1, 3)]
     point = CurvePoint.of(10.0, 0, {"method": values})
     first = [one["r_opening"][0] for one in values]
     estimate = point.figures["method"]["r_opening"]
@@ -157,7 +158,7 @@ def made_curve(*means: float) -> LearningCurve:
     """A curve of one method, whose r and cost are the means at 10 s, 20 s, ... with deviations of .01."""
     stream, points = np.random.default_rng(0), []
     for number, mean in enumerate(means):
-        values = {name: stream.normal(mean, 0.01, 2001) for name in ("r_opening", "r_width")}
+        values = {name: stream.normal(mean, 0.01, 2001) for name, _ in FIGURE_HEADS}
         values = {name: np.concatenate([[mean], one[1:]]) for name, one in values.items()}
         values["dtw_cost"] = 1.0 - values["r_opening"]
         points.append(CurvePoint.of(10.0 * (number + 1), number, {"own alone": [values, values]}))
@@ -168,7 +169,7 @@ def test_only_steps_beyond_their_interval_are_named() -> None:
     assert monotony(made_curve(0.5, 0.6, 0.59)).startswith("No figure becomes worse")
     assert monotony(made_curve(0.5, 0.6, 0.4)) == (
         "Worse than with less material by more than the 95 % interval: "
-        "own alone at 30 s (r opening, r width, DTW cost)."
+        "own alone at 30 s (r opening, r width, DTW cost, r opening within, r width within)."
     )
 
 
@@ -181,7 +182,7 @@ def test_tables_hold_every_amount_and_method(curve: LearningCurve) -> None:
     assert "± " in text
     assert "| as built with base minus |" in text
     assert text.endswith((".", "interval."))
-    n_numbers = 3 * (3 * 5 + 2 * 5 + 3 * 4)
+    n_numbers = len(FIGURE_HEADS) * (3 * 5 + 2 * 5 + 3 * 4)
     assert len(list(curve_rows(curve))) == 1 + n_numbers
 
 

@@ -11,6 +11,7 @@ from cli.main import run
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
 from corpus_tools.studies.evaluation.people import (
+    FIGURE_HEADS,
     PeopleEvaluation,
     compare_people,
     difference_table,
@@ -126,6 +127,9 @@ def test_figures_equal_those_of_pooled_frames(rng_curves: tuple[list[np.ndarray]
     figures = estimate(PairedCurves.of(real, made, [1.0, 2.0, 3.0, 4.0]))
     expected = np.corrcoef(np.concatenate(real)[:, 0], np.concatenate(made)[:, 0])[0, 1]
     assert figures["r_opening"].value == pytest.approx(expected, rel=1e-12)
+    apart = [np.concatenate([one - one.mean(axis=0) for one in curves]) for curves in (real, made)]
+    expected = np.corrcoef(apart[0][:, 1], apart[1][:, 1])[0, 1]
+    assert figures["r_width_within"].value == pytest.approx(expected, rel=1e-12)
     assert figures["dtw_cost"].value == 2.5
     assert figures["r_opening"].low <= figures["r_opening"].value <= figures["r_opening"].high
 
@@ -159,7 +163,18 @@ def test_a_curve_that_never_moves_correlates_with_nothing(
     real, made = rng_curves
     for precision in (np.float32, np.float64):
         flat = [np.full(one.shape, value, precision) for one in made]
-        assert estimate(PairedCurves.of(real, flat, [1.0] * 4))["r_opening"] == IntervalEstimate(0.0, 0.0, 0.0)
+        figures = estimate(PairedCurves.of(real, flat, [1.0] * 4))
+        assert figures["r_opening"] == figures["r_opening_within"] == IntervalEstimate(0.0, 0.0, 0.0)
+
+
+def test_a_mood_of_single_utterances_changes_no_correlation_within(
+    rng_curves: tuple[list[np.ndarray], list[np.ndarray]],
+) -> None:
+    real, made = rng_curves
+    smiling = [one + 3.0 * number for number, one in enumerate(real)]
+    plain, shifted = (estimate(PairedCurves.of(one, made, [1.0] * 4)) for one in (real, smiling))
+    assert shifted["r_width"].value < plain["r_width"].value - 0.1
+    assert shifted["r_width_within"].value == pytest.approx(plain["r_width_within"].value, rel=1e-9)
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e6])
@@ -193,7 +208,7 @@ def test_tables_hold_every_method(found: PeopleEvaluation) -> None:
     assert [line.split(" | ")[0] for line in people_table(found).splitlines()[2:]] == [f"| {m}" for m in found.figures]
     assert len(difference_table(found, "exemplar").splitlines()) == 2 + len(found.figures) - 1
     assert f"| {found.phones[0].phone} | {found.phones[0].n_tokens} | yes |" in phone_table(found, ["exemplar"])
-    assert len(list(people_rows(found))) == 1 + 3 * (len(found.figures) + len(found.differences))
+    assert len(list(people_rows(found))) == 1 + len(FIGURE_HEADS) * (len(found.figures) + len(found.differences))
 
 
 def test_speech_only_is_evaluated() -> None:
