@@ -1,7 +1,7 @@
 """Gaze in conversation: looks at the partner's face and away by a person's habits, and the head that follows.
 
-The viewer is the partner. Habits are drawn from what 15 people did (`tts2face.models.gaze`); what was not recorded
-there follows published figures, which stand beside the constants.
+The viewer is the partner, to whom a silent face listens. Habits are drawn from what 15 people did
+(`tts2face.models.gaze`); what was not recorded there follows published figures, which stand beside the constants.
 """
 
 import math
@@ -12,7 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.models.gaze import FACE_DEG, LISTENING, SPEAKING, GazeHabit, GazeModel
+from tts2face.gestures.blinks import PAUSE_DB
+from tts2face.gestures.presentation import FrameContext
+from tts2face.models.gaze import FACE_DEG, LISTENING, SPEAKING, GazeHabit, GazeModel, LogNormal
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.numeric.arrays import smoothstep
 
@@ -25,13 +27,14 @@ N_TRIES = 8  # for a place that differs visibly from the one before
 # At the beginning of a turn people look away: seven in ten long utterances (Kendon 1967, Acta Psychologica 26; the same
 # share in the rule of Cassell, Torres and Prevost 1999), and when they think, mostly up (Andrist et al. 2014, HRI).
 TURN_AWAY, TURN_UP = 0.7, 0.6
-# After its own turn, or where the state changes, a look that is away ends within this time.
-RETURN_S = 0.3
+TURN_END_S = 1.5  # of silence that ends a turn; pauses within one are shorter
+RETURN_S = 0.3  # in which a look away ends where the state changes
 SHORTEST_S = 0.1  # of a look and a fixation: what the recordings could show
-# Head: it takes no part within 10 degrees of the middle, and beyond has three quarters of the rest (Stahl 1999,
-# Experimental Brain Research 126: people differ widely; Freedman and Sparks 1997 for the order of eyes and head).
-HEAD_ONSET_DEG, HEAD_SHARE = 10.0, 0.75
-HEAD_RATE = 9.0  # 1/s of a critically damped follower: half of the way after .19 s, as heads need .3 to .5 s
+# Head: beyond an eye-only range, which differs between people from nothing to 40 degrees, it has .8 of a shift (Stahl
+# 1999, Experimental Brain Research 126), so on average half of what lies beyond 10 degrees; and less where the gaze is
+# about to return (Oommen, Smith and Stahl 2004, Vision Research 44), as in conversation. Eyes go first.
+HEAD_ONSET_DEG, HEAD_SHARE = 10.0, 0.4
+HEAD_RATE = 7.0  # 1/s of a critically damped follower: half of the way after .24 s
 
 FloatArray = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -77,7 +80,7 @@ class GazeProcess:
 
     def __init__(self, habits: Mapping[str, GazeHabit], seed: list[int]) -> None:
         self._habits, self._generator = habits, np.random.default_rng(seed)
-        self._state = SPEAKING
+        self._state, self._quiet_s = SPEAKING, 0.0
         self._fixations = [Fixation(-1.0, 0.0, 0.0)]  # at first the viewer is looked at
         self._rest = _Rest(self._length("face"), self._length("face_fixation"))
 
@@ -93,10 +96,14 @@ class GazeProcess:
         new._rest = copy(self._rest)
         return new
 
-    def extend(self, times: FloatArray, is_listening: NDArray[np.bool_]) -> None:
-        """Draw fixations for frames at increasing times (n,) in seconds of the clip, each 1 / `GESTURE_FPS` long."""
-        for time, listens in zip(times.tolist(), is_listening.tolist(), strict=True):
-            state = LISTENING if listens else SPEAKING
+    def extend(self, frames: FrameContext) -> None:
+        """Draw fixations for the next frames, each 1 / `GESTURE_FPS` long."""
+        quiet = frames.intensity < PAUSE_DB
+        for time, is_quiet, listens in zip(
+            frames.times.tolist(), quiet.tolist(), frames.is_listening.tolist(), strict=True
+        ):
+            self._quiet_s = self._quiet_s + 1.0 / GESTURE_FPS if is_quiet else 0.0
+            state = LISTENING if listens or self._quiet_s > TURN_END_S else SPEAKING
             if state != self._state:
                 self._change(state, time)
             self._rest.look_s -= 1.0 / GESTURE_FPS
@@ -130,7 +137,8 @@ class GazeProcess:
 
     def _length(self, name: str) -> float:
         """Seconds of a look or a fixation."""
-        return max(getattr(self._habit, name).draw(self._generator), SHORTEST_S)
+        lengths: LogNormal = getattr(self._habit, name)
+        return max(lengths.draw(self._generator), SHORTEST_S)
 
     def _change(self, state: str, time: float) -> None:
         """Go on in another state: a turn begins with a look away or goes on, and a listener looks at the partner."""

@@ -14,7 +14,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.gestures.stream import NO_SEEDS, GestureFields, GestureValues, apply_timeline, style_median
+from tts2face.gestures.stream import NO_SEEDS, GestureFields, GestureValues, style_median
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.types import Waveform
@@ -45,7 +45,8 @@ class NoiseStream:
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
         return {
-            name: apply_timeline(name, self._values(name, times), times, timeline) for name in self._fields.features
+            name: self._fields.apply_timeline(name, self._values(name, times), times, timeline)
+            for name in self._fields.features
         }
 
     def _values(self, feature: str, times: NDArray[np.float64]) -> Float32Array:

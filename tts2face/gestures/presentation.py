@@ -82,12 +82,15 @@ class FrameContext:
         Seconds and strength (0 to 1) of the accents of the current piece of sound.
     is_presented : (n,)
         Whether the style of each frame is a derived one.
+    is_listening : (n,)
+        Whether the face listens.
     """
 
     times: FloatArray
     intensity: Float32Array
     accents: FloatArray
     is_presented: NDArray[np.bool_]
+    is_listening: NDArray[np.bool_]
 
 
 class Presentation(Protocol):
@@ -168,7 +171,7 @@ SLOW_HZ = 0.7  # cut-off of the part that is scaled: turns and tilts that last a
 RETURN_HZ = 0.12  # cut-off of what is subtracted, so that the head drifts back to the viewer within some 10 s
 # Standard deviation in radians to which the slow part is scaled, and the largest angle of it. Speakers who look at a
 # listener move by 2 to 5 degrees (yaw) about the direction to the listener.
-TARGET_SPREAD = {"pitch": np.radians(1.2), "yaw": np.radians(5.0), "roll": np.radians(1.2)}
+TARGET_SPREAD = {"pitch": np.radians(1.2), "yaw": np.radians(4.0), "roll": np.radians(1.2)}
 LARGEST_RATIO = 2.6  # of the slow part, in units of its target spread; approached smoothly
 MAX_SCALE = 20.0
 ONSET_S = 0.3  # transition from and to recorded styles

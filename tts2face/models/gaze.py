@@ -82,8 +82,9 @@ class GazeHabit:
         """From values (P,) of `PARAMETERS`."""
         named = dict(zip(PARAMETERS, np.exp(np.clip(values, -MAX_VALUE, MAX_VALUE)).tolist(), strict=True))
         total = 1.0 + named["up"] + named["down"]
+        drawn = {name: LogNormal(named[name], named[f"{name}_spread"]) for name in PAIRS}
         return cls(
-            *(LogNormal(named[name], named[f"{name}_spread"]) for name in PAIRS),
+            **drawn,
             directions=(1.0 / total, named["up"] / total, named["down"] / total),
             left=named["left"] / (1.0 + named["left"]),
             spot_deg=named["spot"],

@@ -17,6 +17,7 @@ from corpus_tools.training.gaze_recordings import (
     read_people,
 )
 from tts2face.gestures.gaze import GazeProcess
+from tts2face.gestures.presentation import FrameContext
 from tts2face.models.gaze import LISTENING, STATES, GazeModel, load_gaze
 from tts2face.models.palette import GESTURE_FPS
 
@@ -50,7 +51,7 @@ def survival(lengths: Lengths) -> Distribution:
     order = np.argsort(lengths.seconds, kind="stable")
     at_risk = len(order) - np.arange(len(order))
     kept = 1.0 - lengths.is_complete[order] / at_risk
-    return Distribution(lengths.seconds[order], np.cumprod(kept))
+    return Distribution(lengths.seconds[order], np.cumprod(kept, dtype=np.float64))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,16 +118,17 @@ def made_person(model: GazeModel, state: str, seed: int) -> Fixations:
     """Fixations of a drawn person who stays in a state."""
     process = GazeProcess.of_person(model, [seed])
     times = np.arange(MINUTES * 60 * GESTURE_FPS) / GESTURE_FPS
-    process.extend(times, np.full(len(times), state == LISTENING))
+    listens, level = np.full(len(times), state == LISTENING), np.zeros(len(times), np.float32)
+    process.extend(FrameContext(times, level, np.zeros((0, 2)), np.ones(len(times), bool), listens))
     return made_fixations(process.fixations[1:], float(times[-1]))
 
 
 def measures(fixations: Fixations) -> GazeMeasures:
     """Measures of a person in a state."""
     looks, jumps = find_looks(fixations), jump_sizes(fixations.merged())
+    known = Lengths(jumps, np.ones(len(jumps), bool))
     return GazeMeasures(
-        *(_distribution(one) for one in (looks.face, looks.away, Lengths(jumps, np.ones(len(jumps), bool)))),
-        fixations.share_on_face,
+        _distribution(looks.face), _distribution(looks.away), _distribution(known), fixations.share_on_face
     )
 
 
