@@ -112,7 +112,7 @@ def _check_options(request: Request, picture: Picture, options: SpeakOptions) ->
         check_file_name(options.explain, "an explanation", EXPLANATION_SUFFIXES)
     _check_overwriting(request, picture, options)
     _check_exports(options)
-    is_silent = request.audio is not None or request.idle is not None
+    is_silent = request.audio is not None or request.silence is not None
     if not request.text.strip() and (not is_silent or options.explain is not None):
         raise InputError("the text is empty; add words to speak, or the words of --audio")
     if options.view:

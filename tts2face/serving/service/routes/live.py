@@ -31,8 +31,9 @@ INVALID = 1007  # WebSocket close code: a message is not what it should be
 
 # Options that live text does not take, with the reason.
 NOT_IN_LIVE_TEXT: Mapping[str, str] = MappingProxyType(
-    {"text": "it comes in parts", "audio": "live sound has options of its own", "audio_map": "there is no recording"}
-    | dict.fromkeys(("idle", "timeline", "expression"), "the end of live text is not known")
+    {"audio": "live sound has options of its own", "audio_map": "there is no recording"}
+    | dict.fromkeys(("text", "partner"), "it comes in parts")
+    | dict.fromkeys(("idle", "listen", "timeline", "expression"), "the end of live text is not known")
     | dict.fromkeys(
         ("plain_delivery", "synthesis", "context", "exemplars", "articulation", "pitch"), "live text has the defaults"
     )

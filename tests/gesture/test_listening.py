@@ -1,0 +1,115 @@
+"""What a listener does: nods and raised brows, a still head, few blinks, and the mood it shows."""
+
+import numpy as np
+import pytest
+
+from corpus_tools.studies.gestures.measures import find_blinks
+from tts2face.gestures.elements import Listening, Nod
+from tts2face.gestures.listening import (
+    LASTS_S,
+    LEAST_GAP_S,
+    WAIT_S,
+    cue_times,
+    drawn_times,
+    responses,
+    with_responses,
+)
+from tts2face.gestures.stream import GestureFields, GestureStream
+from tts2face.gestures.timeline import Timeline
+from tts2face.models.palette import EXPRESSIONS, load_palette
+from tts2face.types import Waveform
+
+FPS, RATE = 30.0, 16_000
+HEARD = Timeline(listens=(Listening(0.0, 600.0),))
+
+
+def test_responses_at_intervals_are_as_many_as_look_natural_and_the_same_in_pieces() -> None:
+    times = drawn_times(0.0, 3600.0, 1)
+    assert 6 <= len(times) / 60 <= 12  # Poppe, Truong and Heylen 2011
+    assert np.diff(times).min() > 2.0
+    parts = [drawn_times(begin, begin + 0.2, 1) for begin in np.arange(0, 60, 0.2)]
+    assert [time for part in parts for time in part] == drawn_times(0.0, 60.0, 1)
+    assert drawn_times(0.0, 60.0, 2) != drawn_times(0.0, 60.0, 1)
+
+
+def test_a_response_nods_or_raises_the_brows() -> None:
+    times = np.arange(0, 4000, 10.0).tolist()
+    made = responses(times, 3)
+    nodded = {round(nod.time / 10) for nod in made.nods}
+    raised = {round(one.time / 10) for one in made.brow_raises}
+    assert nodded | raised == set(range(400))
+    assert len(nodded) / 400 == pytest.approx(0.75, abs=0.06)
+    assert 0.3 < len(raised) / 400 < 0.7
+    assert responses(times[5:7], 3).nods == tuple(nod for nod in made.nods if 45 < nod.time < 65)
+
+
+def test_spans_respond_where_they_hold_and_react() -> None:
+    spans = (Listening(0.0, 100.0), Listening(200.0, 300.0, reacts=False))
+    found = with_responses(Timeline(listens=spans, nods=(Nod(250.0),)), 0.0, 400.0, 1)
+    own = [nod.time for nod in found.nods if nod.time != 250.0]
+    assert own
+    assert max(own) < 100.0 + LASTS_S
+    assert len(found.nods) == len(own) + 1
+    plain = Timeline(nods=(Nod(250.0),))
+    assert with_responses(plain, 0.0, 400.0, 1) is plain
+
+
+def spoken(parts: list[tuple[float, float]]) -> Waveform:
+    """A voice as parts of seconds and Hz; 0 is a pause."""
+    samples, phase = [], 0.0
+    for seconds, hertz in parts:
+        steps = np.full(round(seconds * RATE), hertz / RATE)
+        phases = phase + np.cumsum(steps)
+        phase = float(phases[-1])
+        pulses = sum(np.sin(2 * np.pi * k * phases) / k for k in range(1, 9))
+        samples.append(0.1 * pulses if hertz else np.zeros(len(steps)))
+    return Waveform(np.concatenate(samples), RATE)
+
+
+def test_a_listener_responds_after_low_pitch_and_at_pauses() -> None:
+    fall = spoken([(3.0, 220.0), (1.0, 120.0), (3.0, 220.0)])
+    (time,) = cue_times(fall)
+    assert time == pytest.approx(3.0 + 0.11 + WAIT_S, abs=0.08)
+    pause = spoken([(2.0, 200.0), (1.0, 0.0), (2.0, 200.0)])
+    assert cue_times(pause)[0] == pytest.approx(2.0 + 0.3, abs=0.08)
+    assert cue_times(spoken([(0.4, 200.0), (1.0, 0.0)])) == []  # too little was said
+    assert cue_times(Waveform(np.zeros(RATE), RATE)) == []
+
+
+def test_responses_to_speech_are_apart_and_not_too_many() -> None:
+    sentence = [(1.2, 210.0), (0.9, 180.0), (0.5, 130.0), (0.5, 0.0)]
+    times = cue_times(spoken(sentence * 12))
+    assert np.diff(times).min() >= LEAST_GAP_S - 1e-6
+    assert 6 <= len(times) / (12 * 3.1 / 60) <= 13
+
+
+@pytest.fixture(scope="module")
+def clips() -> dict[str, dict[str, np.ndarray]]:
+    """Silence of three minutes, with a face that listens and one that does not."""
+    fields = GestureFields(load_palette("starter"))
+    silence = Waveform(np.zeros(180 * 8000), 8000)
+    return {
+        f"{style}{' listens' if timeline.listens else ''}": GestureStream(fields, style=style, seed=2, fps=FPS).next(
+            silence, round(180 * FPS), timeline
+        )
+        for style, timeline in (("neutral", Timeline()), ("neutral", HEARD), ("depressed", HEARD))
+    }
+
+
+def test_listeners_blink_less_and_hold_the_head_still(clips) -> None:
+    plain, heard = clips["neutral"], clips["neutral listens"]
+    rates = [
+        find_blinks(one["blink"], np.array([len(one["blink"])], np.int32), FPS).per_minute for one in (plain, heard)
+    ]
+    assert rates[1] == pytest.approx(rates[0] * 17 / 26, rel=0.2)
+    assert 6 <= rates[1] <= 21  # Doughty 2001, Optometry and Vision Science 78: silence
+    spreads = [np.degrees(one["head"][60:, 1].std()) for one in (plain, heard)]
+    assert spreads[1] < 0.7 * spreads[0]
+
+
+def test_a_friendly_listener_smiles_and_a_sad_one_does_not(clips) -> None:
+    happy, sad = EXPRESSIONS.index("happy"), EXPRESSIONS.index("sad")
+    smiles = {name: one["expression"][60:, happy].mean() for name, one in clips.items()}
+    assert smiles["neutral listens"] > 1.15 * smiles["neutral"]
+    assert smiles["depressed listens"] < 0.1
+    assert clips["depressed listens"]["expression"][60:, sad].mean() > 0.7
