@@ -166,6 +166,6 @@ def find_looks(fixations: Fixations) -> Looks:
 
 
 def jump_sizes(merged: Fixations) -> FloatArray:
-    """(n,) degrees of the jumps between merged fixations of one segment."""
+    """(n,) degrees of the jumps of at least `LEAST_JUMP_DEG` between merged fixations of one segment."""
     jumps = np.linalg.norm(np.diff(merged.place, axis=0), axis=1)
-    return np.asarray(jumps[np.diff(merged.segment) == 0])
+    return np.asarray(jumps[(np.diff(merged.segment) == 0) & (jumps >= LEAST_JUMP_DEG)])

@@ -9,6 +9,7 @@ from tts2face.gestures.listening import (
     LASTS_S,
     LEAST_GAP_S,
     WAIT_S,
+    PartnerSound,
     cue_times,
     drawn_times,
     responses,
@@ -113,3 +114,14 @@ def test_a_friendly_listener_smiles_and_a_sad_one_does_not(clips) -> None:
     assert smiles["neutral listens"] > 1.15 * smiles["neutral"]
     assert smiles["depressed listens"] < 0.1
     assert clips["depressed listens"]["expression"][60:, sad].mean() > 0.7
+
+
+def test_cues_of_a_sound_in_blocks_come_once_and_in_time() -> None:
+    sound = spoken([(1.2, 210.0), (0.9, 180.0), (0.5, 130.0), (0.5, 0.0)] * 8)
+    heard, told = PartnerSound(RATE), []
+    for begin in range(0, len(sound.samples), RATE // 5):
+        heard.add(sound.samples[begin : begin + RATE // 5])
+        end = min(begin + RATE // 5, len(sound.samples)) / RATE
+        told += [end + cue for cue in heard.new_cues()]
+    assert np.diff(told).min() >= LEAST_GAP_S - 0.5
+    assert 0.6 * len(cue_times(sound)) <= len(told) <= len(cue_times(sound)) + 1

@@ -29,6 +29,7 @@ NOD_SHARE, RAISE_SHARE = 0.75, 0.4  # of responses; one without a nod raises the
 NOD_SIZES, RAISE_SIZES = (0.35, 0.8), (0.4, 0.9)
 SECOND_NOD, SECOND_S, SECOND_SIZE = 0.5, 0.42, 0.6  # share of nods that a smaller one follows, and after how long
 LASTS_S = 1.0  # a response
+KEPT_S, LOOK_S = 8.0, 0.4  # of arriving sound in which cues are looked for, and between two looks
 
 FloatArray = NDArray[np.float64]
 
@@ -72,8 +73,11 @@ def drawn_times(begin: float, end: float, seed: int) -> list[float]:
     return found
 
 
-def cue_times(sound: Waveform) -> list[float]:
-    """Seconds of a partner's sound at which a listener responds, at least `LEAST_GAP_S` apart."""
+def cue_times(sound: Waveform, *, last: float = -LEAST_GAP_S, earliest: float = 0.0) -> list[float]:
+    """Seconds of a partner's sound at which a listener responds, at least `LEAST_GAP_S` apart.
+
+    `last` is the time of the response before them, `earliest` the least one.
+    """
     track = speech_intensity(sound)
     if track is None:
         return []
@@ -91,11 +95,39 @@ def cue_times(sound: Waveform) -> list[float]:
         spoken += STEP_S if talks else 0.0
         has_paused = abs(silent - PAUSE_S) < STEP_S / 2
         due = time if has_paused else time + WAIT_S
-        if (
-            spoken >= SPOKEN_S
-            and (low >= LOW_PITCH_S or has_paused)
-            and due - [-LEAST_GAP_S, *found][-1] >= LEAST_GAP_S
-        ):
+        is_cue = spoken >= SPOKEN_S and (low >= LOW_PITCH_S or has_paused) and due >= earliest
+        if is_cue and due - [last, *found][-1] >= LEAST_GAP_S:
             found.append(due)
             spoken = 0.0
     return found
+
+
+class PartnerSound:
+    """Cues in a partner's sound that arrives in blocks.
+
+    Parameters
+    ----------
+    rate
+        Of its samples, in Hz.
+    """
+
+    def __init__(self, rate: int) -> None:
+        self._rate, self._n_samples, self._n_seen = rate, 0, 0
+        self._kept = np.zeros(0, np.float32)
+        self._last = -LEAST_GAP_S
+
+    def add(self, samples: NDArray[np.float32]) -> None:
+        """Hear samples (m,) in [-1, 1]."""
+        self._n_samples += len(samples)
+        self._kept = np.concatenate([self._kept, samples])[-round(KEPT_S * self._rate) :]
+
+    def new_cues(self) -> list[float]:
+        """Seconds from the end of the sound, 0 or more, of responses that have not been told yet."""
+        seen, end = self._n_seen / self._rate, self._n_samples / self._rate
+        if end - seen < LOOK_S:
+            return []
+        begin, self._n_seen = end - len(self._kept) / self._rate, self._n_samples
+        sound = Waveform(self._kept, self._rate)
+        found = [begin + time for time in cue_times(sound, last=self._last - begin, earliest=seen - begin)]
+        self._last = found[-1] if found else self._last
+        return [max(time - end, 0.0) for time in found]
