@@ -10,6 +10,7 @@ from corpus_tools.studies.gestures.gaze import compare, made_person, study_gaze,
 from corpus_tools.training.gaze import estimate, fit_lognormal, learn_gaze
 from corpus_tools.training.gaze_recordings import Fixations, Lengths, find_looks, jump_sizes, read_people
 from lexicon.errors import DataError, InputError
+from tests.corpus_tools.gesture_study.made_gaze import write_people
 from tts2face.models.gaze import PARAMETERS, STATES, GazeModel, load_gaze
 
 RECORDED = "gaze_dialogue"
@@ -84,6 +85,16 @@ def test_people_who_are_like_each_other_are_not_like_others() -> None:
     near, far = (compare(people, other, n_made=2, seed=5).comparisons for other in (model, slow))
     for one, other in zip(near[:3], far[:3], strict=True):
         assert 3 * one.made < other.made > 0.1
+
+
+def test_tables_are_read_in_degrees_of_the_person(tmp_path: Path) -> None:
+    people = read_people(write_people(tmp_path, 1))
+    assert [*people] == ["person01"]
+    for state in STATES:
+        made, read = made_person(load_gaze(), state, 1), people["person01"][state]
+        np.testing.assert_allclose(read.place, made.place, atol=1e-3)
+        np.testing.assert_allclose(read.start, made.start, atol=1e-3)
+        assert read.share_on_face == pytest.approx(made.share_on_face, abs=1e-3)
 
 
 def test_tables_that_are_none_are_refused(tmp_path: Path) -> None:
