@@ -1,9 +1,13 @@
 """What a listener does: nods and raised brows, a still head, few blinks, and the mood it shows."""
 
+import wave
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from corpus_tools.studies.gestures.measures import find_blinks
+from lexicon.errors import InputError
 from tts2face.gestures.elements import Listening, Nod
 from tts2face.gestures.listening import (
     LASTS_S,
@@ -18,6 +22,9 @@ from tts2face.gestures.listening import (
 from tts2face.gestures.stream import GestureFields, GestureStream
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import EXPRESSIONS, load_palette
+from tts2face.request import Request
+from tts2face.session.prepared import prepare
+from tts2face.storage.media_files import pcm_bytes
 from tts2face.types import Waveform
 
 FPS, RATE = 30.0, 16_000
@@ -125,3 +132,21 @@ def test_cues_of_a_sound_in_blocks_come_once_and_in_time() -> None:
         told += [end + cue for cue in heard.new_cues()]
     assert np.diff(told).min() >= LEAST_GAP_S - 0.5
     assert 0.6 * len(cue_times(sound)) <= len(told) <= len(cue_times(sound)) + 1
+
+
+def test_the_sound_of_a_partner_gives_the_responses_of_a_request(tmp_path: Path) -> None:
+    sound = spoken([(1.2, 210.0), (0.9, 180.0), (0.5, 130.0), (0.5, 0.0)] * 4)
+    path = tmp_path / "other.wav"
+    with wave.open(str(path), "wb") as file:
+        file.setparams((1, 2, RATE, 0, "NONE", ""))
+        file.writeframes(pcm_bytes(sound.samples))
+    heard = prepare(Request(listen=10.0, partner=path)).listening
+    assert [span.reacts for span in heard.listens] == [False]
+    begins = {one.time for one in (*heard.nods, *heard.brow_raises)}
+    cues = [time for time in cue_times(sound) if time < 10.0]
+    assert cues
+    assert all(min(abs(time - cue) for time in begins) < 0.05 for cue in cues)
+    alone = prepare(Request(listen=10.0)).listening
+    assert ([span.reacts for span in alone.listens], alone.nods) == ([True], ())
+    with pytest.raises(InputError, match=r"there is no recording nowhere\.wav"):
+        prepare(Request(listen=10.0, partner=Path("nowhere.wav")))

