@@ -38,10 +38,12 @@ HABIT = GazeHabit(
 HABITS = {SPEAKING: HABIT, LISTENING: replace(HABIT, face=LogNormal(8.0, 0.3), away=LogNormal(0.5, 0.3))}
 
 
-def made(process: GazeProcess, seconds: float, *, listens: bool = False, begin: float = 0.0) -> np.ndarray:
+def made(
+    process: GazeProcess, seconds: float, *, listens: bool = False, begin: float = 0.0, decibels: float = 0.0
+) -> np.ndarray:
     """Gaze (T, 2) in degrees."""
     times = begin + np.arange(round(seconds * FPS)) / FPS
-    process.extend(frames(times, listens=listens))
+    process.extend(frames(times, listens=listens, decibels=decibels))
     return np.degrees(process.at(times))
 
 
@@ -93,7 +95,7 @@ def test_most_turns_begin_with_a_look_away_and_up_and_end_on_the_listener() -> N
     for seed in range(150):
         process = GazeProcess(HABITS, [seed])
         made(process, 1.0, listens=True)
-        turn = made(process, 0.2, begin=1.0)
+        turn = made(process, 0.2, begin=1.0, decibels=-35.0)  # before the first word
         away.append(np.linalg.norm(turn[-1]) >= FACE_DEG)
         up.append(turn[-1, 0] < -abs(turn[-1, 1]))
         back = made(process, 0.6, listens=True, begin=1.2)

@@ -1,6 +1,7 @@
 """What a listener does: nods and raised brows, a still head, few blinks, and the mood it shows."""
 
 import wave
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -91,14 +92,29 @@ def test_responses_to_speech_are_apart_and_not_too_many() -> None:
     assert 6 <= len(times) / (12 * 3.1 / 60) <= 13
 
 
+@pytest.mark.parametrize(("style", "fps"), [("neutral", 30.0), ("depressed", 29.97)])
+def test_listening_in_short_pieces_is_as_at_once(style: str, fps: float) -> None:
+    fields, n_pieces, n = GestureFields(load_palette("starter")), 30, 6
+    whole = GestureStream(fields, style=style, seed=1, fps=fps)
+    silence = Waveform(np.zeros(8000 * n_pieces), 8000)
+    at_once = whole.next(silence, n_pieces * n, Timeline(listens=(Listening(0.0, 60.0),)))
+    stream, parts, known = GestureStream(fields, style=style, seed=1, fps=fps), [], Timeline()
+    for piece in range(n_pieces):
+        begin, end = float(Fraction(piece * n) / Fraction(fps)), float(Fraction(piece * n + n) / Fraction(fps))
+        known = known.restrict(begin - 1.0, np.inf).merge(Timeline(listens=(Listening(begin, end),)))
+        parts.append(stream.next(Waveform(np.zeros(1600), 8000), n, known))
+    for name in at_once:
+        np.testing.assert_allclose(np.concatenate([part[name] for part in parts]), at_once[name], atol=2e-5)
+
+
 @pytest.fixture(scope="module")
 def clips() -> dict[str, dict[str, np.ndarray]]:
-    """Silence of three minutes, with a face that listens and one that does not."""
+    """Silence of two minutes, with a face that listens and one that does not."""
     fields = GestureFields(load_palette("starter"))
-    silence = Waveform(np.zeros(180 * 8000), 8000)
+    silence = Waveform(np.zeros(120 * 8000), 8000)
     return {
         f"{style}{' listens' if timeline.listens else ''}": GestureStream(fields, style=style, seed=2, fps=FPS).next(
-            silence, round(180 * FPS), timeline
+            silence, round(120 * FPS), timeline
         )
         for style, timeline in (("neutral", Timeline()), ("neutral", HEARD), ("depressed", HEARD))
     }

@@ -102,7 +102,7 @@ class GazeProcess:
         for time, is_quiet, listens in zip(
             frames.times.tolist(), quiet.tolist(), frames.is_listening.tolist(), strict=True
         ):
-            self._quiet_s = self._quiet_s + 1.0 / GESTURE_FPS if is_quiet else 0.0
+            self._quiet_s = self._quiet_s + 1.0 / GESTURE_FPS if is_quiet and not listens else 0.0
             state = LISTENING if listens or self._quiet_s > TURN_END_S else SPEAKING
             if state != self._state:
                 self._change(state, time)

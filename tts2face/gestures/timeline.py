@@ -49,6 +49,7 @@ NOD_RAD = math.radians(6.0)  # of a nod of size 1; radians, as a head moves with
 # A flash of the brows: up, held, down; seconds, and shares of BROW_RAISE_MM (Ekman 1979, About brows).
 BROW_RAISE_KEYS = ((0.0, 0.0), (0.15, 1.0), (0.4, 1.0), (0.8, 0.0))
 BROW_RAISE_MM = 4.0
+LISTENING_HOLD_S = 0.1  # after a span: gestures of a piece are drawn two frames ahead, before the next span is known
 SACCADE_S = 0.06  # transition to a gaze target; saccades of 10 degrees take 50 ms (Bahill et al. 1975)
 
 
@@ -175,11 +176,11 @@ class Timeline:
         return moved
 
     def is_listening(self, times: ArrayLike) -> NDArray[np.bool_]:
-        """(T,) whether the face listens at T times."""
+        """(T,) whether the face listens at T times, or did within `LISTENING_HOLD_S` before."""
         seconds = np.atleast_1d(np.asarray(times, np.float64))
         found = np.zeros(len(seconds), bool)
         for span in self.listens:
-            found |= (span.start <= seconds) & (seconds < span.end)
+            found |= (span.start <= seconds) & (seconds < span.end + LISTENING_HOLD_S)
         return found
 
     def nod_pitch(self, times: ArrayLike) -> FloatArray:

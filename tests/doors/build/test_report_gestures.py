@@ -60,8 +60,8 @@ def test_the_page_is_complete_and_loads_nothing(here: Path) -> None:
     assert html.count("<td>met</td>") + html.count("<td>missed</td>") == 4
 
 
-def test_the_table_has_a_line_a_trait(here: Path) -> None:
-    rows = list(csv.DictReader(report_bytes("g.csv").decode().splitlines()))
+def test_the_table_has_a_line_a_trait(plain: bytes) -> None:
+    rows = list(csv.DictReader(plain.decode().splitlines()))
     assert len(rows) == 20
     assert {row["style"]: row["source"] for row in rows} == {"calm": "", "quick": "calm"}
     assert all(float(row[name]) >= 0 for row in rows for name in ("w_halves", "w_field", "w_noise"))
@@ -69,11 +69,11 @@ def test_the_table_has_a_line_a_trait(here: Path) -> None:
     assert {row["trait"] for row in rows if row["target"]} == {"head speed", "brow height", "blink interval"}
 
 
-def test_the_json_equals_the_table(here: Path) -> None:
+def test_the_json_equals_the_table(plain: bytes, here: Path) -> None:
     content = json.loads(report_bytes("g.json", "--people", str(write_people(here))))
     assert [(one["state"], one["trait"]) for one in content["gaze"]] == [*product(STATES, TRAITS)]
     assert all(0 <= one["made"] <= 1 for one in content["gaze"])
-    rows = list(csv.DictReader(report_bytes("g.csv").decode().splitlines()))
+    rows = list(csv.DictReader(plain.decode().splitlines()))
     weights = [
         (style["name"], trait["name"], trait["field"]) for style in content["styles"] for trait in style["traits"]
     ]
