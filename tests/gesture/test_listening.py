@@ -139,12 +139,13 @@ def test_a_friendly_listener_smiles_and_a_sad_one_does_not(clips) -> None:
     assert clips["depressed listens"]["expression"][60:, sad].mean() > 0.7
 
 
-def test_cues_of_a_sound_in_blocks_come_once_and_in_time() -> None:
+@pytest.mark.parametrize("rate", [RATE, 44_100])
+def test_cues_of_a_sound_in_blocks_come_once_and_in_time(rate: int) -> None:
     sound = spoken([(1.2, 210.0), (0.9, 180.0), (0.5, 130.0), (0.5, 0.0)] * 8)
-    heard, told = PartnerSound(RATE), []
-    for begin in range(0, len(sound.samples), RATE // 5):
-        heard.add(sound.samples[begin : begin + RATE // 5])
-        end = min(begin + RATE // 5, len(sound.samples)) / RATE
+    heard, told, sent = PartnerSound(rate), [], sound.resampled(rate).samples
+    for begin in range(0, len(sent), rate // 5):
+        heard.add(sent[begin : begin + rate // 5])
+        end = min(begin + rate // 5, len(sent)) / rate
         told += [end + cue for cue in heard.new_cues()]
     assert np.diff(told).min() >= LEAST_GAP_S - 0.5
     assert 0.6 * len(cue_times(sound)) <= len(told) <= len(cue_times(sound)) + 1

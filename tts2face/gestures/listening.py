@@ -29,7 +29,7 @@ NOD_SHARE, RAISE_SHARE = 0.75, 0.4  # of responses; one without a nod raises the
 NOD_SIZES, RAISE_SIZES = (0.35, 0.8), (0.4, 0.9)
 SECOND_NOD, SECOND_S, SECOND_SIZE = 0.5, 0.42, 0.6  # share of nods that a smaller one follows, and after how long
 LASTS_S = 1.0  # a response
-KEPT_S, LOOK_S = 8.0, 0.4  # of arriving sound in which cues are looked for, and between two looks
+KEPT_S, LOOK_S = 5.0, 0.4  # of arriving sound in which cues are looked for (20 ms), and between two looks
 
 FloatArray = NDArray[np.float64]
 
@@ -112,22 +112,23 @@ class PartnerSound:
     """
 
     def __init__(self, rate: int) -> None:
-        self._rate, self._n_samples, self._n_seen = rate, 0, 0
+        self._rate, self._n_samples, self._n_seen = rate, 0, 0  # numbers of samples at `CUE_RATE`
         self._kept = np.zeros(0, np.float32)
         self._last = -LEAST_GAP_S
 
     def add(self, samples: NDArray[np.float32]) -> None:
         """Hear samples (m,) in [-1, 1]."""
-        self._n_samples += len(samples)
-        self._kept = np.concatenate([self._kept, samples])[-round(KEPT_S * self._rate) :]
+        heard = Waveform(samples, self._rate).resampled(CUE_RATE).samples
+        self._n_samples += len(heard)
+        self._kept = np.concatenate([self._kept, heard])[-round(KEPT_S * CUE_RATE) :]
 
     def new_cues(self) -> list[float]:
         """Seconds from the end of the sound, 0 or more, of responses that have not been told yet."""
-        seen, end = self._n_seen / self._rate, self._n_samples / self._rate
+        seen, end = self._n_seen / CUE_RATE, self._n_samples / CUE_RATE
         if end - seen < LOOK_S:
             return []
-        begin, self._n_seen = end - len(self._kept) / self._rate, self._n_samples
-        sound = Waveform(self._kept, self._rate)
+        begin, self._n_seen = end - len(self._kept) / CUE_RATE, self._n_samples
+        sound = Waveform(self._kept, CUE_RATE)
         found = [begin + time for time in cue_times(sound, last=self._last - begin, earliest=seen - begin)]
         self._last = found[-1] if found else self._last
         return [max(time - end, 0.0) for time in found]
