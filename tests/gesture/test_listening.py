@@ -92,9 +92,14 @@ def test_responses_to_speech_are_apart_and_not_too_many() -> None:
     assert 6 <= len(times) / (12 * 3.1 / 60) <= 13
 
 
+@pytest.fixture(scope="module")
+def fields() -> GestureFields:
+    return GestureFields(load_palette("starter"))
+
+
 @pytest.mark.parametrize(("style", "fps"), [("neutral", 30.0), ("depressed", 29.97)])
-def test_listening_in_short_pieces_is_as_at_once(style: str, fps: float) -> None:
-    fields, n_pieces, n = GestureFields(load_palette("starter")), 30, 6
+def test_listening_in_short_pieces_is_as_at_once(fields: GestureFields, style: str, fps: float) -> None:
+    n_pieces, n = 30, 6
     whole = GestureStream(fields, style=style, seed=1, fps=fps)
     silence = Waveform(np.zeros(8000 * n_pieces), 8000)
     at_once = whole.next(silence, n_pieces * n, Timeline(listens=(Listening(0.0, 60.0),)))
@@ -108,9 +113,8 @@ def test_listening_in_short_pieces_is_as_at_once(style: str, fps: float) -> None
 
 
 @pytest.fixture(scope="module")
-def clips() -> dict[str, dict[str, np.ndarray]]:
+def clips(fields: GestureFields) -> dict[str, dict[str, np.ndarray]]:
     """Silence of two minutes, with a face that listens and one that does not."""
-    fields = GestureFields(load_palette("starter"))
     silence = Waveform(np.zeros(120 * 8000), 8000)
     return {
         f"{style}{' listens' if timeline.listens else ''}": GestureStream(fields, style=style, seed=2, fps=FPS).next(
@@ -141,7 +145,7 @@ def test_a_friendly_listener_smiles_and_a_sad_one_does_not(clips) -> None:
 
 @pytest.mark.parametrize("rate", [RATE, 44_100])
 def test_cues_of_a_sound_in_blocks_come_once_and_in_time(rate: int) -> None:
-    sound = spoken([(1.2, 210.0), (0.9, 180.0), (0.5, 130.0), (0.5, 0.0)] * 8)
+    sound = spoken([(1.2, 210.0), (0.9, 180.0), (0.5, 130.0), (0.5, 0.0)] * 5)
     heard, told, sent = PartnerSound(rate), [], sound.resampled(rate).samples
     for begin in range(0, len(sent), rate // 5):
         heard.add(sent[begin : begin + rate // 5])
