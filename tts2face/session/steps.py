@@ -18,8 +18,9 @@ from lexicon.sequence import PhoneSequence
 from tts2face.face.body import Body, phrase_starts
 from tts2face.face.gestures import SPEECH_GAINS
 from tts2face.gestures.elements import KINDS, ChannelEdit, interpolate_keys
+from tts2face.gestures.gaze import microsaccades
 from tts2face.gestures.listening import with_responses
-from tts2face.gestures.noise import NoiseStream, microsaccades
+from tts2face.gestures.noise import NoiseStream
 from tts2face.gestures.stream import GestureFields, GestureStream, GestureValues
 from tts2face.gestures.timeline import Timeline
 from tts2face.lips.exemplar import ExemplarModel, TokenSelection, select_tokens

@@ -20,7 +20,7 @@ from scipy.stats import wasserstein_distance
 
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.face.body import BREATH_SHAPE, DILATION, PUPIL_SHAPE, Breathing, Pupils
-from tts2face.gestures.noise import microsaccades
+from tts2face.gestures.gaze import microsaccades
 from tts2face.gestures.stream import style_median
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
 from tts2face.types import Trajectory
