@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from tts2face.serving.batch.store import Store
 
 
-NOT_IN_BATCH = frozenset({"text", "exports", "audio", "audio_map", "idle", "timeline", "expression"})
+NOT_IN_BATCH = frozenset(
+    {"text", "exports", "audio", "audio_map", "idle", "listen", "partner", "timeline", "expression"}
+)
 MAX_WARNINGS = 40  # on the terminal; all are in the manifest
 
 

@@ -154,7 +154,7 @@ def speak(  # noqa: PLR0913 - one parameter a flag
     if text is not None and text_option is not None:
         raise InputError("the text is given twice, as an argument and as --text; remove one of them")
     options["gestures"] = _gesture_method(options.get("gestures"), noise=noise, none=no_gestures)
-    needs_text = options.get("audio") is None and options.get("idle") is None
+    needs_text = all(options.get(name) is None for name in ("audio", "idle", "listen"))
     others = {"--face": face, "--identity": identity, "--hair": hair, "--hair-color": hair_color}
     files = {"--fit": fit, "--smile": smile}
     refuse_others(photo, {"--consent": consent, **files}, others)

@@ -49,7 +49,7 @@ def similarity(  # noqa: PLR0913 - one parameter a flag
 
 
 @report.command
-def gestures(
+def gestures(  # noqa: PLR0913 - one parameter a flag
     palette: Annotated[str, Parameter(help="Shipped palette or .palette file.")] = "starter",
     /,
     *,
@@ -58,13 +58,16 @@ def gestures(
     halves: Annotated[int, whole_number("Number of random split halves of the held-out recordings to compare.")] = 50,
     clips: Annotated[int, whole_number("Number of clips, of different seeds, made by each method.")] = 3,
     seed: Annotated[int, whole_number("Seed of the random choice of recordings, halves and clips.")] = 0,
+    people: Annotated[
+        Path | None, Parameter(help="Folder of fixations of people in conversation, to compare the gaze with.")
+    ] = None,
 ) -> None:
     """Compare each style's gestures with motion from its fields, noise and published fields for the same sound."""
-    refuse_overwriting({"--out": out}, {"the palette": palette})
+    refuse_overwriting({"--out": out}, {"the palette": palette, "--people": people})
     from corpus_tools.studies.gestures.analysis import StudyOptions
     from corpus_tools.studies.gestures.write import write_gestures
 
-    options = StudyOptions(held_out, halves, clips, seed)
+    options = StudyOptions(held_out, halves, clips, seed, people)
     with progress_bar("analysing styles") as on_progress:
         study = write_gestures(palette, out, options, on_progress=on_progress)
     n_met, n_targets = study.targets

@@ -117,8 +117,8 @@ def _check_options(request: Request, picture: Picture, options: SpeakOptions) ->
         check_file_name(options.explain, "an explanation", EXPLANATION_SUFFIXES)
     _check_overwriting(request, picture, options)
     _check_exports(options)
-    has_phones = request.has_phones and request.idle is None
-    needs_text = request.audio is None and request.idle is None
+    has_phones = request.has_phones and request.silence is None
+    needs_text = request.audio is None and request.silence is None
     if not request.text.strip() and (needs_text or (options.explain is not None and not has_phones)):
         raise InputError("the text is empty; add words to speak, or the words of --audio")
     if options.view:

@@ -1,17 +1,22 @@
 """Measure the starter palette's measured style and its moods, and write the tables of gestures.md.
 
-Run: python docs/make_gestures.py
+Run: python docs/make_gestures.py [styles] [moods] [gaze]; the people are those of ../shared/recordings/gaze_dialogue.
 """
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 from corpus_tools.studies.gestures.analysis import StudyOptions, StyleStudy, TraitComparison, study_gestures
+from corpus_tools.studies.gestures.gaze import GazeStudy, study_gaze
 from corpus_tools.studies.gestures.moods import MoodOptions, MoodStudy, mood_rows, study_moods
+from corpus_tools.studies.gestures.page import gaze_panels, panels_png
 from tts2face.models.palette import MEASURED_STYLE, load_palette
 from tts2face.session.session import Session
 
 PAGE = Path(__file__).with_name("gestures.md")
+GAZE_PICTURE = PAGE.parent / "pictures/gaze.png"
+PEOPLE = PAGE.parents[2] / "shared/recordings/gaze_dialogue"
 MOODS = MoodOptions(seeds=12, first_seed=300)  # no parameter was chosen on these seeds
 
 
@@ -96,18 +101,45 @@ def _headed(names: tuple[str, ...]) -> list[str]:
     return [f"| {' | '.join(names)} |", "| --- |" + " --- |" * (len(names) - 1)]
 
 
-def main() -> None:
-    """Measure and write."""
+def gaze(found: GazeStudy) -> str:
+    """Markdown table of made people against people, by state and trait."""
+    lines = _headed(("state", "trait", "two people", "a made one and a person", "ratio"))
+    for one in found.comparisons:
+        cells = (one.state, one.trait, f"{one.people:.3f}", f"{one.made:.3f}", f"{one.made / one.people:.2f}")
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def style_tables() -> dict[str, str]:
+    """Tables of the measured style."""
     palette = replace(load_palette("starter"), derivations={})
     (found,) = study_gestures("starter", palette, StudyOptions()).styles
-    page = PAGE.read_text(encoding="utf-8")
+    return {"distances": distances(found), "blinks": blinks(found), "movements": movements(found)}
+
+
+def mood_tables() -> dict[str, str]:
+    """Tables of the derived styles."""
     session = Session(face="head")  # the tracker reads its brows
-    tables = {
-        "distances": distances(found),
-        "blinks": blinks(found),
-        "movements": movements(found),
-        "moods": moods(study_moods(session, MOODS), study_moods(session, MOODS, ["neutral", MEASURED_STYLE])),
-    }
+    measured = study_moods(session, MOODS, ["neutral", MEASURED_STYLE])
+    return {"moods": moods(study_moods(session, MOODS), measured)}
+
+
+def gaze_tables() -> dict[str, str]:
+    """Tables of the gaze, of which a picture is written too."""
+    found = study_gaze(PEOPLE)
+    GAZE_PICTURE.write_bytes(panels_png("Gaze of people and of made people", gaze_panels(found)))
+    return {"gaze": gaze(found)}
+
+
+PARTS = {"styles": style_tables, "moods": mood_tables, "gaze": gaze_tables}
+
+
+def main() -> None:
+    """Measure and write the parts that are named, or all."""
+    tables: dict[str, str] = {}
+    for part in sys.argv[1:] or PARTS:
+        tables |= PARTS[part]()
+    page = PAGE.read_text(encoding="utf-8")
     for name, table in tables.items():
         begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
         before, _, rest = page.partition(begin)

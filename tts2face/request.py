@@ -17,11 +17,13 @@ AUDIO_MAP_NAMES = (RECOGNISED, "linear", "network")
 SYNTHESIS_METHODS = ("exemplar", "theobald2007")
 FIELDS = "fields"
 GESTURES = (FIELDS, "ju2008", "noise", "none")
+CONVERSATION, CAMERA = GAZES = ("conversation", "camera")
 IDLE_LIMITS_S = (0.1, 3600.0)
 NATURAL, CLEAR = 1.0, 1.5  # factors of articulation
 ARTICULATIONS = {"natural": NATURAL, "clear": CLEAR}
 ARTICULATION_LIMITS = (0.5, 2.0)
 LEAD_S = 0.1  # from the start of a clip to its first sound: three frames at 30 Hz, in which the lips open
+TURN_S = 0.3  # at least, after listening: a breath of less is not seen; gaps between turns of people are .2 s
 LEAD_LIMITS_S = (0.0, 1.0)
 OWN_FACE = "self"  # name of the talker's own face
 DRAWN_FACE, REALISTIC_FACE = "ada", "head"  # the shipped face that is shown by default, and the one with identities
@@ -127,7 +129,19 @@ class Request:
     )
     timeline: Path | None = option(None, "JSON file with styles, expressions, nods and gains over time.")
     pitch: bool = option(False, "Gestures follow the pitch of the voice in addition to its loudness.")
+    gaze: str = option(
+        CONVERSATION,
+        "Where the eyes of derived styles look: conversation (at the viewer and away, as people who speak or listen), "
+        "or camera (always at the viewer).",
+        choices=GAZES,
+    )
     idle: float | None = option(None, "Seconds of idle animation instead of speech.", limits=IDLE_LIMITS_S)
+    listen: float | None = option(
+        None, "Seconds for which the face listens, before its text if there is one.", limits=IDLE_LIMITS_S
+    )
+    partner: Path | None = option(
+        None, "Sound of the person to whom the face listens (--listen), at whose pauses and falls of pitch it responds."
+    )
 
     @property
     def has_phones(self) -> bool:
@@ -146,8 +160,13 @@ class Request:
 
     @property
     def is_text(self) -> bool:
-        """Whether a text is spoken by a voice, in place of a recording or idle animation."""
-        return self.audio is None and self.idle is None
+        """Whether a text is spoken by a voice, in place of a recording, or of idle animation or listening alone."""
+        return self.audio is None and self.idle is None and (self.listen is None or bool(self.text.strip()))
+
+    @property
+    def silence(self) -> float | None:
+        """Seconds of idle animation, or of listening; None where there are neither."""
+        return self.listen if self.idle is None else self.idle
 
     def __post_init__(self) -> None:
         """Reject values of other types, numbers outside their range, and options that exclude each other."""
@@ -169,6 +188,7 @@ class Request:
             raise InputError("--voice, --rate and --lead have no effect on a recording; remove them or --audio")
         if self.idle is not None:
             _check_idle(self)
+        _check_listening(self)
         _check_gestures(self)
 
 
@@ -215,11 +235,25 @@ def _check_gestures(request: Request) -> None:
     if request.gestures == "noise" and request.pitch:
         raise InputError("--pitch has no effect with --gestures noise; remove one of them")
     gesture_options = (request.style, request.gain, request.expression, request.timeline, request.pitch)
-    if request.gestures == "none" and gesture_options != (None, None, None, None, False):
+    if request.gaze not in GAZES:
+        raise InputError(f"there is no gaze {request.gaze!r}; choose {' or '.join(GAZES)}")
+    if request.gestures == "none" and (*gesture_options, request.gaze) != (None, None, None, None, False, CONVERSATION):
         raise InputError(
-            "--style, --gain, --expression, --timeline and --pitch have no effect with --gestures none; remove them, "
-            "or choose --gestures fields"
+            "--style, --gain, --expression, --timeline, --pitch and --gaze have no effect with --gestures none; remove "
+            "them, or choose --gestures fields"
         )
+
+
+def _check_listening(request: Request) -> None:
+    if request.partner is not None and request.listen is None:
+        raise InputError("--partner needs a face that listens; add --listen with the seconds, or remove it")
+    if request.listen is None:
+        return
+    if request.audio is not None or request.idle is not None:
+        raise InputError("--listen cannot be combined with --audio or --idle; remove one of them")
+    speech = (request.voice, request.rate, request.volume, request.lead)
+    if not request.text.strip() and speech != (None, 1.0, 1.0, LEAD_S):
+        raise InputError("--voice, --rate, --volume and --lead need a text after --listen; add one, or remove them")
 
 
 def _check_idle(request: Request) -> None:

@@ -8,6 +8,7 @@ phones  ``heart.phones``, ``recordings.phones``       speech of two voices, reco
 talker  ``grid_s1.talker``                            recordings of GRID's talker s1, lip tracks of free English
 heads   ``head.face`` with identities, nine haircuts  MakeHuman's data, released under CC0
 palette ``starter.palette``                           recordings of GRID's talker s1, ``derived_styles.tsv``
+gaze    ``conversation.gaze``                         fixations of 15 people in remote conversations
 cast    drawn and realistic characters                MakeHuman's data; `corpus_tools.drawn` says who they are
 light   their film light, their other haircuts        the path tracer of Blender's package bpy
 mouths  the light of their mouths, fitted to pictures the same
@@ -44,7 +45,7 @@ class Making:
     out
         Folder of the models.
     recordings
-        Folder of the recordings, with ``grid_s1`` and ``address_tracks``.
+        Folder of the recordings, with ``grid_s1``, ``address_tracks`` and ``gaze_dialogue``.
     kept
         Folder of downloads, baked poses and traced pictures, so that a step that was interrupted goes on.
     names
@@ -120,6 +121,14 @@ def derive_styles(making: Making) -> None:
     write_palette(path, replace(palette, derivations=read_derived_styles(recorded)))
 
 
+def make_gaze(making: Making) -> None:
+    """How people look at a partner in conversation: a distribution over people, in some seconds."""
+    from corpus_tools.training.gaze import learn_gaze
+    from tts2face.models.gaze import SHIPPED, write_gaze
+
+    write_gaze(making.out / f"{SHIPPED}.gaze", learn_gaze(making.recordings / "gaze_dialogue"))
+
+
 def make_cast(making: Making) -> None:
     """Characters from MakeHuman's mesh alone, on the topology and with the shapes of the head, still without light."""
     from corpus_tools.drawn.build_drawn import CAST, build_character
@@ -156,6 +165,7 @@ STEPS: Mapping[str, Callable[[Making], None]] = {
     "talker": make_talker,
     "heads": make_heads,
     "palette": make_palette,
+    "gaze": make_gaze,
     "cast": make_cast,
     "light": make_light,
     "mouths": make_mouths,

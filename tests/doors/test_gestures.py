@@ -15,7 +15,7 @@ from tts2face.face.gestures import gesture_face
 from tts2face.models.face import Face
 from tts2face.models.palette import FEATURES, load_palette, write_palette
 from tts2face.models.talker import Talker
-from tts2face.request import Request
+from tts2face.request import GAZES, Request
 from tts2face.session.session import Session
 from tts2face.storage.files import SHIPPED_FOLDER
 from tts2face.types import Clip
@@ -153,6 +153,22 @@ def test_an_idle_face_lives(session: Session, face: Face) -> None:
     assert np.degrees(np.ptp(clip.head.values[:, :3], axis=0)).max() > 0.5
     gap = lip_gap(gesture_face(face, load_palette("starter")).face, clip)
     assert np.ptp(gap) < 0.5  # mm: lips stay closed
+
+
+def test_the_camera_holds_the_gaze(session: Session) -> None:
+    plain, held = (session.clip(Request(text=TEXT * 4, seed=3, gaze=gaze)) for gaze in GAZES)
+    assert gaze_degrees(plain).max() > 8
+    assert gaze_degrees(held).max() < 2  # microsaccades
+    with pytest.raises(InputError, match="--gain of the gaze has no effect with --gaze camera; remove one"):
+        session.clip(Request(text=TEXT, gaze="camera", gain="gaze=2"))
+
+
+def gaze_degrees(clip: Clip) -> np.ndarray:
+    """(T,) degrees of the line of sight from the viewer: of the eyes, in the head, and of the head."""
+    ways = {"Out": 25, "In": 25, "Up": 20, "Down": 20}  # degrees of the left eye at weight 1
+    left, right, up, down = (turn * channels_of(clip, (f"eyeLook{way}Left",))[:, 0] for way, turn in ways.items())
+    pitch, yaw = np.degrees(clip.head.values[:, :2]).T
+    return np.hypot(down - up + pitch, left - right + yaw)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face
 from tts2face.models.talker import Talker
 from tts2face.numeric.kernels import CACHE_VARIABLE, FOLDER
-from tts2face.request import GESTURES, Request
+from tts2face.request import GESTURES, LEAD_S, TURN_S, Request
 from tts2face.session.session import Session
 from tts2face.types import Clip, concatenate_clips
 
@@ -35,6 +35,8 @@ CHANGES = {
     "pitch": True,
     "style": "delighted",
     "gain": "head=2,blink=0",
+    "gaze": "camera",
+    "listen": 0.5,
     "expression": "happy=0.6@0.2-0.9",
 }
 
@@ -56,7 +58,7 @@ def digest(clip: Clip) -> str:
 
 
 # tests/doors/test_audio.py changes these; idle animation and delivery below
-ELSEWHERE = {"audio", "audio_map", "idle", "plain_delivery"}
+ELSEWHERE = {"audio", "audio_map", "idle", "partner", "plain_delivery"}
 
 
 @pytest.mark.parametrize("name", [option.name for option in fields(Request) if option.name not in ELSEWHERE])
@@ -120,6 +122,27 @@ def test_an_idle_clip_is_silent_and_has_the_requested_duration(seconds: float, f
     assert clip.speech.phones.phones == ("sil",)
     assert len(pieces) == -(-seconds // 10)
     assert sum(piece.n_steps for piece in pieces) == 1000
+
+
+def test_a_face_listens_before_it_speaks(session: Session, clip: Clip) -> None:
+    pieces = list(session.stream(TEXT, listen=10.5))
+    joined = concatenate_clips([piece.clip for piece in pieces])
+    assert len(pieces) == 4
+    assert sum(piece.n_steps for piece in pieces) == 1000 + sum(piece.n_steps for piece in session.stream(TEXT))
+    later = 10.5 + TURN_S - LEAD_S  # the first sound leaves time for a breath
+    assert joined.speech.waveform.duration == pytest.approx(clip.speech.waveform.duration + later, abs=0.05)
+    assert joined.speech.phones.edges[1] == pytest.approx(clip.speech.phones.edges[1] + later, abs=0.04)
+    first = round(10.5 * joined.speech.waveform.rate)
+    assert not joined.speech.waveform.samples[:first].any()
+    listened, plain = (jaw_before_speech(one) for one in (joined, session.clip(TEXT, lead=TURN_S)))
+    assert (listened - plain)[1:6].max() > 0.04  # the lips part for it
+    assert abs(listened - plain)[-1] < 0.02
+
+
+def jaw_before_speech(clip: Clip) -> np.ndarray:
+    """Weights of the last eight frames before the first phone."""
+    frame = round(clip.speech.phones.edges[1] * clip.fps)
+    return clip.motion.values[frame - 8 : frame, clip.motion.channels.index("jawOpen")]
 
 
 @pytest.mark.parametrize("fps", [23.976, 24.0, 25.0, 29.97, 50.0, 59.94])
@@ -187,6 +210,14 @@ def test_requests_that_cannot_be_spoken_are_refused(change: dict, reason: str, s
             "--volume and --lead have no effect with --idle; remove them",
         ),
         ({"idle": 0.0, "text": ""}, "idle must lie between 0.1 and 3600, not 0"),
+        (
+            {"listen": 5.0, "audio": Path("speech.wav"), "text": ""},
+            "--listen cannot be combined with --audio or --idle",
+        ),
+        ({"listen": 5.0, "text": "", "rate": 1.2}, "--lead need a text after --listen; add one, or remove them"),
+        ({"partner": Path("other.wav")}, "--partner needs a face that listens; add --listen with the seconds"),
+        ({"gaze": "up"}, "no gaze 'up'; choose conversation or camera"),
+        ({"gestures": "none", "gaze": "camera"}, "have no effect with --gestures none"),
         ({"gestures": "none", "style": "calm"}, "have no effect with --gestures none"),
         ({"gestures": "none", "pitch": True}, "have no effect with --gestures none"),
         ({"gestures": "noise", "pitch": True}, "--pitch has no effect with --gestures noise; remove one of them"),

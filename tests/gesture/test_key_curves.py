@@ -10,10 +10,12 @@ from hypothesis import strategies as st
 from lexicon.errors import DataError, InputError
 from tts2face.gestures.elements import (
     KINDS,
+    BrowRaise,
     ChannelEdit,
     ExpressionCurve,
     ExpressionSpan,
     GazeTarget,
+    Listening,
     Nod,
     StrengthCurve,
     StyleSpan,
@@ -37,6 +39,8 @@ WHOLE = Timeline(
     spans=(StyleSpan("brows", "wild", 1.0, 2.0),),
     expressions=(ExpressionSpan("happy", 0.5, 1.0, 2.0),),
     nods=(Nod(0.5, 1.5),),
+    brow_raises=(BrowRaise(1.0, 0.5),),
+    listens=(Listening(0.5, 1.0, reacts=False), Listening(2.0)),
     gaze=(GazeTarget(-5.0, 20.0, 1.0, 2.0), GazeTarget(0.0, 0.0, 2.0, np.inf)),
     strengths=(StrengthCurve("head", ((0.0, 0.0), (2.0, 1.5))),),
     curves=(ExpressionCurve("sad", ((0.0, 0.2),)),),
@@ -75,6 +79,14 @@ def test_strength_scales_one_feature_over_time(palette: Palette) -> None:
     np.testing.assert_allclose(scaled["head"][60:], 2.0 * plain["head"][60:], rtol=1e-6)
     for feature in set(plain) - {"head"}:
         np.testing.assert_array_equal(scaled[feature], plain[feature])
+
+
+def test_brows_rise_by_their_size_and_return(palette: Palette) -> None:
+    plain = gestures(palette, Timeline())
+    raised = gestures(palette, Timeline(brow_raises=(BrowRaise(1.0, 0.5),)))
+    height = (raised["brows"] - plain["brows"]) @ palette.brow_lift
+    np.testing.assert_allclose(height[35:42], 2.0, atol=1e-4)
+    np.testing.assert_allclose(height[[0, 30, 54, 89]], 0.0, atol=1e-4)
 
 
 def test_the_gaze_reaches_its_target_and_returns(palette: Palette) -> None:

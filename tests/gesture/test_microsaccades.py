@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tts2face.gestures.noise import microsaccades
+from tts2face.gestures.gaze import microsaccades
 
 
 def test_one_to_two_jumps_a_second_below_a_degree() -> None:

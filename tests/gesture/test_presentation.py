@@ -7,7 +7,7 @@ import pytest
 
 from corpus_tools.studies.gestures.measures import find_blinks, wasserstein
 from tts2face.gestures.blinks import PAUSE_DB
-from tts2face.gestures.elements import Gains, StyleSpan
+from tts2face.gestures.elements import Gains, GazeTarget, StyleSpan
 from tts2face.gestures.presentation import (
     LowPass,
     filtered_spread,
@@ -130,15 +130,40 @@ def yaw_spread(clip) -> float:
     return float(np.degrees(clip["head"][:, 1].std()))
 
 
-def test_heads_turn_visibly_and_return_to_the_viewer(neutral, measured) -> None:
+def test_heads_turn_visibly_and_return_to_the_viewer(fields: GestureFields, neutral, measured) -> None:
+    held = [gestures(fields, seed=seed, timeline=Timeline(gains=Gains({"gaze": 0.0}))) for seed in SEEDS]
     spreads = [yaw_spread(clip) for clip in neutral]
     assert 2.0 <= np.mean(spreads) <= 4.0
     assert min(spreads) > 1.2
     assert np.mean([yaw_spread(clip) for clip in measured]) < 0.6
-    for clip in neutral:
+    for clip in held:
+        assert 1.0 < yaw_spread(clip) < 4.0
         yaw = np.degrees(clip["head"][:, 1])
         assert abs(yaw.mean()) < 1.5
         assert np.abs(yaw).max() < 16
+
+
+def test_the_head_follows_the_eyes_of_derived_styles_only(fields: GestureFields, neutral, measured) -> None:
+    held = Timeline(gains=Gains({"gaze": 0.0}))
+    turned = np.degrees(neutral[0]["head"] - gestures(fields, timeline=held)["head"])[:, 1]
+    far = np.degrees(neutral[0]["gaze"][:, 1])
+    assert np.abs(turned).max() > 4
+    assert np.corrcoef(turned, far)[0, 1] > 0.7
+    assert np.corrcoef(turned[5:], far[:-5])[0, 1] > np.corrcoef(turned, far)[0, 1]  # after them
+    still = gestures(fields, "measured", timeline=Timeline(gaze=(GazeTarget(0.0, 30.0),)))
+    np.testing.assert_array_equal(still["head"], measured[0]["head"])
+    np.testing.assert_allclose(still["gaze"], np.tile(np.radians([0.0, 30.0]), (len(turned), 1)), atol=1e-6)
+
+
+def test_a_style_scales_the_gaze_and_recorded_styles_keep_theirs(fields: GestureFields, neutral) -> None:
+    annoyed = gestures(fields, "annoyed")
+    middle = fields.middle("grid_s1", "gaze")
+    np.testing.assert_allclose(annoyed["gaze"] - middle, 0.5 * (neutral[0]["gaze"] - middle), atol=1e-6)
+    assert np.degrees(np.linalg.norm(neutral[0]["gaze"], axis=1)).max() > 10
+    mixed = gestures(fields, timeline=Timeline(spans=(StyleSpan("gaze", "measured", 10.0, SECONDS),)))
+    np.testing.assert_allclose(mixed["gaze"][:290], neutral[0]["gaze"][:290], atol=1e-6)
+    recorded = fields.palette.styles["grid_s1"].motion["gaze"]
+    assert np.abs(mixed["gaze"][310:]).max() <= np.abs(recorded).max()
 
 
 def fast_power(head: np.ndarray) -> np.ndarray:

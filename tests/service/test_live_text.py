@@ -188,3 +188,29 @@ def test_each_sentence_is_a_request_of_its_key() -> None:
     with pytest.raises(RefusedError, match=r"'Three.' and what follows it in the message is not spoken: the key a"):
         follow(text, say("One. Two. Three. Four. And"))
     assert given(text) == ["One.", "Two."]
+
+
+def test_sound_of_the_partner_is_given_in_blocks_after_its_rate() -> None:
+    text = live()
+
+    async def run() -> None:
+        with pytest.raises(RefusedError, match="sound of the other is heard after listen with its sample rate"):
+            await text.receive({"type": "audio"}, bytes(320))
+        await text.receive({"type": "listen", "rate": 16_000})
+        for _ in range(11):
+            await text.receive({"type": "audio"}, bytes(320))  # 10 ms
+
+    asyncio.run(run())
+    assert [text.inputs.get_nowait() for _ in range(2)] == [
+        ({"type": "listen", "rate": 16_000}, b""),
+        ({"type": "heard"}, bytes(3200)),
+    ]
+    assert text.inputs.empty()
+
+
+@pytest.mark.parametrize("rate", [7_999, 16_000.0, "16000", [1]], ids=str)
+def test_a_rate_that_is_none_is_refused(rate: Any) -> None:
+    text = live()
+    with pytest.raises(RefusedError, match="rate must be a sample rate from 8000 to 192000 Hz, or null, not"):
+        follow(text, [{"type": "listen", "rate": rate}])
+    assert text.inputs.empty()

@@ -9,7 +9,7 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence
-from tts2face.gestures.elements import KINDS, GazeTarget, Nod, StyleSpan
+from tts2face.gestures.elements import KINDS, GazeTarget, Listening, Nod, StyleSpan
 from tts2face.lips.options import ExcludedToken
 from tts2face.models.palette import FEATURES
 from tts2face.request import Request
@@ -75,12 +75,15 @@ def test_nods_and_gaze_are_placed_replaced_and_removed() -> None:
         PROJECT,
         {"kind": "nod", "time": 1.0, "size": 1.0}, {"kind": "nod", "time": 1.02, "size": 0.5},
         {"kind": "gaze", "start": 0, "end": 2, "down_deg": 5, "left_deg": -10},
+        {"kind": "listen", "start": -1, "end": 2}, {"kind": "listen", "start": 1, "end": 3},
     )  # fmt: skip
     assert project.timeline.nods == (Nod(1.02, 0.5),)
     assert project.timeline.gaze == (GazeTarget(5, -10, 0, 2),)
-    empty = edited(project, {"kind": "remove_nod", "time": 1.03}, {"kind": "remove_gaze", "time": 0.5}).timeline
-    assert (empty.nods, empty.gaze) == ((), ())
-    for kind in ("nod", "gaze"):
+    assert project.timeline.listens == (Listening(0, 1), Listening(1, 3))
+    removed = ({"kind": "remove_nod", "time": 1.03}, {"kind": "remove_gaze", "time": 0.5})
+    empty = edited(project, *removed, *({"kind": "remove_listen", "time": time} for time in (0.5, 2))).timeline
+    assert (empty.nods, empty.gaze, empty.listens) == ((), (), ())
+    for kind in ("nod", "gaze", "listen"):
         with pytest.raises(InputError, match=r"at 5.00 s; click on one"):
             edited(project, {"kind": f"remove_{kind}", "time": 5})
 
@@ -189,8 +192,9 @@ def test_wrong_edits_are_refused_with_their_reason(edit: dict[str, Any], reason:
 
 def test_every_kind_of_edit_is_tested() -> None:
     assert set(EDITS) == {
-        "paint", "erase", "curve", "strength", "channel", "nod", "remove_nod", "gaze", "remove_gaze", "mute", "solo",
-        "seed", "edge", "reset_edges", "pronounce", "exclude", "request", "models", "picture", "name",
+        "paint", "erase", "curve", "strength", "channel", "nod", "remove_nod", "gaze", "remove_gaze", "listen",
+        "remove_listen", "mute", "solo", "seed", "edge", "reset_edges", "pronounce", "exclude", "request", "models",
+        "picture", "name",
     }  # fmt: skip
 
 

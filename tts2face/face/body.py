@@ -207,6 +207,21 @@ class Pupils:
         return replace(face, values=weights), Dilation(now.clock_s + face.duration, effort)
 
 
+JAW_SHAPE, PARTED = "jawOpen", 0.07  # weight at which a mouth that was closed draws breath
+PARTS_S, CLOSES_S = 0.3, 0.05  # before the first phone: begin and end, so that its closure is the phone's own
+
+
+def part_lips(face: Trajectory, turns: Sequence[float]) -> Trajectory:
+    """Motion (T, K) with lips that part before `turns` (s); as it is for a face without `JAW_SHAPE`."""
+    if not turns or JAW_SHAPE not in face.channels:
+        return face
+    weights, column, times = face.values.copy(), face.channels.index(JAW_SHAPE), face.times
+    for turn in turns:
+        share = np.clip((turn - CLOSES_S - times) / (PARTS_S - CLOSES_S), 0.0, 1.0)
+        weights[:, column] = np.maximum(weights[:, column], PARTED * np.square(np.sin(np.pi * share)))
+    return replace(face, values=weights)
+
+
 class Body:
     """Hair, shoulders and pupils of a face with some channels, piece by piece of a clip."""
 
@@ -219,10 +234,16 @@ class Body:
         self._breath: Breath | None = None
         self._dilation: Dilation | None = None
 
-    def move(self, face: Trajectory, head: Trajectory, phones: PhoneSequence) -> Trajectory:
-        """Motion (T, K) of the next piece with these, from that of the face and the head (T, 6)."""
+    def move(
+        self, face: Trajectory, head: Trajectory, phones: PhoneSequence, turns: Sequence[float] = ()
+    ) -> Trajectory:
+        """Motion (T, K) of the next piece with these, from that of the face and the head (T, 6).
+
+        Before `turns`, seconds of the piece at which speech begins after listening, the lips part for the breath.
+        """
         if not len(face):
             return face
+        face = part_lips(face, turns)
         if self._hair is not None:
             face, self._swing = self._hair.apply(face, head, self._swing)
         if self._breathing is not None:

@@ -24,6 +24,7 @@ MAX_PROFILES = 256
 # pauses and ends of phrases (Bentivoglio et al. 1997, Movement Disorders 12; Nakano and Kitazawa 2010, Experimental
 # Brain Research 205).
 MEAN_INTERVAL_S, INTERVAL_SHAPE, MIN_INTERVAL_S = 4.7, 10.0, 1.5
+LISTENING_INTERVALS = 26 / 17  # of those of speech: 17 blinks a minute at rest, 26 in conversation (Bentivoglio)
 EARLY_SHARE = 0.6  # of the interval after which a phrase end is used
 PATIENCE_S = 1.6  # an overdue blink waits this long for a pause
 PAUSE_DB = -20.0  # intensity of a pause, relative to the mean level of speech
@@ -170,18 +171,19 @@ class BlinkPresentation:
         time = float(frames.times[at])
         self._waited, self._time = self._waited + time - self._time, time
         self._paused_frames = self._paused_frames + 1 if frames.intensity[at] < PAUSE_DB else 0
-        if frames.is_presented[at] and self._frame >= len(self._profile) and self._begins():
+        listens = bool(frames.is_listening[at])
+        if frames.is_presented[at] and self._frame >= len(self._profile) and self._begins(listens=listens):
             self._interval, self._waited = self._draw_interval(float(chances[0])), 0.0
             self._profile, self._frame = self._profiles[int(chances[1] * len(self._profiles))], 0
         self._frame += 1
         return self._profile[self._frame - 1] if self._frame <= len(self._profile) else np.zeros(2)
 
-    def _begins(self) -> bool:
+    def _begins(self, *, listens: bool) -> bool:
         if self._waited < MIN_INTERVAL_S:
             return False
-        if self._paused_frames == PHRASE_END_FRAMES and self._waited >= EARLY_SHARE * self._interval:
+        if not listens and self._paused_frames == PHRASE_END_FRAMES and self._waited >= EARLY_SHARE * self._interval:
             return True
-        overdue = self._waited - self._interval
+        overdue = self._waited - (LISTENING_INTERVALS if listens else 1.0) * self._interval
         return overdue >= (0.0 if self._paused_frames >= PHRASE_END_FRAMES else PATIENCE_S)
 
     def _draw_interval(self, chance: float) -> float:

@@ -169,6 +169,23 @@ class GazeTarget:
 
 
 @dataclass(frozen=True, slots=True)
+class Listening:
+    """The face listens to its partner in [start, end); `end` may be infinite.
+
+    It nods and raises the brows at intervals as listeners do, unless ``reacts`` is False: what is known of the other's
+    speech then gives the nods.
+    """
+
+    start: float = 0.0
+    end: float = math.inf
+    reacts: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse times that do not run forward."""
+        _check_span("listening", self.start, self.end)
+
+
+@dataclass(frozen=True, slots=True)
 class Nod:
     """A nod that starts at `time` seconds; size 1 is 6 degrees."""
 
@@ -180,6 +197,20 @@ class Nod:
         if not 0.0 <= self.time < math.inf:
             raise InputError(f"a nod needs a time of 0 s or more, not {self.time:g}")
         check_limits("the size of a nod", self.size, NOD_SIZE_LIMITS)
+
+
+@dataclass(frozen=True, slots=True)
+class BrowRaise:
+    """Brows that go up at `time` seconds and down again; size 1 is 4 mm."""
+
+    time: float
+    size: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Refuse times before the clip and sizes out of range."""
+        if not 0.0 <= self.time < math.inf:
+            raise InputError(f"a brow raise needs a time of 0 s or more, not {self.time:g}")
+        check_limits("the size of a brow raise", self.size, NOD_SIZE_LIMITS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -341,8 +372,9 @@ class ElementKind:
                         f"lasts {duration:.2f} s; shorten it"
                     )
             elif self.shape == "instant" and one.time >= duration:
+                what = self.name.removesuffix("s").replace("_", " ")
                 raise InputError(
-                    f"the nod at {one.time:g} s lies beyond the clip, which lasts {duration:.2f} s; move it"
+                    f"the {what} at {one.time:g} s lies beyond the clip, which lasts {duration:.2f} s; move it"
                 )
 
 
@@ -352,7 +384,9 @@ KINDS: Mapping[str, ElementKind] = MappingProxyType({
         ElementKind("spans", StyleSpan, "span", "feature"),
         ElementKind("expressions", ExpressionSpan, "span", "expression"),
         ElementKind("gaze", GazeTarget, "span", ""),
+        ElementKind("listens", Listening, "span", ""),
         ElementKind("nods", Nod, "instant", ""),
+        ElementKind("brow_raises", BrowRaise, "instant", ""),
         ElementKind("strengths", StrengthCurve, "curve", "feature"),
         ElementKind("curves", ExpressionCurve, "curve", "expression"),
         ElementKind("edits", ChannelEdit, "curve", "channel"),

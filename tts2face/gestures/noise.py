@@ -1,10 +1,6 @@
 """Gestures from noise, as a baseline for comparison (Perlin 1985, 1995).
 
 Amplitudes and blink rates are those of the recordings; the timing is independent of the sound.
-
-Micro-saccades: eyes that rest on a place jump a little about it, and drift back.
-
-Source: Martinez-Conde et al. 2004 (one to two a second, below a degree, more along than across the horizon).
 """
 
 from collections.abc import Mapping
@@ -14,7 +10,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.gestures.stream import NO_SEEDS, GestureFields, GestureValues, apply_timeline, style_median
+from tts2face.gestures.stream import NO_SEEDS, GestureFields, GestureValues, style_median
 from tts2face.gestures.timeline import Timeline
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.types import Waveform
@@ -45,7 +41,8 @@ class NoiseStream:
         times = (self._n_frames + np.arange(n_frames)) / self._fps
         self._n_frames += n_frames
         return {
-            name: apply_timeline(name, self._values(name, times), times, timeline) for name in self._fields.features
+            name: self._fields.apply_timeline(name, self._values(name, times), times, timeline)
+            for name in self._fields.features
         }
 
     def _values(self, feature: str, times: NDArray[np.float64]) -> Float32Array:
@@ -99,27 +96,3 @@ def _hash_noise(numbers: NDArray[np.int64], key: int, octave: int) -> NDArray[np
     for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB), (31, 1)):
         mixed = (mixed ^ (mixed >> np.uint64(shift))) * np.uint64(factor)
     return mixed.astype(np.float64) / 2.0**63 - 1.0
-
-
-FloatArray = NDArray[np.float64]
-
-CELL_S, SHARE = 0.75, 0.85  # at most one jump a cell, in a share of them: 1.1 a second
-MARGIN = 0.1  # of a cell, between jumps of neighbours
-SPREAD_RAD = np.radians([0.12, 0.28])  # of places in pitch and yaw
-DRIFT_S = 0.8  # in which two thirds of a jump are taken back
-
-
-def microsaccades(times: FloatArray, seed: int) -> FloatArray:
-    """Offset (T, 2) of pitch and yaw in radians at times (T,) of the whole clip, whatever its pieces."""
-    cells = np.floor(times / CELL_S).astype(np.int64)
-    found = np.zeros((len(times), 2))
-    for cell in range(int(cells.min(initial=0)) - 1, int(cells.max(initial=-1)) + 1):
-        if cell < 0:
-            continue
-        draws = np.random.default_rng((seed, cell))
-        jumps, begin = draws.uniform() < SHARE, CELL_S * (cell + draws.uniform(MARGIN, 1 - MARGIN))
-        place = draws.normal(size=2) * SPREAD_RAD
-        if jumps:
-            later = times >= begin
-            found[later] = place * np.exp(-(times[later, None] - begin) / DRIFT_S)
-    return found

@@ -62,6 +62,7 @@ SMOOTHING_STAGES = 4  # low-pass stages in series: 80 dB per decade, so that sca
 LOUD_DB = 0.0  # intensity relative to the mean level of speech at which the loudness is 1
 # Emphasis of a mood's expression: share in silence, gain with the smoothed loudness, and spread of a slow random part.
 SILENT_EMPHASIS, LOUDNESS_EMPHASIS, RANDOM_EMPHASIS = 0.86, 0.21, 0.07
+LISTENING_LOUDNESS = 1.2  # a listener shows the mood as in loud speech: a friendly one smiles
 EMPHASIS_HZ, RANDOM_HZ = 0.9, 0.25
 EMPHASIS_LIMITS = (0.6, 1.35)
 
@@ -82,12 +83,15 @@ class FrameContext:
         Seconds and strength (0 to 1) of the accents of the current piece of sound.
     is_presented : (n,)
         Whether the style of each frame is a derived one.
+    is_listening : (n,)
+        Whether the face listens.
     """
 
     times: FloatArray
     intensity: Float32Array
     accents: FloatArray
     is_presented: NDArray[np.bool_]
+    is_listening: NDArray[np.bool_]
 
 
 class Presentation(Protocol):
@@ -158,19 +162,37 @@ class Emphasis:
     def next(self, frames: FrameContext) -> FloatArray:
         """(n,) factors of a mood's expression at the next frames; 1 where the style is a recorded one."""
         loudness = np.clip((frames.intensity.astype(np.float64) - QUIET_DB) / (LOUD_DB - QUIET_DB), 0.0, 1.3)
+        loudness = np.where(frames.is_listening, LISTENING_LOUDNESS, loudness)
         loud = self._loudness.filter(np.square(loudness)[:, None])[:, 0]
         noise = self._random.filter(self._generator.normal(size=(len(frames.times), 1)))[:, 0]
         emphasis = SILENT_EMPHASIS + LOUDNESS_EMPHASIS * loud + RANDOM_EMPHASIS * self._random_gain * noise
         return np.where(frames.is_presented, np.clip(emphasis, *EMPHASIS_LIMITS), 1.0)
 
 
+class Glide:
+    """Share of a state that begins and ends within some seconds; at first at once."""
+
+    def __init__(self, seconds: float) -> None:
+        self._change, self._share = 1.0 / (seconds * GESTURE_FPS), -1.0
+
+    def next(self, holds: NDArray[np.bool_]) -> FloatArray:
+        """(n,) shares at the next frames, in which the state holds or not."""
+        shares = np.zeros(len(holds))
+        for at, target in enumerate(holds.astype(np.float64).tolist()):
+            change = self._change if self._share >= 0.0 else 2.0
+            self._share = float(np.clip(target, self._share - change, self._share + change))
+            shares[at] = self._share
+        return shares
+
+
 SLOW_HZ = 0.7  # cut-off of the part that is scaled: turns and tilts that last a phrase
 RETURN_HZ = 0.12  # cut-off of what is subtracted, so that the head drifts back to the viewer within some 10 s
 # Standard deviation in radians to which the slow part is scaled, and the largest angle of it. Speakers who look at a
 # listener move by 2 to 5 degrees (yaw) about the direction to the listener.
-TARGET_SPREAD = {"pitch": np.radians(1.2), "yaw": np.radians(5.0), "roll": np.radians(1.2)}
+TARGET_SPREAD = {"pitch": np.radians(1.2), "yaw": np.radians(4.0), "roll": np.radians(1.2)}
 LARGEST_RATIO = 2.6  # of the slow part, in units of its target spread; approached smoothly
 MAX_SCALE = 20.0
+STILL_S, LISTENING_MOTION = 1.0, 0.4  # listeners turn the head far less than speakers (Hadar et al. 1983)
 ONSET_S = 0.3  # transition from and to recorded styles
 # Nods at accents: size in radians of strength 1, and a sum of Gaussians (seconds from the accent, share): a slight
 # lift, the nod, and a slight overshoot. Gaussians of 0.1 s hold no power above 6 Hz.
@@ -249,7 +271,7 @@ class HeadPresentation:
         self._generator = np.random.default_rng(seed)
         self._slow, self._lasting = (LowPass(cutoff, np.zeros(len(scales))) for cutoff in (SLOW_HZ, RETURN_HZ))
         self._limits = np.array([LARGEST_RATIO * TARGET_SPREAD.get(channel, 1e9) for channel in HEAD_CHANNELS])
-        self._share = -1.0
+        self._presented, self._still = Glide(ONSET_S), Glide(STILL_S)
         self._nods: list[_Nod] = []
         self._last_accent = -ACCENT_GAP_S
 
@@ -258,6 +280,7 @@ class HeadPresentation:
         new = copy(self)
         new._generator, new._nods = deepcopy(self._generator), self._nods.copy()
         new._slow, new._lasting = self._slow.copy(), self._lasting.copy()
+        new._presented, new._still = copy(self._presented), copy(self._still)
         return new
 
     def apply(self, values: Float32Array, frames: FrameContext) -> Float32Array:
@@ -266,17 +289,9 @@ class HeadPresentation:
         slow = self._slow.filter(values.astype(np.float64) - self._middle)
         slow = slow - self._lasting.filter(slow)
         scaled = self._limits * np.tanh(slow * (self._scales - 1.0) / self._limits)
+        scaled *= 1.0 - (1.0 - LISTENING_MOTION) * self._still.next(frames.is_listening)[:, None]
         added = scaled + self._nodded(frames.times)
-        return np.asarray(values + self._shares(frames.is_presented)[:, None] * added, np.float32)
-
-    def _shares(self, is_presented: NDArray[np.bool_]) -> FloatArray:
-        """(n,) shares of the presentation, which change within `ONSET_S`."""
-        shares = np.zeros(len(is_presented))
-        for at, target in enumerate(is_presented.astype(np.float64).tolist()):
-            change = 1.0 / (ONSET_S * GESTURE_FPS) if self._share >= 0.0 else 2.0
-            self._share = float(np.clip(target, self._share - change, self._share + change))
-            shares[at] = self._share
-        return shares
+        return np.asarray(values + self._presented.next(frames.is_presented)[:, None] * added, np.float32)
 
     def _add_nods(self, frames: FrameContext) -> None:
         begin = float(frames.times[0])

@@ -16,7 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.gestures.blinks import BlinkPresentation, blink_profiles, lids_without_blinks
-from tts2face.gestures.field import Field, FieldOptions, build_field, initial_state, sample_field, transfer_state
+from tts2face.gestures.field import (
+    Field,
+    FieldOptions,
+    FieldState,
+    build_field,
+    initial_state,
+    sample_field,
+    transfer_state,
+)
+from tts2face.gestures.gaze import GazeProcess, HeadFollower
 from tts2face.gestures.presentation import (
     Emphasis,
     FrameContext,
@@ -28,6 +37,7 @@ from tts2face.gestures.presentation import (
     speech_intensity,
 )
 from tts2face.gestures.timeline import Timeline
+from tts2face.models.gaze import load_gaze
 from tts2face.models.palette import FEATURES, GESTURE_FPS, FeatureChange, Palette, Style
 from tts2face.numeric.arrays import interpolate_cubic
 from tts2face.sound.features import IntensityTrack
@@ -110,6 +120,14 @@ class GestureFields:
             return HeadPresentation(self.middle(source, feature), self._scales[source], key)
         return None
 
+    def gaze_process(self, feature: str, seed: int) -> GazeProcess | None:
+        """Gaze of derived styles for one clip; None for other features, and for motion as published."""
+        if feature != "gaze" or not self.has_presentation:
+            return None
+        # With this name the default seed draws a typical person (on the face .66 of speech, .92 of listening), who
+        # looks at the viewer for two seconds first.
+        return GazeProcess.of_person(load_gaze(), [seed, crc32(b"partner")])
+
     def source(self, style: str, feature: str) -> str:
         """Recorded style from which a style's feature is sampled; another one if that style lacks the feature."""
         styles, name = self.palette.styles, self.palette.source(style)
@@ -132,6 +150,22 @@ class GestureFields:
         offsets = offset if emphasis is None else emphasis[:, None] * offset
         return np.asarray(middle + np.float32(change.gain) * (values - middle) + offsets, np.float32)
 
+    def apply_timeline(
+        self, feature: str, values: Float32Array, times: NDArray[np.float64], timeline: Timeline
+    ) -> Float32Array:
+        """Apply what a timeline adds to a feature, and its strength, to values (T, k)."""
+        values = np.asarray(values * timeline.strength(feature, times).astype(np.float32)[:, None], np.float32)
+        if feature == "expression":
+            values = values + timeline.expression_weights(times).astype(np.float32)
+        elif feature == "gaze":
+            values = timeline.apply_gaze(times, values).astype(np.float32)
+        elif feature == "head":
+            values[:, 0] += timeline.nod_pitch(times).astype(np.float32)
+        elif feature == "brows" and timeline.brow_raises:
+            lift = self.palette.brow_lift
+            values = values + np.outer(timeline.brow_height(times), lift / (lift @ lift)).astype(np.float32)
+        return values
+
     @property
     def features(self) -> tuple[str, ...]:
         """Features of which any style of the palette has recordings."""
@@ -151,11 +185,12 @@ class GestureStream:
         fields.palette.require(style)
         self._fields, self._fps = fields, fps
         self._tracks = {name: _FeatureTrack(fields, name, style, seeds.get(name, seed)) for name in fields.features}
-        self._n_frames = 0
+        self._n_frames, self._style, self._follower = 0, style, HeadFollower()
 
     def copy(self) -> "GestureStream":
         """A stream that continues as this one, independently of it."""
         new = copy(self)
+        new._follower = self._follower.copy()
         new._tracks = {name: track.copy() for name, track in self._tracks.items()}
         return new
 
@@ -175,20 +210,13 @@ class GestureStream:
         values, prosody = {}, _SoundFeatures(sound, begin, with_pitch=self._fields.with_pitch)
         for name, track in self._tracks.items():
             track.extend(prosody, float(times[-1]), timeline)
-            values[name] = apply_timeline(name, track.at(times, timeline), times, timeline)
+            values[name] = self._fields.apply_timeline(name, track.at(times, timeline), times, timeline)
+        if "gaze" in values and "head" in values:
+            turned = self._follower.next(values["gaze"], self._fps) * timeline.strength("head", times)[:, None]
+            shares = timeline.style_shares("head", times, default=self._style)
+            presented = sum(share for style, share in shares.items() if self._fields.presents(style))
+            values["head"][:, :2] += (np.reshape(presented, (-1, 1)) * turned).astype(np.float32)
         return values
-
-
-def apply_timeline(feature: str, values: Float32Array, times: NDArray[np.float64], timeline: Timeline) -> Float32Array:
-    """Apply the strength, expressions, gaze targets and nods of a timeline to values (T, k) of a feature."""
-    values = np.asarray(values * timeline.strength(feature, times).astype(np.float32)[:, None], np.float32)
-    if feature == "expression":
-        values = values + timeline.expression_weights(times).astype(np.float32)
-    elif feature == "gaze":
-        values = timeline.apply_gaze(times, values).astype(np.float32)
-    elif feature == "head":
-        values[:, 0] += timeline.nod_pitch(times).astype(np.float32)
-    return values
 
 
 class _SoundFeatures:
@@ -223,12 +251,12 @@ class _FeatureTrack:
     def __init__(self, fields: GestureFields, feature: str, style: str, seed: int) -> None:
         self._fields, self._feature, self._style = fields, feature, style
         self._generator = np.random.default_rng([seed, crc32(feature.encode())])
-        self._source = self._source_of(style)
-        field = self._field(self._source)
-        self._state = initial_state(field, self._generator.random())
+        self._source, self._first_chance = self._source_of(style), self._generator.random()
+        self._state: FieldState | None = None  # before the first frame of a field
         self._times: list[float] = []
-        self._values = np.zeros((0, field.values.shape[1]), np.float32)
+        self._values = np.zeros((0, len(fields.palette.channels(feature))), np.float32)
         self._presentation = fields.presentation(self._source[0], feature, seed)
+        self._gaze = fields.gaze_process(feature, seed)
         self._emphasis = Emphasis([seed, crc32(b"emphasis")]) if feature == "expression" else None
         self._emphases = np.zeros(0)
 
@@ -238,6 +266,7 @@ class _FeatureTrack:
         new._generator, new._times = deepcopy(self._generator), self._times.copy()  # all else is replaced, not changed
         new._presentation = None if self._presentation is None else self._presentation.copy()
         new._emphasis = None if self._emphasis is None else self._emphasis.copy()
+        new._gaze = None if self._gaze is None else self._gaze.copy()
         return new
 
     def extend(self, sound: "_SoundFeatures", end: float, timeline: Timeline) -> None:
@@ -256,28 +285,33 @@ class _FeatureTrack:
         borders = [0, *(i for i in range(1, len(new)) if sources[i] != sources[i - 1]), len(new)]
         parts = [self._sample(sources[low], prosody[low:high], chances[low:high]) for low, high in pairwise(borders)]
         values, is_presented = np.concatenate(parts), np.array([self._fields.presents(style) for style in styles])
+        frames = FrameContext(new, prosody[:, 0], sound.accents, is_presented, timeline.is_listening(new))
         if self._presentation is not None:
-            frames = FrameContext(new, prosody[:, 0], sound.accents, is_presented)
             values = self._presentation.apply(values, frames)
+        if self._gaze is not None:
+            self._gaze.extend(frames)
         if self._emphasis is not None:
-            emphases = self._emphasis.next(FrameContext(new, prosody[:, 0], sound.accents, is_presented))
-            self._emphases = np.concatenate([self._emphases, emphases])
+            self._emphases = np.concatenate([self._emphases, self._emphasis.next(frames)])
         self._values = np.concatenate([self._values, values])
 
     def _source_of(self, style: str) -> tuple[str, bool]:
-        """Recorded style of which the field is sampled, and whether with its blinks."""
-        has_blinks = self._feature != "blink" or not self._fields.presents(style)
-        return self._fields.source(style, self._feature), has_blinks
+        """Recorded style of which the field is sampled, and whether with its blinks, or its gaze."""
+        is_whole = self._feature not in {"blink", "gaze"} or not self._fields.presents(style)
+        return self._fields.source(style, self._feature), is_whole
 
     def _field(self, source: tuple[str, bool]) -> Field:
         name, has_blinks = source
         return self._fields.of(name, self._feature, has_blinks=has_blinks)
 
     def _sample(self, source: tuple[str, bool], prosody: Float32Array, chances: NDArray[np.float64]) -> Float32Array:
+        if self._gaze is not None and not source[1]:
+            return np.zeros((len(chances), self._values.shape[1]), np.float32)
         field = self._field(source)
-        if source != self._source:
+        if self._state is None:
+            self._state = initial_state(field, self._first_chance)
+        elif source != self._source:
             self._state = transfer_state(self._state, self._field(self._source), field)
-            self._source = source
+        self._source = source
         values, self._state = sample_field(field, self._state, prosody, chances)
         return values
 
@@ -287,10 +321,12 @@ class _FeatureTrack:
         values = interpolate_cubic(self._values, np.interp(times, clock, np.arange(len(clock))))
         emphasis = np.interp(times, clock, self._emphases) if len(self._emphases) else None
         shares = timeline.style_shares(self._feature, times, default=self._style)
+        presented = values if self._gaze is None else self._gaze.at(times)
         changed = np.zeros_like(values)
         for style, share in shares.items():
+            of_style = presented if self._fields.presents(style) else values
             changed += share.astype(np.float32)[:, None] * self._fields.apply_change(
-                style, self._feature, values, emphasis
+                style, self._feature, of_style, emphasis
             )
         passed = max(0, bisect_right(self._times, times[-1]) - 1 - N_LOOKAHEAD_FRAMES)
         self._times, self._values = self._times[passed:], self._values[passed:]

@@ -19,6 +19,7 @@ from lexicon.errors import InputError
 from tts2face.gestures.elements import (
     GAIN_NAMES,
     KINDS,
+    BrowRaise,
     ChannelEdit,
     ElementKind,
     ExpressionCurve,
@@ -26,6 +27,7 @@ from tts2face.gestures.elements import (
     FloatArray,
     Gains,
     GazeTarget,
+    Listening,
     Nod,
     StrengthCurve,
     StyleSpan,
@@ -44,6 +46,10 @@ ONSET_S = 0.6
 # speakers (1.8-3.7 Hz: Hadar et al. 1983, Human Movement Science 2); seconds, and shares of NOD_RAD.
 NOD_KEYS = ((0.0, 0.0), (0.18, 1.0), (0.42, -0.1), (0.55, 0.0))
 NOD_RAD = math.radians(6.0)  # of a nod of size 1; radians, as a head moves with a stressed word
+# A flash of the brows: up, held, down; seconds, and shares of BROW_RAISE_MM (Ekman 1979, About brows).
+BROW_RAISE_KEYS = ((0.0, 0.0), (0.15, 1.0), (0.4, 1.0), (0.8, 0.0))
+BROW_RAISE_MM = 4.0
+LISTENING_HOLD_S = 0.1  # after a span: gestures of a piece are drawn two frames ahead, before the next span is known
 SACCADE_S = 0.06  # transition to a gaze target; saccades of 10 degrees take 50 ms (Bahill et al. 1975)
 
 
@@ -57,12 +63,14 @@ class Timeline:
         Style of each feature outside its spans; features without an entry use the default style.
     spans, expressions
         Spans, sorted by time; those of one feature or expression may be adjacent but not overlap.
-    nods
-        Nods, sorted by time.
+    nods, brow_raises
+        Nods and raises of the brows, sorted by time.
     gains
         Factors of the motion of features.
     gaze
         Directions in which the eyes look, sorted by time.
+    listens
+        Spans in which the face listens, sorted by time.
     strengths, curves, edits
         Strengths of features, weights of expressions, and offsets of finished channels through key points; one for each
         feature, expression and channel.
@@ -80,8 +88,10 @@ class Timeline:
     spans: tuple[StyleSpan, ...] = ()
     expressions: tuple[ExpressionSpan, ...] = ()
     nods: tuple[Nod, ...] = ()
+    brow_raises: tuple[BrowRaise, ...] = ()
     gains: Gains = field(default_factory=Gains)
     gaze: tuple[GazeTarget, ...] = ()
+    listens: tuple[Listening, ...] = ()
     strengths: tuple[StrengthCurve, ...] = ()
     curves: tuple[ExpressionCurve, ...] = ()
     edits: tuple[ChannelEdit, ...] = ()
@@ -165,6 +175,14 @@ class Timeline:
             moved += share * (np.radians([target.down_deg, target.left_deg]) - gaze)
         return moved
 
+    def is_listening(self, times: ArrayLike) -> NDArray[np.bool_]:
+        """(T,) whether the face listens at T times, or did within `LISTENING_HOLD_S` before."""
+        seconds = np.atleast_1d(np.asarray(times, np.float64))
+        found = np.zeros(len(seconds), bool)
+        for span in self.listens:
+            found |= (span.start <= seconds) & (seconds < span.end + LISTENING_HOLD_S)
+        return found
+
     def nod_pitch(self, times: ArrayLike) -> FloatArray:
         """Radians (T,) by which nods turn the head down at T times; of overlapping nods the deeper one applies."""
         seconds = np.atleast_1d(np.asarray(times, np.float64))
@@ -173,6 +191,15 @@ class Timeline:
             pitch = nod.size * NOD_RAD * interpolate_keys(seconds - nod.time, NOD_KEYS)
             down, up = np.maximum(down, pitch), np.minimum(up, pitch)
         return down + up
+
+    def brow_height(self, times: ArrayLike) -> FloatArray:
+        """Millimetres (T,) by which raises lift the brows at T times; of overlapping ones the higher one applies."""
+        seconds = np.atleast_1d(np.asarray(times, np.float64))
+        height = np.zeros(len(seconds))
+        for one in self.brow_raises:
+            curve = one.size * BROW_RAISE_MM * interpolate_keys(seconds - one.time, BROW_RAISE_KEYS)
+            height = np.maximum(height, curve)
+        return height
 
     def merge(self, later: "Timeline") -> "Timeline":
         """Merge with another timeline, which takes precedence where both overlap."""

@@ -324,6 +324,11 @@ class Palette:
             return tuple(f"{feature}{i}" for i in range(len(self.regions[feature].modes)))
         return FIXED_CHANNELS[feature]
 
+    @property
+    def brow_lift(self) -> NDArray[np.float64]:
+        """(k,) mean height in mm of the brows' landmarks for one unit of each of their modes."""
+        return np.asarray(self.regions["brows"].modes[:, :, 1].mean(axis=1), np.float64)
+
     def require(self, name: str) -> str:
         """Return the name of an existing style.
 

@@ -54,7 +54,7 @@ def clips_of_length(
     if prepared.request.audio is not None:
         recorded = list(clips)
         clips, n_speech = iter(recorded), min(left, sum(len(clip.motion) for clip in recorded))
-    opening_s = EASE_S if prepared.request.idle is not None else (prepared.request.lead or 0.0) + OPENING_S
+    opening_s = EASE_S if prepared.request.silence is not None else (prepared.request.lead or 0.0) + OPENING_S
     for clip in _eased(clips, n_speech, length.first_channel, opening_s):
         rate = clip.speech.waveform.rate
         done += len(clip.motion)

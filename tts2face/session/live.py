@@ -6,7 +6,7 @@
 
 import threading
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
@@ -16,14 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
+from tts2face.gestures.elements import Listening
+from tts2face.gestures.listening import LASTS_S, responses
+from tts2face.gestures.timeline import Timeline
 from tts2face.lips.performer import PerformerRetargeter, build_performer_retargeter
 from tts2face.models.face import Face
 from tts2face.models.talker import speech_channels
 from tts2face.request import Request
 from tts2face.session.models import SessionModels
-from tts2face.session.prepared import idle_request, prepare
+from tts2face.session.prepared import idle_request, listening_request, prepare
 from tts2face.session.recording import select_audio_map
-from tts2face.session.speech_stream import Piece
+from tts2face.session.speech_stream import Piece, turn_request
 from tts2face.session.steps import pieces_from
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.listener import StreamingAudioMap
@@ -235,7 +238,7 @@ UNUSED_IDLE_S = 1.0  # of the request from which the gestures of the whole are m
 
 
 class LiveSpeech:
-    """A clip without an end: `say` appends speech, `idle` appends silence with a living face.
+    """A clip without an end: `say` appends speech, `idle` and `listen` silence with a living face.
 
     Gestures continue from piece to piece. Not thread-safe.
 
@@ -251,11 +254,13 @@ class LiveSpeech:
     """
 
     def __init__(self, request: Request, models: SessionModels) -> None:
-        if request.text or request.audio is not None or request.idle is not None or request.timeline is not None:
+        given = (request.audio, request.idle, request.listen, request.timeline)
+        if request.text or given != (None, None, None, None):
             raise InputError("a live request has options only; send its text in parts")
         self._request, self._models = request, models
         self._layer = models.gesture_layer(prepare(idle_request(request, UNUSED_IDLE_S)))
-        self._n_frames, self._is_speaking = 0, False
+        self._n_frames, self._is_speaking, self._has_listened = 0, False, False
+        self._cues: list[float] = []  # seconds of the clip at which the face responds
 
     @property
     def seconds(self) -> float:
@@ -265,6 +270,8 @@ class LiveSpeech:
     def say(self, text: str) -> Iterator[Piece]:
         """Append the sentences of a text; errors as `Session.stream`."""
         request = replace(self._request, text=text)
+        request = turn_request(request) if self._has_listened else request
+        self._has_listened = False
         yield from self._append(replace(request, lead=None) if self._is_speaking else request)
         self._is_speaking = True
 
@@ -273,12 +280,30 @@ class LiveSpeech:
         self.rest()
         yield from self._append(idle_request(self._request, seconds))
 
+    def listen(self, seconds: float, cues: Sequence[float] | None = None) -> Iterator[Piece]:
+        """Append silence in which the face listens.
+
+        Parameters
+        ----------
+        cues
+            Seconds from now at which it responds to what it hears; None where it hears nothing, and responds at
+            intervals.
+        """
+        self.rest()
+        begin = self.seconds
+        self._cues = [cue for cue in self._cues if cue > begin - LASTS_S] + [begin + cue for cue in cues or ()]
+        responding = responses(self._cues, self._request.seed).restrict(begin, begin + seconds).shift(-begin)
+        listened = Timeline(listens=(Listening(0.0, seconds, reacts=cues is None),))
+        yield from self._append(listening_request(self._request, seconds), responding.merge(listened))
+        self._has_listened = True
+
     def rest(self) -> None:
         """What is said next begins with the ``lead`` of the request, without a pause after the sentence before it."""
         self._is_speaking = False
 
-    def _append(self, request: Request) -> Iterator[Piece]:
+    def _append(self, request: Request, listening: Timeline | None = None) -> Iterator[Piece]:
         prepared = prepare(request)
+        prepared = prepared if listening is None else replace(prepared, listening=listening)
         for piece in pieces_from(prepared, self._models.for_request(prepared), self._layer, self._n_frames):
             self._n_frames += len(piece.clip.motion)
             yield piece

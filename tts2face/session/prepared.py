@@ -17,12 +17,13 @@ from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS, MarkedText
 from lexicon.sentences import Sentence, split_sentences
 from lexicon.sequence import SILENCE, PhoneSequence
 from lexicon.ssml import parse_marks
-from tts2face.gestures.elements import Gains
+from tts2face.gestures.elements import Gains, Listening
+from tts2face.gestures.listening import CUE_RATE, cue_times, responses
 from tts2face.gestures.timeline import Timeline, parse_expressions, parse_gains, parse_style
 from tts2face.gestures.timeline_file import read_timeline
 from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
 from tts2face.picture.options import Picture
-from tts2face.request import LEAD_S, Request
+from tts2face.request import CAMERA, LEAD_S, Request
 from tts2face.storage.files import AnyPath
 from tts2face.types import exact_rate
 
@@ -187,6 +188,8 @@ class PreparedRequest:
         Corrected phone edges of sentences.
     excluded
         Recorded tokens that are not used.
+    listening
+        What the face does while it listens, in seconds from the beginning of ``listen``.
     """
 
     request: Request
@@ -196,6 +199,7 @@ class PreparedRequest:
     dictionary: Mapping[str, tuple[IpaPhone, ...]] = field(default_factory=dict)
     edges: tuple[SentenceEdges, ...] = ()
     excluded: tuple[ExcludedToken, ...] = ()
+    listening: Timeline = field(default_factory=Timeline)
 
     @property
     def fps(self) -> Fraction:
@@ -207,7 +211,8 @@ class PreparedRequest:
         """Total steps of progress: characters of a text, or parts of a recording or of idle animation."""
         if self.request.audio is not None:
             return RECORDING_STEPS
-        return IDLE_STEPS if self.request.idle is not None else max(len(self.text.text), 1)
+        silent = 0 if self.request.silence is None else IDLE_STEPS
+        return silent + len(self.text.text) if silent else max(len(self.text.text), 1)
 
     def sentences(self) -> Iterator[Sentence]:
         """Sentences of the text in order."""
@@ -230,16 +235,18 @@ def prepare(request: Request) -> PreparedRequest:
     DataError
         The timeline file or the dictionary is invalid.
     """
-    if request.audio is not None and not is_file(request.audio):
-        raise InputError(f"there is no recording {request.audio}; check the path")
+    for path in (request.audio, request.partner):
+        if path is not None and not is_file(path):
+            raise InputError(f"there is no recording {path}; check the path")
     prepared = PreparedRequest(
         request,
         parse_marks(request.text, request.language),
         build_request_timeline(request),
         synthesis_options(request),
         read_dictionary(request.dictionary).entries if request.dictionary else {},
+        listening=_listening(request),
     )
-    if not request.text.strip() and (request.audio is not None or request.idle is not None):
+    if not request.text.strip() and (request.audio is not None or request.silence is not None):
         return prepared
     check_readable(prepared.text, request.language)
     check_marks(prepared.text, request)
@@ -248,10 +255,32 @@ def prepare(request: Request) -> PreparedRequest:
     return prepared
 
 
+def _listening(request: Request) -> Timeline:
+    """What the face does while it listens; what is heard of a partner gives the responses."""
+    if request.listen is None:
+        return Timeline()
+    span = Listening(0.0, request.listen, reacts=request.partner is None)
+    cues: list[float] = []
+    if request.partner is not None:
+        from tts2face.video.media import read_sound
+
+        cues = [time for time in cue_times(read_sound(request.partner, CUE_RATE)) if time < request.listen]
+    return responses(cues, request.seed).merge(Timeline(listens=(span,)))
+
+
 def idle_request(request: Request, seconds: float) -> Request:
     """The request with idle animation in place of its speech."""
+    return replace(_silent(request), idle=seconds)
+
+
+def listening_request(request: Request, seconds: float) -> Request:
+    """The request with a face that listens in place of its speech."""
+    return replace(_silent(request), listen=seconds)
+
+
+def _silent(request: Request) -> Request:
     silent = replace(request, text="", audio=None, audio_map=None, voice=None, rate=1.0, volume=1.0, dictionary=None)
-    return replace(silent, articulation=None, lead=LEAD_S, idle=seconds)
+    return replace(silent, articulation=None, lead=LEAD_S, listen=None, partner=None)
 
 
 def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:
@@ -305,9 +334,18 @@ def build_request_timeline(request: Request) -> Timeline:
     flags = Timeline(
         style=parse_style(request.style) if request.style is not None else {},
         expressions=parse_expressions(request.expression) if request.expression is not None else (),
-        gains=parse_gains(request.gain) if request.gain is not None else Gains(),
+        gains=_gains(request),
     )
     return read_timeline(request.timeline).merge(flags) if request.timeline is not None else flags
+
+
+def _gains(request: Request) -> Gains:
+    gains = parse_gains(request.gain) if request.gain is not None else Gains()
+    if request.gaze != CAMERA:
+        return gains
+    if "gaze" in gains.factors:
+        raise InputError("--gain of the gaze has no effect with --gaze camera; remove one of them")
+    return Gains({**gains.factors, "gaze": 0.0})
 
 
 def synthesis_options(request: Request) -> SynthesisOptions:
@@ -324,6 +362,7 @@ def input_paths(request: Request, picture: Picture) -> dict[str, AnyPath]:
     """Paths of the files that a request and a picture read, by the names of their options."""
     return {
         "audio": request.audio,
+        "partner": request.partner,
         "dictionary": request.dictionary,
         "timeline": request.timeline,
         "voice": request.voice,

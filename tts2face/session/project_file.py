@@ -24,7 +24,7 @@ FIRST_FACE = "head"  # that files of version 1 mean where they name none
 PROJECT_SUFFIX = ".json"
 # Options that name files; their paths are relative to the folder of the project.
 REQUEST_FILES, MODEL_FILES, PICTURE_FILES = (
-    ("audio", "dictionary", "voice"),
+    ("audio", "partner", "dictionary", "voice"),
     ("talker", "face", "palette"),
     ("background",),
 )

@@ -179,7 +179,7 @@ class Session:
         return timed_speech(prepared, self._models.for_request(prepared).speech)
 
     def live(self, **options: Any) -> LiveSpeech:
-        """A clip without an end, extended by `say` and `idle` of the result; options and errors as `clip`."""
+        """A clip without an end, extended by `say`, `idle` and `listen` of the result; options and errors as `clip`."""
         return LiveSpeech(Request(**options), self._models)
 
     def listen(self, rate: int = FEATURE_RATE, *, audio_map: str | None = None) -> LiveLips:

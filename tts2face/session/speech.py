@@ -239,14 +239,19 @@ def _join_sentence(speeches: Sequence[Speech], sentence: Sentence, rate: int) ->
     return speech, begins
 
 
-def silent_sentences(seconds: float, fps: Fraction, n_steps: int) -> Iterator[tuple[SpokenSentence, int, str]]:
-    """Yield silence in parts of up to `IDLE_PART_S` that end on frames, each with its progress steps and no text."""
+def silent_sentences(
+    seconds: float, fps: Fraction, n_steps: int, timeline: Timeline, rate: int = IDLE_RATE
+) -> Iterator[tuple[SpokenSentence, int, str]]:
+    """Yield silence in parts of up to `IDLE_PART_S` that end on frames, each with its progress steps and no text.
+
+    `timeline` is that of the whole silence, `rate` that of the sound in Hz.
+    """
     n_frames = frame_count(seconds, float(fps))
     bounds = [*range(0, n_frames, max(round(IDLE_PART_S * fps), 1)), n_frames]
     for first, last in pairwise(bounds):
         steps = n_steps * last // n_frames - n_steps * first // n_frames
-        silence = silent_frames(first, last, IDLE_RATE, fps)
-        yield SpokenSentence(silence, Timeline(), (), silence.waveform), steps, ""
+        silence, begin, end = silent_frames(first, last, rate, fps), float(first / fps), float(last / fps)
+        yield SpokenSentence(silence, timeline.restrict(begin, end).shift(-begin), (), silence.waveform), steps, ""
 
 
 def resolve_marks(

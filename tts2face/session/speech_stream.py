@@ -14,6 +14,7 @@ from lexicon.sentences import Sentence
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
 from tts2face.numeric.reuse import NO_MEMORY, SentenceMemory
+from tts2face.request import CONVERSATION, TURN_S, Request
 from tts2face.session.prepared import IDLE_STEPS, PreparedRequest, correct_phones
 from tts2face.session.speech import (
     NO_DELIVERIES,
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 # Options of a request that do not affect the speech of its sentences.
 NOT_SPOKEN: Mapping[str, Any] = MappingProxyType(
     {"expression": None, "gain": None, "timeline": None, "pitch": False, "context": None, "exemplars": None}
+    | {"gaze": CONVERSATION, "listen": None, "partner": None}
 )
 
 
@@ -175,16 +177,25 @@ def timed_speech(prepared: PreparedRequest, models: SpeechModels) -> Iterator[Pi
     return spoken_pieces(prepared, models)
 
 
+def turn_request(request: Request) -> Request:
+    """The request whose speech follows listening: its first sound leaves time for a breath and for lips that part."""
+    return request if request.lead is None else replace(request, lead=max(request.lead, TURN_S))
+
+
 def speak_sentences(
     prepared: PreparedRequest, models: SpeechModels, *, has_phones: bool = True
 ) -> Iterator[tuple[SpokenSentence, int, str]]:
     """Spoken sentences with numbers of characters and texts, or parts of idle animation with steps and no text."""
-    request = prepared.request
-    if request.idle is not None:
-        yield from silent_sentences(request.idle, prepared.fps, IDLE_STEPS)
+    request, fps = prepared.request, prepared.fps
+    if request.silence is not None and not request.is_text:
+        yield from silent_sentences(request.silence, fps, IDLE_STEPS, prepared.listening)
         return
     voices, said = cache(models.voice), Counter[str]()
     voice = voices(request.voice, request.language)
+    if request.listen is not None:
+        rate = voice.sample_rate
+        yield from silent_sentences(request.listen, fps, IDLE_STEPS, prepared.listening, rate)
+        request = turn_request(request)
     spoken_with = cache(lambda: (replace(request, text="", **NOT_SPOKEN), frozenset(prepared.dictionary.items())))
     following = cache(lambda: replace(request, lead=None))  # sentences after the first keep the voice's pause
 

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence
-from tts2face.face.body import Body
+from tts2face.face.body import Body, phrase_starts
 from tts2face.face.gestures import SPEECH_GAINS
 from tts2face.gestures.elements import KINDS, ChannelEdit, interpolate_keys
-from tts2face.gestures.noise import NoiseStream, microsaccades
+from tts2face.gestures.gaze import microsaccades
+from tts2face.gestures.listening import with_responses
+from tts2face.gestures.noise import NoiseStream
 from tts2face.gestures.stream import GestureFields, GestureStream, GestureValues
 from tts2face.gestures.timeline import Timeline
 from tts2face.lips.exemplar import ExemplarModel, TokenSelection, select_tokens
@@ -47,6 +49,7 @@ Explain = Callable[[], tuple[PhoneExplanation, ...]]
 TRANSCRIPT_BYTES = 10_000  # of a transcript besides its phones
 DEFAULT_STYLE = "neutral"
 REACH_S = 2.0  # s around a piece within which elements of the timeline affect it: nods last .6 s, fades .6 s
+TURN_REACH_S = 0.6  # before a phrase within which the face listened, where a turn begins
 STATE_BYTES = 200_000  # of a stream between two pieces
 POLL_S = 0.005  # between turns of other requests, while gestures are drawn
 Drawn = tuple[GestureValues, GestureStream | NoiseStream]  # gestures of a piece, and the stream for the piece after it
@@ -283,8 +286,9 @@ class GestureLayer:
     def _recall(self, piece: Piece) -> tuple[bytes, Timeline, Drawn]:
         """Gestures of a piece with their key, after those before it, and the timelines of request and marks."""
         sound = piece.speech.waveform if piece.voice_sound is None else piece.voice_sound
-        timeline = self._requested.merge(self._marked(piece))
         times = self._now.seconds + piece.clip.motion.times
+        timeline = self._requested.merge(self._marked(piece))
+        timeline = with_responses(timeline, float(times[0]), float(times[-1]), self._seed)
         history = self.key(times, sound, timeline) if self._memory.is_used else self._now.history
         drawn = self._memory.recall(
             lambda: history,
@@ -319,8 +323,15 @@ class GestureLayer:
     def body(self, piece: Piece) -> Piece:
         """The piece with hair, shoulders and pupils that follow its motion; the next piece continues from it."""
         self._now, clip = self._next, piece.clip
-        moved = self._body.move(clip.motion, clip.head, clip.speech.phones)
+        moved = self._body.move(clip.motion, clip.head, clip.speech.phones, self._turns(piece))
         return replace(piece, clip=replace(clip, motion=moved))
+
+    def _turns(self, piece: Piece) -> list[float]:
+        """Seconds of a piece at which speech begins after the face has listened."""
+        starts = phrase_starts(piece.speech.phones)
+        before = np.array(starts) + self._now.seconds - piece.clip.motion.duration - TURN_REACH_S
+        listened = self._requested.merge(self._now.marked).is_listening(before)
+        return [start for start, was_listening in zip(starts, listened.tolist(), strict=True) if was_listening]
 
     def finish(self) -> None:
         """Reject requested gestures beyond the end of the clip.

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from corpus_tools.studies.gestures.clips import (
     published_clip,
     replace_style,
 )
+from corpus_tools.studies.gestures.gaze import GazeStudy, study_gaze
 from corpus_tools.studies.gestures.measures import (
     BodyMeasure,
     Spectrum,
@@ -50,6 +52,8 @@ Motion = Mapping[str, NDArray[np.floating]]
 class StudyOptions:
     """Options of a study: one in `one_in` recordings is held out; numbers of random halvings and clips; the seed.
 
+    `people` is a folder of recorded gaze, with which the made one is compared; None: it is not.
+
     Raises
     ------
     InputError
@@ -60,6 +64,7 @@ class StudyOptions:
     halves: int = 50
     clips: int = 3
     seed: int = 0
+    people: Path | None = None
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -154,13 +159,15 @@ class GestureStudy:
     options: StudyOptions
     styles: tuple[StyleStudy, ...]
     body: tuple[BodyMeasure, ...]
+    gaze: GazeStudy | None
 
     @property
     def targets(self) -> tuple[int, int]:
-        """Number of targets of measured styles that are met, and number of targets."""
+        """Number of targets of measured styles and of the gaze that are met, and number of targets."""
         measured = [style for style in self.styles if style.source is None]
         kept = [one.is_met for style in measured for one in style.trait_comparisons if one.trait.has_target]
         kept += [one.follows_sound for style in measured for one in style.motion_comparisons if one.feature == "head"]
+        kept += [one.is_met for one in self.gaze.comparisons] if self.gaze is not None else []
         return sum(kept), len(kept)
 
 
@@ -168,6 +175,7 @@ def study_gestures(
     name: str, palette: Palette, options: StudyOptions, on_progress: Progress | None = None
 ) -> GestureStudy:
     """Measure every style of a palette."""
+    gaze = None if options.people is None else study_gaze(options.people, seed=options.seed)
     studies: list[StyleStudy] = []
     prepared: dict[str, _PreparedStyle] = {}
     for done, style in enumerate(names := (*palette.styles, *palette.derivations)):
@@ -179,7 +187,7 @@ def study_gestures(
         studies.append(_study_style(palette, style, prepared[source], options))
     if on_progress:
         on_progress(len(names), len(names))
-    return GestureStudy(name, options, tuple(studies), measure_body(options.seed))
+    return GestureStudy(name, options, tuple(studies), measure_body(options.seed), gaze)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,7 +20,7 @@ from scipy.stats import wasserstein_distance
 
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.face.body import BREATH_SHAPE, DILATION, PUPIL_SHAPE, Breathing, Pupils
-from tts2face.gestures.noise import microsaccades
+from tts2face.gestures.gaze import microsaccades
 from tts2face.gestures.stream import style_median
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
 from tts2face.types import Trajectory
@@ -266,7 +266,7 @@ def _motion_traits(palette: Palette, feature: str, middle: Doubles) -> list[Trai
     """Speed and amplitude of a feature in display units."""
     display, unit = display_units(palette, feature)
     if feature == "brows":
-        lift = brow_lift(palette)
+        lift = palette.brow_lift
         return [
             Trait("brow height", "mm", feature, lambda part: part @ lift, has_target=True),
             Trait("brow speed", "mm/s", feature, lambda part: np.abs(np.diff(part @ lift)) * GESTURE_FPS),
@@ -293,11 +293,6 @@ def display_units(palette: Palette, feature: str) -> tuple[Callable[[Motion], Mo
         size = np.sqrt(len(palette.regions[feature].landmarks))
         return lambda values: values.astype(np.float64) / size, "mm"
     return lambda values: values.astype(np.float64), ""
-
-
-def brow_lift(palette: Palette) -> Doubles:
-    """(k,) mean height in mm of the brows' landmarks for one unit of each mode."""
-    return np.asarray(palette.regions["brows"].modes[:, :, 1].mean(axis=1), np.float64)
 
 
 def in_display_units(palette: Palette, motion: Mapping[str, Motion]) -> dict[str, Motion]:

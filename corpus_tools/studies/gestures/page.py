@@ -20,6 +20,7 @@ from corpus_tools.studies.gestures.analysis import (
     TraitComparison,
 )
 from corpus_tools.studies.gestures.clips import FROM_S, LAGS_S, MINUTES, VISITED_AFTER
+from corpus_tools.studies.gestures.gaze import GazeStudy
 from corpus_tools.studies.gestures.measures import FAST_HZ, ratio
 from corpus_tools.studies.pages import note_paragraph, page, paragraphs, scroll_box, table
 from corpus_tools.studies.plots import SERIES, draw_png, draw_svg
@@ -159,7 +160,53 @@ def gestures_page(study: GestureStudy) -> str:
     for style in study.styles:
         parts += _style(style)
     parts += ["<h2>Breath and eyes</h2>", _body(study)]
+    if study.gaze is not None:
+        parts += ["<h2>Gaze in conversation</h2>", *_gaze(study.gaze)]
     return page(f"Gestures: {study.name}", parts)
+
+
+def _gaze(study: GazeStudy) -> list[str]:
+    rows = [
+        (one.state, one.trait, format_number(one.people, 3), format_number(one.made, 3), _met(one.is_met))
+        for one in study.comparisons
+    ]
+    head = ("state", "trait", "two people", "a made one and a person", "target")
+    n_made = len(next(iter(study.made.values())))
+    return [
+        table(head, rows, numbers=(2, 3)),
+        note_paragraph(
+            "Medians over pairs of Kolmogorov-Smirnov distances, and of differences of the share on the face; "
+            f"{n_made} made people. Target: a made person is no further from people than they are from each other."
+        ),
+        _panels(gaze_panels(study)),
+    ]
+
+
+def gaze_panels(study: GazeStudy) -> list[Panel]:
+    """What lasts longer, or is larger, than a length or a jump: a line for each person and made person."""
+    kinds = (("looks at the face, s", "face"), ("looks away, s", "away"), ("jumps, degrees", "jumps"))
+    return [_survival_panel(study, state, name, trait) for state in study.people for name, trait in kinds]
+
+
+def _survival_panel(study: GazeStudy, state: str, name: str, trait: str) -> Panel:
+    title = f"{state}: {name.partition(',')[0]}"
+    people, made = ([getattr(one, trait) for one in kind[state]] for kind in (study.people, study.made))
+
+    def draw(axes: "Axes") -> None:
+        from matplotlib.ticker import NullFormatter
+
+        kinds = ("people", people, 1.4), ("made", made[: len(people)], 0.8)
+        for (label, ones, width), (colour, _) in zip(kinds, SERIES, strict=False):
+            for at, one in enumerate([one for one in ones if one is not None]):
+                (line,) = axes.step(one.values, 100 * one.shares, where="post", label=label if at == 0 else None)
+                line.set(color=colour, linewidth=width, alpha=0.5)
+        axes.set(title=title, xlabel=name, ylabel="% longer", xscale="log", ylim=(0, 100))
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        if axes.lines:
+            axes.legend()
+
+    return Panel(title, draw)
 
 
 def _body(study: GestureStudy) -> str:
@@ -257,7 +304,11 @@ def target_result(style: StyleStudy, one: TraitComparison) -> str:
     """Whether a trait with a target meets it; empty without a target."""
     if not one.trait.has_target or style.source is not None:
         return ""
-    return "met" if one.is_met else "missed"
+    return _met(one.is_met)
+
+
+def _met(is_met: bool) -> str:
+    return "met" if is_met else "missed"
 
 
 def _motion_table(style: StyleStudy) -> str:
@@ -288,7 +339,7 @@ def _pad_columns(values: tuple[float, ...], n: int) -> tuple[float, ...]:
 def _correlation_result(style: StyleStudy, one: FeatureComparison) -> str:
     if one.feature != "head" or style.source is not None:
         return ""
-    return "met" if one.follows_sound else "missed"
+    return _met(one.follows_sound)
 
 
 def _long_run(style: StyleStudy) -> list[str]:

@@ -52,7 +52,7 @@ def gestures_csv(study: GestureStudy) -> str:
 def gestures_json(study: GestureStudy) -> str:
     """All figures, and quantiles of the values."""
     options = study.options
-    content = {
+    content: dict[str, Any] = {
         "palette": study.name,
         "held_out_one_in": options.one_in,
         "halves": options.halves,
@@ -65,6 +65,16 @@ def gestures_json(study: GestureStudy) -> str:
             for one in study.body
         ],
     }
+    if study.gaze is not None:
+        content["gaze"] = [
+            {
+                "state": one.state,
+                "trait": one.trait,
+                "people": _round_number(one.people),
+                "made": _round_number(one.made),
+            }
+            for one in study.gaze.comparisons
+        ]
     return json.dumps(content, ensure_ascii=False, indent=1) + "\n"
 
 

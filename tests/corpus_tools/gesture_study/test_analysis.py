@@ -12,7 +12,7 @@ from corpus_tools.studies.gestures.clips import (
     replace_style,
     select_recordings,
 )
-from corpus_tools.studies.gestures.measures import brow_lift, split_recordings, style_traits, wasserstein
+from corpus_tools.studies.gestures.measures import split_recordings, style_traits, wasserstein
 from lexicon.errors import InputError
 from tests.corpus_tools.gesture_study.made_palette import BLINK, N_FRAMES, made_palette, made_style
 from tts2face.gestures.stream import GestureFields, GestureStream, style_median
@@ -81,7 +81,7 @@ def test_traits_have_the_units_that_they_say():
     turning = np.zeros((3, 6))
     turning[:, 1] = np.radians([0, 1, 3])
     np.testing.assert_allclose(traits["head speed"].of(turning), [30, 60])
-    np.testing.assert_allclose(brow_lift(palette), [np.sqrt(0.5), 0], rtol=1e-6)
+    np.testing.assert_allclose(palette.brow_lift, [np.sqrt(0.5), 0], rtol=1e-6)
     lifted = np.array([[0.0, 5.0], [np.sqrt(2), 5.0]])  # both landmarks by 1 mm
     np.testing.assert_allclose(traits["brow height"].of(lifted), [0, 1], atol=1e-6)
     np.testing.assert_allclose(traits["brow speed"].of(lifted), [30], rtol=1e-6)

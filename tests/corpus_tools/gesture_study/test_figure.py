@@ -1,6 +1,7 @@
 """Panels: histograms by hand, logarithmic axes, the same panels in the page and in the picture."""
 
 import re
+from dataclasses import replace
 from io import BytesIO
 from itertools import pairwise
 from types import SimpleNamespace
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from corpus_tools.studies.gestures.gaze import compare, made_person
 from corpus_tools.studies.gestures.page import (
     COLUMNS,
     HEAD,
@@ -17,12 +19,15 @@ from corpus_tools.studies.gestures.page import (
     WIDTH,
     autocorrelation_panel,
     distribution_panel,
+    gaze_panels,
+    gestures_page,
     panel_svg,
     panels_png,
     spectrum_panel,
     summary_panels,
 )
 from corpus_tools.studies.plots import PNG_SCALE, SERIES, load_matplotlib
+from tts2face.models.gaze import STATES, load_gaze
 
 
 @pytest.fixture
@@ -87,6 +92,21 @@ def test_a_spectrum_names_powers_of_ten_and_its_unit(calm):
     words = re.findall(r">([^<>]+)</text>", panel_svg(spectrum_panel(calm, moving)))
     assert {"0.1", "1"} <= set(words)
     assert not [word for word in words if "$" in word or "^" in word]
+
+
+def test_the_gaze_of_people_and_of_made_people_has_a_line_for_each(found):
+    people = [{state: made_person(load_gaze(), state, seed) for state in STATES} for seed in range(2)]
+    study = compare(people, load_gaze(), n_made=3, seed=5)
+    panels = gaze_panels(study)
+    assert [panel.title for panel in panels[::3]] == ["speaking: looks at the face", "listening: looks at the face"]
+    axes = drawn(panels[0])
+    assert [line.get_label() for line in axes.lines if not line.get_label().startswith("_")] == ["people", "made"]
+    assert len(axes.lines) == 4
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), 100 * study.people["speaking"][0].face.shares)
+    html = gestures_page(replace(found, styles=(), gaze=study))
+    assert html.count("<svg") == 6
+    assert html.count("<td>met</td>") + html.count("<td>missed</td>") == 8
+    assert "<h2>Gaze in conversation</h2>" not in gestures_page(replace(found, styles=()))
 
 
 def test_repetition_is_over_seconds_of_lag(calm):

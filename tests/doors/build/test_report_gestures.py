@@ -3,14 +3,18 @@
 import csv
 import json
 import re
+from itertools import product
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
 from cli.main import run
+from corpus_tools.studies.gestures.gaze import TRAITS
 from corpus_tools.studies.plots import SERIES
+from tests.corpus_tools.gesture_study.made_gaze import write_people
 from tests.corpus_tools.gesture_study.made_palette import made_palette
+from tts2face.models.gaze import STATES
 from tts2face.models.palette import write_palette
 
 
@@ -56,8 +60,8 @@ def test_the_page_is_complete_and_loads_nothing(here: Path) -> None:
     assert html.count("<td>met</td>") + html.count("<td>missed</td>") == 4
 
 
-def test_the_table_has_a_line_a_trait(here: Path) -> None:
-    rows = list(csv.DictReader(report_bytes("g.csv").decode().splitlines()))
+def test_the_table_has_a_line_a_trait(plain: bytes) -> None:
+    rows = list(csv.DictReader(plain.decode().splitlines()))
     assert len(rows) == 20
     assert {row["style"]: row["source"] for row in rows} == {"calm": "", "quick": "calm"}
     assert all(float(row[name]) >= 0 for row in rows for name in ("w_halves", "w_field", "w_noise"))
@@ -65,9 +69,11 @@ def test_the_table_has_a_line_a_trait(here: Path) -> None:
     assert {row["trait"] for row in rows if row["target"]} == {"head speed", "brow height", "blink interval"}
 
 
-def test_the_json_equals_the_table(here: Path) -> None:
-    content = json.loads(report_bytes("g.json"))
-    rows = list(csv.DictReader(report_bytes("g.csv").decode().splitlines()))
+def test_the_json_equals_the_table(plain: bytes, here: Path) -> None:
+    content = json.loads(report_bytes("g.json", "--people", str(write_people(here))))
+    assert [(one["state"], one["trait"]) for one in content["gaze"]] == [*product(STATES, TRAITS)]
+    assert all(0 <= one["made"] <= 1 for one in content["gaze"])
+    rows = list(csv.DictReader(plain.decode().splitlines()))
     weights = [
         (style["name"], trait["name"], trait["field"]) for style in content["styles"] for trait in style["traits"]
     ]
@@ -108,6 +114,7 @@ def test_the_same_options_write_the_same(plain: bytes, here: Path) -> None:
         ("made.palette", "g.html", ("--held-out", "1"), "one in 1 recordings cannot be held out"),
         ("made.palette", "g.html", ("--held-out", "50"), "of 60 recordings one in 50 cannot be held out"),
         ("made.palette", "g.html", ("--held-out", "2.5"), '"2.5" is not a whole number'),
+        ("made.palette", "g.html", ("--people", "."), "there are no recordings of gaze in .; give the folder"),
         ("made.palette", "g.html", ("--halves", "0"), "at least 1 halving, not 0"),
         ("made.palette", "g.html", ("--halves", "0.5"), '"0.5" is not a whole number'),
         ("made.palette", "g.html", ("--clips", "1"), "at least 2 clips, not 1"),

@@ -103,6 +103,22 @@ def test_a_living_face_fills_the_silence_in_real_time(service: RunningService) -
     assert np.ptp(np.concatenate([one["head"] for _, one in idle]), axis=0)[:3].max() > 0.001  # radians
 
 
+def test_a_face_listens_to_the_partner_and_then_answers(service: RunningService) -> None:
+    async def talk(live: Live) -> None:
+        await live.send(type="listen", rate=16_000)
+        await live.connection.send(bytes(6_400))
+        while (await live.receive_until("curves"))["begin"] < 0.4:
+            pass
+        await live.send(type="text", text="Yes.")
+        await live.send(type="end")
+        await live.receive_until("done")
+
+    live = converse(service, talk, with_idle=False)
+    (said,) = live.events("speech")
+    assert said["phones"][0][2] - said["begin"] == pytest.approx(0.3, abs=0.1)  # in which it takes breath
+    assert not live.events("error")
+
+
 @pytest.mark.parametrize("wrong", [7, {"a": 1}, ["Hello."], True], ids=str)
 def test_null_is_no_text_and_other_types_are_refused(service: RunningService, wrong: Any) -> None:
     async def talk(live: Live) -> None:
@@ -236,13 +252,13 @@ def test_wrong_sound_is_refused_and_the_stream_goes_on(
     assert sum(len(one["weights"]) for one in live.events("curves")) == 25
 
 
-def test_a_stream_of_text_refuses_sound(service: RunningService) -> None:
+def test_a_stream_of_text_refuses_sound_to_which_it_does_not_listen(service: RunningService) -> None:
     async def talk(live: Live) -> None:
         await live.connection.send(b"1234")
         await live.receive_until("error")
 
     live = converse(service, talk, with_idle=False)
-    assert "a message must be JSON with one of the types cancel" in live.events("error")[0]["message"]
+    assert "sound of the other is heard after listen with its sample rate" in live.events("error")[0]["message"]
 
 
 def test_a_sentence_that_cannot_be_spoken_does_not_end_the_stream(service: RunningService) -> None:
@@ -256,7 +272,7 @@ def test_a_sentence_that_cannot_be_spoken_does_not_end_the_stream(service: Runni
     assert [one["text"] for one in live.events("speech")] == ["Hello there."]
     messages = " ".join(one["message"] for one in live.events("error"))
     assert "cannot read 漢字" in messages
-    assert "one of the types cancel, end, flush, interrupt, text" in messages
+    assert "one of the types cancel, end, flush, interrupt, listen, text" in messages
 
 
 @pytest.mark.parametrize(

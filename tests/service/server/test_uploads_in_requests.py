@@ -50,6 +50,14 @@ def test_a_timeline_moves_the_face(client: httpx.Client) -> None:
     assert smiles[1] > smiles[0] + 0.1
 
 
+def test_a_face_listens_to_an_uploaded_partner(client: httpx.Client) -> None:
+    options = {"text": "", "listen": 3.0, "format": "curves"}
+    form = {"request": json.dumps(options)}
+    response = client.post("/v1/clips", data=form, files={"partner": ("other.wav", wav())})
+    assert response.status_code == 200, response.text
+    assert len(response.text.splitlines()) == 1 + 90
+
+
 @pytest.mark.parametrize(
     ("data", "files", "status", "reason"),
     [
@@ -57,6 +65,7 @@ def test_a_timeline_moves_the_face(client: httpx.Client) -> None:
         ({}, {"background": ("b.png", png_bomb(60_000))}, 422, "background cannot be used: it has 60000 x 60000"),
         ({}, {"timeline": ("t.json", b"{")}, 422, "t"),
         ({}, {"timeline": ("t.json", b"[" * 100_000)}, 422, "t"),
+        ({"request": '{"partner": "/etc/passwd"}'}, {"background": ("b.png", png(4, 4))}, 422, "partner"),
         ({}, {"song": ("s.wav", b"x")}, 422, "there is no part 'song'"),
         ({"request": "{"}, {"audio": ("a.wav", wav())}, 422, "JSON"),
         ({"request": "{}", "audio": "text"}, {"background": ("b.png", png(4, 4))}, 422, "audio must be a file"),

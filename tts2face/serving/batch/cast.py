@@ -38,6 +38,7 @@ MODEL_NAMES = tuple(option.name for option in fields(Models))
 PATTERN_NAMES = ("speaker", "subtitle_style", "file")
 NOT_IN_CAST: Mapping[str, str] = MappingProxyType({  # options, with the reason
     "text": "the cues have it", "audio": "that of the file", "audio_map": "the words are given", "idle": "cues speak",
+    "listen": "cues speak", "partner": "cues speak",
     "fps": "one of all clips", "timeline": "its times are those of one clip",
     "expression": "its times are those of one clip", "lead": "the cues have their time",
 })  # fmt: skip

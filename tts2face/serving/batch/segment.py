@@ -124,7 +124,7 @@ def program_version() -> dict[str, str]:
 
 MOVIE, ALPHA_MOVIE, TRACK = "movie", "vp9", "track"  # what a segment is stored as: H.264, VP9, or motion for exports
 FILE_PREFIX = "file."  # of the medium of a whole clip in a format of `Session.stream_file`
-REQUEST_FILES = ("audio", "dictionary", "voice", "timeline")
+REQUEST_FILES = ("audio", "partner", "dictionary", "voice", "timeline")
 HAIR = ("hair", "hair_color")  # of models; not part of the addresses of segments without them
 
 

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import Tts2faceError
+from tts2face.gestures.listening import PartnerSound
+from tts2face.processes.message import Message
 from tts2face.serving.service.messages import Event, Inputs, Step, Wait, Work, check_words
 from tts2face.serving.service.scheduler import InterruptedTaskError
 from tts2face.types import Chunk, Clip, Trajectory
@@ -28,9 +30,10 @@ AHEAD_S = 0.3  # by which idle motion is ahead of the clock
 
 
 class LiveTask:
-    """One live stream: inputs are ``say``, ``cancel`` and ``end``; results are events and sound.
+    """One live stream: inputs are ``say``, ``listen``, ``heard``, ``cancel`` and ``end``; results are events and sound.
 
-    The text of ``say`` is a sentence; ``said`` with their number ``n`` tells which ones are spoken or forgotten.
+    The text of ``say`` is a sentence; ``said`` with their number ``n`` tells which ones are spoken or forgotten. From
+    ``listen`` to the next sentence the face listens; the payload of ``heard`` is 16-bit sound of the partner.
 
     Parameters
     ----------
@@ -48,20 +51,24 @@ class LiveTask:
         self._is_ended = False
         self._began: float | None = None  # of the stream on the clock
         self._n_cancels = 0
+        self._listens = False
+        self._partner: PartnerSound | None = None
 
     def steps(self) -> Iterator[Step]:
         """Yield results until ``end`` and all its text are done."""
         while True:
             yield from self._read_inputs()
-            if self._began is None and (self._sentences or self._has_idle):
+            is_alive = self._has_idle or self._listens
+            if self._began is None and (self._sentences or is_alive):
                 self._began = self._clock() - self._speech.seconds
             if self._sentences:
+                self._listens = False
                 yield from self._say(self._sentences.popleft())
                 yield _said(1)
                 continue
             if self._is_ended:
                 return
-            if not self._has_idle or self._began is None:
+            if not is_alive or self._began is None:
                 yield Wait()
                 continue
             ahead = self._speech.seconds - (self._clock() - self._began)
@@ -69,8 +76,14 @@ class LiveTask:
                 yield Wait(ahead - AHEAD_S)
                 continue
             with suppress(InterruptedTaskError):  # by a message that is read next
-                for piece in self._speech.idle(IDLE_S):
+                for piece in self._silence():
                     yield from self._curves.events(piece.clip, piece.begin)
+
+    def _silence(self) -> "Iterator[Piece]":
+        """Idle motion, or that of a listener."""
+        if not self._listens:
+            return self._speech.idle(IDLE_S)
+        return self._speech.listen(IDLE_S, None if self._partner is None else self._partner.new_cues())
 
     def _say(self, sentence: str) -> Iterator[Event | Chunk]:
         n_cancels = self._n_cancels
@@ -92,8 +105,11 @@ class LiveTask:
 
     def _read_inputs(self) -> Iterator[Event]:
         while self._inputs:
-            content = self._inputs.popleft().content
+            given = self._inputs.popleft()
+            content = given.content
             match content["type"]:
+                case "listen" | "heard":
+                    self._hear(given)
                 case "say":
                     self._sentences.append(content["text"])
                 case "end":
@@ -108,6 +124,18 @@ class LiveTask:
                     after_ms = 1000 * (self._clock() - content["arrived"])
                     cancelled = {"at": round(self._speech.seconds, 4), "after_ms": round(after_ms, 1)}
                     yield Event({"type": "cancelled", **cancelled})
+
+    def _hear(self, given: Message) -> None:
+        """Begin to listen, or hear a block of the partner's sound."""
+        if given.content["type"] == "heard":
+            if self._partner is not None:
+                self._partner.add(np.frombuffer(given.payload, "<i2").astype(np.float32) / np.float32(32768))
+            return
+        self._listens = True
+        rate = given.content["rate"]
+        self._partner = None if rate is None else PartnerSound(rate)
+        if self._began is None or self._clock() - self._began > self._speech.seconds:
+            self._began = self._clock() - self._speech.seconds  # it listens from now on
 
 
 def _said(n_sentences: int) -> Event:

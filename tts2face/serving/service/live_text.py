@@ -18,7 +18,11 @@ PART_CHARACTERS = 1000  # that are divided into sentences in one step of the eve
 MAX_WAITING_CHARACTERS = 65_536  # of sentences that have not been given; then the client is not read from
 MAX_CANCELS = 8  # that have not been answered; likewise
 N_GIVEN = 2  # sentences that a task has: one is spoken, the next one waits
+HEARD_S = 0.1  # of the partner's sound that the task gets at once
 REFUSED_S = 0.1  # for which a client that sends what is refused is not read from
+
+MAX_AHEAD_S = 5.0  # by which a client's sound is read ahead of real time
+SAMPLE_BYTES, SAMPLE_RATES = 2, (8_000, 192_000)  # of sound, and its rates in Hz
 
 Count = Callable[[], None]  # counts a sentence as a request of its key, or raises its refusal
 
@@ -41,6 +45,22 @@ def parse_message(text: str) -> Any:
         return None
 
 
+class Pace:
+    """Slows a sender of sound down to real time once it is `MAX_AHEAD_S` ahead."""
+
+    def __init__(self, bytes_per_s: float) -> None:
+        self._bytes_per_s, self._seconds, self._began = bytes_per_s, 0.0, time.monotonic()
+
+    async def add(self, n_bytes: int) -> None:
+        """Wait after so many more bytes, if they are too far ahead."""
+        self._seconds += n_bytes / self._bytes_per_s
+        ahead = self._seconds - (time.monotonic() - self._began)
+        if ahead < 0:  # a pause of the sender is no credit
+            self._began += -ahead
+        if ahead > MAX_AHEAD_S:
+            await asyncio.sleep(ahead - MAX_AHEAD_S)
+
+
 class LiveText:
     """The text of one stream.
 
@@ -56,7 +76,7 @@ class LiveText:
     Attributes
     ----------
     inputs
-        Of the task: ``say`` with one sentence, ``cancel`` and ``end``.
+        Of the task: ``say`` with one sentence, ``listen``, ``heard`` with sound of the partner, ``cancel`` and ``end``.
     """
 
     def __init__(self, language: str, limits: tuple[int, int], count: Count) -> None:
@@ -66,11 +86,16 @@ class LiveText:
         self._n_characters, self._minute = 0, Bucket()
         self._sentences: deque[str] = deque()
         self._n_given, self._n_cancels, self._is_ended = 0, 0, False
+        self._heard, self._block = (
+            bytearray(),
+            0.0,
+        )  # sound of the partner that the task has not got, and bytes of a block
+        self._partner_pace: Pace | None = None
         self._has_room = asyncio.Event()
         self._has_room.set()
 
-    async def receive(self, content: Mapping[str, Any], _: bytes = b"") -> None:
-        """Follow a message of the client, as soon as there is room for its text.
+    async def receive(self, content: Mapping[str, Any], samples: bytes = b"") -> None:
+        """Follow a message of the client, as soon as there is room for its text or its sound.
 
         Raises
         ------
@@ -78,7 +103,10 @@ class LiveText:
             It has too much text, or sentences that the key may not have spoken now; the rest of it is dropped.
         """
         try:
-            await self._follow(content)
+            if samples:
+                await self._hear(samples)
+            else:
+                await self._follow(content)
         finally:
             self._give()
         await self._has_room.wait()
@@ -87,6 +115,8 @@ class LiveText:
         match content["type"]:
             case "text":
                 await self._add(content.get("text"))
+            case "listen":
+                self._listen(content.get("rate"))
             case "flush":
                 self._queue(self._growing.flush())
             case "end":
@@ -97,6 +127,29 @@ class LiveText:
                 self._growing.clear()
                 self._n_cancels += 1
                 self.inputs.put_nowait(({"type": "cancel", "arrived": time.monotonic()}, b""))
+
+    def _listen(self, rate: Any) -> None:
+        low, high = SAMPLE_RATES
+        if rate is not None and not (isinstance(rate, int) and low <= rate <= high):
+            shown = format_value(rate)
+            raise RefusedError(
+                400, "invalid_request", f"rate must be a sample rate from {low} to {high} Hz, or null, not {shown}"
+            )
+        self._heard.clear()
+        self._partner_pace = None if rate is None else Pace(SAMPLE_BYTES * rate)
+        self._block = HEARD_S * SAMPLE_BYTES * (rate or 0)
+        self.inputs.put_nowait(({"type": "listen", "rate": rate}, b""))
+
+    async def _hear(self, samples: bytes) -> None:
+        if self._partner_pace is None:
+            raise RefusedError(
+                400, "invalid_request", "sound of the other is heard after listen with its sample rate; send that first"
+            )
+        self._heard += samples
+        await self._partner_pace.add(len(samples))
+        if len(self._heard) >= self._block:
+            self.inputs.put_nowait(({"type": "heard"}, bytes(self._heard)))
+            self._heard.clear()
 
     def is_note(self, event: Mapping[str, Any]) -> bool:
         """Follow an event of the task; whether it is for this object alone."""

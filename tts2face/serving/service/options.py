@@ -36,7 +36,8 @@ from tts2face.session.outputs import media_types
 
 # Options that a door does not take, with the reason.
 NOT_IN_CLIPS: Mapping[str, str] = MappingProxyType({
-    "audio": "a part of the form", "timeline": "a part of the form", "renderer": "the operator's machine draws",
+    "audio": "a part of the form", "partner": "a part of the form", "timeline": "a part of the form",
+    "renderer": "the operator's machine draws",
 })  # fmt: skip
 
 if TYPE_CHECKING:
@@ -98,8 +99,8 @@ MAX_CAST_CHARACTERS = 1_000_000
 
 # Options of clips that subtitles do not take, with the reason.
 NOT_IN_SUBTITLES: Mapping[str, str] = NOT_IN_CLIPS | MappingProxyType({
-    "text": "the cues have it", "idle": "cues speak", "expression": "its times are those of one clip",
-    "audio_map": "the words of recordings are given",
+    "text": "the cues have it", "idle": "cues speak", "listen": "cues speak",
+    "expression": "its times are those of one clip", "audio_map": "the words of recordings are given",
 })  # fmt: skip
 if TYPE_CHECKING:
     from tts2face.serving.service.request_fields import StrictModel as SubtitleFields
@@ -148,7 +149,7 @@ async def add_clip_file(order: JobOrder, part: str, file: UploadFile, number: in
     """Check and note the recording or the timeline of a clip."""
     _refuse_second(part, number)
     folder = order.upload.folder
-    made = await folder.sound(part, file) if part == "audio" else await folder.text(part, file, ".json")
+    made = await folder.sound(part, file) if FILES[part].endswith(".wav") else await folder.text(part, file, ".json")
     order.upload.files[FILES[part]] = made
 
 
@@ -192,9 +193,10 @@ async def prepare_clip(order: JobOrder) -> dict[str, Any]:
             413, "too_long", f"the text has more than {order.state.settings.text_characters} characters; divide it"
         )
     has_audio = FILES["audio"] in order.upload.files
-    if not (given.get("text", "").strip() or has_audio or "idle" in given):
-        raise RefusedError(400, "invalid_request", "there is nothing to say; give text, audio or idle")
-    Request(**fields.request | ({"audio": Path("audio.wav")} if has_audio else {}))
+    if not (given.get("text", "").strip() or has_audio or "idle" in given or "listen" in given):
+        raise RefusedError(400, "invalid_request", "there is nothing to say; give text, audio, idle or listen")
+    sounds = {name: Path(file) for name, file in FILES.items() if name != "timeline" and file in order.upload.files}
+    Request(**fields.request | sounds)
     Picture(**fields.picture)
     work = order.state.work(models=fields.models, request=fields.request, picture=fields.picture, format=format)
     return work.as_json()
@@ -262,6 +264,7 @@ JOB_KINDS: dict[str, JobKind] = {
         {
             "audio": ("Speech in place of a voice.", add_clip_file),
             "background": ("Picture behind the face.", add_background),
+            "partner": ("Sound that the face listens to.", add_clip_file),
             "timeline": ("Timeline of gestures, JSON.", add_clip_file),
         },
         prepare_clip,

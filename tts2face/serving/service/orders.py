@@ -48,8 +48,9 @@ CHARACTERS_PER_S, CUE_S = 15.0, 3.0  # of speech; what a job takes of its key's 
 def expected_speech_s(order: JobOrder) -> float:
     """Seconds of speech that a job is expected to make."""
     options = order.options
-    text, idle = getattr(options, "text", ""), getattr(options, "idle", None)
-    return len(text) / CHARACTERS_PER_S + (idle or 0.0) + CUE_S * order.upload.n_cues
+    text = getattr(options, "text", "")
+    silent_s = sum(getattr(options, name, None) or 0.0 for name in ("idle", "listen"))
+    return len(text) / CHARACTERS_PER_S + silent_s + CUE_S * order.upload.n_cues
 
 
 AddFile = Callable[[JobOrder, str, UploadFile, int], Awaitable[None]]

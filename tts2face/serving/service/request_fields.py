@@ -30,12 +30,14 @@ DESCRIPTIONS: Mapping[str, str] = MappingProxyType({
     "palette": "A palette of GET /v1/palettes.",
     "background": "studio, transparent, blur, or a colour.",
 })  # fmt: skip
-LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType({"seed": (0, 2**31 - 1), "idle": (0.1, 30)})
+LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
+    {"seed": (0, 2**31 - 1), "idle": (0.1, 30), "listen": (0.1, 30)}
+)
 EXAMPLES: Mapping[str, Any] = MappingProxyType({
     "text": "Hello there.", "voice": "heart", "articulation": "clear", "style": "delighted", "gain": "head=1.5",
     "talker": "grid_s1", "face": "ada", "identity": "kofi", "hair": "long01", "hair_color": "brown",
     "palette": "starter", "size": "512x512", "background": "#204060", "quality": "draft", "expression": "happy=0.6",
-    "idle": 2.5, "context": 3, "exemplars": 10, "audio_map": "network",
+    "idle": 2.5, "listen": 2.5, "gaze": "camera", "context": 3, "exemplars": 10, "audio_map": "network",
 })  # fmt: skip
 
 

@@ -21,7 +21,13 @@ from tts2face.storage.temporary import Temporary
 FORMAT = 3  # of entries; those of others are not found
 CACHED_KINDS = frozenset({"file", "speech"})
 MAX_SHARE = 0.25  # of the budget that one entry may take
-FILE_FIELDS = ("audio", "timeline", "dictionary", "background")  # whose files are read while a result is made
+FILE_FIELDS = (
+    "audio",
+    "partner",
+    "timeline",
+    "dictionary",
+    "background",
+)  # whose files are read while a result is made
 
 
 def work_hash(work: Work) -> str:

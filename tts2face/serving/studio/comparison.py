@@ -31,7 +31,9 @@ from tts2face.storage.files import translate_disk_errors, write_atomically
 
 KEPT, SETTINGS, RECORDING, TAKE = "kept", "settings", "recording", "take"
 KINDS = (KEPT, SETTINGS, RECORDING, TAKE)
-NOT_SETTINGS = frozenset({"text", "audio", "idle", "timeline", "dictionary"})  # what is said stays the same
+NOT_SETTINGS = frozenset(
+    {"text", "audio", "idle", "listen", "partner", "timeline", "dictionary"}
+)  # what is said stays the same
 MAX_LABEL = 100
 MAX_OFFSET_S = 3600.0
 

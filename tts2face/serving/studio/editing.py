@@ -14,7 +14,7 @@ from typing import Any
 from lexicon.errors import InputError
 from lexicon.inputs import check_type, is_number
 from lexicon.sequence import PhoneSequence
-from tts2face.gestures.elements import KINDS, ElementKind, GazeTarget, Nod, StyleSpan, check_feature
+from tts2face.gestures.elements import KINDS, ElementKind, Nod, StyleSpan, check_feature
 from tts2face.gestures.timeline import Timeline, expand_feature
 from tts2face.lips.options import ExcludedToken
 from tts2face.picture.options import Picture
@@ -101,16 +101,18 @@ def _remove_nod(project: Project, given: Edit, _: Sentences) -> Project:
     return _timed(project, nods=tuple(nod for nod in nods if nod is not near))
 
 
-def _gaze(project: Project, given: Edit, _: Sentences) -> Project:
-    target = GazeTarget(given["down_deg"], given["left_deg"], max(0.0, given["start"]), given["end"])
-    return _timed(project, gaze=KINDS["gaze"].merged(project.timeline.gaze, (target,)))
+def _place(kind: ElementKind, project: Project, given: Edit, _: Sentences) -> Project:
+    """Add a span that replaces those of its lane under it."""
+    element = kind.record(**dict(given) | {"start": max(0.0, given["start"])})
+    return _timed(project, **{kind.name: kind.merged(getattr(project.timeline, kind.name), (element,))})
 
 
-def _remove_gaze(project: Project, given: Edit, _: Sentences) -> Project:
-    kept = tuple(one for one in project.timeline.gaze if not one.start <= given["time"] < one.end)
-    if len(kept) == len(project.timeline.gaze):
-        raise InputError(f"there is no gaze target at {given['time']:.2f} s; click on one")
-    return _timed(project, gaze=kept)
+def _remove_span(kind: ElementKind, what: str, project: Project, given: Edit, _: Sentences) -> Project:
+    spans = getattr(project.timeline, kind.name)
+    kept = tuple(one for one in spans if not one.start <= given["time"] < one.end)
+    if len(kept) == len(spans):
+        raise InputError(f"there is no {what} at {given['time']:.2f} s; click on one")
+    return _timed(project, **{kind.name: kept})
 
 
 def _mute(project: Project, given: Edit, _: Sentences) -> Project:
@@ -210,8 +212,10 @@ EDITS: Mapping[str, tuple[Mapping[str, type], Change]] = {
     },
     "nod": ({"time": float, "size": float}, _nod),
     "remove_nod": ({"time": float}, _remove_nod),
-    "gaze": ({**_SPAN, "down_deg": float, "left_deg": float}, _gaze),
-    "remove_gaze": ({"time": float}, _remove_gaze),
+    "gaze": ({**_SPAN, "down_deg": float, "left_deg": float}, partial(_place, KINDS["gaze"])),
+    "remove_gaze": ({"time": float}, partial(_remove_span, KINDS["gaze"], "gaze target")),
+    "listen": (_SPAN, partial(_place, KINDS["listens"])),
+    "remove_listen": ({"time": float}, partial(_remove_span, KINDS["listens"], "listening span")),
     "mute": ({"feature": str, "on": bool}, _mute),
     "solo": ({"feature": str, "on": bool}, _solo),
     "seed": ({"feature": str, "seed": int}, _seed),

@@ -36,7 +36,8 @@ from tts2face.serving.work.run import JobTask, Product, Products, products_of
 from tts2face.session.named_models import Models
 from tts2face.session.outputs import line_formats, media_types
 
-FILES = {"audio": "audio.wav", "timeline": "timeline.json"}  # fields of a request: names of the job's files
+# Fields of a request: names of the job's files.
+FILES = {"audio": "audio.wav", "partner": "partner.wav", "timeline": "timeline.json"}
 BACKGROUND = "background.png"
 
 

@@ -92,7 +92,8 @@ async def timed_speech(request: HttpRequest | WebSocket, work: Work) -> tuple[li
 
 router = APIRouter(prefix="/v1", tags=["clips"])
 
-FILES = ("audio", "background", "timeline")
+FILES = ("audio", "background", "partner", "timeline")
+SOUNDS = ("audio", "partner")
 
 MULTIPART = {
     "description": "Options as JSON; or a form whose part `request` holds them, with files.",
@@ -110,6 +111,7 @@ MULTIPART = {
                     },
                     "audio": {"type": "string", "format": "binary", "description": "Speech in place of a voice."},
                     "background": {"type": "string", "format": "binary", "description": "Picture behind the face."},
+                    "partner": {"type": "string", "format": "binary", "description": "Sound that the face listens to."},
                     "timeline": {"type": "string", "format": "binary", "description": "Timeline of gestures, JSON."},
                 },
             }
@@ -152,7 +154,7 @@ async def _read_form(form: FormData, folder: UploadFolder) -> tuple[ClipRequest,
             raise RefusedError(422, "invalid_request", f"{name} must be a file with a file name")
         if upload is None:
             continue
-        if name == "audio":
+        if name in SOUNDS:
             files[name] = str(await folder.sound(name, upload))
         elif name == "background":
             files[name] = str(await folder.picture(name, upload))
@@ -169,7 +171,7 @@ async def _answer(
     state = service_state(request)
     fields = await divide_options(state, request.state.key, given)
     picture = fields.picture | {name: files[name] for name in ("background",) if name in files}
-    spoken = fields.request | {name: files[name] for name in ("audio", "timeline") if name in files}
+    spoken = fields.request | {name: files[name] for name in (*SOUNDS, "timeline") if name in files}
     keeps_pace = format in MOVIE_KINDS and not clip.model_fields_set & {"quality", "supersampling"}
     work = state.work(models=fields.models, request=spoken, picture=picture, format=format, keeps_pace=keeps_pace)
     return await stream_work(request, work, media_types()[format], resources=resources)

@@ -1,7 +1,6 @@
 """Live streams for avatars: text or sound comes in, speech, phones and curves go out with their times."""
 
 import asyncio
-import time
 from collections.abc import AsyncIterator, Mapping
 from contextlib import aclosing, suppress
 from types import MappingProxyType
@@ -13,26 +12,25 @@ from pydantic import Field, ValidationError
 from tts2face.processes.message import Message
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.library import check_voice, resolve_dictionary, resolve_models
-from tts2face.serving.service.live_text import REFUSED_S, LiveText, parse_message
+from tts2face.serving.service.live_text import REFUSED_S, SAMPLE_BYTES, SAMPLE_RATES, LiveText, Pace, parse_message
 from tts2face.serving.service.pool import InputQueue
 from tts2face.serving.service.request_fields import MODEL_FIELDS, PICTURE_FIELDS, StrictModel, options_model
 from tts2face.serving.service.state import ServiceState
 
 router = APIRouter(tags=["live"])
 
-TEXT_TYPES = frozenset({"text", "flush", "cancel", "interrupt", "end"})  # of messages of a stream of text
+TEXT_TYPES = frozenset({"text", "listen", "flush", "cancel", "interrupt", "end"})  # of messages of a stream of text
 AUDIO_TYPES = frozenset({"end"})  # of a stream of sound, besides the sound
 MAX_BLOCK_BYTES = 1 << 16  # of sound in one message
 MAX_BLOCKS = 16  # that wait for the task
-MAX_AHEAD_S = 5.0  # by which a client's sound is read ahead of real time
-SAMPLE_BYTES = 2
 INVALID = 1007  # WebSocket close code: a message is not what it should be
 
 
 # Options that live text does not take, with the reason.
 NOT_IN_LIVE_TEXT: Mapping[str, str] = MappingProxyType(
-    {"text": "it comes in parts", "audio": "live sound has options of its own", "audio_map": "there is no recording"}
-    | dict.fromkeys(("idle", "timeline", "expression"), "the end of live text is not known")
+    {"audio": "live sound has options of its own", "audio_map": "there is no recording"}
+    | dict.fromkeys(("text", "partner"), "it comes in parts")
+    | dict.fromkeys(("idle", "listen", "timeline", "expression"), "the end of live text is not known")
     | dict.fromkeys(
         ("plain_delivery", "synthesis", "context", "exemplars", "articulation", "pitch"), "live text has the defaults"
     )
@@ -57,7 +55,7 @@ class AudioOptions(StrictModel):
 
     type: Literal["start"]
     input: Literal["audio"]
-    rate: Annotated[int, Field(ge=8_000, le=192_000, description="Sample rate in Hz.")] = 16_000
+    rate: Annotated[int, Field(ge=SAMPLE_RATES[0], le=SAMPLE_RATES[1], description="Sample rate in Hz.")] = 16_000
     talker: str | None = None
     face: str | None = None
     identity: str | None = None
@@ -129,7 +127,7 @@ async def _receive(connection: WebSocket, receiver: "LiveText | _Sound") -> bool
     """Pass the client's messages on; True after ``end``, False when the client has left."""
     while True:
         try:
-            content, samples = _read_message(await connection.receive(), has_sound=isinstance(receiver, _Sound))
+            content, samples = _read_message(await connection.receive(), is_sound=isinstance(receiver, _Sound))
             await receiver.receive(content, samples)
         except WebSocketDisconnect:
             return False
@@ -146,7 +144,7 @@ class _Sound:
 
     def __init__(self, rate: int) -> None:
         self.inputs: InputQueue = asyncio.Queue(MAX_BLOCKS)
-        self._pace = _Pace(SAMPLE_BYTES * rate)
+        self._pace = Pace(SAMPLE_BYTES * rate)
 
     async def receive(self, content: dict[str, Any], samples: bytes) -> None:
         await self._pace.add(len(samples))
@@ -156,22 +154,7 @@ class _Sound:
         return False
 
 
-class _Pace:
-    """Slows a sender of sound down to real time once it is `MAX_AHEAD_S` ahead."""
-
-    def __init__(self, bytes_per_s: float) -> None:
-        self._bytes_per_s, self._seconds, self._began = bytes_per_s, 0.0, time.monotonic()
-
-    async def add(self, n_bytes: int) -> None:
-        self._seconds += n_bytes / self._bytes_per_s
-        ahead = self._seconds - (time.monotonic() - self._began)
-        if ahead < 0:  # a pause of the sender is no credit
-            self._began += -ahead
-        if ahead > MAX_AHEAD_S:
-            await asyncio.sleep(ahead - MAX_AHEAD_S)
-
-
-def _read_message(message: Any, *, has_sound: bool) -> tuple[dict[str, Any], bytes]:
+def _read_message(message: Any, *, is_sound: bool) -> tuple[dict[str, Any], bytes]:
     """Content and sound of a message.
 
     Raises
@@ -184,18 +167,18 @@ def _read_message(message: Any, *, has_sound: bool) -> tuple[dict[str, Any], byt
     if message["type"] == "websocket.disconnect":
         raise WebSocketDisconnect
     samples = message.get("bytes")
-    if samples is not None and has_sound:
+    if samples is not None:
         if len(samples) % SAMPLE_BYTES or len(samples) > MAX_BLOCK_BYTES:
             raise RefusedError(
                 400, "invalid_request",
                 f"a block of sound has {len(samples)} bytes; send 16-bit samples in up to {MAX_BLOCK_BYTES} bytes",
             )  # fmt: skip
         return {"type": "audio"}, samples
-    content, types = parse_message(message.get("text") or ""), AUDIO_TYPES if has_sound else TEXT_TYPES
+    content, types = parse_message(message.get("text") or ""), AUDIO_TYPES if is_sound else TEXT_TYPES
     if not isinstance(content, dict) or content.get("type") not in types:
         raise RefusedError(
             400, "invalid_request",
-            f"a message must be {'16-bit samples, or ' if has_sound else ''}JSON with one of the types "
+            f"a message must be 16-bit samples, or JSON with one of the types "
             f"{', '.join(sorted(types))}",
         )  # fmt: skip
     return content, b""

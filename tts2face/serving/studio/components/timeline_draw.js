@@ -1,6 +1,6 @@
 // Drawing of the timeline; only what is visible is drawn.
 
-import { channelRange, columnOf, describeGaze, frameValue, valueY } from "./timeline_values.js";
+import { SPAN_ROWS, channelRange, columnOf, frameValue, valueY } from "./timeline_values.js";
 import { curveValue, firstAfter, formatTime } from "./timeline_view.js";
 
 const FONT = "12px system-ui, sans-serif";
@@ -70,7 +70,8 @@ export class Painter {
       phones: () => this.#labels(row, this.state.phones),
       curve: () => this.#expressions(row),
       nods: () => this.#nods(row),
-      targets: () => this.#targets(row),
+      targets: () => this.#spans(row),
+      listens: () => this.#spans(row),
       channel: () => this.#channel(row),
     }[row.id];
     return draw();
@@ -225,10 +226,10 @@ export class Painter {
     }
   }
 
-  #targets(row) {
-    const { model, view, colors } = this.state, { context: c } = this;
-    if (!model.gaze.length) this.#hint(row, "Double-click to add a direction of the eyes");
-    for (const one of model.gaze) {
+  #spans(row) {
+    const { model, view, colors } = this.state, { context: c } = this, { list, hint, text } = SPAN_ROWS[row.id];
+    if (!model[list].length) this.#hint(row, hint);
+    for (const one of model[list]) {
       const x = view.x(one.start), width = (Math.min(one.end, view.duration) - one.start) * view.scale;
       if (x + width < 0 || x > view.width) continue;
       c.fillStyle = colors.select;
@@ -237,7 +238,7 @@ export class Painter {
       c.lineWidth = 1.5;
       c.strokeRect(x + 0.75, row.y + 3.75, Math.max(width - 1.5, 0.5), row.height - 8.5);
       c.fillStyle = colors.text;
-      this.#text(describeGaze(one), x + 6, row.y + row.height / 2, width - 8);
+      this.#text(text(one), x + 6, row.y + row.height / 2, width - 8);
     }
   }
 

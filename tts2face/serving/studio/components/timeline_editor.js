@@ -1,13 +1,14 @@
 // Forms in which the values of an element are typed.
 
 import { clock } from "./clock.js";
+import { SPAN_ROWS } from "./timeline_values.js";
 import { rounded } from "./timeline_view.js";
 
 const number = (name, label, value, low, high, step) => ({ name, label, value: rounded(value), low, high, step });
 
 /** Open the form of an element; words and phones have none. */
 export function openEditor(host, row, item) {
-  const forms = { span: openSpan, nod: openNod, gaze: openGaze, key: openKey };
+  const forms = { span: openSpan, nod: openNod, gaze: openElement, listen: openElement, key: openKey };
   clock.pause();
   forms[item.kind]?.(host, row, item);
 }
@@ -36,19 +37,19 @@ function openNod(host, row, item) {
   host.component.openEditor("Nod", fields, (values) => host.replaceNod(item.nod, values.time, values.size), () => host.remove(row, item));
 }
 
-function openGaze(host, row, item) {
-  const { gaze } = item, { duration } = host.state.view;
-  const fields = [
-    ...times(gaze.start, gaze.end, duration),
-    number("down_deg", "Degrees down", gaze.down_deg, -35, 35, 1),
-    number("left_deg", "Degrees to the person’s left", gaze.left_deg, -35, 35, 1),
-  ];
+function openElement(host, row, item) {
+  const { element } = item, { kind, title } = SPAN_ROWS[row.id];
+  const fields = times(element.start, element.end, host.state.view.duration);
+  if (kind === "gaze") {
+    fields.push(number("down_deg", "Degrees down", element.down_deg, -35, 35, 1));
+    fields.push(number("left_deg", "Degrees to the person’s left", element.left_deg, -35, 35, 1));
+  }
   const apply = (values) => {
     if (values.end <= values.start) return host.component.say("The end must lie after the start.");
-    host.emit({ kind: "remove_gaze", time: gaze.start });
-    return host.emit({ kind: "gaze", ...values });
+    host.emit({ kind: `remove_${kind}`, time: element.start });
+    return host.emit({ kind, ...values });
   };
-  host.component.openEditor("Gaze target", fields, apply, () => host.remove(row, item));
+  host.component.openEditor(title, fields, apply, () => host.remove(row, item));
 }
 
 function openKey(host, row, item) {

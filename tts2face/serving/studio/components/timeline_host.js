@@ -10,6 +10,7 @@ import { rowItems } from "./timeline_items.js";
 import { performKey } from "./timeline_keyboard.js";
 import { describeEdit, TimelineModel } from "./timeline_model.js";
 import { PointerTools } from "./timeline_pointer.js";
+import { SPAN_ROWS } from "./timeline_values.js";
 import { curveValue, formatTime, rounded, View } from "./timeline_view.js";
 import { Waveform } from "./waveform.js";
 
@@ -269,7 +270,7 @@ export class TimelineHost {
     const { state } = this;
     if (item.kind === "span") this.emit({ kind: "erase", feature: row.feature, start: item.begin, end: Math.min(item.end, state.view.duration) });
     else if (item.kind === "nod") this.emit({ kind: "remove_nod", time: item.nod.time });
-    else if (item.kind === "gaze") this.emit({ kind: "remove_gaze", time: item.begin });
+    else if (SPAN_ROWS[row.id]) this.emit({ kind: `remove_${item.kind}`, time: item.begin });
     else if (item.kind === "key") this.emit(state.model.removeKey(state.model.curveOf(row, state.chosen), item.number));
   }
 

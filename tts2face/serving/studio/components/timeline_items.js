@@ -1,6 +1,6 @@
 // Elements of the rows of a timeline as a list: what keys reach, what a pointer hits, and what a screen reader says.
 
-import { columnOf, describeGaze, frameValue } from "./timeline_values.js";
+import { SPAN_ROWS, columnOf, frameValue } from "./timeline_values.js";
 import { curveValue, firstAfter } from "./timeline_view.js";
 
 const HIT_PX = 6;
@@ -12,14 +12,15 @@ export function rowItems(row, state) {
     words: () => preview.words.map(([text, begin, end, , isDoubtful], index) => ({ kind: "word", begin, end, index, name: text, label: `${isDoubtful ? "doubtful " : ""}word ${text}` })),
     phones: () => state.phones.map((phone, index) => ({ kind: "phone", begin: phone[1], end: phone[2], index, name: phone[0], label: `phone ${phone[0]}` })),
     nods: () => model.nods.map((nod) => ({ kind: "nod", begin: nod.time, end: nod.time, nod, label: `nod of size ${nod.size}` })),
-    targets: () => model.gaze.map((gaze) => ({ kind: "gaze", begin: gaze.start, end: gaze.end, gaze, label: `eyes look ${describeGaze(gaze)}` })),
     curve: () => keyItems(row, state, chosen.expression),
     channel: () => keyItems(row, state, chosen.channel),
   }[row.id];
   if (make) return make();
+  const spans = SPAN_ROWS[row.id];
+  if (spans) return model[spans.list].map((one) => ({ kind: spans.kind, begin: one.start, end: one.end, element: one, label: spans.label(one) }));
   if (!row.feature) return [];
-  const spans = model.spansOf(row.feature).map((span) => ({ kind: "span", begin: span.start, end: span.end, span, label: `style ${span.style}` }));
-  return [...spans, ...keyItems(row, state, `strength of ${row.label}`)].sort((a, b) => a.begin - b.begin);
+  const styles = model.spansOf(row.feature).map((span) => ({ kind: "span", begin: span.start, end: span.end, span, label: `style ${span.style}` }));
+  return [...styles, ...keyItems(row, state, `strength of ${row.label}`)].sort((a, b) => a.begin - b.begin);
 }
 
 function keyItems(row, state, name) {

@@ -2,6 +2,7 @@
 
 import { clock } from "./clock.js";
 import { rowItems } from "./timeline_items.js";
+import { SPAN_ROWS } from "./timeline_values.js";
 import { curveValue, rounded } from "./timeline_view.js";
 
 const STEP_S = 0.01;
@@ -104,9 +105,10 @@ function enter(state, host) {
     return;
   }
   if (row.id === "nods") host.emit({ kind: "nod", time, size: 1 });
-  else if (row.id === "targets") {
+  else if (SPAN_ROWS[row.id]) {
+    const { kind, made } = SPAN_ROWS[row.id];
     const [start, end] = state.range ?? [time, Math.min(time + 1, state.view.duration)];
-    host.emit({ kind: "gaze", start: rounded(start), end: rounded(end), down_deg: 0, left_deg: 0 });
+    host.emit({ kind, start: rounded(start), end: rounded(end), ...made });
   } else addKey(row, state, host, time);
 }
 

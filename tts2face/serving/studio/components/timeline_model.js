@@ -20,6 +20,7 @@ export class TimelineModel {
     this.expressions = ended(copy.expressions);
     this.nods = copy.nods ?? [];
     this.gaze = ended(copy.gaze);
+    this.listens = ended(copy.listens);
     this.strengths = byName(copy.strengths, "feature");
     this.curves = byName(copy.curves, "expression");
     this.channels = byName(copy.edits, "channel");
@@ -79,8 +80,10 @@ export class TimelineModel {
       channel: () => setKeys(this.channels, edit.channel, edit.keys),
       nod: () => (this.nods = [...this.nods, { time: edit.time, size: edit.size }].sort((a, b) => a.time - b.time)),
       remove_nod: () => (this.nods = this.nods.filter((nod) => Math.abs(nod.time - edit.time) > 1e-6)),
-      gaze: () => (this.gaze = [...cut(this.gaze, edit.start, edit.end), { ...edit }].sort((a, b) => a.start - b.start)),
-      remove_gaze: () => (this.gaze = this.gaze.filter((one) => !(one.start <= edit.time && edit.time < one.end))),
+      gaze: () => (this.gaze = placed(this.gaze, edit)),
+      remove_gaze: () => (this.gaze = without(this.gaze, edit.time)),
+      listen: () => (this.listens = placed(this.listens, edit)),
+      remove_listen: () => (this.listens = without(this.listens, edit.time)),
       seed: () => (this.seeds = { ...this.seeds, [edit.feature]: edit.seed }),
     }[edit.kind];
     change?.();
@@ -117,6 +120,15 @@ function cut(spans, start, end) {
   );
 }
 
+/** Spans with one more, which replaces those under it. */
+function placed(spans, edit) {
+  return [...cut(spans, edit.start, edit.end), { ...edit }].sort((a, b) => a.start - b.start);
+}
+
+function without(spans, time) {
+  return spans.filter((one) => !(one.start <= time && time < one.end));
+}
+
 /** Adjacent spans of one style as one. */
 function joined(spans) {
   const result = [];
@@ -139,6 +151,8 @@ export function describeEdit(edit) {
     remove_nod: "removed a nod",
     gaze: `gaze target${span}`,
     remove_gaze: "removed a gaze target",
+    listen: `the face listens${span}`,
+    remove_listen: "removed a listening span",
     seed: `new seed for ${edit.feature}`,
   };
   return names[edit.kind] ?? `changed the curve of ${edit.feature ?? edit.expression ?? edit.channel}`;

@@ -1,7 +1,7 @@
 // What a pointer does on the timeline: each press begins one gesture, which moves with the pointer and ends in edits.
 
 import { clock } from "./clock.js";
-import { channelRange, valueY, yValue } from "./timeline_values.js";
+import { SPAN_ROWS, channelRange, valueY, yValue } from "./timeline_values.js";
 import { channelValue, edgeAt, hitKey, rowAt, rowItems, shownLimits, snapTimes } from "./timeline_items.js";
 import { rounded } from "./timeline_view.js";
 
@@ -9,7 +9,7 @@ const EDGE_LEAST_S = 0.01; // of a phone
 const SPAN_LEAST_S = 0.02; // of a painted span
 const CLICK_PX = 3;
 const RESIZE_PX = 5;
-const TARGET_S = 1.0; // of a new gaze target
+const NEW_S = 1.0; // of a new gaze target or listening span
 
 export class PointerTools {
   /** `state` holds what is shown; `host` has the methods emit(edit), redraw(), pick(item), open(row, item). */
@@ -238,9 +238,9 @@ export class PointerTools {
     const onKey = curve && hitKey(row, state, x, y, (value) => this.valueY(row, value));
     if (onKey || (item && !curve)) this.host.open(row, item);
     else if (row.id === "nods") this.host.emit({ kind: "nod", time: rounded(time), size: 1 });
-    else if (row.id === "targets") {
-      const end = rounded(Math.min(time + TARGET_S, state.view.duration));
-      this.host.emit({ kind: "gaze", start: rounded(time), end, down_deg: 0, left_deg: 0 });
+    else if (SPAN_ROWS[row.id]) {
+      const end = rounded(Math.min(time + NEW_S, state.view.duration)), { kind, made } = SPAN_ROWS[row.id];
+      this.host.emit({ kind, start: rounded(time), end, ...made });
     } else if (curve && this.canAdd(row)) {
       const value = yValue(row, y, ...shownLimits(row, state, channelRange));
       this.host.emit(state.model.addKey(curve, time, this.keyValue(row, curve, time, value)));

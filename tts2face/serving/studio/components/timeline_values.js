@@ -43,6 +43,18 @@ export function channelRange(state) {
   return state.kept.range;
 }
 
+/** Rows of spans of which one element at most holds at a time: kind of its edits, list of the model, and values of a new one. */
+export const SPAN_ROWS = {
+  targets: {
+    kind: "gaze", list: "gaze", title: "Gaze target", hint: "Double-click to add a direction of the eyes",
+    made: { down_deg: 0, left_deg: 0 }, text: describeGaze, label: (one) => `eyes look ${describeGaze(one)}`,
+  },
+  listens: {
+    kind: "listen", list: "listens", title: "Listening", hint: "Double-click where nothing is said to let the face listen",
+    made: {}, text: () => "listens", label: () => "the face listens",
+  },
+};
+
 export function describeGaze({ down_deg: down, left_deg: left }) {
   const parts = [];
   if (down) parts.push(`${Math.abs(down)}° ${down > 0 ? "down" : "up"}`);

@@ -24,6 +24,7 @@ export function layoutRows(features) {
     { id: "curve", label: "Expression keys", height: 44 },
     { id: "nods", label: "Nods", height: 22 },
     { id: "targets", label: "Gaze targets", height: 22 },
+    { id: "listens", label: "Listening", height: 22 },
     { id: "channel", label: "Channel", height: 72 },
   ];
   let y = 0;

@@ -1,0 +1,134 @@
+"""What a listener does: nods and raised brows at the other's cues, or at intervals where nothing of the other is heard.
+
+Cues are those of Ward and Tsukahara 2000 (Journal of Pragmatics 32) for English: a region of low pitch, after enough
+speech; and pauses, at which listeners respond as well (Dittmann and Llewellyn 1968).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tts2face.gestures.blinks import PAUSE_DB
+from tts2face.gestures.elements import BrowRaise, Listening, Nod
+from tts2face.gestures.presentation import prosody_features, speech_intensity
+from tts2face.gestures.timeline import Timeline
+from tts2face.types import Waveform
+
+# Ward and Tsukahara 2000, section 4: pitch below its 26th percentile for 110 ms, after 700 ms of speech; the response
+# follows 700 ms later.
+LOW_PITCH_SHARE, LOW_PITCH_S, SPOKEN_S, WAIT_S = 0.26, 0.11, 0.7, 0.7
+PAUSE_S = 0.3  # of silence that is a cue; shorter ones are closures of plosives
+# Between responses: their rule has .8 s, and responds far more often than their listeners did. Six to twelve a minute
+# look natural (Poppe, Truong and Heylen 2011, IVA).
+LEAST_GAP_S = 4.5
+STEP_S, CUE_RATE = 0.01, 16_000  # s, and Hz of the sound in which cues are looked for
+# Without the other's sound: one response in each cell of time, away from its ends, so 6.7 a minute.
+CELL_S, MARGIN = 9.0, 0.15
+NOD_SHARE, RAISE_SHARE = 0.75, 0.4  # of responses; one without a nod raises the brows
+NOD_SIZES, RAISE_SIZES = (0.35, 0.8), (0.4, 0.9)
+SECOND_NOD, SECOND_S, SECOND_SIZE = 0.5, 0.42, 0.6  # share of nods that a smaller one follows, and after how long
+LASTS_S = 1.0  # a response
+KEPT_S, LOOK_S = 5.0, 0.4  # of arriving sound in which cues are looked for (20 ms), and between two looks
+
+FloatArray = NDArray[np.float64]
+
+
+def responses(times: Sequence[float], seed: int) -> Timeline:
+    """Nods and brow raises of responses that begin at times in seconds of the clip; each depends on its time alone."""
+    nods, raises = list[Nod](), list[BrowRaise]()
+    for time in times:
+        draws = np.random.default_rng((seed, round(time * 1000))).random(5)
+        has_nod = draws[0] < NOD_SHARE
+        if has_nod:
+            size = float(np.interp(draws[1], (0.0, 1.0), NOD_SIZES))
+            nods.append(Nod(time, size))
+            if draws[2] < SECOND_NOD:
+                nods.append(Nod(time + SECOND_S, SECOND_SIZE * size))
+        if not has_nod or draws[3] < RAISE_SHARE:
+            raises.append(BrowRaise(time, float(np.interp(draws[4], (0.0, 1.0), RAISE_SIZES))))
+    return Timeline(nods=tuple(nods), brow_raises=tuple(raises))
+
+
+def with_responses(timeline: Timeline, begin: float, end: float, seed: int) -> Timeline:
+    """A timeline with the responses that its listening spans have at intervals and that show in [begin, end)."""
+    spans = [span for span in timeline.listens if span.reacts]
+    if not spans:
+        return timeline
+    due = [time for time in drawn_times(begin - LASTS_S, end, seed) if any(_holds(span, time) for span in spans)]
+    return responses(due, seed).merge(timeline)
+
+
+def _holds(span: Listening, time: float) -> bool:
+    return span.start <= time < span.end
+
+
+def drawn_times(begin: float, end: float, seed: int) -> list[float]:
+    """Times of responses at intervals in [begin, end), the same whatever the pieces of a clip."""
+    found = []
+    for cell in range(max(int(begin // CELL_S), 0), int(end // CELL_S) + 1):
+        time = CELL_S * (cell + np.random.default_rng((seed, cell, 1)).uniform(MARGIN, 1.0 - MARGIN))
+        if begin <= time < end:
+            found.append(float(time))
+    return found
+
+
+def cue_times(sound: Waveform, *, last: float = -LEAST_GAP_S, earliest: float = 0.0) -> list[float]:
+    """Seconds of a partner's sound at which a listener responds, at least `LEAST_GAP_S` apart.
+
+    `last` is the time of the response before them, `earliest` the least one.
+    """
+    track = speech_intensity(sound)
+    if track is None:
+        return []
+    times = np.arange(0.0, sound.duration, STEP_S)
+    level, pitch = prosody_features(sound, times, track, with_pitch=True).astype(np.float64).T
+    speaks, voiced = level >= PAUSE_DB, pitch != 0.0
+    if not voiced.any():
+        return []
+    is_low = voiced & (pitch <= np.quantile(pitch[voiced], LOW_PITCH_SHARE))
+    spoken, low, silent = 0.0, 0.0, 0.0
+    found: list[float] = []
+    for time, talks, deep in zip(times.tolist(), speaks.tolist(), is_low.tolist(), strict=True):
+        low = low + STEP_S if deep else 0.0
+        silent = 0.0 if talks else silent + STEP_S
+        spoken += STEP_S if talks else 0.0
+        has_paused = abs(silent - PAUSE_S) < STEP_S / 2
+        due = time if has_paused else time + WAIT_S
+        is_cue = spoken >= SPOKEN_S and (low >= LOW_PITCH_S or has_paused) and due >= earliest
+        if is_cue and due - [last, *found][-1] >= LEAST_GAP_S:
+            found.append(due)
+            spoken = 0.0
+    return found
+
+
+class PartnerSound:
+    """Cues in a partner's sound that arrives in blocks.
+
+    Parameters
+    ----------
+    rate
+        Of its samples, in Hz.
+    """
+
+    def __init__(self, rate: int) -> None:
+        self._rate, self._n_samples, self._n_seen = rate, 0, 0  # numbers of samples at `CUE_RATE`
+        self._kept = np.zeros(0, np.float32)
+        self._last = -LEAST_GAP_S
+
+    def add(self, samples: NDArray[np.float32]) -> None:
+        """Hear samples (m,) in [-1, 1]."""
+        heard = Waveform(samples, self._rate).resampled(CUE_RATE).samples
+        self._n_samples += len(heard)
+        self._kept = np.concatenate([self._kept, heard])[-round(KEPT_S * CUE_RATE) :]
+
+    def new_cues(self) -> list[float]:
+        """Seconds from the end of the sound, 0 or more, of responses that have not been told yet."""
+        seen, end = self._n_seen / CUE_RATE, self._n_samples / CUE_RATE
+        if end - seen < LOOK_S:
+            return []
+        begin, self._n_seen = end - len(self._kept) / CUE_RATE, self._n_samples
+        sound = Waveform(self._kept, CUE_RATE)
+        found = [begin + time for time in cue_times(sound, last=self._last - begin, earliest=seen - begin)]
+        self._last = found[-1] if found else self._last
+        return [max(time - end, 0.0) for time in found]
