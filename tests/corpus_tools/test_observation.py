@@ -62,7 +62,7 @@ def test_a_long_gap():
 
 def _aligned_speech() -> AlignedSpeech:
     phones = PhoneSequence([SILENCE, "b", "i", SILENCE], [0.0, 1.0, 1.1, 1.5, 3.0])
-    return AlignedSpeech(phones, (WordSpan("b", 1, 3),), -3000.0, Waveform(np.zeros(100), 100), False)
+    return AlignedSpeech(phones, (WordSpan("b", 1, 3),), 0.9, (), Waveform(np.zeros(100), 100), False)
 
 
 def test_a_cut_moves_phones_and_pictures_together():

@@ -15,7 +15,8 @@ from tts2face.session.session import Session
 from tts2face.sound.voice_pool import load_voice
 
 SAID = "The young chef usually pushes five big maps before noon."
-WRONG = "Please wait for the beep, then say your name."
+WRONG = "The young chef usually pushes five big maps before noon, yesterday elephants remembered."
+OTHER = "Please wait for the beep, then say your name."
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +42,17 @@ def test_the_core_reports_the_words(recording: Path, tmp_path: Path) -> None:
     assert [piece.mismatches for piece in ready.stream(replace(request, text=SAID))] == [()]
 
 
+def test_another_text_is_refused_with_its_words(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "clip.mp4"
+    assert run(["--audio", str(recording), "--text", OTHER, "--out", str(out)]) == 3
+    refusal = capsys.readouterr().err
+    assert "the recording does not contain this text" in refusal
+    assert "wait" in refusal
+    assert not out.exists()
+
+
 @pytest.mark.parametrize(("text", "n_lines"), [(SAID, 0), (WRONG, 1)])
 def test_the_command_line_reports_mismatches(
     text: str, n_lines: int, recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -53,4 +65,4 @@ def test_the_command_line_reports_mismatches(
     assert out.is_file()
     for line in lines:
         assert line.startswith("tts2face: warning: the text does not fit the recording from ")
-        assert "beep" in line
+        assert "elephants" in line

@@ -26,7 +26,7 @@ def piece(
     return {
         "number": number, "text": f"T{number}", "occurrence": 0, "begin": 0.0, "seconds": n_frames / FPS, "rate": RATE,
         "n_frames": n_frames, "n_samples": 10 * n_frames, "digest": digest, "phones": ["sil", "a"],
-        "edges": [0.0, 0.04, n_frames / FPS], "words": [["w", 0.04, n_frames / FPS]], "channels": CHANNELS,
+        "edges": [0.0, 0.04, n_frames / FPS], "words": [["w", 0.04, n_frames / FPS, False]], "channels": CHANNELS,
     }  # fmt: skip
 
 
@@ -59,7 +59,7 @@ def test_a_first_bundle_has_all(memory: PieceMemory) -> None:
     assert sound.tolist() == [7] * 30 + [8] * 20
     assert header["sentences"] == [["T0", 0, 0.0, 0.1], ["T1", 0, 0.1, 0.166667]]
     assert header["phones"][2:] == [["sil", 0.1, 0.14, 1, 0], ["a", 0.14, 0.166667, 1, 1]]
-    assert header["words"][1] == ["w", 0.14, 0.166667, 1]
+    assert header["words"][1] == ["w", 0.14, 0.166667, 1, False]
 
 
 def test_only_changed_frames_and_samples_follow(memory: PieceMemory) -> None:

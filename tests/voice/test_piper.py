@@ -143,7 +143,7 @@ def test_sound_that_cannot_be_aligned_gets_nominal_durations(voice_file: Path) -
     speech = load_voice(str(voice_file), "en-us").speak("x " * 60)
     assert [word.text for word in speech.words] == ["x"] * 60
     assert speech.phones.end == pytest.approx(speech.waveform.duration)
-    assert speech.phones.phones[:3] == ("ɛ", "k", "s")
+    assert [phone for phone in speech.phones.phones if phone != "sil"][:3] == ["ɛ", "k", "s"]
 
 
 def test_rate_acts_and_seed_does_not(voice_file: Path) -> None:
