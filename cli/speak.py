@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 EXPLANATION_SUFFIXES = (".json", ".txt")
 WITHOUT_WORDS = (
     "the words are not given: lips follow the English phones that are heard; with the words (--text) they agree better "
-    "with the person's (r of the opening .74 in place of .63)"
+    "with the person's (r of the opening .74 in place of .62)"
 )
 
 

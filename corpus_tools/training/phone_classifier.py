@@ -24,7 +24,7 @@ from lexicon.sequence import SILENCE, PhoneSequence, enforce_increasing
 from tts2face.models.phone_classifier import PhoneClassifier
 from tts2face.sound.alignment import Aligner, levelled, recording_features
 from tts2face.sound.heart import NeuralVoice
-from tts2face.sound.recogniser import ENGLISH, FRAME_S, PhoneRecogniser
+from tts2face.sound.recogniser import FEATURES, FRAME_S, PhoneRecogniser
 from tts2face.sound.segments import RATE, STEP_S, StatedPhone, find_edges, frame_features
 from tts2face.sound.spikes import NEVER, find_spikes
 from tts2face.sound.transcript import pronounce_transcript
@@ -219,11 +219,10 @@ def _damaged_frames(
 ) -> Frames:
     """Some frames of damaged speech."""
     features, labels, is_test = [], [], []
-    inventory = tuple(sorted(ENGLISH))
     for at in range(N_DAMAGED * len(spoken)):
         one = damage(spoken[at % len(spoken)], spoken, rng)
         sound = levelled(one.sound)
-        seen = recording_features(sound, recogniser.hear(sound).log_probabilities(inventory))
+        seen = recording_features(sound, recogniser.hear(sound).log_probabilities(FEATURES))
         told = phone_labels(one.phones, len(seen))
         kept = rng.random(len(seen)) < np.where(told == SILENCE, *FRAME_SHARES)
         features.append(seen[kept].astype(np.float16))

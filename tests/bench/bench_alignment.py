@@ -10,6 +10,7 @@ import csv
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from sentences import sentences
 
 from corpus_tools.recordings.folder import read_word_times
 from corpus_tools.training.damage import babble, coded, speech_power, stationary_noise, with_echo
-from lexicon.sequence import SILENCE
+from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.sound.alignment import LEAST_FIT, Aligner
 from tts2face.sound.segments import RATE
 from tts2face.sound.transcript import PronouncedTranscript, pronounce_transcript
@@ -46,11 +47,11 @@ LANGUAGES = {
 
 @dataclass(frozen=True)
 class Case:
-    """A sound, its words, and the true times: middles of phones, or edges of words."""
+    """A sound, its words, and the true times of each word: middles of its phones, or its edges."""
 
     sound: Waveform
     words: PronouncedTranscript
-    truth: NDArray[np.float64]
+    truth: tuple[NDArray[np.float64], ...]
     is_of_words: bool = False
 
 
@@ -58,9 +59,12 @@ def hand_edges(folder: Path) -> Iterator[Case]:
     """Sentences of a woman in an office."""
     for row in csv.DictReader((folder / "transcripts.tsv").open(), delimiter="\t"):
         rows = csv.DictReader((folder / f"{row['name']}.phones.tsv").open(), delimiter="\t")
-        middles = [(float(one["start"]) + float(one["end"])) / 2 for one in rows if one["phone"] != SILENCE]
+        times = [
+            (one["word"], (float(one["start"]) + float(one["end"])) / 2) for one in rows if one["phone"] != SILENCE
+        ]
+        middles = tuple(np.array([time for _, time in word]) for _, word in groupby(times, lambda one: one[0]))
         sound = read_sound(folder / f"{row['name']}.flac", RATE)
-        yield Case(sound, pronounce_transcript(row["text"], "en-us"), np.array(middles))
+        yield Case(sound, pronounce_transcript(row["text"], "en-us"), middles)
 
 
 def grid(folder: Path) -> Iterator[Case]:
@@ -68,7 +72,7 @@ def grid(folder: Path) -> Iterator[Case]:
     for path in sorted((folder / "align").glob("*.align"))[1::39][:N_GRID]:
         cues = read_word_times(path)
         words = pronounce_transcript(" ".join(cue.text for cue in cues), "en-us")
-        edges = np.array([[cue.begin, cue.end] for cue in cues]).ravel()
+        edges = tuple(np.array([cue.begin, cue.end]) for cue in cues)
         yield Case(read_sound(folder / "clips" / f"{path.stem}.mkv", RATE), words, edges, is_of_words=True)
 
 
@@ -81,13 +85,14 @@ def spoken(voice_name: str, texts: Sequence[str], language: str) -> Iterator[Cas
         phones = speech.phones
         said = [[one for one in phones.phones[word.first : word.last] if one != SILENCE] for word in speech.words]
         words = tuple((word.text, (tuple(one),)) for word, one in zip(speech.words, said, strict=True))
-        middles = [
-            (phones.edges[at] + phones.edges[at + 1]) / 2
-            for word in speech.words
-            for at in range(word.first, word.last)
-            if phones.phones[at] != SILENCE
-        ]
-        yield Case(sound, words, np.array(middles))
+        middles = tuple(_middles(phones, word) for word in speech.words)
+        yield Case(sound, words, middles)
+
+
+def _middles(phones: PhoneSequence, word: WordSpan) -> NDArray[np.float64]:
+    """Middles of the phones of a word."""
+    inside = [at for at in range(word.first, word.last) if phones.phones[at] != SILENCE]
+    return np.array([(phones.edges[at] + phones.edges[at + 1]) / 2 for at in inside])
 
 
 def _resampled(sound: Waveform) -> NDArray[np.float32]:
@@ -122,7 +127,7 @@ def joined(cases: Sequence[Case]) -> list[Case]:
         if found and found[-1].sound.duration < JOINED_S:
             last = found.pop()
             samples = np.concatenate([last.sound.samples, case.sound.samples])
-            truth = np.concatenate([last.truth, case.truth + last.sound.duration])
+            truth = (*last.truth, *(times + last.sound.duration for times in case.truth))
             case = Case(Waveform(samples, RATE), last.words + case.words, truth, case.is_of_words)  # noqa: PLW2901
         found.append(case)
     return found
@@ -135,15 +140,13 @@ def report(name: str, cases: Sequence[Case], aligner: Aligner) -> str:
     for case in cases:
         found = aligner.align(case.sound, case.words)
         right.append(found.fit.share)
-        edges, phones = found.phones.edges, found.phones.phones
-        if case.is_of_words:
-            times = np.array([[edges[one.first], edges[one.last]] for one in found.words]).ravel()
-        else:
-            times = np.array([(edges[at] + edges[at + 1]) / 2 for at in range(len(phones)) if phones[at] != SILENCE])
-        if len(times) != len(case.truth):  # another pronunciation than that of the reference
-            skipped += 1
-            continue
-        apart += (1000 * np.abs(times - case.truth)).tolist()
+        for word, truth in zip(found.words, case.truth, strict=True):
+            edges = found.phones.edges[[word.first, word.last]]
+            times = edges if case.is_of_words else _middles(found.phones, word)
+            if len(times) == len(truth):
+                apart += (1000 * np.abs(times - truth)).tolist()
+            else:  # another pronunciation than that of the reference
+                skipped += 1
     seconds = (time.process_time() - began) / sum(case.sound.duration for case in cases)
     for at, case in enumerate(cases):
         wrong.append(aligner.align(case.sound, cases[at - 1].words).fit.share)
@@ -162,7 +165,7 @@ def main() -> None:
     shared = parser.parse_args().shared / "recordings"
     aligner = Aligner()
     aligner.load()
-    print("| sound | mean ms | median | beyond 100 ms | left out | refused right / wrong | CPU s a second |")
+    print("| sound | mean ms | median | beyond 100 ms | words left out | refused right / wrong | CPU s a second |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     hand = list(hand_edges(shared / "fadg0_sound"))
     print(report("a woman in an office, edges by hand", hand, aligner), flush=True)

@@ -17,10 +17,10 @@ from lexicon.errors import DataError
 from lexicon.sequence import DOUBTFUL, SILENCE, PhoneSequence, WordSpan, concatenate_phones, enforce_increasing
 from tts2face.models.phone_classifier import PhoneClassifier, load_phone_classifier
 from tts2face.sound.pauses import Span
-from tts2face.sound.recogniser import FRAME_S, LEAST_PEAK, PEAK, PhoneRecogniser
+from tts2face.sound.recogniser import ENGLISH, FEATURES, FRAME_S, LEAST_PEAK, PEAK, PhoneRecogniser
 from tts2face.sound.segments import STEP_S, divide, frame_features
 from tts2face.sound.spikes import NEVER, UNSAID, find_spikes
-from tts2face.sound.word_lattice import PlacedPhone, Pronunciations, place_phones, sounding, word_segments
+from tts2face.sound.word_lattice import PlacedPhone, Pronunciations, place_phones, word_segments
 from tts2face.types import Waveform
 
 CONTEXT_S = (-0.12, -0.08, -0.05, -0.03, -0.015, 0.0, 0.015, 0.03, 0.045, 0.06, 0.08, 0.11, 0.15, 0.19)
@@ -183,16 +183,16 @@ class Aligner:
         """
         if words is not None and not words:
             raise DataError("there is no word to align; give a transcript")
-        duration, inventory = sound.duration, sounding(self._classifier)
+        duration = sound.duration
         sound = _padded(levelled(sound))
         hearing = self.recogniser.hear(sound)
         if words is None:
             words = [(f"/{''.join(word)}/", [word]) for word in hearing.words()]
         if not words:
             raise DataError("the sound contains no speech; give a recording of a person who speaks")
-        labels = (*inventory, *sorted(_phones_in(words) - {*inventory}))
+        labels = (*FEATURES, *sorted(_phones_in(words) - ENGLISH))
         heard = hearing.log_probabilities(labels)
-        known = heard[:, [*range(len(inventory)), len(labels)]]
+        known = heard[:, [*range(len(FEATURES)), len(labels)]]
         frames = self._classifier.log_probabilities(recording_features(sound, known))[:-1]
         number = {label: at for at, label in enumerate(labels)}
         columns = [[[number[phone] for phone in phones] for phones in alternatives] for _, alternatives in words]

@@ -32,6 +32,7 @@ ALSO = {
     "t": "ɾ", "d": "ɾ", "l": "ɫ", "u": "ʉ", "h": "ɦ",
 }  # fmt: skip
 ENGLISH = frozenset(ARPABET.values())  # the network hears English and Korean; other phones show as the nearest ones
+FEATURES = tuple(sorted(ENGLISH))  # phones whose probabilities are features of a classifier of frames
 Phones = tuple[str, ...]
 
 

@@ -244,4 +244,4 @@ def test_a_talkers_modes(few_takes: Path, face_model: Path, tmp_path: Path, caps
     assert face.metadata["dense"]["frames"] == n_frames
     assert face.metadata["command"].endswith("--basis 8")
     opens = face_landmarks(face, face.shapes[face.shape_names.index("dense1")])
-    assert abs(opens[13, 1] - opens[14, 1]) > 0.15  # mm: the first mode of speech opens or closes the lips
+    assert abs(opens[13, 1] - opens[14, 1]) > 0.1  # mm: the first mode of speech opens or closes the lips
