@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from corpus_tools.recordings.observation import Observation
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import parse_cell
-from lexicon.sequence import SILENCE, PhoneSequence
+from lexicon.sequence import PhoneSequence
 from tts2face.models.talker import Talker
 from tts2face.session.recording import map_audio_to_motion
 from tts2face.sound.segments import RATE
@@ -58,8 +58,7 @@ def _with_edges(one: Observation, path: Path) -> Observation:
         raise DataError(f"{path} has no column {missing[0]}; it needs {', '.join(COLUMNS)}")
     start, end, label = (head.index(name) for name in COLUMNS)
     edges = [parse_cell(rows[0][start], path, 2)] + [parse_cell(row[end], path, at) for at, row in enumerate(rows, 2)]
-    labels = [row[label] if row[label] != "sil" else SILENCE for row in rows]
-    return replace(one, phones=PhoneSequence(labels, edges))
+    return replace(one, phones=PhoneSequence([row[label] for row in rows], edges))
 
 
 def heard_phones(utterances: Sequence[Observation], sounds: Mapping[str, Path]) -> dict[str, list[PhoneSequence]]:
