@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -42,6 +43,17 @@ def with_words(seen: Observation) -> Observation:
     first = "".join("abcdefghij"[int(digit)] for digit in seen.name if digit.isdigit())
     texts = (f"{first}um", "alpha", "beta", "gamma")
     return replace(seen, words=tuple(WordSpan(text, 1 + 2 * at, 3 + 2 * at) for at, text in enumerate(texts)))
+
+
+def track_arrays(one: Observation) -> dict[str, Any]:
+    """Arrays of a file of tracks that holds the utterance."""
+    labels = ["sil" if label == SILENCE else label for label in one.phones.phones]
+    arrays = {"landmarks": one.landmarks, "head": one.head, "fps": one.fps, "phones": labels, "edges": one.phones.edges}
+    if one.words:
+        arrays["words"] = [word.text for word in one.words]
+        arrays["word_first"] = [word.first for word in one.words]
+        arrays["word_last"] = [word.last for word in one.words]
+    return arrays
 
 
 class OwnVoice:

@@ -30,6 +30,7 @@ NOT_EXECUTED = {  # beginning of a command line: why it is parsed only
     "report retarget": PERSON,
     "corpus audio-maps": "needs 20 or more recordings",
     "corpus evaluate --talker": "needs landmark tracks; tests/corpus_tools/build/test_people.py runs the command",
+    "corpus evaluate --people": "needs their sounds, too; tests/corpus_tools/build/test_heard.py runs the command",
     "corpus pool": "needs lip tracks; tests/corpus_tools/build/test_pooling.py runs the command",
     "corpus evaluate": PERSON,
     "report gestures": LONG,

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cli.main import run
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.studies.evaluation.heard import (
     OWN_ALIGNMENT,
@@ -18,6 +19,7 @@ from corpus_tools.studies.evaluation.heard import (
 from corpus_tools.studies.evaluation.people import DEFAULT_METHOD, evaluate_people
 from corpus_tools.studies.evaluation.tracks import TRACKED
 from lexicon.errors import DataError, InputError
+from tests.corpus_tools.speaking import track_arrays
 from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
 from tts2face.models.talker import load_talker
 from tts2face.sound.voice_pool import load_voice
@@ -62,6 +64,17 @@ def test_lips_from_sound_are_nearly_those_of_the_given_phones(person: tuple[Path
     assert opening[OWN_ALIGNMENT] > 0.93
     assert opening[SOUND_ALONE] > 0.75
     assert opening[SOUND_ALONE] > opening["audio map network"]
+
+
+def test_the_command_reports_both(
+    person: tuple[Path, tuple[Observation, ...]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, utterances = person
+    for one in utterances[:2]:
+        np.savez(tmp_path / f"{one.name}.npz", **track_arrays(one))
+    assert run(["corpus", "evaluate", "--people", str(tmp_path), "--sounds", str(folder)]) == 0
+    heads = [line.split(" | ")[0] for line in capsys.readouterr().out.splitlines()]
+    assert {f"| {OWN_ALIGNMENT}", f"| {SOUND_ALONE}"} <= set(heads)
 
 
 def test_edges_by_hand_replace_those_of_the_track(person: tuple[Path, tuple[Observation, ...]]) -> None:

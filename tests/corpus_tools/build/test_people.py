@@ -26,7 +26,7 @@ from corpus_tools.studies.evaluation.tracks import ExternalTrack, read_person
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE
-from tests.corpus_tools.speaking import FPS, OPENINGS, observation, with_words
+from tests.corpus_tools.speaking import FPS, OPENINGS, observation, track_arrays, with_words
 from tts2face.lips.explanation import speech_frames
 from tts2face.models.talker import Talker, write_talker
 
@@ -43,16 +43,6 @@ def person(gain: float, name: str) -> list[Observation]:
 @pytest.fixture(scope="module")
 def found(talker: Talker) -> PeopleEvaluation:
     return evaluate_people(talker, [person(2.0, "loud"), person(0.5, "quiet")])
-
-
-def track_arrays(one: Observation) -> dict[str, Any]:
-    labels = ["sil" if label == SILENCE else label for label in one.phones.phones]
-    arrays = {"landmarks": one.landmarks, "head": one.head, "fps": one.fps, "phones": labels, "edges": one.phones.edges}
-    if one.words:
-        arrays["words"] = [word.text for word in one.words]
-        arrays["word_first"] = [word.first for word in one.words]
-        arrays["word_last"] = [word.last for word in one.words]
-    return arrays
 
 
 def write_tracks(folder: Path, gain: float = 2.0, **changes: Any) -> Path:
