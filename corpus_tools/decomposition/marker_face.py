@@ -20,7 +20,7 @@ from tts2face.models.landmarks import (
     OUTER_LIP_LOWER,
     OUTER_LIP_UPPER,
 )
-from tts2face.numeric.arrays import interpolate_columns
+from tts2face.numeric.arrays import interpolate_columns, true_runs
 from tts2face.numeric.splines import fit_interpolant
 from tts2face.video.pose import similarity_transforms
 
@@ -182,17 +182,11 @@ def fill_marker_gaps(tracks: Floats, names: Sequence[str], fps: float) -> tuple[
     return whole, (f"gaps were filled in {named}{more}",)
 
 
-def find_gaps(is_missing: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """(G, 2) first frame and one past the last of each run of True in (T,)."""
-    borders = np.flatnonzero(np.diff(np.concatenate([[False], is_missing, [False]])))
-    return borders.reshape(-1, 2)
-
-
 def check_gap(what: str, is_missing: NDArray[np.bool_], fps: float) -> None:
     """Check that gaps, True in (T,), are short enough to be filled; errors as `fill_marker_gaps`."""
     if is_missing.all():
         raise DataError(f"the {what} is never visible; {MARKER_SET_ADVICE}, or capture it again")
-    begin, end = max(find_gaps(is_missing).tolist(), key=lambda gap: gap[1] - gap[0], default=(0, 0))
+    begin, end = max(true_runs(is_missing).tolist(), key=lambda gap: gap[1] - gap[0], default=(0, 0))
     if (end - begin) / fps > MAX_MARKER_GAP_S:
         raise DataError(
             f"the {what} is hidden for {(end - begin) / fps:.2f} s from {begin / fps:.2f} s on, and gaps up to "

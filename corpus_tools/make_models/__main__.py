@@ -74,7 +74,7 @@ def make_phones(making: Making) -> None:
     voice = train_voice_classifier(on_progress=making.stage("the voice speaks"), report=making.report)
     write_phone_classifier(making.out / "heart.phones", voice)
     recordings = train_recording_classifier(
-        making.recordings / GRID, on_progress=making.stage("damaged speech is heard"), report=making.report
+        making.recordings, on_progress=making.stage("damaged speech is heard"), report=making.report
     )
     write_phone_classifier(making.out / "recordings.phones", recordings)
 

@@ -15,6 +15,7 @@ from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_table
 from lexicon.normalize import normalize
 from tts2face.interchange.subtitles.reader import read_subtitles, read_text
+from tts2face.sound.word_lattice import PronouncedWords, Pronunciations
 
 SUBTITLE_SUFFIXES = (".srt", ".vtt", ".ass", ".ssa", ".ttml")  # in order of preference
 CUE_MARGIN_S = 0.3  # before and after a cue; subtitles are rarely closer to the speech
@@ -176,9 +177,6 @@ LETTER_NAMES = {
 # The older "hw" of "white" (Wells 1982, "glide cluster reduction"); alignment would label the rounded lips of w as h.
 HW_CLUSTER = ("h", "w")
 
-Pronunciations = tuple[tuple[str, ...], ...]  # pronunciations of one word, each a tuple of phones
-PronouncedTranscript = tuple[tuple[str, Pronunciations], ...]  # words with their pronunciations
-
 
 @dataclass(frozen=True, slots=True)
 class Recording:
@@ -193,7 +191,7 @@ class Recording:
     transcript: str | Path | None
     is_spelling: bool = False
     span: tuple[float, float] | None = None
-    words: PronouncedTranscript | None = None
+    words: PronouncedWords | None = None
 
 
 def find_recordings(folder: Path) -> tuple[Recording, ...]:
@@ -223,7 +221,7 @@ def find_recordings(folder: Path) -> tuple[Recording, ...]:
     return found
 
 
-def pronounce_recording(recording: Recording) -> PronouncedTranscript | None:
+def pronounce_recording(recording: Recording) -> PronouncedWords | None:
     """The words of a transcript with their pronunciations; None without a transcript.
 
     Raises

@@ -15,6 +15,7 @@ from corpus_tools.recordings.video import MEASURES, NOT_COUNTED
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, lip_opening
+from tts2face.numeric.arrays import true_runs
 from tts2face.sound.alignment import LEAST_FIT
 from tts2face.sound.pauses import sound_windows
 from tts2face.types import Waveform
@@ -223,9 +224,8 @@ def picture_measures(
     """
     counted = n_faces[n_faces != NOT_COUNTED]
     crowded = float((counted > 1).mean()) if len(counted) else 0.0
-    still = np.concatenate([[False], changes < MIN_PICTURE_CHANGE, [False]])
-    borders = np.flatnonzero(np.diff(still.astype(np.int8))).reshape(-1, 2)
-    frozen = max((float(times[last - 1] - times[max(first - 1, 0)]) for first, last in borders), default=0.0)
+    still = true_runs(changes < MIN_PICTURE_CHANGE)
+    frozen = max((float(times[last - 1] - times[max(first - 1, 0)]) for first, last in still), default=0.0)
     seconds = float(times[-1] - times[0]) if len(times) else 0.0
     rate = (len(times) - 1) / seconds if seconds > 0 else np.inf
     return {"crowded": crowded, "frozen_s": frozen, "frame_rate": rate}

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.recordings.folder import PronouncedTranscript
 from corpus_tools.recordings.video import content_key
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.sound.alignment import Aligner, TextMismatch
 from tts2face.sound.pauses import Span, cut_at_pauses, cut_sound
 from tts2face.sound.transcript import assign_words
+from tts2face.sound.word_lattice import PronouncedWords
 from tts2face.storage.tensors import read_kept, write_tensors
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
@@ -66,7 +66,7 @@ class CachedAligner:
             self._last = key, read_sound(video, SOUND_RATE)
         return self._last[1] if span is None else cut_sound(self._last[1], span)
 
-    def align(self, video: Path, words: PronouncedTranscript | None, span: Span | None = None) -> AlignedSpeech:
+    def align(self, video: Path, words: PronouncedWords | None, span: Span | None = None) -> AlignedSpeech:
         """Phones of a recording's sound, from the cache if the same sound and words have been aligned.
 
         Parameters
@@ -89,9 +89,7 @@ class CachedAligner:
         found = _read_cached_alignment(cached, sound, is_recognised=words is None)
         return found or self._align_words(sound, words, cached)
 
-    def utterances(
-        self, video: Path, words: PronouncedTranscript | None
-    ) -> tuple[tuple[Span, PronouncedTranscript | None], ...]:
+    def utterances(self, video: Path, words: PronouncedWords | None) -> tuple[tuple[Span, PronouncedWords | None], ...]:
         """A long recording cut at pauses: spans in seconds, and the words in each.
 
         Raises
@@ -113,7 +111,7 @@ class CachedAligner:
         ]
         return tuple((span, found) for span, found in zip(spans, words_of_spans, strict=True) if found)
 
-    def _align_words(self, sound: Waveform, words: PronouncedTranscript | None, cached: Path) -> AlignedSpeech:
+    def _align_words(self, sound: Waveform, words: PronouncedWords | None, cached: Path) -> AlignedSpeech:
         found = self._aligner.align(sound, words, may_lack=words is not None)
         header = {
             "phones": found.phones.phones,

@@ -25,28 +25,33 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SpokenText:
-    """Sound of a text, and its phones."""
+class Damaged:
+    """Sound of speech that begins ``lead`` seconds later than it did, and is ``faster`` by a factor."""
 
     sound: Waveform
-    phones: PhoneSequence
+    lead: float
+    faster: float
+
+    def phones(self, phones: PhoneSequence) -> PhoneSequence:
+        """Phones in this sound, from those before; silences at the ends are longer by the pauses."""
+        edges = phones.edges / self.faster + self.lead
+        edges[[0, -1]] = 0.0, self.sound.duration
+        return PhoneSequence(phones.phones, edges)
 
 
-def damage(spoken: SpokenText, others: Sequence[SpokenText], rng: np.random.Generator) -> SpokenText:
+def damage(sound: Waveform, others: Sequence[Waveform], rng: np.random.Generator) -> Damaged:
     """The same speech by another voice in another place; `others` speak behind it."""
     import soxr
 
-    rate, faster = spoken.sound.rate, float(rng.uniform(*VOICES))
+    rate, faster = sound.rate, float(rng.uniform(*VOICES))
     lead, tail = (round(float(seconds) * rate) for seconds in rng.uniform(*PAUSES_S, 2))
-    voice = soxr.resample(spoken.sound.samples.astype(np.float64), rate * faster, rate)
+    voice = soxr.resample(sound.samples.astype(np.float64), rate * faster, rate)
     samples = np.concatenate([np.zeros(lead), voice, np.zeros(tail)])
-    edges = spoken.phones.edges / faster + lead / rate
-    edges[[0, -1]] = 0.0, len(samples) / rate  # silences, which the pauses lengthen
     power = speech_power(samples)
     if rng.random() < ECHO_SHARE:
         samples = with_echo(samples, rate, (float(rng.uniform(*ECHO_S)), float(rng.uniform(*ECHO_LEVELS))), rng)
     if rng.random() < BABBLE_SHARE:
-        noise = babble(len(samples), [one.sound.samples for one in others], rng)
+        noise = babble(len(samples), [one.samples for one in others], rng)
     else:
         noise = stationary_noise(len(samples), rate, float(rng.uniform(*NOISE_TILT)), rng)
     samples = samples + noise * np.sqrt(power / 10 ** (float(rng.uniform(*NOISE_DB)) / 10))
@@ -58,7 +63,7 @@ def damage(spoken: SpokenText, others: Sequence[SpokenText], rng: np.random.Gene
     elif line < CODED_SHARE + TELEPHONE_SHARE:
         samples = np.resize(soxr.resample(soxr.resample(samples, rate, TELEPHONE_HZ), TELEPHONE_HZ, rate), len(samples))
     scaled = (samples * PEAK / np.abs(samples).max()).astype(np.float32)
-    return SpokenText(Waveform(scaled, rate), PhoneSequence(spoken.phones.phones, edges))
+    return Damaged(Waveform(scaled, rate), lead / rate, faster)
 
 
 def speech_power(samples: NDArray[np.floating]) -> float:

@@ -3,9 +3,10 @@
 That of the voice ``heart`` begins with the durations that the voice states and learns its own edges again (embedded
 training, Young et al. 2006). That of recordings begins with the voice's speech, which is damaged
 (`corpus_tools.training.damage`); what it has learnt aligns another voice and recorded sentences, whose words' times are
-known, and it is trained on all.
+known, and it is trained on all, again and again.
 """
 
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -17,20 +18,22 @@ from numpy.typing import NDArray
 
 from corpus_tools.prompts.prompts import shipped_sentences
 from corpus_tools.recordings.folder import read_word_times
-from corpus_tools.training.damage import SpokenText, damage
+from corpus_tools.training.damage import Damaged, damage
 from lexicon.dictionary import cmudict_words
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, enforce_increasing
 from tts2face.models.phone_classifier import PhoneClassifier
-from tts2face.sound.alignment import Aligner, levelled, recording_features
+from tts2face.sound.alignment import Aligner, recording_features
 from tts2face.sound.heart import NeuralVoice
-from tts2face.sound.recogniser import FEATURES, FRAME_S, PhoneRecogniser
+from tts2face.sound.pauses import Span
+from tts2face.sound.recogniser import FEATURES, FRAME_S, PhoneRecogniser, levelled
 from tts2face.sound.segments import RATE, STEP_S, StatedPhone, find_edges, frame_features
 from tts2face.sound.spikes import NEVER, find_spikes
 from tts2face.sound.transcript import pronounce_transcript
 from tts2face.sound.voice import pronounce_content
 from tts2face.sound.voice_pool import load_voice
-from tts2face.types import Progress, Speech, Waveform
+from tts2face.sound.word_lattice import PronouncedWords
+from tts2face.types import Progress, Waveform
 from tts2face.video.media import read_sound
 
 N_RANDOM = 800  # texts of words in random order
@@ -40,15 +43,18 @@ RATES = (1.0, 1.0, 0.5, 0.7, 0.85, 1.2, 1.5, 2.0)
 N_ROUNDS = 3  # in which edges and classifier of the voice are found from each other
 N_UNITS, N_EPOCHS = 128, 12
 N_UNITS_OF_RECORDINGS = 192
+LEARNING_RATES = (1.5e-3, 7.5e-5)  # in the first and the last epoch
 LEAST_SPREAD, WEIGHT_DECAY = 0.05, 1e-4
 TEST_SHARE = 20  # every twentieth text tells the accuracy
 PRIOR_SHARE = 0.6  # of the log frequencies of phones that is taken out: the search knows which phones are there
-LEAST_DURATION_S, LEAST_DEVIATION, LEAST_SECONDS = 0.02, 0.3, 1.0
+LEAST_DURATION_S, LEAST_DEVIATION = 0.02, 0.3
 SPEECH_RATES = (0.8, 0.9, 1.0, 1.0, 1.15, 1.3)
 N_TEXTS, N_OTHER, OTHER_VOICE = 420, 260, "joe"  # of both voices
+PLAIN, N_CAPTION_WORDS = re.compile(r"[A-Za-z ,.'?!;-]+"), 4  # of captions that are spoken
+N_ROUNDS_OF_RECORDINGS = 2  # in which edges of other speech and the classifier are found from each other
 RECORDED_STEP = 3  # every third recorded sentence
 N_DAMAGED = 2  # times that each text is learnt
-FRAME_SHARES = 0.15, 0.45  # of silence and of speech that are learnt
+FRAME_SHARE, SILENCE_SHARE = 0.45, 0.33  # of frames, and of the silent ones among them, that are learnt
 SURE = 0.5  # of a spike whose delay is measured
 Told = Callable[[str], None]
 
@@ -87,19 +93,35 @@ def train_recording_classifier(recordings: Path, *, on_progress: Progress, repor
     Parameters
     ----------
     recordings
-        Folder of GRID's talker s1, with the times of the words.
+        Folder with GRID's talker s1 (``grid_s1``), and with captions of free English (``address_tracks``), which the
+        voices speak.
     """
-    rng, texts = np.random.default_rng(0), list(dict.fromkeys(training_texts()))
+    rng, recogniser = np.random.default_rng(0), PhoneRecogniser()
+    texts = [*caption_texts(recordings / "address_tracks"), *shipped_sentences()]
     rng.shuffle(texts)
-    voice, recogniser = load_voice("heart", "en-us"), PhoneRecogniser()
-    spoken = [_speech(voice.speak(text, rate=float(rng.choice(SPEECH_RATES)))) for text in texts[:N_TEXTS]]
-    delays = _delays(spoken, recogniser)
-    frames = _damaged_frames(spoken, rng, recogniser, on_progress)
-    aligner = Aligner(_completed(_fit(frames, N_UNITS_OF_RECORDINGS, report), spoken, delays))
-    others = [*_spoken_by_another(texts[N_TEXTS : N_TEXTS + N_OTHER], aligner, rng), *_recorded(recordings, aligner)]
-    more = _damaged_frames(others, rng, recogniser, on_progress)
-    frames = Frames(*(np.concatenate([getattr(part, one.name) for part in (frames, more)]) for one in fields(Frames)))
-    return _completed(_fit(frames, N_UNITS_OF_RECORDINGS, report), [*spoken, *others], delays)
+    voice = load_voice("heart", "en-us")
+    spoken = [voice.speak(text, rate=float(rng.choice(SPEECH_RATES))) for text in texts[:N_TEXTS]]
+    others = [*_spoken_by_another(texts[N_TEXTS : N_TEXTS + N_OTHER], rng), *_recorded(recordings / "grid_s1")]
+    sounds = [*(_resampled(one.waveform) for one in spoken), *(one.sound for one in others)]
+    stated = [one.phones for one in spoken]
+    known: list[PhoneSequence | None] = [*stated, *([None] * len(others))]
+    lessons = _lessons(sounds, rng, recogniser, on_progress)
+    delays = _delays(sounds[: len(spoken)], stated, recogniser)
+    classifier = _fit_lessons(lessons, known, delays, report)
+    for _ in range(N_ROUNDS_OF_RECORDINGS):
+        aligner = Aligner(classifier)
+        for at, one in enumerate(others, len(spoken)):
+            with suppress(DataError):  # it is spoken too quickly for its words
+                known[at] = aligner.align(one.sound, one.words, one.times).phones
+        classifier = _fit_lessons(lessons, known, delays, report)
+    return classifier
+
+
+def caption_texts(folder: Path) -> list[str]:
+    """Texts of captions (``*.cues.tsv``) that can be spoken alone."""
+    pages = (path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.cues.tsv")))
+    texts = [line.split("\t")[2] for page in pages for line in page.splitlines()]
+    return [text for text in dict.fromkeys(texts) if PLAIN.fullmatch(text) and len(text.split()) >= N_CAPTION_WORDS]
 
 
 def training_texts() -> tuple[str, ...]:
@@ -140,12 +162,13 @@ def _fit(frames: Frames, n_units: int, report: Told) -> PhoneClassifier:
     features, labels, is_test = frames.features, frames.labels, frames.is_test
     learnt = features[~is_test].astype(np.float32)
     mean, scale = learnt.mean(axis=0), 1.0 / np.maximum(learnt.std(axis=0), LEAST_SPREAD)
-    model = MLPClassifier(
-        (n_units,), batch_size=512, learning_rate_init=2e-3, max_iter=N_EPOCHS, alpha=WEIGHT_DECAY, random_state=0
-    )
+    scaled = (learnt - mean) * scale
+    model = MLPClassifier((n_units,), batch_size=512, max_iter=1, alpha=WEIGHT_DECAY, warm_start=True)
+    model.set_params(random_state=np.random.RandomState(0))  # which goes on from epoch to epoch
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that it has not converged after its epochs
-        model.fit((learnt - mean) * scale, labels[~is_test])
+        warnings.simplefilter("ignore")  # that it has not converged after one epoch
+        for rate in np.geomspace(*LEARNING_RATES, N_EPOCHS):
+            model.set_params(learning_rate_init=rate).fit(scaled, labels[~is_test])
     inventory = tuple(model.classes_.tolist())
     weights, biases = (
         (layers[0].astype(np.float32), layers[1].astype(np.float32)) for layers in (model.coefs_, model.intercepts_)
@@ -157,22 +180,29 @@ def _fit(frames: Frames, n_units: int, report: Told) -> PhoneClassifier:
     return classifier
 
 
-def _completed(
-    classifier: PhoneClassifier, spoken: Sequence[SpokenText], delays: Mapping[str, float]
+def _fit_lessons(
+    lessons: "Sequence[_Lesson]",
+    known: Sequence[PhoneSequence | None],
+    delays: Mapping[str, float],
+    report: Told,
 ) -> PhoneClassifier:
-    """The classifier with durations and delays, which tells phones as if most of them were equally frequent."""
-    sequences = [one.phones for one in spoken]
-    seconds = dict.fromkeys(classifier.inventory, LEAST_SECONDS)
-    for one in sequences:
-        for label, duration in zip(one.phones, one.durations, strict=True):
-            seconds[label] += float(duration) * (FRAME_SHARES[0] / FRAME_SHARES[1] if label == SILENCE else 1.0)
+    """Classifier of damaged speech whose phones are known; it tells them as if most of them were equally frequent."""
+    rng, parts = np.random.default_rng(0), []
+    for one in lessons:
+        if (phones := known[one.number]) is not None:
+            labels = one.labels(phones)
+            kept = (labels != SILENCE) | (rng.random(len(labels)) < SILENCE_SHARE)
+            parts.append(Frames(one.features[kept], labels[kept], np.full(kept.sum(), one.number % TEST_SHARE == 0)))
+    frames = Frames(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Frames)))
+    classifier = _fit(frames, N_UNITS_OF_RECORDINGS, report)
+    counts = np.unique(frames.labels[~frames.is_test], return_counts=True)[1]  # sorted, as the inventory
     inner, outer = classifier.biases
-    even = (outer - PRIOR_SHARE * np.log(list(seconds.values()))).astype(np.float32)
+    even = (outer - PRIOR_SHARE * np.log(counts)).astype(np.float32)
     usual = float(np.median(list(delays.values())))
     return replace(
         classifier,
         biases=(inner, even),
-        durations=_durations(classifier.inventory, sequences),
+        durations=_durations(classifier.inventory, [phones for phones in known if phones is not None]),
         delays=np.array([delays.get(label, usual) for label in classifier.inventory], np.float32),
     )
 
@@ -188,67 +218,83 @@ def _durations(inventory: Sequence[str], sequences: Sequence[PhoneSequence]) -> 
     return np.array([[np.mean(one), max(np.std(one), LEAST_DEVIATION)] for one in known], np.float32)
 
 
-def _speech(spoken: Speech) -> SpokenText:
-    return SpokenText(_resampled(spoken.waveform), spoken.phones)
-
-
 def _resampled(sound: Waveform) -> Waveform:
     import soxr
 
     return Waveform(np.clip(soxr.resample(sound.samples, sound.rate, RATE), -1.0, 1.0), RATE)
 
 
-def _delays(spoken: Sequence[SpokenText], recogniser: PhoneRecogniser) -> dict[str, float]:
+def _delays(
+    sounds: Sequence[Waveform], known: Sequence[PhoneSequence], recogniser: PhoneRecogniser
+) -> dict[str, float]:
     """Median seconds from the middle of each phone to the instant at which the recogniser says it."""
     apart: dict[str, list[float]] = {}
-    for one in spoken:
-        known = [at for at, label in enumerate(one.phones.phones) if label != SILENCE]
-        labels = [one.phones.phones[at] for at in known]
-        heard = recogniser.hear(levelled(one.sound)).log_probabilities(tuple(labels))
+    for sound, phones in zip(sounds, known, strict=True):
+        said = [at for at, label in enumerate(phones.phones) if label != SILENCE]
+        labels = [phones.phones[at] for at in said]
+        heard = recogniser.hear(levelled(sound)).log_probabilities(tuple(labels))
         spikes = find_spikes(heard, [[list(range(len(labels)))]], NEVER)
         moments = (np.arange(len(spikes)) + 0.5) * FRAME_S
-        middles = (one.phones.edges[known] + one.phones.edges[[at + 1 for at in known]]) / 2
+        middles = (phones.edges[said] + phones.edges[[at + 1 for at in said]]) / 2
         for label, spike, middle in zip(labels, spikes.T, middles, strict=True):
             if spike.max() > SURE:
                 apart.setdefault(label, []).append(float(spike @ moments / spike.sum() - middle))
     return {label: float(np.median(values)) for label, values in apart.items()}
 
 
-def _damaged_frames(
-    spoken: Sequence[SpokenText], rng: np.random.Generator, recogniser: PhoneRecogniser, on_progress: Progress
-) -> Frames:
-    """Some frames of damaged speech."""
-    features, labels, is_test = [], [], []
-    for at in range(N_DAMAGED * len(spoken)):
-        one = damage(spoken[at % len(spoken)], spoken, rng)
-        sound = levelled(one.sound)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Lesson:
+    """Damaged speech, which one it was, and features (T, K) of some frames with their numbers (T,)."""
+
+    damaged: Damaged
+    number: int
+    features: NDArray[np.float16]
+    frames: NDArray[np.int64]
+
+    def labels(self, phones: PhoneSequence) -> NDArray[np.str_]:
+        """Phones (T,) of the frames, from those of the speech before it was damaged."""
+        return phone_labels(self.damaged.phones(phones), int(self.frames.max()) + 1)[self.frames]
+
+
+def _lessons(
+    sounds: Sequence[Waveform], rng: np.random.Generator, recogniser: PhoneRecogniser, on_progress: Progress
+) -> list[_Lesson]:
+    """Each sound several times, damaged in several ways."""
+    found = []
+    for at in range(N_DAMAGED * len(sounds)):
+        number = at % len(sounds)
+        damaged = damage(sounds[number], sounds, rng)
+        sound = levelled(damaged.sound)
         seen = recording_features(sound, recogniser.hear(sound).log_probabilities(FEATURES))
-        told = phone_labels(one.phones, len(seen))
-        kept = rng.random(len(seen)) < np.where(told == SILENCE, *FRAME_SHARES)
-        features.append(seen[kept].astype(np.float16))
-        labels.append(told[kept])
-        is_test.append(np.full(int(kept.sum()), at % len(spoken) % TEST_SHARE == 0))
-        on_progress(at + 1, N_DAMAGED * len(spoken))
-    return Frames(np.concatenate(features), np.concatenate(labels), np.concatenate(is_test))
+        frames = np.flatnonzero(rng.random(len(seen)) < FRAME_SHARE)
+        found.append(_Lesson(replace(damaged, sound=sound), number, seen[frames].astype(np.float16), frames))
+        on_progress(at + 1, N_DAMAGED * len(sounds))
+    return found
 
 
-def _spoken_by_another(texts: Sequence[str], aligner: Aligner, rng: np.random.Generator) -> Iterator[SpokenText]:
-    """Texts in the voice `OTHER_VOICE`, aligned."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Unaligned:
+    """Speech whose words are known, and their times or not."""
+
+    sound: Waveform
+    words: PronouncedWords
+    times: Sequence[Span] | None = None
+
+
+def _spoken_by_another(texts: Sequence[str], rng: np.random.Generator) -> Iterator[_Unaligned]:
+    """Texts in the voice `OTHER_VOICE`."""
     voice = load_voice(OTHER_VOICE, "en-us")
     for text in texts:
         sound = _resampled(voice.sound(text, rate=float(rng.choice(SPEECH_RATES))))
         words = [(word.text, [tuple(word.phones)]) for word in pronounce_content(text, "en-us", {})]
-        with suppress(DataError):  # it speaks too quickly for its words
-            yield SpokenText(sound, aligner.align(sound, words).phones)
+        yield _Unaligned(sound, words)
 
 
-def _recorded(folder: Path, aligner: Aligner) -> Iterator[SpokenText]:
-    """Recorded sentences, aligned within the known times of their words."""
+def _recorded(folder: Path) -> Iterator[_Unaligned]:
+    """Recorded sentences with known times of their words."""
     for path in sorted((folder / "align").glob("*.align"))[::RECORDED_STEP]:
         cues = read_word_times(path)
         words = pronounce_transcript(" ".join(cue.text for cue in cues), "en-us")
-        sound = read_sound(folder / "clips" / f"{path.stem}.mkv", RATE)
-        times = [(cue.begin, cue.end) for cue in cues]
-        with suppress(DataError):  # a known word is shorter than its phones
-            if len(words) == len(cues):
-                yield SpokenText(sound, aligner.align(sound, words, times).phones)
+        if len(words) == len(cues):
+            sound = read_sound(folder / "clips" / f"{path.stem}.mkv", RATE)
+            yield _Unaligned(sound, words, [(cue.begin, cue.end) for cue in cues])

@@ -33,12 +33,12 @@ class CommandVoice:
     sample_rate = 22_050  # Hz
 
     def __init__(self, setting):
-        self._setting, self._aligner = setting, setting.aligner or Aligner()
+        self._setting, self._align = setting, setting.align or Aligner().align
 
     def speak(self, content, *, rate=1.0, seed=0):
         words = pronounce_content(content, self._setting.language, self._setting.own_words)
         sound = self._say(" ".join(word.text + word.mark for word in words), rate)
-        found = self._aligner.align(sound, [(word.text, [tuple(word.phones)]) for word in words])
+        found = self._align(sound, [(word.text, [tuple(word.phones)]) for word in words])
         return Speech(sound, found.phones, found.words)
 
     def sound(self, content, *, rate=1.0, seed=0):

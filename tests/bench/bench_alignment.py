@@ -22,8 +22,9 @@ from corpus_tools.training.damage import babble, coded, speech_power, stationary
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.sound.alignment import LEAST_FIT, Aligner
 from tts2face.sound.segments import RATE
-from tts2face.sound.transcript import PronouncedTranscript, pronounce_transcript
+from tts2face.sound.transcript import pronounce_transcript
 from tts2face.sound.voice_pool import load_voice
+from tts2face.sound.word_lattice import PronouncedWords
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 
@@ -50,7 +51,7 @@ class Case:
     """A sound, its words, and the true times of each word: middles of its phones, or its edges."""
 
     sound: Waveform
-    words: PronouncedTranscript
+    words: PronouncedWords
     truth: tuple[NDArray[np.float64], ...]
     is_of_words: bool = False
 

@@ -329,9 +329,9 @@ def test_voices_of_a_pool_share_an_aligner_whose_work_is_done_in_turn() -> None:
         run.append(threading.current_thread().name)
         return compute()
 
-    setting = VoicePool(count)._aligner
-    assert setting is not None
+    align = VoicePool(count)._align
+    assert align is not None
     sound = load_voice("heart", "en-us").speak("Bob may read.").waveform
     words = [("Bob", [("b", "ɑ", "b")]), ("may", [("m", "eɪ")]), ("read.", [("ɹ", "i", "d")])]
-    np.testing.assert_array_equal(setting.align(sound, words).phones.edges, Aligner().align(sound, words).phones.edges)
+    np.testing.assert_array_equal(align(sound, words).phones.edges, Aligner().align(sound, words).phones.edges)
     assert len(run) == 1

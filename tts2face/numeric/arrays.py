@@ -18,6 +18,12 @@ def ordered_product(a: NDArray[np.floating], b: NDArray[np.floating]) -> FloatAr
     return summed
 
 
+def true_runs(values: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """(N, 2) first index and one past the last of each run of True in (T,)."""
+    borders = np.flatnonzero(np.diff(np.concatenate([[False], values, [False]])))
+    return borders.reshape(-1, 2)
+
+
 def smoothstep(values: NDArray[AnyFloat], low: float = 0.0, high: float = 1.0) -> NDArray[AnyFloat]:
     """``3 s^2 - 2 s^3``: from 0 at `low` to 1 at `high` without slope at both, constant outside; `high` may be less."""
     share = np.clip((values - low) / (high - low), 0.0, 1.0)

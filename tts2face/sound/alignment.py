@@ -5,10 +5,9 @@ of 5 ms belongs. A search over all divisions of the sound (`tts2face.sound.segme
 Words that are not said are left out, and sounds that are not written are stepped over.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +15,12 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from lexicon.sequence import DOUBTFUL, SILENCE, PhoneSequence, WordSpan, concatenate_phones, enforce_increasing
 from tts2face.models.phone_classifier import PhoneClassifier, load_phone_classifier
+from tts2face.numeric.arrays import true_runs
 from tts2face.sound.pauses import Span
-from tts2face.sound.recogniser import ENGLISH, FEATURES, FRAME_S, LEAST_PEAK, PEAK, PhoneRecogniser
+from tts2face.sound.recogniser import ENGLISH, FEATURES, FRAME_S, Heard, PhoneRecogniser, levelled
 from tts2face.sound.segments import STEP_S, divide, frame_features
 from tts2face.sound.spikes import NEVER, UNSAID, find_spikes
-from tts2face.sound.word_lattice import PlacedPhone, Pronunciations, place_phones, word_segments
+from tts2face.sound.word_lattice import PlacedPhone, PronouncedWords, Pronunciations, place_phones, word_segments
 from tts2face.types import Waveform
 
 CONTEXT_S = (-0.12, -0.08, -0.05, -0.03, -0.015, 0.0, 0.015, 0.03, 0.045, 0.06, 0.08, 0.11, 0.15, 0.19)
@@ -124,11 +124,19 @@ def unwritten_part(sound: Waveform, n_heard: int) -> Alignment:
     return Alignment(PhoneSequence([SILENCE], [0.0, sound.duration]), (), Fit(heard=float(n_heard)), mismatches)
 
 
-class SpeechAligner(Protocol):
-    """Whatever aligns as `Aligner` does, for instance in turn with other tasks."""
+@dataclass(frozen=True, slots=True, eq=False)
+class HeardSound:
+    """A sound, and what the recogniser hears in it after `_padded`."""
 
-    def align(self, sound: Waveform, words: Sequence[tuple[str, Pronunciations]]) -> Alignment:
-        """As `Aligner.align`."""
+    sound: Waveform
+    heard: Heard
+
+    def words(self) -> tuple[tuple[str, ...], ...]:
+        """The most probable phones of each word."""
+        return self.heard.words()
+
+
+Align = Callable[[Waveform, PronouncedWords], Alignment]
 
 
 class Aligner:
@@ -156,10 +164,14 @@ class Aligner:
     def _classifier(self) -> PhoneClassifier:
         return self._given or load_phone_classifier("recordings")
 
+    def hear(self, sound: Waveform) -> HeardSound:
+        """What is heard in a sound, which is aligned without being heard again."""
+        return HeardSound(sound, self.recogniser.hear(_padded(sound)))
+
     def align(
         self,
-        sound: Waveform,
-        words: Sequence[tuple[str, Pronunciations]] | None,
+        sound: Waveform | HeardSound,
+        words: PronouncedWords | None,
         times: Sequence[Span] | None = None,
         *,
         may_lack: bool = False,
@@ -183,17 +195,16 @@ class Aligner:
         """
         if words is not None and not words:
             raise DataError("there is no word to align; give a transcript")
-        duration = sound.duration
-        sound = _padded(levelled(sound))
-        hearing = self.recogniser.hear(sound)
+        known = sound if isinstance(sound, HeardSound) else self.hear(sound)
+        duration = known.sound.duration
         if words is None:
-            words = [(f"/{''.join(word)}/", [word]) for word in hearing.words()]
+            words = [(f"/{''.join(word)}/", [word]) for word in known.words()]
         if not words:
             raise DataError("the sound contains no speech; give a recording of a person who speaks")
         labels = (*FEATURES, *sorted(_phones_in(words) - ENGLISH))
-        heard = hearing.log_probabilities(labels)
-        known = heard[:, [*range(len(FEATURES)), len(labels)]]
-        frames = self._classifier.log_probabilities(recording_features(sound, known))[:-1]
+        heard = known.heard.log_probabilities(labels)
+        english = heard[:, [*range(len(FEATURES)), len(labels)]]
+        frames = self._classifier.log_probabilities(recording_features(_padded(known.sound), english))[:-1]
         number = {label: at for at, label in enumerate(labels)}
         columns = [[[number[phone] for phone in phones] for phones in alternatives] for _, alternatives in words]
         confidence = _confidence(find_spikes(heard, columns, UNSAID), words)
@@ -226,18 +237,13 @@ class Aligner:
         return [one for one in seconds if one[0] is not None or (one[2] > STEP_S and one[1] < end - STEP_S)]
 
 
-def _phones_in(words: Sequence[tuple[str, Pronunciations]]) -> set[str]:
+def _phones_in(words: PronouncedWords) -> set[str]:
     return {phone for _, alternatives in words for phones in alternatives for phone in phones}
 
 
-def levelled(sound: Waveform) -> Waveform:
-    """The sound at the level of the training data."""
-    factor = np.float32(PEAK / max(float(np.abs(sound.samples).max(initial=0.0)), LEAST_PEAK))
-    return Waveform(sound.samples * factor, sound.rate)
-
-
 def _padded(sound: Waveform) -> Waveform:
-    """The sound with quiet noise before and after it: an abrupt begin is heard as a stop."""
+    """The sound at its level, with quiet noise before and after it: an abrupt begin is heard as a stop."""
+    sound = levelled(sound)
     quiet = np.random.default_rng(0).normal(0.0, PADDING_LEVEL, round(PADDING_S * sound.rate)).astype(np.float32)
     return Waveform(np.concatenate([quiet, sound.samples, quiet]), sound.rate)
 
@@ -260,7 +266,7 @@ def spike_times(heard: NDArray[np.float32]) -> Floats:
     return np.flatnonzero(is_new).astype(np.float64) * FRAME_S + FRAME_S / 2 - USUAL_DELAY_S
 
 
-def _confidence(spikes: Floats, words: Sequence[tuple[str, Pronunciations]]) -> Floats:
+def _confidence(spikes: Floats, words: PronouncedWords) -> Floats:
     """Probabilities (W,) that words are said: the sums of those of their pronunciations."""
     totals, at = spikes.sum(axis=0), 0
     found: Floats = np.zeros(len(words))
@@ -272,14 +278,13 @@ def _confidence(spikes: Floats, words: Sequence[tuple[str, Pronunciations]]) -> 
     return sure
 
 
-def _runs(chosen: NDArray[np.bool_], words: Sequence[tuple[str, Pronunciations]], least: int) -> list[tuple[int, int]]:
+def _runs(chosen: NDArray[np.bool_], words: PronouncedWords, least: int) -> list[tuple[int, int]]:
     """Ranges of successive chosen words that have at least so many phones together."""
-    borders = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8))).reshape(-1, 2)
     lengths = [len(alternatives[0]) for _, alternatives in words]
-    return [(int(first), int(last)) for first, last in borders if sum(lengths[first:last]) >= least]
+    return [(int(first), int(last)) for first, last in true_runs(chosen) if sum(lengths[first:last]) >= least]
 
 
-def _is_kept(confidence: Floats, words: Sequence[tuple[str, Pronunciations]]) -> NDArray[np.bool_]:
+def _is_kept(confidence: Floats, words: PronouncedWords) -> NDArray[np.bool_]:
     """Whether words (W,) are said; a short word alone is easily misheard, and so are all words in noise."""
     kept = np.ones(len(words), bool)
     for first, last in _runs(confidence < LEFT_OUT, words, N_LEFT_OUT):
@@ -310,7 +315,7 @@ def _sequence(
 
 
 def _unheard(
-    words: Sequence[tuple[str, Pronunciations]],
+    words: PronouncedWords,
     confidence: Floats,
     kept: NDArray[np.bool_],
     phones: PhoneSequence,

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
+from tts2face.numeric.arrays import true_runs
 from tts2face.types import Waveform
 
 LEVEL_WINDOW_S = 0.01
@@ -34,8 +35,7 @@ def find_pauses(sound: Waveform) -> tuple[Span, ...]:
     if speech - noise < MIN_CONTRAST_DB:
         return ()
     quiet = levels < noise + QUIET_SHARE * (speech - noise)
-    borders = np.flatnonzero(np.diff(np.concatenate([[False], quiet, [False]]).astype(np.int8)))
-    spans = (borders.reshape(-1, 2) * LEVEL_WINDOW_S).tolist()
+    spans = (true_runs(quiet) * LEVEL_WINDOW_S).tolist()
     return tuple((begin, end) for begin, end in spans if end - begin >= MIN_PAUSE_S)
 
 
@@ -54,7 +54,7 @@ def speech_onset(sound: Waveform) -> float:
     threshold = np.quantile(relative, NOISE_QUANTILE) + ONSET_ABOVE_NOISE_DB
     loud = relative > np.clip(threshold, ONSET_DB, LATEST_ONSET_DB)
     closure, shortest = round(MAX_CLOSURE_S / ONSET_WINDOW_S), round(MIN_SOUND_S / ONSET_WINDOW_S)
-    begins, ends = np.flatnonzero(np.diff(np.concatenate([[False], loud, [False]]).astype(np.int8))).reshape(-1, 2).T
+    begins, ends = true_runs(loud).T
     is_new = np.concatenate([[True], begins[1:] - ends[:-1] > closure])
     begins, ends = begins[is_new], ends[np.concatenate([is_new[1:], [True]])]
     for begin, end in zip(begins, ends, strict=True):

@@ -22,7 +22,7 @@ from lexicon.phones import PHONES, nearest_phones
 from lexicon.pronounce import Word
 from lexicon.sequence import NOMINAL_S, PhoneSequence, WordSpan
 from tts2face.numeric.kernels import disable_telemetry
-from tts2face.sound.alignment import Aligner, SpeechAligner
+from tts2face.sound.alignment import Align, Aligner
 from tts2face.sound.voice import (
     PronunciationMap,
     SpeechInput,
@@ -223,9 +223,7 @@ class PiperVoice:
         The voice speaks another language than English, and piper-tts is not installed.
     """
 
-    def __init__(
-        self, path: Path, language: str, own_words: PronunciationMap, aligner: SpeechAligner | None = None
-    ) -> None:
+    def __init__(self, path: Path, language: str, own_words: PronunciationMap, align: Align | None = None) -> None:
         if not path.is_file():
             raise InputError(f"there is no Piper voice {path}; check the path")
         settings = path.with_name(path.name + ".json")
@@ -242,7 +240,7 @@ class PiperVoice:
         self._text_reader = None if self._language == DEFAULT_LANGUAGE else PiperTextReader(self._network, content)
         self._phones = tuple(phone for phone in PHONES if self._network.letters.issuperset(phone_letters(phone)))
         self._own_words = own_words
-        self._aligner: SpeechAligner = aligner or Aligner()
+        self._align: Align = align or Aligner().align
 
     @property
     def sample_rate(self) -> int:
@@ -254,7 +252,7 @@ class PiperVoice:
         words, sentences = self._spoken(content)
         sound = self._synthesise(sentences, rate)
         try:
-            found = self._aligner.align(sound, words)
+            found = self._align(sound, words)
         except DataError:
             return Speech(sound, *nominal_phones_in(words, sound.duration))
         return Speech(sound, found.phones, found.words)

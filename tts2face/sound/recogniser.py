@@ -36,6 +36,12 @@ FEATURES = tuple(sorted(ENGLISH))  # phones whose probabilities are features of 
 Phones = tuple[str, ...]
 
 
+def levelled(sound: Waveform) -> Waveform:
+    """The sound at the level of the network's training data."""
+    factor = np.float32(PEAK / max(float(np.abs(sound.samples).max(initial=0.0)), LEAST_PEAK))
+    return Waveform(sound.samples * factor, sound.rate)
+
+
 class PhoneRecogniser:
     """Recogniser of phones.
 
@@ -84,7 +90,7 @@ class PhoneRecogniser:
         import soxr
 
         samples = sound.samples if sound.rate == RATE else soxr.resample(sound.samples, sound.rate, RATE)
-        samples = samples * np.float32(PEAK / max(float(np.abs(samples).max(initial=0.0)), LEAST_PEAK))
+        samples = levelled(Waveform(samples, RATE)).samples
         part, context, frame = (round(seconds * RATE) for seconds in (PART_S, CONTEXT_S, FRAME_S))
         found = []
         for begin in range(0, max(len(samples), 1), part):

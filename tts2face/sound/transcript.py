@@ -19,6 +19,7 @@ from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.numeric.kernels import kernel
 from tts2face.sound.alignment import Aligner, TextMismatch, join_alignments, unwritten_part
 from tts2face.sound.pauses import cut_at_pauses, cut_sound
+from tts2face.sound.word_lattice import PronouncedWords, Pronunciations
 from tts2face.types import Waveform
 
 BAND = 1500  # largest offset in phones between text and sound: two minutes of speech
@@ -120,14 +121,11 @@ def _trace_back(steps: NDArray[np.uint8], m: int, band: int) -> NDArray[np.int64
     return partner
 
 
-Pronunciations = tuple[tuple[str, ...], ...]  # alternative pronunciations of one word
-PronouncedTranscript = tuple[tuple[str, Pronunciations], ...]
-
-MAX_ALIGNED_S = 60.0  # memory of the alignment grows with the square of the length; 234 MB at this one
+MAX_ALIGNED_S = 60.0  # time of the search grows with the square of the length
 MAX_STRETCH_S = 20.0  # longest part into which longer recordings are divided
 
 
-def pronounce_transcript(text: str, language: str, own: Dictionary | None = None) -> PronouncedTranscript:
+def pronounce_transcript(text: str, language: str, own: Dictionary | None = None) -> PronouncedWords:
     """Words of a text with their pronunciations; English words also with those of the dictionary (full forms, ...).
 
     Parameters
@@ -159,7 +157,7 @@ def _pronunciations(word: Word, language: str, own: Dictionary | None) -> Pronun
 
 
 def align_recording(
-    sound: Waveform, words: PronouncedTranscript
+    sound: Waveform, words: PronouncedWords
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...], tuple[TextMismatch, ...]]:
     """Align words with a sound of any length.
 
@@ -185,14 +183,17 @@ def align_recording(
         found.check()
         return found.phones, found.words, found.mismatches
     parts = [cut_sound(sound, span) for span in cut_at_pauses(sound, MAX_STRETCH_S)]
-    recognised = [[phone for word in aligner.recogniser.hear(part).words() for phone in word] for part in parts]
+    heard = [aligner.hear(part) for part in parts]
+    recognised = [[phone for word in one.words() for phone in word] for one in heard]
     if not any(recognised):
         raise DataError("the recording contains no speech; give another recording")
     places = assign_words([alternatives[0] for _, alternatives in words], recognised)
     aligned = []
     for at, part in enumerate(parts):
         said = [word for word, place in zip(words, places, strict=True) if place == at]
-        aligned.append(aligner.align(part, said, may_lack=True) if said else unwritten_part(part, len(recognised[at])))
+        aligned.append(
+            aligner.align(heard[at], said, may_lack=True) if said else unwritten_part(part, len(recognised[at]))
+        )
     joined = join_alignments(aligned)
     joined.check()
     return joined.phones, joined.words, joined.mismatches

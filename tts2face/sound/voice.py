@@ -19,7 +19,7 @@ from lexicon.sentences import TextWord, pronounce_words
 from tts2face.types import Speech, Waveform
 
 if TYPE_CHECKING:
-    from tts2face.sound.alignment import SpeechAligner
+    from tts2face.sound.alignment import Align
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ class VoiceSetting:
         Code of `lexicon.languages`.
     own_words
         A user's pronunciations, which take precedence over those of the voice.
-    aligner
+    align
         Finds the phone edges of sound, for voices that report none; None: the voice makes its own
         (`tts2face.sound.alignment.Aligner`).
     run
@@ -95,7 +95,7 @@ class VoiceSetting:
 
     language: str
     own_words: PronunciationMap = field(default_factory=dict)
-    aligner: "SpeechAligner | None" = None
+    align: "Align | None" = None
     run: NativeRun | None = None
 
 

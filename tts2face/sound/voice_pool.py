@@ -6,7 +6,7 @@ Choice and loading of a voice by name and language: those of tts2face, of other 
 import importlib.util
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,9 +16,8 @@ from types import MappingProxyType
 from lexicon.errors import BackendError, InputError
 from lexicon.languages import language_code
 from tts2face.plugins import VOICES, declared, load_plugin
-from tts2face.sound.alignment import Aligner, Alignment, SpeechAligner
+from tts2face.sound.alignment import Align, Aligner
 from tts2face.sound.voice import NativeRun, PronunciationMap, SpeechInput, Voice, VoiceInfo, VoiceSetting
-from tts2face.sound.word_lattice import Pronunciations
 from tts2face.types import Speech, Waveform
 
 ENGLISH_CODES = ("en", "en-us", "en-gb")
@@ -48,7 +47,7 @@ def _espeak_female(setting: VoiceSetting) -> Voice:
 def _piper(path: Path, setting: VoiceSetting) -> Voice:
     from tts2face.sound.piper import PiperVoice
 
-    return PiperVoice(path, setting.language, setting.own_words, setting.aligner)
+    return PiperVoice(path, setting.language, setting.own_words, setting.align)
 
 
 SHIPPED_VOICES: Mapping[str, VoiceInfo] = MappingProxyType({
@@ -109,7 +108,7 @@ def load_voice(
     name: str | None,
     language: str,
     own_words: PronunciationMap | None = None,
-    aligner: "SpeechAligner | None" = None,
+    align: Align | None = None,
     run: NativeRun | None = None,
 ) -> Voice:
     """Load a voice by name, or the default voice of a language.
@@ -120,7 +119,7 @@ def load_voice(
         One of `voice_names`, the path of a Piper voice (``.onnx``), or None for the default.
     language
         Code, tag or English name, see `lexicon.languages.language_code`.
-    own_words, aligner, run
+    own_words, align, run
         As for `VoiceSetting`.
 
     Raises
@@ -132,7 +131,7 @@ def load_voice(
     BackendError
         A package that the voice needs is not installed.
     """
-    setting = VoiceSetting(language_code(language), own_words or {}, aligner, run)
+    setting = VoiceSetting(language_code(language), own_words or {}, align, run)
     chosen = name or ("heart" if setting.language in ENGLISH_CODES[:2] else "espeak")
     if chosen.endswith(".onnx"):
         return _piper(Path(chosen), setting)
@@ -175,7 +174,7 @@ class VoicePool:
     """
 
     def __init__(self, run: NativeRun | None = None) -> None:
-        self._aligner, self._native_run = None if run is None else _SharedAligner(Aligner(), run), run
+        self._aligner, self._native_run = Aligner(), run
         self._lock = threading.Lock()
         self._unused: list[tuple[Hashable, Voice]] = []  # the newest at the end
         self._kept: OrderedDict[Hashable, Speech] = OrderedDict()
@@ -198,7 +197,7 @@ class VoicePool:
         """
         key = (name, language, frozenset(dictionary.items()))
         shared = _SharedVoice(
-            self, key, lambda: load_voice(name, language, dictionary, self._aligner, self._native_run), keeps_utterances
+            self, key, lambda: load_voice(name, language, dictionary, self._align, self._native_run), keeps_utterances
         )
         with self.borrow(key, shared.load):  # an unknown voice is refused at once
             return shared
@@ -211,9 +210,15 @@ class VoicePool:
                 return
             thread = ThreadPoolExecutor(1, "voice")
             self._loading[key] = thread.submit(
-                lambda: self._put_back(key, load_voice(name, language, dictionary, self._aligner, self._native_run))
+                lambda: self._put_back(key, load_voice(name, language, dictionary, self._align, self._native_run))
             )
             thread.shutdown(wait=False)
+
+    @property
+    def _align(self) -> Align | None:
+        """Aligner of all voices of the pool, which take turns."""
+        run = self._native_run
+        return run and (lambda sound, words: run(lambda: self._aligner.align(sound, words), _nothing))
 
     def yield_turn(self) -> None:
         """Let other requests take their turn, between two steps of a synthesis."""
@@ -231,7 +236,7 @@ class VoicePool:
             found = next((at for at, (kept, _) in enumerate(self._unused) if kept == key), None)
             voice = None if found is None else self._unused.pop(found)[1]
         voice = voice or load()
-        if self._aligner is not None:
+        if self._native_run is not None:
             self._put_back(key, voice)
             yield voice
             return
@@ -260,18 +265,6 @@ class VoicePool:
 
 def _nothing() -> None:
     pass
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _SharedAligner:
-    """Aligner of all voices of a pool, which take turns."""
-
-    aligner: Aligner
-    run: NativeRun
-
-    def align(self, sound: Waveform, words: Sequence[tuple[str, Pronunciations]]) -> Alignment:
-        found: Alignment = self.run(lambda: self.aligner.align(sound, words), _nothing)
-        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,6 +24,7 @@ LEAST_SPIKE, LEAST_SHARE = 1e-4, 1e-3  # of probabilities
 LONGEST_S = 0.45
 LEAST_DURATION = -6.0  # log probability of any duration up to the longest
 Pronunciations = Sequence[tuple[str, ...]]  # alternatives of one word, in phones of the table
+PronouncedWords = Sequence[tuple[str, Pronunciations]]
 Floats = NDArray[np.float64]
 
 

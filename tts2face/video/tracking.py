@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError, InputError
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS, N_MESH_LANDMARKS
+from tts2face.numeric.arrays import true_runs
 from tts2face.storage.files import user_cache
 
 MODEL_NAME = "face_landmarker.task"
@@ -359,8 +360,7 @@ def smooth_crops(crops: Sequence[Crop | None], fps: float) -> list[Crop | None]:
 
     smooth = list(crops)
     present = np.array([crop is not None for crop in crops])
-    borders = np.flatnonzero(np.diff(np.concatenate([[False], present, [False]])))
-    for first, last in borders.reshape(-1, 2):
+    for first, last in true_runs(present):
         rows = np.array([astuple(crop) for crop in crops[first:last] if crop is not None])
         rows[:, 3] = np.unwrap(rows[:, 3])
         rows = gaussian_filter1d(rows, CROP_SMOOTHING_S * fps, axis=0, mode="nearest")
