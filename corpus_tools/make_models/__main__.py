@@ -91,6 +91,20 @@ def make_talker(making: Making) -> None:
     # GRID has 51 words and lacks seven phones: its networks also learn free English, of which only the lips are known
     # (docs/decisions/124). Exemplars stay its own.
     pool_talker(str(path), making.recordings / "address_tracks", path, source=TRACKS, stages=making.stage)
+    add_voices_map(making)
+
+
+def add_voices_map(making: Making) -> None:
+    """The audio map for live sound of any voice, in the talker that is there; a quarter of an hour."""
+    from corpus_tools.training.voices_audio_map import NAME, learn_voices_map
+    from tts2face.models.talker import load_talker, write_talker
+
+    path = making.out / f"{GRID}.talker"
+    talker = load_talker(str(path))
+    learnt = learn_voices_map(
+        talker, making.recordings, on_progress=making.stage("lips of damaged speech"), report=making.report
+    )
+    write_talker(path, replace(talker, audio_maps={**talker.audio_maps, NAME: learnt}))
 
 
 def make_heads(making: Making) -> None:
@@ -170,14 +184,19 @@ STEPS: Mapping[str, Callable[[Making], None]] = {
     "light": make_light,
     "mouths": make_mouths,
 }
-ALONE: Mapping[str, Callable[[Making], None]] = {"styles": derive_styles}  # parts of steps that are repeated
+ALONE: Mapping[str, Callable[[Making], None]] = {
+    "styles": derive_styles,
+    "voices": add_voices_map,
+}  # parts of steps that are repeated
 
 
 def main() -> None:
     """Make the models; steps and their start in seconds go to standard error."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     choices = [*STEPS, *ALONE]
-    parser.add_argument("steps", nargs="*", metavar="STEP", help=f"{', '.join(choices)}; without any: all but styles")
+    parser.add_argument(
+        "steps", nargs="*", metavar="STEP", help=f"{', '.join(choices)}; without any: all but styles and voices"
+    )
     parser.add_argument("--out", type=Path, default=Path("tts2face/data"), help="folder of the models")
     parser.add_argument("--recordings", type=Path, default=Path("../shared/recordings"), help="folder of recordings")
     parser.add_argument("--keep", type=Path, default=Path.home() / ".cache/tts2face/models", help="downloads and bakes")

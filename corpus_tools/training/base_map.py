@@ -110,9 +110,10 @@ class BaseMap:
 
     def audio_map(self, audio_map: AudioMap) -> AudioMap:
         """The audio map of the new person; without the part of the phones, which a sound does not tell."""
-        outer = (self.matrix @ audio_map.outer).astype(np.float32)
-        offset = (self.matrix @ audio_map.offset + self.offset).astype(np.float32)
-        return replace(audio_map, outer=outer, offset=offset)
+        outer = (self.matrix @ audio_map.weights[-1]).astype(np.float32)
+        offset = (self.matrix @ audio_map.biases[-1] + self.offset).astype(np.float32)
+        weights, biases = (*audio_map.weights[:-1], outer), (*audio_map.biases[:-1], offset)
+        return replace(audio_map, weights=weights, biases=biases)
 
 
 def frame_terms(

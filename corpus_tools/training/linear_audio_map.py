@@ -130,11 +130,9 @@ def learn_linear_map(
         after,
         data.mean,
         data.spread,
-        inner.astype(np.float32),
-        (-inner @ factors.mean_a).astype(np.float32),
-        mapping.astype(np.float32),
-        factors.mean_b.astype(np.float32),
-        is_nonlinear=False,
+        (inner.astype(np.float32), mapping.astype(np.float32)),
+        ((-inner @ factors.mean_a).astype(np.float32), factors.mean_b.astype(np.float32)),
+        "linear",
     )
 
 

@@ -97,11 +97,9 @@ def learn_network_map(utterances: Sequence[TrainingUtterance], *, feature: str, 
         options.after,
         data.mean,
         data.spread,
-        inner.astype(np.float32),
-        bias.astype(np.float32),
-        (outer * back[:, None]).astype(np.float32),
-        (offset * back + centre).astype(np.float32),
-        is_nonlinear=True,
+        (inner.astype(np.float32), (outer * back[:, None]).astype(np.float32)),
+        (bias.astype(np.float32), (offset * back + centre).astype(np.float32)),
+        "tanh",
     )
 
 

@@ -6,9 +6,8 @@ training, Young et al. 2006). That of recordings begins with the voice's speech,
 known, and it is trained on all, again and again.
 """
 
-import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -17,24 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.prompts.prompts import shipped_sentences
-from corpus_tools.recordings.folder import read_word_times
 from corpus_tools.training.damage import Damaged, damage
+from corpus_tools.training.spoken_material import KnownSpeech, spoken_material
 from lexicon.dictionary import cmudict_words
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, enforce_increasing
 from tts2face.models.phone_classifier import PhoneClassifier
 from tts2face.sound.alignment import Aligner, recording_features
 from tts2face.sound.heart import NeuralVoice
-from tts2face.sound.pauses import Span
 from tts2face.sound.recogniser import FEATURES, FRAME_S, PhoneRecogniser, levelled
-from tts2face.sound.segments import RATE, STEP_S, StatedPhone, find_edges, frame_features
+from tts2face.sound.segments import STEP_S, StatedPhone, find_edges, frame_features
 from tts2face.sound.spikes import NEVER, find_spikes
-from tts2face.sound.transcript import pronounce_transcript
-from tts2face.sound.voice import pronounce_content
-from tts2face.sound.voice_pool import load_voice
-from tts2face.sound.word_lattice import PronouncedWords
 from tts2face.types import Progress, Waveform
-from tts2face.video.media import read_sound
 
 N_RANDOM = 800  # texts of words in random order
 N_WORDS = (3, 9)
@@ -48,11 +41,7 @@ LEAST_SPREAD, WEIGHT_DECAY = 0.05, 1e-4
 TEST_SHARE = 20  # every twentieth text tells the accuracy
 PRIOR_SHARE = 0.6  # of the log frequencies of phones that is taken out: the search knows which phones are there
 LEAST_DURATION_S, LEAST_DEVIATION = 0.02, 0.3
-SPEECH_RATES = (0.8, 0.9, 1.0, 1.0, 1.15, 1.3)
-N_TEXTS, N_OTHER, OTHER_VOICE = 420, 260, "joe"  # of both voices
-PLAIN, N_CAPTION_WORDS = re.compile(r"[A-Za-z ,.'?!;-]+"), 4  # of captions that are spoken
 N_ROUNDS_OF_RECORDINGS = 2  # in which edges of other speech and the classifier are found from each other
-RECORDED_STEP = 3  # every third recorded sentence
 N_DAMAGED = 2  # times that each text is learnt
 FRAME_SHARE, SILENCE_SHARE = 0.45, 0.33  # of frames, and of the silent ones among them, that are learnt
 SURE = 0.5  # of a spike whose delay is measured
@@ -93,35 +82,22 @@ def train_recording_classifier(recordings: Path, *, on_progress: Progress, repor
     Parameters
     ----------
     recordings
-        Folder with GRID's talker s1 (``grid_s1``), and with captions of free English (``address_tracks``), which the
-        voices speak.
+        As for `corpus_tools.training.spoken_material.spoken_material`.
     """
     rng, recogniser = np.random.default_rng(0), PhoneRecogniser()
-    texts = [*caption_texts(recordings / "address_tracks"), *shipped_sentences()]
-    rng.shuffle(texts)
-    voice = load_voice("heart", "en-us")
-    spoken = [voice.speak(text, rate=float(rng.choice(SPEECH_RATES))) for text in texts[:N_TEXTS]]
-    others = [*_spoken_by_another(texts[N_TEXTS : N_TEXTS + N_OTHER], rng), *_recorded(recordings / "grid_s1")]
-    sounds = [*(_resampled(one.waveform) for one in spoken), *(one.sound for one in others)]
-    stated = [one.phones for one in spoken]
-    known: list[PhoneSequence | None] = [*stated, *([None] * len(others))]
+    stated, others = spoken_material(recordings, rng)
+    sounds = [*(one.sound for one in stated), *(one.sound for one in others)]
+    known: list[PhoneSequence | None] = [*(one.phones for one in stated), *([None] * len(others))]
     lessons = _lessons(sounds, rng, recogniser, on_progress)
-    delays = _delays(sounds[: len(spoken)], stated, recogniser)
+    delays = _delays(stated, recogniser)
     classifier = _fit_lessons(lessons, known, delays, report)
     for _ in range(N_ROUNDS_OF_RECORDINGS):
         aligner = Aligner(classifier)
-        for at, one in enumerate(others, len(spoken)):
+        for at, one in enumerate(others, len(stated)):
             with suppress(DataError):  # it is spoken too quickly for its words
-                known[at] = aligner.align(one.sound, one.words, one.times).phones
+                known[at] = one.align(aligner)
         classifier = _fit_lessons(lessons, known, delays, report)
     return classifier
-
-
-def caption_texts(folder: Path) -> list[str]:
-    """Texts of captions (``*.cues.tsv``) that can be spoken alone."""
-    pages = (path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.cues.tsv")))
-    texts = [line.split("\t")[2] for page in pages for line in page.splitlines()]
-    return [text for text in dict.fromkeys(texts) if PLAIN.fullmatch(text) and len(text.split()) >= N_CAPTION_WORDS]
 
 
 def training_texts() -> tuple[str, ...]:
@@ -218,21 +194,14 @@ def _durations(inventory: Sequence[str], sequences: Sequence[PhoneSequence]) -> 
     return np.array([[np.mean(one), max(np.std(one), LEAST_DEVIATION)] for one in known], np.float32)
 
 
-def _resampled(sound: Waveform) -> Waveform:
-    import soxr
-
-    return Waveform(np.clip(soxr.resample(sound.samples, sound.rate, RATE), -1.0, 1.0), RATE)
-
-
-def _delays(
-    sounds: Sequence[Waveform], known: Sequence[PhoneSequence], recogniser: PhoneRecogniser
-) -> dict[str, float]:
+def _delays(stated: Sequence[KnownSpeech], recogniser: PhoneRecogniser) -> dict[str, float]:
     """Median seconds from the middle of each phone to the instant at which the recogniser says it."""
     apart: dict[str, list[float]] = {}
-    for sound, phones in zip(sounds, known, strict=True):
+    for one in stated:
+        phones = one.phones
         said = [at for at, label in enumerate(phones.phones) if label != SILENCE]
         labels = [phones.phones[at] for at in said]
-        heard = recogniser.hear(levelled(sound)).log_probabilities(tuple(labels))
+        heard = recogniser.hear(one.sound).log_probabilities(tuple(labels))
         spikes = find_spikes(heard, [[list(range(len(labels)))]], NEVER)
         moments = (np.arange(len(spikes)) + 0.5) * FRAME_S
         middles = (phones.edges[said] + phones.edges[[at + 1 for at in said]]) / 2
@@ -270,31 +239,3 @@ def _lessons(
         found.append(_Lesson(replace(damaged, sound=sound), number, seen[frames].astype(np.float16), frames))
         on_progress(at + 1, N_DAMAGED * len(sounds))
     return found
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Unaligned:
-    """Speech whose words are known, and their times or not."""
-
-    sound: Waveform
-    words: PronouncedWords
-    times: Sequence[Span] | None = None
-
-
-def _spoken_by_another(texts: Sequence[str], rng: np.random.Generator) -> Iterator[_Unaligned]:
-    """Texts in the voice `OTHER_VOICE`."""
-    voice = load_voice(OTHER_VOICE, "en-us")
-    for text in texts:
-        sound = _resampled(voice.sound(text, rate=float(rng.choice(SPEECH_RATES))))
-        words = [(word.text, [tuple(word.phones)]) for word in pronounce_content(text, "en-us", {})]
-        yield _Unaligned(sound, words)
-
-
-def _recorded(folder: Path) -> Iterator[_Unaligned]:
-    """Recorded sentences with known times of their words."""
-    for path in sorted((folder / "align").glob("*.align"))[::RECORDED_STEP]:
-        cues = read_word_times(path)
-        words = pronounce_transcript(" ".join(cue.text for cue in cues), "en-us")
-        if len(words) == len(cues):
-            sound = read_sound(folder / "clips" / f"{path.stem}.mkv", RATE)
-            yield _Unaligned(sound, words, [(cue.begin, cue.end) for cue in cues])

@@ -43,8 +43,8 @@ def test_a_mapped_network_gives_the_mapped_output(known: tuple[str, ...]) -> Non
 
 def test_a_mapped_audio_map_gives_the_mapped_output() -> None:
     rng = np.random.default_rng(2)
-    parts = [rng.normal(size=size).astype(np.float32) for size in (4, (5, 12), 5, (3, 5), 3)]
-    plain = AudioMap("formants", 1, 1, parts[0], np.ones(4, np.float32), *parts[1:], is_nonlinear=True)
+    parts = [rng.normal(size=size).astype(np.float32) for size in (4, (5, 12), (6, 5), (3, 6), 5, 6, 3)]
+    plain = AudioMap("formants", 1, 1, parts[0], np.ones(4, np.float32), tuple(parts[1:4]), tuple(parts[4:]), "tanh")
     mapped, features = made_map(), rng.normal(size=(9, 4))
     expected = plain.parameters(features) @ mapped.matrix.T + mapped.offset
     assert mapped.audio_map(plain).parameters(features) == pytest.approx(expected, abs=1e-5)

@@ -67,8 +67,9 @@ def write_made_talker(path: Path, *, has_face: bool) -> None:
     layers = [rng.normal(0, 0.1, (2, a, b)).astype(np.float32) for a, b in pairwise(sizes)]
     network = PhoneNetwork(INVENTORY, tuple(layers), tuple(layer[:, 0] for layer in layers))
     n = FEATURE_SIZES["mfcc"]
-    weights = [rng.normal(0, 0.1, size).astype(np.float32) for size in ((4, 3 * n), (4,), (2, 4), (2,))]
-    audio_map = AudioMap("mfcc", 1, 1, np.zeros(n, np.float32), np.ones(n, np.float32), *weights, is_nonlinear=True)
+    weights = [rng.normal(0, 0.1, size).astype(np.float32) for size in ((4, 3 * n), (2, 4), (4,), (2,))]
+    scale = np.zeros(n, np.float32), np.ones(n, np.float32)
+    audio_map = AudioMap("mfcc", 1, 1, *scale, tuple(weights[:2]), tuple(weights[2:]), "tanh")
     metadata = {"name": "Ada", "refused": [["u9", "no face"]], "phones_recognised": ["u1"]}
     written = Talker(
         talker.fps, talker.model, tuple(utterances), metadata, talker.appearance, network, {"linear": audio_map}

@@ -83,7 +83,7 @@ def put(name: str, value: float) -> Callable[[dict, dict], None]:
         ("talker", "edges", 0.1, "edges do not increase at"),
         ("talker", "edges", 9.0, "phones of the utterance 'u5' end after its frames"),
         ("talker", "basis", 0.9, "basis is not orthonormal"),
-        ("talker", "drive.linear.context", 2, "drive.linear.context ends with 2, not 0 or 1"),
+        ("talker", "drive.linear.context", 3, "drive.linear.context ends with 3, not one of"),
         ("talker", "drive.linear.feature", 98, "drive.linear.feature is 'mfcb', not a sum of formants"),
         ("talker", "network.weights0", np.nan, "network.weights0 holds nan"),
         ("talker", "appearance.face.pixels", 10**6, "appearance.face.pixels holds 1000000, beyond its"),

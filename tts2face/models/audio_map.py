@@ -1,11 +1,12 @@
 """Audio maps: trained maps from acoustic features to speech shape parameters (Theobald et al. 2007, section 3.2).
 
-`corpus_tools.training` trains them: `linear_audio_map` and `network_audio_map`.
+`corpus_tools.training` trains them: `linear_audio_map`, `network_audio_map`, and `voices_audio_map` for any voice.
 """
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
 
@@ -16,15 +17,21 @@ from lexicon.errors import DataError, InputError
 
 AUDIO_MAP_PREFIX = "drive."
 # Number of values per frame of each kind of feature of `tts2face.sound.features`.
-FEATURE_SIZES: Mapping[str, int] = MappingProxyType({"formants": 4, "mfcc": 13, "lpc": 16, "lsf": 16, "level": 1})
+FEATURE_SIZES: Mapping[str, int] = MappingProxyType(
+    {"formants": 4, "mfcc": 13, "lpc": 16, "lsf": 16, "level": 1, "mel": 72}
+)
 MAX_CONTEXT = 1000  # frames of context on either side
 MAX_GAIN_DB = 40.0  # fainter recordings contain more noise than speech
+ACTIVATIONS = ("linear", "tanh", "rectified")  # by their numbers in a file
+FIRST, MIDDLE, LAST = ("inner", "bias"), ("middle", "middle_bias"), ("outer", "offset")  # names of layers in a file
+N_AT_ONCE = 1000  # frames, whose windows take 5 MB
 Values = NDArray[np.floating]
+Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AudioMap:
-    """Two-layer map from features of neighbouring frames through factors or hidden units to shape parameters.
+    """Map of two or three layers from features of neighbouring frames through units to shape parameters.
 
     Parameters
     ----------
@@ -34,16 +41,13 @@ class AudioMap:
         Frames of context before and after each frame.
     mean, spread : (D,)
         Mean and standard deviation of the training features.
-    inner : (H, (before + 1 + after) D)
-        Weights of the standardised features: canonical factors (T07 eq. 6), or a network's first layer.
-    bias : (H,)
-        Of factors or hidden units.
-    outer : (S, H)
-        Weights of factors or hidden units: T07 eq. 7, or a network's second layer.
-    offset : (S,)
-        Of the shape parameters.
-    is_nonlinear
-        Whether hidden units apply tanh; otherwise the map is linear.
+    weights : (H, (before + 1 + after) D), ..., (S, H)
+        Of the standardised features in the first layer, canonical factors (T07 eq. 6) or units; of the shape
+        parameters in the last (eq. 7).
+    biases : (H,), ..., (S,)
+        Of all layers.
+    activation
+        Of units, one of `ACTIVATIONS`.
     loudness
         Level of the training speech, dB of full scale; NaN if unknown.
     """
@@ -51,20 +55,17 @@ class AudioMap:
     feature: str
     before: int
     after: int
-    mean: NDArray[np.float32]
-    spread: NDArray[np.float32]
-    inner: NDArray[np.float32]
-    bias: NDArray[np.float32]
-    outer: NDArray[np.float32]
-    offset: NDArray[np.float32]
-    is_nonlinear: bool
+    mean: Floats
+    spread: Floats
+    weights: tuple[Floats, ...]
+    biases: tuple[Floats, ...]
+    activation: str
     loudness: float = math.nan
 
     def __post_init__(self) -> None:
         """Check that the shapes of all arrays agree."""
-        n_inputs = (self.before + 1 + self.after) * len(self.mean)
-        n_hidden, n_outputs = len(self.bias), len(self.offset)
-        fits = self.inner.shape == (n_hidden, n_inputs) and self.outer.shape == (n_outputs, n_hidden)
+        sizes = [(self.before + 1 + self.after) * len(self.mean), *map(len, self.biases)]
+        fits = [one.shape for one in self.weights] == [(outer, inner) for inner, outer in pairwise(sizes)]
         if not fits or self.spread.shape != self.mean.shape or min(self.before, self.after) < 0:
             raise DataError(f"the parts of the audio map of {self.feature} do not fit each other; train it again")
 
@@ -83,26 +84,33 @@ class AudioMap:
         """
         if features.ndim != 2 or features.shape[1] != len(self.mean):
             raise InputError(f"the audio map takes {len(self.mean)} features per frame, not the shape {features.shape}")
-        if not len(features):
-            return np.zeros((0, len(self.offset)), np.float32)
         padded = np.concatenate(
             [np.repeat(features[:1], self.before, axis=0), features, np.repeat(features[-1:], self.after, axis=0)]
         )
-        return self.inside(padded)
+        context = self.before + self.after
+        return np.concatenate(
+            [self.inside(padded[at : at + N_AT_ONCE + context]) for at in range(0, max(len(features), 1), N_AT_ONCE)]
+        )
 
     def inside(self, features: Values) -> NDArray[np.float32]:
         """Shape parameters (T - before - after, S) of the frames of features (T, D) that have full context."""
-        windows = context_windows((features - self.mean) / self.spread, self.before, self.after).astype(np.float32)
-        units = np.zeros((len(windows), len(self.bias)), np.float32) + self.bias
-        # One row at a time: the result does not depend on the number of frames.
-        for unit, weights in enumerate(self.inner):
-            units[:, unit] += (windows * weights).sum(axis=1)
-        if self.is_nonlinear:
-            units = np.tanh(units)
-        outputs = np.zeros((len(windows), len(self.offset)), np.float32) + self.offset
-        for hidden in range(units.shape[1]):
-            outputs += units[:, hidden, None] * self.outer[:, hidden]
-        return outputs
+        values = context_windows((features - self.mean) / self.spread, self.before, self.after).astype(np.float32)
+        for weights, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+            values = self._activated(_layer(values, weights, bias))
+        return _layer(values, self.weights[-1], self.biases[-1])
+
+    def _activated(self, units: Floats) -> Floats:
+        if self.activation == "linear":
+            return units
+        return np.tanh(units) if self.activation == "tanh" else np.maximum(units, np.float32(0.0))
+
+
+def _layer(values: Floats, weights: Floats, bias: Floats) -> Floats:
+    """Units (T, H) of values (T, K); one at a time, so that they do not depend on the number of frames."""
+    units = np.zeros((len(values), len(bias)), np.float32) + bias
+    for unit, row in enumerate(weights):
+        units[:, unit] += (values * row).sum(axis=1)
+    return units
 
 
 def context_windows(features: Values, before: int, after: int) -> Values:
@@ -112,17 +120,24 @@ def context_windows(features: Values, before: int, after: int) -> Values:
     return np.concatenate([features[at : at + n_frames] for at in range(width)], axis=1)
 
 
+def layer_names(n_layers: int) -> list[tuple[str, str]]:
+    """Names of the weights and the bias of each layer in a file."""
+    return [FIRST, *[MIDDLE] * (n_layers - 2), LAST]
+
+
 def audio_map_arrays(audio_maps: Mapping[str, AudioMap]) -> dict[str, NDArray[Any]]:
     """Arrays of audio maps for a talker file; inverse of `audio_maps_from_arrays`."""
     arrays: dict[str, NDArray[Any]] = {}
     for name, audio_map in audio_maps.items():
-        for part in ("mean", "spread", "inner", "bias", "outer", "offset"):
-            arrays[f"{AUDIO_MAP_PREFIX}{name}.{part}"] = getattr(audio_map, part)
-        arrays[f"{AUDIO_MAP_PREFIX}{name}.context"] = np.array(
-            [audio_map.before, audio_map.after, audio_map.is_nonlinear], np.int32
-        )
-        arrays[f"{AUDIO_MAP_PREFIX}{name}.loudness"] = np.array([audio_map.loudness], np.float32)
-        arrays[f"{AUDIO_MAP_PREFIX}{name}.feature"] = np.frombuffer(audio_map.feature.encode(), np.uint8)
+        prefix = f"{AUDIO_MAP_PREFIX}{name}"
+        arrays |= {f"{prefix}.mean": audio_map.mean, f"{prefix}.spread": audio_map.spread}
+        layers = zip(layer_names(len(audio_map.weights)), audio_map.weights, audio_map.biases, strict=True)
+        for names, weights, bias in layers:
+            arrays |= {f"{prefix}.{names[0]}": weights, f"{prefix}.{names[1]}": bias}
+        context = [audio_map.before, audio_map.after, ACTIVATIONS.index(audio_map.activation)]
+        arrays[f"{prefix}.context"] = np.array(context, np.int32)
+        arrays[f"{prefix}.loudness"] = np.array([audio_map.loudness], np.float32)
+        arrays[f"{prefix}.feature"] = np.frombuffer(audio_map.feature.encode(), np.uint8)
     return arrays
 
 
@@ -135,14 +150,21 @@ def audio_maps_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Audi
         A part is missing.
     """
     names = sorted({key.split(".")[1] for key in arrays if key.startswith(AUDIO_MAP_PREFIX)})
-    audio_maps = {}
-    for name in names:
-        before, after, is_nonlinear = (int(number) for number in arrays[f"{AUDIO_MAP_PREFIX}{name}.context"])
-        parts = {
-            part: arrays[f"{AUDIO_MAP_PREFIX}{name}.{part}"]
-            for part in ("mean", "spread", "inner", "bias", "outer", "offset")
-        }
-        feature = arrays[f"{AUDIO_MAP_PREFIX}{name}.feature"].tobytes().decode()
-        loudness = float(arrays[f"{AUDIO_MAP_PREFIX}{name}.loudness"][0])
-        audio_maps[name] = AudioMap(feature, before, after, **parts, is_nonlinear=bool(is_nonlinear), loudness=loudness)
-    return audio_maps
+    return {name: _audio_map(arrays, f"{AUDIO_MAP_PREFIX}{name}") for name in names}
+
+
+def _audio_map(arrays: Mapping[str, NDArray[Any]], prefix: str) -> AudioMap:
+    before, after, activation = (int(number) for number in arrays[f"{prefix}.context"])
+    layers = layer_names(3 if f"{prefix}.{MIDDLE[0]}" in arrays else 2)
+    weights, biases = (tuple(arrays[f"{prefix}.{names[part]}"] for names in layers) for part in range(2))
+    return AudioMap(
+        arrays[f"{prefix}.feature"].tobytes().decode(),
+        before,
+        after,
+        arrays[f"{prefix}.mean"],
+        arrays[f"{prefix}.spread"],
+        weights,
+        biases,
+        ACTIVATIONS[activation],
+        float(arrays[f"{prefix}.loudness"][0]),
+    )

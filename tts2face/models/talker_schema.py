@@ -1,6 +1,7 @@
 """Schema of ``.talker`` files (docs/file-formats.md), checked when a file is read."""
 
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from lexicon.phones import PHONES
 from lexicon.sequence import SILENCE
-from tts2face.models.audio_map import AUDIO_MAP_PREFIX, FEATURE_SIZES, MAX_CONTEXT
+from tts2face.models.audio_map import ACTIVATIONS, AUDIO_MAP_PREFIX, FEATURE_SIZES, MAX_CONTEXT, MIDDLE, layer_names
 from tts2face.models.landmarks import FACE_OVAL, N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.models.networks import N_PHONES_SEEN, N_PLACE, check_score_map
 from tts2face.storage.schema import (
@@ -223,18 +224,22 @@ def _check_audio_map(contents: Contents, prefix: str) -> None:
     kinds = feature.split("+")
     if any(kind not in FEATURE_SIZES for kind in kinds):
         contents.fail(f"{prefix}.feature is {feature!r}, not a sum of {', '.join(FEATURE_SIZES)}")
-    before, after, is_nonlinear = (int(number_) for number_ in contents.arrays[f"{prefix}.context"])
-    contents.require(is_nonlinear in (0, 1), f"{prefix}.context ends with {is_nonlinear}, not 0 or 1")
-    n_features, hidden = sum(FEATURE_SIZES[kind] for kind in kinds), f"{prefix} units"
-    weights, n_speech = (-MAX_WEIGHT, MAX_WEIGHT), contents.header["n_speech"]
+    before, after, activation = (int(number_) for number_ in contents.arrays[f"{prefix}.context"])
+    known = range(len(ACTIVATIONS))
+    contents.require(activation in known, f"{prefix}.context ends with {activation}, not one of {[*known]}")
+    layers = layer_names(3 if f"{prefix}.{MIDDLE[0]}" in contents.arrays else 2)
+    n_features, values = sum(FEATURE_SIZES[kind] for kind in kinds), (-MAX_WEIGHT, MAX_WEIGHT)
+    units = [f"{prefix} units {at}" for at in range(len(layers) - 1)]
+    sizes = ((before + 1 + after) * n_features, *units, contents.header["n_speech"])
     contents.tensors(
         {
-            f"{prefix}.mean": Tensor("float32", (n_features,), *weights),
+            f"{prefix}.mean": Tensor("float32", (n_features,), *values),
             f"{prefix}.spread": Tensor("float32", (n_features,), 0.0, MAX_WEIGHT),
-            f"{prefix}.inner": Tensor("float32", (hidden, (before + 1 + after) * n_features), *weights),
-            f"{prefix}.bias": Tensor("float32", (hidden,), *weights),
-            f"{prefix}.outer": Tensor("float32", (n_speech, hidden), *weights),
-            f"{prefix}.offset": Tensor("float32", (n_speech,), *weights),
+            **{
+                f"{prefix}.{name}": Tensor("float32", shape, *values)
+                for names, (inner, outer) in zip(layers, pairwise(sizes), strict=True)
+                for name, shape in zip(names, ((outer, inner), (outer,)), strict=True)
+            },
         }
     )
     contents.require(

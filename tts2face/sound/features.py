@@ -8,6 +8,7 @@ Intensity and pitch of a voice over time, as Praat defines them.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from types import MappingProxyType
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from tts2face.numeric.arrays import ordered_product
 from tts2face.sound.pauses import NOISE_QUANTILE, SPEECH_QUANTILE
 from tts2face.types import Trajectory, Waveform
 
@@ -32,7 +34,14 @@ WINDOWS_AT_ONCE = 1000  # 11 MB
 
 AnalysisWindows = NDArray[np.float64]
 Measure = Callable[[AnalysisWindows], NDArray[np.float64]]
-FEATURE_KINDS = ("formants", "mfcc", "lpc", "lsf", "level")
+FEATURE_KINDS = ("formants", "mfcc", "lpc", "lsf", "level", "mel")
+# Log powers of bands, three times a frame of 25 Hz; relative to the mean of the speech so far, which is that of a voice
+# and a microphone. It is found at once, and follows slowly.
+N_BANDS, BAND_LIMITS_HZ, BAND_WINDOW, BAND_TRANSFORM = 24, (80.0, 7600.0), 400, 512
+BAND_OFFSETS = (-213, 0, 213)  # samples from the frame
+LEAST_BAND_POWER, FIRST_MEAN, FIRST_LEVEL = 1e-8, -9.0, -20.0  # natural logarithms
+MEAN_FRAMES, LEAST_FOLLOWED = 4, 0.03  # weight of the first mean, in frames; least share of a frame
+LEVEL_FALL, SPEECH_RANGE = 0.02, 3.5  # of the level a frame; speech is not farther below it
 
 
 def speech_features(sound: Waveform, kind: str, *, fps: float, n_frames: int, start: float = 0.0) -> Trajectory:
@@ -44,7 +53,8 @@ def speech_features(sound: Waveform, kind: str, *, fps: float, n_frames: int, st
         Sound at `FEATURE_RATE`.
     kind
         One of `FEATURE_KINDS`, or several as ``mfcc+lsf``: ``formants`` (4, Hz), ``mfcc`` (13, the first is the level),
-        ``lpc`` (16 prediction coefficients), ``lsf`` (16, rad), ``level`` (1, dB relative to full scale).
+        ``lpc`` (16 prediction coefficients), ``lsf`` (16, rad), ``level`` (1, dB relative to full scale), ``mel`` (72,
+        logarithms of the powers of 24 bands at three instants, relative to `ChannelMean`).
     start
         Time of the first frame in seconds.
 
@@ -61,7 +71,7 @@ def speech_features(sound: Waveform, kind: str, *, fps: float, n_frames: int, st
         measure_windows(analysis_windows(sound.samples, centres[at : at + WINDOWS_AT_ONCE]), measures)
         for at in range(0, n_frames, WINDOWS_AT_ONCE)
     ]
-    values = np.concatenate(parts)
+    values = channel_adaptation(kind)(np.concatenate(parts))
     return Trajectory([f"{kind}.{i}" for i in range(values.shape[1])], values, fps)
 
 
@@ -195,6 +205,54 @@ def level(windows: AnalysisWindows) -> NDArray[np.float64]:
     return np.asarray(10.0 * np.log10(power)[:, None], np.float64)
 
 
+def mel(windows: AnalysisWindows) -> NDArray[np.float64]:
+    """(T, 72) log powers of `N_BANDS` bands at `BAND_OFFSETS` around the middles of T windows."""
+    taper = np.hanning(BAND_WINDOW)
+    begins = [HALF_WINDOW_SAMPLES + offset - BAND_WINDOW // 2 for offset in BAND_OFFSETS]
+    parts = np.stack([windows[:, begin : begin + BAND_WINDOW] for begin in begins], axis=1) * taper
+    powers = np.square(np.abs(np.fft.rfft(parts, BAND_TRANSFORM))) / np.square(taper).sum()
+    bands = np.log(ordered_product(powers, mel_bands(N_BANDS, BAND_LIMITS_HZ, BAND_TRANSFORM)) + LEAST_BAND_POWER)
+    return bands.reshape(len(windows), -1)
+
+
+@cache
+def mel_bands(n_bands: int, limits: tuple[float, float], transform: int) -> NDArray[np.float64]:
+    """Weights (F, B) of triangular bands of a spectrum, equally wide in mel (O'Shaughnessy 1987)."""
+    lowest, highest = (2595.0 * np.log10(1.0 + hertz / 700.0) for hertz in limits)
+    edges = 700.0 * (10.0 ** (np.linspace(lowest, highest, n_bands + 2) / 2595.0) - 1.0)
+    frequencies = np.linspace(0.0, FEATURE_RATE / 2, transform // 2 + 1)[:, None]
+    low, middle, high = edges[:-2], edges[1:-1], edges[2:]
+    weights: NDArray[np.float64] = np.clip(
+        np.minimum((frequencies - low) / (middle - low), (high - frequencies) / (high - middle)), 0.0, None
+    )
+    return weights
+
+
+class ChannelMean:
+    """Takes the mean of the speech so far out of `mel` features, whose frames arrive one after another."""
+
+    def __init__(self) -> None:
+        self._mean = np.full(N_BANDS, FIRST_MEAN)
+        self._level, self._n_frames = FIRST_LEVEL, 0
+
+    def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(T, 72) features relative to the mean."""
+        found = np.empty_like(values)
+        for at, frame in enumerate(values.reshape(-1, len(BAND_OFFSETS), N_BANDS)):
+            bands = frame.mean(axis=0, dtype=np.float64)
+            self._level = max(float(bands.mean()), self._level - LEVEL_FALL)
+            if bands.mean() > self._level - SPEECH_RANGE:
+                self._n_frames += 1
+                self._mean += (bands - self._mean) * max(LEAST_FOLLOWED, 1.0 / (self._n_frames + MEAN_FRAMES))
+            found[at] = (frame - self._mean).ravel()
+        return found
+
+
+def channel_adaptation(kind: str) -> Callable[[NDArray[np.float32]], NDArray[np.float32]]:
+    """What makes features of a kind independent of voice and microphone, for one sound."""
+    return ChannelMean() if kind == "mel" else np.asarray
+
+
 def speech_level(levels: NDArray[np.floating]) -> float:
     """Mean in dB of those (T, 1) levels that exceed the midpoint of the noise and speech levels."""
     noise, speech = np.quantile(levels, NOISE_QUANTILE), np.quantile(levels, SPEECH_QUANTILE)
@@ -202,7 +260,7 @@ def speech_level(levels: NDArray[np.floating]) -> float:
 
 
 MEASURES: Mapping[str, Measure] = MappingProxyType(
-    dict(zip(FEATURE_KINDS, (formants, mfcc, lpc, lsf, level), strict=True))
+    dict(zip(FEATURE_KINDS, (formants, mfcc, lpc, lsf, level, mel), strict=True))
 )
 
 

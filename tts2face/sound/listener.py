@@ -13,6 +13,7 @@ from tts2face.sound.features import (
     HALF_WINDOW_SAMPLES,
     WINDOWS_AT_ONCE,
     analysis_windows,
+    channel_adaptation,
     feature_measures,
     measure_windows,
 )
@@ -28,6 +29,7 @@ class StreamingFeatures:
         if not fps > 0:
             raise InputError(f"frames per second must be above 0, not {fps}")
         self._measures, self._fps = feature_measures(kind), fps
+        self._adapt = channel_adaptation(kind)
         self._buffer: NDArray[np.float32] = np.zeros(0, np.float32)
         self._buffer_start = 0  # index of the first sample of the buffer
         self._n_returned = 0
@@ -63,7 +65,7 @@ class StreamingFeatures:
             found.append(measure_windows(self._windows(range(self._n_returned, last)), self._measures))
             self._n_returned = last
         self._drop_samples()
-        return np.concatenate(found)
+        return self._adapt(np.concatenate(found))
 
     def _windows(self, frames: range) -> NDArray[np.float64]:
         centres = np.rint(np.arange(frames.start, frames.stop) / self._fps * FEATURE_RATE).astype(np.int64)

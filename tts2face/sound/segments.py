@@ -8,7 +8,6 @@ begin (segmental Viterbi search, after Ostendorf et al. 1996).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -18,11 +17,12 @@ from lexicon.sequence import SILENCE, enforce_increasing
 from tts2face.models.phone_classifier import PhoneClassifier
 from tts2face.numeric.arrays import ordered_product
 from tts2face.numeric.kernels import kernel
+from tts2face.sound.features import mel_bands
 from tts2face.types import Waveform
 
 RATE, STEP, WINDOW, TRANSFORM = 16_000, 80, 320, 512  # Hz; samples between frames, of a frame, of its spectrum
 STEP_S = STEP / RATE
-N_BANDS, LOWEST_HZ, HIGHEST_HZ = 40, 60.0, 7800.0
+N_BANDS, BAND_LIMITS_HZ = 40, (60.0, 7800.0)
 LEAST_POWER = 1e-7
 LOUD_SHARE, BAND_SPREAD = 0.5, 3.0  # frames whose mean is the level of a sound; spread of log powers
 OFFSETS = (-16, -11, -8, -5, -3, -1, 0, 1, 3, 5, 8, 11, 16)  # frames of the window of a classifier
@@ -243,22 +243,9 @@ def frame_features(sound: Waveform) -> NDArray[np.float32]:
     padded = np.pad(samples.astype(np.float32), (WINDOW // 2, WINDOW))
     windows = sliding_window_view(padded, WINDOW)[::STEP][: len(samples) // STEP + 1] * np.hanning(WINDOW)
     powers = np.square(np.abs(np.fft.rfft(windows, TRANSFORM)))
-    bands = np.log(ordered_product(powers, _mel_bands()) + LEAST_POWER)
+    bands = np.log(ordered_product(powers, mel_bands(N_BANDS, BAND_LIMITS_HZ, TRANSFORM)) + LEAST_POWER)
     loud = bands.mean(axis=1) >= np.quantile(bands.mean(axis=1), 1.0 - LOUD_SHARE)
     bands = ((bands - bands[loud].mean(axis=0)) / BAND_SPREAD).astype(np.float32)
     rows = np.clip(np.arange(len(bands))[:, None] + np.array(OFFSETS), 0, len(bands) - 1)
     features: NDArray[np.float32] = bands[rows].reshape(len(bands), -1)
     return features
-
-
-@cache
-def _mel_bands() -> Floats:
-    """Weights (F, B) of triangular bands, equally wide in mel (O'Shaughnessy 1987)."""
-    lowest, highest = (2595.0 * np.log10(1.0 + hertz / 700.0) for hertz in (LOWEST_HZ, HIGHEST_HZ))
-    edges = 700.0 * (10.0 ** (np.linspace(lowest, highest, N_BANDS + 2) / 2595.0) - 1.0)
-    frequencies = np.linspace(0.0, RATE / 2, TRANSFORM // 2 + 1)[:, None]
-    low, middle, high = edges[:-2], edges[1:-1], edges[2:]
-    weights: Floats = np.clip(
-        np.minimum((frequencies - low) / (middle - low), (high - frequencies) / (high - middle)), 0.0, None
-    )
-    return weights
