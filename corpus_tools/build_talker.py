@@ -233,7 +233,7 @@ def add_audio_maps(
     audio_maps = learn_audio_maps(kept, talker, stages=stages)
     if not audio_maps:
         raise InputError(f"{recordings} contains too little speech for audio maps; give 20 utterances or more")
-    talker = replace(talker, audio_maps=audio_maps)
+    talker = replace(talker, audio_maps={**talker.audio_maps, **audio_maps})
     write_talker(out, talker)
     return talker
 

@@ -13,7 +13,7 @@ from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS
 
 FPS_LIMITS = (1.0, 120.0)
 RECOGNISED = "phones"
-AUDIO_MAP_NAMES = (RECOGNISED, "linear", "network")
+AUDIO_MAP_NAMES = (RECOGNISED, "voices", "network", "linear")
 SYNTHESIS_METHODS = ("exemplar", "theobald2007")
 FIELDS = "fields"
 GESTURES = (FIELDS, "ju2008", "noise", "none")
@@ -69,7 +69,8 @@ class Request:
     audio_map: str | None = option(
         None,
         "How a recording without a transcript moves the lips: phones (default: English phones are recognised and "
-        "spoken as those of a text), or the talker's map from sound: network (for its own voice) or linear.",
+        "spoken as those of a text), or the talker's map from sound, as for live sound: voices (of anybody), network "
+        "(for its own voice) or linear.",
         choices=AUDIO_MAP_NAMES,
     )
     language: str = option(

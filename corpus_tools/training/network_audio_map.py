@@ -265,7 +265,8 @@ def learn_audio_maps(
     on_map(1, 2)
     nonlinear = learn_network_map(utterances, feature=AUDIO_MAP_FEATURES, options=network)
     on_map(2, 2)
-    return {"linear": replace(linear, loudness=loudness), "network": replace(nonlinear, loudness=loudness)}
+    maps = {"linear": linear, "network": nonlinear}
+    return {name: replace(one, loudness=loudness, fps=talker.fps) for name, one in maps.items()}
 
 
 def _read_sounds(observations: Sequence[Observation]) -> Iterator[tuple[Observation, Waveform]]:

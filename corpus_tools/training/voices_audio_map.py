@@ -8,7 +8,7 @@ that was not learnt (docs/decisions/195-live-voices.md).
 import warnings
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +62,7 @@ def learn_voices_map(
         with suppress(DataError):  # it is spoken too quickly for its words
             known.append(KnownSpeech(one.sound, one.align(aligner)))
     lessons = _lessons(talker, known, rng, on_progress)
-    audio_map = _fit([one for one in lessons if not one.is_test])
+    audio_map = replace(_fit([one for one in lessons if not one.is_test]), fps=talker.fps)
     tests = [one for one in lessons if one.is_test]
     made = np.concatenate([audio_map.parameters(one.features) for one in tests])
     real = np.concatenate([one.lips for one in tests])

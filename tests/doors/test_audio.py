@@ -225,7 +225,7 @@ def test_files_without_sound_are_refused(session: Session, here: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        ({"audio_map": "magic"}, "no audio map 'magic'; choose phones, linear, network"),
+        ({"audio_map": "magic"}, "no audio map 'magic'; choose phones, voices, network, linear"),
         ({"audio_map": "linear", "audio": None, "text": "Hi."}, "--audio-map needs a recording"),
         ({"audio_map": "linear", "text": "Hi."}, "remove --audio-map or the text"),
         ({"voice": "espeak"}, "--voice, --rate and --lead have no effect on a recording"),
@@ -251,6 +251,22 @@ def test_a_missing_recording_and_a_talker_without_audio_maps_are_refused(
 def test_the_text_is_given_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["Hi.", "--text", "Hi.", "--out", "a.mp4"]) == 2
     assert "the text is given twice" in capsys.readouterr().err
+
+
+def test_live_lips_hold_for_another_voice(session: Session) -> None:
+    """They are near those of the words by the default map; the map of the talker's own voice is far worse."""
+    text = "Bob may move five big maps away from the shore."
+    clip = session.clip(Request(text=text, voice="joe", gestures="none", fps=25.0))
+    sound, near = clip.speech.waveform, {}
+    for audio_map in (None, "network"):
+        lips = session.listen(sound.rate, audio_map)
+        parts = [part for part in (lips.add_samples(sound.samples), lips.finish()) if part is not None]
+        at = parts[0].channels.index("jawOpen")
+        moved = np.concatenate([part.values[:, at] for part in parts])[: len(clip.motion)]
+        truth = clip.motion.values[: len(moved), clip.motion.channels.index("jawOpen")]
+        near[audio_map] = float(np.corrcoef(moved, truth)[0, 1])
+    assert near[None] > 0.55
+    assert near["network"] < near[None] - 0.1
 
 
 @ONLY_RENDERED

@@ -58,7 +58,7 @@ def test_with_fewer_factors_equation_8_is_still_least_squares_on_what_it_can_rea
     """The factors of two visual parameters span both: the fit equals direct regression."""
     taught = [TrainingUtterance(one.features, one.parameters[:, :2]) for one in lessons()]
     drive = learn_linear_map(taught, feature="mfcc")
-    assert len(drive.bias) == 2
+    assert len(drive.biases[0]) == 2
     inputs = np.concatenate([one.features for one in taught])
     table = np.concatenate([inputs, np.ones((len(inputs), 1))], axis=1).astype(np.float64)
     seen = np.concatenate([one.parameters for one in taught])
@@ -101,8 +101,8 @@ def test_the_network_learns_what_a_linear_map_cannot() -> None:
 def test_the_same_seed_gives_the_same_network_and_another_seed_another() -> None:
     options = [NetworkMapOptions(n_hidden=3, before=1, after=1, seed=seed) for seed in (0, 0, 1)]
     first, again, other = (learn_network_map(lessons(), feature="mfcc", options=one) for one in options)
-    np.testing.assert_array_equal(first.inner, again.inner)
-    assert not np.array_equal(first.inner, other.inner)
+    np.testing.assert_array_equal(first.weights[0], again.weights[0])
+    assert not np.array_equal(first.weights[0], other.weights[0])
 
 
 def test_pieces_with_their_context_are_the_whole() -> None:
@@ -137,7 +137,7 @@ def test_a_drive_that_lost_a_part_is_refused() -> None:
     arrays = audio_map_arrays({"linear": learn_linear_map(lessons(), feature="mfcc")})
     arrays["drive.linear.inner"] = arrays["drive.linear.inner"][:, :2]
     with pytest.raises(DataError, match="do not fit each other"):
-        audio_maps_from_arrays(arrays)
+        audio_maps_from_arrays(arrays, 25.0)
 
 
 def test_features_of_another_number_are_refused() -> None:

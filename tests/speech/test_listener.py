@@ -49,7 +49,7 @@ def test_features_of_blocks_are_those_of_the_whole(kind: str, fps: float, sizes:
 @pytest.mark.parametrize(("before", "after", "bends"), [(0, 0, False), (2, 3, False), (3, 1, True)])
 def test_lips_of_blocks_are_those_of_the_whole(before: int, after: int, bends: bool, sizes: tuple[int, ...]) -> None:
     audio_map = linear_map("mfcc", before, after, bends=bends)
-    listener = StreamingAudioMap(audio_map, 25.0)
+    listener = StreamingAudioMap(audio_map)
     made = np.concatenate([*(listener.add_samples(block) for block in blocks(*sizes)), listener.finish()])
     features = speech_features(SOUND, "mfcc", fps=25.0, n_frames=frame_count(SOUND.duration, 25.0))
     np.testing.assert_array_equal(made, audio_map.parameters(features.values))
@@ -57,7 +57,7 @@ def test_lips_of_blocks_are_those_of_the_whole(before: int, after: int, bends: b
 
 def test_lips_come_no_later_than_stated() -> None:
     audio_map = linear_map("lsf", 2, 3, bends=True)
-    listener = StreamingAudioMap(audio_map, 25.0)
+    listener = StreamingAudioMap(audio_map)
     assert listener.look_ahead_s == pytest.approx(3 / 25 + 0.0427, abs=1e-3)
     known, n_received = 0, 0
     for block in blocks(160):
@@ -68,7 +68,7 @@ def test_lips_come_no_later_than_stated() -> None:
 
 
 def test_a_sound_shorter_than_the_look_ahead_has_lips() -> None:
-    listener = StreamingAudioMap(linear_map("mfcc", 2, 5, bends=False), 25.0)
+    listener = StreamingAudioMap(linear_map("mfcc", 2, 5, bends=False))
     assert len(listener.add_samples(SOUND.samples[:1000])) == 0
     made = listener.finish()
     assert made.shape == (2, 3)

@@ -50,6 +50,8 @@ class AudioMap:
         Of units, one of `ACTIVATIONS`.
     loudness
         Level of the training speech, dB of full scale; NaN if unknown.
+    fps
+        Rate of the frames in Hz; that of the talker may be another where the map is that of its base.
     """
 
     feature: str
@@ -61,6 +63,7 @@ class AudioMap:
     biases: tuple[Floats, ...]
     activation: str
     loudness: float = math.nan
+    fps: float = 25.0
 
     def __post_init__(self) -> None:
         """Check that the shapes of all arrays agree."""
@@ -137,12 +140,13 @@ def audio_map_arrays(audio_maps: Mapping[str, AudioMap]) -> dict[str, NDArray[An
         context = [audio_map.before, audio_map.after, ACTIVATIONS.index(audio_map.activation)]
         arrays[f"{prefix}.context"] = np.array(context, np.int32)
         arrays[f"{prefix}.loudness"] = np.array([audio_map.loudness], np.float32)
+        arrays[f"{prefix}.fps"] = np.array([audio_map.fps])
         arrays[f"{prefix}.feature"] = np.frombuffer(audio_map.feature.encode(), np.uint8)
     return arrays
 
 
-def audio_maps_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, AudioMap]:
-    """Audio maps by name in the arrays of a talker file.
+def audio_maps_from_arrays(arrays: Mapping[str, NDArray[Any]], fps: float) -> dict[str, AudioMap]:
+    """Audio maps by name in the arrays of a talker file; older files state no rate, which is that of the talker.
 
     Raises
     ------
@@ -150,10 +154,10 @@ def audio_maps_from_arrays(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Audi
         A part is missing.
     """
     names = sorted({key.split(".")[1] for key in arrays if key.startswith(AUDIO_MAP_PREFIX)})
-    return {name: _audio_map(arrays, f"{AUDIO_MAP_PREFIX}{name}") for name in names}
+    return {name: _audio_map(arrays, f"{AUDIO_MAP_PREFIX}{name}", fps) for name in names}
 
 
-def _audio_map(arrays: Mapping[str, NDArray[Any]], prefix: str) -> AudioMap:
+def _audio_map(arrays: Mapping[str, NDArray[Any]], prefix: str, fps: float) -> AudioMap:
     before, after, activation = (int(number) for number in arrays[f"{prefix}.context"])
     layers = layer_names(3 if f"{prefix}.{MIDDLE[0]}" in arrays else 2)
     weights, biases = (tuple(arrays[f"{prefix}.{names[part]}"] for names in layers) for part in range(2))
@@ -167,4 +171,5 @@ def _audio_map(arrays: Mapping[str, NDArray[Any]], prefix: str) -> AudioMap:
         biases,
         ACTIVATIONS[activation],
         float(arrays[f"{prefix}.loudness"][0]),
+        float(arrays.get(f"{prefix}.fps", [fps])[0]),
     )

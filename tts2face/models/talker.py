@@ -230,6 +230,6 @@ def _talker_from_arrays(arrays: dict[str, NDArray[Any]], header: dict[str, Any])
         utterances.append(
             Utterance(name, sequence, spans, shape[span], head[span], intensity[span], appearance_parameters)
         )
-    maps = audio_maps_from_arrays(arrays)
+    maps = audio_maps_from_arrays(arrays, fps)
     scores = score_map_from_arrays(arrays, speech_channels(model))
     return Talker(fps, model, tuple(utterances), header, appearance, network, maps, scores)

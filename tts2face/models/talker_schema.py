@@ -30,13 +30,14 @@ from tts2face.storage.schema import (
 )
 from tts2face.types import HEAD_CHANNELS
 
+FPS_LIMITS = (1.0, 1000.0)
 MAX_WEIGHT = 1e6  # of a network or an audio map
 MAX_PX = 1e5
 MAX_TEXTURE_SIDE_PX = 4096  # pixels per side
 ROUNDING_S, BEYOND_S = 1e-6, 1.0  # largest excess of phones before and after the frames of their utterance
 
 METADATA: Mapping[str, Check] = {
-    "fps": number(1.0, 1000.0),
+    "fps": number(*FPS_LIMITS),
     "n_speech": whole(1, 10_000),
     "inventory": list_of(text),
     "head_channels": list_of(text, len(HEAD_CHANNELS)),
@@ -235,6 +236,7 @@ def _check_audio_map(contents: Contents, prefix: str) -> None:
         {
             f"{prefix}.mean": Tensor("float32", (n_features,), *values),
             f"{prefix}.spread": Tensor("float32", (n_features,), 0.0, MAX_WEIGHT),
+            **({f"{prefix}.fps": Tensor("float64", (1,), *FPS_LIMITS)} if f"{prefix}.fps" in contents.arrays else {}),
             **{
                 f"{prefix}.{name}": Tensor("float32", shape, *values)
                 for names, (inner, outer) in zip(layers, pairwise(sizes), strict=True)

@@ -194,8 +194,9 @@ class LiveLips:
             raise InputError(f"the sample rate must lie between {low} and {high} Hz, not {rate}; convert the sound")
         talker = models.talker
         request = Request(text="unused", audio_map=audio_map)
-        self._stream = StreamingAudioMap(select_audio_map(request, talker), talker.fps)
-        self._face, self._channels, self.fps = models.speech_face, speech_channels(talker.model), talker.fps
+        chosen = select_audio_map(request, talker)
+        self._stream = StreamingAudioMap(chosen)
+        self._face, self._channels, self.fps = models.speech_face, speech_channels(talker.model), chosen.fps
         self._resampler: Any = None
         if rate != FEATURE_RATE:
             import soxr

@@ -32,7 +32,7 @@ CLIP_RATE = 48_000  # Hz, sample rate of the clips
 MAX_CLIP_FRAMES = 300  # frames of each clip into which a recording is divided
 MIN_RECORDING_S = 0.1  # shorter recordings contain no phone
 SILENCE_LEVEL = 1e-4  # peak amplitude, relative to full scale, below which a recording counts as silent
-DEFAULT_AUDIO_MAP = "network"
+DEFAULT_AUDIO_MAPS = ("voices", "network")  # the first that a talker has
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,17 +59,18 @@ class TimedTranscript:
 
 
 def select_audio_map(request: Request, talker: Talker) -> AudioMap:
-    """Audio map of a talker chosen by a request; `DEFAULT_AUDIO_MAP` if the request names none, as live sound does.
+    """Audio map of a talker chosen by a request; of `DEFAULT_AUDIO_MAPS` if the request names none, as live sound does.
 
     Raises
     ------
     InputError
         The talker has no such audio map.
     """
-    name = request.audio_map or DEFAULT_AUDIO_MAP
+    usual = next((name for name in DEFAULT_AUDIO_MAPS if name in talker.audio_maps), DEFAULT_AUDIO_MAPS[-1])
+    name = request.audio_map or usual
     if name == RECOGNISED:
         raise InputError(
-            "phones are recognised in whole recordings; for live sound choose the audio map network or linear"
+            "phones are recognised in whole recordings; for live sound choose the audio map voices, network or linear"
         )
     if name not in talker.audio_maps:
         raise InputError(
@@ -122,10 +123,10 @@ def map_audio_to_motion(
     InputError, DataError
         The recording cannot be read, is silent or too short.
     """
-    levels, _ = _features(path, "level", talker.fps, 1.0)
+    levels, _ = _features(path, "level", audio_map.fps, 1.0)
     gain = audio_map.gain_for(speech_level(levels))
-    features, duration = _features(path, audio_map.feature, talker.fps, gain)
-    lips = resample_motion(audio_map.parameters(features), talker.fps, fps, frame_count(duration, fps))
+    features, duration = _features(path, audio_map.feature, audio_map.fps, gain)
+    lips = resample_motion(audio_map.parameters(features), audio_map.fps, fps, frame_count(duration, fps))
     phones = PhoneSequence([SILENCE], [0.0, duration])
     return TimedTranscript(phones, ()), Trajectory(speech_channels(talker.model), lips, fps)
 

@@ -79,12 +79,11 @@ class StreamingFeatures:
 
 
 class StreamingAudioMap:
-    """Converts blocks of sound at `FEATURE_RATE` to speech parameters at the talker's frame rate."""
+    """Converts blocks of sound at `FEATURE_RATE` to speech parameters at the frame rate of an audio map."""
 
-    def __init__(self, audio_map: AudioMap, fps: float) -> None:
+    def __init__(self, audio_map: AudioMap) -> None:
         self._audio_map = audio_map
-        self._feature_stream = StreamingFeatures(audio_map.feature, fps)
-        self._fps = fps
+        self._feature_stream = StreamingFeatures(audio_map.feature, audio_map.fps)
         self._features: NDArray[np.float32] = np.zeros((0, len(audio_map.mean)), np.float32)
 
     @property
@@ -95,7 +94,7 @@ class StreamingAudioMap:
     @property
     def look_ahead_s(self) -> float:
         """Seconds of sound after a frame that are needed to compute its parameters."""
-        return self._audio_map.after / self._fps + (HALF_WINDOW_SAMPLES + 2) / FEATURE_RATE
+        return self._audio_map.after / self._audio_map.fps + (HALF_WINDOW_SAMPLES + 2) / FEATURE_RATE
 
     def add_samples(self, samples: SampleBlock) -> NDArray[np.float32]:
         """Add samples (m,); returns (n, S) parameters of all frames with enough sound after them.
