@@ -193,8 +193,7 @@ class LiveLips:
         if not low <= rate <= high:
             raise InputError(f"the sample rate must lie between {low} and {high} Hz, not {rate}; convert the sound")
         talker = models.talker
-        request = Request(text="unused", audio_map=audio_map)
-        chosen = select_audio_map(request, talker)
+        chosen = select_audio_map(audio_map, talker)
         self._stream = StreamingAudioMap(chosen)
         self._face, self._channels, self.fps = models.speech_face, speech_channels(talker.model), chosen.fps
         self._resampler: Any = None

@@ -20,7 +20,7 @@ from tts2face.lips.explanation import PhoneExplanation
 from tts2face.models.audio_map import AudioMap
 from tts2face.models.talker import Talker, speech_channels
 from tts2face.numeric.arrays import interpolate_cubic
-from tts2face.request import RECOGNISED, Request
+from tts2face.request import RECOGNISED
 from tts2face.sound.alignment import TextMismatch
 from tts2face.sound.features import FEATURE_RATE, speech_level
 from tts2face.sound.listener import StreamingFeatures
@@ -58,16 +58,15 @@ class TimedTranscript:
         return replace(phone, confidence=sure)
 
 
-def select_audio_map(request: Request, talker: Talker) -> AudioMap:
-    """Audio map of a talker chosen by a request; of `DEFAULT_AUDIO_MAPS` if the request names none, as live sound does.
+def select_audio_map(name: str | None, talker: Talker) -> AudioMap:
+    """Audio map of a talker by its name; None: the first of `DEFAULT_AUDIO_MAPS` that it has.
 
     Raises
     ------
     InputError
         The talker has no such audio map.
     """
-    usual = next((name for name in DEFAULT_AUDIO_MAPS if name in talker.audio_maps), DEFAULT_AUDIO_MAPS[-1])
-    name = request.audio_map or usual
+    name = name or next((one for one in DEFAULT_AUDIO_MAPS if one in talker.audio_maps), DEFAULT_AUDIO_MAPS[-1])
     if name == RECOGNISED:
         raise InputError(
             "phones are recognised in whole recordings; for live sound choose the audio map voices, network or linear"

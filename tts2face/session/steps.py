@@ -171,7 +171,7 @@ def _recording_motion(
 ) -> tuple[TimedTranscript, Trajectory, Explain]:
     fps, request = float(prepared.fps), prepared.request
     if not request.has_phones:
-        audio_map = select_audio_map(request, models.talker)
+        audio_map = select_audio_map(request.audio_map, models.talker)
         transcript, parameters = map_audio_to_motion(audio, audio_map, models.talker, fps)
         return transcript, models.face.motion_of_parameters(parameters), tuple
 
