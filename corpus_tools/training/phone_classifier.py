@@ -41,7 +41,7 @@ LEAST_SPREAD, WEIGHT_DECAY = 0.05, 1e-4
 TEST_SHARE = 20  # every twentieth text tells the accuracy
 PRIOR_SHARE = 0.6  # of the log frequencies of phones that is taken out: the search knows which phones are there
 LEAST_DURATION_S, LEAST_DEVIATION = 0.02, 0.3
-N_ROUNDS_OF_RECORDINGS = 2  # in which edges of other speech and the classifier are found from each other
+EPOCHS_OF_RECORDINGS = (12, 12, 12, 20)  # of rounds in which edges of other speech and the classifier are found
 N_DAMAGED = 2  # times that each text is learnt
 FRAME_SHARE, SILENCE_SHARE = 0.45, 0.33  # of frames, and of the silent ones among them, that are learnt
 SURE = 0.5  # of a spike whose delay is measured
@@ -71,7 +71,7 @@ def train_voice_classifier(*, on_progress: Progress, report: Told) -> PhoneClass
     aligned = [_stated_sequence(stated, sound.duration) for sound, stated, _ in parts]
     for _ in range(N_ROUNDS):
         labels = [phone_labels(phones, len(one)) for phones, one in zip(aligned, seen, strict=True)]
-        classifier = _fit(Frames(features, np.concatenate(labels), is_test), N_UNITS, report)
+        classifier = _fit(Frames(features, np.concatenate(labels), is_test), (N_UNITS, N_EPOCHS), report)
         aligned = [_found_sequence(sound, stated, classifier) for sound, stated, _ in parts]
     return replace(classifier, durations=_durations(classifier.inventory, aligned))
 
@@ -90,13 +90,14 @@ def train_recording_classifier(recordings: Path, *, on_progress: Progress, repor
     known: list[PhoneSequence | None] = [*(one.phones for one in stated), *([None] * len(others))]
     lessons = _lessons(sounds, rng, recogniser, on_progress)
     delays = _delays(stated, recogniser)
-    classifier = _fit_lessons(lessons, known, delays, report)
-    for _ in range(N_ROUNDS_OF_RECORDINGS):
+    first, *rounds = EPOCHS_OF_RECORDINGS
+    classifier = _fit_lessons(lessons, known, delays, first, report)
+    for n_epochs in rounds:
         aligner = Aligner(classifier)
         for at, one in enumerate(others, len(stated)):
             with suppress(DataError):  # it is spoken too quickly for its words
                 known[at] = one.align(aligner)
-        classifier = _fit_lessons(lessons, known, delays, report)
+        classifier = _fit_lessons(lessons, known, delays, n_epochs, report)
     return classifier
 
 
@@ -131,19 +132,19 @@ def _found_sequence(sound: Waveform, stated: Sequence[StatedPhone], classifier: 
     return PhoneSequence([stated[at].label for at in kept], [*edges[kept], sound.duration])
 
 
-def _fit(frames: Frames, n_units: int, report: Told) -> PhoneClassifier:
-    """Classifier of frames; durations and delays are not known yet."""
+def _fit(frames: Frames, size: tuple[int, int], report: Told) -> PhoneClassifier:
+    """Classifier of frames by a number of units, in a number of epochs; durations and delays are not known yet."""
     from sklearn.neural_network import MLPClassifier
 
     features, labels, is_test = frames.features, frames.labels, frames.is_test
     learnt = features[~is_test].astype(np.float32)
     mean, scale = learnt.mean(axis=0), 1.0 / np.maximum(learnt.std(axis=0), LEAST_SPREAD)
     scaled = (learnt - mean) * scale
-    model = MLPClassifier((n_units,), batch_size=512, max_iter=1, alpha=WEIGHT_DECAY, warm_start=True)
+    model = MLPClassifier((size[0],), batch_size=512, max_iter=1, alpha=WEIGHT_DECAY, warm_start=True)
     model.set_params(random_state=np.random.RandomState(0))  # which goes on from epoch to epoch
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that it has not converged after one epoch
-        for rate in np.geomspace(*LEARNING_RATES, N_EPOCHS):
+        for rate in np.geomspace(*LEARNING_RATES, size[1]):
             model.set_params(learning_rate_init=rate).fit(scaled, labels[~is_test])
     inventory = tuple(model.classes_.tolist())
     weights, biases = (
@@ -160,6 +161,7 @@ def _fit_lessons(
     lessons: "Sequence[_Lesson]",
     known: Sequence[PhoneSequence | None],
     delays: Mapping[str, float],
+    n_epochs: int,
     report: Told,
 ) -> PhoneClassifier:
     """Classifier of damaged speech whose phones are known; it tells them as if most of them were equally frequent."""
@@ -170,7 +172,7 @@ def _fit_lessons(
             kept = (labels != SILENCE) | (rng.random(len(labels)) < SILENCE_SHARE)
             parts.append(Frames(one.features[kept], labels[kept], np.full(kept.sum(), one.number % TEST_SHARE == 0)))
     frames = Frames(*(np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Frames)))
-    classifier = _fit(frames, N_UNITS_OF_RECORDINGS, report)
+    classifier = _fit(frames, (N_UNITS_OF_RECORDINGS, n_epochs), report)
     counts = np.unique(frames.labels[~frames.is_test], return_counts=True)[1]  # sorted, as the inventory
     inner, outer = classifier.biases
     even = (outer - PRIOR_SHARE * np.log(counts)).astype(np.float32)
