@@ -184,10 +184,8 @@ STEPS: Mapping[str, Callable[[Making], None]] = {
     "light": make_light,
     "mouths": make_mouths,
 }
-ALONE: Mapping[str, Callable[[Making], None]] = {
-    "styles": derive_styles,
-    "voices": add_voices_map,
-}  # parts of steps that are repeated
+# Parts of steps that are repeated.
+ALONE: Mapping[str, Callable[[Making], None]] = {"styles": derive_styles, "voices": add_voices_map}
 
 
 def main() -> None:
@@ -195,7 +193,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     choices = [*STEPS, *ALONE]
     parser.add_argument(
-        "steps", nargs="*", metavar="STEP", help=f"{', '.join(choices)}; without any: all but styles and voices"
+        "steps", nargs="*", metavar="STEP", help=f"{', '.join(choices)}; without any: all but {' and '.join(ALONE)}"
     )
     parser.add_argument("--out", type=Path, default=Path("tts2face/data"), help="folder of the models")
     parser.add_argument("--recordings", type=Path, default=Path("../shared/recordings"), help="folder of recordings")

@@ -1,7 +1,7 @@
 """Speech as other people, rooms, microphones and lines would have it, for the training of what hears it."""
 
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -64,6 +64,15 @@ def damage(sound: Waveform, others: Sequence[Waveform], rng: np.random.Generator
         samples = np.resize(soxr.resample(soxr.resample(samples, rate, TELEPHONE_HZ), TELEPHONE_HZ, rate), len(samples))
     scaled = (samples * PEAK / np.abs(samples).max()).astype(np.float32)
     return Damaged(Waveform(scaled, rate), lead / rate, faster)
+
+
+def damaged_copies(
+    sounds: Sequence[Waveform], n_copies: int, rng: np.random.Generator
+) -> Iterator[tuple[int, Damaged]]:
+    """Each sound several times, damaged in several ways, with its number; the others speak behind it."""
+    for at in range(n_copies * len(sounds)):
+        number = at % len(sounds)
+        yield number, damage(sounds[number], sounds, rng)
 
 
 def speech_power(samples: NDArray[np.floating]) -> float:

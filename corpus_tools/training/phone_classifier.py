@@ -8,7 +8,6 @@ known, and it is trained on all, again and again.
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -16,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.prompts.prompts import shipped_sentences
-from corpus_tools.training.damage import Damaged, damage
+from corpus_tools.training.damage import Damaged, damaged_copies
 from corpus_tools.training.spoken_material import KnownSpeech, spoken_material
 from lexicon.dictionary import cmudict_words
-from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence, enforce_increasing
 from tts2face.models.phone_classifier import PhoneClassifier
 from tts2face.sound.alignment import Aligner, recording_features
@@ -95,8 +93,7 @@ def train_recording_classifier(recordings: Path, *, on_progress: Progress, repor
     for n_epochs in rounds:
         aligner = Aligner(classifier)
         for at, one in enumerate(others, len(stated)):
-            with suppress(DataError):  # it is spoken too quickly for its words
-                known[at] = one.align(aligner)
+            known[at] = one.align(aligner) or known[at]
         classifier = _fit_lessons(lessons, known, delays, n_epochs, report)
     return classifier
 
@@ -232,12 +229,10 @@ def _lessons(
 ) -> list[_Lesson]:
     """Each sound several times, damaged in several ways."""
     found = []
-    for at in range(N_DAMAGED * len(sounds)):
-        number = at % len(sounds)
-        damaged = damage(sounds[number], sounds, rng)
+    for at, (number, damaged) in enumerate(damaged_copies(sounds, N_DAMAGED, rng)):
         sound = levelled(damaged.sound)
         seen = recording_features(sound, recogniser.hear(sound).log_probabilities(FEATURES))
         frames = np.flatnonzero(rng.random(len(seen)) < FRAME_SHARE)
-        found.append(_Lesson(replace(damaged, sound=sound), number, seen[frames].astype(np.float16), frames))
+        found.append(_Lesson(damaged, number, seen[frames].astype(np.float16), frames))
         on_progress(at + 1, N_DAMAGED * len(sounds))
     return found

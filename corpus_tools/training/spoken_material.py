@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from corpus_tools.prompts.prompts import shipped_sentences
 from corpus_tools.recordings.folder import read_word_times
+from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence
 from tts2face.sound.alignment import Aligner
 from tts2face.sound.pauses import Span
@@ -43,9 +45,11 @@ class WordedSpeech:
     words: PronouncedWords
     times: Sequence[Span] | None = None
 
-    def align(self, aligner: Aligner) -> PhoneSequence:
-        """Its phones; errors as `tts2face.sound.alignment.Aligner.align`."""
-        return aligner.align(self.sound, self.words, self.times).phones
+    def align(self, aligner: Aligner) -> PhoneSequence | None:
+        """Its phones; None if it is spoken too quickly for its words."""
+        with suppress(DataError):
+            return aligner.align(self.sound, self.words, self.times).phones
+        return None
 
 
 def spoken_material(recordings: Path, rng: np.random.Generator) -> tuple[list[KnownSpeech], list[WordedSpeech]]:

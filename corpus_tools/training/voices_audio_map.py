@@ -7,17 +7,15 @@ that was not learnt (docs/decisions/195-live-voices.md).
 
 import warnings
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.training.damage import damage
+from corpus_tools.training.damage import damaged_copies
 from corpus_tools.training.linear_audio_map import standardised_windows
 from corpus_tools.training.spoken_material import KnownSpeech, spoken_material
-from lexicon.errors import DataError
 from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
 from tts2face.models.audio_map import AudioMap
 from tts2face.models.talker import Talker
@@ -59,8 +57,8 @@ def learn_voices_map(
     rng, aligner = np.random.default_rng(0), Aligner()
     known, others = spoken_material(recordings, rng)
     for one in others:
-        with suppress(DataError):  # it is spoken too quickly for its words
-            known.append(KnownSpeech(one.sound, one.align(aligner)))
+        if phones := one.align(aligner):
+            known.append(KnownSpeech(one.sound, phones))
     lessons = _lessons(talker, known, rng, on_progress)
     audio_map = replace(_fit([one for one in lessons if not one.is_test]), fps=talker.fps)
     tests = [one for one in lessons if one.is_test]
@@ -76,9 +74,7 @@ def _lessons(
 ) -> list[_Lesson]:
     """Each sound several times, damaged in several ways and at several levels."""
     model, sounds, found = build_exemplar_model(talker), [one.sound for one in known], []
-    for at in range(N_DAMAGED * len(known)):
-        number = at % len(known)
-        damaged = damage(sounds[number], sounds, rng)
+    for at, (number, damaged) in enumerate(damaged_copies(sounds, N_DAMAGED, rng)):
         gain = 10.0 ** (float(rng.uniform(*GAINS_DB)) / 20.0)
         sound = Waveform(np.clip(damaged.sound.samples * np.float32(gain), -1.0, 1.0), damaged.sound.rate)
         n_frames = int(sound.duration * talker.fps)

@@ -19,6 +19,7 @@ from sentences import sentences
 
 from corpus_tools.recordings.folder import read_word_times
 from corpus_tools.training.damage import babble, coded, speech_power, stationary_noise, with_echo
+from corpus_tools.training.spoken_material import resampled
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.sound.alignment import LEAST_FIT, Aligner
 from tts2face.sound.segments import RATE
@@ -82,7 +83,7 @@ def spoken(voice_name: str, texts: Sequence[str], language: str) -> Iterator[Cas
     voice = load_voice(voice_name, language)
     for text in texts:
         speech = voice.speak(text)
-        sound = Waveform(_resampled(speech.waveform), RATE)
+        sound = resampled(speech.waveform)
         phones = speech.phones
         said = [[one for one in phones.phones[word.first : word.last] if one != SILENCE] for word in speech.words]
         words = tuple((word.text, (tuple(one),)) for word, one in zip(speech.words, said, strict=True))
@@ -94,12 +95,6 @@ def _middles(phones: PhoneSequence, word: WordSpan) -> NDArray[np.float64]:
     """Middles of the phones of a word."""
     inside = [at for at in range(word.first, word.last) if phones.phones[at] != SILENCE]
     return np.array([(phones.edges[at] + phones.edges[at + 1]) / 2 for at in inside])
-
-
-def _resampled(sound: Waveform) -> NDArray[np.float32]:
-    import soxr
-
-    return np.clip(soxr.resample(sound.samples, sound.rate, RATE), -1.0, 1.0)
 
 
 def with_samples(case: Case, samples: NDArray[np.floating]) -> Case:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from corpus_tools.training import voices_audio_map
+from corpus_tools.training.damage import damage
 from corpus_tools.training.spoken_material import KnownSpeech, resampled
 from lexicon.sequence import PhoneSequence
 from tts2face.models.talker import Talker, load_talker
@@ -48,7 +49,7 @@ def test_a_map_learns_the_lips_of_damaged_speech(
 
 def test_phones_move_with_damaged_speech(known: list[KnownSpeech]) -> None:
     one = known[0]
-    damaged = voices_audio_map.damage(one.sound, [two.sound for two in known], np.random.default_rng(3))
+    damaged = damage(one.sound, [two.sound for two in known], np.random.default_rng(3))
     moved = damaged.phones(one.phones)
     assert isinstance(moved, PhoneSequence)
     assert moved.phones == one.phones.phones

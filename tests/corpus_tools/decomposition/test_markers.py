@@ -19,6 +19,7 @@ from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decomposition.made_markers import FPS, SIZE, Made, write_c3d, write_table
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
+from tts2face.numeric.arrays import true_runs
 
 REST = slice(0, 60)  # the made performance's frames at rest
 
@@ -333,4 +334,5 @@ def test_a_gap_is_bridged_without_overshoot() -> None:
     assert whole.min() >= 0.0
     assert whole.max() <= 1.0
     assert notes == ("gaps were filled in A (10 frames)",)
+    assert true_runs(np.isnan(track[:, 0, 0])).tolist() == [[15, 25]]
     assert MAX_MARKER_GAP_S * 100.0 > 10
