@@ -6,7 +6,6 @@ training, Young et al. 2006). That of recordings begins with the voice's speech,
 known, and it is trained on all, again and again.
 """
 
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.prompts.prompts import shipped_sentences
 from corpus_tools.training.damage import Damaged, damaged_copies
+from corpus_tools.training.epochs import fit_epochs
 from corpus_tools.training.spoken_material import KnownSpeech, spoken_material
 from lexicon.dictionary import cmudict_words
 from lexicon.sequence import SILENCE, PhoneSequence, enforce_increasing
@@ -137,12 +137,8 @@ def _fit(frames: Frames, size: tuple[int, int], report: Told) -> PhoneClassifier
     learnt = features[~is_test].astype(np.float32)
     mean, scale = learnt.mean(axis=0), 1.0 / np.maximum(learnt.std(axis=0), LEAST_SPREAD)
     scaled = (learnt - mean) * scale
-    model = MLPClassifier((size[0],), batch_size=512, max_iter=1, alpha=WEIGHT_DECAY, warm_start=True)
-    model.set_params(random_state=np.random.RandomState(0))  # which goes on from epoch to epoch
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that it has not converged after one epoch
-        for rate in np.geomspace(*LEARNING_RATES, size[1]):
-            model.set_params(learning_rate_init=rate).fit(scaled, labels[~is_test])
+    model = MLPClassifier((size[0],), batch_size=512, alpha=WEIGHT_DECAY)
+    fit_epochs(model, scaled, labels[~is_test], LEARNING_RATES, size[1])
     inventory = tuple(model.classes_.tolist())
     weights, biases = (
         (layers[0].astype(np.float32), layers[1].astype(np.float32)) for layers in (model.coefs_, model.intercepts_)

@@ -5,7 +5,6 @@ have them; its lips are those that the talker makes for their phones. Widths, de
 that was not learnt (docs/decisions/195-live-voices.md).
 """
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from corpus_tools.training.damage import damaged_copies
+from corpus_tools.training.epochs import fit_epochs
 from corpus_tools.training.linear_audio_map import standardised_windows
 from corpus_tools.training.spoken_material import KnownSpeech, spoken_material
 from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
@@ -95,12 +95,8 @@ def _fit(lessons: Sequence[_Lesson]) -> AudioMap:
     weight = range_of_motion**SPREAD_EXPONENT / np.sqrt(np.mean(range_of_motion ** (2 * SPREAD_EXPONENT)))
     inputs = np.concatenate([standardised_windows(one.features, (mean, spread), BEFORE, AFTER) for one in lessons])
     targets = ((lips - centre) / range_of_motion * weight).astype(np.float32)
-    model = MLPRegressor(hidden_layer_sizes=N_UNITS, batch_size=BATCH, max_iter=1, alpha=WEIGHT_DECAY, warm_start=True)
-    model.set_params(random_state=np.random.RandomState(0))  # which goes on from epoch to epoch
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that it has not converged after one epoch
-        for rate in np.geomspace(*LEARNING_RATES, N_EPOCHS):
-            model.set_params(learning_rate_init=rate).fit(inputs, targets)
+    model = MLPRegressor(hidden_layer_sizes=N_UNITS, batch_size=BATCH, alpha=WEIGHT_DECAY)
+    fit_epochs(model, inputs, targets, LEARNING_RATES, N_EPOCHS)
     back = range_of_motion / weight
     weights = [*model.coefs_[:-1], model.coefs_[-1] * back]
     biases = [*model.intercepts_[:-1], model.intercepts_[-1] * back + centre]
