@@ -177,16 +177,21 @@ class Workers:
         DatabaseAwayError
             The database cannot be reached.
         """
-        try:
-            if self._looking is None:
-                self._looking = self._engine.connect().execution_options(isolation_level="AUTOCOMMIT")
-            return self._looking.connection.driver_connection.execute(self._waiting).fetchone() is not None
-        except (self._engine.dialect.dbapi.Error, self._database_error) as away:
-            looking, self._looking = self._looking, None
-            if looking is not None:
-                looking.invalidate()
-                looking.close()
-            raise DatabaseAwayError(f"the database cannot be reached ({database_reason(away)}); try again") from away
+        while True:
+            was_open = self._looking is not None
+            try:
+                if self._looking is None:
+                    self._looking = self._engine.connect().execution_options(isolation_level="AUTOCOMMIT")
+                return self._looking.connection.driver_connection.execute(self._waiting).fetchone() is not None
+            except (self._engine.dialect.dbapi.Error, self._database_error) as away:
+                looking, self._looking = self._looking, None
+                if looking is not None:
+                    looking.invalidate()
+                    looking.close()
+                if not was_open:  # an old connection may be of before a restart of the database
+                    raise DatabaseAwayError(
+                        f"the database cannot be reached ({database_reason(away)}); try again"
+                    ) from away
 
     def leave(self, executor_id: str) -> None:
         """Note that a worker ends; the others take its jobs over without waiting."""

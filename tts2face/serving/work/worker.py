@@ -348,10 +348,13 @@ class Worker:
         next_beat_s = time.monotonic() + BEAT_S
         while not self._stopped.wait(self._look_s if self._is_reached else BEAT_S):
             began_s = time.monotonic()
+            is_due, is_asleep = began_s >= next_beat_s, not self._pauses.is_awake
+            if not (is_due or is_asleep):
+                continue  # nothing is asked of the database, so nothing is learnt about it
             try:
-                if not self._pauses.is_awake and workers.has_waiting():
+                if is_asleep and workers.has_waiting():
                     self._pauses.wake()
-                if began_s >= next_beat_s:
+                if is_due:
                     next_beat_s = began_s + BEAT_S
                     self._vanished = workers.beat(self.executor_id, self._place)
             except (sqlalchemy.exc.SQLAlchemyError, DatabaseAwayError) as away:
