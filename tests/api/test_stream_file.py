@@ -86,7 +86,7 @@ def test_sound_is_that_of_the_clip(format: str, session: tts2face.Session, clip:
         assert np.corrcoef(shared, given)[0, 1] > 0.95
 
 
-@pytest.mark.parametrize("format", ["oculus", "azure", "curves", "livelink"])
+@pytest.mark.parametrize("format", ["oculus", "azure", "curves", "words", "livelink"])
 def test_lines_are_those_of_the_export(
     format: str, session: tts2face.Session, tmp_path: "pytest.TempPathFactory"
 ) -> None:

@@ -31,7 +31,8 @@ def test_names_and_suffixes_are_unique():
     [
         (
             "clip.jsonl",
-            r"clip.jsonl may have several formats; end its name in .oculus.jsonl, .azure.jsonl or .curves.jsonl",
+            r"clip.jsonl may have several formats; end its name in .oculus.jsonl, .azure.jsonl, .curves.jsonl or "
+            r".words.jsonl",
         ),
         ("clip.tsv", r"end its name in .rhubarb.tsv"),
         ("clip.fbx", "clip.fbx has no suffix of an export format"),

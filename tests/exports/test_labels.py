@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from itertools import pairwise
 from xml.etree import ElementTree
 
@@ -146,3 +147,18 @@ def test_idle_animation_has_labels_of_silence(tmp_path):
     assert json.loads(paths[1].read_text())["mouthCues"] == [{"start": 0.0, "end": 1.0, "value": "X"}]
     assert [one["viseme_id"] for one in lines(paths[2])] == [0]
     assert [one["viseme"] for one in lines(paths[3])] == ["sil"]
+
+
+def test_lines_of_words_tell_how_sure_they_are(tmp_path):
+    clip = made_clip()
+    sure, doubtful = clip.speech.words
+    speech = replace(clip.speech, words=(sure, replace(doubtful, confidence=0.25)))
+    tts2face.export([clip, replace(clip, speech=speech)], tmp_path / "a.words.jsonl")
+    read = lines(tmp_path / "a.words.jsonl")
+    assert [(one["word"], one["confidence"]) for one in read] == [
+        *((w.text, 1) for w in WORDS),
+        (WORDS[0].text, 1),
+        (WORDS[1].text, 0.25),
+    ]
+    edges = clip.speech.phones.edges
+    assert (read[3]["start"], read[3]["end"]) == pytest.approx((1 + edges[3], 1 + edges[5]), abs=1e-9)

@@ -37,6 +37,15 @@ def test_a_recording_and_a_background_make_a_clip(client: httpx.Client) -> None:
     assert set(Path(tempfile.gettempdir()).glob("tts2face-upload-*")) == folders
 
 
+def test_words_of_a_recording_come_with_their_confidence(client: httpx.Client) -> None:
+    form = {"request": json.dumps({"text": "We were away.", "format": "words"})}
+    response = client.post("/v1/clips", data=form, files={"audio": ("a.mp4", movie_bytes())})
+    assert response.status_code == 200, response.text
+    words = [json.loads(line) for line in response.text.splitlines()]
+    assert [one["word"] for one in words] == ["We", "were", "away"]
+    assert all(0.5 < one["confidence"] <= 1.0 and one["start"] < one["end"] for one in words)
+
+
 def test_a_timeline_moves_the_face(client: httpx.Client) -> None:
     timeline = json.dumps({"expressions": [{"expression": "happy", "weight": 1.0}]})
     options = {"text": "Hello there.", "format": "curves"}

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence, WordSpan
-from tts2face.interchange.exports.parts import AllLabels, Part, Target
+from tts2face.interchange.exports.parts import AllLabels, Part, Target, part_words
 from tts2face.storage.media_files import open_wave, pcm_bytes
 
 if TYPE_CHECKING:
@@ -122,6 +122,26 @@ def textgrid(phones: "PhoneSequence", words: Sequence["WordSpan"], *, note: str 
     for number, (name, intervals) in enumerate(tiers, start=1):
         lines += _tier(number, name, intervals)
     return "\n".join(lines) + "\n"
+
+
+class WordLinesWriter:
+    """Writer of one JSON object for each word: start and end in seconds, and how probably a recording has it there."""
+
+    def __init__(self, target: Target) -> None:
+        self._file = target.open_lines()
+
+    def add(self, part: Part) -> None:
+        """Append the words of a part."""
+        for word in part_words(part):
+            record = {"start": round(word.start, 9), "end": round(word.end, 9), "word": word.text}
+            record["confidence"] = round(word.confidence, 3)
+            self._file.write(json.dumps(record, ensure_ascii=False) + "\n")
+
+    def finish(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    close = finish
 
 
 class TextGridWriter:

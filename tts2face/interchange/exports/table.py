@@ -111,6 +111,8 @@ FORMATS = (
                ("visemes", "RhubarbJsonWriter")),
     FormatInfo("rhubarb-tsv", (".rhubarb.tsv",), "the same as a table", ("visemes", "RhubarbTsvWriter")),
     FormatInfo("rhubarb-xml", (".rhubarb.xml",), "the same as XML", ("visemes", "RhubarbXmlWriter")),
+    FormatInfo("words", (".words.jsonl",), "words with their times and confidence, JSON lines",
+               ("annotations", "WordLinesWriter"), has_lines=True),
     FormatInfo("textgrid", (".textgrid",), "words and phones for Praat", ("annotations", "TextGridWriter")),
     FormatInfo("vtt", (".vtt",), "WebVTT captions, one cue for each sentence", ("captions", "SentenceVttWriter")),
     FormatInfo("srt", (".srt",), "SubRip captions, one cue for each sentence", ("captions", "SentenceSrtWriter")),
