@@ -11,12 +11,13 @@ from tts2face.lips.retargeting import MAX_CONTACT_MM, Retargeter, build_retarget
 from tts2face.lips.score_matching import scaled_scores
 from tts2face.models.face import Face
 from tts2face.models.landmarks import EYELID_LANDMARKS, MOUTH_REGION, N_LANDMARKS, eye_aperture, inner_lip_gaps
-from tts2face.models.networks import mouth_scores
+from tts2face.models.networks import SCORE_SHAPES, mouth_scores
 from tts2face.models.talker import ShapeModel, Talker, speech_channels
 from tts2face.numeric.arrays import principal_axes
 from tts2face.types import Trajectory
 
 N_MOUTH_MODES = 20
+SMILE = "mouthSmile"
 CLOSED_FRAME_SHARE = 0.15  # share of the frames that count as having closed lips
 SCORE_DRIVEN_SHAPES = ("eye", "brow", "nose", "cheek")  # name prefixes of the shapes that follow scores
 SCORE_DEAD_ZONE = 0.04  # amplitude of the noise of scores
@@ -29,7 +30,8 @@ class PerformerRetargeter:
     """Mapping from a performer's landmarks and scores to the weights of a face; built by `build_performer_retargeter`.
 
     ``open_apertures`` holds the aperture of each open eye over its width, ``neutral_scores`` (B,) the median scores,
-    ``rest_scores`` (n,) those of `mouth_scores` with closed lips.
+    ``rest_scores`` (n,) those of `mouth_scores` with closed lips. A smile that is held throughout is no rest: the face
+    smiles, too.
     """
 
     model: ShapeModel
@@ -96,10 +98,16 @@ def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajecto
     closed = np.argsort(gaps[:, MIDDLE_PAIR], kind="stable")[: max(1, int(CLOSED_FRAME_SHARE * len(gaps)))]
     contact = np.clip(np.percentile(gaps[closed], 50, axis=0), 0.0, MAX_CONTACT_MM)
     rest_scores = np.median(mouth_scores(scores)[closed], axis=0)
+    # Other scores at rest are due to the person's build; people who do not smile have a smile of .00 to .01.
+    is_held = (np.array(list(SCORE_SHAPES)) == SMILE) & (rest_scores > SCORE_DEAD_ZONE)
+    smile = np.median(scores.columns(SCORE_SHAPES[SMILE])[closed], axis=0)
     talker = Talker(scores.fps, model, (), {"name": "performer"})
+    lips = build_retargeter(talker, face, contact=contact, rest_scores=np.where(is_held, 0.0, rest_scores))
+    if is_held.any():
+        lips = lips.with_held_smile(dict(zip(SCORE_SHAPES[SMILE], smile.tolist(), strict=True)))
     return PerformerRetargeter(
         model=model,
-        lips=build_retargeter(talker, face, contact=contact, rest_scores=rest_scores),
+        lips=lips,
         face=face,
         open_apertures={
             side: float(np.quantile(eye_aperture(landmarks, side), OPEN_LID_QUANTILE)) for side in EYELID_LANDMARKS

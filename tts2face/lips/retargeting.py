@@ -5,7 +5,8 @@ an orthonormal target basis without limits.
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,6 +98,21 @@ class Retargeter:
     model: ShapeModel
     scores: ScoreMap | None = None
     matching: ScoreMatching | None = None
+
+    def with_held_smile(self, scores: Mapping[str, float]) -> "Retargeter":
+        """The retargeter of a person who smiles throughout: a face at rest smiles, and speech moves about that.
+
+        Parameters
+        ----------
+        scores
+            Scores of shapes at rest.
+        """
+        names = [self.shape_names[at] for at in self.moving]
+        given = np.array([scores.get(name, 0.0) for name in names])
+        held = given if self.matching is None else self.matching.weights_alone(given)
+        linear = self.linear_term.copy()
+        linear[:, -1] += ordered_product(self.curvature, held)
+        return replace(self, linear_term=linear)
 
     def retarget(self, speech: Trajectory, scores: FloatArray | None = None) -> Trajectory:
         """Weights (T, K) of all shapes of the face for a trajectory of speech parameters (T, S).

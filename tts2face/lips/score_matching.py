@@ -110,6 +110,11 @@ class ScoreMatching:
         wanted: FloatArray = np.clip(scores + (offset - at_rest) + share * at_rest, *SCORE_LIMITS)
         return wanted
 
+    def weights_alone(self, scores: FloatArray) -> FloatArray:
+        """Weights (k,) at which shapes have their scores (k,) by themselves; 0 for those that no score is of."""
+        targets = np.where(np.arange(N_SCORES) == self.owner[:, None], scores[:, None], 0.0)
+        return np.where(self.owner < 0, 0.0, np.diag(self._prior_weights(targets)))
+
     def _solve_block(self, linear: FloatArray, targets: FloatArray, gaps: FloatArray) -> FloatArray:
         open_share = smoothstep(gaps[:, MIDDLE_PAIR] / JAW_GAP_MM)
         hold = CLOSED_GAP_WEIGHT * (1.0 - smoothstep(gaps / FREE_GAP_MM))
