@@ -95,19 +95,18 @@ def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajecto
     """
     model = lip_model(landmarks)
     gaps = inner_lip_gaps(landmarks)
-    closed = np.argsort(gaps[:, MIDDLE_PAIR], kind="stable")[: max(1, int(CLOSED_FRAME_SHARE * len(gaps)))]
+    closed = _closed_frames(gaps)
     contact = np.clip(np.percentile(gaps[closed], 50, axis=0), 0.0, MAX_CONTACT_MM)
     rest_scores = np.median(mouth_scores(scores)[closed], axis=0)
-    # Other scores at rest are due to the person's build; people who do not smile have a smile of .00 to .01.
-    is_held = (np.array(list(SCORE_SHAPES)) == SMILE) & (rest_scores > SCORE_DEAD_ZONE)
-    smile = np.median(scores.columns(SCORE_SHAPES[SMILE])[closed], axis=0)
+    smile = held_smile(landmarks, scores)  # scores of other shapes at rest are due to the person's build
+    is_smile = np.array(list(SCORE_SHAPES)) == SMILE
     talker = Talker(scores.fps, model, (), {"name": "performer"})
-    lips = build_retargeter(talker, face, contact=contact, rest_scores=np.where(is_held, 0.0, rest_scores))
-    if is_held.any():
-        lips = lips.with_held_smile(dict(zip(SCORE_SHAPES[SMILE], smile.tolist(), strict=True)))
+    lips = build_retargeter(
+        talker, face, contact=contact, rest_scores=np.where(is_smile & bool(smile), 0.0, rest_scores)
+    )
     return PerformerRetargeter(
         model=model,
-        lips=lips,
+        lips=lips.with_held_smile(smile) if smile else lips,
         face=face,
         open_apertures={
             side: float(np.quantile(eye_aperture(landmarks, side), OPEN_LID_QUANTILE)) for side in EYELID_LANDMARKS
@@ -115,6 +114,18 @@ def build_performer_retargeter(landmarks: NDArray[np.floating], scores: Trajecto
         neutral_scores=np.median(scores.values, axis=0),
         rest_scores=rest_scores,
     )
+
+
+def held_smile(landmarks: NDArray[np.floating], scores: Trajectory) -> dict[str, float]:
+    """Scores of a person's smile at closed lips, by shape; empty for people who do not smile, whose are .00 to .01."""
+    names = SCORE_SHAPES[SMILE]
+    found = np.median(scores.columns(names)[_closed_frames(inner_lip_gaps(landmarks))], axis=0)
+    return dict(zip(names, found.tolist(), strict=True)) if found.mean() > SCORE_DEAD_ZONE else {}
+
+
+def _closed_frames(gaps: NDArray[np.floating]) -> NDArray[np.int64]:
+    """Frames with the smallest of the lips' gaps (T, P)."""
+    return np.argsort(gaps[:, MIDDLE_PAIR], kind="stable")[: max(1, int(CLOSED_FRAME_SHARE * len(gaps)))]
 
 
 def match_shapes(captured: Trajectory, face: Face, *, gain: float = 1.0) -> Trajectory:

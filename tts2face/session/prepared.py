@@ -17,7 +17,7 @@ from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS, MarkedText
 from lexicon.sentences import Sentence, split_sentences
 from lexicon.sequence import SILENCE, PhoneSequence
 from lexicon.ssml import parse_marks
-from tts2face.gestures.elements import Gains, Listening
+from tts2face.gestures.elements import ExpressionSpan, Gains, Listening
 from tts2face.gestures.listening import CUE_RATE, cue_times, responses
 from tts2face.gestures.timeline import Timeline, parse_expressions, parse_gains, parse_style
 from tts2face.gestures.timeline_file import read_timeline
@@ -82,6 +82,8 @@ def _primary(language: str) -> str:
 
 RECORDING = ""  # text of the one sentence of a recording
 MAX_END_CHANGE_S = 0.05  # the last edge is the end of the sound, padded to a whole number of frames
+OF_VIDEO = "video"  # expression of the person in the video of a recording
+SMILE_S = 10.0  # of its beginning are read: as `held_smile`, its score is the weight of happy (.63 for .7)
 EQUAL_EDGES_S = 1e-3  # by which edges of one sound differ, as its start is cut at a sample
 
 
@@ -333,10 +335,24 @@ def build_request_timeline(request: Request) -> Timeline:
     """
     flags = Timeline(
         style=parse_style(request.style) if request.style is not None else {},
-        expressions=parse_expressions(request.expression) if request.expression is not None else (),
+        expressions=_expressions(request),
         gains=_gains(request),
     )
     return read_timeline(request.timeline).merge(flags) if request.timeline is not None else flags
+
+
+def _expressions(request: Request) -> tuple[ExpressionSpan, ...]:
+    if request.expression is None or request.expression.strip() != OF_VIDEO:
+        return parse_expressions(request.expression) if request.expression is not None else ()
+    if request.audio is None:
+        raise InputError("--expression video needs a recording with pictures of the person; add --audio clip.mp4")
+    from tts2face.lips.performer import held_smile
+    from tts2face.video.streaming import StreamingTracker
+    from tts2face.video.take import BlendshapeReader, read_take
+
+    take = read_take(request.audio, StreamingTracker(), BlendshapeReader(), seconds=SMILE_S)
+    smile = held_smile(take.landmarks, take.scores)
+    return (ExpressionSpan("happy", float(np.mean(list(smile.values())))),) if smile else ()
 
 
 def _gains(request: Request) -> Gains:

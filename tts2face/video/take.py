@@ -6,6 +6,7 @@ Reader of Live Link Face captures: CSV files with 61 ARKit channels for each fra
 """
 
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -106,12 +107,19 @@ class Take:
 
 
 def read_take(
-    video: Path, tracker: StreamingTracker, reader: BlendshapeReader, *, on_progress: Progress | None = None
+    video: Path,
+    tracker: StreamingTracker,
+    reader: BlendshapeReader,
+    *,
+    seconds: float | None = None,
+    on_progress: Progress | None = None,
 ) -> Take:
     """Track the performer in a video.
 
     Parameters
     ----------
+    seconds
+        Length of its beginning that is read; None for all.
     on_progress
         Called with the number of frames tracked and the estimated total.
 
@@ -123,10 +131,12 @@ def read_take(
         The file cannot be read as video, or shows no face, several faces, or a face in profile.
     """
     info = read_media_info(video)
-    fps, n_frames = info.fps, max(1, round(info.duration * info.fps))
+    read_s = info.duration if seconds is None else min(seconds, info.duration)
+    fps, n_frames = info.fps, max(1, round(read_s * info.fps))
     tracked: list[TrackedFrame] = []
     n_crowded = 0
-    for frame in tracker.track(read_frames(video), fps):
+    frames = read_frames(video) if seconds is None else islice(read_frames(video), n_frames)
+    for frame in tracker.track(frames, fps):
         tracked.append(frame)
         n_crowded += frame.n_faces is not None and frame.n_faces > 1
         if n_crowded > MAX_COUNTS_WITH_TWO_FACES:
