@@ -65,7 +65,7 @@ def test_two_workers_share_the_queue_and_a_second_batch_costs_nothing(
 def test_killed_workers_lose_nothing(
     database: str, segments: Segments, start_worker: StartWorker, rendered: Rendered, tmp_path: Path
 ) -> None:
-    work = segments(*(f"Words {number}." for number in range(24)))
+    work = segments(*(f"Words {number}." for number in range(16)))
     workers = [start_worker(database, 0.3), start_worker(database, 0.3)]
     ended = threading.Event()
     kills = 0
@@ -73,8 +73,12 @@ def test_killed_workers_lose_nothing(
     def kill_now_and_then() -> None:
         nonlocal kills
         generator = random.Random(5)
-        while not ended.wait(generator.uniform(2.0, 4.0)):
-            victims = [generator.randrange(2)] if generator.random() < 0.7 else [0, 1]
+        for victims in ([0], [0, 1], [1]):  # each after some work, so that a slow machine gets on, too
+            n_rendered = len(rendered())
+            while len(rendered()) < n_rendered + 2 and not ended.wait(0.1):
+                pass
+            if ended.wait(generator.uniform(0.0, 1.0)):
+                return
             for number in victims:
                 workers[number].kill()
                 workers[number].wait()

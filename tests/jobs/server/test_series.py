@@ -29,9 +29,10 @@ from tts2face.serving.work.client import list_jobs
 
 N_CUES = int(os.environ.get("TTS2FACE_SERIES_CUES", "12"))
 FPS = 10
+N_KILLS = N_CUES // 4  # at most, of one worker or of both
 TIMEOUT_S = 240 + 6 * N_CUES
 N_STORED = 6  # when everything is killed
-FIRST_KILL_S, KILL_INTERVAL_S = 3.0, (4.0, 12.0)
+FIRST_KILL_S, KILL_INTERVAL_S = 3.0, (2.0, 6.0)
 LOG = logging.getLogger(__name__)
 COMMAND = [sys.executable, "-m", "tts2face"]
 DRAFT = ["--voice", "espeak", "--size", "64x64", "--supersampling", "1", "--fps", str(FPS)]
@@ -61,7 +62,9 @@ class Killer:
     def _run(self) -> None:
         generator = random.Random(1)
         wait_s = FIRST_KILL_S
-        while not self._ended.wait(wait_s):
+        for _ in range(N_KILLS):
+            if self._ended.wait(wait_s):
+                return
             wait_s = generator.uniform(*KILL_INTERVAL_S)
             n_stored = len(self._watch.stored)
             for number in [generator.randrange(2)] if generator.random() < 0.8 else [0, 1]:
