@@ -3,6 +3,7 @@
 Summary of a talker's contents.
 """
 
+import math
 import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -20,7 +21,9 @@ from corpus_tools.recordings.video import CachedTracker
 from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.studies.plots import load_matplotlib
 from corpus_tools.studies.recordings_page import recordings_page
+from corpus_tools.training.adapt_talker import Base, carried_audio_maps
 from corpus_tools.training.choose_adaptation import (
+    BASE_ONLY,
     NO_BASE,
     ShortTalker,
     learn_short_talker,
@@ -45,6 +48,7 @@ from tts2face.video.tracking import find_bundle
 PROVENANCE = "provenance.json"  # in the folder of recordings: their sources and licence
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
 READING_STAGE = "reading recordings"  # name of the first stage
+N_SHOWN = 40  # recordings that show how the mouth of the person lies beside that of a base
 NETWORK_STAGE = "learning phone network"
 CONTENT_WITH_PICTURES = (
     "landmark shapes, head pose, phones, loudness, and with the stated consent pictures of the person's face; no sound"
@@ -158,7 +162,11 @@ def _learn_with_base(
 def _learn_from_recordings(
     observations: Sequence[Observation], base: str, metadata: Mapping[str, Any], stages: StageCallback
 ) -> Talker:
-    """The talker of the recordings; its networks are also trained on phrases by those of the base, if there is one."""
+    """The talker of the recordings.
+
+    If there is a base, its networks are also trained on phrases by those of the base, and it has the base's audio maps,
+    which hold for other voices than its own.
+    """
     learnt = learn_talker(observations, metadata=metadata)
     if base == NO_BASE:
         return add_phone_network(learnt, on_progress=stages(NETWORK_STAGE))
@@ -167,7 +175,10 @@ def _learn_from_recordings(
     trained = add_phone_network(learnt, phrases, on_progress=stages(NETWORK_STAGE))
     stated = {name: known.metadata[name] for name in ("name", "pooled") if name in known.metadata}
     both = statements_of_both(metadata, known.metadata)
-    return replace(trained, metadata={**metadata, **both, "network_base": {**stated, "phrases": len(phrases)}})
+    told = {**metadata, **both, "network_base": {**stated, "phrases": len(phrases)}}
+    shown = observations[:: math.ceil(len(observations) / N_SHOWN)]
+    maps = carried_audio_maps(Base.of(known), shown, trained.model, BASE_ONLY) if known.audio_maps else {}
+    return replace(trained, metadata=told, audio_maps=maps)
 
 
 def add_appearance(

@@ -15,6 +15,7 @@ from lexicon.sequence import SILENCE
 from tts2face.lips.cloning import UNBOUNDED_MM, face_size, facing_gaps, nearest_valid_parameters
 from tts2face.lips.exemplar import DEFAULT_OPTIONS, ExemplarModel, build_exemplar_model, speech_trajectory
 from tts2face.lips.retargeting import inner_product_map
+from tts2face.models.audio_map import AudioMap
 from tts2face.models.landmarks import (
     LOWER_LIP_INNER_MID,
     MOUTH_CORNER_LEFT,
@@ -82,6 +83,15 @@ def adapted_talker(
         network=None if network is None else mapped.network(network),
         audio_maps={name: mapped.audio_map(one) for name, one in base.talker.audio_maps.items()},
     )
+
+
+def carried_audio_maps(
+    base: Base, observations: Sequence[Observation], model: ShapeModel, adaptation: Adaptation
+) -> dict[str, AudioMap]:
+    """Audio maps of a base by name, carried to the speech parameters of a person's shape model."""
+    lips = {one.name: base_lips(base, one) for one in observations}
+    mapped = learn_base_map(base, observations, model, adaptation, lips, amplitude=DEFAULT_OPTIONS.amplitude)
+    return {name: mapped.audio_map(one) for name, one in base.talker.audio_maps.items()}
 
 
 def learn_base_map(

@@ -32,6 +32,7 @@ from lexicon.errors import InputError
 from lexicon.phones import ARPABET
 from lexicon.sequence import SILENCE
 from tests.corpus_tools.speaking import FPS, OPENINGS, observation
+from tts2face.models.audio_map import FEATURE_SIZES, AudioMap
 from tts2face.models.landmarks import lip_opening
 from tts2face.models.talker import Talker, read_talker, write_talker
 
@@ -137,7 +138,13 @@ def test_a_base_without_networks_is_refused(base: Talker) -> None:
 def test_the_build_of_a_long_talker_states_the_base_of_its_networks(
     base: Talker, recordings: list[Observation], face_model: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    write_talker(tmp_path / "base.talker", replace(base, metadata={**base.metadata, "pooled": "lips, CC0"}))
+    n_features, n_speech = FEATURE_SIZES["mel"], base.model.n_speech
+    inner = np.random.default_rng(1).normal(0.0, 0.1, (n_speech, n_features)).astype(np.float32)
+    outer = np.diag(base.model.spread[:n_speech])
+    zeros, ones = np.zeros(n_features, np.float32), np.ones(n_features, np.float32)
+    heard = AudioMap("mel", 0, 0, zeros, ones, (inner, outer), (zeros[:n_speech], base.model.rest[:n_speech]), "linear")
+    known = replace(base, metadata={**base.metadata, "pooled": "lips, CC0"}, audio_maps={"voices": heard})
+    write_talker(tmp_path / "base.talker", known)
     own = without_hidden(recordings[40:])
     monkeypatch.setattr("corpus_tools.training.phone_network.TRAINING", FEW_PASSES)
     monkeypatch.setattr("corpus_tools.build_talker.observe", lambda *_, **__: Observations(tuple(own), (), ()))
@@ -151,6 +158,9 @@ def test_the_build_of_a_long_talker_states_the_base_of_its_networks(
     assert [one.name for one in made.utterances] == [one.name for one in own]
     assert made.network is not None
     assert {HIDDEN, "ʃ"} < set(made.network.inventory)
+    sound = np.random.default_rng(2).normal(size=(50, n_features))
+    lips = [lip_opening(one.model.shapes(one.audio_maps["voices"].parameters(sound))) for one in (known, made)]
+    assert np.corrcoef(*lips)[0, 1] > 0.99
     assert run([*command, str(tmp_path / "alone.talker"), "--base", "none"]) == 0
     alone = read_talker(tmp_path / "alone.talker")
     assert "network_base" not in alone.metadata
