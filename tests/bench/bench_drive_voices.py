@@ -1,74 +1,83 @@
-"""Audio maps on voices outside their training data, compared with exemplar synthesis for the known phones.
+"""Lips from sound alone, on synthetic voices and on other people.
 
-Run: ``python tests/bench/bench_drive_voices.py me.talker`` with a talker that has audio maps.
+On voices they are compared with those of the known phones, on people (``--people``: a folder of recordings, one of each
+person) with the recorded ones. Run: ``python tests/bench/bench_drive_voices.py grid_s1``.
 """
 
 import argparse
 import tempfile
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from sentences import sentences
 
+from corpus_tools.recordings.observe import observe
+from corpus_tools.studies.evaluation.people import evaluate_people, people_table
 from tts2face.lips import explanation
 from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
 from tts2face.models.landmarks import lip_opening, lip_width
 from tts2face.models.talker import Talker, load_talker
+from tts2face.request import AUDIO_MAP_NAMES, RECOGNISED
 from tts2face.session.recording import map_audio_to_motion
+from tts2face.sound.transcript import recognise_phones
 from tts2face.sound.voice_pool import load_voice
+from tts2face.storage.media_files import wave_bytes
 from tts2face.types import Speech, frame_count
+
+VOICES = ("heart", "joe", "espeak", "espeak-female")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("talker")
+    parser.add_argument("talker", nargs="?", default="grid_s1")
     parser.add_argument("--sentences", type=int, default=20)
+    parser.add_argument("--people", type=Path)
     options = parser.parse_args()
     talker = load_talker(options.talker)
-    print("| voice | drive | loudness | r opening | r width | range ratio |\n| --- | --- | --- | --- | --- | --- |")
-    for name in ("heart", "espeak"):
+    if options.people is not None:
+        kept = observe(options.people).kept
+        found = evaluate_people(talker, [[one] for one in kept], sounds={one.name: one.video for one in kept})
+        print(people_table(found))
+    print("| voice | audio map | r opening | r width | range ratio |\n| --- | --- | --- | --- | --- |")
+    for name in VOICES:
         voice = load_voice(name, "en-us", {})
         speeches = [voice.speak(text, rate=1.0, seed=0) for text in sentences(options.sentences)]
-        for drive in ("linear", "network"):
-            for is_matched in (False, True):
-                kept = talker.audio_maps[drive]
-                used = kept if is_matched else replace(kept, loudness=float("nan"))
-                figures = " | ".join(f"{value:.3f}" for value in lip_errors(speeches, talker, used))
-                print(f"| {name} | {drive} | {'matched' if is_matched else 'as it is'} | {figures} |", flush=True)
+        for audio_map, figures in lip_figures(speeches, talker):
+            print(f"| {name} | {audio_map} | {' | '.join(f'{value:.3f}' for value in figures)} |", flush=True)
 
 
-def lip_errors(speeches: list[Speech], talker: Talker, drive: object) -> tuple[float, float, float]:
-    known = build_exemplar_model(talker)
-    exemplars, heard = [], []
+def lip_figures(speeches: list[Speech], talker: Talker) -> Iterator[tuple[str, tuple[float, float, float]]]:
+    """Correlations of opening and width with those of the known phones, and the ratio of ranges, by audio map."""
+    known, fps = build_exemplar_model(talker), talker.fps
+
+    def of_phones(speech: Speech) -> NDArray[np.float32]:
+        n_frames = frame_count(speech.waveform.duration, fps)
+        return speech_trajectory(speech.phones, known, fps=fps, n_frames=n_frames).values
+
+    true = [of_phones(speech) for speech in speeches]
     with tempfile.TemporaryDirectory() as folder:
-        for speech in speeches:
-            path = write_wave(Path(folder) / "said.wav", speech)
-            n_frames = frame_count(speech.waveform.duration, talker.fps)
-            exemplars.append(speech_trajectory(speech.phones, known, fps=talker.fps, n_frames=n_frames).values)
-            heard.append(map_audio_to_motion(path, drive, talker, talker.fps)[1].values[:n_frames])
-    n = [min(len(a), len(b)) for a, b in zip(exemplars, heard, strict=True)]
-    shapes = [
-        talker.model.shapes(np.concatenate([one[:k] for one, k in zip(ways, n, strict=True)]))
-        for ways in (exemplars, heard)
-    ]
-    openings, widths = ([measure(one) for one in shapes] for measure in (lip_opening, lip_width))
-    return (
-        explanation.correlation(*openings),
-        explanation.correlation(*widths),
-        explanation.range_ratio(*openings),
-    )
-
-
-def write_wave(path: Path, speech: Speech) -> Path:
-    import wave
-
-    with wave.open(str(path), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(speech.waveform.rate)
-        file.writeframes((speech.waveform.samples * 32767).astype(np.int16).tobytes())
-    return path
+        path = Path(folder) / "said.wav"
+        for name in AUDIO_MAP_NAMES:
+            heard = []
+            for speech in speeches:
+                if name == RECOGNISED:
+                    heard.append(of_phones(Speech(speech.waveform, recognise_phones(speech.waveform), ())))
+                else:
+                    path.write_bytes(wave_bytes(speech.waveform.samples, speech.waveform.rate))
+                    heard.append(map_audio_to_motion(path, talker.audio_maps[name], talker, fps)[1].values)
+            pairs = [(a[: len(b)], b[: len(a)]) for a, b in zip(true, heard, strict=True)]
+            shapes = [talker.model.shapes(np.concatenate(one)) for one in zip(*pairs, strict=True)]
+            openings, widths = ([measure(one) for one in shapes] for measure in (lip_opening, lip_width))
+            yield (
+                name,
+                (
+                    explanation.correlation(*openings),
+                    explanation.correlation(*widths),
+                    explanation.range_ratio(*openings),
+                ),
+            )
 
 
 if __name__ == "__main__":
