@@ -331,7 +331,9 @@ def build_request_timeline(request: Request) -> Timeline:
     Raises
     ------
     InputError, DataError
-        An option cannot be parsed, or the file is invalid.
+        An option cannot be parsed, or the file is invalid; or the recording shows no face, as `read_take`.
+    BackendError
+        The tracker of faces is not installed, for the expression of a video.
     """
     flags = Timeline(
         style=parse_style(request.style) if request.style is not None else {},
