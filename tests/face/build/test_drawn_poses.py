@@ -18,7 +18,7 @@ from tts2face.picture.options import CameraView, Picture
 from tts2face.picture.renderer import mesh_renderer
 from tts2face.session.session import Session
 
-N_POSES = 80
+N_POSES = 200
 SIDE_PX, SHARE = 700, 0.8
 OUTLINE_PX = 5  # width of what may lie over an outline: landmarks lie between vertices, and lips are round
 FOLDED_MM2 = 12.0  # skin of the lower face that is seen at rest and turned over; lids turn over their edges
