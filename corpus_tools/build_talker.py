@@ -48,8 +48,8 @@ from tts2face.video.tracking import find_bundle
 PROVENANCE = "provenance.json"  # in the folder of recordings: their sources and licence
 PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
 READING_STAGE = "reading recordings"  # name of the first stage
-N_SHOWN = 40  # recordings that show how the mouth of the person lies beside that of a base
 NETWORK_STAGE = "learning phone network"
+N_SHOWN = 40  # recordings that show how the mouth of the person lies beside that of a base
 CONTENT_WITH_PICTURES = (
     "landmark shapes, head pose, phones, loudness, and with the stated consent pictures of the person's face; no sound"
 )

@@ -70,8 +70,7 @@ def adapted_talker(
     """
     model = combined_shapes(base.talker.model, observations)
     own = build_utterances(observations, model)
-    lips = {one.name: base_lips(base, one) for one in observations}
-    mapped = learn_base_map(base, observations, model, adaptation, lips, amplitude=DEFAULT_OPTIONS.amplitude)
+    mapped = _default_base_map(base, observations, model, adaptation)
     fps = observations[0].fps
     carried = tuple(_carry_utterance(one, base.talker, model, mapped, fps) for one in base.talker.utterances)
     network = base.talker.network
@@ -89,9 +88,16 @@ def carried_audio_maps(
     base: Base, observations: Sequence[Observation], model: ShapeModel, adaptation: Adaptation
 ) -> dict[str, AudioMap]:
     """Audio maps of a base by name, carried to the speech parameters of a person's shape model."""
-    lips = {one.name: base_lips(base, one) for one in observations}
-    mapped = learn_base_map(base, observations, model, adaptation, lips, amplitude=DEFAULT_OPTIONS.amplitude)
+    mapped = _default_base_map(base, observations, model, adaptation)
     return {name: mapped.audio_map(one) for name, one in base.talker.audio_maps.items()}
+
+
+def _default_base_map(
+    base: Base, observations: Sequence[Observation], model: ShapeModel, adaptation: Adaptation
+) -> BaseMap:
+    """`learn_base_map` for the default synthesis."""
+    lips = {one.name: base_lips(base, one) for one in observations}
+    return learn_base_map(base, observations, model, adaptation, lips, amplitude=DEFAULT_OPTIONS.amplitude)
 
 
 def learn_base_map(

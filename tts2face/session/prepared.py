@@ -344,8 +344,10 @@ def build_request_timeline(request: Request) -> Timeline:
 
 
 def _expressions(request: Request) -> tuple[ExpressionSpan, ...]:
-    if request.expression is None or request.expression.strip() != OF_VIDEO:
-        return parse_expressions(request.expression) if request.expression is not None else ()
+    if request.expression is None:
+        return ()
+    if request.expression.strip() != OF_VIDEO:
+        return parse_expressions(request.expression)
     if request.audio is None:
         raise InputError("--expression video needs a recording with pictures of the person; add --audio clip.mp4")
     from tts2face.lips.performer import held_smile

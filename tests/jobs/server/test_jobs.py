@@ -65,7 +65,7 @@ def test_two_workers_share_the_queue_and_a_second_batch_costs_nothing(
 def test_killed_workers_lose_nothing(
     database: str, segments: Segments, start_worker: StartWorker, rendered: Rendered, tmp_path: Path
 ) -> None:
-    work = segments(*(f"Words {number}." for number in range(16)))
+    work = segments(*(f"Words {number}." for number in range(24)))
     workers = [start_worker(database, 0.3), start_worker(database, 0.3)]
     ended = threading.Event()
     kills = 0

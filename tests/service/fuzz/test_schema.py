@@ -20,7 +20,7 @@ SMALL = {
 }  # fmt: skip
 # Meaning is checked after form: a text may be empty, so that requests of the right form may be refused.
 OPTIONS = (
-    "--max-examples", "5", "--request-timeout", "300", "--no-color", "--workers", "2", "--generation-database", "none",
+    "--max-examples", "8", "--request-timeout", "300", "--no-color", "--workers", "2", "--generation-database", "none",
     "--exclude-path-regex", "/events$",  # of a job that nobody works on: they never end
     "--suppress-health-check", "all", "--seed", "7", "--exclude-checks", "positive_data_acceptance",
 )  # fmt: skip
