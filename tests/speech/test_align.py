@@ -9,8 +9,11 @@ from lexicon.errors import DataError
 from lexicon.sequence import enforce_increasing
 from tests.rendered_takes import manifest_rows
 from tts2face.sound.alignment import Aligner
+from tts2face.sound.recogniser import RATE
+from tts2face.sound.transcript import pronounce_transcript
 from tts2face.sound.voice_pool import load_voice
 from tts2face.types import Waveform
+from tts2face.video.media import read_sound
 
 WORDS = [("bob", [("b", "ɑ", "b")]), ("may", [("m", "eɪ")]), ("read", [("ɹ", "i", "d"), ("ɹ", "ɛ", "d")])]
 
@@ -95,7 +98,10 @@ def test_confidence_tells_a_wrong_word_from_right_ones(aligner: Aligner, sound: 
 
 @pytest.mark.parametrize("kind", ["pink", "babble"])
 def test_edges_hold_in_noise(aligner: Aligner, kind: str) -> None:
-    """At 10 dB, edges of a voice of another make stay within 15 ms in the mean, and none is beyond 0.15 s."""
+    """At 10 dB, edges of a voice of another make stay within 15 ms in the mean, and none but the end beyond 0.1 s.
+
+    Of the babble of the same sentence, an /s/ may follow the last one at once.
+    """
     speech = load_voice("heart", "en-us").speak("The third witness slowly carved a box of matches.")
     rng, samples = np.random.default_rng(0), speech.waveform.samples
     if kind == "pink":
@@ -114,7 +120,17 @@ def test_edges_hold_in_noise(aligner: Aligner, kind: str) -> None:
         for mine, other in zip(found.words, speech.words, strict=True)
     ]
     assert np.concatenate(apart).mean() < 0.015
-    assert np.concatenate(apart).max() < 0.15
+    assert np.concatenate(apart)[:-1].max() < 0.1
+    assert apart[-1][-1] < 0.2
+
+
+def test_a_diphthong_that_ends_as_another_vowel_is_not_a_pause(aligner: Aligner, shared_recordings: Path) -> None:
+    """Edges read from the spectrogram: "three now" without a pause, whose last vowel is heard as /oʊ/ to its end."""
+    sound = read_sound(shared_recordings / "grid_talkers" / "swiz3n.mpg", RATE)
+    found = aligner.align(sound, pronounce_transcript("set white in z three now", "en-us"))
+    three, now = found.words[-2:]
+    assert three.last == now.first
+    assert found.phones.edges[now.last] == pytest.approx(2.66, abs=0.03)
 
 
 def test_other_languages_are_aligned_by_the_nearest_phones(aligner: Aligner) -> None:

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
+from lexicon.phones import look_up_phone
 from lexicon.sequence import DOUBTFUL, SILENCE, PhoneSequence, WordSpan, concatenate_phones, enforce_increasing
 from tts2face.models.phone_classifier import PhoneClassifier, load_phone_classifier
-from tts2face.numeric.arrays import true_runs
+from tts2face.numeric.arrays import ordered_product, true_runs
 from tts2face.sound.pauses import Span
 from tts2face.sound.recogniser import ENGLISH, FEATURES, FRAME_S, Heard, PhoneRecogniser, levelled
 from tts2face.sound.segments import STEP_S, divide, frame_features
@@ -28,6 +29,8 @@ LEAST_LOG, LOG_SPREAD = -10.0, 5.0  # log probabilities of the recogniser as fea
 # Chosen on a voice that the classifier has not heard, in noise; docs/decisions/193-alignment.md
 FRAME_WEIGHT = 0.15  # of log probabilities of frames: neighbouring ones are not independent
 LEAST_FRAME, PASSED_OVER = -12.0, -6.0  # of a frame; of one of a silence in which something else is heard
+OF_ITS_CLASS, SOUNDING = 0.1, 0.01  # shares of a phone in the probability of those like it, and of all sound
+SONORANTS = frozenset({"nasal", "lateral", "approximant", "tap", "trill"})
 PADDING_S, PADDING_LEVEL = 0.1, 3e-4
 USUAL_DELAY_S = 0.035  # of spikes behind the middles of phones
 LEAST_FIT = 0.6  # of a right text; docs/decisions/193-alignment.md
@@ -226,7 +229,7 @@ class Aligner:
     ) -> list[tuple[PlacedPhone | None, float, float]]:
         """Phones of the best division of a sound, None for silences, each with its begin and end in seconds."""
         silence = self._classifier.inventory.index(SILENCE)
-        frames = np.maximum(frames, LEAST_FRAME)
+        frames = np.maximum(_lenient(frames, self._classifier.inventory), LEAST_FRAME)
         frames[:, silence] = np.maximum(frames[:, silence], PASSED_OVER)
         placed, padding = place_phones(self._classifier, words, spikes), PADDING_S
         known = times and [(begin + padding, end + padding) for begin, end in times]
@@ -235,6 +238,29 @@ class Aligner:
         end = len(frames) * STEP_S - 2 * padding
         seconds = [(phones[at], _seconds(begin), _seconds(last)) for at, begin, last in found]
         return [one for one in seconds if one[0] is not None or (one[2] > STEP_S and one[1] < end - STEP_S)]
+
+
+def _lenient(frames: Floats, inventory: Sequence[str]) -> Floats:
+    """Log probabilities (T, P) of frames, in which a phone may also be heard as another vowel, sonorant or obstruent.
+
+    The end of a diphthong is a vowel of its own, and a voice that the classifier has not learnt is often misheard;
+    then only that there is a sound tells a phone from a pause.
+    """
+    classes = np.array([_class_of(label) for label in inventory])
+    sounds = classes != SILENCE
+    alike = (classes[:, None] == classes) & sounds
+    shares = OF_ITS_CLASS * alike + SOUNDING * (sounds[:, None] & sounds)
+    np.fill_diagonal(shares, 1.0)
+    found: Floats = np.log(ordered_product(np.exp(frames), shares) + np.finfo(np.float64).tiny)
+    return found
+
+
+def _class_of(label: str) -> str:
+    """Of phones that are taken for each other."""
+    if label == SILENCE:
+        return SILENCE
+    phone = look_up_phone(label)
+    return "vowel" if phone.is_vowel else "sonorant" if phone.kind in SONORANTS else "obstruent"
 
 
 def _phones_in(words: PronouncedWords) -> set[str]:
