@@ -49,9 +49,9 @@ def test_speech_is_synthesised_while_the_renderer_is_built(
     begun, models, build = threading.Event(), session._models, session.renderer
     synthesise, waited = type(models).pieces, []
 
-    def pieces(self, prepared):  # type: ignore[no-untyped-def]
+    def pieces(*given):  # type: ignore[no-untyped-def]
         begun.set()
-        yield from synthesise(self, prepared)
+        yield from synthesise(*given)
 
     def renderer(*given, **named):  # type: ignore[no-untyped-def]
         waited.append(begun.wait(20))

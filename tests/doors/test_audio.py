@@ -160,6 +160,20 @@ def test_a_long_recording_is_divided_into_pieces(text: str, film: Path, session:
         assert len(whole.speech.words) == len(text.split())
 
 
+def test_progress_begins_while_the_words_of_a_long_recording_are_found(
+    film: Path, session: Session, here: Path
+) -> None:
+    """Four parts are heard and aligned before the first frame is drawn."""
+    sound = write_wave(here / "minute.wav", np.tile(read_sound(film, 16000).samples, 22))
+    seen: list[tuple[int, int]] = []
+    request = Request(audio=sound, text="bin blue at F two now " * 22, fps=5.0)
+    session.export(request, (here / "motion.csv",), on_progress=lambda done, of: seen.append((done, of)))
+    steps = [done for done, _ in seen]
+    assert steps == sorted(steps)
+    assert len({step for step in steps if step <= 300}) >= 6
+    assert seen[-1] == (1000, 1000)
+
+
 @pytest.mark.parametrize("suffix", sorted(SUFFIXES))
 def test_files_of_sound_alone_are_read(suffix: str, here: Path) -> None:
     tone = 0.3 * np.sin(2 * np.pi * 440 * np.arange(16000) / 16000)

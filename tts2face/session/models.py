@@ -28,6 +28,7 @@ from tts2face.session.speech_stream import Piece, SpeechModels
 from tts2face.session.steps import GestureLayer, SynthesisModels, pieces
 from tts2face.sound.voice import Voice
 from tts2face.sound.voice_pool import VoicePool
+from tts2face.types import Progress
 
 MAX_RENDERERS = 2  # renderers in memory, one for each picture; about 30 MB each
 
@@ -183,9 +184,9 @@ class SessionModels:
         speech = SpeechModels(load_voice, self.voices.yield_turn, self._memory, deliveries)
         return SynthesisModels(self.talker, exemplars, face, speech)
 
-    def pieces(self, prepared: PreparedRequest) -> Iterator[Piece]:
-        """Synthesise the clip of a request piece by piece."""
-        return pieces(prepared, self.for_request(prepared), self.gesture_layer(prepared))
+    def pieces(self, prepared: PreparedRequest, on_heard: Progress | None = None) -> Iterator[Piece]:
+        """Synthesise the clip of a request piece by piece; `on_heard` is called while a recording is heard."""
+        return pieces(prepared, self.for_request(prepared), self.gesture_layer(prepared), on_heard)
 
     @property
     def _exemplars(self) -> ExemplarModel:

@@ -29,7 +29,7 @@ from tts2face.picture.renderer import FrameRenderer
 from tts2face.picture.sound_stream import SOUND_KINDS, encode_sound
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.models import SessionModels
-from tts2face.session.prepared import PreparedRequest, marked_styles
+from tts2face.session.prepared import HEARING_STEPS, PreparedRequest, marked_styles
 from tts2face.session.speech import MarkTime
 from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces
 from tts2face.sound.alignment import TextMismatch
@@ -177,7 +177,13 @@ class RequestSteps:
 
     def __init__(self, n_steps: int, on_progress: Progress | None) -> None:
         self._n_steps, self._on_progress = n_steps, on_progress
-        self._steps_before = self._piece_steps = self._frames_before = self._n_frames = 0
+        self._steps_heard = self._steps_before = self._piece_steps = self._frames_before = self._n_frames = 0
+
+    def report_heard(self, done: int, of: int) -> None:
+        """Report how much of a recording has been heard, before its first piece."""
+        self._steps_heard = HEARING_STEPS * done // of
+        if self._on_progress:
+            self._on_progress(self._steps_heard, self._n_steps)
 
     def begin(self, piece: Piece) -> None:
         """Start the next piece."""
@@ -189,7 +195,8 @@ class RequestSteps:
         """Report the frames drawn, out of those passed to the writer so far."""
         if self._on_progress:
             share = (n_drawn - self._frames_before) / max(n_submitted - self._frames_before, 1)
-            self._on_progress(min(self._n_steps, int(self._steps_before + self._piece_steps * share)), self._n_steps)
+            steps = max(self._steps_heard, int(self._steps_before + self._piece_steps * share))
+            self._on_progress(min(self._n_steps, steps), self._n_steps)
 
     def finish(self) -> None:
         """Report that all steps are done."""

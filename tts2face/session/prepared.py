@@ -168,7 +168,7 @@ def correct_phones(
     return phones
 
 
-RECORDING_STEPS = 1000  # steps of progress of a recording
+HEARING_STEPS, RECORDING_STEPS = 300, 700  # steps of progress of a recording: until its phones are known, and then
 IDLE_STEPS = 1000  # steps of progress of idle animation
 
 
@@ -212,7 +212,7 @@ class PreparedRequest:
     def n_steps(self) -> int:
         """Total steps of progress: characters of a text, or parts of a recording or of idle animation."""
         if self.request.audio is not None:
-            return RECORDING_STEPS
+            return HEARING_STEPS + RECORDING_STEPS
         silent = 0 if self.request.silence is None else IDLE_STEPS
         return silent + len(self.text.text) if silent else max(len(self.text.text), 1)
 

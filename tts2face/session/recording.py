@@ -25,7 +25,17 @@ from tts2face.sound.alignment import TextMismatch
 from tts2face.sound.features import FEATURE_RATE, speech_level
 from tts2face.sound.listener import StreamingFeatures
 from tts2face.sound.transcript import align_recording, pronounce_transcript, recognise_phones
-from tts2face.types import Clip, Speech, Trajectory, Waveform, exact_rate, first_sample, frame_count, resting_head
+from tts2face.types import (
+    Clip,
+    Progress,
+    Speech,
+    Trajectory,
+    Waveform,
+    exact_rate,
+    first_sample,
+    frame_count,
+    resting_head,
+)
 from tts2face.video.media import sound_blocks
 
 CLIP_RATE = 48_000  # Hz, sample rate of the clips
@@ -80,7 +90,11 @@ def select_audio_map(name: str | None, talker: Talker) -> AudioMap:
 
 
 def align_transcript(
-    text: str, language: str, path: Path, dictionary: Mapping[str, tuple[IpaPhone, ...]]
+    text: str,
+    language: str,
+    path: Path,
+    dictionary: Mapping[str, tuple[IpaPhone, ...]],
+    on_progress: Progress | None = None,
 ) -> TimedTranscript:
     """Align a text with a recording of it; `dictionary` holds the user's pronunciations by `word_key`.
 
@@ -92,10 +106,10 @@ def align_transcript(
         The phone recogniser does not run on this machine.
     """
     words = pronounce_transcript(text, language, Dictionary(dictionary) if dictionary else None)
-    return TimedTranscript(*align_recording(_sound_of(path), words))
+    return TimedTranscript(*align_recording(_sound_of(path), words, on_progress))
 
 
-def recognise_transcript(path: Path) -> TimedTranscript:
+def recognise_transcript(path: Path, on_progress: Progress | None = None) -> TimedTranscript:
     """Phones that are heard in a recording; its words are not known.
 
     Raises
@@ -105,7 +119,7 @@ def recognise_transcript(path: Path) -> TimedTranscript:
     BackendError
         The phone recogniser does not run on this machine.
     """
-    return TimedTranscript(recognise_phones(_sound_of(path)), ())
+    return TimedTranscript(recognise_phones(_sound_of(path), on_progress), ())
 
 
 def _sound_of(path: Path) -> Waveform:

@@ -356,7 +356,7 @@ class Session:
         prepared.preload_voice(self._models.voices)  # while the face is prepared
         progress = RequestSteps(prepared.n_steps, on_progress)
         face = self._models.face(has_gestures=has_gestures)
-        with ahead(self._models.pieces(prepared)) as pieces:  # spoken while the renderer is built
+        with ahead(self._models.pieces(prepared, progress.report_heard)) as pieces:  # while the renderer is built
             renderer = None if outputs.out is None else self.renderer(picture, has_gestures=has_gestures)
             with outputs.open(face, renderer, progress.report_frames) as files:
                 return write_pieces(pieces, files, outputs, progress, on_piece)

@@ -30,7 +30,14 @@ from tts2face.models.talker import Talker
 from tts2face.numeric.reuse import NO_MEMORY, SentenceMemory
 from tts2face.request import FIELDS
 from tts2face.session.animated_face import AnimatedFace
-from tts2face.session.prepared import RECORDING, RECORDING_STEPS, PreparedRequest, correct_phones, marked_styles
+from tts2face.session.prepared import (
+    HEARING_STEPS,
+    RECORDING,
+    RECORDING_STEPS,
+    PreparedRequest,
+    correct_phones,
+    marked_styles,
+)
 from tts2face.session.recording import (
     TimedTranscript,
     align_transcript,
@@ -41,7 +48,7 @@ from tts2face.session.recording import (
 )
 from tts2face.session.speech import resolve_recording_marks
 from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces
-from tts2face.types import HEAD_CHANNELS, Clip, Trajectory, Waveform, YieldTurn, frame_count, keep_on
+from tts2face.types import HEAD_CHANNELS, Clip, Progress, Trajectory, Waveform, YieldTurn, frame_count, keep_on
 
 Step = Callable[[Piece], Piece]
 Explain = Callable[[], tuple[PhoneExplanation, ...]]
@@ -65,7 +72,12 @@ class SynthesisModels:
     speech: SpeechModels
 
 
-def pieces(prepared: PreparedRequest, models: SynthesisModels, gestures: "GestureLayer | None") -> Iterator[Piece]:
+def pieces(
+    prepared: PreparedRequest,
+    models: SynthesisModels,
+    gestures: "GestureLayer | None",
+    on_heard: Progress | None = None,
+) -> Iterator[Piece]:
     """Synthesise the clip of a request piece by piece.
 
     Each piece ends on a frame boundary, so that sound and picture stay synchronous at any length, in bounded memory.
@@ -75,20 +87,26 @@ def pieces(prepared: PreparedRequest, models: SynthesisModels, gestures: "Gestur
     ----------
     gestures
         Gestures of this clip; None for lip motion only.
+    on_heard
+        Called while the phones of a recording are found, before its first piece.
     """
-    yield from pieces_from(prepared, models, gestures)
+    yield from pieces_from(prepared, models, gestures, on_heard=on_heard)
     if gestures is not None:
         gestures.finish()
 
 
 def pieces_from(
-    prepared: PreparedRequest, models: SynthesisModels, gestures: "GestureLayer | None", first_frame: int = 0
+    prepared: PreparedRequest,
+    models: SynthesisModels,
+    gestures: "GestureLayer | None",
+    first_frame: int = 0,
+    on_heard: Progress | None = None,
 ) -> Iterator[Piece]:
     """Pieces of a recording, or of a text or of idle animation that begins at a frame of a longer clip."""
     lips = Lips(prepared, models)
     steps: tuple[Step, ...] = () if gestures is None else (gestures, gestures.edits, gestures.body)
     if prepared.request.audio is not None:
-        started = recorded_pieces(prepared, prepared.request.audio, models, lips)
+        started = recorded_pieces(prepared, prepared.request.audio, lips, on_heard)
     else:
         started, steps = spoken_pieces(prepared, models.speech, first_frame), (lips, *steps)
     for piece in started:
@@ -144,9 +162,9 @@ class Lips:
         return explain
 
 
-def recorded_pieces(prepared: PreparedRequest, audio: Path, models: SynthesisModels, lips: Lips) -> Iterator[Piece]:
+def recorded_pieces(prepared: PreparedRequest, audio: Path, lips: Lips, on_heard: Progress | None) -> Iterator[Piece]:
     """First step of a recording: its sound with lip motion, from exemplars if its words are known, else from a map."""
-    transcript, motion, explain = _recording_motion(prepared, audio, models, lips)
+    transcript, motion, explain = _recording_motion(prepared, audio, lips, on_heard)
     language = prepared.request.language
     timeline, marks = resolve_recording_marks(prepared.text, transcript.phones, transcript.words, language)
     fps, before = float(prepared.fps), 0
@@ -156,7 +174,9 @@ def recorded_pieces(prepared: PreparedRequest, audio: Path, models: SynthesisMod
         yield Piece(
             clip,
             begin,
-            RECORDING_STEPS * after // len(motion) - RECORDING_STEPS * before // len(motion),
+            RECORDING_STEPS * after // len(motion)
+            - RECORDING_STEPS * before // len(motion)
+            + (HEARING_STEPS if before == 0 else 0),
             timeline.restrict(begin, end),
             tuple(mark for mark in marks if begin <= mark.seconds < end),
             explain if before == 0 else tuple,
@@ -167,9 +187,9 @@ def recorded_pieces(prepared: PreparedRequest, audio: Path, models: SynthesisMod
 
 
 def _recording_motion(
-    prepared: PreparedRequest, audio: Path, models: SynthesisModels, lips: Lips
+    prepared: PreparedRequest, audio: Path, lips: Lips, on_heard: Progress | None
 ) -> tuple[TimedTranscript, Trajectory, Explain]:
-    fps, request = float(prepared.fps), prepared.request
+    fps, request, models = float(prepared.fps), prepared.request, lips.models
     if not request.has_phones:
         audio_map = select_audio_map(request.audio_map, models.talker)
         transcript, parameters = map_audio_to_motion(audio, audio_map, models.talker, fps)
@@ -182,8 +202,8 @@ def _recording_motion(
 
     def find() -> TimedTranscript:
         if not request.text.strip():
-            return recognise_transcript(audio)
-        return align_transcript(prepared.text.text, request.language, audio, prepared.dictionary)
+            return recognise_transcript(audio, on_heard)
+        return align_transcript(prepared.text.text, request.language, audio, prepared.dictionary, on_heard)
 
     transcript = models.speech.memory.recall(
         key,

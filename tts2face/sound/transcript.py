@@ -20,7 +20,7 @@ from tts2face.numeric.kernels import kernel
 from tts2face.sound.alignment import Aligner, TextMismatch, join_alignments, unwritten_part
 from tts2face.sound.pauses import cut_at_pauses, cut_sound
 from tts2face.sound.word_lattice import PronouncedWords, Pronunciations
-from tts2face.types import Waveform
+from tts2face.types import Progress, Waveform
 
 BAND = 1500  # largest offset in phones between text and sound: two minutes of speech
 SUBSTITUTION_COST = 1.0
@@ -157,9 +157,14 @@ def _pronunciations(word: Word, language: str, own: Dictionary | None) -> Pronun
 
 
 def align_recording(
-    sound: Waveform, words: PronouncedWords
+    sound: Waveform, words: PronouncedWords, on_progress: Progress | None = None
 ) -> tuple[PhoneSequence, tuple[WordSpan, ...], tuple[TextMismatch, ...]]:
     """Align words with a sound of any length.
+
+    Parameters
+    ----------
+    on_progress
+        Called after each part of a long sound.
 
     Returns
     -------
@@ -183,7 +188,11 @@ def align_recording(
         found.check()
         return found.phones, found.words, found.mismatches
     parts = [cut_sound(sound, span) for span in cut_at_pauses(sound, MAX_STRETCH_S)]
-    heard = [aligner.hear(part) for part in parts]
+    tell, n_parts = on_progress or (lambda _done, _of: None), len(parts)
+    heard = []
+    for at, part in enumerate(parts, start=1):
+        heard.append(aligner.hear(part))
+        tell(at, 2 * n_parts)
     recognised = [[phone for word in one.words() for phone in word] for one in heard]
     if not any(recognised):
         raise DataError("the recording contains no speech; give another recording")
@@ -194,13 +203,14 @@ def align_recording(
         aligned.append(
             aligner.align(heard[at], said, may_lack=True) if said else unwritten_part(part, len(recognised[at]))
         )
+        tell(n_parts + at + 1, 2 * n_parts)
     joined = join_alignments(aligned)
     joined.check()
     return joined.phones, joined.words, joined.mismatches
 
 
-def recognise_phones(sound: Waveform) -> PhoneSequence:
-    """Phones that are heard in a sound of any length, from 0 s to its end.
+def recognise_phones(sound: Waveform, on_progress: Progress | None = None) -> PhoneSequence:
+    """Phones that are heard in a sound of any length, from 0 s to its end; `on_progress` is called after each part.
 
     Raises
     ------
@@ -208,10 +218,13 @@ def recognise_phones(sound: Waveform) -> PhoneSequence:
         The phone recogniser does not run on this machine.
     """
     aligner, found = Aligner(), []
-    for span in cut_at_pauses(sound, MAX_STRETCH_S):
+    spans = cut_at_pauses(sound, MAX_STRETCH_S)
+    for span in spans:
         part = cut_sound(sound, span)
         try:
             found.append(aligner.align(part, None))
         except DataError:  # nobody speaks
             found.append(unwritten_part(part, 0))
+        if on_progress:
+            on_progress(len(found), len(spans))
     return join_alignments(found).phones
