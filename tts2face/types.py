@@ -20,6 +20,7 @@ from tts2face.numeric.arrays import interpolate_columns
 from tts2face.request import FPS_LIMITS
 
 MAX_RATE_HZ = 1e6  # of samples or frames; the fastest converters of sound have 768 kHz
+SOUND_RATE = 48_000  # Hz, of clips and films; the usual rate of players and editors, required by Opus
 HEAD_CHANNELS = ("pitch", "yaw", "roll", "x", "y", "z")  # radians (nod down, turn to own left, tilt) and mm
 
 

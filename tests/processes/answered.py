@@ -11,8 +11,8 @@ from tts2face.processes.child import Call, Handler, answer
 from tts2face.processes.message import Message, read_message
 from tts2face.processes.parent import ChildEndedError, call_once
 from tts2face.processes.program import Program
-from tts2face.serving.service.uploads import DECODE, program
 from tts2face.serving.work.resource_check import RefusedFileError
+from tts2face.serving.work.uploaded_file import DECODE, program
 
 
 def answered(handler: Handler, content: Mapping[str, Any]) -> list[Message]:

@@ -12,7 +12,8 @@ import pytest
 from PIL import Image
 
 from tests.processes.answered import refusal
-from tts2face.serving.service.uploads import PICTURE, SOUND, SUBTITLES, decode_file
+from tts2face.serving.service.uploads import decode_file
+from tts2face.serving.work.uploaded_file import PICTURE, SOUND, SUBTITLES
 
 RATE = 16_000
 

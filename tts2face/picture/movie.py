@@ -22,9 +22,8 @@ from tts2face.picture.options import Picture
 from tts2face.picture.pace import Pace
 from tts2face.picture.provenance import WriteBuffer, append_to_mp4
 from tts2face.picture.renderer import FrameRenderer
-from tts2face.types import Chunk, Clip, exact_rate, first_sample
+from tts2face.types import SOUND_RATE, Chunk, Clip, exact_rate, first_sample
 
-SOUND_RATE = 48_000  # Hz; the usual rate of players and editors, required by Opus
 BT709, LIMITED_RANGE = 1, 1  # H.273 code points: primaries, transfer and matrix of BT.709; studio range
 
 

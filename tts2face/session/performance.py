@@ -15,7 +15,7 @@ from tts2face.session.animated_face import AnimatedFace, FaceMotion
 from tts2face.session.models import SessionModels
 from tts2face.session.outputs import OutputFiles, WrittenClip
 from tts2face.session.recording import clip_bounds
-from tts2face.types import Clip, Progress, Speech, Waveform, exact_rate
+from tts2face.types import SOUND_RATE, Clip, Progress, Speech, Waveform, exact_rate
 from tts2face.video.media import read_media_info, read_sound
 from tts2face.video.streaming import StreamingTracker
 from tts2face.video.take import BlendshapeReader, Take, read_livelink, read_take
@@ -23,7 +23,6 @@ from tts2face.video.take import BlendshapeReader, Take, read_livelink, read_take
 CAPTURE_SUFFIX = ".csv"
 CAPTURE_FPS = 30.0  # default frame rate of captures, whose own is higher than a video needs
 GAINS = (0.0, 4.0)
-SOUND_RATE = 48_000  # Hz
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

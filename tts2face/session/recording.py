@@ -26,6 +26,7 @@ from tts2face.sound.features import FEATURE_RATE, speech_level
 from tts2face.sound.listener import StreamingFeatures
 from tts2face.sound.transcript import align_recording, pronounce_transcript, recognise_phones
 from tts2face.types import (
+    SOUND_RATE,
     Clip,
     Progress,
     Speech,
@@ -38,7 +39,6 @@ from tts2face.types import (
 )
 from tts2face.video.media import sound_blocks
 
-CLIP_RATE = 48_000  # Hz, sample rate of the clips
 MAX_CLIP_FRAMES = 300  # frames of each clip into which a recording is divided
 MIN_RECORDING_S = 0.1  # shorter recordings contain no phone
 SILENCE_LEVEL = 1e-4  # peak amplitude, relative to full scale, below which a recording counts as silent
@@ -167,15 +167,15 @@ def clip_bounds(motion: Trajectory, rate: int) -> Iterator[tuple[int, int, int, 
 def recording_clips(path: Path, transcript: TimedTranscript, motion: Trajectory, *, volume: float) -> Iterator[Clip]:
     """Divide a recording's motion and sound into clips of at most `MAX_CLIP_FRAMES` frames, each with its phones."""
     fps = exact_rate(motion.fps)
-    sound = _SampleReader(sound_blocks(path, CLIP_RATE))
-    for first, last, begin, end in clip_bounds(motion, CLIP_RATE):
+    sound = _SampleReader(sound_blocks(path, SOUND_RATE))
+    for first, last, begin, end in clip_bounds(motion, SOUND_RATE):
         samples = np.clip(volume * sound.next(end - begin), -1.0, 1.0)
-        seconds = (float(Fraction(first) / fps), len(samples) / CLIP_RATE)
+        seconds = (float(Fraction(first) / fps), len(samples) / SOUND_RATE)
         phones, words = _phones_within(transcript, *seconds)
         yield Clip(
             motion.part(first, last),
             resting_head(last - first, motion.fps),
-            Speech(Waveform(samples, CLIP_RATE), phones, words),
+            Speech(Waveform(samples, SOUND_RATE), phones, words),
         )
 
 

@@ -12,12 +12,11 @@ from lexicon.sequence import PhoneSequence
 from tts2face.interchange.exports.table import batch_format
 from tts2face.interchange.exports.track import read_track
 from tts2face.interchange.exports.writer import ExportWriter, mesh_of, plan_exports
-from tts2face.picture.movie import SOUND_RATE
 from tts2face.request import OWN_FACE, Request
 from tts2face.serving.batch.output import Output, Sound
 from tts2face.serving.batch.segment import Segment
 from tts2face.session.named_models import Models
-from tts2face.types import Clip, Speech, Waveform, exact_rate, first_sample
+from tts2face.types import SOUND_RATE, Clip, Speech, Waveform, exact_rate, first_sample
 
 if TYPE_CHECKING:
     from tts2face.session.session import Session

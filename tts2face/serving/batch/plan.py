@@ -13,7 +13,6 @@ from lexicon.errors import DataError, InputError
 from tts2face.interchange.exports.table import batch_format
 from tts2face.interchange.subtitles.cues import Cue, Subtitles, SubtitleWarning
 from tts2face.interchange.subtitles.reader import read_subtitles
-from tts2face.picture.movie import SOUND_RATE
 from tts2face.picture.options import Picture
 from tts2face.request import DRAWN_FACE, IDLE_LIMITS_S, Request
 from tts2face.serving.batch.cast import MODEL_NAMES, REQUEST_NAMES, Cast, check_names
@@ -24,7 +23,7 @@ from tts2face.serving.batch.segment import ALPHA_MOVIE, MOVIE, Segment, file_has
 from tts2face.serving.batch.windows import Window, cue_windows, scenes
 from tts2face.session.named_models import Models
 from tts2face.session.prepared import prepare
-from tts2face.types import exact_rate, first_sample
+from tts2face.types import SOUND_RATE, exact_rate, first_sample
 
 SOUND_SUFFIXES = frozenset({".wav", ".flac", ".mp3", ".m4a", ".ogg", ".opus", ".aac", ".aif", ".aiff", ".mp4", ".mov",
                             ".mkv", ".webm"})  # fmt: skip

@@ -20,7 +20,6 @@ import numpy as np
 from lexicon.errors import DataError
 from tts2face.interchange.exports.writer import ExportWriter, plan_exports
 from tts2face.picture.film import MKV, ClipWriter
-from tts2face.picture.movie import SOUND_RATE
 from tts2face.picture.options import Picture
 from tts2face.picture.own_face import OwnFaceRenderer
 from tts2face.picture.renderer import FrameRenderer
@@ -44,7 +43,7 @@ from tts2face.session.session import Session
 from tts2face.sound.pauses import speech_onset
 from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.temporary import Temporary
-from tts2face.types import Waveform, exact_rate, first_sample, frame_count
+from tts2face.types import SOUND_RATE, Waveform, exact_rate, first_sample, frame_count
 
 ONSET_S = 60  # of a recording of a cue, within which its first sound lies
 

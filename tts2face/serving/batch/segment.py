@@ -24,12 +24,11 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 from tts2face import __version__
 from tts2face.models.hair import BALD
-from tts2face.picture.movie import SOUND_RATE
 from tts2face.request import OWN_FACE, Request
 from tts2face.session.named_models import Models
 from tts2face.storage.content_store import content_hash
 from tts2face.storage.files import find_file, translate_disk_errors
-from tts2face.types import exact_rate, first_sample
+from tts2face.types import SOUND_RATE, exact_rate, first_sample
 from tts2face.video.media import sound_blocks
 
 SEGMENT_SUFFIX = ".mov"

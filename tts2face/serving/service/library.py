@@ -24,7 +24,7 @@ from tts2face.serving.batch.segment import file_hash
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.settings import ServiceSettings
-from tts2face.serving.service.uploads import DRAW, RESOURCE_TIMEOUT_S, decode_file
+from tts2face.serving.service.uploads import RESOURCE_TIMEOUT_S, decode_file
 from tts2face.serving.work.blobs import BlobStore, open_blobs
 from tts2face.serving.work.database import database_url
 from tts2face.serving.work.resource_check import CONTENT, DICTIONARY, FACE, PICTURE, TALKER
@@ -38,6 +38,7 @@ from tts2face.serving.work.resources import (
     resource_from_folder,
 )
 from tts2face.serving.work.run import RESOURCES
+from tts2face.serving.work.uploaded_file import DRAW
 from tts2face.session import catalogue
 from tts2face.storage.files import FORMER, find_file, translate_disk_errors
 from tts2face.storage.temporary import Temporary

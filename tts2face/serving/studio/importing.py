@@ -21,11 +21,12 @@ from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.service.uploads import MAX_TEXT_BYTES, SOUND, SUBTITLES, decode_file
+from tts2face.serving.service.uploads import MAX_TEXT_BYTES, decode_file
 from tts2face.serving.studio.requests import check_project
 from tts2face.serving.studio.store import ProjectEntry, ProjectStore
 from tts2face.serving.studio.work import WorkList
 from tts2face.serving.studio.workspace import Workspace
+from tts2face.serving.work.uploaded_file import SOUND, SUBTITLES
 from tts2face.session.project import MAX_NAME, Project
 
 

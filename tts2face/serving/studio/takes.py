@@ -24,7 +24,6 @@ from lexicon.inputs import read_json
 from tts2face.processes.tools import run_take_tool
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
-from tts2face.serving.service.uploads import SOUND as SOUND_KIND
 from tts2face.serving.service.uploads import decode_file
 from tts2face.serving.studio.importing import StudioHost, add_recording
 from tts2face.serving.studio.recordings import OwnedFolders
@@ -33,6 +32,7 @@ from tts2face.serving.studio.store import SUFFIXES
 from tts2face.serving.studio.styles import Styles
 from tts2face.serving.studio.work import BackgroundWork, WorkKind
 from tts2face.serving.work.table import FAILED
+from tts2face.serving.work.uploaded_file import SOUND as SOUND_KIND
 from tts2face.storage.files import translate_disk_errors, write_atomically
 
 ENTRY, TABLE, SOUND, PREVIEW, FILM, VIDEO = (

@@ -1,0 +1,215 @@
+"""Decoding of an uploaded file in a child process, with limits of memory, time and files, and without a network.
+
+A file becomes a plain one (sound: mono .wav at 48 kHz; picture: .png); a resource (talker, face, palette, dictionary)
+is checked and written, with its description and picture, into the folder ``target``; ``draw-`` and its kind draw the
+picture ``target`` only; ``places`` finds lips and lids in a photo for the folder ``target``; ``subtitles-`` and an
+encoding check subtitles; a video is measured. ``limit`` is the largest duration in seconds, number of pixels or cues,
+or size in bytes.
+"""
+
+import json
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from lexicon.errors import Tts2faceError
+from tts2face.processes.child import Call, Handler
+from tts2face.processes.program import ProcessLimits, Program
+from tts2face.processes.tools import LOW_PRIORITY
+from tts2face.serving.work.resource_check import (
+    RESOURCE_KINDS,
+    RefusedFileError,
+    check_resource,
+    draw_resource,
+    find_places,
+)
+from tts2face.storage.files import is_disk_full
+from tts2face.types import SOUND_RATE
+
+SOUND, PICTURE, VIDEO, DRAW, SUBTITLES, PLACES = "sound", "picture", "video", "draw-", "subtitles-", "places"
+LIMITS = ProcessLimits(memory_bytes=2 << 30, cpu_s=60, file_bytes=1 << 30, n_files=64)
+RESOURCE_CPU_S = 180  # a resource with its picture takes 3 to 5 s, at the first time with the compilation of kernels
+SOUND_FORMATS = "wav,mp3,ogg,flac,aac,mov,mp4,m4a,matroska,webm,aiff,caf"
+# Formats of recordings, with the endings under which other readers recognise them.
+VIDEO_FORMATS = {
+    "mov": ".mp4", "mp4": ".mp4", "matroska": ".mkv", "webm": ".webm", "avi": ".avi", "mpegps": ".mpg", "mpeg": ".mpg",
+}  # fmt: skip
+MAX_VIDEO_PIXELS, MAX_VIDEO_FPS = 4096 * 2304, 240
+PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TIFF")
+DECODE = "decode"  # name of the call
+
+
+@contextmanager
+def _decoding(kind: str, *errors: type[Exception]) -> Iterator[None]:
+    """Refuse a file whose decoding ends in one of these errors."""
+    try:
+        yield
+    except RefusedFileError:
+        raise
+    except errors as error:
+        if is_disk_full(error):
+            raise
+        raise RefusedFileError(f"it is no {kind} that can be decoded") from error
+
+
+def decode_sound(source: Path, target: Path, max_seconds: float) -> None:
+    """Write the first sound stream of a file as mono 16-bit .wav at `SOUND_RATE`.
+
+    Raises
+    ------
+    RefusedFileError
+        It has no sound, more than `max_seconds`, or cannot be decoded.
+    """
+    import wave
+
+    import av
+
+    # A playlist could name other files: only formats without references, and no protocol to open them.
+    options = {"format_whitelist": SOUND_FORMATS, "protocol_whitelist": "none"}
+    with (
+        _decoding("sound", av.FFmpegError, ValueError, EOFError),
+        source.open("rb") as file,
+        av.open(file, "r", options=options) as container,
+    ):
+        if not container.streams.audio:
+            raise RefusedFileError("it has no sound")
+        resampler = av.AudioResampler(format="s16", layout="mono", rate=SOUND_RATE)
+        n_left = int(max_seconds * SOUND_RATE)
+        with wave.open(str(target), "wb") as out:
+            out.setparams((1, 2, SOUND_RATE, 0, "NONE", "not compressed"))
+            for frame in container.decode(audio=0):
+                for part in resampler.resample(frame):
+                    n_left -= part.samples
+                    if n_left < 0:
+                        raise RefusedFileError(f"it is longer than {max_seconds:g} s")
+                    out.writeframesraw(bytes(part.planes[0])[: 2 * part.samples])
+    if n_left == int(max_seconds * SOUND_RATE):
+        raise RefusedFileError("its sound is empty")
+
+
+def decode_picture(source: Path, target: Path, max_pixels: float) -> None:
+    """Write a picture as .png.
+
+    Raises
+    ------
+    RefusedFileError
+        It has more than `max_pixels`, or cannot be decoded.
+    """
+    from PIL import Image
+
+    Image.MAX_IMAGE_PIXELS = None  # the size is checked here, before anything is decoded
+    with (
+        _decoding("picture", OSError, ValueError, SyntaxError, MemoryError),
+        Image.open(source, formats=PICTURE_FORMATS) as picture,
+    ):
+        if picture.width * picture.height > max_pixels:
+            raise RefusedFileError(f"it has {picture.width} x {picture.height} pixels, more than {max_pixels:g}")
+        picture.convert("RGB").save(target, "PNG", compress_level=1)
+
+
+def check_video(source: Path, target: Path, max_seconds: float) -> None:
+    """Write what a video is, JSON with its ending and seconds; its packets are counted and not decoded.
+
+    Raises
+    ------
+    RefusedFileError
+        It is no video, longer than `max_seconds`, or its pictures are too large or too many.
+    """
+    import av
+
+    options = {"format_whitelist": ",".join(VIDEO_FORMATS), "protocol_whitelist": "none"}
+    with (
+        _decoding("video", av.FFmpegError, ValueError, EOFError, StopIteration),
+        source.open("rb") as file,
+        av.open(file, "r", options=options) as container,
+    ):
+        stream = next((one for one in container.streams.video if one.codec_context is not None), None)
+        if stream is None:
+            raise RefusedFileError("it holds no video")
+        if stream.width * stream.height > MAX_VIDEO_PIXELS:
+            raise RefusedFileError(f"it has {stream.width} x {stream.height} pixels, more than 4096 x 2304")
+        suffix = next(VIDEO_FORMATS[name] for name in container.format.name.split(",") if name in VIDEO_FORMATS)
+        seconds = _measure_video(container, stream, max_seconds)
+    target.write_text(json.dumps({"suffix": suffix, "seconds": seconds}))
+
+
+def _measure_video(container: Any, stream: Any, max_seconds: float) -> float:
+    """Seconds from the first to the last packet of a video, whatever the file states."""
+    first = last = None
+    for number, packet in enumerate(container.demux(stream)):
+        if number > MAX_VIDEO_FPS * max_seconds:
+            raise RefusedFileError(f"it has more pictures than {max_seconds:g} s of video")
+        if packet.pts is not None and packet.time_base is not None:
+            at = float(packet.pts * packet.time_base)
+            first, last = (at, at) if first is None or last is None else (min(first, at), max(last, at))
+            if last - first > max_seconds:
+                raise RefusedFileError(f"it is longer than {max_seconds:g} s")
+    if first is None or last is None:
+        raise RefusedFileError("it has no pictures")
+    return last - first
+
+
+def check_subtitles(source: Path, target: Path, max_cues: float, encoding: str | None) -> None:
+    """Copy a subtitle file, and write its numbers beside it: cues and seconds, as JSON.
+
+    Raises
+    ------
+    RefusedFileError
+        It contains no cues or more than `max_cues`.
+    """
+    from tts2face.interchange.subtitles.reader import read_subtitles
+
+    shutil.copyfile(source, target)
+    try:
+        cues = read_subtitles(target, encoding).cues
+    except Tts2faceError as wrong:
+        raise RefusedFileError(str(wrong).replace(f"{target.parent}/", "")) from wrong
+    if len(cues) > max_cues:
+        raise RefusedFileError(f"it has {len(cues)} cues, more than {max_cues:g}")
+    numbers = {"cues": len(cues), "seconds": max(cue.end_s for cue in cues)}
+    Path(f"{target}.json").write_text(json.dumps(numbers))
+
+
+def decode(kind: str, source: Path, target: Path, limit: float) -> None:
+    """Decode or check one file of a kind.
+
+    Raises
+    ------
+    RefusedFileError
+        It is not what it should be.
+    """
+    if kind in RESOURCE_KINDS:
+        check_resource(kind, source, target, limit)
+    elif kind.startswith(SUBTITLES):
+        check_subtitles(source, target, limit, kind.removeprefix(SUBTITLES) or None)
+    elif kind == PLACES:
+        find_places(source, target)
+    elif kind.startswith(DRAW):
+        draw_resource(kind.removeprefix(DRAW), source, target)
+    else:
+        {SOUND: decode_sound, PICTURE: decode_picture, VIDEO: check_video}[kind](source, target, limit)
+
+
+def _decode(call: Call) -> dict[str, Any]:
+    asked = call.content
+    try:
+        decode(asked["kind"], Path(asked["source"]), Path(asked["target"]), float(asked["limit"]))
+    except OSError as error:
+        if not is_disk_full(error):
+            raise
+        return {"is_full": True}
+    return {"is_full": False}
+
+
+def program(kind: str) -> Program:
+    """The child that decodes a file of a kind."""
+    if kind in {SOUND, PICTURE, VIDEO} or kind.startswith(SUBTITLES):
+        return Program(f"{__name__}:HANDLERS", LIMITS)
+    return Program(f"{__name__}:HANDLERS", replace(LIMITS, cpu_s=RESOURCE_CPU_S), niceness=LOW_PRIORITY)
+
+
+HANDLERS: Mapping[str, Handler] = MappingProxyType({DECODE: _decode})
