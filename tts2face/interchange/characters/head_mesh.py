@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.interchange.characters.character import Character, MaterialPiece, MorphTarget
 from tts2face.interchange.characters.shapes import ShapeMapping, ShapeSource
-from tts2face.numeric.arrays import smoothstep
+from tts2face.numeric.arrays import ordered_product, smoothstep
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -224,15 +224,16 @@ def _join(character: Character, mapping: ShapeMapping, turn: FloatArray) -> Head
     starts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
     weights = {shape: [source_weights(character, source) for source in sources] for shape, sources in mapping.items()}
     shapes: dict[str, NDArray[np.float32]] = {}
+    turned = turn.T.astype(np.float32)
     for shape, sources in weights.items():
         moved = [_displacement(piece, sources) for piece in pieces]
         if any(part is not None for part in moved):
             zeros = [np.zeros(piece.vertices.shape, np.float32) for piece in pieces]
             parts = [zero if part is None else part for part, zero in zip(moved, zeros, strict=True)]
-            shapes[shape] = (np.concatenate(parts) @ turn.T).astype(np.float32)
+            shapes[shape] = ordered_product(np.concatenate(parts), turned).astype(np.float32, copy=False)
     driven = mapped_targets(character, mapping)
     return HeadMesh(
-        vertices=np.concatenate([_at_rest(piece, driven) for piece in pieces]) @ turn.T,
+        vertices=ordered_product(np.concatenate([_at_rest(piece, driven) for piece in pieces]), turn.T),
         triangles=np.concatenate([piece.triangles + start for piece, start in zip(pieces, starts, strict=False)]),
         piece_of=np.repeat(np.arange(len(pieces)), [len(piece.triangles) for piece in pieces]),
         uv=np.concatenate([_or_nan(piece.uv, len(piece.vertices)) for piece in pieces]),
