@@ -3,7 +3,9 @@
 import json
 import struct
 import wave
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -79,11 +81,20 @@ def imported(folder: Path, name: str, variant: Variant) -> Face:
     return import_face(character, landmarks=write_landmarks(folder / "landmarks.tsv")).face
 
 
+SHARED = {"plain": Variant(), "skinned": Variant(is_skinned=True), "forward": Variant(turn_deg=0.0)}
+
+
+@pytest.fixture(scope="module")
+def shared(folder: Path) -> Callable[[str], Face]:
+    """A face of `SHARED`, imported once from the file of its name."""
+    return cache(lambda name: imported(folder, name, SHARED[name]))
+
+
 def test_weights_of_the_own_targets_are_those_of_the_clip(folder: Path) -> None:
-    face = imported(folder, "plain", Variant(rename=lambda name: f"BS.{name}"))
+    face = imported(folder, "renamed", Variant(rename=lambda name: f"BS.{name}"))
     clip = made_clip(face, {"jawOpen": 0.6, "mouthSmileLeft": 0.3, "eyeBlinkRight": 1.0})
-    written = write_character(clip, face, folder / "plain_out.glb")
-    played = Played(folder / "plain_out.glb")
+    written = write_character(clip, face, folder / "renamed_out.glb")
+    played = Played(folder / "renamed_out.glb")
     weights = played.weights()
     assert weights["BS.jawOpen"] == pytest.approx(0.6, abs=1e-6)
     assert {name for name, weight in weights.items() if weight} == {
@@ -92,12 +103,12 @@ def test_weights_of_the_own_targets_are_those_of_the_clip(folder: Path) -> None:
     times = played.rows(played.animation.samplers[0].input)[:, 0]
     np.testing.assert_allclose(times, np.arange(N_FRAMES) / FPS, atol=1e-6)
     assert written.n_frames == N_FRAMES
-    with wave.open(str(folder / "plain_out.wav")) as sound:
+    with wave.open(str(folder / "renamed_out.wav")) as sound:
         assert sound.getnframes() == round(N_FRAMES / FPS * 8000)
 
 
-def test_a_posed_character_lies_where_the_posed_face_does(folder: Path) -> None:
-    face, head = imported(folder, "posed", Variant()), shipped_head()
+def test_a_posed_character_lies_where_the_posed_face_does(folder: Path, shared: Callable[[str], Face]) -> None:
+    face, head = shared("plain"), shipped_head()
     poses = {"jawOpen": 0.7, "mouthPucker": 0.4, "browInnerUp": 0.5}
     write_character(made_clip(face, poses), face, folder / "posed_out.glb")
     weights = Played(folder / "posed_out.glb").weights()
@@ -118,8 +129,8 @@ def test_one_target_for_both_sides_gets_their_mean(folder: Path) -> None:
     assert Played(folder / "merged_out.glb").weights()["mouthSmile"] == pytest.approx(0.6, abs=1e-6)
 
 
-def test_head_and_eye_bones_turn(folder: Path) -> None:
-    face = imported(folder, "bones", Variant(is_skinned=True))
+def test_head_and_eye_bones_turn(folder: Path, shared: Callable[[str], Face]) -> None:
+    face = shared("skinned")
     clip = made_clip(face, {"eyeLookOutLeft": 1.0}, head=(0.0, 0.3, 0.0, 0.0, 0.0, 0.0))
     written = write_character(clip, face, folder / "bones_out.glb")
     played = Played(folder / "bones_out.glb")
@@ -131,8 +142,8 @@ def test_head_and_eye_bones_turn(folder: Path) -> None:
     np.testing.assert_allclose(played.track("rotation", "LeftEye")[-1], [0, np.sin(angle), 0, np.cos(angle)], atol=1e-6)
 
 
-def test_a_head_without_bones_turns_about_the_pivot_of_the_face(folder: Path) -> None:
-    face = imported(folder, "still", Variant(turn_deg=0.0))
+def test_a_head_without_bones_turns_about_the_pivot_of_the_face(folder: Path, shared: Callable[[str], Face]) -> None:
+    face = shared("forward")
     clip = made_clip(face, {}, head=(0.2, 0.0, 0.0, 0.0, 5.0, 0.0))
     write_character(clip, face, folder / "still_out.glb")
     played = Played(folder / "still_out.glb")
@@ -150,8 +161,10 @@ def test_a_head_without_bones_turns_about_the_pivot_of_the_face(folder: Path) ->
         assert np.abs(turn @ place + shift - shown).max() < TOLERANCE_MM
 
 
-def test_eyeballs_that_are_nodes_without_bones_turn_about_their_centres(folder: Path) -> None:
-    face = imported(folder, "nodes", Variant(turn_deg=0.0))
+def test_eyeballs_that_are_nodes_without_bones_turn_about_their_centres(
+    folder: Path, shared: Callable[[str], Face]
+) -> None:
+    face = shared("forward")
     write_character(made_clip(face, {"eyeLookUpRight": 1.0}), face, folder / "nodes_out.glb")
     played = Played(folder / "nodes_out.glb")
     x, y, z, w = played.track("rotation", "RightEye")[-1].astype(float)
@@ -165,8 +178,8 @@ def test_eyeballs_that_are_nodes_without_bones_turn_about_their_centres(folder: 
     assert np.abs(played.track("rotation", "LeftEye")[-1][:3]).max() == 0.0
 
 
-def test_a_pose_that_the_file_was_saved_in_is_not_the_face_at_rest(folder: Path) -> None:
-    plain = imported(folder, "unposed", Variant())
+def test_a_pose_that_the_file_was_saved_in_is_not_the_face_at_rest(folder: Path, shared: Callable[[str], Face]) -> None:
+    plain = shared("plain")
     names = shipped_head().shape_names
     character = write_character_file(
         folder / "saved.glb", Variant(rename=lambda name: "Fatness" if name == "cheekPuff" else name)
@@ -210,12 +223,12 @@ def test_everything_else_of_the_file_is_kept(folder: Path) -> None:
     assert total == (folder / "kept_out.glb").stat().st_size
 
 
-def test_another_file_or_face_is_refused(folder: Path) -> None:
-    face = imported(folder, "own", Variant())
+def test_another_file_or_face_is_refused(folder: Path, shared: Callable[[str], Face]) -> None:
+    face = shared("plain")
     clip = made_clip(face, {})
     with pytest.raises(InputError, match="not imported from a character's file"):
         write_character(clip, shipped_head(), folder / "x.glb")
-    (folder / "other.glb").write_bytes((folder / "own.glb").read_bytes() + b"\0")
+    (folder / "other.glb").write_bytes((folder / "plain.glb").read_bytes() + b"\0")
     with pytest.raises(DataError, match=r"content of .* differs from the file from which the face was imported"):
         write_character(clip, face, folder / "x.glb", character=folder / "other.glb")
     with pytest.raises(DataError, match="there is no character"):
@@ -267,16 +280,14 @@ def test_a_moved_character_is_found_again(tmp_path: Path, capsys: pytest.Capture
     assert face.read_bytes() == linked
 
 
-@pytest.mark.parametrize("variant", [Variant(), Variant(is_skinned=True)], ids=["plain", "skinned"])
-def test_the_khronos_validator_finds_no_error(variant: Variant, folder: Path) -> None:
+@pytest.mark.parametrize("name", ["plain", "skinned"])
+def test_the_khronos_validator_finds_no_error(name: str, folder: Path, shared: Callable[[str], Face]) -> None:
     packages = programs.node_package("gltf-validator")
-    face = imported(folder, f"valid{variant.is_skinned}", variant)
-    out = folder / f"valid{variant.is_skinned}_out.glb"
+    face, out = shared(name), folder / f"{name}_out.glb"
     head = (0.1, 0.2, 0.0, 1.0, 0.0, 0.0)
     write_character(made_clip(face, {"jawOpen": 0.5, "eyeLookOutLeft": 0.5}, head=head), face, out)
     reports = [
-        json.loads(programs.run_node(programs.VALIDATE, packages, str(path)))
-        for path in (folder / f"valid{variant.is_skinned}.glb", out)
+        json.loads(programs.run_node(programs.VALIDATE, packages, str(path))) for path in (folder / f"{name}.glb", out)
     ]
     errors = [[m["code"] for m in report["issues"]["messages"] if m["severity"] == 0] for report in reports]
     assert errors == [[], []]

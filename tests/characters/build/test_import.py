@@ -1,6 +1,8 @@
 """A character made from the shipped head is imported back: same vertices, shapes, landmarks, eyes and speech."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -46,8 +48,15 @@ def made_face(folder: Path, name: str, variant: Variant) -> ImportedFace:
 
 
 @pytest.fixture(scope="module")
-def plain(tmp_path_factory: pytest.TempPathFactory) -> ImportedFace:
-    return made_face(tmp_path_factory.mktemp("plain"), "plain", Variant())
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], ImportedFace]:
+    """A face of `VARIANTS`, imported once."""
+    folder = tmp_path_factory.mktemp("variants")
+    return cache(lambda name: made_face(folder, name, VARIANTS[name]))
+
+
+@pytest.fixture(scope="module")
+def plain(shared: Callable[[str], ImportedFace]) -> ImportedFace:
+    return shared("plain")
 
 
 def motion_of(face: Face, name: str) -> np.ndarray:
@@ -55,8 +64,8 @@ def motion_of(face: Face, name: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", VARIANTS)
-def test_shapes_and_landmarks_come_back(name: str, tmp_path: Path) -> None:
-    face, head = made_face(tmp_path, name, VARIANTS[name]).face, shipped_head()
+def test_shapes_and_landmarks_come_back(name: str, shared: Callable[[str], ImportedFace]) -> None:
+    face, head = shared(name).face, shipped_head()
     assert set(face.shape_names) == set(head.shape_names) - {"tongueUp"}  # not one of ARKit's
     here, there = (scatter_landmarks(one, landmark_positions(one)) for one in (face, head))
     shift = np.median(here - there, axis=0)
@@ -83,8 +92,8 @@ def test_speech_moves_an_imported_face_as_the_face_it_was_made_of(plain: Importe
     np.testing.assert_allclose(weights[0].values, weights[1].values[:, shared], atol=2e-3)  # share of a shape
 
 
-def test_a_skinned_head_turns_about_its_bone(tmp_path: Path) -> None:
-    face = made_face(tmp_path, "bones", Variant(is_skinned=True)).face
+def test_a_skinned_head_turns_about_its_bone(shared: Callable[[str], ImportedFace]) -> None:
+    face = shared("skinned").face
     assert np.abs(face.pivot - shipped_head().pivot).max() < ORIGIN_MM
 
 
@@ -141,9 +150,11 @@ def test_a_mapping_survives_its_table(plain: ImportedFace, tmp_path: Path) -> No
     assert read_mapping(path) == plain.report.mapping
 
 
-def test_landmarks_survive_their_table_in_the_axes_of_the_file(tmp_path: Path) -> None:
-    imported = made_face(tmp_path, "turned", Variant(turn_deg=180.0))
-    given = read_landmark_table(tmp_path / "turned.tsv")
+def test_landmarks_survive_their_table_in_the_axes_of_the_file(
+    shared: Callable[[str], ImportedFace], tmp_path: Path
+) -> None:
+    imported = shared("backwards")
+    given = read_landmark_table(write_landmarks(tmp_path / "given.tsv", VARIANTS["backwards"].turn_deg))
     (tmp_path / "again.tsv").write_text(landmark_table(imported.report.landmarks))
     again = read_landmark_table(tmp_path / "again.tsv")
     gaps = [np.linalg.norm(given[number] - again[number]) for number in given]
