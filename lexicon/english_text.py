@@ -10,11 +10,14 @@ Reduced forms of function words in connected speech (to, the, of), by the sound 
 
 The forms of ``function_words.tsv`` are those of misaki's American dictionary, with which the neural voice was trained.
 
+The forms of ``weak_forms.tsv`` are those that people may say in their place (Roach 2009, ch. 12; Wells 2008): a
+recording has one or the other.
+
 Tense of a verb whose past is spelled as its present (read): auxiliaries, the subject, times, and other verbs.
 """
 
 import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from itertools import pairwise
@@ -38,15 +41,32 @@ class _Forms:
     before_pause: tuple[IpaPhone, ...]
 
 
+def _rows(name: str) -> Iterator[list[str]]:
+    """Cells of the lines of a table, but its head."""
+    for line in resources.files("lexicon").joinpath(name).read_text(encoding="utf-8").splitlines()[1:]:
+        yield line.split("\t")
+
+
 @functools.cache
 def _forms() -> dict[str, _Forms]:
     found = {}
-    lines = resources.files("lexicon").joinpath("function_words.tsv").read_text(encoding="utf-8").splitlines()[1:]
-    for line in lines:
-        word, *written = line.split("\t")
+    for word, *written in _rows("function_words.tsv"):
         plain, vowel, pause = (parse_ipa(cell) if cell else () for cell in written)
         found[word] = _Forms(plain, vowel or plain, pause or plain)
     return found
+
+
+@functools.cache
+def _weak_forms() -> dict[str, tuple[tuple[str, ...], ...]]:
+    return {
+        word: tuple(tuple(one.phone for one in parse_ipa(form)) for form in forms.split())
+        for word, forms in _rows("weak_forms.tsv")
+    }
+
+
+def weak_forms(word: str) -> tuple[tuple[str, ...], ...]:
+    """Phones of each weak form of a function word; none of other words."""
+    return _weak_forms().get(word_key(word), ())
 
 
 def reduced_segments(

@@ -22,7 +22,7 @@ from tts2face.video.media import read_sound
 
 LEVEL_WINDOW_S = 0.02
 ALIGNMENT_KIND = "alignment"
-ALIGNMENT_VERSION = 6  # increased when alignment gives other edges, which invalidates cached ones
+ALIGNMENT_VERSION = 7  # increased when alignment gives other edges, which invalidates cached ones
 RECOGNITION_KIND = "hearing"
 RECOGNITION_VERSION = 2  # increased when other phones are recognised
 SOUND_RATE = 16_000  # Hz; input of the aligner and the recogniser

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.dictionary import Dictionary, cmudict_lookup
+from lexicon.english_text import weak_forms
 from lexicon.errors import DataError, InputError
 from lexicon.pronounce import Word, pronounce
 from lexicon.sequence import PhoneSequence, WordSpan
@@ -126,7 +127,7 @@ MAX_STRETCH_S = 20.0  # longest part into which longer recordings are divided
 
 
 def pronounce_transcript(text: str, language: str, own: Dictionary | None = None) -> PronouncedWords:
-    """Words of a text with their pronunciations; English words also with those of the dictionary (full forms, ...).
+    """Words of a text with their pronunciations; English words also with those of the dictionary and weak forms.
 
     Parameters
     ----------
@@ -153,7 +154,7 @@ def _pronunciations(word: Word, language: str, own: Dictionary | None) -> Pronun
         if found is None:
             break
         alternatives.append(tuple(segment.phone for segment in found))
-    return tuple(dict.fromkeys(alternatives))
+    return tuple(dict.fromkeys([*alternatives, *weak_forms(word.text)]))
 
 
 def align_recording(
