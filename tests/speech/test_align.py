@@ -5,6 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import tts2face
+from lexicon.dictionary import parse_dictionary
 from lexicon.errors import DataError
 from lexicon.sequence import enforce_increasing
 from tests.rendered_takes import manifest_rows
@@ -40,6 +42,20 @@ def test_of_several_pronunciations_the_fitting_one_is_taken(aligner: Aligner, so
     swapped = [*WORDS[:2], ("read", [("ɹ", "ɛ", "d"), ("ɹ", "i", "d")])]
     found = aligner.align(sound, swapped)
     assert found.phones.phones[found.words[2].first : found.words[2].last] == ("ɹ", "i", "d")
+
+
+def test_a_weak_form_is_found_where_it_is_said(aligner: Aligner) -> None:
+    said = []
+    for word in ('<phoneme ph="ən">and</phoneme>', "and"):
+        speech = tts2face.Session().clip(f"<speak>Look at Bob {word} Mary.</speak>", gestures="none").speech
+        found = aligner.align(speech.waveform, pronounce_transcript("Look at Bob and Mary.", "en-us"))
+        said.append(found.phones.phones[found.words[3].first : found.words[3].last])
+    assert said == [("ə", "n"), ("æ", "n", "d")]
+
+
+def test_the_user_s_pronunciation_has_no_weak_form() -> None:
+    own = parse_dictionary("and  B AA1", "own")
+    assert pronounce_transcript("and at", "en-us", own) == (("and", (("b", "ɑ"),)), ("at", (("æ", "t"), ("ə", "t"))))
 
 
 def test_silence_before_moves_every_edge_by_its_length(aligner: Aligner, sound: Waveform) -> None:
