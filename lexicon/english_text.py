@@ -17,7 +17,7 @@ Tense of a verb whose past is spelled as its present (read): auxiliaries, the su
 """
 
 import functools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from itertools import pairwise
@@ -28,6 +28,7 @@ from lexicon.g2p import DEFAULT_LANGUAGE, segments_by_rules
 from lexicon.ipa import IpaPhone, parse_ipa
 from lexicon.part_of_speech import tag_words
 from lexicon.sentence_ends import MARKS
+from lexicon.written_forms import read_table
 
 _DEMONSTRATIVE_BEFORE = word_set("of for with at like about after before in on by from than")
 _DEMONSTRATIVE_AFTER = word_set("is was will would could may might must one sounds looks means makes")
@@ -41,16 +42,10 @@ class _Forms:
     before_pause: tuple[IpaPhone, ...]
 
 
-def _rows(name: str) -> Iterator[list[str]]:
-    """Cells of the lines of a table, but its head."""
-    for line in resources.files("lexicon").joinpath(name).read_text(encoding="utf-8").splitlines()[1:]:
-        yield line.split("\t")
-
-
 @functools.cache
 def _forms() -> dict[str, _Forms]:
     found = {}
-    for word, *written in _rows("function_words.tsv"):
+    for word, written in read_table("function_words.tsv").items():
         plain, vowel, pause = (parse_ipa(cell) if cell else () for cell in written)
         found[word] = _Forms(plain, vowel or plain, pause or plain)
     return found
@@ -60,7 +55,7 @@ def _forms() -> dict[str, _Forms]:
 def _weak_forms() -> dict[str, tuple[tuple[str, ...], ...]]:
     return {
         word: tuple(tuple(one.phone for one in parse_ipa(form)) for form in forms.split())
-        for word, forms in _rows("weak_forms.tsv")
+        for word, (forms,) in read_table("weak_forms.tsv").items()
     }
 
 
