@@ -27,9 +27,9 @@ from scipy.spatial import cKDTree
 from corpus_tools.prompts.coverage import count_units, sentence_units
 from corpus_tools.tools.recordings import prompts_answer
 from tests.running import ServeProcess, serve_process
-from tests.studio.chromium import Browser, open_browser
-from tests.studio.fake_camera import write_fake_media
-from tests.studio.served import Page
+from tests.serving.studio.chromium import Browser, open_browser
+from tests.serving.studio.fake_camera import write_fake_media
+from tests.serving.studio.served import Page
 from tts2face.serving.service.keys import LOCAL_KEY
 from tts2face.serving.studio.recordings import GOOD, REFUSED, WEAK, RecordingStore
 

@@ -163,7 +163,7 @@ class HostedService(RunningService):
     Parameters
     ----------
     host
-        A process of `tests.service.host`.
+        A process of `tests.serving.service.host`.
     number
         Of the service in the host.
     studio
@@ -209,7 +209,9 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Iterator[HostService]:
     environment variables.
     """
     folder, numbers = tmp_path_factory.mktemp("harness"), count(1)
-    process = LoggedProcess("-m", "tests.service.host", str(folder), environment={"PYTHONPATH": str(Path.cwd())})
+    process = LoggedProcess(
+        "-m", "tests.serving.service.host", str(folder), environment={"PYTHONPATH": str(Path.cwd())}
+    )
 
     @contextmanager
     def start(*, studio: bool = False, is_ready: bool = True, **settings: Any) -> Iterator[HostedService]:

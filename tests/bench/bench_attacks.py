@@ -20,7 +20,7 @@ import websockets
 
 from cli.main import run as run_command
 from tests.running import ServeProcess
-from tests.service.raw import connect, request
+from tests.serving.service.raw import connect, request
 from tts2face.serving.service.keys import add_key
 
 LONG = "We were away a year ago, but Bob may move five big maps. " * 40

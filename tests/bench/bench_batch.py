@@ -110,7 +110,13 @@ def bench_queue(folder: Path, database: str, n_workers: int = 4, n_cues: int = 4
 
     plan = plan_of(folder, n_cues)
     store = folder / "store"
-    command = [sys.executable, "-m", "tests.jobs.stub_worker", database or str(folder / "jobs.sqlite"), str(store)]
+    command = [
+        sys.executable,
+        "-m",
+        "tests.serving.work.stub_worker",
+        database or str(folder / "jobs.sqlite"),
+        str(store),
+    ]
     children = [
         subprocess.Popen([*command, str(folder / "rendered"), "0"], stdin=subprocess.PIPE) for _ in range(n_workers)
     ]

@@ -19,8 +19,8 @@ N_PROFILED = 25
 
 def make(folder: Path) -> None:
     """Write the shipped head and its skin with four times the triangles as characters."""
-    from tests.characters.build.test_dense import dense_head
-    from tests.characters.made import Variant, write_character_file, write_landmarks
+    from tests.interchange.characters.build.test_dense import dense_head
+    from tests.interchange.characters.made import Variant, write_character_file, write_landmarks
 
     write_character_file(folder / "head.glb")
     write_character_file(folder / "dense.glb", Variant(is_dense=True), face=dense_head())

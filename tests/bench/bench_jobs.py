@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.bench.bench_batch import plan_of
-from tests.jobs.conftest import Postgres
+from tests.serving.work.conftest import Postgres
 from tts2face.serving.batch.segment import Segment, SegmentResult
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.work.client import list_jobs

@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from tests.render.stability import flicker, part_masks
+from tests.picture.stability import flicker, part_masks
 from tts2face.models.face import Face, keep_parts
 from tts2face.models.face_loading import load_face
 from tts2face.picture.kernels.picture import allocate_buffers

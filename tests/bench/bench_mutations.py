@@ -9,7 +9,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tests.model_files.made import write_made_talker
+from tests.models.made import write_made_talker
 from tts2face.storage.files import SHIPPED_FOLDER
 
 BATCH = 50  # mutations in one process; one that crashes ends its batch
@@ -17,7 +17,7 @@ BATCH = 50  # mutations in one process; one that crashes ends its batch
 
 def batch(kind: str, file: Path, first: int, last: int) -> list[dict]:
     """Outcomes of mutations; the one at which the process ended has the answer ``crash``."""
-    words = [sys.executable, "-m", "tests.model_files.usage", kind, str(file), str(first), str(last)]
+    words = [sys.executable, "-m", "tests.models.usage", kind, str(file), str(first), str(last)]
     tried = subprocess.run(words, capture_output=True, text=True, check=False)
     rows = [json.loads(line) for line in tried.stdout.splitlines()]
     reached = first + len(rows) - 1

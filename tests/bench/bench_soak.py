@@ -3,7 +3,7 @@
 ``PYTHONPATH=. python tests/bench/bench_soak.py --requests 20000``, as root on Linux for all attacks: synthesis
 processes and workers are killed, the data folder is filled (it lies on a file system of its own), the clock of the
 server goes back by an hour (with a C compiler), the database is away for a minute (with PostgreSQL). What cannot be
-done here is said and left out. `tests/jobs/server/test_soak.py` is a short run of the same.
+done here is said and left out. `tests/serving/work/server/test_soak.py` is a short run of the same.
 
 Memory, threads, descriptors and temporary files at the end are compared with those after 1,000 requests, before the
 attacks; every job that was accepted has ended once and its webhook has come, and no log line is a defect.
@@ -28,10 +28,10 @@ import httpx
 import pytest
 
 from tests.bench.soak_traffic import AT_ONCE, CUT, KINDS, LONG, Soak, client_of, drive
-from tests.jobs.conftest import Postgres
-from tests.jobs.watch import StoreWatch, ends_of_jobs
 from tests.running import ServeProcess, eventually
-from tests.service.receiver import Receiver
+from tests.serving.service.receiver import Receiver
+from tests.serving.work.conftest import Postgres
+from tests.serving.work.watch import StoreWatch, ends_of_jobs
 from tests.started import children
 
 MAX_GROWTH = 0.05

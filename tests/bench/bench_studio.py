@@ -13,9 +13,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.studio.chromium import Browser
-from tests.studio.harness import TEXT
-from tests.studio.served import HARNESS, Page, create_project, service_with_harness
+from tests.serving.studio.chromium import Browser
+from tests.serving.studio.harness import TEXT
+from tests.serving.studio.served import HARNESS, Page, create_project, service_with_harness
 from tts2face.serving.studio.components.stage import COMPONENTS
 
 WARM_S, PLAYED_S = 2.0, 6.0  # played before and while a page is measured

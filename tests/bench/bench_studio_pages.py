@@ -14,9 +14,9 @@ from pathlib import Path
 import httpx
 
 from tests.running import RunningService, ServeProcess, eventually
-from tests.studio.chromium import Browser
-from tests.studio.served import slowness
-from tests.studio.server.test_projects_http import create, edit, preview
+from tests.serving.studio.chromium import Browser
+from tests.serving.studio.served import slowness
+from tests.serving.studio.server.test_projects_http import create, edit, preview
 
 ROUNDS = 3
 SHOWN = "const s = window.__studio; return Boolean(s && s.frames > 0 && s.face_ms && s.view && s.view.duration > 0)"

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import BackendError
-from tests.characters.made import write_character_file
+from tests.interchange.characters.made import write_character_file
 from tts2face import Session
 from tts2face.processes.parent import call_once
 from tts2face.processes.program import Program

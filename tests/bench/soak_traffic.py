@@ -12,10 +12,10 @@ from pathlib import Path
 import httpx
 import websockets
 
-from tests.jobs.conftest import Postgres
 from tests.running import ServeProcess
-from tests.service.raw import connect, request
-from tests.service.receiver import Receiver
+from tests.serving.service.raw import connect, request
+from tests.serving.service.receiver import Receiver
+from tests.serving.work.conftest import Postgres
 
 SEED, AT_ONCE = 1, 24
 LONG = "We were away a year ago, but Bob may move five big maps. " * 20

@@ -7,7 +7,7 @@ import pytest
 
 from corpus_tools.head.mouth import mouth_vertices, scatter_in_mouth
 from corpus_tools.head.skin import HeadSkin
-from tests.render.tiny_face import tiny_face
+from tests.picture.tiny_face import tiny_face
 from tts2face.picture.occlusion import sphere_directions
 
 N_DIRECTIONS = 128

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tests.render.tiny_face import tiny_face
+from tests.picture.tiny_face import tiny_face
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_loading import load_face

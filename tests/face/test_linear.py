@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.face.posing import posed_vertices
-from tests.render.tiny_face import tiny_face
+from tests.picture.tiny_face import tiny_face
 from tts2face.face.deformation import build_rig, head_rotation, rotation_matrix
 from tts2face.models.landmarks import CHIN
 

@@ -8,8 +8,8 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from tests.face.test_hair import cap
-from tests.render.film.lit_face import lit_tiny_face
-from tests.render.tiny_face import tiny_face
+from tests.picture.film.lit_face import lit_tiny_face
+from tests.picture.tiny_face import tiny_face
 from tts2face.models.baked_light import HairLight, HairTint, table_levels
 from tts2face.models.face import Face, Hairdo, Late
 from tts2face.models.face_file import read_face, write_face

@@ -15,13 +15,13 @@ import numpy as np
 
 import tts2face
 from lexicon.errors import BackendError, DataError, InputError
-from tests.exports.made import made_clip, made_stream
 from tests.face.test_hair import cap
 from tests.face.test_lit_hair import haired_face, wig_of
 from tests.fuzz.mutations import change_bytes, change_value, json_bytes, mutate_model, toml_bytes
-from tests.gesture.test_key_curves import WHOLE
-from tests.model_files.made import write_made_face, write_made_palette, write_made_talker
-from tests.render.tiny_face import tiny_face
+from tests.gestures.test_key_curves import WHOLE
+from tests.interchange.exports.made import made_clip, made_stream
+from tests.models.made import write_made_face, write_made_palette, write_made_talker
+from tests.picture.tiny_face import tiny_face
 from tts2face.gestures.timeline_file import read_timeline, timeline_json
 from tts2face.interchange.characters.shapes import read_mapping
 from tts2face.models.face_file import Identity, read_face, write_face

@@ -105,7 +105,7 @@ def project(folder: Path) -> Fingerprint:
 
 def character(folder: Path) -> Fingerprint:
     """A character of another program: imported, saved, drawn, and animated in its own file."""
-    from tests.characters.made import Variant, head_without_mouth, write_character_file, write_landmarks
+    from tests.interchange.characters.made import Variant, head_without_mouth, write_character_file, write_landmarks
     from tts2face.interchange.characters.animation import write_character
     from tts2face.interchange.characters.importing import import_face, save_face
 
@@ -121,7 +121,7 @@ def character(folder: Path) -> Fingerprint:
 
 def own_files(folder: Path) -> Fingerprint:
     """A talker, face, palette and dictionary by file, shown by the face and then by the talker's own face."""
-    from tests.model_files.made import write_made_models, write_made_talker
+    from tests.models.made import write_made_models, write_made_talker
 
     paths = write_made_models(folder, b"away  M AA1 M AA0\n")
     write_made_talker(folder / "own.talker", has_face=True)
@@ -167,7 +167,7 @@ def similarity(folder: Path) -> Fingerprint:
 
 def http_clip(folder: Path) -> Fingerprint:
     """A clip over HTTP as a film, as curves and as sound: the bodies of the answers."""
-    from tests.service.in_process import service_client
+    from tests.serving.service.in_process import service_client
     from tts2face.serving.service.settings import ServiceSettings
 
     options = {"text": "Bob may move.", "style": "delighted", **SMALL, **CHEAP}
@@ -189,8 +189,8 @@ def http_clip(folder: Path) -> Fingerprint:
 
 def http_job(folder: Path) -> Fingerprint:
     """A job of subtitles over HTTP, with a SQLite database and a worker in this process: its results."""
-    from tests.service.in_process import service_client
-    from tests.service.job_requests import finished
+    from tests.serving.service.in_process import service_client
+    from tests.serving.service.job_requests import finished
     from tts2face.serving.batch.render import SegmentRenderer
     from tts2face.serving.service.settings import ServiceSettings
     from tts2face.serving.work.worker import Worker

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import InputError
-from tests.model_files.made import write_made_face
+from tests.models.made import write_made_face
 from tts2face.models.face_file import read_face
 from tts2face.photo import face_from_photo
 from tts2face.photo.face_from_photo import N_KEPT, find_kept, keep_face, kept_path

@@ -9,7 +9,7 @@ from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
 from lexicon.errors import DataError, InputError
-from tests.exports.test_stage_glb import Read
+from tests.interchange.exports.test_stage_glb import Read
 from tests.photo.pictures import found_in, photographed, still
 from tts2face.face.deformation import REST_HEAD, moved_landmarks
 from tts2face.interchange.exports.stage_glb import stage_glb

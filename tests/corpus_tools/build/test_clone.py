@@ -9,7 +9,7 @@ import pytest
 
 from corpus_tools.clone_talker import clone_talker, transfer_talker
 from lexicon.errors import InputError
-from tests.cloning.test_clone import gaps_of, model_of, opening_model
+from tests.lips.test_clone import gaps_of, model_of, opening_model
 from tts2face.lips.cloning import build_parameter_transfer, face_size
 from tts2face.models.talker import Talker, load_talker, read_talker
 

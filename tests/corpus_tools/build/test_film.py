@@ -15,7 +15,7 @@ from corpus_tools.film.compare import View, differences, draw_view
 from corpus_tools.film.fit_light import fit_light
 from corpus_tools.film.look import LAMPS, Look
 from corpus_tools.film.poses import EXPRESSIONS, LitPose, PoseLight, expression_pose, farthest
-from tests.characters.makehuman import makehuman
+from tests.interchange.characters.makehuman import makehuman
 from tts2face.models.baked_light import table_levels
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face

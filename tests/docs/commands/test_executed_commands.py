@@ -16,13 +16,13 @@ from PIL import Image
 
 from cli.main import run
 from corpus_tools.studies.gestures import moods
-from tests.characters.made import write_character_file, write_landmarks
 from tests.docs.blocks import (
     EXECUTED_PAGES,
     own_commands,
     reason_not_executed,
     shell_lines,
 )
+from tests.interchange.characters.made import write_character_file, write_landmarks
 from tests.photo.pictures import SMILE, still
 from tts2face import Picture, Project, Request, export, import_face, save_face, save_project
 from tts2face.models.palette import Palette, load_palette, write_palette

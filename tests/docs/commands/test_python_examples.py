@@ -6,7 +6,7 @@ import pytest
 
 from tests.docs.blocks import PAGES, code_blocks
 
-SERVICE_PAGE = "http.md"  # its examples need a service: tests/service/server/test_http_page.py
+SERVICE_PAGE = "http.md"  # its examples need a service: tests/serving/service/server/test_http_page.py
 WITH_EXAMPLES = [page for page in PAGES if code_blocks(page, "python") and page.name != SERVICE_PAGE]
 
 

@@ -1,0 +1,55 @@
+"""Blender's own importer opens GLB files, where its package bpy is installed; it runs in a process of its own."""
+
+import importlib.util
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import tts2face
+from tests.interchange.exports.made import signed_clip, with_gesture
+from tts2face.face.deformation import build_rig
+from tts2face.interchange.exports.surfaces import divide_surface
+
+FRAME = 12
+SCRIPT = """
+import json, sys
+import bpy, numpy
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.context.scene.render.fps = 30
+bpy.ops.import_scene.gltf(filepath=sys.argv[1])
+mesh = next(one for one in bpy.data.objects if one.type == "MESH" and one.data.shape_keys)
+bpy.context.scene.frame_set(int(sys.argv[2]))
+shown = mesh.evaluated_get(bpy.context.evaluated_depsgraph_get())
+places = numpy.zeros(3 * len(shown.data.vertices), numpy.float32)
+shown.data.vertices.foreach_get("co", places)
+world = numpy.array(shown.matrix_world)
+places = places.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]
+keys = {key.name: key.value for key in mesh.data.shape_keys.key_blocks}
+names = [material.name for material in mesh.data.materials]
+print("ANSWER" + json.dumps({"keys": keys, "places": places.tolist(), "materials": names}))
+"""
+
+
+def test_blender_shows_the_vertices_of_the_renderer(tmp_path):
+    if importlib.util.find_spec("bpy") is None:
+        pytest.skip("Blender's package bpy is not installed")
+    face = with_gesture()
+    clip = signed_clip(30, face)
+    tts2face.export(clip, tmp_path / "a.glb", face=face)
+    command = [sys.executable, "-c", SCRIPT, str(tmp_path / "a.glb"), str(FRAME)]
+    printed = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
+    answer = json.loads(next(line for line in printed.splitlines() if line.startswith("ANSWER")).removeprefix("ANSWER"))
+    assert list(answer["keys"]) == ["Basis", *face.shape_names, "brows0Minus"]
+    surfaces = divide_surface(face)
+    assert answer["materials"] == [surface.part.name for surface in surfaces]
+    weights = clip.motion.values[FRAME]
+    values = list(answer["keys"].values())[1:]
+    assert np.allclose(values[:4], weights[:4], rtol=0, atol=1e-4)
+    assert np.allclose(9 * (values[4] - values[5]), weights[4], rtol=0, atol=1e-3)
+    posed = build_rig(face).pose(weights, clip.head.values[FRAME]) / 1000
+    expected = np.concatenate([posed[surface.vertices] for surface in surfaces])
+    x, y, z = expected.T
+    assert np.allclose(answer["places"], np.column_stack([x, -z, y]), rtol=0, atol=2e-5)  # z is up in Blender

@@ -1,0 +1,137 @@
+"""Jobs that are refused: of other keys, beyond limits, with wrong options or files."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.running import HostService, RunningService
+from tests.serving.service.job_requests import CLIP, SMALL, submit
+from tts2face.serving.service.keys import add_key
+
+LIMITS = {"job_waiting": 3, "job_cues": 3, "job_files": 2, "job_s": 60, "text_characters": 500, "workers": 0}
+
+
+Idle = tuple[RunningService, dict[str, httpx.Client]]
+
+
+@pytest.fixture(scope="module")
+def idle(host: HostService, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Idle]:
+    """A service without workers, with small limits, and clients of its keys."""
+    keys = tmp_path_factory.mktemp("keys") / "keys.toml"
+    scopes = {"ann": ["speak"], "bob": ["speak"], "boss": ["speak", "admin"], "smith": ["build"]}
+    secrets = {name: add_key(keys, name, found) for name, found in scopes.items()}
+    with host(keys=keys, **LIMITS) as running, ExitStack() as stack:
+        yield (
+            running,
+            {
+                name: stack.enter_context(
+                    httpx.Client(base_url=running.url, timeout=60.0, headers={"Authorization": f"Bearer {secret}"})
+                )
+                for name, secret in secrets.items()
+            },
+        )
+
+
+def test_a_key_sees_its_own_jobs_only(idle: Idle) -> None:
+    _, clients = idle
+    ann, bob, boss = clients["ann"], clients["bob"], clients["boss"]
+    job = submit(ann, CLIP).json()
+    other = submit(bob, CLIP).json()
+    assert [one["id"] for one in ann.get("/v1/jobs").json()["jobs"]] == [job["id"]]
+    assert [one["id"] for one in boss.get("/v1/jobs").json()["jobs"]] == [other["id"], job["id"]]
+    first = boss.get("/v1/jobs", params={"limit": 1, "state": "waiting"}).json()
+    second = boss.get("/v1/jobs", params={"limit": 1, "before": first["next"]}).json()
+    assert [one["id"] for one in (*first["jobs"], *second["jobs"])] == [other["id"], job["id"]]
+    assert second["next"] is None
+    calls: tuple[Callable[..., httpx.Response], ...] = (bob.get, bob.delete)
+    for call in calls:
+        assert call(f"/v1/jobs/{job['id']}").status_code == 404
+    assert bob.post(f"/v1/jobs/{job['id']}/cancel").status_code == 404
+    assert bob.get(f"/v1/jobs/{job['id']}/events").status_code == 404
+    assert boss.get(f"/v1/jobs/{job['id']}").status_code == 200
+    answer = submit(clients["smith"], CLIP)
+    assert (answer.status_code, answer.json()["error"]["code"]) == (403, "forbidden")
+    for client, one in ((ann, job), (bob, other)):
+        assert client.delete(f"/v1/jobs/{one['id']}").status_code == 204
+
+
+def test_waiting_jobs_of_a_key_are_limited(idle: Idle) -> None:
+    _, clients = idle
+    made = [submit(clients["ann"], CLIP) for _ in range(4)]
+    assert [one.status_code for one in made] == [202, 202, 202, 429]
+    assert int(made[-1].headers["retry-after"]) > 0
+    other = submit(clients["bob"], CLIP)
+    assert other.status_code == 202
+    for one in made[:3]:
+        assert clients["ann"].delete(one.headers["location"]).status_code == 204
+    clients["bob"].delete(other.headers["location"])
+
+
+@pytest.mark.parametrize(
+    ("body", "status", "reason"),
+    [
+        ({"kind": "fly"}, 422, "no job of kind 'fly' here; the kinds are clip, subtitles, talker"),
+        ({"kind": "clip"}, 400, "nothing to say"),
+        ({"kind": "clip", "request": {**CLIP, "speed": 2}}, 422, "speed: Extra inputs are not permitted"),
+        ({"kind": "clip", "request": {**CLIP, "voice": "../x.onnx"}}, 400, "no voice '../x.onnx'"),
+        ({"kind": "clip", "request": {**CLIP, "talker": "/etc/passwd"}}, 400, "no talker '/etc/passwd'"),
+        ({"kind": "clip", "request": {**CLIP, "size": "3x3"}}, 400, "size must be"),
+        ({"kind": "clip", "request": {**CLIP, "language": "Klingonese"}}, 400, "language"),
+        ({"kind": "clip", "request": {**CLIP, "text": "x" * 501}}, 413, "more than 500 characters"),
+        ({"kind": "clip", "request": CLIP, "priority": 1}, 422, "priority: Extra inputs"),
+        ({"kind": "subtitles", "request": SMALL}, 422, "there are no subtitles"),
+        ({"kind": "subtitles", "request": {**SMALL, "exports": ["exe"]}}, 422, "no subtitles"),
+        ([], 422, "body"),
+    ],
+)
+def test_wrong_jobs_are_refused(idle: Idle, body: object, status: int, reason: str) -> None:
+    answer = idle[1]["ann"].post("/v1/jobs", json=body)
+    assert (answer.status_code, reason in answer.json()["error"]["message"]) == (status, True), answer.text
+
+
+def role(**settings: str) -> dict[str, Any]:
+    """Options with a cast."""
+    return {"cast": {"role": [{"speaker": "ANN", **settings}]}}
+
+
+def cues(number: int, at: int = 0) -> bytes:
+    return "\n".join(
+        f"{n + 1}\n00:00:{at + n:02d},000 --> 00:00:{at + n + 1:02d},000\nWords.\n" for n in range(number)
+    ).encode()
+
+
+@pytest.mark.parametrize(
+    ("request_", "files", "status", "reason"),
+    [
+        ({}, [("subtitles", b"\x00\x01")], 422, "contains no subtitles"),
+        ({}, [("subtitles", b'<!DOCTYPE tt [<!ENTITY a "b">]><tt>&a;</tt>')], 422, "subtitles-001 cannot"),
+        ({}, [("subtitles", cues(4))], 422, "4 cues, more than 3"),
+        ({}, [("subtitles", cues(2)), ("subtitles", cues(2))], 413, "more than 3 cues"),
+        ({}, [("subtitles", cues(1))] * 3, 413, "more than 2 subtitle files"),
+        ({}, [("subtitles", cues(1).replace(b"00:00:01", b"01:00:01"))], 413, "longer than 60 s"),
+        ({}, [("subtitles", cues(1)), ("audio", b"no sound")], 422, "audio-001 cannot be used"),
+        ({}, [("subtitles", cues(1)), ("timeline", b"{}")], 422, "there is no part 'timeline'"),
+        ({"encoding": "klingon"}, [("subtitles", b"\xff\xfe\xfd")], 422, "klingon"),
+        ({"exports": ["exe"]}, [("subtitles", cues(1))], 400, "exe"),
+        ({"cast": "[[role"}, [("subtitles", cues(1))], 422, "cast is not TOML"),
+        (role(talker="/etc/passwd"), [("subtitles", cues(1))], 400, "no talker"),
+        (role(voice="x.onnx"), [("subtitles", cues(1))], 400, "no voice"),
+        (role(dictionary="/etc/passwd"), [("subtitles", cues(1))], 400, "no dictionary"),
+        (role(shell="rm"), [("subtitles", cues(1))], 422, "no setting 'shell'"),
+        ({"background": "transparent"}, [("subtitles", cues(1))], 400, "no transparency"),
+    ],
+)  # fmt: skip
+def test_wrong_subtitle_jobs_are_refused(
+    idle: Idle, request_: dict[str, Any], files: list[tuple[str, bytes]], status: int,
+    reason: str,
+) -> None:  # fmt: skip
+    running, clients = idle
+    form = {"job": json.dumps({"kind": "subtitles", "request": {**SMALL, **request_}})}
+    answer = clients["ann"].post("/v1/jobs", data=form, files=files)
+    assert (answer.status_code, reason in answer.json()["error"]["message"]) == (status, True), answer.text
+    assert running.data.name not in answer.text
+    assert "/tmp" not in answer.text

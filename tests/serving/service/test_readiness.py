@@ -1,0 +1,150 @@
+"""What /readyz finds missing, and what a running job says while its disk is full."""
+
+import asyncio
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from tests.running import eventually
+from tests.serving.service.in_process import service_client
+from tts2face.serving.service import readiness
+from tts2face.serving.service.preparation import Preparation, Step
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.work.changes import JobChanges
+from tts2face.serving.work.connection import JobDatabase
+from tts2face.serving.work.database import database_url, prepare_database
+from tts2face.serving.work.run import CHECK_S, FULL, JobWatch
+from tts2face.serving.work.table import NewJob
+from tts2face.session.functions import SessionCache
+
+MB = 1 << 20
+
+
+@pytest.fixture
+def free(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
+    """Free bytes of all disks."""
+    found = {"bytes": 1000 * MB}
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=found["bytes"]))
+    return found
+
+
+@pytest.fixture
+def client(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClient]:
+    """Client of a service whose data folder is there and whose database is elsewhere."""
+    monkeypatch.setattr(readiness, "LOOK_S", 0.0)
+    settings = ServiceSettings(workers=0, data=tmp_path / "data", database=str(tmp_path / "jobs.sqlite"))
+    with service_client(settings, SessionCache(1)) as client:
+        yield client
+
+
+def ready(client: TestClient) -> tuple[int, list[str], list[str]]:
+    """Status, names of what is missing, and the reasons."""
+    answer = client.get("/readyz")
+    content = answer.json()
+    return answer.status_code, [name for name, is_well in content["checks"].items() if not is_well], content["missing"]
+
+
+def test_a_service_with_all_it_needs_is_ready(client: TestClient, free: dict[str, int]) -> None:
+    assert ready(client) == (200, [], [])
+    assert set(client.get("/readyz").json()["checks"]) == {
+        "models", "data", "temporary", "database", "workers", "accepting",
+    }  # fmt: skip
+
+
+def test_a_full_disk_is_named(client: TestClient, free: dict[str, int]) -> None:
+    """By /readyz, and by the refusal of a job when its database cannot write."""
+    free["bytes"] = 12 * MB
+    status, names, reasons = ready(client)
+    assert (status, names) == (503, ["data", "temporary"])
+    assert reasons[0] == "the disk of the data folder has 12 MB free, and work needs 200; free some space"
+    refused = client.app.state.service.jobs._unavailable()  # type: ignore[attr-defined]
+    assert refused.message.startswith("the jobs are not available now: the disk of the data folder has 12 MB free")
+    free["bytes"] = 300 * MB
+    assert ready(client) == (200, [], [])
+    refused = client.app.state.service.jobs._unavailable()  # type: ignore[attr-defined]
+    assert "their database cannot be reached" in refused.message
+
+
+def test_a_data_folder_that_is_gone_is_named(client: TestClient, tmp_path: Path) -> None:
+    shutil.rmtree(tmp_path / "data")
+    status, names, reasons = ready(client)
+    assert (status, names) == (503, ["data"])
+    assert reasons == [
+        "the data folder cannot be written (No such file or directory); check its place, its rights and its disk"
+    ]
+    assert str(tmp_path) not in reasons[0]
+
+
+def test_what_is_still_prepared_is_named(client: TestClient) -> None:
+    pool = client.app.state.service.pool  # type: ignore[attr-defined]
+    pool.processes[0].is_ready = False
+    pool.preparation = Preparation([Step("kernels of motion", "", {}, is_shared=True), Step("voice", "", {})], 2)
+    seen = []
+
+    async def call(*_: object) -> None:
+        pool.processes[0].is_ready = len(seen) > 1  # at last another one is ready
+        seen.append((*ready(client), client.get("/readyz").json()["preparing"]))
+
+    asyncio.run(pool.preparation.run(call, 0))
+    asyncio.run(pool.preparation.run(call, 1))
+    assert seen[:2] == [
+        (503, ["models"], [f"the service prepares {part} ({done} of 3 steps are done); wait, or see the log"],
+         {"parts": [part], "done": done, "of": 3})
+        for done, part in enumerate(["kernels of motion", "voice"])
+    ]  # fmt: skip
+    assert seen[2] == (200, [], [], {"parts": ["voice"], "done": 2, "of": 3})
+    assert client.get("/readyz").json()["preparing"] == {"parts": [], "done": 3, "of": 3}
+
+
+def test_workers_that_have_ended_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(readiness, "LOOK_S", 0.0)
+    with service_client(ServiceSettings(workers=1, data=tmp_path), SessionCache(1)) as client:
+        eventually(lambda: ready(client)[0] == 200)
+        jobs = client.app.state.service.jobs  # type: ignore[attr-defined]
+        jobs._stopped.set()
+        jobs._supervisor.join()
+        assert ready(client) == (503, ["workers"], ["none of 1 job workers is alive; see the log"])
+
+
+def test_a_running_job_says_why_it_waits(tmp_path: Path, free: dict[str, int], monkeypatch: pytest.MonkeyPatch) -> None:
+    url = database_url(tmp_path / "jobs.sqlite")
+    prepare_database(url)
+    database = JobDatabase(url)
+    try:
+        changes = JobChanges(database)
+        changes.table.submit(NewJob("one", "a", "clip", {}, "0"), lambda *_: None)
+        job = changes.begin("one")
+        assert job is not None
+        watch = JobWatch(job, changes, tmp_path)
+        clock = Clock(monkeypatch)
+
+        def state() -> tuple[str | None, list[Any]]:
+            clock.now += 2 * CHECK_S
+            watch.check()
+            found = changes.table.get("one")
+            assert found is not None
+            return found.error, [one.content for one in changes.table.events("one", 2)[0]]
+
+        assert state() == (None, [])
+        free["bytes"] = 100 * MB
+        assert state() == (FULL, [{"type": "paused", "reason": FULL}])
+        assert state()[0] == FULL
+        other = JobWatch(changes.table.get("one") or job, changes, tmp_path)  # of the worker that takes over
+        assert other._is_paused
+        free["bytes"] = 300 * MB
+        assert state() == (None, [{"type": "paused", "reason": FULL}, {"type": "continued"}])
+    finally:
+        database.close()
+
+
+class Clock:
+    """Seconds of the watch of a job."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = 1000.0
+        monkeypatch.setattr("tts2face.serving.work.run.time", SimpleNamespace(monotonic=lambda: self.now))

@@ -1,0 +1,55 @@
+"""A running service with the studio and the harness, and a browser: one of each for each process of the tests."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from tests.conftest import SHARED
+from tests.running import RunningService
+from tests.serving.studio.chromium import Browser, open_browser
+from tests.serving.studio.fake_camera import write_fake_media
+
+pytest.importorskip("nicegui", reason="needs `pip install 'tts2face[studio]'`")
+
+SPOKEN = SHARED / "recordings" / "grid_s1" / "clips" / "bbaf2n.mkv"  # "bin blue at f two now"
+
+
+@pytest.fixture(scope="module")
+def studio_service(service: RunningService) -> Iterator[RunningService]:
+    """The service of the run, with the harness; the tests of a file leave no traceback in its log."""
+    begin = len(service.lines)
+    yield service
+    assert not [event for event in service.events()[begin:] if "traceback" in event]
+
+
+@pytest.fixture
+def studio(studio_service: RunningService) -> Iterator[httpx.Client]:
+    with httpx.Client(base_url=f"{studio_service.url}/studio", timeout=120.0) as made:
+        yield made
+
+
+@pytest.fixture
+def data(studio_service: RunningService) -> Path:
+    """Data folder of the service."""
+    return Path(studio_service.data.name)
+
+
+@pytest.fixture(scope="session")
+def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A window whose camera and microphone play a recording of GRID, if there is one."""
+    arguments = write_fake_media(SPOKEN, tmp_path_factory.mktemp("camera")) if SPOKEN.is_file() else []
+    with open_browser(arguments=arguments) as opened:
+        yield opened
+
+
+@pytest.fixture
+def browser(window: Browser) -> Iterator[Browser]:
+    """The window; the test's pages write no errors to its console."""
+    window.errors()
+    yield window
+    try:
+        assert window.errors() == []
+    finally:
+        window.open("about:blank")  # a page that stays draws its face in one core
