@@ -6,14 +6,18 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the processes of a run sha
 
 import gc
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from tts2face.numeric.kernels import CACHE_VARIABLE, FOLDER
 
 os.environ.setdefault(CACHE_VARIABLE, str(FOLDER))  # processes with another home compile nothing again
+
+if TYPE_CHECKING:
+    from tests.world import World
 
 pytest_plugins = ["tests.started", "tests.running", "tests.models_once"]
 
@@ -43,20 +47,31 @@ def shared_recordings() -> Path:
 
 @pytest.fixture(scope="session")
 def rendered_takes() -> Path:
-    """Videos of a speaking head with transcripts and word times; see `tests.rendered_takes`."""
-    from tests.kept import kept_folder
-    from tests.rendered_takes import render_takes
-
-    return kept_folder(render_takes)
+    """Videos of a speaking head with transcripts and word times, to read only; see `tests.rendered_takes`."""
+    return TESTS / "takes"
 
 
 @pytest.fixture(scope="session")
 def rendered_capture() -> Path:
-    """A Live Link Face capture of a speaking face; its sound is in the same folder."""
-    from tests.kept import kept_folder
-    from tests.rendered_takes import CAPTURE_NAME, write_capture
+    """A Live Link Face capture of a speaking face, to read only; its sound is in the same folder."""
+    return TESTS / "takes" / "take.csv"
 
-    return kept_folder(write_capture) / f"{CAPTURE_NAME}.csv"
+
+@pytest.fixture(scope="session")
+def world(tmp_path_factory: pytest.TempPathFactory) -> "World":
+    """The small made world, see `tests.world`."""
+    from tests.world import make_world
+
+    return make_world(tmp_path_factory.mktemp("world"))
+
+
+@pytest.fixture(scope="module")
+def tones(world: "World") -> "Iterator[World]":
+    """The made world, while this process has its voice."""
+    from tests.world import voice_of_tones
+
+    with voice_of_tones(world):
+        yield world
 
 
 @pytest.fixture(scope="session", params=["rendered", "real"])
