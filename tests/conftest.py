@@ -19,7 +19,7 @@ os.environ.setdefault(CACHE_VARIABLE, str(FOLDER))  # processes with another hom
 if TYPE_CHECKING:
     from tests.world import World
 
-pytest_plugins = ["tests.started", "tests.running", "tests.models_once"]
+pytest_plugins = ["tests.started", "tests.running"]
 
 TESTS = Path(__file__).resolve().parent
 GROUPS = {  # name of a folder and of a marker: what the tests in it do

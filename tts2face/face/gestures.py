@@ -27,6 +27,7 @@ from tts2face.models.face import Face
 from tts2face.models.landmarks import LID_RINGS, LIP_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.models.palette import FEATURES, FIXED_CHANNELS, REGION_FEATURES, FaceRegion, Palette
 from tts2face.numeric.arrays import ordered_product
+from tts2face.numeric.reuse import shared
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
 # Expression weights at which the mouth begins to respond and responds in full: a neutral speaker scores up to 0.1 sad
@@ -54,7 +55,7 @@ class FaceMotion:
     head: Trajectory
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class GestureFace:
     """Face prepared for the gestures of a palette; built by `gesture_face`.
 
@@ -185,6 +186,7 @@ def check_gestures(
             raise InputError(f"the gain of {name} must be 0 or more, not {gain}")
 
 
+@shared
 def gesture_face(face: Face, palette: Palette) -> GestureFace:
     """Face prepared for the gestures of a palette.
 

@@ -31,6 +31,7 @@ from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.networks import PhoneNetwork
 from tts2face.models.talker import Talker, require_appearance, speech_channels
 from tts2face.numeric.arrays import interpolate_columns, smoothstep
+from tts2face.numeric.reuse import shared
 from tts2face.types import Trajectory, YieldTurn, keep_on
 
 RELEASE_FROM_S = 0.08  # distance from speech at which the transition to rest begins
@@ -45,7 +46,7 @@ MIN_EASE_S = 0.06  # transition from and to rest if a clip begins or ends within
 DEFAULT_OPTIONS = SynthesisOptions()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class ExemplarModel:
     """A talker indexed for synthesis: tokens, their index, phone similarity, and reference poses.
 
@@ -65,6 +66,7 @@ class ExemplarModel:
     network: PhoneNetwork | None
 
 
+@shared
 def build_exemplar_model(talker: Talker) -> ExemplarModel:
     """Index a talker's tokens and compute the similarity of its phones."""
     model, n_speech = talker.model, talker.model.n_speech

@@ -7,6 +7,7 @@ from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import KIND, read_face
 from tts2face.models.hair import BALD, attach_hair, parse_hair_colour
 from tts2face.models.hair_file import LitHair, haircut_names, load_hair, tint_hair, wear_hair
+from tts2face.numeric.reuse import Shared, file_state
 from tts2face.request import DRAWN_FACE, REALISTIC_FACE
 from tts2face.storage.files import FORMER, SHIPPED_FOLDER, find_file
 
@@ -14,7 +15,7 @@ from tts2face.storage.files import FORMER, SHIPPED_FOLDER, find_file
 def load_face(
     name: str, identity: str | None = None, *, hair: str | None = None, hair_color: str | None = None
 ) -> Face:
-    """Load a face with its hair.
+    """A face with its hair. All who load the same one share it; files that have changed are read again.
 
     Parameters
     ----------
@@ -36,6 +37,15 @@ def load_face(
         A file is damaged, or the haircut belongs to another kind of head.
     """
     path = find_file(name, KIND)
+    of_hair = SHIPPED_FOLDER if hair is None or not Path(hair).suffix else Path(hair)  # that of a face is shipped
+    key = (file_state(path), file_state(of_hair), identity, hair, hair_color, name in FORMER[KIND])
+    return _FACES.get(key, lambda: _read_face(name, path, identity, hair, hair_color))
+
+
+_FACES: Shared[Face] = Shared()
+
+
+def _read_face(name: str, path: Path, identity: str | None, hair: str | None, hair_color: str | None) -> Face:
     face = read_face(path, identity, checks_pictures=path.parent != SHIPPED_FOLDER)
     if name in FORMER[KIND]:
         return face  # options of its hair are those of the former face

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.numeric.reuse import Shared, file_state
 from tts2face.storage.files import find_file
 from tts2face.storage.schema import Check, Contents, Tensor, free, millimetres, number, record, refuse, table, text
 from tts2face.storage.tensors import read_tensors, write_tensors
@@ -207,13 +208,15 @@ class Style:
     steps: Mapping[str, Float32Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check that all parts have the same number of frames."""
+        """Check that all parts have the same number of frames, then make the arrays read-only."""
         n_frames = int(self.lengths.sum())
         if n_frames == 0 or not len(self.intensity) == len(self.pitch) == n_frames:
             raise DataError("a style's recordings, intensity and pitch differ in length; build the palette again")
         for name, values in self.motion.items():
             if name not in FEATURES or len(values) != n_frames:
                 raise DataError(f"a style's {name} does not fit its {n_frames} frames; build the palette again")
+        for array in (self.lengths, self.intensity, self.pitch, *self.motion.values(), *self.steps.values()):
+            array.setflags(write=False)
 
     @property
     def seconds(self) -> float:
@@ -260,7 +263,7 @@ class Derivation:
     delivery: Delivery = PLAIN
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Palette:
     """Recorded and derived gesture styles by name.
 
@@ -397,8 +400,15 @@ def read_palette(path: Path) -> Palette:
 
 
 def load_palette(name: str) -> Palette:
-    """Load a shipped palette by name, or one from a ``.palette`` file; errors as `find_file` and `read_palette`."""
-    return read_palette(find_file(name, KIND))
+    """A shipped palette by name, or one from a ``.palette`` file; errors as `find_file` and `read_palette`.
+
+    All who load the same file share one palette; a file that has changed is read again.
+    """
+    path = find_file(name, KIND)
+    return _PALETTES.get(file_state(path), lambda: read_palette(path))
+
+
+_PALETTES: Shared[Palette] = Shared()
 
 
 def _palette_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> Palette:

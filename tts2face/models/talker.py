@@ -21,6 +21,7 @@ from tts2face.models.networks import (
     score_map_from_arrays,
 )
 from tts2face.models.talker_schema import check_talker
+from tts2face.numeric.reuse import Shared, file_state
 from tts2face.storage.files import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.types import HEAD_CHANNELS, Trajectory
@@ -95,8 +96,14 @@ class Utterance:
     intensity: NDArray[np.float32]
     appearance_parameters: NDArray[np.float32] | None = None
 
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for array in (self.shape, self.head, self.intensity, self.appearance_parameters):
+            if array is not None:
+                array.setflags(write=False)
 
-@dataclass(frozen=True, slots=True, eq=False)
+
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Talker:
     """Visual speech of one person: shape model, utterances, metadata and, with consent, an appearance model.
 
@@ -204,8 +211,15 @@ def read_talker(path: Path) -> Talker:
 
 
 def load_talker(name: str) -> Talker:
-    """Load a shipped talker by name, or one from a ``.talker`` file; errors as `find_file` and `read_talker`."""
-    return read_talker(find_file(name, KIND))
+    """A shipped talker by name, or one from a ``.talker`` file; errors as `find_file` and `read_talker`.
+
+    All who load the same file share one talker; a file that has changed is read again.
+    """
+    path = find_file(name, KIND)
+    return _TALKERS.get(file_state(path), lambda: read_talker(path))
+
+
+_TALKERS: Shared[Talker] = Shared()
 
 
 def _talker_from_arrays(arrays: dict[str, NDArray[Any]], header: dict[str, Any]) -> Talker:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tts2face.face.deformation import FaceRig, build_rig
 from tts2face.models.face import Face, FacePart, Texture
 from tts2face.numeric.arrays import unit_vectors
+from tts2face.numeric.reuse import shared
 from tts2face.picture.kernels.eyes import EyeGeometry, eye_geometry
 from tts2face.picture.kernels.raster import FIRST, HOLES, LATER, NOT_DRAWN, TRANSLUCENT
 from tts2face.picture.kernels.shade import N_SCATTER_PASSES, SCATTER_MM
@@ -208,7 +209,7 @@ def card_tangents(points: NDArray[np.floating], triangles: NDArray[np.int32], uv
     return tangents
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Surface:
     """Constant arrays for drawing a face.
 
@@ -241,6 +242,7 @@ class Surface:
     eyes: EyeGeometry
 
 
+@shared
 def build_surface(face: Face, *, scatters: bool = True) -> Surface:
     """Surface of a face; `scatters` is whether light spreads under its skin."""
     parts = face.parts

@@ -37,6 +37,7 @@ from tts2face.lips.retargeting import Retargeter, build_retargeter
 from tts2face.models.face import Face
 from tts2face.models.palette import MEASURED_STYLE, Palette
 from tts2face.models.talker import Talker
+from tts2face.numeric.reuse import shared
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import FrameRenderer, marked, mesh_renderer
 from tts2face.request import NATURAL
@@ -175,7 +176,7 @@ class AnimatedFace(Protocol):
         """
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class MeshFace:
     """A mesh to whose shapes the talker's motion is retargeted; `gestures` is None without a palette."""
 
@@ -257,6 +258,7 @@ class MeshFace:
         return marked(mesh_renderer(self.mesh, picture))
 
 
+@shared
 def mesh_face(talker: Talker, exemplars: ExemplarModel, face: Face) -> MeshFace:
     """Prepare a mesh for a talker, without gestures.
 

@@ -16,6 +16,7 @@ from tts2face.interchange.exports.writer import ExportWriter, mesh_of, plan_expo
 from tts2face.models.face import Face
 from tts2face.models.face_loading import default_face, load_face
 from tts2face.models.palette import load_palette
+from tts2face.numeric.reuse import free_unused
 from tts2face.picture.film import write_clips
 from tts2face.picture.options import Picture
 from tts2face.session.animated_face import AnimatedFace
@@ -231,8 +232,10 @@ class SessionCache:
                 self._sessions.popitem(last=False)
             gc.collect()  # sessions hold themselves in circles
             self._sessions[key] = models.open_session(self._voices, memory_mb=self._memory_mb if owner else 0.0)
+            free_unused()  # models of the released sessions that the new one does not share
         while self._max_bytes is not None and len(self._sessions) > 1 and resident_bytes() > self._max_bytes:
             self._sessions.popitem(last=False)
+            free_unused()
             gc.collect()
         return self._sessions[key]
 

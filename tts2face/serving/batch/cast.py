@@ -27,7 +27,7 @@ from lexicon.inputs import check_type, format_value, is_file, parse_toml, read_t
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.models.face_loading import load_face
 from tts2face.models.hair import BALD
-from tts2face.models.palette import Palette, load_palette
+from tts2face.models.palette import load_palette
 from tts2face.request import NATURAL, OWN_FACE, Request, parse_articulation
 from tts2face.session.catalogue import identities
 from tts2face.session.named_models import Models
@@ -186,7 +186,7 @@ def check_names(models: Models, request: Mapping[str, Any]) -> None:
         if models.face == OWN_FACE and factor != NATURAL:
             raise InputError("a talker's own face articulates as recorded; remove articulation, or choose another face")
     if request.get("style") is not None and models.palette is not None:
-        _palette(models.palette).require(str(request["style"]))
+        load_palette(models.palette).require(str(request["style"]))
 
 
 @lru_cache(maxsize=64)
@@ -199,8 +199,3 @@ def _check_hair(face: str, hair: str | None, colour: str | None) -> None:
 @lru_cache(maxsize=64)
 def _identities(face: str) -> tuple[str, ...]:
     return () if face == OWN_FACE else tuple(one.name for one in identities(face))
-
-
-@lru_cache(maxsize=8)
-def _palette(name: str) -> Palette:
-    return load_palette(name)
