@@ -119,7 +119,7 @@ def retarget(  # noqa: PLR0913 - one parameter a flag
     refuse_overwriting({"--out": out}, {"the recordings": recordings, "--face": face, "--model": model})
     from corpus_tools.run_options import RunOptions, ignore_stage
     from corpus_tools.studies.retargeting.page import write_retargeting
-    from tts2face.models.face_loading import default_face
+    from tts2face.models.face_names import default_face
 
     with stage_bar() as stages:
         study = write_retargeting(

@@ -1,17 +1,21 @@
 """Voices, export formats and tools of other packages, by their entry points (docs/plugins.md)."""
 
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import BackendError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
 
 VOICES, EXPORTS, TOOLS = "tts2face.voices", "tts2face.exports", "tts2face.tools"  # groups of entry points
 
 
 @cache
-def declared(group: str) -> dict[str, EntryPoint]:
+def declared(group: str) -> "dict[str, EntryPoint]":
     """What the installed packages declare in a group, by name, in the order of names."""
+    from importlib.metadata import entry_points  # names that are shipped need none
+
     return {one.name: one for one in sorted(entry_points(group=group), key=lambda one: one.name)}
 
 

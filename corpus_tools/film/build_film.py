@@ -16,7 +16,8 @@ from corpus_tools.head.source import SourceMesh
 from corpus_tools.training.calibrate_face import calibrate_face_file
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
-from tts2face.models.hair_file import OF_FACE, write_lit_hair
+from tts2face.models.face_names import OF_FACE
+from tts2face.models.hair_file import write_lit_hair
 
 
 def bake_face(

@@ -10,7 +10,7 @@ import pytest
 
 import tts2face
 from lexicon.errors import InputError
-from tts2face.session.outputs import media_types
+from tts2face.session.encoded_stream import media_types
 
 TEXT = (
     "<speak>Bob may move. <break time='300ms'/> We were away, loud and <prosody volume='+4dB'>clear</prosody>.</speak>"

@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 from PIL import Image
 
-from tts2face.processes.parent import started
+from tts2face.processes.async_parent import started
 from tts2face.serving.studio.camera import PROGRAM
 from tts2face.serving.studio.camera_process import FOLLOW
 from tts2face.video.media import read_frames

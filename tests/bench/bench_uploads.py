@@ -14,7 +14,7 @@ from typing import Any
 from lexicon.errors import BackendError
 from tests.interchange.characters.made import write_character_file
 from tts2face import Session
-from tts2face.processes.parent import call_once
+from tts2face.processes.async_parent import call_once
 from tts2face.processes.program import Program
 from tts2face.serving.work.kinds import BUILDER, LIMITS, TOOL
 from tts2face.serving.work.uploaded_file import DECODE, program

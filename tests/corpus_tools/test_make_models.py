@@ -10,7 +10,7 @@ import pytest
 from corpus_tools.drawn.build_drawn import CAST
 from corpus_tools.drawn.worn import HAIRCUTS
 from corpus_tools.make_models import __main__ as make_models
-from tts2face.models.hair_file import OF_FACE
+from tts2face.models.face_names import OF_FACE
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
 from tts2face.storage.files import SHIPPED_FOLDER

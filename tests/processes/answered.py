@@ -7,9 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from tts2face.processes.async_parent import call_once
 from tts2face.processes.child import Call, Handler, answer
 from tts2face.processes.message import Message, read_message
-from tts2face.processes.parent import ChildEndedError, call_once
+from tts2face.processes.parent import ChildEndedError
 from tts2face.processes.program import Program
 from tts2face.serving.work.resource_check import RefusedFileError
 from tts2face.serving.work.uploaded_file import DECODE, program

@@ -20,8 +20,9 @@ from tests.processes.handlers import NarrowError
 from tests.running import eventually
 from tests.started import running_processes
 from tts2face.processes import parent
+from tts2face.processes.async_parent import AsyncChild, started
 from tts2face.processes.message import Message
-from tts2face.processes.parent import AsyncChild, Child, ChildEndedError, raised, started
+from tts2face.processes.parent import Child, ChildEndedError, raised
 from tts2face.processes.program import ProcessLimits, Program
 
 PROGRAM = Program("tests.processes.handlers:HANDLERS")

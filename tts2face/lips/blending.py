@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.lips.options import SynthesisOptions
 from tts2face.lips.tokens import Targets, Tokens, read_motion
+from tts2face.numeric.filters import gaussian
 from tts2face.numeric.kernels import inlined_kernel, kernel
 
 FloatArray = NDArray[np.float64]
@@ -295,6 +296,4 @@ def gaussian_smooth(values: NDArray[np.floating], sigma_s: float, rate_hz: float
     """
     if sigma_s == 0:
         return np.array(values, np.float32)
-    from scipy.ndimage import gaussian_filter1d
-
-    return np.asarray(gaussian_filter1d(values.astype(np.float32), sigma_s * rate_hz, axis=0, mode="nearest"))
+    return gaussian(values.astype(np.float32), sigma_s * rate_hz)

@@ -5,10 +5,10 @@ from pathlib import Path
 from lexicon.errors import DataError, InputError
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import KIND, read_face
-from tts2face.models.hair import BALD, attach_hair, parse_hair_colour
-from tts2face.models.hair_file import LitHair, haircut_names, load_hair, tint_hair, wear_hair
+from tts2face.models.face_names import BALD
+from tts2face.models.hair import attach_hair, parse_hair_colour
+from tts2face.models.hair_file import LitHair, load_hair, tint_hair, wear_hair
 from tts2face.numeric.reuse import Shared, file_state
-from tts2face.request import DRAWN_FACE, REALISTIC_FACE
 from tts2face.storage.files import FORMER, SHIPPED_FOLDER, find_file
 
 
@@ -74,9 +74,3 @@ def _lit_face(face: Face, chosen: Hairdo) -> Face:
             raise DataError(f"the haircut {chosen.haircut} is for heads; choose another face or one of its haircuts")
         face = wear_hair(face, hair)
     return face if chosen.colour == own.colour else tint_hair(face, chosen.colour)
-
-
-def default_face(identity: str | None, hair: str | None) -> str:
-    """Face that is shown where none is named: the one that the other options belong to."""
-    is_for_heads = hair is not None and (hair in (BALD, *haircut_names()) or bool(Path(hair).suffix))
-    return DRAWN_FACE if identity is None and not is_for_heads else REALISTIC_FACE

@@ -48,7 +48,6 @@ def _parsed(colour: str, kind: str, names: Mapping[str, str]) -> NDArray[np.floa
 
 
 HAIR_PART = "hair"
-BALD = "bald"  # haircut without hair
 MEAN_RELIEF = 128.0  # relief at which a strand has the colour of the hair
 MATERIAL = FacePart(HAIR_PART, 0, 0, specular=0.3, shininess=24.0, wrap=0.3, cutout=True, kind="strands")
 

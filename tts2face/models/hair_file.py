@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError, InputError
 from tts2face.models.baked_light import BakedLight, HairLight, HairTint, grey_curves
 from tts2face.models.face import Face, Hairdo, Late, Texture
+from tts2face.models.face_names import BALD, HAIR_KIND, OF_FACE, haircut_names
 from tts2face.models.face_schema import (
     MAX_OCCLUSION_BYTES,
     decode_occlusion,
@@ -24,7 +25,7 @@ from tts2face.models.face_schema import (
     encode_uv,
     round_places,
 )
-from tts2face.models.hair import BALD, HAIR_PART, Hair, parse_hair_colour
+from tts2face.models.hair import HAIR_PART, Hair, parse_hair_colour
 from tts2face.models.light_coding import (
     HAIR_QUALITY,
     SHAPE_TENSORS,
@@ -217,8 +218,6 @@ def _tinted(light: BakedLight, tint: HairTint, srgb: NDArray[np.float64]) -> Bak
     return replace(light, pages=pages, camera_modes=cameras)
 
 
-KIND = "hair"
-OF_FACE = "-"  # between the names of a face with baked light and of its haircut, in the name of a file
 LEAST_STEP_MM = 0.01  # of shapes
 FORMAT_VERSION = 1
 
@@ -279,7 +278,7 @@ def write_hair(path: Path, hair: Hair) -> None:
         if bits is not None:
             arrays[name], n_bytes = encode_occlusion(bits[None]), bits.shape[1]
     header = {"n_face_vertices": hair.n_face_vertices, "occlusion_bytes": n_bytes, "metadata": dict(hair.metadata)}
-    write_tensors(path, KIND, FORMAT_VERSION, arrays, header, is_packed=True)
+    write_tensors(path, HAIR_KIND, FORMAT_VERSION, arrays, header, is_packed=True)
 
 
 def write_lit_hair(path: Path, hair: LitHair) -> None:
@@ -305,7 +304,7 @@ def write_lit_hair(path: Path, hair: LitHair) -> None:
         LIGHT: stored,
         "metadata": dict(hair.metadata),
     }
-    write_tensors(path, KIND, FORMAT_VERSION, arrays, header, is_packed=True)
+    write_tensors(path, HAIR_KIND, FORMAT_VERSION, arrays, header, is_packed=True)
 
 
 def read_hair(path: Path, *, checks_pictures: bool = True) -> Hair | LitHair:
@@ -320,7 +319,7 @@ def read_hair(path: Path, *, checks_pictures: bool = True) -> Hair | LitHair:
     DataError
         The file is damaged, of another kind or version, or invalid.
     """
-    arrays, header = read_tensors(path, KIND, FORMAT_VERSION)
+    arrays, header = read_tensors(path, HAIR_KIND, FORMAT_VERSION)
     if LIGHT in arrays:
         lit = _lit_hair_from_arrays(arrays, header, path)
         if checks_pictures:
@@ -424,16 +423,8 @@ def load_hair(name: str, face: str = "", own: str = BALD) -> Hair | LitHair:
     if not (name in known or Path(name).suffix):
         lacks = f"the face {face} has no haircut {name!r}" if face else f"there is no haircut {name!r}"
         raise InputError(f"{lacks}; give {', '.join((own, *known))}, or a .hair file")
-    path = find_file(f"{face}{OF_FACE}{name}" if face and name in known else name, KIND)
+    path = find_file(f"{face}{OF_FACE}{name}" if face and name in known else name, HAIR_KIND)
     return read_hair(path, checks_pictures=path.parent != SHIPPED_FOLDER)
-
-
-def haircut_names(face: str = "") -> tuple[str, ...]:
-    """Names of the shipped haircuts of a face with baked light beside its own; without a face those for heads."""
-    stems = sorted(path.stem for path in SHIPPED_FOLDER.glob(f"*.{KIND}"))
-    if face:
-        return tuple(stem.removeprefix(face + OF_FACE) for stem in stems if stem.startswith(face + OF_FACE))
-    return tuple(stem for stem in stems if OF_FACE not in stem)
 
 
 def _check_hair(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> None:

@@ -24,6 +24,20 @@ def true_runs(values: NDArray[np.bool_]) -> NDArray[np.int64]:
     return borders.reshape(-1, 2)
 
 
+def connected_pieces(corners: NDArray[np.integer], n_vertices: int) -> NDArray[np.int32]:
+    """(V,) number of the connected piece of each vertex of triangles (T, 3), by the first vertex of the pieces."""
+    first = np.arange(n_vertices)
+    one, other = np.concatenate([corners[:, :2], corners[:, 1:]]).T
+    while len(one):
+        np.minimum.at(first, np.maximum(one, other), np.minimum(one, other))
+        while not np.array_equal(first, beyond := first[first]):
+            first = beyond
+        one, other = first[one], first[other]
+        apart = one != other
+        one, other = one[apart], other[apart]
+    return np.unique(first, return_inverse=True)[1].astype(np.int32)
+
+
 def smoothstep(values: NDArray[AnyFloat], low: float = 0.0, high: float = 1.0) -> NDArray[AnyFloat]:
     """``3 s^2 - 2 s^3``: from 0 at `low` to 1 at `high` without slope at both, constant outside; `high` may be less."""
     share = np.clip((values - low) / (high - low), 0.0, 1.0)

@@ -15,7 +15,7 @@ from tts2face.models.consent import consent_record
 from tts2face.models.face import Face
 from tts2face.models.face_file import FORMAT_VERSION, KIND, read_face, write_face
 from tts2face.models.face_loading import load_face
-from tts2face.models.hair import BALD
+from tts2face.models.face_names import BALD
 from tts2face.photo.fit import NOTHING_GIVEN, PhotoFit, read_fit
 from tts2face.photo.found_face import PhotographedFace, PhotoReader
 from tts2face.photo.matte import part_background

@@ -9,7 +9,6 @@ A stream that collects what an encoder writes until it is taken.
 import io
 from pathlib import Path
 from typing import TYPE_CHECKING
-from xml.sax.saxutils import quoteattr
 
 if TYPE_CHECKING:
     from PIL.PngImagePlugin import PngInfo
@@ -50,6 +49,8 @@ _PACKET = """<?xpacket begin="\N{ZERO WIDTH NO-BREAK SPACE}" id="W5M0MpCehiHzreS
 
 def xmp_packet(notice: str) -> str:
     """XMP packet of a file whose pictures are what `notice` says."""
+    from xml.sax.saxutils import quoteattr  # it imports a web client
+
     return _PACKET.format(source=quoteattr(SOURCE_TYPE), notice=quoteattr(notice))
 
 

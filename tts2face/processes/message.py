@@ -1,6 +1,5 @@
 """Messages between a process and its children: one line of JSON, then bytes."""
 
-import asyncio
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -42,28 +41,21 @@ class Message:
 
 def read_message(file: BinaryIO) -> Message | None:
     """The next message of a pipe; None where it ends."""
-    head = _head(file.readline(MAX_LINE_BYTES))
+    head = parse_head(file.readline(MAX_LINE_BYTES))
     if head is None:
         return None
     payload = file.read(head["n_bytes"])
-    return _message(head, payload) if len(payload) == head["n_bytes"] else None
+    return message_of(head, payload) if len(payload) == head["n_bytes"] else None
 
 
-async def receive_message(stream: asyncio.StreamReader) -> Message | None:
-    """The next message of a pipe; None where it ends, or sends what is none."""
-    try:
-        head = _head(await stream.readline())
-        return None if head is None else _message(head, await stream.readexactly(head["n_bytes"]))
-    except (ValueError, asyncio.IncompleteReadError, ConnectionError):  # a line that is too long, or half a message
-        return None
-
-
-def _head(line: bytes) -> dict[str, Any] | None:
+def parse_head(line: bytes) -> dict[str, Any] | None:
+    """The object of a line; None where the line is cut off, or names more than `MAX_PAYLOAD_BYTES`."""
     if not line.endswith(b"\n"):
         return None
     head: dict[str, Any] = json.loads(line)
     return head if head["n_bytes"] <= MAX_PAYLOAD_BYTES else None
 
 
-def _message(head: Mapping[str, Any], payload: bytes) -> Message:
+def message_of(head: Mapping[str, Any], payload: bytes) -> Message:
+    """The message of an object that `parse_head` returned."""
     return Message(head["kind"], head["content"], payload, head["id"])

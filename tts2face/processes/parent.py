@@ -1,6 +1,8 @@
-"""The side of the parent: children that are started by their first call, and again after they ended."""
+"""The side of the parent: children that are started by their first call, and again after they ended.
 
-import asyncio
+Parents with an event loop have `tts2face.processes.async_parent`, which takes longer to import.
+"""
+
 import io
 import queue
 import subprocess
@@ -8,23 +10,16 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterator, Mapping
-from contextlib import aclosing, asynccontextmanager, suppress
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from typing import IO, Any
 
 from lexicon.errors import BackendError, Tts2faceError
 from tts2face.processes.message import (
     ERROR,
     EVENT,
-    GO,
-    MAX_LINE_BYTES,
-    MORE,
-    PAUSE,
-    STOP,
     Message,
     read_message,
-    receive_message,
 )
 from tts2face.processes.program import Program
 
@@ -33,11 +28,8 @@ KILL_AGAIN_S = 0.05
 END_S = 1.0  # until a process that has closed its output must have ended
 MAX_SHOWN_CHARACTERS = 300  # of the standard error of a child that ended
 TAIL_BYTES = 1 << 13  # of it that are read
-PAUSE_BYTES = 8 << 20  # of a call that its caller has not read yet, beyond which it is paused
-GO_BYTES = 2 << 20
 
 OnEvent = Callable[[Message], object]
-Inputs = AsyncIterator[tuple[Mapping[str, Any], bytes]]  # of a call that goes on: contents and payloads
 
 
 class ChildEndedError(BackendError):
@@ -59,20 +51,22 @@ def _kinds(kind: type[Tts2faceError]) -> Iterator[type[Tts2faceError]]:
         yield from _kinds(one)
 
 
-def _ended(kind: str, why: str) -> ChildEndedError:
+def ended_error(kind: str, why: str) -> ChildEndedError:
+    """Of a call of a kind whose child ended."""
     return ChildEndedError(f"the process that was to {kind} ended: {why}; check its memory and run again")
 
 
-def _command(program: Program) -> list[str]:
+def child_command(program: Program) -> list[str]:
+    """Command line of a child."""
     return [sys.executable, "-m", "tts2face.processes", program.written()]
 
 
-def _errors(program: Program) -> IO[bytes] | None:
+def error_file(program: Program) -> IO[bytes] | None:
     """File of the standard error of a child; None: that of this process."""
     return None if program.has_log else tempfile.TemporaryFile()
 
 
-def _last_words(errors: IO[bytes] | None, code: int | None) -> str:
+def last_words(errors: IO[bytes] | None, code: int | None) -> str:
     """Why a child ended: the last line of its standard error."""
     if errors is None:
         return f"exit code {code}"
@@ -144,12 +138,12 @@ class Child:
                         break
                     if message.kind != EVENT:
                         is_answered = True
-                        return _answer(message)
+                        return answer_of(message)
                     if on_event is not None:
                         on_event(message)
             finally:
                 why = "" if is_answered else self._end(is_killed=not is_ended)
-            raise _ended(kind, why)
+            raise ended_error(kind, why)
 
     def kill(self) -> None:
         """End the process while another thread waits for it."""
@@ -173,9 +167,9 @@ class Child:
         if self._child is not None and self._child.poll() is None:
             return self._child
         self._end(is_killed=False)
-        self._errors = _errors(self._program)
+        self._errors = error_file(self._program)
         self._child = subprocess.Popen(
-            _command(self._program), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors,
+            child_command(self._program), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors,
             env=self._program.environment(),
         )  # fmt: skip
         self._messages = queue.SimpleQueue()
@@ -200,7 +194,7 @@ class Child:
             if stream is not None:
                 with suppress(OSError):
                     stream.close()
-        return _last_words(self._errors, code)
+        return last_words(self._errors, code)
 
 
 def _receive(file: IO[bytes], messages: "queue.SimpleQueue[Message | None]") -> None:
@@ -211,237 +205,8 @@ def _receive(file: IO[bytes], messages: "queue.SimpleQueue[Message | None]") -> 
     messages.put(None)
 
 
-def _answer(message: Message) -> Message:
+def answer_of(message: Message) -> Message:
+    """A message; raises the error that it tells."""
     if message.kind == ERROR:
         raise raised(message)
     return message
-
-
-@dataclass(slots=True, eq=False)
-class _Answers:
-    """What came of a call and its caller has not read yet; None at the end of the child."""
-
-    id: int
-    messages: asyncio.Queue[Message | None] = field(default_factory=asyncio.Queue)
-    n_bytes: int = 0
-    is_paused: bool = False
-    stopped_at: float | None = None  # second of the clock at which its caller left
-
-
-class _Running:
-    """A process, and the calls that it works on."""
-
-    def __init__(
-        self, process: asyncio.subprocess.Process, errors: IO[bytes] | None, on_released: Callable[[float], None]
-    ) -> None:
-        self.process, self._errors, self._on_released = process, errors, on_released
-        self.why = ""  # it ended
-        self._calls: dict[int, _Answers] = {}
-        self.reading = asyncio.create_task(self._read())
-
-    def begin(self, id: int) -> _Answers:
-        """Answers of a new call."""
-        self._calls[id] = _Answers(id)
-        return self._calls[id]
-
-    def write(self, message: Message) -> None:
-        """Write a message as soon as the process reads it; nothing if it ended, which its messages tell."""
-        if self.process.returncode is None and self.process.stdin is not None:
-            self.process.stdin.write(message.encoded())
-
-    async def send(self, message: Message) -> None:
-        """Write a message, and wait until the process has read most of what was written."""
-        self.write(message)
-        with suppress(ConnectionError):
-            await self.process.stdin.drain()  # type: ignore[union-attr]
-
-    async def forward(self, inputs: Inputs, id: int) -> None:
-        """Send the inputs of a call."""
-        async for content, payload in inputs:
-            await self.send(Message(MORE, content, payload, id))
-
-    async def next(self, call: _Answers) -> Message | None:
-        """Next message of a call; None if the process ended."""
-        message = await call.messages.get()
-        call.n_bytes -= 0 if message is None else len(message.payload)
-        if call.is_paused and call.n_bytes < GO_BYTES:
-            call.is_paused = False
-            self.write(Message(GO, id=call.id))
-        return message
-
-    def stop(self, call: _Answers) -> None:
-        """Stop a call that nobody reads any more."""
-        if call.id in self._calls:
-            call.stopped_at = time.monotonic()
-            self.write(Message(STOP, id=call.id))
-
-    async def end(self) -> None:
-        """End the process at once."""
-        if not self.reading.done():
-            self._kill()
-        await asyncio.wait({self.reading})
-
-    def _kill(self) -> None:
-        with suppress(ProcessLookupError):
-            self.process.kill()
-
-    async def _read(self) -> None:
-        """Distribute messages until the process ends; a loop that ends first takes the process with it."""
-        try:
-            await self._distribute()
-        except asyncio.CancelledError:
-            self._kill()
-            self.why = _last_words(self._errors, await self.process.wait())
-            raise
-
-    async def _distribute(self) -> None:
-        assert self.process.stdout is not None
-        assert self.process.stdin is not None
-        while (message := await receive_message(self.process.stdout)) is not None:
-            call = self._calls.get(message.id)
-            if call is not None:
-                self._add(call, message)
-        self.process.stdin.close()
-        try:  # killing one that has just ended would take its exit status from asyncio, which warns then
-            await asyncio.wait_for(self.process.wait(), END_S)
-        except TimeoutError:
-            self._kill()
-        self.why = _last_words(self._errors, await self.process.wait())
-        for call in self._calls.values():
-            call.messages.put_nowait(None)
-
-    def _add(self, call: _Answers, message: Message) -> None:
-        if message.kind != EVENT:
-            del self._calls[call.id]
-        if call.stopped_at is None:
-            call.messages.put_nowait(message)
-            call.n_bytes += len(message.payload)
-            if call.n_bytes > PAUSE_BYTES and not call.is_paused:
-                call.is_paused = True
-                self.write(Message(PAUSE, id=call.id))
-        elif message.kind != EVENT:
-            self._on_released(time.monotonic() - call.stopped_at)
-
-
-class AsyncChild:
-    """A child for asyncio: as many calls at once as its program says.
-
-    Parameters
-    ----------
-    on_released
-        Called, when a call that its caller left has released what it held, with the seconds that took; of programs
-        with several calls at once.
-    """
-
-    def __init__(self, program: Program, on_released: Callable[[float], None] = lambda _: None) -> None:
-        self._program, self._on_released = program, on_released
-        self._places = asyncio.Semaphore(program.at_once)
-        self._starting = asyncio.Lock()
-        self._running: _Running | None = None
-        self._n_calls = 0
-
-    @property
-    def pid(self) -> int | None:
-        """Number of the process; None while there is none."""
-        return None if self._running is None or self._running.reading.done() else self._running.process.pid
-
-    async def call(
-        self, kind: str, content: Mapping[str, Any], payload: bytes = b"", *, on_event: OnEvent | None = None,
-        timeout_s: float | None = None,
-    ) -> Message:  # fmt: skip
-        """Result of a call; leaving it ends the call, and a child of one call at a time.
-
-        Raises
-        ------
-        Tts2faceError
-            As the handler.
-        ChildEndedError
-            The child ended.
-        TimeoutError
-            It took longer than `timeout_s`.
-        """
-        async with asyncio.timeout(timeout_s):
-            async with aclosing(self.stream(kind, content, payload)) as messages:
-                async for message in messages:
-                    if message.kind != EVENT:
-                        return message
-                    if on_event is not None:
-                        on_event(message)
-        raise AssertionError("a stream ends with its result")
-
-    async def stream(
-        self, kind: str, content: Mapping[str, Any], payload: bytes = b"", *, inputs: Inputs | None = None
-    ) -> AsyncGenerator[Message]:
-        """Messages of a call up to its result; errors, and leaving it, as `call`.
-
-        Parameters
-        ----------
-        inputs
-            What the handler gets by `tts2face.processes.child.Call.more`.
-        """
-        async with self._places:
-            running = await self._start()
-            self._n_calls += 1
-            call = running.begin(self._n_calls)
-            forwarding, is_answered = None, False
-            try:
-                await running.send(Message(kind, content, payload, call.id))
-                if inputs is not None:
-                    forwarding = asyncio.create_task(running.forward(inputs, call.id))
-                while (message := await running.next(call)) is not None:
-                    is_answered = message.kind != EVENT
-                    yield _answer(message)
-                    if is_answered:
-                        return
-                raise _ended(kind, running.why)
-            finally:
-                if forwarding is not None:
-                    forwarding.cancel()
-                if not is_answered and self._program.at_once > 1:
-                    running.stop(call)
-                elif not is_answered:
-                    await running.end()
-                if forwarding is not None:
-                    await asyncio.gather(forwarding, return_exceptions=True)
-
-    async def close(self) -> None:
-        """End the process at once; the next call starts another one."""
-        async with self._starting:
-            if self._running is not None:
-                await self._running.end()
-
-    async def close_when_idle(self) -> None:
-        """End the process after the calls that wait."""
-        async with self._places:
-            await self.close()
-
-    async def _start(self) -> _Running:
-        """The process that runs, or a new one."""
-        async with self._starting:
-            if self._running is None or self._running.reading.done():
-                errors = _errors(self._program)
-                process = await asyncio.create_subprocess_exec(
-                    *_command(self._program), stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
-                    stderr=errors, env=self._program.environment(), limit=MAX_LINE_BYTES,
-                )  # fmt: skip
-                self._running = _Running(process, errors, self._on_released)
-            return self._running
-
-
-@asynccontextmanager
-async def started(program: Program) -> AsyncIterator[AsyncChild]:
-    """A child that is ended when the context is left."""
-    child = AsyncChild(program)
-    try:
-        yield child
-    finally:
-        await child.close()
-
-
-async def call_once(
-    program: Program, kind: str, content: Mapping[str, Any], *, on_event: OnEvent | None = None,
-    timeout_s: float | None = None,
-) -> Mapping[str, Any]:  # fmt: skip
-    """Content of the result of a call of a child that works on this call only; errors as `AsyncChild.call`."""
-    async with started(program) as child:
-        return (await child.call(kind, content, on_event=on_event, timeout_s=timeout_s)).content

@@ -8,7 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 from lexicon.errors import DataError
-from tts2face.processes.parent import ChildEndedError, call_once
+from tts2face.processes.async_parent import call_once
+from tts2face.processes.parent import ChildEndedError
 from tts2face.processes.program import ProcessLimits, Program
 
 TAKES, TAKE_S = "takes", 1800.0  # the tool, and the time of one order

@@ -200,17 +200,16 @@ def identities(face: str = "head") -> tuple[IdentityEntry, ...]:
 @cache
 def haircuts() -> tuple[HaircutEntry, ...]:
     """The shipped haircuts by their faces: of the head, with ``bald``, and of each drawn character, its own first."""
-    from tts2face.models.hair import BALD
-    from tts2face.models.hair_file import KIND, OF_FACE
+    from tts2face.models.face_names import BALD, HAIR_KIND, OF_FACE
 
     found = [HaircutEntry(BALD, REALISTIC_FACE, "no hair")]
     for path in _shipped_files("face"):
         if path.stem != REALISTIC_FACE:
             hairdos = _read(path, "face").get("hairdos", {})
             found += [HaircutEntry(name, path.stem, "the face's own") for name, _ in hairdos.values()]
-    for path in _shipped_files(KIND):
+    for path in _shipped_files(HAIR_KIND):
         face, _, name = path.stem.rpartition(OF_FACE)
-        summary = str(_read(path, KIND)["metadata"].get("summary", ""))
+        summary = str(_read(path, HAIR_KIND)["metadata"].get("summary", ""))
         found.append(HaircutEntry(name, face or REALISTIC_FACE, summary))
     order = [REALISTIC_FACE, *(path.stem for path in _shipped_files("face"))]
     return tuple(sorted(found, key=lambda one: order.index(one.face)))

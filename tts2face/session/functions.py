@@ -14,7 +14,8 @@ from tts2face.face.gestures import gesture_face
 from tts2face.interchange.exports.track import read_track
 from tts2face.interchange.exports.writer import ExportWriter, mesh_of, plan_exports
 from tts2face.models.face import Face
-from tts2face.models.face_loading import default_face, load_face
+from tts2face.models.face_loading import load_face
+from tts2face.models.face_names import default_face
 from tts2face.models.palette import load_palette
 from tts2face.numeric.reuse import free_unused
 from tts2face.picture.film import write_clips

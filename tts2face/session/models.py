@@ -13,7 +13,8 @@ from tts2face.gestures.stream import FIELD_OPTIONS, GestureFields
 from tts2face.lips.exemplar import ExemplarModel, build_exemplar_model, exclude_tokens
 from tts2face.lips.options import ExcludedToken
 from tts2face.models.face import Face
-from tts2face.models.face_loading import default_face, load_face
+from tts2face.models.face_loading import load_face
+from tts2face.models.face_names import default_face
 from tts2face.models.palette import Derivation, Palette, load_palette
 from tts2face.models.palette_editing import add_derivation
 from tts2face.models.talker import Talker, load_talker

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from lexicon.inputs import check_fields
+from tts2face.models.face_names import default_face
 
 if TYPE_CHECKING:
     from tts2face.models.face import Face
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 class Models:
     """Models that show and move a speaker, by name or path.
 
-    Without a face, `tts2face.models.face_loading.default_face`.
+    Without a face, `tts2face.models.face_names.default_face`.
 
     Raises
     ------
@@ -34,8 +35,6 @@ class Models:
         """Reject values of other types, and choose a face where none is named."""
         check_fields(self)
         if not self.face:
-            from tts2face.models.face_loading import default_face
-
             object.__setattr__(self, "face", default_face(self.identity, self.hair))
 
     def shown_face(self) -> "Face | None":

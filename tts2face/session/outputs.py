@@ -1,41 +1,32 @@
-"""Outputs of a clip: a film or pictures, exports, or both, as files or as bytes that are sent while they are made.
+"""Output files of a clip: a film or pictures, exports, or both.
 
-`write_pieces` reports progress in the steps of the request; `encode_stream` yields a movie, sound or lines of text;
-`write_speech` makes files of sound and phones without talker, face and palette.
+`write_pieces` reports progress in the steps of the request; `write_speech` makes files of sound and phones without
+talker, face and palette, and without what draws and animates.
 """
 
-import io
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from lexicon.errors import InputError
 from lexicon.marked_text import NameMark
 from tts2face.gestures.timeline import Timeline
-from tts2face.interchange.exports.parts import FormatWriter, FrameGrid
-from tts2face.interchange.exports.table import FormatInfo, all_formats
-from tts2face.interchange.exports.writer import ExportFile, ExportWriter, make_target, mesh_of, plan_exports
-from tts2face.models.face import Face
+from tts2face.interchange.exports.writer import ExportFile, ExportWriter, mesh_of, plan_exports
 from tts2face.numeric.reuse import Prefetch
-from tts2face.picture.film import ClipWriter, check_output
-from tts2face.picture.movie import MOVIE_KINDS, encode_movie, find_movie_kind
-from tts2face.picture.options import Picture
-from tts2face.picture.pace import Pace
-from tts2face.picture.renderer import FrameRenderer
-from tts2face.picture.sound_stream import SOUND_KINDS, encode_sound
-from tts2face.session.animated_face import AnimatedFace
-from tts2face.session.models import SessionModels
 from tts2face.session.prepared import HEARING_STEPS, PreparedRequest, marked_styles
 from tts2face.session.speech import MarkTime
 from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces
-from tts2face.sound.alignment import TextMismatch
 from tts2face.sound.voice_pool import VoicePool
 from tts2face.storage.files import AnyPath, refuse_overwriting
-from tts2face.types import Chunk, Clip, Progress
+from tts2face.types import Clip, Progress
+
+if TYPE_CHECKING:
+    from tts2face.picture.film import ClipWriter
+    from tts2face.picture.renderer import FrameRenderer
+    from tts2face.session.animated_face import AnimatedFace
+    from tts2face.sound.alignment import TextMismatch
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +54,7 @@ class OutputFiles:
         """Paths of the exports."""
         return tuple(file.path for file in self.exports)
 
-    def check_face(self, face: AnimatedFace) -> None:
+    def check_face(self, face: "AnimatedFace") -> None:
         """Reject exports that a face cannot fill.
 
         Raises
@@ -75,7 +66,7 @@ class OutputFiles:
 
     @contextmanager
     def open(
-        self, face: AnimatedFace | None, renderer: FrameRenderer | None, on_frames: Progress | None
+        self, face: "AnimatedFace | None", renderer: "FrameRenderer | None", on_frames: Progress | None
     ) -> Iterator["OpenOutputs"]:
         """Writer of consecutive clips to all files; errors as `ClipWriter` and `ExportWriter`.
 
@@ -91,6 +82,8 @@ class OutputFiles:
         with ExitStack() as stack:
             film = None
             if self.out is not None and renderer is not None:
+                from tts2face.picture.film import ClipWriter
+
                 film = stack.enter_context(ClipWriter(self.out, renderer, on_progress=on_frames))
             exports = stack.enter_context(ExportWriter(self.exports, face=mesh_of(face, self.exports)))
             yield OpenOutputs(film, exports)
@@ -100,7 +93,7 @@ class OutputFiles:
 class OpenOutputs:
     """Writers of a film and of exports."""
 
-    film: ClipWriter | None
+    film: "ClipWriter | None"
     exports: ExportWriter
 
     def add(self, clip: Clip, text: str = "") -> None:
@@ -126,6 +119,8 @@ def plan_outputs(out: str | Path | None, exports: Sequence[str | Path], inputs: 
         A folder cannot be written.
     """
     if out is not None:
+        from tts2face.picture.film import check_output
+
         check_output(out)
     files = plan_exports(exports)
     if out is None and not files:
@@ -163,7 +158,7 @@ class WrittenClip:
     n_frames: int
     marks: tuple[MarkTime, ...] = ()
     is_silent: bool = False
-    mismatches: tuple[TextMismatch, ...] = ()
+    mismatches: "tuple[TextMismatch, ...]" = ()
     exports: tuple[Path, ...] = ()
 
     @property
@@ -241,146 +236,6 @@ def write_pieces(
     return WrittenClip(
         outputs.path, seconds, n_frames, tuple(marks), mismatches=tuple(mismatches), exports=outputs.export_paths
     )
-
-
-BLOCK_BYTES = 1 << 18  # of a file that is read when it is complete
-
-
-@cache
-def line_formats() -> Mapping[str, FormatInfo]:
-    """Formats of lines by name, of other packages, too."""
-    return MappingProxyType({one.name: one for one in all_formats() if one.has_lines})
-
-
-@cache
-def media_types() -> Mapping[str, str]:
-    """Media types of the formats of `Session.stream_file`."""
-    return MappingProxyType({
-        **{name: kind.media_type for name, kind in MOVIE_KINDS.items()},
-        **{name: kind.media_type for name, kind in SOUND_KINDS.items()},
-        **dict.fromkeys(line_formats(), "application/jsonl"),
-        "livelink": "text/csv",
-        "glb": "model/gltf-binary",
-    })  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class StreamFormat:
-    """Format of streamed bytes, one of `media_types`, and the drawing options of movies.
-
-    Parameters
-    ----------
-    threads, pace
-        As for `tts2face.picture.movie.ClipFrames`.
-
-    Raises
-    ------
-    InputError
-        There is no such format, or it cannot be transparent.
-    """
-
-    name: str
-    picture: Picture
-    threads: int | None = None
-    pace: Pace | None = None
-
-    def __post_init__(self) -> None:
-        """Check the format."""
-        if self.name not in media_types():
-            raise InputError(f"there is no streamed format {self.name!r}; the formats are {', '.join(media_types())}")
-        if self.name in MOVIE_KINDS:
-            find_movie_kind(self.name, self.picture)
-
-
-def encode_stream(prepared: PreparedRequest, models: SessionModels, format: StreamFormat) -> Iterator[Chunk]:
-    """Synthesise and encode a request; yields consecutive chunks of a file."""
-    request, name = prepared.request, format.name
-    if name in MOVIE_KINDS:
-        renderer = models.renderer(format.picture, has_gestures=request.has_gestures)
-        clips = (piece.clip for piece in models.pieces(prepared))
-        return encode_movie(clips, renderer, name, threads=format.threads, pace=format.pace)
-    if name in SOUND_KINDS:
-        if request.audio is None:
-            pieces = spoken_pieces(prepared, models.for_request(prepared).speech, has_phones=False)
-        else:
-            pieces = models.pieces(prepared)
-        return encode_sound((piece.speech.waveform for piece in pieces), name)
-    if name not in line_formats():
-        file, face = f"clip.{name}", models.face(has_gestures=request.has_gestures)
-        return encode_whole(models.pieces(prepared), file, face, lambda folder: folder / file)
-    mesh = models.face(has_gestures=request.has_gestures).mesh if line_formats()[name].uses_face else None
-    return encode_lines(models.pieces(prepared), name, mesh)
-
-
-def encode_whole(
-    pieces: Iterable[Piece], name: str, face: AnimatedFace, choose: Callable[[Path], Path]
-) -> Iterator[Chunk]:
-    """Write pieces to an export of a name, whose bytes come after the last piece.
-
-    Parameters
-    ----------
-    choose
-        Path of the file that is sent, in the folder of all files that were written.
-
-    Raises
-    ------
-    InputError, BackendError
-        As `plan_exports`, `mesh_of` and `ExportWriter`.
-    """
-    with tempfile.TemporaryDirectory(prefix="tts2face-") as folder:
-        files = plan_exports([Path(folder, name)])
-        with ExportWriter(files, face=mesh_of(face, files)) as writer:
-            for piece in pieces:
-                writer.add(piece.clip, piece.text)
-                yield Chunk(b"", piece.clip.speech.waveform.duration)
-        with choose(Path(folder)).open("rb") as file:
-            while block := file.read(BLOCK_BYTES):
-                yield Chunk(block)
-
-
-class LineBuffer(io.StringIO):
-    """Text that is taken in parts; closing it keeps what was not yet taken."""
-
-    def take(self) -> bytes:
-        """Return the text written since the last call as UTF-8."""
-        taken = self.getvalue().encode()
-        self.seek(0)
-        self.truncate()
-        return taken
-
-    def close(self) -> None:
-        """Do nothing: memory is all that a buffer holds."""
-
-
-def encode_lines(pieces: Iterable[Piece], format: str, face: Face | None) -> Iterator[Chunk]:
-    """Write consecutive pieces in a format of lines; yields a chunk for each piece.
-
-    Parameters
-    ----------
-    format
-        One of `line_formats`.
-    face
-        Mesh whose shapes the clips' channels are, for formats of ARKit shapes.
-
-    Raises
-    ------
-    InputError
-        As `ExportWriter`.
-    """
-    info = line_formats()[format]
-    file, buffer = ExportFile(Path(f"clip{info.suffixes[0]}"), info), LineBuffer()
-    grid: FrameGrid | None = None
-    writer: FormatWriter | None = None
-    for piece in pieces:
-        if grid is None or writer is None:
-            grid = FrameGrid(piece.clip, info.default_fps)
-            writer = info.make_writer()(make_target(file, grid, piece.clip, face, file.path, buffer))
-        writer.add(grid.place(piece.clip, piece.text))
-        yield Chunk(buffer.take(), piece.clip.speech.waveform.duration)
-    if grid is not None and writer is not None:
-        writer.add(grid.remainder())
-        writer.finish()
-        yield Chunk(buffer.take())
 
 
 def is_speech_only(prepared: PreparedRequest, outputs: OutputFiles) -> bool:

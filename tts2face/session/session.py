@@ -15,16 +15,15 @@ from tts2face.picture.pace import Pace
 from tts2face.picture.renderer import FrameRenderer
 from tts2face.request import Request
 from tts2face.session.animated_face import AnimatedFace
+from tts2face.session.encoded_stream import StreamFormat, encode_stream
 from tts2face.session.fixed_length import Length, clips_of_length
 from tts2face.session.live import LiveLips, LiveSpeech
 from tts2face.session.models import SessionModels, shown_face
 from tts2face.session.outputs import (
     OutputFiles,
     RequestSteps,
-    StreamFormat,
     WrittenClip,
     ahead,
-    encode_stream,
     plan_outputs,
     write_pieces,
 )

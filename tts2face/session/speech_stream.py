@@ -26,7 +26,6 @@ from tts2face.session.speech import (
     silent_sentences,
     speak_sentence,
 )
-from tts2face.sound.alignment import TextMismatch
 from tts2face.types import (
     Clip,
     Speech,
@@ -41,6 +40,7 @@ from tts2face.types import (
 
 if TYPE_CHECKING:
     from tts2face.lips.explanation import PhoneExplanation
+    from tts2face.sound.alignment import TextMismatch
 
 # Options of a request that do not affect the speech of its sentences.
 NOT_SPOKEN: Mapping[str, Any] = MappingProxyType(
@@ -84,7 +84,7 @@ class Piece:
     timeline: Timeline = field(default_factory=Timeline)
     marks: tuple[MarkTime, ...] = ()
     explain: "Callable[[], tuple[PhoneExplanation, ...]]" = tuple
-    mismatches: tuple[TextMismatch, ...] = ()
+    mismatches: "tuple[TextMismatch, ...]" = ()
     text: str = ""
     transcript: PhoneSequence | None = None
     voice_sound: Waveform | None = None

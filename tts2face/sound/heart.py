@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,8 @@ from lexicon.errors import BackendError
 from lexicon.phones import PHONES, nearest_phones
 from lexicon.pronounce import PAUSES_S, Word
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tts2face.models.phone_classifier import PhoneClassifier, load_phone_classifier
 from tts2face.numeric.kernels import disable_telemetry
-from tts2face.sound.segments import StatedPhone, find_edges
+from tts2face.sound.transforms import import_hibari
 from tts2face.sound.voice import (
     NativeRun,
     PronunciationMap,
@@ -30,6 +29,10 @@ from tts2face.sound.voice import (
     split_spoken_sentences,
 )
 from tts2face.types import Speech, Waveform, concatenate_speech
+
+if TYPE_CHECKING:
+    from tts2face.models.phone_classifier import PhoneClassifier
+    from tts2face.sound.segments import StatedPhone
 
 # Letters to phones of the table.
 PHONE_OF_LETTER = MappingProxyType({
@@ -136,17 +139,19 @@ class NeuralVoice:
         self._own_words = own_words
         disable_telemetry()
         try:
-            from hibari import Hibari
+            hibari = import_hibari()
             from hibari.voices import voice_path
         except ImportError as missing:
             raise BackendError("the voice heart needs hibari-tts; run: pip install hibari-tts") from missing
-        self._model: Any = Hibari(voice="heart", model=IDENTITY_NETWORK, threads=1)
+        self._model: Any = hibari.Hibari(voice="heart", model=IDENTITY_NETWORK, threads=1)
         self._network = _Network(_session_without_arena(Path(voice_path("heart")).read_bytes()), run)
         self._model.sess = self._network
         pronounce_content("Hello.", LANGUAGE, {})  # reads the dictionary while other models are loaded
 
     @cached_property
-    def _classifier(self) -> PhoneClassifier:
+    def _classifier(self) -> "PhoneClassifier":
+        from tts2face.models.phone_classifier import load_phone_classifier  # sound alone has no edges
+
         return load_phone_classifier("heart")
 
     @property
@@ -160,7 +165,7 @@ class NeuralVoice:
 
     def parts(
         self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0
-    ) -> Iterator[tuple[Waveform, Sequence[LetteredWord], Sequence[StatedPhone]]]:
+    ) -> "Iterator[tuple[Waveform, Sequence[LetteredWord], Sequence[StatedPhone]]]":
         """Sound, words and stated phones of each part that the model synthesises in one call."""
         for words in self._spoken_parts(content):
             sound = self._sound_of(words, rate, seed)
@@ -176,7 +181,9 @@ class NeuralVoice:
         words = pronounce_content(content, LANGUAGE, self._own_words)
         return [part for sentence in split_spoken_sentences(words) for part in _cut_tokens([*map(_token, sentence)])]
 
-    def _with_edges(self, sound: Waveform, words: Sequence[LetteredWord], stated: Sequence[StatedPhone]) -> Speech:
+    def _with_edges(self, sound: Waveform, words: Sequence[LetteredWord], stated: "Sequence[StatedPhone]") -> Speech:
+        from tts2face.sound.segments import find_edges
+
         edges = find_edges(sound, stated, self._classifier)
         spoken = [at for at, one in enumerate(stated) if not one.may_be_skipped or edges[at + 1] > edges[at]]
         spans, first = [], 1  # stated phones of a word
@@ -192,7 +199,7 @@ class NeuralVoice:
         return Waveform(apply_volume(samples), self.sample_rate)
 
 
-def stated_phones(tokens: Sequence[LetteredWord], steps: NDArray[np.integer]) -> list[StatedPhone]:
+def stated_phones(tokens: Sequence[LetteredWord], steps: NDArray[np.integer]) -> "list[StatedPhone]":
     """Phones as the model states them, with a silence before each word, which may lack, and one at the end.
 
     Parameters
@@ -200,6 +207,8 @@ def stated_phones(tokens: Sequence[LetteredWord], steps: NDArray[np.integer]) ->
     steps : (L + 2,)
         Durations of the L letters and of the padding at both ends, in steps of `DURATION_STEP_S`.
     """
+    from tts2face.sound.segments import StatedPhone
+
     begins = np.cumsum(steps)[:-1] * DURATION_STEP_S - BOUNDARY_DELAY_S
     found, at, is_marked = [StatedPhone(SILENCE, 0.0)], 0, False
     for token in tokens:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
+from tts2face.numeric.filters import moving_mean, moving_minimum
 from tts2face.numeric.kernels import kernel
 from tts2face.types import Speech, Waveform, YieldTurn, keep_on
 
@@ -203,15 +204,12 @@ def _limiting_gain(peaks: Floats, rate: int) -> Floats:
 
     Each value averages gains that all suffice at its sample, so that no peak exceeds the ceiling.
     """
-    from scipy.ndimage import minimum_filter1d, uniform_filter1d
-
     ceiling = 10 ** (CEILING_DB / 20)
     needed = ceiling / np.maximum(peaks, ceiling)
     if not len(needed) or needed.min() == 1.0:
         return needed
     half = max(round(LOOK_AHEAD_S * rate / 2), 1)
-    gain = minimum_filter1d(needed, 4 * half + 3, mode="constant", cval=1.0)  # one sample wider than the average
+    gain = moving_minimum(needed, 4 * half + 3, beyond=1.0)  # one sample wider than the average
     for _ in range(2):  # triangular window of 4 half + 1 samples
-        gain = uniform_filter1d(gain, 2 * half + 1, mode="nearest")
-    smooth: Floats = gain
-    return smooth
+        gain = moving_mean(gain, 2 * half + 1)
+    return gain

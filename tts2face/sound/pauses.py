@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.numeric.arrays import true_runs
+from tts2face.numeric.filters import moving_mean
 from tts2face.types import Waveform
 
 LEVEL_WINDOW_S = 0.01
@@ -91,10 +92,8 @@ def _quietest_instant(levels: NDArray[np.float64], earliest: float, latest: floa
 
 def _window_levels(sound: Waveform) -> NDArray[np.float64]:
     """(T,) levels in dB relative to full scale, in windows of `LEVEL_WINDOW_S`."""
-    from scipy.ndimage import uniform_filter1d
-
     power = np.square(sound_windows(sound, LEVEL_WINDOW_S), dtype=np.float64).mean(axis=1)
-    smooth = uniform_filter1d(power, SMOOTHING_WINDOWS, mode="nearest") if len(power) else power
+    smooth = moving_mean(power, SMOOTHING_WINDOWS) if len(power) else power
     levels: NDArray[np.float64] = 10.0 * np.log10(np.maximum(smooth, 1e-10))
     return levels
 

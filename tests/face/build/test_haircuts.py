@@ -9,8 +9,9 @@ from tests.face.test_mouth import part_vertices
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face
 from tts2face.models.face_loading import load_face
+from tts2face.models.face_names import haircut_names
 from tts2face.models.hair import Hair, fit_hair
-from tts2face.models.hair_file import SWING_SHAPES, haircut_names, load_hair
+from tts2face.models.hair_file import SWING_SHAPES, load_hair
 from tts2face.session.catalogue import haircuts, identities
 from tts2face.storage.files import SHIPPED_FOLDER, find_file
 

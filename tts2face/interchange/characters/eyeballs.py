@@ -5,13 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from tts2face.face.expressions import GAZE_SHAPES
 from tts2face.face.shape_transfer import default_head
 from tts2face.interchange.characters.character import Character
 from tts2face.interchange.characters.head_mesh import LEFT_EYE, RIGHT_EYE, HeadMesh
+from tts2face.numeric.arrays import connected_pieces
 
 BLINKS = {LEFT_EYE: "eyeBlinkLeft", RIGHT_EYE: "eyeBlinkRight"}
 SIDE_NAMES = {LEFT_EYE: "Left", RIGHT_EYE: "Right"}
@@ -118,11 +117,7 @@ def _components(head: HeadMesh) -> NDArray[np.int32]:
     """Number (V,) of the connected part that each vertex belongs to; vertices at one place are connected."""
     size = float(np.ptp(head.vertices, axis=0).max())
     _, place = np.unique(np.rint(head.vertices / size * 1e5).astype(np.int64), axis=0, return_inverse=True)
-    corners = place.ravel()[head.triangles]
-    ends = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]])
-    n_places = int(place.max()) + 1
-    links = coo_matrix((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), (n_places, n_places))
-    return np.asarray(connected_components(links, directed=False)[1], np.int32)[place.ravel()]
+    return connected_pieces(place.ravel()[head.triangles], int(place.max()) + 1)[place.ravel()]
 
 
 def _moved_by_gaze(head: HeadMesh, marked: NDArray[np.int8]) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Protocol, TextIO
+from typing import TYPE_CHECKING, Protocol, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE
 from tts2face.interchange.exports.table import sound_name
-from tts2face.models.face import Face
 from tts2face.numeric.arrays import interpolate_rows
 from tts2face.types import HEAD_CHANNELS, Clip, exact_rate, first_sample, frame_count
+
+if TYPE_CHECKING:
+    from tts2face.models.face import Face
 
 Float32Array = NDArray[np.float32]
 
@@ -78,7 +80,7 @@ class Target:
     source_fps: Fraction
     rate: int
     channels: tuple[str, ...]
-    face: Face | None
+    face: "Face | None"
     lines: TextIO | None = None
 
     def open_lines(self) -> TextIO:

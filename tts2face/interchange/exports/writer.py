@@ -4,16 +4,17 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, TextIO
+from typing import TYPE_CHECKING, Protocol, TextIO
 
 from lexicon.errors import InputError
 from tts2face.interchange.exports.parts import FormatWriter, FrameGrid, Target
-from tts2face.interchange.exports.stage_glb import in_rest_light
 from tts2face.interchange.exports.table import FormatInfo, find_format, sound_name, split_format
-from tts2face.models.face import Face
 from tts2face.storage.files import check_name, translate_disk_errors
 from tts2face.storage.temporary import Temporary
 from tts2face.types import Clip, exact_rate
+
+if TYPE_CHECKING:
+    from tts2face.models.face import Face
 
 SOUND_FORMAT = "wav"
 
@@ -72,11 +73,11 @@ class HasMesh(Protocol):
     """A face with a mesh, such as `tts2face.AnimatedFace`."""
 
     @property
-    def mesh(self) -> Face:
+    def mesh(self) -> "Face":
         """Mesh with the shapes of all channels."""
 
 
-def mesh_of(face: Face | HasMesh | None, files: Iterable[ExportFile]) -> Face | None:
+def mesh_of(face: "Face | HasMesh | None", files: Iterable[ExportFile]) -> "Face | None":
     """Mesh of a face if one of the files uses it, else None; that of a photograph with its picture for textures.
 
     Raises
@@ -84,7 +85,12 @@ def mesh_of(face: Face | HasMesh | None, files: Iterable[ExportFile]) -> Face | 
     InputError
         The face is a talker's own face, which has no mesh.
     """
-    if face is None or isinstance(face, Face) or not any(file.format.uses_face for file in files):
+    if face is None:  # exports of sound import no models
+        return None
+    from tts2face.interchange.exports.stage_glb import in_rest_light
+    from tts2face.models.face import Face
+
+    if isinstance(face, Face) or not any(file.format.uses_face for file in files):
         mesh = face if isinstance(face, Face) else None
     else:
         mesh = face.mesh
@@ -126,7 +132,7 @@ class ExportWriter:
         The disk is full or cannot be written, or a package is missing.
     """
 
-    def __init__(self, files: Sequence[ExportFile], *, face: Face | None = None, fps: float | None = None) -> None:
+    def __init__(self, files: Sequence[ExportFile], *, face: "Face | None" = None, fps: float | None = None) -> None:
         for file in files:
             if file.format.needs_mesh and face is None:
                 raise InputError(f"{file.path.name} holds the mesh of the face; give the face, as in face=session.face")
@@ -175,7 +181,7 @@ class ExportWriter:
 class _OpenFile:
     """One file of an `ExportWriter`."""
 
-    def __init__(self, file: ExportFile, face: Face | None, fps: float | None) -> None:
+    def __init__(self, file: ExportFile, face: "Face | None", fps: float | None) -> None:
         self.path, self._format, self._face = file.path, file.format, face
         self._fps = (fps or file.format.default_fps) if file.format.has_frames else None
         self._grid: FrameGrid | None = None
@@ -222,7 +228,7 @@ class _OpenFile:
 
 
 def make_target(
-    file: ExportFile, grid: FrameGrid, clip: Clip, face: Face | None, path: Path, lines: TextIO | None = None
+    file: ExportFile, grid: FrameGrid, clip: Clip, face: "Face | None", path: Path, lines: TextIO | None = None
 ) -> Target:
     """Target of a writer for clips such as the given one; `path` and `lines` as for `Target`.
 

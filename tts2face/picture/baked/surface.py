@@ -19,7 +19,7 @@ from lexicon.errors import DataError
 from tts2face.face.deformation import FaceRig, build_rig
 from tts2face.models.baked_light import BLACK_SHARE, N_PAGES, BakedLight
 from tts2face.models.face import Face
-from tts2face.numeric.arrays import decode_srgb
+from tts2face.numeric.arrays import connected_pieces, decode_srgb
 from tts2face.numeric.kernels import kernel, vectorized_kernel
 
 Array = NDArray[Any]
@@ -306,15 +306,7 @@ def build_surface(face: Face, light: BakedLight) -> LitSurface:
 
 def _pieces(face: Face, corners: NDArray[np.int32]) -> NDArray[np.int32]:
     """(D,) number of the connected piece of each triangle (D, 3): pieces of one part have edges over each other."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    n = len(face.vertices)
-    a, b, c = corners.T
-    edges = (np.concatenate([a, b]), np.concatenate([b, c]))
-    joined = coo_matrix((np.ones(len(edges[0]), np.int8), edges), shape=(n, n))
-    pieces: NDArray[np.int32] = connected_components(joined, directed=False)[1][a].astype(np.int32)
-    return pieces
+    return connected_pieces(corners, len(face.vertices))[corners[:, 0]]
 
 
 def page_places(uv: NDArray[np.float64], page: NDArray[np.int64], least_side: int) -> NDArray[np.float64]:

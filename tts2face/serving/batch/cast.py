@@ -26,7 +26,7 @@ from lexicon.errors import DataError, InputError
 from lexicon.inputs import check_type, format_value, is_file, parse_toml, read_text
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.models.face_loading import load_face
-from tts2face.models.hair import BALD
+from tts2face.models.face_names import BALD
 from tts2face.models.palette import load_palette
 from tts2face.request import NATURAL, OWN_FACE, Request, parse_articulation
 from tts2face.session.catalogue import identities

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face import __version__
-from tts2face.models.hair import BALD
+from tts2face.models.face_names import BALD
 from tts2face.request import OWN_FACE, Request
 from tts2face.session.named_models import Models
 from tts2face.storage.content_store import content_hash

@@ -16,7 +16,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
-from tts2face.models.face_loading import default_face
+from tts2face.models.face_names import default_face
 from tts2face.models.hair import parse_hair_colour
 from tts2face.picture.options import BLUR, COLOURS, STUDIO, TRANSPARENT
 from tts2face.request import OWN_FACE

@@ -32,7 +32,7 @@ from tts2face.serving.service.request_fields import MODEL_FIELDS, PICTURE_FIELDS
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.work.kinds import BACKGROUND, FILES
 from tts2face.serving.work.resource_check import TALKER
-from tts2face.session.outputs import media_types
+from tts2face.session.encoded_stream import media_types
 
 # Options that a door does not take, with the reason.
 NOT_IN_CLIPS: Mapping[str, str] = MappingProxyType({

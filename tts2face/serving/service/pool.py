@@ -16,8 +16,9 @@ from lexicon.errors import BackendError, Tts2faceError
 from tts2face.numeric.reuse import available_cores
 from tts2face.picture.movie import MOVIE_KINDS
 from tts2face.picture.sound_stream import SOUND_KINDS
+from tts2face.processes.async_parent import AsyncChild, started
 from tts2face.processes.message import Message
-from tts2face.processes.parent import AsyncChild, ChildEndedError, started
+from tts2face.processes.parent import ChildEndedError
 from tts2face.processes.program import Program
 from tts2face.serving.service.logs import REQUEST_ID, log_event
 from tts2face.serving.service.messages import SERVE, SYNTHESISE, Work

@@ -18,7 +18,8 @@ from starlette.datastructures import UploadFile
 
 from lexicon.errors import DataError, InputError, Tts2faceError
 from lexicon.inputs import parse_json
-from tts2face.processes.parent import ChildEndedError, call_once
+from tts2face.processes.async_parent import call_once
+from tts2face.processes.parent import ChildEndedError
 from tts2face.processes.tools import run_take_tool
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import while_client_stays

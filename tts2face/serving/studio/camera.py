@@ -14,7 +14,7 @@ from typing import Any
 from fastapi import WebSocket, WebSocketDisconnect
 
 from lexicon.errors import Tts2faceError
-from tts2face.processes.parent import started
+from tts2face.processes.async_parent import started
 from tts2face.processes.program import Program
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.studio.camera_process import FOLLOW, LIMITS

@@ -19,8 +19,9 @@ from types import MappingProxyType
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
+from tts2face.processes.async_parent import AsyncChild, call_once
 from tts2face.processes.child import Call, Handler
-from tts2face.processes.parent import AsyncChild, ChildEndedError, call_once
+from tts2face.processes.parent import ChildEndedError
 from tts2face.processes.program import ProcessLimits, Program
 from tts2face.processes.tools import run_tool
 from tts2face.serving.studio.recordings import (

@@ -143,7 +143,7 @@ def project_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
 
 def project_export(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
     """Bytes of an export of a project, whose file is named by ``name``; several files come as one .zip file."""
-    from tts2face.session.outputs import encode_whole
+    from tts2face.session.encoded_stream import encode_whole
 
     project = read_project(work)
     face = session.animated_face(has_gestures=project.request.has_gestures)

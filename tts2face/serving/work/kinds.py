@@ -33,8 +33,8 @@ from tts2face.serving.work.connection import DatabaseAwayError
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.serving.work.resources import ResourceTable, Usage, keep_files, over_quota, resource_from_folder
 from tts2face.serving.work.run import JobTask, Product, Products, products_of
+from tts2face.session.encoded_stream import line_formats, media_types
 from tts2face.session.named_models import Models
-from tts2face.session.outputs import line_formats, media_types
 
 # Fields of a request: names of the job's files.
 FILES = {"audio": "audio.wav", "partner": "partner.wav", "timeline": "timeline.json"}

@@ -21,7 +21,7 @@ from tts2face.serving.service.messages import Work
 from tts2face.serving.service.options import ClipRequest, divide_options
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES, UploadFolder, upload_folder
-from tts2face.session.outputs import media_types
+from tts2face.session.encoded_stream import media_types
 
 
 def service_state(request: HttpRequest | WebSocket) -> ServiceState:

@@ -16,7 +16,7 @@ from tts2face.serving.service.client_names import KOKORO_LANGUAGES, Adjustments
 from tts2face.serving.service.request_fields import described
 from tts2face.serving.service.routes.clips import service_state, stream_work, timed_speech
 from tts2face.serving.service.routes.openai import SoundFormat, SpokenText, TimedJson, speech_work, timed
-from tts2face.session.outputs import media_types
+from tts2face.session.encoded_stream import media_types
 
 router = APIRouter(prefix="/dev", tags=["kokoro"])
 

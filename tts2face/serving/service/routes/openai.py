@@ -30,7 +30,7 @@ from tts2face.serving.service.request_fields import described
 from tts2face.serving.service.routes.clips import service_state, stream_work
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.session import catalogue
-from tts2face.session.outputs import media_types
+from tts2face.session.encoded_stream import media_types
 
 router = APIRouter(prefix="/v1", tags=["speech"])
 

@@ -1,0 +1,163 @@
+"""A clip as bytes that are sent while they are made: a movie, sound or lines of text."""
+
+import io
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+
+from lexicon.errors import InputError
+from tts2face.interchange.exports.parts import FormatWriter, FrameGrid
+from tts2face.interchange.exports.table import FormatInfo, all_formats
+from tts2face.interchange.exports.writer import ExportFile, ExportWriter, make_target, mesh_of, plan_exports
+from tts2face.models.face import Face
+from tts2face.picture.movie import MOVIE_KINDS, encode_movie, find_movie_kind
+from tts2face.picture.options import Picture
+from tts2face.picture.pace import Pace
+from tts2face.picture.sound_stream import SOUND_KINDS, encode_sound
+from tts2face.session.animated_face import AnimatedFace
+from tts2face.session.models import SessionModels
+from tts2face.session.prepared import PreparedRequest
+from tts2face.session.speech_stream import Piece, spoken_pieces
+from tts2face.types import Chunk
+
+BLOCK_BYTES = 1 << 18  # of a file that is read when it is complete
+
+
+@cache
+def line_formats() -> Mapping[str, FormatInfo]:
+    """Formats of lines by name, of other packages, too."""
+    return MappingProxyType({one.name: one for one in all_formats() if one.has_lines})
+
+
+@cache
+def media_types() -> Mapping[str, str]:
+    """Media types of the formats of `Session.stream_file`."""
+    return MappingProxyType({
+        **{name: kind.media_type for name, kind in MOVIE_KINDS.items()},
+        **{name: kind.media_type for name, kind in SOUND_KINDS.items()},
+        **dict.fromkeys(line_formats(), "application/jsonl"),
+        "livelink": "text/csv",
+        "glb": "model/gltf-binary",
+    })  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class StreamFormat:
+    """Format of streamed bytes, one of `media_types`, and the drawing options of movies.
+
+    Parameters
+    ----------
+    threads, pace
+        As for `tts2face.picture.movie.ClipFrames`.
+
+    Raises
+    ------
+    InputError
+        There is no such format, or it cannot be transparent.
+    """
+
+    name: str
+    picture: Picture
+    threads: int | None = None
+    pace: Pace | None = None
+
+    def __post_init__(self) -> None:
+        """Check the format."""
+        if self.name not in media_types():
+            raise InputError(f"there is no streamed format {self.name!r}; the formats are {', '.join(media_types())}")
+        if self.name in MOVIE_KINDS:
+            find_movie_kind(self.name, self.picture)
+
+
+def encode_stream(prepared: PreparedRequest, models: SessionModels, format: StreamFormat) -> Iterator[Chunk]:
+    """Synthesise and encode a request; yields consecutive chunks of a file."""
+    request, name = prepared.request, format.name
+    if name in MOVIE_KINDS:
+        renderer = models.renderer(format.picture, has_gestures=request.has_gestures)
+        clips = (piece.clip for piece in models.pieces(prepared))
+        return encode_movie(clips, renderer, name, threads=format.threads, pace=format.pace)
+    if name in SOUND_KINDS:
+        if request.audio is None:
+            pieces = spoken_pieces(prepared, models.for_request(prepared).speech, has_phones=False)
+        else:
+            pieces = models.pieces(prepared)
+        return encode_sound((piece.speech.waveform for piece in pieces), name)
+    if name not in line_formats():
+        file, face = f"clip.{name}", models.face(has_gestures=request.has_gestures)
+        return encode_whole(models.pieces(prepared), file, face, lambda folder: folder / file)
+    mesh = models.face(has_gestures=request.has_gestures).mesh if line_formats()[name].uses_face else None
+    return encode_lines(models.pieces(prepared), name, mesh)
+
+
+def encode_whole(
+    pieces: Iterable[Piece], name: str, face: AnimatedFace, choose: Callable[[Path], Path]
+) -> Iterator[Chunk]:
+    """Write pieces to an export of a name, whose bytes come after the last piece.
+
+    Parameters
+    ----------
+    choose
+        Path of the file that is sent, in the folder of all files that were written.
+
+    Raises
+    ------
+    InputError, BackendError
+        As `plan_exports`, `mesh_of` and `ExportWriter`.
+    """
+    with tempfile.TemporaryDirectory(prefix="tts2face-") as folder:
+        files = plan_exports([Path(folder, name)])
+        with ExportWriter(files, face=mesh_of(face, files)) as writer:
+            for piece in pieces:
+                writer.add(piece.clip, piece.text)
+                yield Chunk(b"", piece.clip.speech.waveform.duration)
+        with choose(Path(folder)).open("rb") as file:
+            while block := file.read(BLOCK_BYTES):
+                yield Chunk(block)
+
+
+class LineBuffer(io.StringIO):
+    """Text that is taken in parts; closing it keeps what was not yet taken."""
+
+    def take(self) -> bytes:
+        """Return the text written since the last call as UTF-8."""
+        taken = self.getvalue().encode()
+        self.seek(0)
+        self.truncate()
+        return taken
+
+    def close(self) -> None:
+        """Do nothing: memory is all that a buffer holds."""
+
+
+def encode_lines(pieces: Iterable[Piece], format: str, face: Face | None) -> Iterator[Chunk]:
+    """Write consecutive pieces in a format of lines; yields a chunk for each piece.
+
+    Parameters
+    ----------
+    format
+        One of `line_formats`.
+    face
+        Mesh whose shapes the clips' channels are, for formats of ARKit shapes.
+
+    Raises
+    ------
+    InputError
+        As `ExportWriter`.
+    """
+    info = line_formats()[format]
+    file, buffer = ExportFile(Path(f"clip{info.suffixes[0]}"), info), LineBuffer()
+    grid: FrameGrid | None = None
+    writer: FormatWriter | None = None
+    for piece in pieces:
+        if grid is None or writer is None:
+            grid = FrameGrid(piece.clip, info.default_fps)
+            writer = info.make_writer()(make_target(file, grid, piece.clip, face, file.path, buffer))
+        writer.add(grid.place(piece.clip, piece.text))
+        yield Chunk(buffer.take(), piece.clip.speech.waveform.duration)
+    if grid is not None and writer is not None:
+        writer.add(grid.remainder())
+        writer.finish()
+        yield Chunk(buffer.take())
