@@ -29,7 +29,8 @@ GROUPS = {  # name of a folder and of a marker: what the tests in it do
     "commands": "run command lines and examples of the documentation, or the package in processes of their own",
     "fuzz": "try many generated or hostile inputs",
 }
-DEFAULT = f"smoke or not ({' or '.join(GROUPS)})"  # as in pyproject.toml
+NIGHTLY = "nightly"  # marker of tests that take minutes, of which others do a little; they are in no other group
+DEFAULT = f"smoke or not ({' or '.join((*GROUPS, NIGHTLY))})"  # as in pyproject.toml
 SHARED_SERVER = "host"  # fixture
 LONGEST_NAME = 200  # characters of a value in the name of a test
 SKIPPED = "tts2face/skipped"  # in pytest's cache
@@ -111,6 +112,9 @@ def pytest_configure(config: pytest.Config) -> None:
         config.addinivalue_line("markers", f"{name}: tests in folders of this name: {content}")
     config.addinivalue_line("markers", "smoke: one test of a promise; it runs by default though its folder does not")
     config.addinivalue_line(
+        "markers", f"{NIGHTLY}: soaks and all cases of what others try in examples; in no other group"
+    )
+    config.addinivalue_line(
         "markers", "skipped: tests that the last run has skipped, for a machine that has now what they need"
     )
     if config.args_source == pytest.Config.ArgsSource.ARGS and config.option.markexpr == DEFAULT:
@@ -129,7 +133,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if item.nodeid in skipped:
             item.add_marker("skipped")
         folders = item.path.relative_to(TESTS).parts[:-1]
-        for name in GROUPS.keys() & set(folders):
+        is_nightly = item.get_closest_marker(NIGHTLY) is not None
+        for name in GROUPS.keys() & set(folders) if not is_nightly else ():
             item.add_marker(name)
         if SHARED_SERVER in getattr(item, "fixturenames", ()):
             is_apart = "browser" in folders and not item.get_closest_marker("smoke")
@@ -152,7 +157,7 @@ def pytest_collection_finish() -> None:
 
 
 def _groups(item: pytest.Item) -> set[str]:
-    return GROUPS.keys() & {marker.name for marker in item.iter_markers()}
+    return {*GROUPS, NIGHTLY} & {marker.name for marker in item.iter_markers()}
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests import started
-from tests.conftest import DEFAULT, GROUPS, TESTS
+from tests.conftest import DEFAULT, GROUPS, NIGHTLY, TESTS
 from tests.running import eventually
 
 STARTS = """
@@ -51,3 +51,9 @@ def test_the_default_run_leaves_out_the_groups(pytestconfig: pytest.Config) -> N
         [sys.executable, "-m", "pytest", "--markers"], cwd=TESTS.parent, capture_output=True, text=True, check=True
     )
     assert all(f"@pytest.mark.{name}: tests in folders of this name" in shown.stdout for name in GROUPS)
+    assert f"@pytest.mark.{NIGHTLY}: " in shown.stdout
+
+
+def test_nightly_tests_are_in_no_other_group(request: pytest.FixtureRequest) -> None:
+    found = [item for item in request.session.items if item.get_closest_marker(NIGHTLY)]
+    assert [item.nodeid for item in found if {mark.name for mark in item.iter_markers()} & {*GROUPS, "smoke"}] == []

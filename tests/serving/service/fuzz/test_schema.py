@@ -20,7 +20,7 @@ SMALL = {
 }  # fmt: skip
 # Meaning is checked after form: a text may be empty, so that requests of the right form may be refused.
 OPTIONS = (
-    "--max-examples", "8", "--request-timeout", "300", "--no-color", "--workers", "2", "--generation-database", "none",
+    "--request-timeout", "300", "--no-color", "--workers", "2", "--generation-database", "none",
     "--exclude-path-regex", "/events$",  # of a job that nobody works on: they never end
     "--suppress-health-check", "all", "--seed", "7", "--exclude-checks", "positive_data_acceptance",
 )  # fmt: skip
@@ -40,12 +40,19 @@ def run_schemathesis(service: RunningService, folder: Path, *options: str) -> No
     assert not [event for event in service.events() if event["event"] == "defect"]
 
 
-@pytest.mark.parametrize("phase", ["examples,coverage", "fuzzing,stateful"])
+@pytest.mark.parametrize(
+    ("phases", "n_examples"),
+    [
+        ("examples,fuzzing", 2),
+        pytest.param("examples,coverage", 8, marks=pytest.mark.nightly),
+        pytest.param("fuzzing,stateful", 8, marks=pytest.mark.nightly),
+    ],
+)
 def test_requests_made_from_the_schema_get_documented_answers(
-    small: RunningService, tmp_path: Path, phase: str
+    small: RunningService, tmp_path: Path, phases: str, n_examples: int
 ) -> None:
     """All routes; data at the edges of the schema, random data, and sequences of calls that use earlier answers."""
-    run_schemathesis(small, tmp_path, "--phases", phase)
+    run_schemathesis(small, tmp_path, "--phases", phases, "--max-examples", str(n_examples))
     assert httpx.get(f"{small.url}/readyz").status_code == 200
 
 
