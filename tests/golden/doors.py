@@ -3,7 +3,6 @@
 import csv
 import importlib.util
 import json
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -167,13 +166,13 @@ def similarity(folder: Path) -> Fingerprint:
 
 def http_clip(folder: Path) -> Fingerprint:
     """A clip over HTTP as a film, as curves and as sound: the bodies of the answers."""
-    from tests.serving.service.in_process import service_client
+    from tests.serving.service.in_process import SessionProcess, service_client
     from tts2face.serving.service.settings import ServiceSettings
 
     options = {"text": "Bob may move.", "style": "delighted", **SMALL, **CHEAP}
     paths = [folder / f"clip.{name}" for name in ("mp4", "curves", "wav")]
     settings = ServiceSettings(data=folder / "data", workers=0, studio=False)
-    with service_client(settings, SESSIONS) as client:
+    with service_client(settings, SessionProcess(SESSIONS)) as client:
         for path in paths:
             answer = client.post("/v1/clips", json={**options, "format": path.suffix[1:]})
             assert answer.status_code == 200, answer.text
@@ -189,27 +188,19 @@ def http_clip(folder: Path) -> Fingerprint:
 
 def http_job(folder: Path) -> Fingerprint:
     """A job of subtitles over HTTP, with a SQLite database and a worker in this process: its results."""
-    from tests.serving.service.in_process import service_client
+    from tests.serving.service.in_process import SessionProcess, service_client, working
     from tests.serving.service.job_requests import finished
-    from tts2face.serving.batch.render import SegmentRenderer
     from tts2face.serving.service.settings import ServiceSettings
-    from tts2face.serving.work.worker import Worker
 
     settings = ServiceSettings(data=folder / "data", workers=0, studio=False)
     request = {**SMALL, **CHEAP, "exports": ["track.json", "words.srt"]}
     form = {"job": json.dumps({"kind": "subtitles", "request": request})}
     out = folder / "out"
     out.mkdir()
-    with service_client(settings, SESSIONS) as client:
-        worker = Worker(settings.database_place, settings.store_place, renderer=SegmentRenderer())
-        running = threading.Thread(target=worker.run)
-        running.start()
-        try:
+    with service_client(settings, SessionProcess(SESSIONS)) as client:
+        with working(settings):
             answer = client.post("/v1/jobs", data=form, files=[("subtitles", ("one.srt", SRT[: SRT.index("2\n")]))])
             job = finished(client, answer.json())
-        finally:
-            worker.stop()
-            running.join()
         assert (job["state"], job["error"]) == ("done", None), job
         for result in job["results"]:
             (out / result["name"]).write_bytes(client.get(result["url"]).content)

@@ -11,7 +11,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from tests.running import eventually
-from tests.serving.service.in_process import service_client
+from tests.serving.service.in_process import TableProcess, service_client
 from tts2face.serving.service import readiness
 from tts2face.serving.service.preparation import Preparation, Step
 from tts2face.serving.service.settings import ServiceSettings
@@ -20,7 +20,6 @@ from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
 from tts2face.serving.work.run import CHECK_S, FULL, JobWatch
 from tts2face.serving.work.table import NewJob
-from tts2face.session.functions import SessionCache
 
 MB = 1 << 20
 
@@ -38,7 +37,7 @@ def client(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[TestClie
     """Client of a service whose data folder is there and whose database is elsewhere."""
     monkeypatch.setattr(readiness, "LOOK_S", 0.0)
     settings = ServiceSettings(workers=0, data=tmp_path / "data", database=str(tmp_path / "jobs.sqlite"))
-    with service_client(settings, SessionCache(1)) as client:
+    with service_client(settings, TableProcess()) as client:
         yield client
 
 
@@ -103,7 +102,7 @@ def test_what_is_still_prepared_is_named(client: TestClient) -> None:
 
 def test_workers_that_have_ended_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(readiness, "LOOK_S", 0.0)
-    with service_client(ServiceSettings(workers=1, data=tmp_path), SessionCache(1)) as client:
+    with service_client(ServiceSettings(workers=1, data=tmp_path), TableProcess()) as client:
         eventually(lambda: ready(client)[0] == 200)
         jobs = client.app.state.service.jobs  # type: ignore[attr-defined]
         jobs._stopped.set()

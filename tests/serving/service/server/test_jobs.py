@@ -201,17 +201,6 @@ def test_a_webhook_is_signed_and_sent_again_until_it_arrives(api: httpx.Client, 
     assert api.get(f"/v1/jobs/{moved['id']}").json()["webhook"]["state"] == "waiting"
 
 
-@pytest.mark.parametrize(
-    "url",
-    ["http://169.254.169.254/latest", "https://example.org/", "file:///etc/passwd", "http://{host}@example.org/",
-     "http://example.org@{host}/", "http://{host}.example.org/", "//{host}/", "http://[/", "http://{host}/a b"],
-)  # fmt: skip
-def test_webhooks_to_other_hosts_are_refused(api: httpx.Client, receiver: Receiver, url: str) -> None:
-    body = {"kind": "clip", "request": CLIP, "webhook": url.replace("{host}", receiver.host)}
-    answer = api.post("/v1/jobs", json=body)
-    assert (answer.status_code, answer.json()["error"]["code"]) == (400, "invalid_webhook")
-
-
 def test_old_jobs_and_their_results_are_removed(host: HostService, tmp_path: Path) -> None:
     with host(data=tmp_path, results_days=30) as running, httpx.Client(base_url=running.url, timeout=60.0) as api:
         job = finished(api, submit(api, CLIP).json())

@@ -1,44 +1,45 @@
-"""Jobs that are refused: of other keys, beyond limits, with wrong options or files."""
+"""Jobs that are refused: of other keys, beyond limits, with wrong options or files, and hooks of other hosts."""
 
 import json
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+from starlette.testclient import TestClient
 
-from tests.running import HostService, RunningService
+from tests.serving.service.in_process import TableProcess, decoding_here, service_client, with_key
 from tests.serving.service.job_requests import CLIP, SMALL, submit
 from tts2face.serving.service.keys import add_key
+from tts2face.serving.service.settings import ServiceSettings
 
-LIMITS = {"job_waiting": 3, "job_cues": 3, "job_files": 2, "job_s": 60, "text_characters": 500, "workers": 0}
-
-
-Idle = tuple[RunningService, dict[str, httpx.Client]]
+HOST = "hooks.example"  # the only one that may be told
+Clients = dict[str, TestClient]
 
 
 @pytest.fixture(scope="module")
-def idle(host: HostService, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Idle]:
-    """A service without workers, with small limits, and clients of its keys."""
-    keys = tmp_path_factory.mktemp("keys") / "keys.toml"
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("data")
+
+
+@pytest.fixture(scope="module")
+def idle(data: Path) -> Iterator[Clients]:
+    """Clients of the keys of a service without workers, with small limits."""
+    keys = data / "keys.toml"
     scopes = {"ann": ["speak"], "bob": ["speak"], "boss": ["speak", "admin"], "smith": ["build"]}
     secrets = {name: add_key(keys, name, found) for name, found in scopes.items()}
-    with host(keys=keys, **LIMITS) as running, ExitStack() as stack:
-        yield (
-            running,
-            {
-                name: stack.enter_context(
-                    httpx.Client(base_url=running.url, timeout=60.0, headers={"Authorization": f"Bearer {secret}"})
-                )
-                for name, secret in secrets.items()
-            },
-        )
+    secrets["quick"] = add_key(keys, "quick", ["speak"], speech_s_per_day=10)
+    settings = ServiceSettings(
+        data=data, keys=keys, workers=0, job_waiting=3, job_cues=3, job_files=2, job_s=60, text_characters=500,
+        webhook_hosts=(HOST,), webhook_secret="x" * 32,
+    )  # fmt: skip
+    with service_client(settings, TableProcess()) as client, decoding_here():
+        yield {name: with_key(client, secret) for name, secret in secrets.items()}
 
 
-def test_a_key_sees_its_own_jobs_only(idle: Idle) -> None:
-    _, clients = idle
-    ann, bob, boss = clients["ann"], clients["bob"], clients["boss"]
+def test_a_key_sees_its_own_jobs_only(idle: Clients) -> None:
+    ann, bob, boss = idle["ann"], idle["bob"], idle["boss"]
     job = submit(ann, CLIP).json()
     other = submit(bob, CLIP).json()
     assert [one["id"] for one in ann.get("/v1/jobs").json()["jobs"]] == [job["id"]]
@@ -53,22 +54,21 @@ def test_a_key_sees_its_own_jobs_only(idle: Idle) -> None:
     assert bob.post(f"/v1/jobs/{job['id']}/cancel").status_code == 404
     assert bob.get(f"/v1/jobs/{job['id']}/events").status_code == 404
     assert boss.get(f"/v1/jobs/{job['id']}").status_code == 200
-    answer = submit(clients["smith"], CLIP)
+    answer = submit(idle["smith"], CLIP)
     assert (answer.status_code, answer.json()["error"]["code"]) == (403, "forbidden")
     for client, one in ((ann, job), (bob, other)):
         assert client.delete(f"/v1/jobs/{one['id']}").status_code == 204
 
 
-def test_waiting_jobs_of_a_key_are_limited(idle: Idle) -> None:
-    _, clients = idle
-    made = [submit(clients["ann"], CLIP) for _ in range(4)]
+def test_waiting_jobs_of_a_key_are_limited(idle: Clients) -> None:
+    made = [submit(idle["ann"], CLIP) for _ in range(4)]
     assert [one.status_code for one in made] == [202, 202, 202, 429]
     assert int(made[-1].headers["retry-after"]) > 0
-    other = submit(clients["bob"], CLIP)
+    other = submit(idle["bob"], CLIP)
     assert other.status_code == 202
     for one in made[:3]:
-        assert clients["ann"].delete(one.headers["location"]).status_code == 204
-    clients["bob"].delete(other.headers["location"])
+        assert idle["ann"].delete(one.headers["location"]).status_code == 204
+    idle["bob"].delete(other.headers["location"])
 
 
 @pytest.mark.parametrize(
@@ -88,8 +88,8 @@ def test_waiting_jobs_of_a_key_are_limited(idle: Idle) -> None:
         ([], 422, "body"),
     ],
 )
-def test_wrong_jobs_are_refused(idle: Idle, body: object, status: int, reason: str) -> None:
-    answer = idle[1]["ann"].post("/v1/jobs", json=body)
+def test_wrong_jobs_are_refused(idle: Clients, body: object, status: int, reason: str) -> None:
+    answer = idle["ann"].post("/v1/jobs", json=body)
     assert (answer.status_code, reason in answer.json()["error"]["message"]) == (status, True), answer.text
 
 
@@ -126,12 +126,28 @@ def cues(number: int, at: int = 0) -> bytes:
     ],
 )  # fmt: skip
 def test_wrong_subtitle_jobs_are_refused(
-    idle: Idle, request_: dict[str, Any], files: list[tuple[str, bytes]], status: int,
-    reason: str,
+    idle: Clients, data: Path, request_: dict[str, Any], files: list[tuple[str, bytes]], status: int, reason: str,
 ) -> None:  # fmt: skip
-    running, clients = idle
     form = {"job": json.dumps({"kind": "subtitles", "request": {**SMALL, **request_}})}
-    answer = clients["ann"].post("/v1/jobs", data=form, files=files)
+    answer = idle["ann"].post("/v1/jobs", data=form, files=files)
     assert (answer.status_code, reason in answer.json()["error"]["message"]) == (status, True), answer.text
-    assert running.data.name not in answer.text
+    assert str(data) not in answer.text
     assert "/tmp" not in answer.text
+
+
+@pytest.mark.parametrize(
+    "url",
+    ["http://169.254.169.254/latest", "https://example.org/", "file:///etc/passwd", "http://{host}@example.org/",
+     "http://example.org@{host}/", "http://{host}.example.org/", "//{host}/", "http://[/", "http://{host}/a b"],
+)  # fmt: skip
+def test_webhooks_to_other_hosts_are_refused(idle: Clients, url: str) -> None:
+    answer = idle["ann"].post("/v1/jobs", json={"kind": "clip", "request": CLIP, "webhook": url.replace("{host}", HOST)})
+    assert (answer.status_code, answer.json()["error"]["code"]) == (400, "invalid_webhook")
+
+
+def test_jobs_use_the_seconds_of_speech_too(idle: Clients) -> None:
+    """By their texts, as they are made later and elsewhere."""
+    job = {"kind": "clip", "request": {"text": "We were away a year ago. " * 12}}
+    answers = [idle["quick"].post("/v1/jobs", json=job) for _ in range(2)]
+    assert [answer.status_code for answer in answers] == [202, 429], answers[0].text
+    assert int(answers[1].headers["retry-after"]) > 3600
