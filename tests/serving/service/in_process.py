@@ -6,9 +6,10 @@ processes (`tests.running`).
 """
 
 import asyncio
+import io
 import json
 import threading
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -17,12 +18,13 @@ from starlette.testclient import TestClient
 
 from tests.processes.answered import answered
 from tests.running import eventually
-from tts2face.processes.message import ERROR, EVENT, RESULT, Message
+from tts2face.processes.child import Call, Handler, answer
+from tts2face.processes.message import ERROR, EVENT, MORE, STOP, Message, read_message
 from tts2face.processes.parent import raised
 from tts2face.processes.program import Program
 from tts2face.serving.service import uploads
-from tts2face.serving.service.messages import Work
-from tts2face.serving.service.pool import WarmProcess
+from tts2face.serving.service.messages import SYNTHESISE, Work
+from tts2face.serving.service.pool import InputQueue, WarmProcess, work_call
 from tts2face.serving.service.preparation import Preparation
 from tts2face.serving.service.server import Mount, create_app
 from tts2face.serving.service.settings import ServiceSettings
@@ -34,38 +36,65 @@ SECONDS = 1.0  # of speech of an answer of a table
 
 
 class LocalProcess(WarmProcess):
-    """Executes works in this process, one after the other and in the thread of the server.
+    """A process of the pool that is this one.
 
     Parameters
     ----------
-    answer
-        Messages of a work, of which the last one is its result or its error.
+    handlers
+        Its answer to `SYNTHESISE`; each call has a thread.
     """
 
-    def __init__(self, answer: Callable[[Work], Sequence[Message]]) -> None:
+    def __init__(self, handlers: Mapping[str, Handler]) -> None:
         super().__init__({}, Preparation((), 1), lambda: None)
-        self._answer, self.is_ready = answer, True
+        self._handlers, self.is_ready = handlers, True
 
     async def run(self) -> None:
         """Nothing is to be started."""
 
-    async def stream(self, work: Work, priority: int, inputs: Any = None) -> AsyncIterator[Message]:
-        """Messages of a work, made when the first one is asked for."""
-        made = self._answer(work)
-        if made[-1].kind == ERROR:
-            raise raised(made[-1])
-        for message in made:
+    async def stream(self, work: Work, priority: int, inputs: InputQueue | None = None) -> AsyncIterator[Message]:
+        """Messages of a work as they are made."""
+        answers = Answers(asyncio.get_running_loop())
+        call = Call(Message(SYNTHESISE, work_call(work, priority)), answers, threading.Condition())  # type: ignore[arg-type]
+        asked = asyncio.create_task(asyncio.to_thread(answer, call, self._handlers))
+        given = asyncio.create_task(_pass_on(call, inputs)) if inputs is not None else None
+        try:
+            while (message := await answers.queue.get()).kind == EVENT:
+                yield message
+            if message.kind == ERROR:
+                raise raised(message)
             yield message
+        finally:
+            if given is not None:
+                given.cancel()
+            call.control(Message(STOP, {}))
+            await asyncio.shield(asked)
+
+
+async def _pass_on(call: Call, inputs: InputQueue) -> None:
+    while True:
+        call.control(Message(MORE, *(await inputs.get())))
+
+
+class Answers(io.BytesIO):
+    """Where the thread of a call writes messages, each in one piece, for the thread of the server."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        super().__init__()
+        self._loop, self.queue = loop, asyncio.Queue[Message]()
+
+    def write(self, content: Any) -> int:
+        """Pass a message on."""
+        message = read_message(io.BytesIO(content))
+        assert message is not None
+        self._loop.call_soon_threadsafe(self.queue.put_nowait, message)
+        return len(content)
 
 
 class SessionProcess(LocalProcess):
     """Executes works with sessions of this process."""
 
     def __init__(self, sessions: SessionCache) -> None:
-        synthesis = Synthesis(sessions)
-        super().__init__(
-            lambda work: answered(synthesis.synthesise, {"work": work.as_json(), "priority": 0, "id": None})
-        )
+        super().__init__({SYNTHESISE: Synthesis(sessions).synthesise})
 
 
 class TableProcess(LocalProcess):
@@ -80,15 +109,13 @@ class TableProcess(LocalProcess):
     def __init__(self, table: Mapping[str, bytes] | None = None) -> None:
         self.works: list[Work] = []
         self._table = table or {}
-        super().__init__(self._look_up)
+        super().__init__({SYNTHESISE: self._look_up})
 
-    def _look_up(self, work: Work) -> list[Message]:
+    def _look_up(self, call: Call) -> Mapping[str, float]:
+        work = Work(**call.content["work"])
         self.works.append(work)
-        content = self._table.get(work.format, work.format.encode())
-        return [
-            Message(EVENT, {"seconds": SECONDS}, content),
-            Message(RESULT, {"seconds": SECONDS, "cpu_s": 0.0}),
-        ]
+        call.event({"seconds": SECONDS}, self._table.get(work.format, work.format.encode()))
+        return {"seconds": SECONDS, "cpu_s": 0.0}
 
 
 @contextmanager
@@ -128,7 +155,7 @@ def working(settings: ServiceSettings) -> Iterator[None]:
 
 @contextmanager
 def decoding_here() -> Iterator[None]:
-    """Uploads are decoded in this process, without limits of memory and time (`tests/serving/service/test_uploads.py`)."""
+    """Uploads are decoded in this process, without limits of memory and time (those: `test_uploads.py`)."""
 
     async def call_here(program: Program, kind: str, content: Mapping[str, Any], **_: Any) -> Mapping[str, Any]:
         made = (await asyncio.to_thread(answered, program.load()[kind], content))[-1]

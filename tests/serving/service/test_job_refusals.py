@@ -141,7 +141,9 @@ def test_wrong_subtitle_jobs_are_refused(
      "http://example.org@{host}/", "http://{host}.example.org/", "//{host}/", "http://[/", "http://{host}/a b"],
 )  # fmt: skip
 def test_webhooks_to_other_hosts_are_refused(idle: Clients, url: str) -> None:
-    answer = idle["ann"].post("/v1/jobs", json={"kind": "clip", "request": CLIP, "webhook": url.replace("{host}", HOST)})
+    answer = idle["ann"].post(
+        "/v1/jobs", json={"kind": "clip", "request": CLIP, "webhook": url.replace("{host}", HOST)}
+    )
     assert (answer.status_code, answer.json()["error"]["code"]) == (400, "invalid_webhook")
 
 

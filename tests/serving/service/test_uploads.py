@@ -24,8 +24,8 @@ def decode(kind: str, content: bytes, folder: Path, limit: float) -> tuple[str, 
     return refusal(kind, given, decoded, limit), decoded
 
 
-def wav(seconds: float = 1.0) -> bytes:
-    samples = 0.3 * np.sin(2 * np.pi * 220 * np.arange(int(seconds * RATE)) / RATE)
+def wav(seconds: float = 1.0, level: float = 0.3) -> bytes:
+    samples = level * np.sin(2 * np.pi * 220 * np.arange(int(seconds * RATE)) / RATE)
     buffer = io.BytesIO()
     with wave.open(buffer, "wb") as file:
         file.setparams((1, 2, RATE, 0, "NONE", ""))

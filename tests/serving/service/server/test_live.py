@@ -57,34 +57,6 @@ def converse(service: RunningService, talk: Any, **options: Any) -> Live:
     return asyncio.run(run())
 
 
-@pytest.mark.smoke
-def test_sentences_are_spoken_as_soon_as_they_are_complete(service: RunningService) -> None:
-    async def talk(live: Live) -> None:
-        for word in WORDS[:6]:
-            await live.send(type="text", text=f"{word} ")
-        first = await live.receive_until("speech")
-        assert first["text"] == "Hello there, how are you?"
-        for word in WORDS[6:]:
-            await live.send(type="text", text=f"{word} ")
-        await live.send(type="end")
-        await live.receive_until("done")
-
-    live = converse(service, talk, with_idle=False)
-    spoken = live.events("speech")
-    assert [one["text"] for one in spoken] == ["Hello there, how are you?", "I am well.", "And"]
-    assert spoken[1]["begin"] == pytest.approx(spoken[0]["begin"] + spoken[0]["seconds"], abs=0.01)
-    assert [word for word, *_ in spoken[0]["words"]] == ["Hello", "there", "how", "are", "you"]
-    assert spoken[0]["phones"][0][0] == "sil"
-    assert all(one["begin"] <= begin < end for one in spoken for _, begin, end in one["words"])
-    assert len(live.sound) == 2 * round(sum(one["seconds"] for one in spoken) * 24_000)
-    curves = live.events("curves")
-    assert len(curves) == 3
-    weights = np.concatenate([one["weights"] for one in curves])
-    assert weights.shape[1] == len(curves[0]["names"]) == 52
-    assert weights[:, curves[0]["names"].index("jawOpen")].max() > 0.1
-    assert len(weights) == round(sum(one["seconds"] for one in spoken) * 30)
-
-
 def test_a_living_face_fills_the_silence_in_real_time(service: RunningService) -> None:
     async def talk(live: Live) -> None:
         while (await live.receive_until("curves"))["begin"] < 1.5:  # it follows the clock, however busy the machine
@@ -117,22 +89,6 @@ def test_a_face_listens_to_the_partner_and_then_answers(service: RunningService)
     (said,) = live.events("speech")
     assert said["phones"][0][2] - said["begin"] == pytest.approx(0.3, abs=0.1)  # in which it takes breath
     assert not live.events("error")
-
-
-@pytest.mark.parametrize("wrong", [7, {"a": 1}, ["Hello."], True], ids=str)
-def test_null_is_no_text_and_other_types_are_refused(service: RunningService, wrong: Any) -> None:
-    async def talk(live: Live) -> None:
-        for text in ("Hello there. ", None, wrong, "Good bye."):
-            await live.send(type="text", text=text)
-        await live.send(type="text")
-        await live.send(type="end")
-        await live.receive_until("done")
-
-    live = converse(service, talk, with_idle=False)
-    assert [one["text"] for one in live.events("speech")] == ["Hello there.", "Good bye."]
-    assert [one["message"] for one in live.events("error")] == [
-        f"text must be a text, or null for none, not {json.dumps(wrong)}; send words"
-    ]
 
 
 def test_cancel_forgets_the_text_that_waits(service: RunningService) -> None:
@@ -228,66 +184,3 @@ def test_curves_of_a_microphone_are_those_of_python(service: RunningService, rat
     begins = [one["begin"] for one in live.events("curves")]
     ends = [one["begin"] + len(one["weights"]) / one["fps"] for one in live.events("curves")]
     assert begins == pytest.approx([0.0, *ends[:-1]], abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("block", "reason"),
-    [
-        (b"123", "a block of sound has 3 bytes; send 16-bit samples"),
-        (bytes(70_000), "a block of sound has 70000 bytes"),
-        ('{"type": "text", "text": "Hello."}', "16-bit samples, or JSON with one of the types end"),
-    ],
-)
-def test_wrong_sound_is_refused_and_the_stream_goes_on(
-    service: RunningService, block: bytes | str, reason: str
-) -> None:
-    async def talk(live: Live) -> None:
-        await live.connection.send(block)
-        await live.connection.send(bytes(32_000))
-        await live.send(type="end")
-        await live.receive_until("done")
-
-    live = converse(service, talk, input="audio")
-    assert [reason in one["message"] for one in live.events("error")] == [True]
-    assert sum(len(one["weights"]) for one in live.events("curves")) == 25
-
-
-def test_a_stream_of_text_refuses_sound_to_which_it_does_not_listen(service: RunningService) -> None:
-    async def talk(live: Live) -> None:
-        await live.connection.send(b"1234")
-        await live.receive_until("error")
-
-    live = converse(service, talk, with_idle=False)
-    assert "sound of the other is heard after listen with its sample rate" in live.events("error")[0]["message"]
-
-
-def test_a_sentence_that_cannot_be_spoken_does_not_end_the_stream(service: RunningService) -> None:
-    async def talk(live: Live) -> None:
-        await live.send(type="text", text="漢字. Hello there. ")
-        await live.send(type="fly")
-        await live.send(type="end")
-        await live.receive_until("done")
-
-    live = converse(service, talk, with_idle=False)
-    assert [one["text"] for one in live.events("speech")] == ["Hello there."]
-    messages = " ".join(one["message"] for one in live.events("error"))
-    assert "cannot read 漢字" in messages
-    assert "one of the types cancel, end, flush, interrupt, listen, text" in messages
-
-
-@pytest.mark.parametrize(
-    ("options", "reason"),
-    [
-        ({"fps": 1000}, "fps: Input should be less than"),
-        ({"voice": "/tmp/x.onnx"}, "there is no voice"),
-        ({"song": "la"}, "song: Extra inputs"),
-        ({"input": "audio", "rate": 1.0}, "rate: Input should be a valid integer"),
-        ({"input": "audio", "voice": "heart"}, "voice: Extra inputs"),
-        ({"input": "pictures"}, "input: Input should be 'text'"),
-    ],
-)
-def test_wrong_options_are_refused(service: RunningService, options: dict[str, Any], reason: str) -> None:
-    async def talk(live: Live) -> None:
-        assert reason in (await live.receive_until("error"))["message"]
-
-    converse(service, talk, **options)
