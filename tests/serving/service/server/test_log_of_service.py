@@ -4,6 +4,7 @@ import signal
 from pathlib import Path
 
 import httpx
+import pytest
 
 from tests.running import HostService, RunningService
 from tts2face.serving.service.keys import add_key, remove_key
@@ -23,6 +24,15 @@ def test_the_log_says_when_a_process_can_serve(service: RunningService) -> None:
     before = service.host.wait_for_event("preparing", part="models")
     found = httpx.get(f"{service.url}/readyz").json()["preparing"]
     assert before["done"] < found["done"] == found["of"] == before["of"]
+
+
+def test_the_log_names_the_studio_and_it_can_be_left_out(service: RunningService, host: HostService) -> None:
+    pytest.importorskip("nicegui", reason="needs `pip install 'tts2face[studio]'`")
+    listening = service.wait_for_event("listening", url=service.url)
+    assert listening["studio"] == f"{listening['url']}/studio"
+    with host(workers=0, is_ready=False) as without:
+        assert without.wait_for_event("listening", url=without.url)["studio"] is None
+        assert httpx.get(f"{without.url}/studio/").status_code == 404
 
 
 def test_server_timing_names_the_stages(client: httpx.Client) -> None:

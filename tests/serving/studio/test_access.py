@@ -5,13 +5,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import httpx
 import pytest
+from starlette.testclient import TestClient
 
-from tests.running import HostService, RunningService, serve_process
+from tests.serving.service.in_process import TableProcess, service_client
 from tts2face.serving.service.exchange import POLICY
 from tts2face.serving.service.guard import COOKIE, cookie_key, set_cookie
 from tts2face.serving.service.keys import add_key
+from tts2face.serving.service.settings import ServiceSettings
 
 HTML = {"Accept": "text/html"}
 
@@ -24,21 +25,37 @@ def keys(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def closed(keys: dict[str, str]) -> Iterator[RunningService]:
-    """A service with keys."""
-    with serve_process("--keys", keys["file"]) as running:
-        yield running
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("data")
 
 
-@contextmanager
-def browser(closed: RunningService, key: str = "") -> Iterator[httpx.Client]:
-    with httpx.Client(base_url=f"{closed.url}/studio", timeout=60.0, headers=HTML) as client:
-        if key:
-            assert client.post("/login", data={"key": key}).status_code == 303
+@pytest.fixture(scope="module")
+def closed(keys: dict[str, str], data: Path) -> Iterator[TestClient]:
+    """Client of a service with keys and the studio."""
+    from tts2face.serving.studio.app import STUDIO
+
+    settings = ServiceSettings(data=data, keys=Path(keys["file"]), workers=0, warm_studio=False)
+    with service_client(settings, TableProcess(), [STUDIO]) as client:
         yield client
 
 
-def test_pages_need_a_login(closed: RunningService) -> None:
+@contextmanager
+def browser(closed: TestClient, key: str = "") -> Iterator[TestClient]:
+    client = TestClient(closed.app, base_url="http://localhost/studio/", follow_redirects=False, headers=HTML)
+    client.portal = closed.portal
+    if key:
+        assert client.post("/login", data={"key": key}).status_code == 303
+    yield client
+
+
+@pytest.fixture
+def studio(closed: TestClient, keys: dict[str, str]) -> Iterator[TestClient]:
+    """Client of the studio with a key."""
+    with browser(closed, keys["ann"]) as client:
+        yield client
+
+
+def test_pages_need_a_login(closed: TestClient) -> None:
     with browser(closed) as client:
         for path in ("/", "/animate/0123456789abcdef"):
             answer = client.get(path)
@@ -50,7 +67,7 @@ def test_pages_need_a_login(closed: RunningService) -> None:
 
 
 def test_a_login_keeps_the_key_in_a_cookie_that_scripts_cannot_read(
-    closed: RunningService, keys: dict[str, str]
+    closed: TestClient, keys: dict[str, str]
 ) -> None:
     with browser(closed) as client:
         refused = client.post("/login", data={"key": "t2f_wrong<b>"})
@@ -66,13 +83,13 @@ def test_a_login_keeps_the_key_in_a_cookie_that_scripts_cannot_read(
         assert client.get("/").status_code == 303
 
 
-def test_the_cookie_serves_the_studio_only(closed: RunningService, keys: dict[str, str]) -> None:
+def test_the_cookie_serves_the_studio_only(closed: TestClient, keys: dict[str, str]) -> None:
     cookie = {"Cookie": f"{COOKIE}={keys['ann']}"}
-    assert httpx.get(f"{closed.url}/studio/api/projects", headers=cookie).status_code == 200
-    assert httpx.get(f"{closed.url}/v1/jobs", headers=cookie).status_code == 401
+    assert closed.get("/studio/api/projects", headers=cookie).status_code == 200
+    assert closed.get("/v1/jobs", headers=cookie).status_code == 401
 
 
-def test_a_key_sees_its_own_projects_only(closed: RunningService, keys: dict[str, str]) -> None:
+def test_a_key_sees_its_own_projects_only(closed: TestClient, keys: dict[str, str]) -> None:
     with browser(closed, keys["ann"]) as ann, browser(closed, keys["bob"]) as bob:
         number = ann.post("/api/projects", json={"text": "Hello."}).json()["id"]
         assert number in ann.get("/api/projects").text
@@ -92,13 +109,13 @@ def test_a_key_sees_its_own_projects_only(closed: RunningService, keys: dict[str
         assert ann.delete(f"/api/reports/{report}").status_code == 204
 
 
-def test_a_key_without_speak_makes_no_project(closed: RunningService, keys: dict[str, str]) -> None:
+def test_a_key_without_speak_makes_no_project(closed: TestClient, keys: dict[str, str]) -> None:
     with browser(closed, keys["reader"]) as client:
         answer = client.post("/api/projects", json={"text": "Hello."})
         assert (answer.status_code, "lacks the scope speak" in answer.text) == (400, True)
 
 
-def test_a_key_without_build_is_told_where_recordings_need_it(closed: RunningService, keys: dict[str, str]) -> None:
+def test_a_key_without_build_is_told_where_recordings_need_it(closed: TestClient, keys: dict[str, str]) -> None:
     with browser(closed, keys["ann"]) as client:
         assert "Record your own talker" not in client.get("/").text
         page = client.get("/record").text
@@ -106,7 +123,7 @@ def test_a_key_without_build_is_told_where_recordings_need_it(closed: RunningSer
         assert "Go to the projects" in page
 
 
-def test_pages_of_other_origins_reach_nothing(studio: httpx.Client) -> None:
+def test_pages_of_other_origins_reach_nothing(studio: TestClient) -> None:
     evil = {"Origin": "https://evil.example"}
     assert studio.post("/api/projects", json={"text": "Hello."}, headers=evil).status_code == 403
     upgrade = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13",
@@ -116,7 +133,7 @@ def test_pages_of_other_origins_reach_nothing(studio: httpx.Client) -> None:
     assert studio.get("/", headers={"Host": "evil.example"}).status_code == 421
 
 
-def test_a_page_may_load_and_send_nothing_elsewhere(studio: httpx.Client) -> None:
+def test_a_page_may_load_and_send_nothing_elsewhere(studio: TestClient) -> None:
     for path in ("/", "/animate/0123456789abcdef", "/api/projects"):
         answer = studio.get(path)
         assert answer.headers["content-security-policy"] == POLICY
@@ -131,21 +148,13 @@ def test_a_page_may_load_and_send_nothing_elsewhere(studio: httpx.Client) -> Non
     assert not hosts
 
 
-def test_other_answers_of_the_service_have_no_policy_of_pages(studio_service: RunningService) -> None:
-    assert "content-security-policy" not in httpx.get(f"{studio_service.url}/healthz").headers
+def test_other_answers_of_the_service_have_no_policy_of_pages(closed: TestClient) -> None:
+    assert "content-security-policy" not in closed.get("/healthz").headers
 
 
-def test_the_body_of_an_upload_is_bounded(studio: httpx.Client) -> None:
+def test_the_body_of_an_upload_is_bounded(studio: TestClient) -> None:
     large = b"x" * 21_000_000
     assert studio.post("/api/imports", files={"file": ("x.txt", large)}).status_code == 413
-
-
-def test_the_log_names_the_studio_and_it_can_be_left_out(studio_service: RunningService, host: HostService) -> None:
-    listening = studio_service.wait_for_event("listening", url=studio_service.url)
-    assert listening["studio"] == f"{listening['url']}/studio"
-    with host(workers=0, is_ready=False) as without:
-        assert without.wait_for_event("listening", url=without.url)["studio"] is None
-        assert httpx.get(f"{without.url}/studio/").status_code == 404
 
 
 @pytest.mark.parametrize("cookie", ["", "a=b", "tts2face_key", '"', "tts2face_key=\x01"])
@@ -175,7 +184,7 @@ def test_styles_and_scripts_are_in_the_package() -> None:
     assert {"stage.js", "timeline.js", "clock.js", "preview.js"} <= {one.name for one in folder.glob("components/*.js")}
 
 
-def test_styles_and_takes_belong_to_a_key(closed: RunningService, keys: dict[str, str]) -> None:
+def test_styles_and_takes_belong_to_a_key(closed: TestClient, keys: dict[str, str], data: Path) -> None:
     mix = {"name": "anns", "mix": {"source": "grid_s1"}}
     with browser(closed, keys["ann"]) as ann, browser(closed, keys["bob"]) as bob:
         assert ann.post("/api/styles", json=mix).status_code == 201
@@ -186,7 +195,7 @@ def test_styles_and_takes_belong_to_a_key(closed: RunningService, keys: dict[str
         number = bob.post("/api/projects", json={"text": "Hello."}).json()["id"]
         edit = {
             "kind": "models",
-            "options": {"palette": f"{closed.data.name}/studio/palettes/ann.styles/my-styles.palette"},
+            "options": {"palette": f"{data}/studio/palettes/ann.styles/my-styles.palette"},
         }
         answer = bob.post(f"/api/projects/{number}/edits", json={"edit": edit})
         assert "there is no palette" in answer.json()["error"]["message"]
