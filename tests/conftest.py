@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from tests.packages import needs
 from tts2face.numeric.kernels import CACHE_VARIABLE, FOLDER
 
 os.environ.setdefault(CACHE_VARIABLE, str(FOLDER))  # processes with another home compile nothing again
@@ -94,8 +95,7 @@ def capture(request: pytest.FixtureRequest) -> Path:
 @pytest.fixture(scope="session")
 def face_model() -> Path:
     """Bundle of landmark models."""
-    pytest.importorskip("ai_edge_litert", reason="needs `pip install 'tts2face[capture]'`")
-    pytest.importorskip("cv2", reason="needs `pip install 'tts2face[capture]'`")
+    needs("ai_edge_litert", "cv2")
     from lexicon.errors import BackendError
     from tts2face.video.tracking import find_bundle
 
@@ -117,6 +117,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line(
         "markers", "skipped: tests that the last run has skipped, for a machine that has now what they need"
     )
+    config.addinivalue_line("markers", "needs(*modules): tests that import these modules (tests/packages.py)")
     if config.args_source == pytest.Config.ArgsSource.ARGS and config.option.markexpr == DEFAULT:
         config.option.markexpr = ""
 
@@ -130,7 +131,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     cache = getattr(config, "cache", None)  # absent with `-p no:cacheprovider`
     skipped = set(cache.get(SKIPPED, [])) if cache else set()
     for item in items:
-        if item.nodeid in skipped:
+        if not skipped.isdisjoint((item.nodeid, item.nodeid.partition("::")[0])):  # the test, or its whole file
             item.add_marker("skipped")
         folders = item.path.relative_to(TESTS).parts[:-1]
         is_nightly = item.get_closest_marker(NIGHTLY) is not None
@@ -140,6 +141,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             is_apart = "browser" in folders and not item.get_closest_marker("smoke")
             item.add_marker(pytest.mark.xdist_group("browser" if is_apart else SHARED_SERVER))
     items.sort(key=lambda item: (item.get_closest_marker("xdist_group") is None, not _groups(item)))
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip tests that are marked as needing modules which are not installed."""
+    for marker in item.iter_markers("needs"):
+        needs(*marker.args)
 
 
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:

@@ -1,7 +1,6 @@
 """Eight requests through other doors than `Session.write`; each gives the fingerprint of what it makes in a folder."""
 
 import csv
-import importlib.util
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -216,8 +215,3 @@ NEEDS: Mapping[str, Sequence[str]] = {
     "http_job": ("fastapi", "httpx", "prometheus_client", "dbos"),
     "similarity": ("matplotlib", "sklearn"),
 }
-
-
-def missing_package(name: str) -> str | None:
-    """The first package that a request needs and that is not installed."""
-    return next((one for one in NEEDS.get(name, ()) if importlib.util.find_spec(one) is None), None)

@@ -4,9 +4,10 @@ import copy
 
 import pytest
 
-from tests.golden.doors import missing_package
+from tests.golden.doors import NEEDS
 from tests.golden.fingerprints import differences, environment, is_here, read_machines, renewed
 from tests.golden.requests import CLIPS, NAMES, fingerprint
+from tests.packages import needs
 
 RENEW = "a commit that changes results on purpose renews them: python -m tests.golden.requests"
 MACHINES = read_machines()
@@ -15,9 +16,7 @@ THERE = {"environment": {"machine": "another"}}
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_request_gives_what_it_gave(name: str) -> None:
-    missing = missing_package(name)
-    if missing is not None:
-        pytest.skip(f"the request {name} needs the package {missing}; pip install 'tts2face[test]'")
+    needs(*NEEDS.get(name, ()))
     known = sorted((one for one in MACHINES if name in one["requests"]), key=is_here)[-1]
     found = differences(fingerprint(name), known["requests"][name], is_same_machine=is_here(known))
     if found:

@@ -12,11 +12,14 @@ from lexicon.pronounce import pronounce
 from tests.lexicon.japanese_readings import READINGS
 from tts2face.sound.voice_pool import load_voice
 
+JAPANESE = pytest.mark.needs("pyopenjtalk")
+
 
 def reading(text: str) -> str:
     return re.sub(r"[\s、。？！]", "", g2p.to_kana(text))
 
 
+@JAPANESE
 def test_most_sentences_are_read_as_a_person_reads_them() -> None:
     """35 of 40 when the library was chosen (docs/decisions/058-japanese.md)."""
     assert len(READINGS) == 40
@@ -24,10 +27,12 @@ def test_most_sentences_are_read_as_a_person_reads_them() -> None:
     assert len(right) >= 35
 
 
+@JAPANESE
 def test_phrases_are_separated_and_punctuation_is_kept() -> None:
     assert g2p.to_kana("今日は、東京へ行きます。") == "キョーワ、 トーキョーエ イキマス。"
 
 
+@JAPANESE
 def test_long_texts_are_read_piece_by_piece() -> None:
     assert reading("今日" * 5000).count("キョー") > 4000
 
@@ -37,6 +42,7 @@ def test_texts_in_kana_are_passed_to_espeak_unchanged() -> None:
     assert pronounce("きょうは", "ja").words[0].text == "きょうは"
 
 
+@JAPANESE
 def test_the_voice_pronounces_the_reading() -> None:
     phones = pronounce("東京へ行きます。", "ja").phones
     assert phones == ("t", "o", "o", "k", "o", "o", "e", "i", "k", "i", "m", "a", "s", "ɯ")

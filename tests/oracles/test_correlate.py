@@ -6,6 +6,7 @@ import pytest
 from corpus_tools.training.linear_audio_map import canonical_correlation
 from lexicon.errors import InputError
 from tests.bench.bench_drive import sampled_correlations
+from tests.packages import package
 
 KNOWN = (0.9, 0.5, 0.2)
 
@@ -45,7 +46,7 @@ def test_factors_have_unit_variance_and_the_stated_correlations() -> None:
 
 
 def test_it_equals_scikit_learn() -> None:
-    decomposition = pytest.importorskip("sklearn.cross_decomposition")
+    decomposition = package("sklearn.cross_decomposition")
     a, b = tied(500)
     left, right = decomposition.CCA(3, max_iter=5000, tol=1e-12).fit_transform(a, b)
     theirs = [np.corrcoef(left[:, k], right[:, k])[0, 1] for k in range(3)]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
+from tests.packages import package
 from tts2face.lips.blending import frame_distances, path_cost, warp_path, warp_space, warp_to_reference
 
 
@@ -38,7 +39,7 @@ def test_a_band_keeps_the_cheapest_path_within_it(band):
 
 
 def test_agrees_with_fastdtw_at_a_radius_that_makes_it_exact():
-    fastdtw = pytest.importorskip("fastdtw", reason="fastdtw is the second opinion; install the extra [test]")
+    fastdtw = package("fastdtw")
     stream = np.random.default_rng(8)
     source, target = np.cumsum(stream.normal(size=(40, 3)), axis=0), np.cumsum(stream.normal(size=(33, 3)), axis=0)
     cost = frame_distances(source, target)

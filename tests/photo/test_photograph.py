@@ -8,6 +8,7 @@ import pytest
 from PIL import Image, ImageCms
 
 from lexicon.errors import DataError
+from tests.packages import package
 from tts2face.photo import photograph
 from tts2face.photo.photograph import KEPT_HEIGHT, read_photograph
 
@@ -104,7 +105,7 @@ def test_very_large_pictures_are_reduced(tmp_path: Path, picture: Image.Image, n
 def test_heic_is_read_or_its_package_is_named(
     tmp_path: Path, picture: Image.Image, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    heif = pytest.importorskip("pillow_heif", reason="needs `pip install 'tts2face[photo]'`")
+    heif = package("pillow_heif")
     heif.register_heif_opener()
     path = written(tmp_path, picture, "me.heic", quality=95)
     assert difference(read_photograph(path).pixels, picture) < 3

@@ -7,6 +7,7 @@ import pytest
 
 from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence
+from tests.packages import package
 from tests.picture.tiny_face import tiny_face
 from tts2face.picture import vtk_renderer as vtk
 from tts2face.picture import window as view
@@ -47,7 +48,7 @@ def test_without_pyvista_the_error_names_what_to_install(monkeypatch):
 
 @pytest.mark.parametrize("name", ["front", "three-quarter", "profile", "close", "-20,15,700"])
 def test_the_window_has_the_camera_of_the_picture(name):
-    pyvista = pytest.importorskip("pyvista", reason="needs pyvista: pip install 'tts2face[view]'")
+    pyvista = package("pyvista")
     wanted = camera_matrices(parse_camera(name), tiny_face(), (320, 240))
     plotter = SimpleNamespace(camera=pyvista.Camera())
     vtk.aim_camera(plotter, wanted, 240)

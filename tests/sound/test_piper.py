@@ -11,11 +11,12 @@ import pytest
 from lexicon.errors import BackendError, DataError, InputError
 from lexicon.ipa import parse_ipa
 from lexicon.phones import PHONES
+from tests.packages import needs, package
 from tts2face.sound.piper import PiperVoice, english_letters
 from tts2face.sound.voice import SpokenWord
 from tts2face.sound.voice_pool import load_voice
 
-onnx = pytest.importorskip("onnx", reason="needs `pip install onnx`")
+onnx = package("onnx")
 
 RATE = 22_050
 LETTER_SAMPLES = 1_000  # samples of each letter at the rate 1
@@ -102,7 +103,7 @@ def german_voice_file(voice_file: Path) -> Path:
 
 
 def test_other_languages_are_read_by_piper(german_voice_file: Path) -> None:
-    pytest.importorskip("piper", reason="needs `pip install 'tts2face[piper]'`")
+    needs("piper")
     voice = load_voice(str(german_voice_file), "de", {"tag": parse_ipa("ʃˈiː")})
     assert synthesised_letters(voice, "Guten Abend.") == "ɡˈuːtən ˈɑːbənt."
     assert synthesised_letters(voice, "Guten Tag.") == "ɡˈuːtən ʃˈi."
@@ -112,7 +113,7 @@ def test_other_languages_are_read_by_piper(german_voice_file: Path) -> None:
 
 
 def test_damaged_settings_of_another_language_are_refused(german_voice_file: Path) -> None:
-    pytest.importorskip("piper", reason="needs `pip install 'tts2face[piper]'`")
+    needs("piper")
     content = settings() | {"espeak": {"voice": "de"}, "vowel_clusters": 1}
     german_voice_file.with_name("tiny.onnx.json").write_text(json.dumps(content))
     with pytest.raises(DataError, match="not those of a Piper voice"):

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import BackendError, InputError
+from tests.packages import needs
 from tts2face.storage.content_store import ContentStore, FolderStore, content_hash, divided, open_content_store
 
 NAME = divided("abcdef.bin")
@@ -17,7 +18,7 @@ Opens = Callable[[str], ContentStore]
 def opened(request: pytest.FixtureRequest, tmp_path: Path) -> Opens:
     """Opens a folder of a store."""
     if request.param == "bucket":
-        pytest.importorskip("obstore", reason="needs the extra [batch]")
+        needs("obstore")
     place = str(tmp_path / "store")
     return lambda folder: open_content_store(place if request.param == "folder" else f"file://{place}", folder)
 

@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import InputError
+from tests.packages import needs
 from tts2face.video.streaming import CaptureDevice
 
-pytest.importorskip("cv2", reason="needs `pip install 'tts2face[capture]'`")
+needs("cv2")
 
 
 def test_pictures_come_as_they_are_filmed_and_end_with_the_film(make_video) -> None:

@@ -13,12 +13,13 @@ from corpus_tools.recordings.video import face_light, measure_light
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tests.corpus_tools.films import write_video
+from tests.packages import package
 from tests.rendered_takes import ONLY_RENDERED, transcript
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, FACE_OVAL
 from tts2face.video.media import TimedFrame, read_frames, read_sound
 
 Damage = Callable[[np.ndarray], np.ndarray]
-cv2 = pytest.importorskip("cv2", reason="needs `pip install 'tts2face[capture]'`")
+cv2 = package("cv2")
 
 
 def round_face(radius: float = 60.0) -> np.ndarray:

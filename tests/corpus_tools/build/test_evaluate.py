@@ -17,6 +17,7 @@ from corpus_tools.studies.evaluation.tracks import ExternalTrack, read_tracks
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import WordSpan
 from tests.corpus_tools.speaking import FPS, observation
+from tests.packages import needs
 
 
 @pytest.fixture(scope="module")
@@ -174,7 +175,7 @@ def test_refuses_an_empty_part(observations: list[Observation]):
 def test_a_network_is_trained_and_compared_with_where_there_is_enough_to_learn(
     observations: list[Observation], monkeypatch: pytest.MonkeyPatch
 ):
-    pytest.importorskip("sklearn", reason="needs `pip install 'tts2face[capture]'`")
+    needs("sklearn")
     monkeypatch.setattr("corpus_tools.training.phone_network.MIN_FRAMES", 100)
     result, _ = evaluate([split_randomly(observations, hold_out=8, seed=0)])
     scores = {one.method: one for one in result.scores}

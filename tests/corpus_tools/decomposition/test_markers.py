@@ -17,6 +17,7 @@ from corpus_tools.decomposition.markers import (
 )
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decomposition.made_markers import FPS, SIZE, Made, write_c3d, write_table
+from tests.packages import needs
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.numeric.arrays import true_runs
@@ -26,7 +27,7 @@ REST = slice(0, 60)  # the made performance's frames at rest
 
 @pytest.fixture
 def c3d() -> None:
-    pytest.importorskip("ezc3d", reason="needs `pip install 'tts2face[capture]'`")
+    needs("ezc3d")
 
 
 def at_rest(made: Made, path: Path) -> Path:

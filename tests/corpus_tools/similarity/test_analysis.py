@@ -19,6 +19,7 @@ from corpus_tools.studies.similarity.tables import NO_WORD, SimilarityTable, col
 from corpus_tools.studies.similarity.write import analysis_json
 from lexicon.errors import InputError
 from tests.corpus_tools.similarity.steady_talker import BLOCKS, POSES, made_model, made_talker
+from tests.packages import needs
 from tts2face.lips.exemplar import build_exemplar_model
 
 
@@ -29,6 +30,7 @@ def spoken_tokens(talker):
 
 @pytest.fixture(scope="module")
 def found(talker):
+    needs("sklearn")
     return analyse(NamedTalker("made", talker), SimilarityOptions(halves=4))
 
 

@@ -24,10 +24,12 @@ from corpus_tools.studies.similarity.figures import (
     tree_joins,
 )
 from corpus_tools.studies.similarity.tables import cluster_tree, distances, phone_label
+from tests.packages import needs
 
 
 @pytest.fixture(scope="module")
 def found(talker):
+    needs("sklearn")
     return analyse(NamedTalker("made", talker), SimilarityOptions(halves=2))
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from corpus_tools.studies.similarity.analysis import Analysis, NamedTalker, SimilarityOptions, analyse
+from tests.packages import needs
 from tts2face.models.talker import load_talker
 
 DOC = Path(__file__).resolve().parents[3] / "docs" / "accuracy.md"
@@ -13,6 +14,7 @@ DOC = Path(__file__).resolve().parents[3] / "docs" / "accuracy.md"
 
 @pytest.fixture(scope="module")
 def found() -> Analysis:
+    needs("sklearn")
     return analyse(NamedTalker("grid_s1", load_talker("grid_s1")), SimilarityOptions())
 
 

@@ -15,6 +15,7 @@ import pytest
 from cli.main import run
 from corpus_tools.recordings.observe import Observations
 from tests.corpus_tools.speaking import OwnVoice, observation, with_words
+from tests.packages import needs
 
 HERS = [with_words(observation(number)) for number in range(24)]
 OTHERS = [observation(100 + number, 2.0, "other") for number in range(4)]
@@ -152,7 +153,7 @@ def test_recordings_are_shown_beside_the_head(
     rendered_takes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Six recordings, one held out, with the real voice: the page contains a video of it, and is small."""
-    pytest.importorskip("ai_edge_litert", reason="needs the extra [capture]")
+    needs("ai_edge_litert")
     monkeypatch.chdir(tmp_path)
     source, few = rendered_takes, tmp_path / "few"
     (few / "clips").mkdir(parents=True)

@@ -12,6 +12,7 @@ import pytest
 
 from lexicon import errors
 from tests.docs.blocks import lines_that_need_a_person
+from tests.packages import needs
 from tts2face.video.media import read_sound
 from tts2face.video.tracking import find_bundle
 
@@ -111,7 +112,7 @@ def test_every_command_of_the_readme_works(
 
 
 def require_landmark_model() -> None:
-    pytest.importorskip("ai_edge_litert", reason="needs `pip install 'tts2face[capture]'`")
+    needs("ai_edge_litert")
     try:
         find_bundle()
     except errors.BackendError as missing:

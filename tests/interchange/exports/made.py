@@ -1,6 +1,7 @@
 """Small clips with known motion, head pose and labels, on a small face; made without a voice."""
 
 import numpy as np
+import pytest
 
 from lexicon.sequence import PhoneSequence, WordSpan
 from tests.picture.tiny_face import tiny_face
@@ -12,6 +13,11 @@ RATE = 16_000
 FACE = tiny_face(textured=True)
 PHONES = ("sil", "p", "aɪ", "ʁ", "ts", "sil")
 WORDS = (WordSpan("Größe", 1, 3), WordSpan('<a> & "b"', 3, 5))
+
+
+def format_parameter(one):
+    """Parameter of a test for a format; the test is skipped where the format's package is not installed."""
+    return pytest.param(one, id=one.name, marks=[pytest.mark.needs(one.package)] if one.package else [])
 
 
 def made_clip(n_frames=30, fps=30.0, channels=FACE.shape_names, first_frame=0, seed=0):

@@ -10,6 +10,7 @@ import pytest
 
 import tts2face
 from tests.interchange.exports.made import arkit_clip, made_clip, made_stream, turned_clip
+from tests.packages import package
 from tests.picture.tiny_face import tiny_face
 from tts2face.face.shape_transfer import append_shapes
 from tts2face.interchange.exports.curves import ARKIT_SHAPES, build_arkit_projection, eye_angles, timecode
@@ -66,7 +67,7 @@ def test_captures_have_60_frames_a_second_by_default(tmp_path):
 
 
 def test_openfacefx_reads_the_same_names_and_times(tmp_path):
-    importers = pytest.importorskip("openfacefx.importers_csv", reason="needs openfacefx")
+    importers = package("openfacefx.importers_csv")
     clip = arkit_clip(120)
     tts2face.export(clip, tmp_path / "a.csv")
     track, _ = importers.read_csv(str(tmp_path / "a.csv"), epsilon=0.0)
@@ -80,7 +81,7 @@ def test_openfacefx_reads_the_same_names_and_times(tmp_path):
 
 
 def test_openfacefx_has_the_same_columns(tmp_path):
-    writer = pytest.importorskip("openfacefx.export_livelink", reason="needs openfacefx")
+    writer = package("openfacefx.export_livelink")
     tts2face.export(arkit_clip(2), tmp_path / "a.csv")
     heading = table(tmp_path / "a.csv")[0]
     assert heading[:2] == ["Timecode", "BlendshapeCount"]
@@ -134,7 +135,7 @@ def test_audio2face_json(tmp_path):
     assert (content["exportFps"], content["numFrames"], content["numPoses"]) == (30.0, 40, 52)
     assert content["facsNames"] == list(ARKIT_SHAPES)
     assert np.allclose(content["weightMat"], clip.motion.values, rtol=1e-5, atol=1e-6)
-    reader = pytest.importorskip("openfacefx.export_a2f", reason="needs openfacefx")
+    reader = package("openfacefx.export_a2f")
     track, warnings = reader.read_a2f(str(tmp_path / "a.a2f.json"))
     assert not warnings
     assert track.fps == 30.0

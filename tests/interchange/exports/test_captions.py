@@ -8,12 +8,13 @@ import pytest
 import tts2face
 from lexicon.sequence import PhoneSequence, WordSpan
 from tests.interchange.exports.made import RATE, made_clip, made_stream, silent_clip
+from tests.packages import package
 from tts2face.interchange.exports.captions import MAX_CUE_CHARACTERS, MAX_CUE_S, MAX_LINE_CHARACTERS, sentence_cues
 from tts2face.interchange.exports.parts import Label
 from tts2face.session.session import Session
 from tts2face.types import Clip, Speech, Trajectory, Waveform
 
-pysubs2 = pytest.importorskip("pysubs2", reason="needs pysubs2")
+pysubs2 = package("pysubs2")
 
 
 def piece(text, clip):

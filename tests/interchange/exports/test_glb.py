@@ -15,6 +15,7 @@ import tts2face
 from lexicon.errors import InputError
 from tests.interchange.exports import programs
 from tests.interchange.exports.made import FACE, RATE, made_clip, made_stream, signed_clip, turned_clip, with_gesture
+from tests.packages import package
 from tests.picture.test_cutouts import face_with_sheet
 from tests.picture.tiny_face import tiny_face
 from tts2face.face.deformation import build_rig, rotation_matrix
@@ -33,7 +34,7 @@ class GltfFile:
     """A file as pygltflib reads it, and its values at a frame by the rules of the glTF specification."""
 
     def __init__(self, path):
-        library = pytest.importorskip("pygltflib", reason="needs pygltflib")
+        library = package("pygltflib")
         self.content = library.GLTF2().load(str(path))
         self.blob = self.content.binary_blob()
 
@@ -169,7 +170,7 @@ def test_a_gesture_of_both_directions_has_two_targets_with_weights_from_0_to_1(t
 
 
 def test_openfacefx_reads_names_and_weights(tmp_path):
-    importers = pytest.importorskip("openfacefx.importers_gltf", reason="needs openfacefx")
+    importers = package("openfacefx.importers_gltf")
     clip = made_clip(20, 30.0)
     tts2face.export(clip, tmp_path / "a.glb", face=FACE)
     track, warnings = importers.read_gltf(str(tmp_path / "a.glb"), epsilon=0.0)
@@ -216,7 +217,7 @@ def test_the_khronos_validator_finds_nothing(face, n_frames, tmp_path):
 
 
 def test_parts_with_holes_are_masked_by_the_alpha_of_the_texture(tmp_path):
-    pygltflib = pytest.importorskip("pygltflib", reason="needs pygltflib")
+    pygltflib = package("pygltflib")
     alpha = np.arange(4096, dtype=np.uint16).reshape(64, 64).astype(np.uint8)
     face = face_with_sheet(alpha)
     tts2face.export(made_clip(2, channels=face.shape_names), tmp_path / "a.glb", face=face)

@@ -17,6 +17,7 @@ from lexicon.phones import PHONES
 from lexicon.sequence import PhoneSequence
 from tests.interchange.exports.made import PHONES as MADE_PHONES
 from tests.interchange.exports.made import WORDS, made_clip, made_stream, silent_clip
+from tests.packages import package
 from tts2face.interchange.exports.parts import Label
 from tts2face.interchange.exports.visemes import INVENTORIES, OCULUS, viseme_labels, viseme_table
 from tts2face.types import Clip, Speech, concatenate_clips
@@ -123,7 +124,7 @@ def test_short_silences_do_not_close_the_mouth(tmp_path):
 
 
 def test_praat_and_praatio_read_the_textgrid(tmp_path):
-    textgrids = pytest.importorskip("praatio.textgrid", reason="needs praatio")
+    textgrids = package("praatio.textgrid")
     pieces = made_stream(2)
     tts2face.export(pieces, tmp_path / "a.TextGrid")
     grid = parselmouth.read(str(tmp_path / "a.TextGrid"))

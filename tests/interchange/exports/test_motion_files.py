@@ -8,6 +8,7 @@ import pytest
 import tts2face
 from lexicon.errors import InputError
 from tests.interchange.exports.made import FACE, RATE, WORDS, made_clip, made_stream, silent_clip, turned_clip
+from tests.packages import package
 from tts2face.face.deformation import head_rotation
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Waveform, concatenate_clips
 
@@ -46,7 +47,7 @@ def test_bvh_rotations_multiplied_in_their_order_are_the_head_s(tmp_path):
 
 @pytest.mark.parametrize(("channel", "name"), [("pitch", "headPitch"), ("yaw", "headYaw"), ("roll", "headRoll")])
 def test_openfacefx_reads_ten_degrees(channel, name, tmp_path):
-    importers = pytest.importorskip("openfacefx.importers_bvh", reason="needs openfacefx")
+    importers = package("openfacefx.importers_bvh")
     tts2face.export(turned_clip(**{channel: np.radians(10.0)}), tmp_path / "a.bvh")
     track, warnings = importers.read_bvh(str(tmp_path / "a.bvh"))
     assert not warnings

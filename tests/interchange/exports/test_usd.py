@@ -9,13 +9,14 @@ import pytest
 import tts2face
 from lexicon.errors import BackendError
 from tests.interchange.exports.made import FACE, made_clip, signed_clip, turned_clip, with_gesture
+from tests.packages import package
 from tts2face.face.deformation import build_rig
 from tts2face.interchange.exports.surfaces import divide_surface
 from tts2face.interchange.exports.usd import _identifiers
 
 TOLERANCE_MM = 1e-3  # weights and offsets are 32-bit, scales of joints 16-bit
 
-Usd = pytest.importorskip("pxr.Usd", reason="needs `pip install 'tts2face[usd]'`")
+Usd = package("pxr.Usd")
 
 
 @pytest.mark.parametrize("suffix", [".usda", ".usdc", ".usd"])

@@ -16,10 +16,11 @@ import time
 import urllib.error
 import urllib.request
 from email.utils import formatdate
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+
+from tests.packages import needs
 
 ACCOUNT = "devstoreaccount1"  # azurite's own, as its documentation states it
 ACCOUNT_KEY = "Eby8vdM02xNOcqFlqUwJPLlmEtlCDXJ1OUzFT50uSRZ6IFsuFq2UVErCz4I6tq/K1SZFPTOtr/KBHBeksoGMGw=="
@@ -121,8 +122,7 @@ class Emulator:
 
 
 def start_moto() -> Emulator:
-    if find_spec("moto") is None or find_spec("flask") is None:
-        pytest.skip("moto is not installed (pip install 'moto[server]')")
+    needs("moto", "flask")
     port = free_port()
     start = "import sys; from moto.server import main; main(sys.argv[1:])"
     return Emulator([sys.executable, "-W", "ignore", "-c", start, "-H", "127.0.0.1", "-p", str(port)], port)

@@ -9,6 +9,7 @@ import pytest
 
 from cli.main import run
 from lexicon.errors import DataError, InputError
+from tests.packages import needs
 from tests.serving.batch.conftest import Planner
 from tests.session.fake_voice import FakeVoice
 from tts2face.serving.batch.run import MIN_AGE_S, SEGMENT_FOLDER, prune_segments, run_batch
@@ -41,7 +42,7 @@ def manifest(folder: Path, *addresses: str) -> Path:
 @pytest.mark.parametrize("scheme", ["", "file://"])
 def test_only_old_segments_without_a_reference_are_removed(scheme: str, tmp_path: Path) -> None:
     if scheme:
-        pytest.importorskip("obstore", reason="needs the extra [batch]")
+        needs("obstore")
     folder = tmp_path / "store"
     store = open_store(f"{scheme}{folder}")
     old = ["aa" * 32, "bb" * 32, "cc" * 32]

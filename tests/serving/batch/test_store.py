@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from lexicon.errors import InputError
+from tests.packages import needs
 from tts2face.serving.batch.segment import SegmentResult
 from tts2face.serving.batch.store import open_store
 
@@ -15,7 +16,7 @@ RESULT = SegmentResult(15, 10.0, 1.1, 1.4, 0.0, 0.0, ("a warning",), 2.5)
 @pytest.mark.parametrize("kind", ["folder", "url"])
 def test_a_segment_is_stored_whole_fetched_listed_and_removed(kind: str, tmp_path: Path) -> None:
     if kind == "url":
-        pytest.importorskip("obstore", reason="needs the extra [batch]")
+        needs("obstore")
     place = tmp_path / "store"
     store = open_store(place if kind == "folder" else f"file://{place}")
     assert store.result(ADDRESS) is None

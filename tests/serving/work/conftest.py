@@ -13,7 +13,9 @@ from tempfile import mkdtemp
 
 import pytest
 
-pytest.importorskip("dbos", reason="needs the extra [batch]")
+from tests.packages import needs, reason
+
+pytest.importorskip("dbos", reason=reason("dbos"))
 
 from tests.running import eventually
 from tests.started import children
@@ -116,7 +118,7 @@ class Postgres:
 
 @pytest.fixture(scope="session")
 def postgres() -> Iterator[Postgres]:
-    pytest.importorskip("psycopg", reason="needs the extra [postgres]")
+    needs("psycopg")
     server = Postgres()
     yield server
     server.remove()

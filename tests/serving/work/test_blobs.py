@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("obstore", reason="needs the extra [batch]")
+from tests.packages import reason
+
+pytest.importorskip("obstore", reason=reason("obstore"))
 
 from lexicon.errors import BackendError
 from tts2face.serving.work.blobs import BlobStore, MissingBlobError, open_blobs

@@ -8,7 +8,9 @@ from threading import Barrier
 
 import pytest
 
-pytest.importorskip("obstore", reason="needs the extra [batch]")
+from tests.packages import reason
+
+pytest.importorskip("obstore", reason=reason("obstore"))
 
 from tts2face.serving.batch.segment import Segment, input_hashes
 from tts2face.serving.work.blobs import (

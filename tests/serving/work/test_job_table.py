@@ -9,7 +9,9 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("dbos", reason="needs the extra [batch]")
+from tests.packages import needs, reason
+
+pytest.importorskip("dbos", reason=reason("dbos"))
 
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.work import client as job_client
@@ -240,7 +242,7 @@ def test_a_job_whose_workflow_has_ended_without_it_fails_with_the_reason(
 
 
 def test_a_database_that_is_away_is_named_as_such(tmp_path: Path) -> None:
-    pytest.importorskip("psycopg", reason="needs the extra [postgres]")
+    needs("psycopg")
     client = JobClient("postgresql://x@127.0.0.1:1/y", open_blobs(tmp_path, "results"))
     with pytest.raises(DatabaseAwayError, match=r"the database cannot be reached \("):
         client.submit(new_job())

@@ -6,7 +6,9 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("dbos", reason="needs the extra [batch]")
+from tests.packages import reason
+
+pytest.importorskip("dbos", reason=reason("dbos"))
 
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey, RateLimits

@@ -24,6 +24,7 @@ from tests.interchange.characters.made import (
     write_landmarks,
 )
 from tests.interchange.exports import programs
+from tests.packages import package
 from tts2face.face.deformation import build_rig
 from tts2face.interchange.characters.animation import NECK_SHARE, write_character
 from tts2face.interchange.characters.importing import import_face
@@ -54,7 +55,7 @@ class Played:
     """A .glb file as pygltflib reads it, with its first animation at its last frame."""
 
     def __init__(self, path: Path) -> None:
-        pygltflib = pytest.importorskip("pygltflib", reason="another reader of glTF, of the extra [test]")
+        pygltflib = package("pygltflib")
         self.gltf = pygltflib.GLTF2().load(str(path))
         self.root, self.binary = split_glb(path.read_bytes())
         self.animation = self.gltf.animations[0]

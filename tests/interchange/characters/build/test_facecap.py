@@ -1,7 +1,6 @@
 """The head that the package openfacefx carries: meshopt, KTX2, 52 shapes with other names, eyeballs without bones."""
 
 import json
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +8,7 @@ import pytest
 
 from tests.interchange.characters.build.test_animation import Played
 from tests.interchange.exports import programs
+from tests.packages import package
 from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
 from tts2face.interchange.characters.animation import write_character
 from tts2face.interchange.characters.importing import ImportedFace, import_face
@@ -19,11 +19,7 @@ from tts2face.session.session import Session
 
 @pytest.fixture(scope="module")
 def path() -> Path:
-    spec = find_spec("openfacefx")
-    path = Path(spec.origin).parent / "studio_web/assets/facecap.glb" if spec and spec.origin else None
-    if path is None or not path.is_file():
-        pytest.skip("the package openfacefx, which carries a head, is not installed")
-    return path
+    return Path(package("openfacefx").__file__).parent / "studio_web/assets/facecap.glb"
 
 
 @pytest.fixture(scope="module")

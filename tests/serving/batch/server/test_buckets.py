@@ -12,7 +12,9 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("obstore", reason="needs the extra [batch]")
+from tests.packages import needs, reason
+
+pytest.importorskip("obstore", reason=reason("obstore"))
 
 from cli.main import run
 from lexicon.errors import BackendError, InputError
@@ -170,7 +172,7 @@ def test_a_batch_keeps_its_segments_in_a_bucket(
 
 @pytest.mark.parametrize("bucket", ["s3"], indirect=True)
 def test_workers_share_a_bucket(bucket: Bucket, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("dbos", reason="needs the extra [batch]")
+    needs("dbos")
     jobs = ["--database", str(tmp_path / "jobs.sqlite")]
     worker = subprocess.Popen(
         [sys.executable, "-m", "tts2face", "worker", "--store", bucket.url, *jobs],

@@ -9,6 +9,7 @@ from typing import Any
 import httpx
 import pytest
 
+from tests.packages import needs
 from tests.running import HostService, RunningService
 from tts2face.serving.service.server import create_app
 from tts2face.serving.service.settings import ServiceSettings
@@ -34,6 +35,7 @@ def small(host: HostService) -> Iterator[RunningService]:
 
 
 def run_schemathesis(service: RunningService, folder: Path, *options: str) -> None:
+    needs("schemathesis")
     command = [sys.executable, "-m", "schemathesis.cli", "run", f"{service.url}/openapi.json", *OPTIONS, *options]
     done = subprocess.run(command, capture_output=True, text=True, timeout=900, check=False, cwd=folder)
     assert done.returncode == 0, done.stdout[-6000:]

@@ -11,10 +11,10 @@ from typing import Any
 import av
 import httpx
 import numpy as np
-import openai
 import pytest
 
 from tests.interchange.exports.programs import node_package
+from tests.packages import package
 from tests.running import RunningService
 
 TEXT = "Hello there. This is a test."
@@ -78,6 +78,7 @@ def test_the_openai_client_of_node(service: RunningService) -> None:
 
 
 def test_the_openai_client_of_python(service: RunningService) -> None:
+    openai = package("openai")
     client = openai.OpenAI(base_url=f"{service.url}/v1", api_key="unused", max_retries=0)
     assert client.models.retrieve("tts-1-1106").id == "tts-1-1106"
     with pytest.raises(openai.NotFoundError, match="there is no model 'nothing'"):

@@ -9,6 +9,7 @@ import yaml
 
 from tests.docs.blocks import DOCS
 from tests.interchange.exports.programs import node_package
+from tests.packages import package
 
 FOLDER = DOCS / "deploy"
 COMPOSE: dict[str, Any] = yaml.safe_load((FOLDER / "compose.yaml").read_text())
@@ -17,7 +18,7 @@ OBJECTS: list[dict[str, Any]] = list(yaml.safe_load_all((FOLDER / "kubernetes.ya
 
 def test_compose_follows_its_specification() -> None:
     """By the schema that comes with the npm package dclint."""
-    jsonschema = pytest.importorskip("jsonschema")
+    jsonschema = package("jsonschema")
     schema = json.loads((node_package("dclint") / "dclint/schemas/compose.schema.json").read_text())
     check = jsonschema.Draft7Validator(schema)
     assert [error.message for error in check.iter_errors(COMPOSE)] == []

@@ -11,10 +11,10 @@ from pathlib import Path
 import av
 import httpx
 import numpy as np
-import openai
 import pytest
 
 import tts2face
+from tests.packages import package
 from tests.running import RunningService
 
 TEXT = "Hello there. This is a test."
@@ -23,8 +23,9 @@ HEADTTS = NODE_MODULES / "@met4citizen" / "headtts" / "modules" / "headtts.mjs"
 
 
 @pytest.fixture
-def official(service: RunningService) -> openai.OpenAI:
-    return openai.OpenAI(base_url=f"{service.url}/v1", api_key="unused", max_retries=0)
+def official(service: RunningService) -> Any:
+    """OpenAI's client."""
+    return package("openai").OpenAI(base_url=f"{service.url}/v1", api_key="unused", max_retries=0)
 
 
 def samples(content: bytes) -> np.ndarray:
@@ -33,7 +34,7 @@ def samples(content: bytes) -> np.ndarray:
 
 
 @pytest.mark.parametrize("format", ["mp3", "opus", "aac", "flac", "wav"])
-def test_the_openai_client_streams_all_its_formats(official: openai.OpenAI, format: str) -> None:
+def test_the_openai_client_streams_all_its_formats(official: Any, format: str) -> None:
     with official.audio.speech.with_streaming_response.create(
         model="gpt-4o-mini-tts", voice="coral", input=TEXT, response_format=format, speed=1.25, instructions="calm"
     ) as response:
@@ -41,7 +42,7 @@ def test_the_openai_client_streams_all_its_formats(official: openai.OpenAI, form
     assert len(samples(content)) > 24_000
 
 
-def test_the_openai_client_streams_events(official: openai.OpenAI) -> None:
+def test_the_openai_client_streams_events(official: Any) -> None:
     with official.audio.speech.with_streaming_response.create(
         model="tts-1", voice="alloy", input=TEXT, response_format="pcm", stream_format="sse"
     ) as response:

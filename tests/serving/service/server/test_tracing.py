@@ -14,10 +14,11 @@ import httpx
 import pytest
 
 from lexicon.errors import BackendError, InputError
+from tests.packages import needs
 from tests.running import HostService, RunningService, ServeProcess, eventually
 from tts2face.serving.service.tracing import is_tracing_requested, tracing_from_environment
 
-pytest.importorskip("opentelemetry.sdk", reason="needs `pip install 'tts2face[otel]'`")
+needs("opentelemetry.sdk")
 
 TEXT = "Zebras graze quietly."
 TRACE, PARENT = "0af7651916cd43dd8448eb211c80319c", "b7ad6b7169203331"

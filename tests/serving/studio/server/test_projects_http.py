@@ -10,10 +10,10 @@ from typing import Any
 
 import httpx
 import numpy as np
-import pygltflib
 import pytest
 from PIL import Image
 
+from tests.packages import package
 from tests.running import eventually, serve_process
 from tts2face.serving.studio.pages.inspector import opening_mm
 from tts2face.serving.studio.previews import read_bundle
@@ -172,7 +172,7 @@ def test_a_face_is_gltf_with_a_target_for_each_channel(studio: httpx.Client, num
     answer = studio.get(f"/api/projects/{number}/face.glb")
     path = tmp_path / "face.glb"
     path.write_bytes(answer.content)
-    gltf = pygltflib.GLTF2().load(str(path))
+    gltf = package("pygltflib").GLTF2().load(str(path))
     header, *_ = preview(studio, number)
     assert gltf.meshes[0].extras["targetNames"] == header["channels"]
     assert {"skin", "teeth_upper", "iris", "hair"} <= {material.name for material in gltf.materials}

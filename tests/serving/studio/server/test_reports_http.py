@@ -7,9 +7,7 @@ import pytest
 
 from tests.running import eventually
 
-pytest.importorskip("matplotlib", reason="needs `pip install 'tts2face[report]'`")
-pytest.importorskip("sklearn", reason="needs `pip install 'tts2face[report]'`")
-
+pytestmark = pytest.mark.needs("matplotlib", "sklearn")
 REPORTS = "/api/reports"
 
 

@@ -16,6 +16,7 @@ import pytest
 
 from cli.main import run
 from lexicon.errors import BackendError, InputError
+from tests.packages import needs
 from tests.running import eventually
 from tests.serving.work.conftest import ROOT, Postgres, StartWorker
 from tts2face.serving.batch.segment import Segment
@@ -317,7 +318,7 @@ def test_the_batch_command_works_with_a_database(tmp_path: Path, capsys: pytest.
 
 
 def test_a_worker_that_cannot_start_says_why(tmp_path: Path) -> None:
-    pytest.importorskip("psycopg", reason="needs the extra [postgres]")
+    needs("psycopg")
     engine = DatabaseEngine("postgresql://nobody@127.0.0.1:1/jobs", str(tmp_path / "store"))
     worker = LocalWorker(engine, None)
     try:

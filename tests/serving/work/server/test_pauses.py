@@ -7,7 +7,9 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("dbos", reason="needs the extra [batch]")
+from tests.packages import reason
+
+pytest.importorskip("dbos", reason=reason("dbos"))
 
 import sqlalchemy
 

@@ -18,7 +18,9 @@ from pathlib import Path
 import av
 import pytest
 
-pytest.importorskip("dbos", reason="needs the extra [batch]")
+from tests.packages import reason
+
+pytest.importorskip("dbos", reason=reason("dbos"))
 
 from tests.running import eventually
 from tests.serving.work.conftest import Postgres

@@ -12,8 +12,10 @@ from typing import Any
 import httpx
 import pytest
 
-pytest.importorskip("dbos", reason="needs the extra [batch]")
-pytest.importorskip("fastapi", reason="needs the extra [service]")
+from tests.packages import reason
+
+pytest.importorskip("dbos", reason=reason("dbos"))
+pytest.importorskip("fastapi", reason=reason("fastapi"))
 
 from tests.running import ServeProcess, eventually
 from tests.serving.service.job_requests import wait_for_database

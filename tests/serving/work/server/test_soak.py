@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("dbos", reason="needs the extra [batch]")
-pytest.importorskip("fastapi", reason="needs the extra [service]")
+from tests.packages import reason
+
+pytest.importorskip("dbos", reason=reason("dbos"))
+pytest.importorskip("fastapi", reason=reason("fastapi"))
 
 from tests.bench.bench_soak import check, run_soak
 from tests.serving.work.conftest import Postgres

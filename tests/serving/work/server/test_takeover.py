@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("dbos", reason="needs the extra [batch]")
+from tests.packages import reason
+
+pytest.importorskip("dbos", reason=reason("dbos"))
 
 from cli.main import run
 from lexicon.errors import BackendError
