@@ -48,6 +48,7 @@ def steps(axes):
     return {patch.get_label(): patch.get_data() for patch in axes.patches}
 
 
+@pytest.mark.needs("matplotlib")
 def test_a_distribution_is_in_percent_and_holds_what_is_beyond(calm):
     compared = calm.trait_comparisons[0]
     found = steps(drawn(distribution_panel(calm, compared)))
@@ -64,6 +65,7 @@ def test_a_distribution_is_in_percent_and_holds_what_is_beyond(calm):
         assert len(shares) == N_BINS
 
 
+@pytest.mark.needs("matplotlib")
 def test_a_derived_style_has_no_line_of_the_published_field(found):
     quick = found.styles[1]
     assert set(steps(drawn(distribution_panel(quick, quick.trait_comparisons[0])))) == {"calm", "field", "noise"}
@@ -74,6 +76,7 @@ def test_a_derived_style_has_no_line_of_the_published_field(found):
     ]
 
 
+@pytest.mark.needs("matplotlib")
 def test_a_trait_without_values_is_an_empty_plot(calm):
     none = np.zeros(0)
     empty = SimpleNamespace(real=none, field=none, noise=none, published=none, trait=calm.trait_comparisons[0].trait)
@@ -82,6 +85,7 @@ def test_a_trait_without_values_is_an_empty_plot(calm):
     assert axes.get_xlim() == (0, 1)
 
 
+@pytest.mark.needs("matplotlib")
 def test_a_spectrum_names_powers_of_ten_and_its_unit(calm):
     (moving,) = (one for one in calm.motion_comparisons if one.feature == "head")
     axes = drawn(spectrum_panel(calm, moving))
@@ -94,6 +98,7 @@ def test_a_spectrum_names_powers_of_ten_and_its_unit(calm):
     assert not [word for word in words if "$" in word or "^" in word]
 
 
+@pytest.mark.needs("matplotlib")
 def test_the_gaze_of_people_and_of_made_people_has_a_line_for_each(found):
     people = [{state: made_person(load_gaze(), state, seed) for state in STATES} for seed in range(2)]
     study = compare(people, load_gaze(), n_made=3, seed=5)
@@ -109,6 +114,7 @@ def test_the_gaze_of_people_and_of_made_people_has_a_line_for_each(found):
     assert "<h2>Gaze in conversation</h2>" not in gestures_page(replace(found, styles=()))
 
 
+@pytest.mark.needs("matplotlib")
 def test_repetition_is_over_seconds_of_lag(calm):
     axes = drawn(autocorrelation_panel(calm, "head"))
     line = axes.lines[1]
@@ -116,6 +122,7 @@ def test_repetition_is_over_seconds_of_lag(calm):
     np.testing.assert_array_equal(line.get_ydata(), calm.long_run.repetition["head"].speech[5:])
 
 
+@pytest.mark.needs("matplotlib")
 def test_the_picture_shows_each_panel_in_its_place(calm):
     panels = summary_panels(calm)
     with Image.open(BytesIO(panels_png("title", panels))) as image:

@@ -24,6 +24,7 @@ def diagonal(figure):
     return [Tip(axes, 0, 0, "from < here"), Tip(axes, 10, 1, "to"), Tip(axes, 0, 0, "all", 10, 1)]
 
 
+@pytest.mark.needs("matplotlib")
 def test_lines_and_tooltips_are_at_their_values():
     svg = draw_svg(diagonal, 300, 200, "a & b")
     (path,) = re.findall(r'<path d="M ([^"]*)" clip-path="[^"]*" style="fill: none; stroke: var\(--first\)', svg)
@@ -37,6 +38,7 @@ def test_lines_and_tooltips_are_at_their_values():
     assert 'aria-label="a &amp; b"' in svg
 
 
+@pytest.mark.needs("matplotlib")
 def test_text_stays_text_and_colours_follow_the_theme():
     svg = draw_svg(diagonal, 300, 200, "")
     assert ">a &lt; $b$ $</text>" in svg
@@ -44,6 +46,7 @@ def test_text_stays_text_and_colours_follow_the_theme():
     assert not re.search(r'http|xmlns|<metadata|<g id="', svg)
 
 
+@pytest.mark.needs("matplotlib")
 def test_figures_are_the_same_whatever_the_settings_of_the_user():
     load_matplotlib()
     import matplotlib as mpl
@@ -55,6 +58,7 @@ def test_figures_are_the_same_whatever_the_settings_of_the_user():
         assert dict(mpl.rcParams) == before
 
 
+@pytest.mark.needs("matplotlib")
 def test_a_picture_has_its_size_and_no_date():
     with Image.open(BytesIO(draw_png(diagonal, 300, 200))) as image:
         assert image.size == (300 * PNG_SCALE, 200 * PNG_SCALE)
@@ -64,6 +68,7 @@ def test_a_picture_has_its_size_and_no_date():
     assert (255, 255, 255) in colours
 
 
+@pytest.mark.needs("matplotlib")
 def test_every_phone_can_be_drawn():
     def glyphs(figure):
         from matplotlib.font_manager import FontProperties, findfont, get_font
@@ -94,6 +99,7 @@ assert dict(os.environ) == before and "matplotlib.pyplot" not in sys.modules
 """
 
 
+@pytest.mark.needs("matplotlib")
 def test_matplotlib_is_imported_late_and_writes_to_the_cache_of_tts2face_alone(tmp_path: Path):
     home, cache = tmp_path / "home", tmp_path / "cache"
     home.mkdir()

@@ -94,6 +94,7 @@ def test_halves_compare_only_the_phones_among_those_given(spoken_tokens):
     assert (split.n_phones == 5).all()
 
 
+@pytest.mark.needs("sklearn")
 def test_a_talker_without_words_has_no_halves_of_words(talker):
     wordless = replace(
         talker, utterances=tuple(replace(spoken_tokens, words=()) for spoken_tokens in talker.utterances)
@@ -105,6 +106,7 @@ def test_a_talker_without_words_has_no_halves_of_words(talker):
     assert '"words": null' in analysis_json(found)
 
 
+@pytest.mark.needs("sklearn")
 def test_progress_runs_to_its_end(talker):
     steps = []
     analyse(
@@ -190,6 +192,7 @@ def test_a_comparison_by_hand():
     assert found.agreement.r == pytest.approx(expected)
 
 
+@pytest.mark.needs("sklearn")
 def test_the_phones_made_to_differ_differ_most(talker):
     other = NamedTalker("other", made_talker(seed=9, gain=20.0))
     compared = analyse(NamedTalker("made", talker), SimilarityOptions(halves=2), other).comparison

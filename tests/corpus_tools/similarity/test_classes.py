@@ -18,12 +18,14 @@ from lexicon.errors import InputError
 LINE = np.abs(np.subtract.outer([0.0, 1.0, 5.0, 7.0], [0.0, 1.0, 5.0, 7.0]))
 
 
+@pytest.mark.needs("sklearn")
 def test_silhouettes_of_four_points_on_a_line_by_hand():
     # point 0: a = 1, b = (5 + 7) / 2 = 6; point 1: a = 1, b = 5; point 5: a = 2, b = 4.5; point 7: a = 2, b = 6.5
     found = silhouettes(LINE, np.array([0, 0, 1, 1]))
     np.testing.assert_allclose(found, [5 / 6, 4 / 5, 2.5 / 4.5, 4.5 / 6.5], rtol=1e-12)
 
 
+@pytest.mark.needs("sklearn")
 def test_a_phone_alone_has_silhouette_zero_and_a_misplaced_one_is_negative():
     found = silhouettes(LINE, np.array([0, 1, 1, 2]))
     assert found[0] == found[3] == 0.0
@@ -43,6 +45,7 @@ def slow_silhouette(distance, labels, item):
     return (b - a) / max(a, b)
 
 
+@pytest.mark.needs("sklearn")
 def test_silhouettes_follow_the_definition():
     stream = np.random.default_rng(3)
     points = stream.normal(size=(12, 2))
@@ -52,6 +55,7 @@ def test_silhouettes_follow_the_definition():
     np.testing.assert_allclose(silhouettes(distance, labels), expected, rtol=1e-12)
 
 
+@pytest.mark.needs("sklearn")
 def test_items_at_one_place_have_no_silhouette():
     assert silhouettes(np.zeros((4, 4)), np.array([0, 0, 1, 1])).tolist() == [0.0] * 4
 
@@ -64,6 +68,7 @@ def block_similarity():
     return matrix, block
 
 
+@pytest.mark.needs("sklearn")
 def test_a_block_matrix_gives_its_blocks():
     matrix, block = block_similarity()
     distance = distances(matrix)

@@ -29,7 +29,7 @@ from tests.packages import needs
 
 @pytest.fixture(scope="module")
 def found(talker):
-    needs("sklearn")
+    needs("matplotlib", "sklearn")
     return analyse(NamedTalker("made", talker), SimilarityOptions(halves=2))
 
 
@@ -83,6 +83,7 @@ def test_labels():
 
 
 @pytest.mark.parametrize("colours", [LIKENESS, FREEDOM])
+@pytest.mark.needs("matplotlib")
 def test_sequential_colours_rise_in_lightness(colours):
     import matplotlib as mpl
 
@@ -112,6 +113,7 @@ def test_articulation_has_a_point_for_each_pair(found):
     assert {"two consonants", "one of each", "two vowels", "similarity"} <= set(words_of(svg))
 
 
+@pytest.mark.needs("matplotlib")
 def test_a_bar_is_as_long_as_its_number():
     svg = shares_svg(["a", "b"], np.array([0.25, 1.0]))
     bars = re.findall(r'<path d="([^"]*)"[^>]*style="fill: var\(--first\)', svg)
@@ -121,6 +123,7 @@ def test_a_bar_is_as_long_as_its_number():
     assert {"0.25", "1.00", "a", "b", "share of the variance"} <= set(words_of(svg))
 
 
+@pytest.mark.needs("matplotlib")
 def test_the_spreads_within_phones_are_written_in_their_cells():
     words = words_of(freedom_svg(["p", "b"], ["opening", "width"], np.array([[0.31, 0.5], [1.0, 1.15]])))
     assert {"0.31", "0.50", "1.00", "1.15", "p", "b", "opening", "width"} <= set(words)
