@@ -66,9 +66,7 @@ def test_pages_need_a_login(closed: TestClient) -> None:
         assert "API key" in client.get("/login").text
 
 
-def test_a_login_keeps_the_key_in_a_cookie_that_scripts_cannot_read(
-    closed: TestClient, keys: dict[str, str]
-) -> None:
+def test_a_login_keeps_the_key_in_a_cookie_that_scripts_cannot_read(closed: TestClient, keys: dict[str, str]) -> None:
     with browser(closed) as client:
         refused = client.post("/login", data={"key": "t2f_wrong<b>"})
         assert refused.status_code == 401
