@@ -1,8 +1,9 @@
 """Puts each listed fault into a copy of the project and runs the tests that are to catch it.
 
-``python -m tests.mutants [NAME ...]`` prints a line for each fault. The exit code is 1 unless each one is caught: the
-first failure is an assertion of a test that passes without the fault, within `LIMIT_S`. The list is `mutants.toml`. The
-copy holds the files that git knows, as they are in the working tree, and has its own cache of compiled kernels.
+``python -m tests.mutants [NAME ...]`` prints a line for each fault. The exit code is 1 unless each one is caught: a
+test fails within `LIMIT_S` that passes without the fault, and not since its code cannot be imported or compiled. The
+list is `mutants.toml`. The copy holds the files that git knows, as they are in the working tree, and has its own cache
+of compiled kernels.
 """
 
 import argparse
@@ -33,7 +34,7 @@ class Run:
     code: int | None
     seconds: float
     test: str = ""
-    is_assertion: bool = False
+    could_run: bool = False
     text: str = ""
 
 
@@ -90,14 +91,14 @@ class Copy:
 
 
 def verdict(run: Run) -> str:
-    """``caught`` if the first failure of a run is an assertion; else what has happened in its place."""
+    """``caught`` if a test has run and failed; else what has happened in its place."""
     if run.code is None:
         return "too slow"
     if run.code == 0:
         return "survived"
     if run.code != FAILED or not run.test:
         return f"no test failed (exit code {run.code})"
-    return "caught" if run.is_assertion else "an error, no failed assertion"
+    return "caught" if run.could_run else "the code is broken"
 
 
 def _tracked_files() -> list[str]:
@@ -132,8 +133,8 @@ def main() -> int:
             n_caught += found == "caught"
             shown = run.test or mutant.fault
             print(f"{mutant.group:9} {mutant.name:20} {found:10} {run.seconds:5.1f} s  {shown}", flush=True)
-            if found != "caught" and run.text:
-                print(f"{'':10}{run.text.strip().splitlines()[0]}", flush=True)
+            if run.text:
+                print(f"{'':10}{run.text.strip().splitlines()[0]:.110}", flush=True)
     print(f"{n_caught} of {len(mutants)} faults are caught")
     return 0 if n_caught == len(mutants) else 1
 

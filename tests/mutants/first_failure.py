@@ -1,7 +1,7 @@
-"""A plugin of pytest that notes the first failure of a run: which test it is, and whether its assertion failed.
+"""A plugin of pytest that notes the first failure of a run: the test, its error, and whether the test could run at all.
 
-The environment variable `NOTE` names the file that it writes. A fault that breaks an import, a fixture or a kernel's
-compilation is an error and no failed assertion: nothing is known then about what the test demands.
+The environment variable `NOTE` names the file that it writes. Code that cannot be imported or compiled, and a fixture
+that fails, say nothing about what the test demands.
 """
 
 import json
@@ -9,17 +9,20 @@ import os
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 NOTE = "TTS2FACE_FIRST_FAILURE"
+BROKEN = (ImportError, SyntaxError, NameError)  # and all errors of numba: code that fails whatever a test demands
 
 
 def pytest_exception_interact(call: Any, report: Any) -> None:
     """Note a failure if it is the first one."""
-    note = Path(os.environ[NOTE])
+    note, error = Path(os.environ[NOTE]), call.excinfo.value
     if note.exists():
         return
-    asserted = (AssertionError, pytest.fail.Exception)
-    is_assertion = getattr(report, "when", "collect") == "call" and isinstance(call.excinfo.value, asserted)
-    text = f"{call.excinfo.typename}: {call.excinfo.value}"
-    note.write_text(json.dumps({"test": report.nodeid, "is_assertion": is_assertion, "text": text}), encoding="utf-8")
+    is_in_test = getattr(report, "when", "collect") == "call"
+    is_broken = isinstance(error, BROKEN) or type(error).__module__.startswith("numba.")
+    found = {
+        "test": report.nodeid,
+        "could_run": is_in_test and not is_broken,
+        "text": f"{call.excinfo.typename}: {error}",
+    }
+    note.write_text(json.dumps(found), encoding="utf-8")

@@ -41,10 +41,10 @@ def test_what_no_longer_applies_is_noticed(tmp_path: Path) -> None:
     assert mutant.missing_tests(tmp_path) == ["test_x.py::test_b"]
 
 
-def test_only_an_assertion_that_fails_catches_a_fault() -> None:
-    failed = Run(1, 1.0, "test_x.py::test_a", is_assertion=True)
+def test_only_a_test_that_could_run_catches_a_fault() -> None:
+    failed = Run(1, 1.0, "test_x.py::test_a", could_run=True)
     assert verdict(failed) == "caught"
-    assert verdict(replace(failed, is_assertion=False)) == "an error, no failed assertion"
+    assert verdict(replace(failed, could_run=False)) == "the code is broken"
     assert verdict(replace(failed, code=2)) == "no test failed (exit code 2)"
     assert verdict(Run(1, 1.0)) == "no test failed (exit code 1)"
     assert verdict(Run(5, 1.0)) == "no test failed (exit code 5)"

@@ -86,6 +86,18 @@ def test_overlapping_pieces_hand_over_without_a_jump():
     assert joined[20, 0] == pytest.approx(0.5, abs=0.01)  # at the shared edge both count alike
 
 
+@pytest.mark.parametrize(
+    ("options", "knots", "n_steps"), [(THEOBALD_2007, 9, 25), (SynthesisOptions(precision=0.0), 25, 75)]
+)
+def test_even_motion_stays_even_over_its_knots(options, knots, n_steps):
+    """Knots lie evenly over the span of a piece, from its first instant to its last one."""
+    ramp = np.linspace(0.0, 1.0, knots, dtype=np.float32)[None, :, None]
+    joined, is_covered = join_averages(AveragedTokens(ramp, 0.0 * ramp), targets(0.5, 0.75), 121, options)
+    covered = joined[is_covered, 0]
+    assert len(covered) == n_steps + 1
+    np.testing.assert_allclose(covered, np.linspace(0.0, 1.0, n_steps + 1), atol=1e-5)
+
+
 def test_the_surer_piece_wins_where_they_overlap():
     even = pieces_of(0.0, 1.0)
     unsure = AveragedTokens(even.mean, np.where(even.mean == 0, 1.0, 0.0).astype(np.float32))
