@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from lexicon.errors import BackendError, InputError
+from lexicon.inputs import check_fields
 from tts2face.processes.child import exit_after
 from tts2face.storage.files import user_cache
 from tts2face.types import Progress
@@ -33,6 +34,10 @@ class RunOptions:
     cache: Path | None = None
     jobs: int | None = None
     model: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse values of other types (`InputError`)."""
+        check_fields(self)
 
     def folder(self) -> Path:
         """The cache folder, created if necessary.

@@ -7,17 +7,19 @@ import csv
 import errno
 import json
 import math
+import operator
 import re
 import stat
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
-from functools import partial
+from functools import cache, partial
 from io import StringIO
+from itertools import repeat
 from numbers import Integral, Real
 from pathlib import Path
-from types import MappingProxyType, NoneType
-from typing import Any, BinaryIO, TypeVar, get_args
+from types import MappingProxyType, UnionType
+from typing import Annotated, Any, BinaryIO, TypeVar, get_args, get_origin
 
 from lexicon.errors import DataError, InputError
 
@@ -30,12 +32,13 @@ EXPECTED: Mapping[type, str] = MappingProxyType({
     bool: "true or false",
     list: "a list in square brackets",
     dict: "an object in curly brackets",
+    Mapping: "an object in curly brackets",
     Path: "a path",
 })  # fmt: skip
 
 
 def check_type(name: str, value: Any, kind: type) -> Any:
-    """A value of a type of `EXPECTED`; whole numbers become floats where a float is expected, booleans are no numbers.
+    """A value of a type; whole numbers become floats where a float is expected, booleans are no numbers.
 
     Raises
     ------
@@ -48,7 +51,8 @@ def check_type(name: str, value: Any, kind: type) -> Any:
         return float(value)
     if kind is not float and type(value) is kind:
         return value
-    raise InputError(f"{name} must be {EXPECTED[kind]}, not {format_value(value)}")
+    expected = EXPECTED.get(kind, f"of the type {kind.__name__}")
+    raise InputError(f"{name} must be {expected}, not {format_value(value)}")
 
 
 def check_list(name: str, value: Any, kind: type) -> list[Any]:
@@ -57,7 +61,10 @@ def check_list(name: str, value: Any, kind: type) -> list[Any]:
 
 
 def check_fields(options: Any) -> None:
-    """Refuse options, a dataclass, whose values are not of the types of its fields; texts and paths become each other.
+    """Refuse options, a dataclass, whose values are not of the types of its fields.
+
+    Texts and paths become each other, and lists tuples or sets. A value that equals the default is not checked: it may
+    be infinite.
 
     Raises
     ------
@@ -65,17 +72,61 @@ def check_fields(options: Any) -> None:
         A value has another type, is no finite number, or is a path with the character U+0000.
     """
     for one in fields(options):
-        value, kinds = getattr(options, one.name), get_args(one.type) or (one.type,)
-        if value is None and NoneType in kinds:
+        value = getattr(options, one.name)
+        if type(value) is type(one.default) and value == one.default:
             continue
-        kind = kinds[0]
-        if isinstance(value, str | Path) and kind in (str, Path):
-            value = kind(value)
-            if kind is Path and "\0" in str(value):
-                raise InputError(f"{one.name} is a path with the character U+0000, {format_value(value)}; remove it")
-            object.__setattr__(options, one.name, value)
-        elif not (isinstance(value, _NUMBERS.get(kind, ())) and is_number(value)):
-            check_type(one.name, value, kind)
+        found = _convert(one.name, value, one.type)
+        if found is not value:
+            object.__setattr__(options, one.name, found)
+
+
+def _convert(name: str, value: Any, kind: Any) -> Any:
+    """A value of the type of an annotation, itself where nothing is converted; errors as `check_fields`."""
+    if kind is float and type(value) is float and math.isfinite(value):  # of curves, of which there are many
+        return value
+    origin, inner = _parts(kind)
+    if origin is UnionType and value is None:
+        return None
+    if origin in (UnionType, Annotated):  # X | None
+        return _convert(name, value, inner[0])
+    if origin in (tuple, frozenset):
+        return _convert_list(name, value, origin, inner)
+    if origin is Mapping and isinstance(value, Mapping):
+        found = {_convert(f"each name of {name}", key, inner[0]): one for key, one in value.items()}
+        found = {key: _convert(f"{key} of {name}", one, inner[1]) for key, one in found.items()}
+        return value if all(found.get(key) is one for key, one in value.items()) else found
+    return _convert_single(name, value, origin or kind)
+
+
+def _convert_single(name: str, value: Any, kind: Any) -> Any:
+    if kind in (str, Path) and isinstance(value, str | Path):
+        if kind is Path and "\0" in str(value):
+            raise InputError(f"{name} is a path with the character U+0000, {format_value(value)}; remove it")
+        return kind(value)
+    if kind in _NUMBERS:
+        is_right = isinstance(value, _NUMBERS[kind]) and is_number(value)
+    else:
+        is_right = kind is Any or (kind not in EXPECTED and isinstance(value, kind))
+    return value if is_right else check_type(name, value, kind)
+
+
+def _convert_list(name: str, value: Any, kind: type, inner: tuple[Any, ...]) -> Any:
+    """A tuple or set of values of one type, or a tuple of one type for each of its values."""
+    if not isinstance(value, list | kind):
+        raise InputError(f"{name} must be {EXPECTED[list]}, not {format_value(value)}")
+    is_fixed, each = kind is tuple and inner[-1] is not Ellipsis, f"each value of {name}"
+    if is_fixed and len(value) != len(inner):
+        raise InputError(f"{name} must be a list of {len(inner)} values, not of {len(value)}")
+    kinds = inner if is_fixed else repeat(inner[0])
+    found = [_convert(each, one, of) for one, of in zip(value, kinds, strict=False)]
+    is_same = isinstance(value, kind) and all(map(operator.is_, value, found))
+    return value if is_same else kind(found)
+
+
+@cache
+def _parts(kind: Any) -> tuple[Any, tuple[Any, ...]]:
+    """Origin and arguments of an annotation."""
+    return get_origin(kind), get_args(kind)
 
 
 def is_number(value: Any) -> bool:

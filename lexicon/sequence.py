@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
+from lexicon.inputs import check_fields
 from lexicon.phones import PHONES
 from lexicon.pronounce import Pronunciation
 
@@ -103,7 +104,8 @@ class WordSpan:
         return replace(self, first=self.first + phones, last=self.last + phones)
 
     def __post_init__(self) -> None:
-        """Refuse an empty or reversed range."""
+        """Refuse values of other types, and an empty or reversed range."""
+        check_fields(self)
         if not 0 <= self.first < self.last:
             raise InputError(f"word {self.text!r} needs a nonempty range of phones, not [{self.first}, {self.last})")
 

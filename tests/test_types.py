@@ -1,5 +1,7 @@
 """Waveform, Trajectory, Speech and Clip: validation, parts, padding and resampling, and joining of clips."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -115,3 +117,17 @@ def test_trajectories_are_read_by_channel_frame_and_second() -> None:
     part = motion.part(1, 9)
     assert (part.channels, part.values.tolist(), part.fps) == (("a", "b"), [[3.0, 4.0], [5.0, 8.0]], 2.0)
     assert motion.at(np.array([-1.0, 0.25, 9.0])).tolist() == [[1.0, 2.0], [2.0, 3.0], [5.0, 8.0]]
+
+
+@pytest.mark.parametrize(
+    ("make", "reason"),
+    [
+        (lambda: Waveform([0.0], "b"), '^rate must be a number, not "b"'),  # type: ignore[arg-type]
+        (lambda: Waveform(["a"], 8000), "^samples must be numbers"),
+        (lambda: Trajectory(["a"], [[0.0]], "b"), '^fps must be a number, not "b"'),  # type: ignore[arg-type]
+        (lambda: Trajectory(["a"], [["b"]], 30.0), "^trajectory values must be numbers"),
+    ],
+)
+def test_values_of_other_types_are_refused(make: Callable[[], object], reason: str) -> None:
+    with pytest.raises(InputError, match=reason):
+        make()

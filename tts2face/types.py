@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_limits
+from lexicon.inputs import check_fields, check_limits, check_type
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, concatenate_phones
 from tts2face.numeric.arrays import interpolate_columns
 from tts2face.request import FPS_LIMITS
@@ -34,7 +34,10 @@ def frame_count(duration_s: float, fps: float) -> int:
 
 
 def _checked_read_only(values: ArrayLike, what: str, ndim: int) -> NDArray[np.float32]:
-    array = np.array(values, dtype=np.float32)
+    try:
+        array = np.array(values, dtype=np.float32)
+    except (TypeError, ValueError) as wrong:
+        raise InputError(f"{what} must be numbers ({wrong})") from wrong
     if array.ndim != ndim:
         raise InputError(f"{what} must have {ndim} dimension(s), not shape {array.shape}")
     if not np.isfinite(array).all():
@@ -81,7 +84,7 @@ class Waveform:
 
     def __init__(self, samples: ArrayLike, rate: int) -> None:
         locked = _checked_read_only(samples, "samples", 1)
-        if not 0 < rate <= MAX_RATE_HZ:
+        if not 0 < check_type("rate", rate, float) <= MAX_RATE_HZ:
             raise InputError(f"a waveform's rate must be above 0 and at most {MAX_RATE_HZ:g} Hz, not {rate:g}")
         if locked.size and float(np.abs(locked).max()) > 1.0:
             raise InputError(f"samples must lie in [-1, 1]; the largest is {float(np.abs(locked).max()):.3f}")
@@ -145,7 +148,7 @@ class Trajectory:
             raise InputError("trajectory channels must have different names")
         if locked.shape[1] != len(channels):
             raise InputError(f"{len(channels)} channels need {len(channels)} columns, not {locked.shape[1]}")
-        if not 0 < fps <= MAX_RATE_HZ:
+        if not 0 < check_type("fps", fps, float) <= MAX_RATE_HZ:
             raise InputError(f"frames per second must be above 0 and at most {MAX_RATE_HZ:g}, not {fps}")
         object.__setattr__(self, "channels", tuple(channels))
         object.__setattr__(self, "values", locked)
@@ -192,7 +195,7 @@ class Speech:
     Raises
     ------
     InputError
-        The phones do not cover the sound, or a word reaches beyond the last phone.
+        A part has another type, the phones do not cover the sound, or a word reaches beyond the last phone.
     """
 
     waveform: Waveform
@@ -200,7 +203,8 @@ class Speech:
     words: tuple[WordSpan, ...]
 
     def __post_init__(self) -> None:
-        """Reject phones that do not cover the sound exactly, and words beyond the phones."""
+        """Reject other types, phones that do not cover the sound exactly, and words beyond the phones."""
+        check_fields(self)
         if self.phones.start != 0.0 or abs(self.phones.end - self.waveform.duration) > 0.5 / self.waveform.rate:
             raise InputError(
                 f"phones cover {self.phones.start}-{self.phones.end} s but the sound lasts {self.waveform.duration} s"
@@ -230,7 +234,7 @@ class Clip:
     Raises
     ------
     InputError
-        The parts differ in frame rate or length, or the head pose has other channels.
+        A part has another type, they differ in frame rate or length, or the head pose has other channels.
     """
 
     motion: Trajectory
@@ -238,7 +242,8 @@ class Clip:
     speech: Speech
 
     def __post_init__(self) -> None:
-        """Reject parts that differ in frame rate or length."""
+        """Reject other types, and parts that differ in frame rate or length."""
+        check_fields(self)
         if self.head.channels != HEAD_CHANNELS:
             raise InputError(f"head pose needs the channels {HEAD_CHANNELS}, not {self.head.channels}")
         if (len(self.motion), self.motion.fps) != (len(self.head), self.head.fps):

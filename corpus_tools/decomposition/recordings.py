@@ -33,7 +33,7 @@ from corpus_tools.recordings.sound import SOUND_RATE
 from corpus_tools.recordings.video import CachedTracker
 from corpus_tools.run_options import RunOptions, map_unordered
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_regular_file
+from lexicon.inputs import check_fields, check_regular_file
 from tts2face.face.deformation import moved_landmarks, rest_landmarks
 from tts2face.lips.performer import match_shapes
 from tts2face.models.face import Face
@@ -55,6 +55,10 @@ class MarkerOptions:
     neutral: Path | None = None
     fps: float | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse values of other types (`InputError`)."""
+        check_fields(self)
+
 
 def is_livelink(path: Path) -> bool:
     """Whether a file begins like a Live Link Face table."""
@@ -73,8 +77,6 @@ def read_capture_file(path: Path, face: Face, *, options: MarkerOptions | None =
         There is no such file, or it is of another kind.
     DataError
         It is damaged; or as `read_marker_recording` says.
-    BackendError
-        Reading C3D needs a package that is missing.
     """
     if path.suffix.lower() not in CAPTURE_SUFFIXES:
         raise InputError(

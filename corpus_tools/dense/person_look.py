@@ -30,6 +30,7 @@ from corpus_tools.dense.skin_colour import (
     srgb_colour,
 )
 from corpus_tools.dense.texels import find_texels
+from lexicon.inputs import check_fields
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import tint_parts
 from tts2face.models.hair import EYE_COLOURS, HAIR_COLOURS, parse_eye_colour, parse_hair_colour
@@ -98,7 +99,8 @@ class LookChoices:
     keeps_lines: bool = True
 
     def __post_init__(self) -> None:
-        """Refuse colours that do not exist (`InputError`)."""
+        """Refuse values of other types, and colours that do not exist (`InputError`)."""
+        check_fields(self)
         if self.eye_color is not None:
             parse_eye_colour(self.eye_color)
 

@@ -20,6 +20,7 @@ from corpus_tools.training.linear_audio_map import (
     standardised_windows,
 )
 from lexicon.errors import InputError
+from lexicon.inputs import check_fields
 from tts2face.models.audio_map import AudioMap
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.sound.features import FEATURE_RATE, speech_features, speech_level
@@ -51,7 +52,8 @@ class NetworkMapOptions:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Check the options."""
+        """Check the options and their types."""
+        check_fields(self)
         if self.n_hidden < 1 or min(self.before, self.after) < 0 or self.weight_decay < 0.0:
             raise InputError(
                 f"a network needs at least one hidden unit, and context and weight decay from 0 up, not {self}"

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_limits
+from lexicon.inputs import check_fields, check_limits
 from lexicon.marked_text import NOD_SIZE_LIMITS
 from tts2face.models.palette import EXPRESSIONS, FEATURES
 from tts2face.numeric.arrays import smoothstep
@@ -128,6 +128,7 @@ class StyleSpan:
 
     def __post_init__(self) -> None:
         """Refuse unknown features and times that do not run forward."""
+        check_fields(self)
         check_feature(self.feature)
         check_style(self.style)
         _check_span(f"the span of {self.feature}", self.start, self.end)
@@ -144,6 +145,7 @@ class ExpressionSpan:
 
     def __post_init__(self) -> None:
         """Refuse unknown expressions, weights out of range, and times that do not run forward."""
+        check_fields(self)
         check_expression(self.expression)
         check_limits(f"the weight of {self.expression}", self.weight, EXPRESSION_WEIGHT_LIMITS)
         _check_span(f"the span of {self.expression}", self.start, self.end)
@@ -163,6 +165,7 @@ class GazeTarget:
 
     def __post_init__(self) -> None:
         """Refuse directions beyond the eyes' range and times that do not run forward."""
+        check_fields(self)
         for name, angle in (("down", self.down_deg), ("left", self.left_deg)):
             check_limits(f"the gaze {name} in degrees", angle, GAZE_LIMITS_DEG)
         _check_span("the gaze", self.start, self.end)
@@ -182,6 +185,7 @@ class Listening:
 
     def __post_init__(self) -> None:
         """Refuse times that do not run forward."""
+        check_fields(self)
         _check_span("listening", self.start, self.end)
 
 
@@ -194,6 +198,7 @@ class Nod:
 
     def __post_init__(self) -> None:
         """Refuse times before the clip and sizes out of range."""
+        check_fields(self)
         if not 0.0 <= self.time < math.inf:
             raise InputError(f"a nod needs a time of 0 s or more, not {self.time:g}")
         check_limits("the size of a nod", self.size, NOD_SIZE_LIMITS)
@@ -208,6 +213,7 @@ class BrowRaise:
 
     def __post_init__(self) -> None:
         """Refuse times before the clip and sizes out of range."""
+        check_fields(self)
         if not 0.0 <= self.time < math.inf:
             raise InputError(f"a brow raise needs a time of 0 s or more, not {self.time:g}")
         check_limits("the size of a brow raise", self.size, NOD_SIZE_LIMITS)
@@ -222,6 +228,7 @@ class StrengthCurve:
 
     def __post_init__(self) -> None:
         """Refuse unknown features, factors out of range, and times that do not increase."""
+        check_fields(self)
         check_feature(self.feature)
         object.__setattr__(self, "keys", check_keys(f"the strength of {self.feature}", self.keys, GAIN_LIMITS))
 
@@ -235,6 +242,7 @@ class ExpressionCurve:
 
     def __post_init__(self) -> None:
         """Refuse unknown expressions, weights out of range, and times that do not increase."""
+        check_fields(self)
         check_expression(self.expression)
         what = f"the weight of {self.expression}"
         object.__setattr__(self, "keys", check_keys(what, self.keys, EXPRESSION_WEIGHT_LIMITS))
@@ -252,6 +260,7 @@ class ChannelEdit:
 
     def __post_init__(self) -> None:
         """Refuse a missing name, offsets out of range, and times that do not increase."""
+        check_fields(self)
         if not self.channel.strip():
             raise InputError("an edit needs a channel; give the name of a shape or of a part of the head pose")
         what = f"the edit of {self.channel}"
@@ -266,6 +275,7 @@ class Gains:
 
     def __post_init__(self) -> None:
         """Refuse unknown features and factors out of range."""
+        check_fields(self)
         for feature, factor in self.factors.items():
             check_feature(feature, GAIN_NAMES)
             check_limits(f"the gain of {feature}", factor, GAIN_LIMITS)

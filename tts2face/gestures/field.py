@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from lexicon.inputs import check_fields
 from tts2face.gestures.field_kernels import (
     MIN_MOMENT_GAP,
     SEARCH_SLACK,
@@ -67,7 +68,7 @@ class FieldOptions:
     Raises
     ------
     InputError
-        A number lies outside its range.
+        A value has another type, or a number lies outside its range.
     """
 
     history: int = 10
@@ -83,7 +84,8 @@ class FieldOptions:
     search_error: float = SEARCH_SLACK
 
     def __post_init__(self) -> None:
-        """Refuse numbers outside their range."""
+        """Refuse values of other types and numbers outside their range."""
+        check_fields(self)
         if not 2 <= self.history <= 60 or not 1 <= self.stride <= 60 or not 0 <= self.future <= 600:
             raise InputError("a field's history is 2 to 60 frames, its stride 1 to 60, its future 0 to 600")
         if not 0 <= self.memory <= 1000:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
+from lexicon.inputs import check_fields
 from tts2face.gestures.elements import (
     GAIN_NAMES,
     KINDS,
@@ -80,8 +81,8 @@ class Timeline:
     Raises
     ------
     InputError
-        A feature is unknown, a style has no name, spans overlap, a seed is negative, or one feature, expression or
-        channel has two curves.
+        A value has another type, a feature is unknown, a style has no name, spans overlap, a seed is negative, or one
+        feature, expression or channel has two curves.
     """
 
     style: Mapping[str, str] = field(default_factory=dict)
@@ -98,7 +99,8 @@ class Timeline:
     seeds: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Refuse unknown features and overlapping spans; put the rest in order of time."""
+        """Refuse values of other types, unknown features and overlapping spans; put the rest in order of time."""
+        check_fields(self)
         for feature, style in self.style.items():
             check_feature(feature)
             check_style(style)

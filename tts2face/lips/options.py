@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from lexicon.errors import InputError
+from lexicon.inputs import check_fields
 
 
 @dataclass(frozen=True, slots=True)
@@ -11,6 +12,10 @@ class ExcludedToken:
 
     utterance: str
     start: float
+
+    def __post_init__(self) -> None:
+        """Refuse values of other types (`InputError`)."""
+        check_fields(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +54,7 @@ class SynthesisOptions:
     Raises
     ------
     InputError
-        A number lies outside its range.
+        A value has another type, or a number lies outside its range.
     """
 
     context: int = 3
@@ -66,7 +71,8 @@ class SynthesisOptions:
     articulation: float | None = None
 
     def __post_init__(self) -> None:
-        """Reject numbers outside their range; `context` and `k` are checked by the search."""
+        """Reject other types and numbers outside their range; `context` and `k` are checked by the search."""
+        check_fields(self)
         for name in ("duration", "sharpness", "precision", "amplitude", "smoothing_s"):
             value = getattr(self, name)
             if not 0 <= value < 100:

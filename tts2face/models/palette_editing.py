@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from lexicon.errors import InputError
+from lexicon.inputs import check_fields
 from tts2face.models.palette import (
     EXPRESSIONS,
     FEATURES,
@@ -56,7 +57,8 @@ class StyleMix:
     tempo: float = 1.0
 
     def __post_init__(self) -> None:
-        """Check names and values."""
+        """Check types, names and values."""
+        check_fields(self)
         for name, share in self.shares.items():
             _check_value(f"the share of {name}", share, SHARE_LIMITS)
         for name, weight in self.expressions.items():

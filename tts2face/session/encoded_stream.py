@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from lexicon.errors import InputError
+from lexicon.inputs import check_fields
 from tts2face.interchange.exports.parts import FormatWriter, FrameGrid
 from tts2face.interchange.exports.table import FormatInfo, all_formats
 from tts2face.interchange.exports.writer import ExportFile, ExportWriter, make_target, mesh_of, plan_exports
@@ -65,7 +66,8 @@ class StreamFormat:
     pace: Pace | None = None
 
     def __post_init__(self) -> None:
-        """Check the format."""
+        """Check the types and the format."""
+        check_fields(self)
         if self.name not in media_types():
             raise InputError(f"there is no streamed format {self.name!r}; the formats are {', '.join(media_types())}")
         if self.name in MOVIE_KINDS:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_limits
+from lexicon.inputs import check_fields, check_limits
 from tts2face.face.body import Body
 from tts2face.numeric.arrays import interpolate_rows
 from tts2face.picture.options import Picture
@@ -47,7 +47,7 @@ class Performance:
     Raises
     ------
     InputError
-        The gain is out of range, or `audio` is given for a video, which has its own sound.
+        A value has another type, the gain is out of range, or `audio` is given for a video, which has its own sound.
     """
 
     take: Path
@@ -58,7 +58,8 @@ class Performance:
     model: Path | None = None
 
     def __post_init__(self) -> None:
-        """Reject options that exclude each other."""
+        """Reject values of other types, and options that exclude each other."""
+        check_fields(self)
         check_limits("the gain", self.gain, GAINS)
         if self.audio is not None and not is_capture(self.take):
             raise InputError(f"{self.take} has its own sound; --audio belongs to a Live Link Face .csv file")

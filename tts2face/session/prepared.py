@@ -10,7 +10,7 @@ import numpy as np
 
 from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
-from lexicon.inputs import is_file
+from lexicon.inputs import check_fields, is_file
 from lexicon.ipa import IpaPhone
 from lexicon.languages import check_readable, language_code
 from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS, MarkedText
@@ -124,7 +124,8 @@ class SentenceEdges:
     edges: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        """Refuse edges that do not fit the phones, and times that do not increase."""
+        """Refuse other types, edges that do not fit the phones, and times that do not increase."""
+        check_fields(self)
         if self.occurrence < 0:
             raise InputError(f"the occurrence of a sentence must be 0 or more, not {self.occurrence}")
         PhoneSequence(self.phones, self.edges)

@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from lexicon.dictionary import Dictionary, parse_dictionary
 from lexicon.errors import InputError
-from lexicon.inputs import check_type
+from lexicon.inputs import check_fields
 from lexicon.ipa import IpaPhone
 from tts2face.gestures.elements import Gains, StyleSpan, check_feature
 from tts2face.gestures.timeline import Timeline, parse_style
@@ -68,8 +68,8 @@ class Project:
     solo: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
-        """Refuse unknown features, a long name, a second timeline and wrong pronunciations."""
-        check_type("the name", self.name, str)
+        """Refuse other types, unknown features, a long name, a second timeline and wrong pronunciations."""
+        check_fields(self)
         if not self.name.strip() or len(self.name) > MAX_NAME:
             raise InputError(f"a project needs a name of 1 to {MAX_NAME} characters, not {self.name[:40]!r}")
         for feature in (*self.muted, *self.solo):

@@ -34,6 +34,7 @@ from corpus_tools.studies.gestures.measures import (
     wasserstein,
 )
 from lexicon.errors import InputError
+from lexicon.inputs import check_fields
 from tts2face.gestures.stream import GestureFields
 from tts2face.lips.explanation import pearson
 from tts2face.models.palette import GESTURE_FPS, Palette, Style
@@ -67,7 +68,8 @@ class StudyOptions:
     people: Path | None = None
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the types and the numbers."""
+        check_fields(self)
         if self.one_in < 2:
             raise InputError(f"one in {self.one_in} recordings cannot be held out; give 2 or more")
         if self.halves < 1:

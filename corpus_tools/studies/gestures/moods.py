@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from corpus_tools.studies.gestures.measures import find_blinks
 from corpus_tools.studies.pages import report_writer
 from lexicon.errors import BackendError, InputError
+from lexicon.inputs import check_fields
 from tts2face.models.palette import Palette
 from tts2face.picture.options import Picture
 from tts2face.session.session import Session
@@ -71,7 +72,8 @@ class MoodOptions:
     sentences: tuple[str, ...] = SENTENCES
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the types and the numbers."""
+        check_fields(self)
         if self.seeds < 4 or self.seeds % 2:
             raise InputError(f"the seeds must be an even number of 4 or more, not {self.seeds}")
         if self.first_seed < 0:

@@ -34,6 +34,7 @@ from corpus_tools.studies.similarity.tables import (
     viseme_classes,
 )
 from lexicon.errors import InputError
+from lexicon.inputs import check_fields
 from lexicon.phones import look_up_phone
 from tts2face.lips.similarity import PhoneSimilarity
 from tts2face.models.talker import Talker
@@ -104,6 +105,10 @@ class SimilarityOptions:
     classes: tuple[int, ...] | None = None
     halves: int = 20
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse values of other types (`InputError`)."""
+        check_fields(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

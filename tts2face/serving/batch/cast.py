@@ -23,7 +23,7 @@ from types import MappingProxyType
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_type, format_value, is_file, parse_toml, read_text
+from lexicon.inputs import check_fields, check_type, format_value, is_file, parse_toml, read_text
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import BALD
@@ -54,6 +54,10 @@ class Role:
     patterns: Mapping[str, str]
     settings: Mapping[str, Any]
 
+    def __post_init__(self) -> None:
+        """Refuse values of other types (`InputError`)."""
+        check_fields(self)
+
     def applies(self, cue: Cue, file: str) -> bool:
         """Whether all patterns match a cue, in capitals and small letters alike."""
         values = {"speaker": cue.speaker, "subtitle_style": cue.style, "file": file}
@@ -66,6 +70,10 @@ class Cast:
 
     default: Mapping[str, Any] = field(default_factory=dict)
     roles: tuple[Role, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse values of other types (`InputError`)."""
+        check_fields(self)
 
     def role_of(self, cue: Cue, file: str) -> Role | None:
         """The first role that applies to a cue."""

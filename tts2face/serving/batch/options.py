@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
+from lexicon.inputs import check_fields
 from lexicon.marked_text import RATE_LIMITS
 from tts2face.interchange.exports.table import batch_format
 from tts2face.request import option
@@ -21,7 +22,7 @@ class BatchOptions:
     Raises
     ------
     InputError
-        An option is unknown or out of range.
+        An option has a value of another type, is unknown or out of range.
     BackendError
         A package of an export format is missing.
     """
@@ -46,7 +47,8 @@ class BatchOptions:
     encoding: str | None = option(None, "Encoding of subtitles that are not UTF-8, such as cp1250.")
 
     def __post_init__(self) -> None:
-        """Reject unknown names and numbers out of range."""
+        """Reject values of other types, unknown names and numbers out of range."""
+        check_fields(self)
         if self.per not in CLIP_UNITS:
             raise InputError(f"--per must be {', '.join(CLIP_UNITS[:-1])} or {CLIP_UNITS[-1]}, not {self.per!r}")
         self._check_formats()
@@ -56,8 +58,6 @@ class BatchOptions:
             raise InputError(f"--max-rate must lie between 1 and {RATE_LIMITS[1]:g}, not {self.max_rate:g}")
         if not 0.0 < self.scene_gap <= 3600.0:
             raise InputError(f"--scene-gap must lie between 0 and 3600 s, not {self.scene_gap:g}")
-        if isinstance(self.audio, str):
-            object.__setattr__(self, "audio", Path(self.audio))
         if self.audio is not None and not self.audio.is_dir():
             raise InputError(f"there is no folder of recordings {self.audio}; check the path")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import EXPECTED, check_limits, format_value, parse_toml, read_text
+from lexicon.inputs import EXPECTED, check_fields, check_limits, format_value, parse_toml, read_text
 from lexicon.records import checked
 from tts2face.storage.files import user_data
 
@@ -41,7 +41,7 @@ class ServiceSettings:
     Raises
     ------
     InputError
-        A value is out of range, or the host is not this machine and there are no keys.
+        A value has another type or is out of range, or the host is not this machine and there are no keys.
     """
 
     host: str = setting("127.0.0.1", "Address to listen on; others than this machine need keys.")
@@ -111,7 +111,8 @@ class ServiceSettings:
     log_text: bool = setting(False, "Write the texts of requests to the log.")
 
     def __post_init__(self) -> None:
-        """Check limits, and that a service that others can reach has keys."""
+        """Check types and limits, and that a service that others can reach has keys."""
+        check_fields(self)
         for one in fields(self):
             if one.metadata["limits"] is not None:
                 check_limits(one.name, getattr(self, one.name), one.metadata["limits"])

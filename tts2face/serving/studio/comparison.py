@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from lexicon.errors import DataError, InputError, Tts2faceError
-from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
+from lexicon.inputs import LARGEST_JSON_BYTES, check_fields, parse_json, read_text
 from lexicon.records import checked
 from tts2face.request import Request
 from tts2face.serving.service.keys import ApiKey
@@ -67,7 +67,8 @@ class Reference:
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what is incomplete."""
+        """Refuse values of other types, and what is incomplete."""
+        check_fields(self)
         if self.kind not in KINDS:
             raise InputError(f"a project is compared with {', '.join(KINDS)}, not {self.kind[:20]!r}")
         if self.kind == KEPT and self.project is None:
