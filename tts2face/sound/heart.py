@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,7 @@ from tts2face.sound.voice import (
     pronounce_content,
     split_spoken_sentences,
 )
+from tts2face.storage.tensors import computed_once
 from tts2face.types import Speech, Waveform, concatenate_speech
 
 if TYPE_CHECKING:
@@ -108,6 +110,7 @@ MARKS = "".join(PAUSES_S)  # punctuation among the letters
 MAX_LETTERS = 400  # the model accepts at most this many letters in one call
 DURATION_STEP_S = 0.025  # length of one step of the model's durations
 BOUNDARY_DELAY_S = 0.061  # delay of the model's own boundaries against its sound (56 ms when fast, 71 when slow)
+CACHE_KIND, CACHE_VERSION = "voices", 1  # raised when the graph of the same model changes
 DURATION_TENSOR = "/Cast_32_output_0"  # internal tensor of the ONNX graph: steps of 25 ms for each letter
 # A network that returns its input: Hibari's constructor loads one, with an arena, and loading the voice's takes 0.1 s.
 IDENTITY_NETWORK = (
@@ -144,7 +147,7 @@ class NeuralVoice:
         except ImportError as missing:
             raise BackendError("the voice heart needs hibari-tts; run: pip install hibari-tts") from missing
         self._model: Any = hibari.Hibari(voice="heart", model=IDENTITY_NETWORK, threads=1)
-        self._network = _Network(_session_without_arena(Path(voice_path("heart")).read_bytes()), run)
+        self._network = _Network(open_network(Path(voice_path("heart")).read_bytes()), run)
         self._model.sess = self._network
         pronounce_content("Hello.", LANGUAGE, {})  # reads the dictionary while other models are loaded
 
@@ -253,17 +256,45 @@ def _run_within(run: Callable[[], Any], _: Callable[[], None]) -> Any:
     return run()
 
 
-def _session_without_arena(model: bytes) -> Any:
-    """ONNX session that frees its memory after each sentence; an arena would retain up to 100 MB."""
+def open_network(model: bytes) -> Any:
+    """ONNX session of the voice, which frees its memory after each sentence; an arena would retain up to 100 MB.
+
+    Optimising the graph takes most of the time of a session. It is kept as far as it is the same on every machine; what
+    depends on the processor is done each time.
+    """
+    import onnxruntime
+
+    levels = onnxruntime.GraphOptimizationLevel
+    kept = computed_once(
+        CACHE_KIND, CACHE_VERSION, [np.frombuffer(model, np.uint8), DURATION_TENSOR, onnxruntime.__version__],
+        lambda: {"graph": _optimised(model)}, lambda found: "graph" in found and found["graph"].dtype == np.uint8,
+    )  # fmt: skip
+    return _session(kept["graph"].tobytes(), levels.ORT_ENABLE_ALL)
+
+
+def _optimised(model: bytes) -> NDArray[np.uint8]:
+    """Bytes (N,) of the model with the durations among its outputs, optimised for any machine."""
+    import onnxruntime
+
+    level = onnxruntime.GraphOptimizationLevel.ORT_ENABLE_EXTENDED
+    with TemporaryDirectory(prefix="tts2face-") as folder:
+        path = Path(folder, "graph.onnx")
+        _session(add_graph_output(model, DURATION_TENSOR), level, path)
+        return np.frombuffer(path.read_bytes(), np.uint8)
+
+
+def _session(model: bytes, level: Any, written: Path | None = None) -> Any:
+    """Session that optimises up to a level, and writes its graph to a path if there is one."""
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 3  # errors
     options.enable_cpu_mem_arena = options.enable_mem_pattern = False
-    return onnxruntime.InferenceSession(
-        add_graph_output(model, DURATION_TENSOR), options, providers=["CPUExecutionProvider"]
-    )
+    options.graph_optimization_level = level
+    if written is not None:
+        options.optimized_model_filepath = str(written)
+    return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
 
 
 def _joined_letters(tokens: Sequence[LetteredWord]) -> str:

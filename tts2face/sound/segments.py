@@ -135,7 +135,9 @@ def _search(sums, segments, costs, found):  # type: ignore[no-untyped-def]
         label, source, target = labels[n], joints[n, 0], joints[n, 1]
         (earliest, latest), (low, high) = bounds[source], bounds[target]
         so_far = score[source, : latest - earliest + 1]
-        starts = so_far + taken[n] + begins[n, : latest - earliest + 1] - sums[earliest : latest + 1, label]
+        starts = np.empty_like(so_far)
+        for at in range(len(starts)):  # loading a kernel with whole arrays imports 50 ms of numba
+            starts[at] = so_far[at] + taken[n] + begins[n, at] - sums[earliest + at, label]
         if durations[n, 0] > 0.0:
             reached, begin = _end_unlimited(starts, (earliest, low, high), shortest[n])
         else:
