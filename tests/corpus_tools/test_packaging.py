@@ -6,7 +6,7 @@ import sys
 import tomllib
 from pathlib import Path
 
-from setuptools.discovery import PEP420PackageFinder
+from tests.packages import package
 
 ROOT = Path(__file__).parents[2]
 BUILDERS = ("corpus_tools.head", "corpus_tools.drawn", "corpus_tools.film", "corpus_tools.make_models")
@@ -30,7 +30,9 @@ except ModuleNotFoundError:
 def shipped_packages() -> list[str]:
     """Packages that setuptools finds, as when it builds a wheel."""
     options = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]["find"]
-    return PEP420PackageFinder.find(str(ROOT), exclude=options["exclude"], include=options["include"])
+    finder = package("setuptools.discovery").PEP420PackageFinder
+    found: list[str] = finder.find(str(ROOT), exclude=options["exclude"], include=options["include"])
+    return found
 
 
 def imported_modules(path: Path) -> set[str]:

@@ -81,6 +81,7 @@ def test_only_frequent_phones_are_judged() -> None:
     assert made_study(n_tokens=4).differences.shape == (0, len(SCORES))
 
 
+@pytest.mark.needs("matplotlib")
 def test_the_page_names_what_is_missed_and_loads_nothing() -> None:
     html = retargeting_page(made_study())
     assert "1 of 14 differences exceed 0.06" in html
@@ -98,6 +99,7 @@ def test_a_page_without_frequent_phones_has_no_plot() -> None:
     assert "0 of 0 differences" in html
 
 
+@pytest.mark.needs("matplotlib")
 def test_tables_hold_every_phone_and_score() -> None:
     study = made_study()
     rows = list(csv.DictReader(io.StringIO(study_csv(study))))
@@ -114,5 +116,6 @@ def test_tables_hold_every_phone_and_score() -> None:
     assert "none spoken" in retargeting_page(silent)
 
 
+@pytest.mark.needs("matplotlib")
 def test_the_plot_is_a_picture() -> None:
     assert figure_png(made_study()).startswith(b"\x89PNG")
