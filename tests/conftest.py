@@ -5,8 +5,9 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the processes of a run share the cores; numpy reads it when loaded
 
 import gc
-from collections import Counter
+from collections import Counter, OrderedDict
 from collections.abc import Iterator
+from hashlib import blake2b
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,8 @@ os.environ.setdefault(CACHE_VARIABLE, str(FOLDER))  # processes with another hom
 
 if TYPE_CHECKING:
     from tests.world import World
+    from tts2face.session.session import Session
+    from tts2face.sound.voice_pool import VoicePool
 
 pytest_plugins = ["tests.started", "tests.running"]
 
@@ -34,6 +37,7 @@ NIGHTLY = "nightly"  # marker of tests that take minutes, of which others do a l
 DEFAULT = f"smoke or not ({' or '.join((*GROUPS, NIGHTLY))})"  # as in pyproject.toml
 SHARED_SERVER = "host"  # fixture
 LONGEST_NAME = 200  # characters of a value in the name of a test
+SENTENCES_HEARD = 64
 SKIPPED = "tts2face/skipped"  # in pytest's cache
 SHARED = Path(os.environ.get("TTS2FACE_SHARED", Path(__file__).resolve().parents[2] / "shared"))
 
@@ -57,6 +61,42 @@ def rendered_takes() -> Path:
 def rendered_capture() -> Path:
     """A Live Link Face capture of a speaking face, to read only; its sound is in the same folder."""
     return TESTS / "takes" / "take.csv"
+
+
+@pytest.fixture(scope="session")
+def voices() -> "VoicePool":
+    """Loaded voices that the sessions of a process share."""
+    from tts2face.sound.voice_pool import VoicePool
+
+    return VoicePool()
+
+
+@pytest.fixture(scope="session")
+def shipped(voices: "VoicePool") -> "Session":
+    """A session of the shipped talker, palette and voices on the head."""
+    from tts2face.session.session import Session
+
+    return Session("grid_s1", "head", voices=voices)
+
+
+@pytest.fixture(scope="session")
+def heard_once() -> Iterator[None]:
+    """What the recogniser hears is kept by the content of the sound: the same sentences are heard by many tests."""
+    from tts2face.sound.recogniser import PhoneRecogniser
+
+    hear, kept = PhoneRecogniser._hear, OrderedDict()
+
+    def recall(recogniser: PhoneRecogniser, samples: Any) -> Any:
+        key = blake2b(samples.tobytes()).digest()
+        if key not in kept:
+            kept[key] = hear(recogniser, samples)
+            while len(kept) > SENTENCES_HEARD:
+                kept.popitem(last=False)
+        return kept[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(PhoneRecogniser, "_hear", recall)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import Delaunay
 
+from lexicon.languages import language_code
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.models.face import Eye, Face, FacePart
 from tts2face.models.face_file import write_face
@@ -45,7 +46,15 @@ from tts2face.models.palette import (
 from tts2face.models.talker import ShapeModel, Talker, Utterance, write_talker
 from tts2face.plugins import declared
 from tts2face.session.session import Session
-from tts2face.sound.voice import SpeechInput, VoiceInfo, VoiceSetting, pronounce_content
+from tts2face.sound.voice import (
+    PronunciationMap,
+    SpeechInput,
+    Voice,
+    VoiceInfo,
+    VoiceSetting,
+    pronounce_content,
+)
+from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import Speech, Waveform
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -91,13 +100,13 @@ RECORDINGS = (70, 70, 60)  # frames
 N_MODES = 2
 MOODS = {
     "neutral": Derivation("calm", {"expression": FeatureChange(offset={"happy": 0.1})}, "calm, a little happier"),
-    "delighted": Derivation(
-        "calm", {"expression": FeatureChange(offset={"happy": 0.6}), "head": FeatureChange(gain=1.5)}, "happy",
-        Delivery(1.05, 1.0),
-    ),
     "depressed": Derivation(
         "calm", {"expression": FeatureChange(offset={"sad": 0.6}), "head": FeatureChange(gain=0.5)}, "sad",
         Delivery(0.9, -2.0),
+    ),
+    "delighted": Derivation(
+        "calm", {"expression": FeatureChange(offset={"happy": 0.6}), "head": FeatureChange(gain=1.5)}, "happy",
+        Delivery(1.05, 1.0),
     ),
     "annoyed": Derivation("wild", {"expression": FeatureChange(offset={"angry": 0.5})}, "wild, and angry"),
 }  # fmt: skip
@@ -389,6 +398,17 @@ def spoken(words: Sequence[tuple[str, Sequence[str]]], rate: float = 1.0, rate_h
     return Speech(Waveform(samples, rate_hz), PhoneSequence([SILENCE, *phones, SILENCE], edges), spans)
 
 
+class WorldVoices(VoicePool):
+    """Voices of which the default one is that of tones."""
+
+    def voice(
+        self, name: str | None, language: str, dictionary: PronunciationMap, *, keeps_utterances: bool = False
+    ) -> Voice:
+        if name is None:
+            return ToneVoice(VoiceSetting(language_code(language), dictionary))
+        return super().voice(name, language, dictionary, keeps_utterances=keeps_utterances)
+
+
 TONES = VoiceInfo("a tone for each phone", ToneVoice, "none", "numpy", "-", "none")
 
 
@@ -402,10 +422,27 @@ class World:
     folder: Path
 
     @property
+    def talker_file(self) -> Path:
+        return self.folder / "made.talker"
+
+    @property
+    def face_file(self) -> Path:
+        return self.folder / "made.face"
+
+    @property
+    def palette_file(self) -> Path:
+        return self.folder / "made.palette"
+
+    @property
+    def models(self) -> list[str]:
+        """Options of the command line for its files."""
+        files = {"--talker": self.talker_file, "--face": self.face_file, "--palette": self.palette_file}
+        return [str(word) for pair in files.items() for word in pair]
+
+    @property
     def flags(self) -> list[str]:
         """Options of the command line for its files and its voice."""
-        paths = ((f"--{kind}", str(self.folder / f"made.{kind}")) for kind in ("talker", "face", "palette"))
-        return [word for pair in paths for word in pair] + ["--voice", VOICE]
+        return [*self.models, "--voice", VOICE]
 
     @property
     def environment(self) -> Mapping[str, str]:
@@ -413,16 +450,17 @@ class World:
         return {"PYTHONPATH": os.pathsep.join([str(ROOT), str(self.folder), os.environ.get("PYTHONPATH", "")])}
 
     def session(self, **options: Any) -> Session:
-        """A session of the world; options as of `Session`."""
-        return Session(self.talker, **{"face": self.face, "palette": self.palette, **options})
+        """A session of the world, whose default voice is that of tones; options as of `Session`."""
+        own = {"face": self.face, "palette": self.palette, "voices": WorldVoices()}
+        return Session(**{"talker": self.talker, **own, **options})
 
 
 def make_world(folder: Path) -> World:
     """Write the files of the world into a folder."""
     world = World(made_talker(), made_face(), made_palette(), folder)
-    write_talker(folder / "made.talker", world.talker)
-    write_face(folder / "made.face", world.face, {})
-    write_palette(folder / "made.palette", world.palette)
+    write_talker(world.talker_file, world.talker)
+    write_face(world.face_file, world.face, {})
+    write_palette(world.palette_file, world.palette)
     about = folder / "made_world-1.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: made_world\nVersion: 1\n")

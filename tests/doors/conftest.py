@@ -1,23 +1,20 @@
-"""The shipped talker and the default head, loaded once for each file of tests."""
+"""Sessions of the doors: on the made world, or on the shipped models where these are the subject."""
+
+from pathlib import Path
 
 import pytest
 
-from tts2face.models.face import Face
-from tts2face.models.face_loading import load_face
-from tts2face.models.talker import Talker, load_talker
+from tests.world import World
 from tts2face.session.session import Session
 
 
 @pytest.fixture(scope="module")
-def talker() -> Talker:
-    return load_talker("grid_s1")
+def session(world: World) -> Session:
+    return world.session()
 
 
-@pytest.fixture(scope="module")
-def face() -> Face:
-    return load_face("head")
-
-
-@pytest.fixture(scope="module")
-def session(talker: Talker, face: Face) -> Session:
-    return Session(talker, face)
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder, in which commands run."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path

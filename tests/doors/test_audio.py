@@ -14,6 +14,7 @@ from corpus_tools.training.linear_audio_map import TrainingUtterance, learn_line
 from corpus_tools.training.network_audio_map import NetworkMapOptions, learn_network_map
 from lexicon.errors import DataError, InputError
 from tests.rendered_takes import ONLY_RENDERED
+from tests.world import World
 from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
 from tts2face.models.landmarks import lip_opening
 from tts2face.models.talker import Talker, load_talker, write_talker
@@ -23,9 +24,11 @@ from tts2face.session.session import Session
 from tts2face.sound import transcript
 from tts2face.sound.features import FEATURE_RATE, speech_features
 from tts2face.sound.listener import StreamingAudioMap
+from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import Trajectory, concatenate_clips, frame_count
 from tts2face.video.media import read_media_info, read_sound, sound_blocks
 
+pytestmark = pytest.mark.usefixtures("heard_once")
 TEXT = "bin blue at F two now"
 TOLERANCE_S = 0.04  # of the takes' own word times, which are automatic as well
 LEARNT_FROM = 60  # utterances: enough to be far better than nothing
@@ -43,8 +46,9 @@ def talker() -> Talker:
 
 
 @pytest.fixture(scope="module")
-def session(talker: Talker) -> Session:
-    return Session(talker, "head")
+def session(talker: Talker, world: World, voices: VoicePool) -> Session:
+    """The shipped talker, which hears, on the made face."""
+    return world.session(talker=talker, voices=voices)
 
 
 @pytest.fixture(scope="module")
@@ -60,12 +64,6 @@ def held_out(shared_recordings: Path) -> Talker:
         lessons.append(TrainingUtterance(features, one.shape[:, : shipped.model.n_speech]))
     network = learn_network_map(lessons, feature="mfcc", options=NetworkMapOptions())
     return replace(shipped, audio_maps={"linear": learn_linear_map(lessons, feature="mfcc"), "network": network})
-
-
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def write_wave(path: Path, samples: np.ndarray, rate: int = 16000) -> Path:
@@ -207,10 +205,11 @@ def test_interpolated_motion_passes_through_the_frames() -> None:
 
 
 @ONLY_RENDERED
-def test_the_command_writes_clips(film: Path, talker: Talker, here: Path) -> None:
+def test_the_command_writes_clips(film: Path, talker: Talker, world: World, here: Path) -> None:
     write_talker(here / "me.talker", talker)
     (here / "said.txt").write_text(TEXT)
-    common = ["--audio", str(film), "--talker", "me.talker", "--size", "64x64", "--fps", "5", "--quiet"]
+    models = ["--talker", "me.talker", "--face", str(world.face_file), "--palette", str(world.palette_file)]
+    common = ["--audio", str(film), *models, "--size", "64x64", "--fps", "5", "--quiet"]
     for out, more in (
         ("sound.mp4", []),
         ("linear.mp4", ["--audio-map", "linear"]),
@@ -260,13 +259,14 @@ def test_options_that_exclude_each_other_are_refused(options: dict, reason: str)
 
 @ONLY_RENDERED
 def test_a_missing_recording_and_a_talker_without_audio_maps_are_refused(
-    film: Path, session: Session, talker: Talker
+    film: Path, session: Session, talker: Talker, world: World
 ) -> None:
+    mute = world.session(talker=replace(talker, audio_maps={}))
     with pytest.raises(InputError, match=r"there is no recording none\.wav"):
         session.clip(Request(audio=Path("none.wav")))
     with pytest.raises(InputError, match="has no network audio map"):
-        Session(replace(talker, audio_maps={}), "head").clip(Request(audio=film, audio_map="network"))
-    assert Session(replace(talker, audio_maps={}), "head").clip(Request(audio=film)).speech.words == ()
+        mute.clip(Request(audio=film, audio_map="network"))
+    assert mute.clip(Request(audio=film)).speech.words == ()
 
 
 def test_the_text_is_given_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -295,10 +295,10 @@ def test_live_lips_hold_for_another_voice(session: Session, talker: Talker) -> N
 
 
 @ONLY_RENDERED
-def test_an_explanation_needs_phones(film: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_explanation_needs_phones(film: Path, world: World, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["--audio", str(film), "--audio-map", "network", "--explain", "why.json"]) == 2
     assert "or the words of --audio" in capsys.readouterr().err
-    assert run(["--audio", str(film), "--explain", str(here / "why.json")]) == 0
+    assert run(["--audio", str(film), "--explain", str(here / "why.json"), "--face", str(world.face_file)]) == 0
     assert "the words are not given" in capsys.readouterr().err
     assert len(json.loads((here / "why.json").read_text())) > 5
 

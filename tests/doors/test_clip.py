@@ -8,9 +8,7 @@ import pytest
 import soxr
 
 from lexicon.sequence import SILENCE
-from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER
-from tts2face.models.talker import load_talker
 from tts2face.session.session import Session
 from tts2face.types import Clip
 
@@ -21,8 +19,8 @@ TOUCHING_MM = 0.6  # a third of a pixel at 512 px
 
 
 @pytest.fixture(scope="module")
-def ready() -> Session:
-    return Session(load_talker("grid_s1"), load_face("head"))
+def ready(shipped: Session) -> Session:
+    return shipped
 
 
 @pytest.fixture(scope="module")

@@ -15,17 +15,12 @@ from cli.main import run
 from cli.process import EXIT_CODES
 from lexicon import errors
 from tests.running import eventually
+from tests.world import VOICE, World
 from tts2face.picture.options import Picture
 from tts2face.request import Request
 
 COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
 SMALL = ["--size", "64x64", "--fps", "5"]
-
-
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def test_help_names_every_option_and_is_quick(capsys: pytest.CaptureFixture[str]) -> None:
@@ -120,25 +115,35 @@ def test_a_folder_that_cannot_be_written_is_named(here: Path, capsys: pytest.Cap
     assert "cannot write locked/x.mp4" in capsys.readouterr().err
 
 
-def test_text_from_standard_input_and_from_a_file(here: Path) -> None:
+WROTE = r"wrote .*: \d+\.\d s, \d+ frames, made in \d+\.\d s \(\d+\.\d x real time\)"
+
+
+def test_text_from_a_file(tones: World, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (here / "text.txt").write_text("\ufeffHello.", encoding="utf-8")
-    for words, standard_input in ((["--file", "text.txt", *SMALL], ""), ([], "Hello."), (["-"], "Hello.")):
-        out = here / ("clip.mp4" if SMALL[0] in words else f"{len(words)}.wav")
-        done = subprocess.run(
-            [*COMMAND, *words, "--out", str(out)],
-            input=standard_input,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        assert re.search(r"wrote .*: \d+\.\d s, \d+ frames, made in \d+\.\d s \(\d+\.\d x real time\)", done.stderr)
-        assert out.stat().st_size > 1000
+    assert run(["--file", "text.txt", *SMALL, *tones.flags, "--out", "clip.mp4"]) == 0
+    assert re.search(WROTE, capsys.readouterr().err)
+    assert (here / "clip.mp4").stat().st_size > 1000
 
 
-def test_an_interruption_leaves_no_files(here: Path) -> None:
-    text = "This is a rather long sentence that takes some time to speak. " * 20
-    process = subprocess.Popen([*COMMAND, text, "--out", "x.mp4"], stderr=subprocess.PIPE, text=True)
+@pytest.mark.parametrize("words", [[], ["-"]])
+def test_text_from_standard_input(words: list[str], world: World, here: Path) -> None:
+    done = subprocess.run(
+        [*COMMAND, *words, "--voice", VOICE, "--out", "said.wav"],
+        input="Hello.",
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, **world.environment},
+    )
+    assert done.returncode == 0, done.stderr
+    assert re.search(WROTE, done.stderr)
+    assert (here / "said.wav").stat().st_size > 1000
+
+
+def test_an_interruption_leaves_no_files(world: World, here: Path) -> None:
+    text = "This is a rather long sentence that takes some time to speak. " * 200
+    command = [*COMMAND, text, *world.flags, "--out", "x.mp4"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env={**os.environ, **world.environment})
     eventually(lambda: list(here.glob(".x*")))
     process.send_signal(signal.SIGINT)
     _, captured = process.communicate(timeout=60)
@@ -147,10 +152,10 @@ def test_an_interruption_leaves_no_files(here: Path) -> None:
     assert list(here.iterdir()) == []
 
 
-def test_an_explanation_names_recorded_phones(here: Path) -> None:
-    assert run(["Bob may.", "--explain", "why.json", "--quiet"]) == 0
+def test_an_explanation_names_recorded_phones(tones: World, here: Path) -> None:
+    assert run(["Bob met.", *tones.flags, "--explain", "why.json", "--quiet"]) == 0
     shown = json.loads((here / "why.json").read_text(encoding="utf-8"))
-    assert [phone["phone"] for phone in shown if phone["phone"] != "sil"] == ["b", "ɑ", "b", "m", "eɪ"]
+    assert [phone["phone"] for phone in shown if phone["phone"] != "sil"] == ["b", "ɑ", "b", "m", "ɛ", "t"]
     for phone in shown:
         assert phone["tokens"]
         assert sum(token["weight"] for token in phone["tokens"]) == pytest.approx(1, abs=1e-6)

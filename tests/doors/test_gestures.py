@@ -10,11 +10,12 @@ import pytest
 
 from cli.main import run
 from lexicon.errors import InputError
+from tests.world import VOICE, World, made_style
 from tts2face.face.deformation import moved_landmarks
 from tts2face.face.gestures import gesture_face
 from tts2face.models.face import Face
+from tts2face.models.face_loading import load_face
 from tts2face.models.palette import FEATURES, load_palette, write_palette
-from tts2face.models.talker import Talker
 from tts2face.request import GAZES, Request
 from tts2face.session.session import Session
 from tts2face.storage.files import SHIPPED_FOLDER
@@ -23,6 +24,17 @@ from tts2face.types import Clip
 TEXT = "Bob may move five big maps, but we keep two."
 SMALL = ["--size", "64x64", "--fps", "5", "--quiet"]
 SHAPES = {"brows": ("brows",), "cheeks": ("cheeks",), "blink": ("eyeBlink",), "gaze": ("eyeLook",)}
+
+
+@pytest.fixture(scope="module")
+def session(shipped: Session) -> Session:
+    """What is shipped is judged; the rest runs on the made world."""
+    return shipped
+
+
+@pytest.fixture(scope="module")
+def face() -> Face:
+    return load_face("head")
 
 
 @pytest.fixture(scope="module")
@@ -119,31 +131,24 @@ def test_eyes_hold_the_viewer_while_the_head_nods(session: Session) -> None:
     assert np.corrcoef(up, clip.head.values[:, 0])[0, 1] > 0.95
 
 
-def test_marks_and_flags_paint_styles(with_gestures: Clip, session: Session) -> None:
-    by_flag = session.clip(Request(text=TEXT, style="head=exaggerated"))
-    by_mark = session.clip(Request(text=f"[style:head=exaggerated]{TEXT}[/style]"))
-    np.testing.assert_allclose(by_mark.head.values[30:-30], by_flag.head.values[30:-30], atol=1e-4)
-    assert not np.array_equal(by_flag.head.values, with_gestures.head.values)
-    np.testing.assert_array_equal(channels_of(by_flag, ("brows",)), channels_of(with_gestures, ("brows",)))
-
-
-def test_another_palette_gives_other_motion(with_gestures: Clip, talker: Talker, face: Face, tmp_path: Path) -> None:
-    starter = load_palette("starter")
-    style = starter.styles["grid_s1"]
-    few = {name: values[: int(style.lengths[:40].sum())] for name, values in style.motion.items()}
-    n_frames = int(style.lengths[:40].sum())
-    part = replace(
-        style,
-        lengths=style.lengths[:40],
-        intensity=style.intensity[:n_frames],
-        pitch=style.pitch[:n_frames],
-        motion=few,
+def test_marks_and_flags_paint_styles(world: World) -> None:
+    ready = world.session()
+    plain, by_flag, by_mark = (
+        ready.clip(Request(text=text, style=style))
+        for text, style in ((TEXT, None), (TEXT, "head=wild"), (f"[style:head=wild]{TEXT}[/style]", None))
     )
-    write_palette(tmp_path / "few.palette", replace(starter, styles={"few": part}, derivations={}))
-    clip = Session(talker, face, palette=tmp_path / "few.palette").clip(Request(text=TEXT))
-    assert not np.array_equal(clip.head.values, with_gestures.head.values)
+    np.testing.assert_allclose(by_mark.head.values[30:-30], by_flag.head.values[30:-30], atol=1e-4)
+    assert not np.array_equal(by_flag.head.values, plain.head.values)
+    np.testing.assert_array_equal(channels_of(by_flag, ("brows",)), channels_of(plain, ("brows",)))
+
+
+def test_another_palette_gives_other_motion(world: World, tmp_path: Path) -> None:
+    other = replace(world.palette, styles={"few": made_style(5)}, derivations={})
+    write_palette(tmp_path / "few.palette", other)
+    ready = world.session(palette=tmp_path / "few.palette")
+    assert not np.array_equal(ready.clip(TEXT).head.values, world.session().clip(TEXT).head.values)
     with pytest.raises(InputError, match="no style 'delighted' in the palette; it has few, measured"):
-        Session(talker, face, palette=tmp_path / "few.palette").clip(Request(text=TEXT, style="delighted"))
+        ready.clip(Request(text=TEXT, style="delighted"))
 
 
 def test_an_idle_face_lives(session: Session, face: Face) -> None:
@@ -183,27 +188,29 @@ def gaze_degrees(clip: Clip) -> np.ndarray:
     ],
 )
 def test_invalid_requests_give_one_sentence_and_nothing_is_written(
-    arguments: list[str], code: int, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+    arguments: list[str], code: int, reason: str, tones: World, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "late.json").write_text(json.dumps({"nods": [{"time": 90}]}))
-    (tmp_path / "half.palette").write_bytes((SHIPPED_FOLDER / "starter.palette").read_bytes()[:100_000])
-    before = set(tmp_path.iterdir())
-    assert run(["Hi there.", *arguments, "--out", "x.mp4", *SMALL]) == code
+    (here / "late.json").write_text(json.dumps({"nods": [{"time": 90}]}))
+    (here / "half.palette").write_bytes((SHIPPED_FOLDER / "starter.palette").read_bytes()[:100_000])
+    before = set(here.iterdir())
+    own = [] if "--palette" in arguments else ["--palette", str(tones.palette_file)]
+    models = ["--talker", str(tones.talker_file), "--face", str(tones.face_file), "--voice", VOICE, *own]
+    assert run(["Hi there.", *arguments, *models, "--out", "x.mp4", *SMALL]) == code
     assert reason in capsys.readouterr().err
-    assert set(tmp_path.iterdir()) == before
+    assert set(here.iterdir()) == before
 
 
-def test_an_unknown_style_in_the_text_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    assert run(["[style:cross]Hi.[/style]", "--out", str(tmp_path / "x.mp4"), *SMALL]) == 2
+def test_an_unknown_style_in_the_text_is_refused(
+    tones: World, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert run(["[style:cross]Hi.[/style]", *tones.flags, "--out", str(tmp_path / "x.mp4"), *SMALL]) == 2
     assert "no style 'cross'" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
 def test_a_capture_becomes_a_style_of_the_starter_palette(
-    capture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    capture: Path, tones: World, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     cache = ["--cache", "cache", "--jobs", "1"]
     assert run(["corpus", "gestures", str(capture), "--style", "live", "--out", "live.palette", *cache]) == 0
     assert re.search(
@@ -212,7 +219,9 @@ def test_a_capture_becomes_a_style_of_the_starter_palette(
     palette = load_palette("live.palette")
     assert palette.names[-3:] == ("grid_s1", "live", "measured")
     assert palette.styles["live"].intensity.max() > 0  # its sound is in the same folder
-    assert run(["Hello.", "--palette", "live.palette", "--style", "live", "--out", "x.mp4", *SMALL]) == 0
+    models = ["--talker", str(tones.talker_file), "--face", str(tones.face_file), "--voice", VOICE]
+    styled = ["--palette", "live.palette", "--style", "live"]
+    assert run(["Hello.", *models, *styled, "--out", "x.mp4", *SMALL]) == 0
     alone = ["--alone", "--estimator", "samples"]
     assert run(["corpus", "gestures", str(capture), "--style", "live", "--out", "a.palette", *alone, *cache]) == 0
     made = load_palette("a.palette")

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from tests.oracles.loudness_meter import measure_loudness, true_peak
-from tts2face.models.face_loading import load_face
-from tts2face.models.talker import load_talker
+from tests.world import World
 from tts2face.picture.options import Picture
 from tts2face.request import Request
 from tts2face.session.session import Session
 from tts2face.session.speech_stream import Piece
 from tts2face.sound import level
 from tts2face.sound.level import integrated_loudness
+from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import Waveform, concatenate_clips
 
 TEXTS = (
@@ -36,8 +36,9 @@ TEXTS = (
 
 
 @pytest.fixture(scope="module")
-def ready() -> Session:
-    return Session(load_talker("grid_s1"), load_face("ada"))
+def ready(world: World, voices: VoicePool) -> Session:
+    """The voices are those that are shipped."""
+    return world.session(voices=voices)
 
 
 def pieces_of(ready: Session, text: str, **options: object) -> list[Piece]:

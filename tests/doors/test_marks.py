@@ -1,6 +1,5 @@
 """Marked texts through every door: clips with pauses, times of marks on the clock of the whole clip."""
 
-import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -10,9 +9,8 @@ import pytest
 from cli.main import run
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE
+from tests.world import RATE_HZ, World
 from tts2face.gestures.elements import StyleSpan
-from tts2face.models.face_loading import load_face
-from tts2face.models.talker import load_talker
 from tts2face.picture.options import Picture
 from tts2face.request import Request
 from tts2face.session.session import Session
@@ -20,17 +18,17 @@ from tts2face.session.speech_stream import Piece
 from tts2face.types import concatenate_clips
 from tts2face.video.media import read_media_info
 
-COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
+pytestmark = pytest.mark.usefixtures("heard_once")
 SMALL = Picture(size="64x64")
 
 
 @pytest.fixture(scope="module")
-def ready() -> Session:
-    return Session(load_talker("grid_s1"), load_face("head"))
+def ready(session: Session) -> Session:
+    return session
 
 
 def pieces(text: str, ready: Session, **options: object) -> list[Piece]:
-    return list(ready.stream(Request(text=text, voice="espeak", **options)))
+    return list(ready.stream(Request(text=text, **options)))
 
 
 def words(found: list[Piece]) -> dict[str, float]:
@@ -49,14 +47,14 @@ def test_marks_come_with_their_words_on_the_whole_clip_s_clock(fps: float, ready
     spans = [span for piece in found for span in piece.timeline.spans]
     assert all(isinstance(span, StyleSpan) and span.feature == "head" for span in spans)
     for before, after in pairwise(spans):
-        assert after.start == pytest.approx(before.end, abs=1 / 22050)
+        assert after.start == pytest.approx(before.end, abs=1 / RATE_HZ)
     assert spans[0].start == pytest.approx(len(found[0].clip.motion) / found[0].clip.fps)
-    assert at["seven"] < spans[-1].end <= at["eight"] + 1 / 22050
+    assert at["seven"] < spans[-1].end <= at["eight"] + 1 / RATE_HZ
 
 
-def test_a_pause_is_silent_and_the_lips_rest_in_it(ready: Session) -> None:
+def test_a_pause_is_silent_and_the_lips_rest_in_it(shipped: Session) -> None:
     texts = ("Bob may go away.", "Bob may [pause 3] go away.")
-    (plain,), (paused,) = (list(ready.stream(Request(text=text, gestures="none"))) for text in texts)
+    (plain,), (paused,) = (list(shipped.stream(Request(text=text, gestures="none"))) for text in texts)
     phones = paused.clip.speech.phones
     assert phones.phones.count(SILENCE) == 3
     middle = phones.phones.index(SILENCE, 1)
@@ -100,11 +98,11 @@ def test_a_file_with_marks_counts_characters_and_tells_the_times_of_names(ready:
     assert read_media_info(tmp_path / "a.mp4").duration == pytest.approx(written.seconds, abs=0.2)
 
 
-def test_the_command_makes_the_pause(tmp_path: Path) -> None:
+def test_the_command_makes_the_pause(tones: World, tmp_path: Path) -> None:
     lengths = []
     for number, text in enumerate(("Hello there.", "Hello [pause 2] there.")):
         out = tmp_path / f"{number}.mp4"
-        assert run([text, "--out", str(out), "--size", "64x64", "--fps", "5", "--voice", "espeak"]) == 0
+        assert run([text, "--out", str(out), "--size", "64x64", "--fps", "5", *tones.flags]) == 0
         lengths.append(read_media_info(out).duration)
     assert 1.7 < lengths[1] - lengths[0] < 2.5
 
@@ -122,9 +120,11 @@ def test_phones_are_those_that_the_text_gives(capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().out.splitlines()[-1].split() == ["dog", "dog.", "kæt", "K", "AE0", "T"]
 
 
-def test_the_command_tells_when_names_are_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_tells_when_names_are_reached(
+    tones: World, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     text = '<speak>Hello <mark name="the place"/>there.</speak>'
-    assert run([text, "--out", str(tmp_path / "a.gif"), "--size", "64x64", "--fps", "5"]) == 0
+    assert run([text, "--out", str(tmp_path / "a.gif"), "--size", "64x64", "--fps", "5", *tones.flags]) == 0
     assert capsys.readouterr().err.rstrip().endswith("s: the place")
 
 

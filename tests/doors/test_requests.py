@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tts2face.models.face import Face
-from tts2face.models.talker import Talker
+from tests.world import ROOT, World
 from tts2face.numeric.kernels import CACHE_VARIABLE, FOLDER
 from tts2face.request import GESTURES, LEAD_S, TURN_S, Request
 from tts2face.session.session import Session
+from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import Clip, concatenate_clips
 
 TEXT = "Bob may move. We were away."
@@ -42,9 +42,9 @@ CHANGES = {
 
 
 @pytest.fixture(scope="module")
-def session(talker: Talker, face: Face) -> Session:
+def session(world: World) -> Session:
     """It keeps finished sentences: an option that the keys of `SentenceMemory` lack would change nothing."""
-    return Session(talker, face, memory_mb=100)
+    return world.session(memory_mb=100)
 
 
 @pytest.fixture(scope="module")
@@ -80,22 +80,22 @@ def test_a_plain_delivery_changes_the_clip_of_a_style(session: Session) -> None:
 
 def test_the_same_request_gives_the_same_bytes_in_another_process(clip: Clip, tmp_path: Path) -> None:
     code = (
-        "import sys; sys.path.insert(0, 'tests/doors')\n"
-        "from test_requests import TEXT, digest\n"
-        "from tts2face import Request, Session\n"
-        "print(digest(Session('grid_s1', 'head').clip(Request(text=TEXT))))"
+        "import sys; from pathlib import Path; from tests.doors.test_requests import TEXT, digest\n"
+        "from tests.world import make_world\n"
+        "print(digest(make_world(Path(sys.argv[1])).session().clip(TEXT)))"
     )
     environment = {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PATH": ""}
-    environment |= {CACHE_VARIABLE: str(FOLDER), "HOME": str(tmp_path)}
-    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
+    environment |= {CACHE_VARIABLE: str(FOLDER), "HOME": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", code, str(tmp_path)]
+    answer = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
     assert answer.stdout.strip() == digest(clip)
 
 
-def test_a_voice_used_before_gives_the_same_bytes(clip: Clip, talker: Talker, face: Face) -> None:
-    ready = Session(talker, face)
+def test_a_voice_used_before_gives_the_same_bytes(world: World) -> None:
+    fresh, ready = (world.session(voices=VoicePool()) for _ in range(2))
     for text in ("Something else was said. Bob may have been away.", TEXT):
         joined = concatenate_clips([piece.clip for piece in ready.stream(Request(text=text))])
-    assert digest(joined) == digest(clip)
+    assert digest(joined) == digest(fresh.clip(TEXT))
 
 
 def test_a_stream_is_the_whole_in_pieces(clip: Clip, session: Session) -> None:

@@ -6,9 +6,8 @@ from typing import Any
 import pytest
 
 from cli.main import run
+from tests.world import World
 from tts2face.interchange.exports.table import FORMATS
-from tts2face.models.face import Face
-from tts2face.models.talker import Talker
 from tts2face.session.named_models import Models
 from tts2face.session.outputs import is_speech_only, plan_outputs, write_speech
 from tts2face.session.prepared import prepare_request
@@ -26,12 +25,13 @@ SPEECH: dict[str, tuple[str, dict[str, Any], list[str]]] = {
 
 
 @pytest.fixture(scope="module")
-def session(talker: Talker, face: Face) -> Session:
-    return Session(talker, face)
+def session(world: World, voices: VoicePool) -> Session:
+    """The voices are those that are shipped, as where nothing else is loaded."""
+    return world.session(voices=voices)
 
 
 @pytest.mark.parametrize("name", SPEECH)
-def test_the_files_are_those_of_a_session(name: str, session: Session, tmp_path: Path) -> None:
+def test_the_files_are_those_of_a_session(name: str, session: Session, voices: VoicePool, tmp_path: Path) -> None:
     text, options, names = SPEECH[name]
     prepared, steps = prepare_request(text, options), []
     found = {}
@@ -43,7 +43,7 @@ def test_the_files_are_those_of_a_session(name: str, session: Session, tmp_path:
         else:
             outputs = plan_outputs(None, paths, {})
             assert is_speech_only(prepared, outputs)
-            written = write_speech(prepared, outputs, VoicePool(), lambda *step: steps.append(step))
+            written = write_speech(prepared, outputs, voices, lambda *step: steps.append(step))
         files = {path.name: path.read_bytes() for path in paths}
         found[folder] = (files, written.seconds, written.n_frames, written.marks)
     assert found["speech"] == found["session"]

@@ -7,22 +7,22 @@ from pathlib import Path
 import pytest
 
 from cli.main import run
-from tts2face.models.face_loading import load_face
-from tts2face.models.talker import load_talker
+from tests.world import World
 from tts2face.picture.options import Picture
 from tts2face.request import Request
 from tts2face.session.session import Session
-from tts2face.sound.voice_pool import load_voice
+from tts2face.sound.voice_pool import VoicePool
 
+pytestmark = pytest.mark.usefixtures("heard_once")
 SAID = "The young chef usually pushes five big maps before noon."
 WRONG = "The young chef usually pushes five big maps before noon, yesterday elephants remembered."
 OTHER = "Please wait for the beep, then say your name."
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def recording(voices: VoicePool, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The project's own voice as the recording."""
-    sound = load_voice("heart", "en-us").speak(SAID).waveform
+    sound = voices.voice("heart", "en-us", {}).speak(SAID).waveform
     path = tmp_path_factory.mktemp("recording") / "speech.wav"
     with wave.open(str(path), "wb") as file:
         file.setparams((1, 2, sound.rate, 0, "NONE", "not compressed"))
@@ -30,8 +30,8 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_the_core_reports_the_words(recording: Path, tmp_path: Path) -> None:
-    ready = Session(load_talker("grid_s1"), load_face("ada"))
+def test_the_core_reports_the_words(recording: Path, session: Session, tmp_path: Path) -> None:
+    ready = session
     request = Request(audio=recording, text=WRONG, fps=10.0, gestures="none")
     pieces = list(ready.stream(request))
     (mismatch,) = (one for piece in pieces for one in piece.mismatches)
@@ -43,10 +43,10 @@ def test_the_core_reports_the_words(recording: Path, tmp_path: Path) -> None:
 
 
 def test_another_text_is_refused_with_its_words(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    recording: Path, world: World, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "clip.mp4"
-    assert run(["--audio", str(recording), "--text", OTHER, "--out", str(out)]) == 3
+    assert run(["--audio", str(recording), "--text", OTHER, "--out", str(out), *world.models]) == 3
     refusal = capsys.readouterr().err
     assert "the recording does not contain this text" in refusal
     assert "wait" in refusal
@@ -55,11 +55,11 @@ def test_another_text_is_refused_with_its_words(
 
 @pytest.mark.parametrize(("text", "n_lines"), [(SAID, 0), (WRONG, 1)])
 def test_the_command_line_reports_mismatches(
-    text: str, n_lines: int, recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    text: str, n_lines: int, recording: Path, world: World, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "clip.mp4"
     options = ["--size", "64x64", "--fps", "10", "--no-gestures", "--quiet"]
-    assert run(["--audio", str(recording), "--text", text, "--out", str(out), *options]) == 0
+    assert run(["--audio", str(recording), "--text", text, "--out", str(out), *world.models, *options]) == 0
     lines = [line for line in capsys.readouterr().err.splitlines() if "does not fit the recording from" in line]
     assert len(lines) == n_lines
     assert out.is_file()
