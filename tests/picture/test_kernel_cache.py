@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -143,32 +144,41 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize("kind", ["kernel", "inlined_kernel"])
-def test_installations_share_code_that_is_compiled_of_the_same(tmp_path, kind):
+def test_installations_share_code_that_is_compiled_of_the_same(tmp_path, monkeypatch, kind):
     """A kernel is compiled again where one that it calls, or a constant, is another; old versions are removed."""
+    monkeypatch.setattr(compilation, "FOLDER", tmp_path / "kernels")
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
 
-    def call(where: str, scale: int, value: int, room: str = "tests_made") -> str:
+    def install(where: str, scale: int, value: int, room: str = "tests_made") -> Path:
         package = tmp_path / where / room
-        package.mkdir(parents=True, exist_ok=True)
+        package.mkdir(parents=True)
         (package / "caller.py").write_text(CALLER.format(room=room))
         (package / "callee.py").write_text(CALLEE.format(kind=kind, scale=scale, value=value))
-        paths = os.pathsep.join((str(package.parent), str(ROOT)))
-        environment = os.environ | {CACHE_VARIABLE: str(tmp_path / "kernels"), "PYTHONPATH": paths}
-        # Python does not notice that a file of the same size was changed within a second (`-B` keeps no bytecode).
-        done = subprocess.run(
-            [sys.executable, "-B", "-c", CALL.format(room=room)],
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        return done.stdout.strip()
+        return package
 
-    assert call("one", 1, 2) == "4 0"
-    assert call("two", 1, 2) == "4 1"
-    assert call("one", 1, 5) == "10 0"
-    assert call("one", 3, 5) == "30 0"
-    assert call("one", 3, 5, "tests_moved") == "30 0"
-    assert [call("one", 1, value) for value in (6, 7)] == ["12 0", "14 0"]
+    def call(*installation: object) -> tuple[int, int]:
+        """What an installation computes, and how much of its code was in the cache."""
+        package = install(*installation)
+        for name in ("callee", "caller", ""):
+            sys.modules.pop(f"{package.name}.{name}".removesuffix("."), None)
+        with monkeypatch.context() as path:
+            path.syspath_prepend(package.parent)
+            twice = import_module(f"{package.name}.caller").twice
+        return twice(), sum(twice.stats.cache_hits.values())
+
+    assert call("one", 1, 2) == (4, 0)
+    assert call("two", 1, 2) == (4, 1)
+    paths = os.pathsep.join((str(tmp_path / "two"), str(ROOT)))
+    environment = os.environ | {CACHE_VARIABLE: str(tmp_path / "kernels"), "PYTHONPATH": paths}
+    in_another_process = subprocess.run(
+        [sys.executable, "-B", "-c", CALL.format(room="tests_made")], env=environment, capture_output=True, text=True,
+        check=True,
+    )  # fmt: skip
+    assert in_another_process.stdout.strip() == "4 1"
+    assert call("three", 1, 5) == (10, 0)
+    assert call("four", 3, 5) == (30, 0)
+    assert call("five", 3, 5, "tests_moved") == (30, 0)
+    assert [call(f"version {value}", 1, value) for value in (6, 7)] == [(12, 0), (14, 0)]
     assert len(list((tmp_path / "kernels").glob("caller-*"))) == compilation.N_VERSIONS
 
 
