@@ -12,6 +12,7 @@ from tts2face.picture.kernels.tables import linear_table
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw
 
+pytestmark = pytest.mark.usefixtures("few_directions")
 PICTURE = Picture(size="160x160", background="#808080")
 EVERY_SAMPLE = replace(PICTURE, quality="high")
 N_SHEET = 2  # triangles of the sheet of lashes, the last of the face

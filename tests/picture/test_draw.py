@@ -16,6 +16,7 @@ from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw, mesh_renderer
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
+pytestmark = pytest.mark.usefixtures("few_directions")
 REST = np.zeros(4)
 SMALL = Picture(size="96x80", background="#204060")
 OTHERS = {

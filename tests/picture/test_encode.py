@@ -19,6 +19,7 @@ from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform, exact_rate, frame_count
 
+pytestmark = pytest.mark.usefixtures("few_directions")
 RATE = 24_000
 SMALL = Picture(size="64x48", background="#3050a0")
 CLEAR = Picture(size="64x48", background="transparent")

@@ -14,6 +14,7 @@ from tts2face.picture.options import Picture
 from tts2face.picture.pace import CHECK_S, HIGH_LEAD_S, LOW_LEAD_S, QUALITIES, Pace
 from tts2face.picture.renderer import mesh_renderer
 
+pytestmark = pytest.mark.usefixtures("few_directions")
 FPS = 30.0
 N_FRAMES = round(CHECK_S * FPS) + 1  # of a check
 

@@ -1,6 +1,7 @@
 """A small synthetic face: a ball of skin with two eyeballs, a tongue and a sheet of lashes."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -36,6 +37,7 @@ def at(*values):
     return np.array(values, np.float32)
 
 
+@cache
 def tiny_face(textured=False, n_rings=14):
     """The face; with `textured`, the skin has a chequered texture."""
     skin, skin_triangles = ball((0, -20, -60), RADIUS, n_rings)
