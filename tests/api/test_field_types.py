@@ -47,8 +47,8 @@ from tts2face.serving.batch.cast import Cast, Role
 from tts2face.serving.batch.options import BatchOptions
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.studio.comparison import KEPT, Reference
+from tts2face.session.encoded_stream import StreamFormat
 from tts2face.session.named_models import Models
-from tts2face.session.outputs import StreamFormat
 from tts2face.session.performance import Performance
 from tts2face.session.prepared import SentenceEdges
 from tts2face.session.project import Project

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import openai
 import pytest
 from starlette.testclient import TestClient
 
 import tts2face
+from tests.packages import package
 from tests.serving.service.in_process import (
     SessionProcess,
     TableProcess,
@@ -59,8 +59,8 @@ def table(client: TestClient) -> Iterator[TableProcess]:
 
 
 @pytest.fixture
-def official(client: TestClient) -> openai.OpenAI:
-    return openai.OpenAI(base_url="http://localhost/v1", api_key="unused", max_retries=0, http_client=client)
+def official(client: TestClient) -> Any:
+    return package("openai").OpenAI(base_url="http://localhost/v1", api_key="unused", max_retries=0, http_client=client)
 
 
 # What is asked of the pool
@@ -104,7 +104,7 @@ def test_a_service_answers_from_its_cache(tmp_path: Path) -> None:
 # What sessions make of it
 
 
-def test_the_openai_client_gets_the_sound_of_the_clip(official: openai.OpenAI) -> None:
+def test_the_openai_client_gets_the_sound_of_the_clip(official: Any) -> None:
     content = official.audio.speech.create(**SPEECH, response_format="pcm").content
     sound = tts2face.Session().clip(TEXT).speech.waveform
     assert sound.rate == 24_000
@@ -152,8 +152,8 @@ def test_wrong_clips_are_refused(client: TestClient, body: object, status: int, 
         ({"input": "漢字", "extra_body": {"language": "en"}}, "cannot read 漢字"),
     ],
 )
-def test_the_openai_client_is_told_what_is_wrong(official: openai.OpenAI, options: dict[str, Any], reason: str) -> None:
-    with pytest.raises(openai.BadRequestError, match=reason):
+def test_the_openai_client_is_told_what_is_wrong(official: Any, options: dict[str, Any], reason: str) -> None:
+    with pytest.raises(package("openai").BadRequestError, match=reason):
         official.audio.speech.create(**{**SPEECH, **options})
 
 
@@ -223,7 +223,7 @@ def test_refusals_show_no_path_of_the_server(
 # Lists
 
 
-def test_the_openai_client_lists_models(official: openai.OpenAI) -> None:
+def test_the_openai_client_lists_models(official: Any) -> None:
     names = [model.id for model in official.models.list()]
     assert names[0] == "grid_s1"
     assert [name for name in names if name in {"grid_s1", "tts-1"}] == ["grid_s1", "tts-1"]
