@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 EXTRAS = {  # modules that the product imports where they are installed; what only tests read comes with the others
-    "ai_edge_litert": "capture", "cv2": "capture", "ezc3d": "capture",
+    "ai_edge_litert": "capture", "cv2": "capture",
     "pillow_heif": "photo",
     "matplotlib": "report", "sklearn": "report",
     "piper": "piper",

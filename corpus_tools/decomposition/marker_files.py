@@ -1,16 +1,15 @@
 """Files of facial marker capture: C3D (Vicon, OptiTrack, ...) and tables of comma-separated values."""
 
-import struct
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.decomposition.c3d_file import C3dFile, read_c3d_file
 from corpus_tools.recordings.sound import SOUND_RATE
-from lexicon.errors import BackendError, DataError, InputError
+from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_table
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.types import Waveform
@@ -21,7 +20,6 @@ MIN_SOUND_HZ = 8000.0  # analogue channels with a lower rate are not sound
 MIN_FPS, MAX_FPS = 10.0, 1000.0
 TIME_TOLERANCE_FRAMES = 0.25  # of a frame: times in a file are rounded, often to milliseconds
 MIN_GAP_STEPS = 1.5  # of the usual step: a longer one is a gap of frames
-BLOCK_BYTES, MAX_BLOCKS, BIG_ENDIAN = 512, 256, 86  # of a C3D file; its first byte counts blocks
 AXES = ("x", "y", "z")
 
 Floats = NDArray[np.float64]
@@ -51,8 +49,6 @@ def read_markers(path: Path, fps: float | None = None) -> MarkerTake:
         There is no such file, its format is unknown, or a table has frame numbers and `fps` is missing.
     DataError
         It is damaged.
-    BackendError
-        The package ezc3d is missing.
     """
     readers = {".c3d": lambda: read_c3d(path), ".csv": lambda: read_marker_table(path, fps)}
     if path.suffix.lower() not in readers:
@@ -73,55 +69,33 @@ def read_markers(path: Path, fps: float | None = None) -> MarkerTake:
 def read_c3d(path: Path) -> MarkerTake:
     """The markers of a C3D file in mm, without the subject's name before a colon; errors as `read_markers`."""
     try:
-        import ezc3d
-    except ImportError as missing:
-        raise BackendError(
-            "reading C3D needs the package ezc3d: run `pip install 'tts2face[capture]'`, or export the markers as CSV"
-        ) from missing
-    try:
-        file = ezc3d.c3d(str(path))
-        _check_length(path, file["data"]["points"].shape[2])
-        about = file["parameters"]["POINT"]
-        points = np.moveaxis(np.asarray(file["data"]["points"], np.float64)[:3], 0, -1).swapaxes(0, 1)
-        labels = [label for key in sorted(about) if key.startswith("LABELS") for label in about[key]["value"]]
-        units = "".join(about["UNITS"]["value"][:1]).strip().lower() if "UNITS" in about else ""
-        fps = float(about["RATE"]["value"][0])
-    except (OSError, ValueError, RuntimeError, KeyError, IndexError) as broken:
+        file = read_c3d_file(path)
+        fps = file.number("POINT:RATE")
+        sound = _analogue_sound(file)
+    except (OSError, ValueError, KeyError, IndexError) as broken:
         raise DataError(f"{path} is damaged, or no C3D file ({broken}); export it again") from broken
+    units = "".join(file.parameters.get("POINT:UNITS", [])[:1]).lower()
     if units not in MM_PER_UNIT:
         raise DataError(
             f"{path} gives its markers in {units!r}; POINT:UNITS must be {', '.join(filter(None, MM_PER_UNIT))}"
         )
-    names = [label.rpartition(":")[2].strip() for label in labels][: points.shape[1]]
+    names = [label.rpartition(":")[2].strip() for label in file.labels("POINT")][: file.points.shape[1]]
+    points = file.points[:, : len(names)] * MM_PER_UNIT[units]
     points[(points == 0.0).all(axis=2)] = np.nan  # how old files mark a gap
-    return MarkerTake(tuple(names), points[:, : len(names)] * MM_PER_UNIT[units], fps, _analogue_sound(file))
+    return MarkerTake(tuple(names), points, fps, sound)
 
 
-def _check_length(path: Path, n_frames: int) -> None:
-    """Check that a file contains all frames that its header states; ezc3d reads truncated files without an error.
-
-    Source: the C3D file format, header words 4 and 5 (first and last frame, 16 bits) and the processor type.
-    """
-    with path.open("rb") as file:
-        content = file.read(BLOCK_BYTES * MAX_BLOCKS)
-    order = ">" if content[BLOCK_BYTES * (content[0] - 1) + 3] == BIG_ENDIAN else "<"
-    first, last = struct.unpack_from(f"{order}HH", content, 6)
-    if (last - first + 1 - n_frames) % 2**16:  # longer recordings count beyond 16 bits elsewhere
-        raise ValueError(f"it ends after {n_frames} of {last - first + 1} frames")
-
-
-def _analogue_sound(file: Any) -> Waveform | None:
-    """Sound among the analogue channels, scaled to full scale."""
+def _analogue_sound(file: C3dFile) -> Waveform | None:
+    """Sound among the analogue channels, without its mean and scaled to full scale."""
     import soxr
 
-    about = file["parameters"]["ANALOG"]
-    labels, rates = about["LABELS"]["value"], about["RATE"]["value"]
+    labels = file.labels("ANALOG")
     named = [at for at, label in enumerate(labels) if any(word in label.lower() for word in SOUND_LABELS)]
-    if not named or not len(rates) or rates[0] < MIN_SOUND_HZ:
+    if not named or file.number("ANALOG:RATE") < MIN_SOUND_HZ:
         return None
-    samples = np.asarray(file["data"]["analogs"], np.float64)[0, named[0]]
+    samples = file.channels[:, named[0]]
     samples = np.nan_to_num(samples - np.nanmean(samples))
-    samples_at_rate = soxr.resample(samples.astype(np.float32), rates[0], SOUND_RATE)
+    samples_at_rate = soxr.resample(samples.astype(np.float32), file.number("ANALOG:RATE"), SOUND_RATE)
     return Waveform(samples_at_rate / max(float(np.abs(samples_at_rate).max(initial=0.0)), 1e-9), SOUND_RATE)
 
 

@@ -179,8 +179,6 @@ def read_marker_recording(
         A file is missing or of another kind.
     DataError
         A file is damaged, lacks a region that the set has, has a gap that is too long, or no rigid head.
-    BackendError
-        Reading C3D needs a package that is missing.
     """
     take = read_markers(path, fps)
     rest = read_marker_face(path if neutral is None else neutral, face, marker_set, fps=fps)

@@ -1,8 +1,10 @@
 """Marker capture with a known answer: the head's own landmarks, moved by a real capture, seen in other axes."""
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
+import c3d
 import numpy as np
 
 from corpus_tools.decomposition.markers import MarkerSet
@@ -47,23 +49,38 @@ def made_take(landmarks: np.ndarray, head: np.ndarray, face: Face, marker_set: M
 
 
 def write_c3d(
-    path: Path, names: tuple[str, ...], points: np.ndarray, *, units: str = "mm", sound: np.ndarray | None = None
+    path: Path,
+    names: tuple[str, ...],
+    points: np.ndarray,
+    *,
+    units: str = "mm",
+    sound: np.ndarray | None = None,
+    scale: float = -1.0,
 ) -> Path:
-    """Points (T, M, 3) in `units` at `FPS`; sound (T k,) with k samples a frame."""
-    import ezc3d
+    """Points (T, M, 3) in `units` at `FPS`, NaN where hidden; sound (T k,) with k samples a frame, all by py-c3d.
 
-    file = ezc3d.c3d()
-    file["parameters"]["POINT"]["RATE"]["value"] = [FPS]
-    file["parameters"]["POINT"]["LABELS"]["value"] = tuple(f"Anna:{name}" for name in names)
-    file.add_parameter("POINT", "UNITS", [units])
-    rows = np.ones((4, len(names), len(points)))
-    rows[:3] = points.transpose(2, 1, 0)
-    file["data"]["points"] = rows
+    Numbers are floats, or with a positive `scale` whole multiples of it.
+    """
+    n_samples = 0 if sound is None else len(sound) // len(points)
+    writer = c3d.Writer(point_rate=FPS, analog_rate=FPS * n_samples, point_scale=scale, point_units=units)
+    for number, first in enumerate(range(0, len(names), 255), start=1):
+        some = [f"Anna:{name}" for name in names[first : first + 255]]
+        text, length = writer.pack_labels(some)
+        writer.point_group.add_str(f"LABELS{number if number > 1 else ''}", "", text, length, len(some))
+    writer.point_group.add_str("DESCRIPTIONS", "", " ", 1, 1)  # by default one a marker, of at most 255
     if sound is not None:
-        file["parameters"]["ANALOG"]["RATE"]["value"] = [FPS * len(sound) / len(points)]
-        file["parameters"]["ANALOG"]["LABELS"]["value"] = ("Force.Fx", "Audio.1")
-        file["data"]["analogs"] = np.stack([np.zeros_like(sound), sound])[None]
-    file.write(str(path))
+        writer.set_analog_labels(["Force.Fx", "Audio.1"])
+        writer.analog_group.add_str("FORMAT", "", "SIGNED  ", 8)
+    rows = np.zeros((*points.shape[:2], 5))
+    rows[..., :3] = np.nan_to_num(points)
+    rows[np.isnan(points).any(axis=2), 3:] = -1
+    channels = np.zeros((len(points), 2 * (n_samples > 0), n_samples))
+    if sound is not None:
+        channels[:, 1] = sound.reshape(len(points), n_samples)
+    writer.add_frames(list(zip(rows, channels, strict=True)))
+    with path.open("wb") as file, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it tells that there are no channels
+        writer.write(file)
     return path
 
 

@@ -13,7 +13,6 @@ from corpus_tools.decomposition.recordings import MarkerOptions
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError
 from tests.corpus_tools.decomposition.made_markers import Made, made_take, write_c3d, write_table
-from tests.packages import needs
 from tts2face.face.deformation import moved_landmarks
 from tts2face.face.expressions import add_expression_shapes, expression_weights
 from tts2face.face.mouth import build_lip_constraints
@@ -35,7 +34,6 @@ def recorded(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> S
     folder.mkdir()
     for row, name in enumerate(("neutral", *EXPRESSIONS)):
         write_table(folder / f"{name}.csv", stills.names, stills.points[row : row + 1].repeat(3, axis=0))
-    needs("ezc3d")
     sound = 0.2 * np.sin(np.arange(len(made.points) * 100) / 8.0)
     write_c3d(tmp_path / "take.c3d", made.names, made.points, sound=sound)
     options = MarkerOptions(neutral=folder / "neutral.csv")

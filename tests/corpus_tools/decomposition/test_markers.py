@@ -17,17 +17,11 @@ from corpus_tools.decomposition.markers import (
 )
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.decomposition.made_markers import FPS, SIZE, Made, write_c3d, write_table
-from tests.packages import needs
 from tts2face.models.face import Face
 from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.numeric.arrays import true_runs
 
 REST = slice(0, 60)  # the made performance's frames at rest
-
-
-@pytest.fixture
-def c3d() -> None:
-    needs("ezc3d")
 
 
 def at_rest(made: Made, path: Path) -> Path:
@@ -38,7 +32,6 @@ def gap(landmarks: np.ndarray) -> np.ndarray:
     return landmarks[:, UPPER_LIP_INNER_MID, 1] - landmarks[:, LOWER_LIP_INNER_MID, 1]
 
 
-@pytest.mark.usefixtures("c3d")
 def test_a_c3d_file_gives_head_face_and_sound_again(
     made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path
 ) -> None:
@@ -192,7 +185,6 @@ def test_three_markers_show_no_face(made: Made, face: Face, marker_set: MarkerSe
         read_marker_recording(path, face, read_marker_set(table))
 
 
-@pytest.mark.usefixtures("c3d")
 def test_two_persons_in_a_file_are_refused(made: Made, tmp_path: Path) -> None:
     path = write_c3d(tmp_path / "take.c3d", (*made.names, "FHD1"), made.points[:5, [*range(len(made.names)), 0]])
     with pytest.raises(DataError, match="the marker FHD1 twice"):
@@ -213,7 +205,6 @@ def test_head_markers_on_a_line_are_refused(made: Made, face: Face, marker_set: 
         read_marker_recording(write_table(tmp_path / "take.csv", made.names, points), face, marker_set)
 
 
-@pytest.mark.usefixtures("c3d")
 @pytest.mark.parametrize(("units", "factor"), [("mm", 1.0), ("cm", 0.1), ("m", 0.001)])
 def test_units_of_a_c3d_file(made: Made, tmp_path: Path, units: str, factor: float) -> None:
     take = read_c3d(write_c3d(tmp_path / "take.c3d", made.names, made.points[:5] * factor, units=units))
@@ -221,7 +212,6 @@ def test_units_of_a_c3d_file(made: Made, tmp_path: Path, units: str, factor: flo
     assert take.names == made.names
 
 
-@pytest.mark.usefixtures("c3d")
 def test_gaps_of_a_c3d_file_are_nan_and_nothing_is_sound(made: Made, tmp_path: Path) -> None:
     points = made.points[:5].copy()
     points[2, 7] = np.nan
@@ -232,14 +222,12 @@ def test_gaps_of_a_c3d_file_are_nan_and_nothing_is_sound(made: Made, tmp_path: P
     assert take.sound is None
 
 
-@pytest.mark.usefixtures("c3d")
 def test_an_unknown_unit_is_refused(made: Made, tmp_path: Path) -> None:
     path = write_c3d(tmp_path / "take.c3d", made.names, made.points[:5], units="px")
     with pytest.raises(DataError, match="'px'; POINT:UNITS must be mm"):
         read_markers(path)
 
 
-@pytest.mark.usefixtures("c3d")
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.5])
 def test_a_c3d_file_that_breaks_off_is_refused(made: Made, tmp_path: Path, share: float) -> None:
     path = write_c3d(tmp_path / "take.c3d", made.names, made.points)
