@@ -54,6 +54,7 @@ def answer(client: httpx.AsyncClient, method: str = "POST", path: str = "/v1/x",
 
 
 def code(response: httpx.Response) -> tuple[int, str]:
+    assert response.is_error, f"served: {response.text}"
     return response.status_code, response.json()["error"]["code"]
 
 
