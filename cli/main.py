@@ -37,6 +37,7 @@ from cli.process import (
     discard_output,
     error_message,
     exit_code,
+    pause_collection,
     repair_streams,
     return_large_blocks,
     signal_exit_code,
@@ -249,6 +250,8 @@ def main() -> None:
     repair_streams()
     INTERRUPTION.install()
     return_large_blocks()
+    if sys.argv[1:2] and sys.argv[1] not in {*app}:  # a text or an option, which `speak` gets
+        pause_collection()
     code = run(sys.argv[1:])
     if INTERRUPTION.number:
         remove_held()  # what no context had taken over when the signal came

@@ -7,6 +7,7 @@ import codecs
 import contextlib
 import ctypes
 import errno
+import gc
 import os
 import select
 import signal
@@ -234,6 +235,18 @@ def return_large_blocks() -> bool:
     if set_option is None:
         return False
     return all(set_option(option, LARGE_BYTES) == 1 for option in (MMAP_THRESHOLD, TRIM_THRESHOLD))
+
+
+def pause_collection() -> None:
+    """Stop the search for garbage: a command that imports and loads makes none, and each search looks at all of it."""
+    gc.disable()
+
+
+def resume_collection() -> None:
+    """Search for garbage again where it was paused, but not in what has been imported and loaded."""
+    if not gc.isenabled():
+        gc.freeze()
+        gc.enable()
 
 
 COMPILATION = "tts2face.numeric.kernels"  # name of its logger; the module itself would load numba

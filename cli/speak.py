@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from cli.flags import Exports, Face, Hair, HairColor, Out, switch
-from cli.process import compilation_messages, progress_bar, write_message
+from cli.process import compilation_messages, progress_bar, resume_collection, write_message
 from lexicon.errors import InputError
 from tts2face.picture.options import Picture
 from tts2face.request import OWN_FACE, Request
@@ -89,6 +89,7 @@ def _make(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions) 
 def _write_clip(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions, voices: "VoicePool") -> None:
     _tell_what_is_heard(prepared.request, options)
     session = _open_session(options, voices)
+    resume_collection()
     explanations: list[PhoneExplanation] = []
 
     def collect(piece: "Piece") -> None:
@@ -192,6 +193,7 @@ def _write_speech(prepared: "PreparedRequest", picture: Picture, options: SpeakO
 
 def _report_writing(write: "Callable[[Progress | None], WrittenClip]", options: SpeakOptions) -> None:
     """Write with a progress bar and print a summary."""
+    resume_collection()
     began = time.perf_counter()
     with progress_bar("writing" if options.out is None else "rendering", options.quiet) as on_progress:
         written = write(on_progress)

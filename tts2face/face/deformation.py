@@ -17,6 +17,7 @@ from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN, N_LANDMARKS
 from tts2face.numeric.arrays import nearest_rotation, smoothstep
 from tts2face.numeric.kernels import kernel
+from tts2face.numeric.reuse import shared
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
 REST_HEAD = np.zeros(len(HEAD_CHANNELS), np.float32)  # head pose at rest
@@ -198,9 +199,16 @@ def landmark_positions(face: Face) -> FloatArray:
 
 def landmark_motion(face: Face, shapes: NDArray[np.integer]) -> FloatArray:
     """Landmark motion (L, 3, k) per weight of the shapes with indices `shapes` (k,), mm."""
+    return np.ascontiguousarray(np.moveaxis(_landmark_moves(face)[np.asarray(shapes)], 0, -1))
+
+
+@shared
+def _landmark_moves(face: Face) -> FloatArray:
+    """Landmark motion (K, L, 3) per weight of all shapes, mm; a face that is prepared needs it eight times."""
     mixed = face.landmark_weights.astype(np.float64)[..., None]
-    moved = face.shapes[np.asarray(shapes)[:, None, None], face.landmark_vertices]
-    return np.ascontiguousarray(np.moveaxis((moved * mixed).sum(axis=2), 0, -1))
+    moves: FloatArray = (face.shapes[:, face.landmark_vertices] * mixed).sum(axis=2)
+    moves.setflags(write=False)
+    return moves
 
 
 def scatter_landmarks(face: Face, values: FloatArray) -> FloatArray:

@@ -272,13 +272,14 @@ def contact_gaps(talker: Talker) -> FloatArray:
     """
     model, n_speech = talker.model, talker.model.n_speech
     apart, mean = inner_lip_gaps(model.basis[:n_speech]), inner_lip_gaps(model.mean)
-    minima = [np.zeros((0, len(mean)))]
-    for utterance in talker.utterances:
-        if BILABIALS.isdisjoint(utterance.phones.phones):
-            continue
-        gaps = ordered_product(utterance.shape[:, :n_speech].astype(np.float64), apart) + mean
-        minima.append(_bilabial_minima(gaps, utterance.phones, talker.fps))
-    bilabial_gaps = np.concatenate(minima)
+    spoken = [utterance for utterance in talker.utterances if not BILABIALS.isdisjoint(utterance.phones.phones)]
+    frames = np.concatenate([np.zeros((0, n_speech)), *(utterance.shape[:, :n_speech] for utterance in spoken)])
+    gaps, ends = ordered_product(frames, apart) + mean, np.cumsum([len(utterance.shape) for utterance in spoken])
+    minima = [
+        _bilabial_minima(gaps[end - len(utterance.shape) : end], utterance.phones, talker.fps)
+        for utterance, end in zip(spoken, ends, strict=True)
+    ]
+    bilabial_gaps = np.concatenate([np.zeros((0, len(mean))), *minima])
     return (
         np.clip(np.percentile(bilabial_gaps, CONTACT_PERCENTILE, axis=0), 0.0, MAX_CONTACT_MM)
         if len(bilabial_gaps)
