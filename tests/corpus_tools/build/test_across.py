@@ -61,6 +61,7 @@ def test_a_scale_makes_the_mean_0_and_the_spread_1(train: list[Observation]) -> 
     np.testing.assert_allclose((scored.opening[0], scored.width[0]), (2.0, -1.0), rtol=1e-12)
 
 
+@pytest.mark.needs("matplotlib")
 def test_the_result_states_its_method(measured: tuple[Evaluation, tuple[SplitResult, ...]]) -> None:
     result, runs = measured
     assert result.to_json()["is_across"]

@@ -77,6 +77,7 @@ def test_tells_itself_as_tables_json_and_rows(measured: tuple[Evaluation, tuple[
     assert all(len(row) == len(head) for row in rows)
 
 
+@pytest.mark.needs("matplotlib")
 def test_the_page_shows_all_figures_and_loads_nothing(measured: tuple[Evaluation, tuple[SplitResult, ...]]):
     html = evaluation_page(*measured)
     assert html.count("<h3>") == 9
@@ -105,6 +106,7 @@ def test_the_recorded_face_as_tracked_has_a_table_of_its_own(observations: list[
     assert "<h2>Recorded face as tracked</h2>" in evaluation_page(result, runs)
 
 
+@pytest.mark.needs("matplotlib")
 def test_folds_hold_out_every_utterance_once(observations: list[Observation]):
     parts = split_into_folds(observations, n_folds=4, seed=1)
     assert sorted(one.name for _, test in parts for one in test) == [one.name for one in observations]

@@ -186,6 +186,7 @@ def test_tables_hold_every_amount_and_method(curve: LearningCurve) -> None:
     assert len(list(curve_rows(curve))) == 1 + n_numbers
 
 
+@pytest.mark.needs("matplotlib")
 def test_files_hold_the_curve(curve: LearningCurve) -> None:
     stored = json.loads(WRITERS[".json"](curve))
     assert [point["seconds"] for point in stored["points"]] == [point.seconds for point in curve.points]

@@ -30,6 +30,7 @@ def known() -> list[KnownSpeech]:
     return [KnownSpeech(resampled(one.waveform), one.phones) for one in spoken]
 
 
+@pytest.mark.needs("sklearn")
 def test_a_map_learns_the_lips_of_damaged_speech(
     talker: Talker, known: list[KnownSpeech], monkeypatch: pytest.MonkeyPatch
 ) -> None:

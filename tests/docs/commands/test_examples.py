@@ -7,6 +7,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+import pytest
 
 import tts2face
 from tests.docs.programs import install, prepare_example, run
@@ -89,6 +90,7 @@ def test_a_voice(tmp_path: Path) -> None:
     assert "the voice's program failed ([Errno 2]" in refused.stderr
 
 
+@pytest.mark.needs("matplotlib", "sklearn")
 def test_a_table_of_similarities(tmp_path: Path) -> None:
     printed = run_example("phone_similarity", tmp_path)
     (_, _, *phones), *rows = csv_rows(tmp_path / "similarity.csv")

@@ -10,6 +10,7 @@ import wave
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 from PIL import Image
@@ -54,6 +55,17 @@ LISTS = {
 
 TOOLS = {"corpus", "report", "convert", "render", "face"}
 
+MODULES = {  # parts of command lines, and the modules of extras without which these end in an error
+    "report similarity": ("matplotlib", "sklearn"),
+    "report gestures": ("matplotlib",),
+    "report moods": ("matplotlib", "ai_edge_litert"),
+    "face picture": ("ai_edge_litert",),
+    "face photo": ("ai_edge_litert",),
+    "face calibrate": ("ai_edge_litert",),
+    " --photo ": ("ai_edge_litert",),
+    ".usda": ("pxr",),
+}
+
 
 EXECUTED = [
     line
@@ -61,6 +73,12 @@ EXECUTED = [
     for line in shell_lines(page)
     if own_commands(line) and not reason_not_executed(line)
 ]
+
+
+def line_parameter(line: str) -> Any:
+    """A line whose test is skipped where a package of an extra is missing."""
+    modules = [name for part, needed in MODULES.items() if part in line for name in needed]
+    return pytest.param(line, id=line.split("#", maxsplit=1)[0].strip(), marks=pytest.mark.needs(*modules))
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -121,7 +139,7 @@ def here(inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("line", EXECUTED, ids=lambda line: line.split("#")[0].strip())
+@pytest.mark.parametrize("line", [line_parameter(line) for line in EXECUTED])
 def test_command_lines_of_readme_and_cli_page_work(
     line: str, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -82,6 +82,7 @@ def test_another_talker_is_reported(here: Path, capsys: pytest.CaptureFixture[st
     assert "4 utterances of another talker, 24 for training" in capsys.readouterr().err
 
 
+@pytest.mark.needs("matplotlib")
 def test_own_durations_are_reported_in_the_terminal_and_in_every_file(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -92,6 +93,7 @@ def test_own_durations_are_reported_in_the_terminal_and_in_every_file(
     assert len(json.loads(evaluation_bytes("own.json", *own))["own"]) == 4
 
 
+@pytest.mark.needs("matplotlib")
 def test_folds_are_reported_in_the_terminal_and_in_every_file(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folds = ("--recordings", "all", "--folds", "3")
     assert b"<h2>3 folds</h2>" in evaluation_bytes("folds.html", *folds)
@@ -153,7 +155,7 @@ def test_recordings_are_shown_beside_the_head(
     rendered_takes: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Six recordings, one held out, with the real voice: the page contains a video of it, and is small."""
-    needs("ai_edge_litert")
+    needs("ai_edge_litert", "matplotlib")
     monkeypatch.chdir(tmp_path)
     source, few = rendered_takes, tmp_path / "few"
     (few / "clips").mkdir(parents=True)

@@ -17,6 +17,8 @@ from tests.corpus_tools.gesture_study.made_palette import made_palette
 from tts2face.models.gaze import STATES
 from tts2face.models.palette import write_palette
 
+pytestmark = pytest.mark.needs("matplotlib")
+
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -13,6 +13,8 @@ from cli.main import run
 from tests.corpus_tools.similarity.steady_talker import made_talker
 from tts2face.models.talker import write_talker
 
+pytestmark = pytest.mark.needs("matplotlib", "sklearn")
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
