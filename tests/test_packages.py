@@ -28,9 +28,12 @@ def test_all_extras_of_the_product_are_tested() -> None:
 
 def test_a_reason_names_the_extra_that_brings_the_package() -> None:
     providers = packages_distributions()
-    for module, extra in EXTRAS.items():
-        packages = {canonicalize_name(name) for name in providers.get(module.partition(".")[0], ())}
-        assert not packages or packages & packages_of(extra), module
+    assert set(EXTRAS.values()) <= set(LISTED)
+    installed = {module: extra for module, extra in EXTRAS.items() if missing(module) is None}
+    assert {"cv2", "dbos", "fastapi", "nicegui"} <= set(installed)
+    for module, extra in installed.items():
+        packages = {canonicalize_name(name) for name in providers[module.partition(".")[0]]}
+        assert packages & packages_of(extra), module
 
 
 def test_a_missing_package_skips_with_the_command_that_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
