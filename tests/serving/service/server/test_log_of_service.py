@@ -4,8 +4,8 @@ import signal
 from pathlib import Path
 
 import httpx
-import pytest
 
+from tests.packages import needs
 from tests.running import HostService, RunningService
 from tts2face.serving.service.keys import add_key, remove_key
 
@@ -27,7 +27,7 @@ def test_the_log_says_when_a_process_can_serve(service: RunningService) -> None:
 
 
 def test_the_log_names_the_studio_and_it_can_be_left_out(service: RunningService, host: HostService) -> None:
-    pytest.importorskip("nicegui", reason="needs `pip install 'tts2face[studio]'`")
+    needs("nicegui")
     listening = service.wait_for_event("listening", url=service.url)
     assert listening["studio"] == f"{listening['url']}/studio"
     with host(workers=0, is_ready=False) as without:
