@@ -6,6 +6,7 @@ process of its own, finds the files by ``--talker``, ``--face`` and ``--palette`
 """
 
 import os
+import re
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,7 +20,7 @@ from scipy.spatial import Delaunay
 from lexicon.languages import language_code
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.models.face import Eye, Face, FacePart
-from tts2face.models.face_file import write_face
+from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import (
     CHIN,
     FACE_OVAL,
@@ -41,9 +42,10 @@ from tts2face.models.palette import (
     FeatureChange,
     Palette,
     Style,
+    read_palette,
     write_palette,
 )
-from tts2face.models.talker import ShapeModel, Talker, Utterance, write_talker
+from tts2face.models.talker import ShapeModel, Talker, Utterance, read_talker, write_talker
 from tts2face.plugins import declared
 from tts2face.session.session import Session
 from tts2face.sound.voice import (
@@ -70,15 +72,12 @@ LIDS = (LEFT_LIDS, RIGHT_LIDS)
 CHEEKS = ((425, 427, 411, 426, 436), (205, 207, 187, 206, 216))  # left and right
 CHIN_SKIN = (208, 171, 175, 199, 396, 428)
 LIPS = (*OUTER_LIP_UPPER, *OUTER_LIP_LOWER[1:-1], *INNER_LIP_UPPER, *INNER_LIP_LOWER[1:-1])
-NAMED = (
-    *LIPS, *FACE_OVAL, *NOSE, *CHIN_SKIN, *CHEEKS[0], *CHEEKS[1], *BROWS[0], *BROWS[1], *range(468, 478),
-    *(number for upper, lower in LIDS for number in (*upper, *lower[1:-1])),
-)  # fmt: skip
+N_OTHER = 12  # places of landmarks without a name
 PUPIL, SKIN, EYE_WHITE = (20, 30, 60), (206, 150, 124), (240, 240, 240)
 GAZE_TURN = 0.5  # rad at weight 1
 SPOKEN_SHAPES = {  # mm of the lips' corners outwards, of the upper and the lower lip upwards, of the lips ahead
-    "jawOpen": (0.0, 0.0, -22.0, 0.0),
     "mouthClose": (0.0, 0.0, 6.0, 0.0),
+    "jawOpen": (-3.0, 0.0, -22.0, 0.0),
     "mouthFunnel": (-4.0, 3.0, -4.0, 4.0),
     "mouthPucker": (-8.0, 0.0, 0.0, 5.0),
     "mouthSmile": (8.0, 1.0, 1.0, -1.0),
@@ -115,14 +114,15 @@ MOODS = {
 VOICE = "tones"
 RATE_HZ = 8000  # the lowest at which loudness is measured
 LEAD_S, TRAIL_S, PHONE_S, LEVEL = 0.2, 0.3, 0.1, 0.25
-LOWEST_HZ, STEP_HZ = 200.0, 40.0  # tone of the first phone of the alphabet, and how much higher the next one is
-ALPHABET = tuple(sorted(OPENINGS))
+LOWEST_HZ, STEP_HZ, N_TONES = 200.0, 40.0, 61
 
 
 def landmark_places() -> np.ndarray:
     """(478, 3) landmarks of the face and of the talker at rest, lips closed."""
-    flat = _oval(N_LANDMARKS, 0.8)  # landmarks without a name
-    flat[list(FACE_OVAL)] = _oval(len(FACE_OVAL), 1.0)
+    few = _arc(OVAL, 1.6 * OVAL_SIZE[0], 0.8 * OVAL_SIZE[1], N_OTHER)
+    flat = np.resize(few, (N_LANDMARKS, 2))  # landmarks without a name share places on the forehead: they cost little
+    angles = np.pi / 2 - 2 * np.pi * np.arange(len(FACE_OVAL)) / len(FACE_OVAL)  # from the top over the left cheek
+    flat[list(FACE_OVAL)] = np.add(OVAL, np.multiply(OVAL_SIZE, np.column_stack([np.cos(angles), np.sin(angles)])))
     for outer, inner, up in ((OUTER_LIP_UPPER, INNER_LIP_UPPER, 1.0), (OUTER_LIP_LOWER, INNER_LIP_LOWER, -1.0)):
         for lips, width, height in ((outer, MOUTH_WIDTH, LIP_HEIGHT), (inner, 0.9 * MOUTH_WIDTH, 0.0)):
             flat[list(lips)] = _arc(MOUTH, width, up * height, len(lips))
@@ -145,12 +145,6 @@ def _arc(centre: tuple[float, float], width: float, height: float, n: int) -> np
     """(n, 2) points of half an ellipse, from its end at the lower x to the other one."""
     angles = np.linspace(np.pi, 0.0, n)
     return np.asarray(centre) + np.column_stack([width / 2 * np.cos(angles), height * np.sin(angles)])
-
-
-def _oval(n: int, size: float) -> np.ndarray:
-    """(n, 2) places on an oval, from the top over the person's left cheek."""
-    angles = np.pi / 2 - 2 * np.pi * np.arange(n) / n
-    return np.add(OVAL, size * np.multiply(OVAL_SIZE, np.column_stack([np.cos(angles), np.sin(angles)])))
 
 
 def made_face() -> Face:
@@ -193,7 +187,7 @@ def made_face() -> Face:
         colours=colours,
         uv=None,
         textures=(),
-        landmarks=np.array(NAMED, np.int32),
+        landmarks=np.arange(N_LANDMARKS, dtype=np.int32),
         landmark_vertices=corners,
         landmark_weights=weights,
         pivot=np.float32([0.0, -60.0, -60.0]),
@@ -233,11 +227,11 @@ def _facing(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def _face_shapes(vertices: np.ndarray, numbers: Sequence[int]) -> tuple[tuple[str, ...], np.ndarray]:
     """Names (K,) and displacements (K, V, 3): of the lips by `SPOKEN_SHAPES`, of the lids; none where eyes turn."""
     at = {number: row for row, number in enumerate(numbers)}
-    x, y = vertices[: len(numbers), 0], vertices[: len(numbers), 1]
+    x = vertices[: len(numbers), 0]
     upper = [at[number] for number in (*OUTER_LIP_UPPER[1:-1], *INNER_LIP_UPPER[1:-1])]
     lower = [at[number] for number in (*OUTER_LIP_LOWER[1:-1], *INNER_LIP_LOWER[1:-1])]
     near = np.exp(-np.square((vertices[: len(numbers), :2] - MOUTH) / (MOUTH_WIDTH, 2 * LIP_HEIGHT)).sum(axis=1))
-    jaw = np.clip((MOUTH[1] - LIP_HEIGHT - y) / 20.0, 0.0, 1.0)
+    jaw = _jaw_share(vertices[: len(numbers)])
     middle = 1.0 - np.square(x / (MOUTH_WIDTH / 2))
     shapes: dict[str, np.ndarray] = {}
     for name, (wider, upper_up, lower_up, ahead) in SPOKEN_SHAPES.items():
@@ -265,6 +259,11 @@ def _face_shapes(vertices: np.ndarray, numbers: Sequence[int]) -> tuple[tuple[st
     return tuple(shapes), np.stack(list(shapes.values()))
 
 
+def _jaw_share(places: np.ndarray) -> np.ndarray:
+    """(N,) share of the jaw's motion that places (N, 3) have."""
+    return np.clip((MOUTH[1] - LIP_HEIGHT - places[:, 1]) / 20.0, 0.0, 1.0)
+
+
 def _eye_turns(side: str) -> dict[str, np.ndarray]:
     out = 1.0 if side == "Left" else -1.0
     axes = {"Up": (-1, 0, 0), "Down": (1, 0, 0), "In": (0, -out, 0), "Out": (0, out, 0)}
@@ -272,8 +271,8 @@ def _eye_turns(side: str) -> dict[str, np.ndarray]:
 
 
 def _landmark_weights(mesh: Delaunay, spread: np.ndarray, numbers: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """(L, 3) vertices around each of `NAMED`, and their weights; a landmark that is a vertex is it alone."""
-    points = spread[list(NAMED), :2]
+    """(478, 3) vertices around each landmark, and their weights; a landmark that is a vertex is it alone."""
+    points = spread[:, :2]
     found = mesh.find_simplex(np.add(OVAL, 0.92 * (points - OVAL)))  # the oval has vertices at every fourth point
     corners = mesh.simplices[found].astype(np.int32)
     across = mesh.transform[found]
@@ -281,20 +280,21 @@ def _landmark_weights(mesh: Delaunay, spread: np.ndarray, numbers: Sequence[int]
     weights = np.clip(np.column_stack([first, 1.0 - first.sum(axis=1)]), 0.0, 1.0)
     weights /= weights.sum(axis=1, keepdims=True)
     for row, number in enumerate(numbers):
-        corners[NAMED.index(number)], weights[NAMED.index(number)] = row, (1.0, 0.0, 0.0)
+        corners[number], weights[number] = row, (1.0, 0.0, 0.0)
     return corners, weights.astype(np.float32)
 
 
 def made_model() -> ShapeModel:
-    """Parameter 0 opens the lips by 1 mm per unit at their middle, 1 widens them, 2 moves the chin, 3 the forehead."""
+    """Parameter 0 opens the mouth, 1 widens it, 2 moves a point of the chin ahead, 3 one of the forehead up."""
     mean = landmark_places()
     basis = np.zeros((4, N_LANDMARKS, 3))
+    basis[0, :, 1] = -_jaw_share(mean)
     for lips in (INNER_LIP_LOWER, OUTER_LIP_LOWER):
-        middle = 1.0 - np.square(mean[list(lips[1:-1]), 0] / (MOUTH_WIDTH / 2))
-        basis[0, list(lips[1:-1]), 1] = -middle
+        basis[0, list(lips[1:-1]), 1] = np.square(mean[list(lips[1:-1]), 0] / (MOUTH_WIDTH / 2)) - 1.0
     for lips in (OUTER_LIP_UPPER, OUTER_LIP_LOWER, INNER_LIP_UPPER, INNER_LIP_LOWER):
         basis[1, list(lips), 0] = mean[list(lips), 0]
     basis[2, CHIN, 2] = basis[3, FACE_OVAL[0], 1] = 1.0
+    assert abs(np.sum(basis[0] * basis[1])) < 1e-9
     basis /= np.linalg.norm(basis.reshape(4, -1), axis=1)[:, None, None]
     spread = np.array([5.0, 2.5, 0.1, 0.1]) * parameters_per_mm(basis)
     rest = np.array([1.0, 0.0, 0.0, 0.0]) * parameters_per_mm(basis)
@@ -338,7 +338,7 @@ def made_style(seed: int, size: float = 1.0, lengths: Sequence[int] = RECORDINGS
     motion["expression"] *= np.float32(0.05)
     motion["gaze"] *= np.float32(0.05)
     motion["blink"] = np.zeros((n_frames, 2), np.float32)
-    for first in range(10, n_frames - 5, 30):
+    for first in np.arange(0, n_frames - 30, 30) + stream.integers(0, 25, (n_frames - 1) // 30):
         motion["blink"][first : first + 5] = np.float32([0.25, 0.9, 1.0, 0.6, 0.25])[:, None]
     prosody = _smooth(stream, 2, n_frames)
     about = {"sources": "made", "licence": "none"}
@@ -382,8 +382,30 @@ class ToneVoice:
         return self.speak(content, rate=rate, seed=seed).waveform
 
 
-def spoken(words: Sequence[tuple[str, Sequence[str]]], rate: float = 1.0, rate_hz: int = RATE_HZ) -> Speech:
-    """Speech of words with their phones, each phone a tone of its own."""
+class LetterVoice:
+    """A phone of 0.1 s and of constant level for each letter; `splits` words at hyphens, as some voices do."""
+
+    def __init__(self, splits: bool = False, rate: int = RATE_HZ) -> None:
+        self.said: list[tuple[str, float]] = []
+        self._splits, self._rate = splits, rate
+
+    @property
+    def sample_rate(self) -> int:
+        return self._rate
+
+    def sound(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Waveform:
+        return self.speak(content, rate=rate, seed=seed).waveform
+
+    def speak(self, content: SpeechInput, *, rate: float = 1.0, seed: int = 0) -> Speech:
+        self.said.append((str(content), rate))
+        words = re.findall(r"\w+" if self._splits else r"[\w'-]+", str(content))
+        return spoken([(word, ["a"] * len(word)) for word in words], rate, self._rate, has_tones=False)
+
+
+def spoken(
+    words: Sequence[tuple[str, Sequence[str]]], rate: float = 1.0, rate_hz: int = RATE_HZ, *, has_tones: bool = True
+) -> Speech:
+    """Speech of words with their phones, each a tone of its own, or a constant."""
     phones = [phone for _, said in words for phone in said]
     edges = np.concatenate([[0.0], LEAD_S + np.arange(len(phones) + 1) * PHONE_S / rate, [0.0]])
     n_samples = round((edges[-2] + TRAIL_S) * rate_hz)
@@ -391,8 +413,9 @@ def spoken(words: Sequence[tuple[str, Sequence[str]]], rate: float = 1.0, rate_h
     bounds = np.rint(edges * rate_hz).astype(int)
     samples = np.zeros(n_samples, np.float32)
     for phone, first, last in zip(phones, bounds[1:-2], bounds[2:-1], strict=True):
-        tone_hz = LOWEST_HZ + STEP_HZ * (sum(map(ord, phone)) % 61)
-        samples[first:last] = LEVEL * np.sin(2 * np.pi * tone_hz / rate_hz * np.arange(last - first))
+        tone_hz = LOWEST_HZ + STEP_HZ * (sum(map(ord, phone)) % N_TONES)
+        tone = np.sin(2 * np.pi * tone_hz / rate_hz * np.arange(last - first))
+        samples[first:last] = LEVEL * (tone if has_tones else 1.0)
     firsts = 1 + np.cumsum([0, *(len(said) for _, said in words)])
     spans = tuple(WordSpan(text, int(firsts[k]), int(firsts[k + 1])) for k, (text, _) in enumerate(words))
     return Speech(Waveform(samples, rate_hz), PhoneSequence([SILENCE, *phones, SILENCE], edges), spans)
@@ -456,16 +479,16 @@ class World:
 
 
 def make_world(folder: Path) -> World:
-    """Write the files of the world into a folder."""
-    world = World(made_talker(), made_face(), made_palette(), folder)
-    write_talker(world.talker_file, world.talker)
-    write_face(world.face_file, world.face, {})
-    write_palette(world.palette_file, world.palette)
+    """Write the files of the world into a folder; what is in memory is read from them, with their rounding."""
+    talker, face, palette = (folder / f"made.{kind}" for kind in ("talker", "face", "palette"))
+    write_talker(talker, made_talker())
+    write_face(face, made_face(), {})
+    write_palette(palette, made_palette())
     about = folder / "made_world-1.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: made_world\nVersion: 1\n")
     (about / "entry_points.txt").write_text(f"[tts2face.voices]\n{VOICE} = tests.world:TONES\n")
-    return world
+    return World(read_talker(talker), read_face(face), read_palette(palette), folder)
 
 
 @contextmanager

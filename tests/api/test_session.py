@@ -10,8 +10,10 @@ from PIL import Image
 
 import tts2face
 from lexicon.errors import InputError
-from tests.golden.requests import starter_with_pictures
+from tests.golden.requests import with_pictures
+from tests.world import World
 from tts2face.session.performance import Performance
+from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import concatenate_clips
 
 TEXTS = ("Bob may move.", "We were away.", "Five big maps.", "Hello there.")
@@ -19,13 +21,19 @@ SMALL = tts2face.Picture(size="64x64", supersampling=1)
 
 
 @pytest.fixture(scope="module")
-def session() -> tts2face.Session:
-    return tts2face.Session()
+def session(world: World) -> tts2face.Session:
+    return world.session()
 
 
-def test_a_clip_moves_the_face_s_own_shapes_first(session: tts2face.Session) -> None:
+@pytest.fixture(scope="module")
+def own(world: World) -> tts2face.Session:
+    """A session that shows its talker's own face."""
+    return world.session(talker=with_pictures(world.talker), face="self")
+
+
+def test_a_clip_moves_the_face_s_own_shapes_first(session: tts2face.Session, world: World) -> None:
     clip = session.clip("Bob may move.")
-    own = tts2face.load_face("head").shape_names
+    own = world.face.shape_names
     assert clip.motion.channels[: len(own)] == own
     assert clip.motion.channels == session.face.channels
     assert len(clip.motion.channels) > len(own)
@@ -64,8 +72,7 @@ def test_speech_is_synthesised_while_the_renderer_is_built(
     assert written.n_frames == len(list((tmp_path / "frames").glob("*.png")))
 
 
-def test_a_talker_s_own_face_is_drawn_by_the_same_calls(tmp_path: Path) -> None:
-    own = tts2face.Session(starter_with_pictures(), "self")
+def test_a_talker_s_own_face_is_drawn_by_the_same_calls(own: tts2face.Session, tmp_path: Path) -> None:
     clip = own.clip("Bob may.", fps=25)
     tts2face.write_clip(clip, own.face, tmp_path / "own", picture=SMALL)
     assert len(list((tmp_path / "own").glob("*.png"))) == len(clip.motion)
@@ -73,14 +80,15 @@ def test_a_talker_s_own_face_is_drawn_by_the_same_calls(tmp_path: Path) -> None:
         _ = own.mesh
 
 
-def test_a_clip_of_another_face_is_refused(session: tts2face.Session, tmp_path: Path) -> None:
-    clip = tts2face.Session(starter_with_pictures(), "self").clip("Bob.", fps=25)
+def test_a_clip_of_another_face_is_refused(own: tts2face.Session, session: tts2face.Session, tmp_path: Path) -> None:
+    clip = own.clip("Bob.", fps=25)
     with pytest.raises(InputError, match="not in the shapes of this face"):
         tts2face.write_clip(clip, session.face, tmp_path / "a", picture=SMALL)
 
 
-def test_threads_get_the_same_clips_as_a_single_thread(session: tts2face.Session) -> None:
-    alone = [tts2face.Session(palette=session.palette).clip(text, seed=2) for text in TEXTS]
+def test_threads_get_the_same_clips_as_a_single_thread(world: World, voices: VoicePool) -> None:
+    session = world.session(voices=voices)
+    alone = [world.session(voices=voices).clip(text, seed=2) for text in TEXTS]
     with ThreadPoolExecutor(4) as pool:
         together = list(pool.map(lambda text: session.clip(text, seed=2), TEXTS * 2))
     for one, other in zip(alone * 2, together, strict=True):
@@ -138,14 +146,15 @@ def test_a_performance_does_not_replace_its_inputs(
     assert (tmp_path / "out.mp4").read_bytes() == content
 
 
-def test_a_session_without_a_palette_moves_lips_alone() -> None:
-    bare = tts2face.Session(palette=None)
+def test_a_session_without_a_palette_moves_lips_alone(world: World) -> None:
+    bare = world.session(palette=None)
     clip = bare.clip("Bob may move.")
-    assert clip.motion.channels == tts2face.load_face("ada").shape_names
+    assert clip.motion.channels == world.face.shape_names
     assert not clip.head.values.any()
 
 
-def test_voices_in_use_are_not_counted_as_cached(session: tts2face.Session) -> None:
+def test_voices_in_use_are_not_counted_as_cached(world: World, voices: VoicePool) -> None:
+    session = world.session(voices=voices)
     text = '<speak>One. <voice name="heart">Two.</voice> <lang xml:lang="de">Drei.</lang> Four.</speak>'
     spoken = [word.text for _ in range(2) for word in session.clip(text, voice="espeak").speech.words]
     assert [word.strip(".") for word in spoken] == ["One", "Two", "Drei", "Four"] * 2

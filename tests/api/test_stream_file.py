@@ -10,7 +10,9 @@ import pytest
 
 import tts2face
 from lexicon.errors import InputError
+from tests.world import World
 from tts2face.session.encoded_stream import media_types
+from tts2face.sound.voice_pool import VoicePool
 
 TEXT = (
     "<speak>Bob may move. <break time='300ms'/> We were away, loud and <prosody volume='+4dB'>clear</prosody>.</speak>"
@@ -19,8 +21,8 @@ SMALL = tts2face.Picture(size="64x64", supersampling=1)
 
 
 @pytest.fixture(scope="module")
-def session() -> tts2face.Session:
-    return tts2face.Session()
+def session(world: World, voices: VoicePool) -> tts2face.Session:
+    return world.session(voices=voices)
 
 
 @pytest.fixture(scope="module")

@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
+from tests.world import World
 from tts2face.gestures.noise import NoiseStream
 from tts2face.gestures.stream import GestureFields, GestureStream
 from tts2face.gestures.timeline import Timeline
-from tts2face.models.palette import load_palette
 from tts2face.types import Waveform
 
 FPS, RATE, SECONDS = 30.0, 8_000, 30
 
 
 @pytest.fixture(scope="module")
-def fields() -> GestureFields:
-    return GestureFields(load_palette("starter"))
+def fields(world: World) -> GestureFields:
+    return GestureFields(world.palette)
 
 
 def sound(n_frames: int, begin: int) -> Waveform:

@@ -9,6 +9,7 @@ import pytest
 
 from corpus_tools.studies.gestures.measures import find_blinks
 from lexicon.errors import InputError
+from tests.world import World
 from tts2face.gestures.elements import Listening, Nod
 from tts2face.gestures.listening import (
     LASTS_S,
@@ -98,8 +99,8 @@ def fields() -> GestureFields:
 
 
 @pytest.mark.parametrize(("style", "fps"), [("neutral", 30.0), ("depressed", 29.97)])
-def test_listening_in_short_pieces_is_as_at_once(fields: GestureFields, style: str, fps: float) -> None:
-    n_pieces, n = 30, 6
+def test_listening_in_short_pieces_is_as_at_once(world: World, style: str, fps: float) -> None:
+    n_pieces, n, fields = 30, 6, GestureFields(world.palette)
     whole = GestureStream(fields, style=style, seed=1, fps=fps)
     silence = Waveform(np.zeros(8000 * n_pieces), 8000)
     at_once = whole.next(silence, n_pieces * n, Timeline(listens=(Listening(0.0, 60.0),)))

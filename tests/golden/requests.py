@@ -65,8 +65,13 @@ NAMES = (*CLIPS, *DOORS)
 
 
 def starter_with_pictures() -> Talker:
-    """The shipped talker with made pictures of 96 x 96, whose parameters vary with the lips."""
-    talker, appearance = load_talker("grid_s1"), own_talker().appearance
+    """The shipped talker with made pictures."""
+    return with_pictures(load_talker("grid_s1"))
+
+
+def with_pictures(talker: Talker) -> Talker:
+    """A talker with made pictures of 96 x 96, whose parameters vary with the lips."""
+    appearance = own_talker().appearance
     assert appearance is not None
     n_modes = len(talker.model.basis)
     plate = replace(appearance.plate, shape=np.tile(talker.model.rest[:n_modes], (4, 1)))

@@ -6,14 +6,15 @@ import pytest
 from tests.golden.requests import starter_with_pictures
 from tts2face.models.palette import EXPRESSIONS
 from tts2face.session.session import Session
+from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import Clip
 
 TEXT = "Bob may move."
 
 
 @pytest.fixture(scope="module")
-def own() -> Session:
-    return Session(starter_with_pictures(), "self")
+def own(voices: VoicePool) -> Session:
+    return Session(starter_with_pictures(), "self", voices=voices)
 
 
 def expressions(clip: Clip) -> np.ndarray:
@@ -35,9 +36,8 @@ def test_an_own_face_keeps_its_expression_at_rest_unless_a_style_is_requested(ow
     assert neutral[:, happy].mean() > 0.1
 
 
-def test_a_head_is_friendly_at_rest_with_closed_lips() -> None:
-    session = Session("grid_s1", "head")
-    clips = [session.clip("", idle=4.0, style=style) for style in (None, "measured")]
+def test_a_head_is_friendly_at_rest_with_closed_lips(shipped: Session) -> None:
+    clips = [shipped.clip("", idle=4.0, style=style) for style in (None, "measured")]
     smiles = [clip.motion.columns(["mouthSmileLeft", "mouthSmileRight"]) for clip in clips]
     assert 0.08 < smiles[0][-1].min() < 0.3
     assert smiles[1].max() < 0.05

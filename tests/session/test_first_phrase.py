@@ -13,8 +13,8 @@ RATE = 24_000
 
 
 @pytest.fixture(scope="module")
-def session() -> Session:
-    return Session()
+def session(shipped: Session) -> Session:
+    return shipped
 
 
 def test_little_silence_follows_a_phrase_within_a_sentence(session: Session) -> None:

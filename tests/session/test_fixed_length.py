@@ -4,26 +4,27 @@ import numpy as np
 import pytest
 
 import tts2face
-from tests.session.fake_voice import LEAD, LETTER, TRAIL, FakeVoice
+from tests.world import LEAD_S, PHONE_S, TRAIL_S, LetterVoice, World
 from tts2face.session.fixed_length import OPENING_S, ease_weights
 from tts2face.sound import voice_pool
+from tts2face.sound.voice_pool import VoicePool
 from tts2face.types import concatenate_clips
 
 FPS = 10
 
 
 @pytest.fixture
-def ready(monkeypatch: pytest.MonkeyPatch) -> tts2face.Session:
-    monkeypatch.setattr(voice_pool, "load_voice", lambda *_: FakeVoice())
-    return tts2face.Session()
+def ready(world: World, monkeypatch: pytest.MonkeyPatch) -> tts2face.Session:
+    monkeypatch.setattr(voice_pool, "load_voice", lambda *_: LetterVoice())
+    return world.session(voices=VoicePool())
 
 
 def test_the_span_of_speech_is_measured_without_motion(ready: tts2face.Session) -> None:
-    span = ready.measure_speech("Hello. Bob.", fps=FPS, lead=LEAD)
-    first = LEAD + 5 * LETTER + TRAIL  # a whole number of frames
-    assert span.begin == pytest.approx(LEAD)
-    assert span.end == pytest.approx(first + LEAD + 3 * LETTER)
-    assert span.total == pytest.approx(first + LEAD + 3 * LETTER + TRAIL)
+    span = ready.measure_speech("Hello. Bob.", fps=FPS, lead=LEAD_S)
+    first = LEAD_S + 5 * PHONE_S + TRAIL_S  # a whole number of frames
+    assert span.begin == pytest.approx(LEAD_S)
+    assert span.end == pytest.approx(first + LEAD_S + 3 * PHONE_S)
+    assert span.total == pytest.approx(first + LEAD_S + 3 * PHONE_S + TRAIL_S)
 
 
 @pytest.mark.parametrize("n_frames", [1, 2, 7, 10, 11, 40, 130])
@@ -59,10 +60,10 @@ def test_speech_in_the_middle_is_that_of_the_clip(ready: tts2face.Session) -> No
     assert np.abs(difference).max() < 1e-6
 
 
-def test_an_utterance_is_spoken_once_when_it_is_measured_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    voice = FakeVoice()
+def test_an_utterance_is_spoken_once_when_it_is_measured_first(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    voice = LetterVoice()
     monkeypatch.setattr(voice_pool, "load_voice", lambda *_: voice)
-    ready = tts2face.Session()
+    ready = world.session(voices=VoicePool())
     ready.measure_speech("Hello. Bob.", fps=FPS)
     list(ready.stream_to_length("Hello. Bob.", 50, fps=FPS))
     assert len(voice.said) == 2

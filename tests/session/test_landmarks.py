@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError
+from tests.world import World
 from tts2face.models.landmarks import lip_opening
 from tts2face.session.session import Session
 from tts2face.types import Trajectory
 
 
 @pytest.fixture(scope="module")
-def mesh_session() -> Session:
-    return Session(palette=None)
+def mesh_session(world: World) -> Session:
+    return world.session(palette=None)
 
 
 def test_a_mesh_opens_with_its_jaw(mesh_session: Session) -> None:

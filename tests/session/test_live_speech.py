@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import tts2face
+from tests.world import World, WorldVoices
 from tts2face.session.live import LiveSpeech
 from tts2face.session.speech_stream import Piece
 from tts2face.sound.voice_pool import VoicePool
@@ -50,8 +51,8 @@ def turns() -> Turns:
 
 
 @pytest.fixture(scope="module")
-def session(turns: Turns) -> tts2face.Session:
-    return tts2face.Session(voices=VoicePool(run=turns.run))
+def session(world: World, turns: Turns) -> tts2face.Session:
+    return world.session(voices=WorldVoices(run=turns.run))
 
 
 def continue_idly(live: LiveSpeech) -> Piece:
@@ -89,9 +90,9 @@ def test_an_interrupted_sentence_does_not_change_what_follows(
     assert number > n_runs // 2  # gestures, drawn in a thread, are waited for in more steps or fewer
 
 
-def test_the_steps_of_a_long_sentence_are_short(session: tts2face.Session, turns: Turns) -> None:
+def test_the_steps_of_a_long_sentence_are_short(turns: Turns) -> None:
     """A service reads `cancel` between them. The alignment, which it runs elsewhere, is not counted."""
-    live = session.live()
+    live = tts2face.Session(face="head", voices=VoicePool(run=turns.run)).live()
     list(live.say(LONG))  # compiles and loads
     shares = []
     for _ in range(3):  # other processes make single steps longer

@@ -13,7 +13,7 @@ from lexicon.marked_text import NodMark
 from lexicon.sentences import Sentence, index_by_letters, split_sentences
 from lexicon.sequence import SILENCE
 from lexicon.ssml import parse_marks
-from tests.session.fake_voice import LEAD, LETTER, LEVEL, RATE, TRAIL, FakeVoice
+from tests.world import LEAD_S, LEVEL, PHONE_S, RATE_HZ, TRAIL_S, LetterVoice
 from tts2face.gestures.elements import Nod, StyleSpan
 from tts2face.request import Request
 from tts2face.session.joining import join_utterances, silent_speech, trim_silence
@@ -32,7 +32,7 @@ from tts2face.sound.voice_pool import load_voice
 def synthesise_sentences(text: str, voice: object | None = None, **options: object) -> list[SpokenSentence]:
     request = Request(text=text, lead=None, **options)
     return [
-        speak_sentence(voice or FakeVoice(), part, request)
+        speak_sentence(voice or LetterVoice(), part, request)
         for part in split_sentences(parse_marks(text), request.language)
     ]
 
@@ -48,9 +48,9 @@ def words(answer: SpokenSentence) -> dict[str, tuple[float, float]]:
 
 
 def test_without_marks_the_speech_of_the_voice_is_unchanged() -> None:
-    voice = FakeVoice()
+    voice = LetterVoice()
     answer = one("hello there.", voice)
-    plain = FakeVoice().speak("hello there.")
+    plain = LetterVoice().speak("hello there.")
     assert answer.speech.waveform.samples.tobytes() == plain.waveform.samples.tobytes()
     assert answer.speech.phones.edges.tobytes() == plain.phones.edges.tobytes()
     assert (answer.timeline.spans, answer.timeline.nods, answer.marks) == ((), (), ())
@@ -59,14 +59,14 @@ def test_without_marks_the_speech_of_the_voice_is_unchanged() -> None:
 
 @pytest.mark.parametrize("pause", [0.02, 0.1, 0.4, 1.0, 3.0])
 def test_a_pause_within_a_sentence_has_the_requested_duration(pause: float) -> None:
-    voice = FakeVoice()
+    voice = LetterVoice()
     answer = one(f"hello [pause {pause}] there.", voice)
     assert [text for text, _ in voice.said] == ["hello", "there."]
-    assert words(answer)["there"][0] - words(answer)["hello"][1] == pytest.approx(pause, abs=2 / RATE)
-    assert answer.speech.phones.end == pytest.approx(LEAD + 10 * LETTER + pause + TRAIL, abs=2 / RATE)
+    assert words(answer)["there"][0] - words(answer)["hello"][1] == pytest.approx(pause, abs=2 / RATE_HZ)
+    assert answer.speech.phones.end == pytest.approx(LEAD_S + 10 * PHONE_S + pause + TRAIL_S, abs=2 / RATE_HZ)
     assert answer.speech.phones.phones.count(SILENCE) == 3
-    silent = answer.speech.waveform.samples[round((words(answer)["hello"][1] + 0.001) * RATE) :][
-        : int((pause - 0.003) * RATE)
+    silent = answer.speech.waveform.samples[round((words(answer)["hello"][1] + 0.001) * RATE_HZ) :][
+        : int((pause - 0.003) * RATE_HZ)
     ]
     assert np.abs(silent).max() == 0
 
@@ -76,14 +76,14 @@ def test_pauses_between_sentences_come_on_top() -> None:
     paused = synthesise_sentences("[pause 2]One. [pause 0.5]Two.[pause 1]")
     gained = [b.speech.phones.end - a.speech.phones.end for a, b in zip(plain, paused, strict=True)]
     assert gained == pytest.approx([2.5, 1.0])
-    assert words(paused[0])["One"][0] == pytest.approx(2 + LEAD)
+    assert words(paused[0])["One"][0] == pytest.approx(2 + LEAD_S)
 
 
 def test_punctuation_after_a_pause_belongs_to_the_preceding_words() -> None:
-    voice = FakeVoice()
+    voice = LetterVoice()
     answer = one("hello [pause 1].", voice)
     assert voice.said == [("hello.", 1.0)]
-    assert answer.speech.phones.end == pytest.approx(LEAD + 5 * LETTER + TRAIL + 1)
+    assert answer.speech.phones.end == pytest.approx(LEAD_S + 5 * PHONE_S + TRAIL_S + 1)
 
 
 def test_pauses_without_words_are_kept() -> None:
@@ -104,7 +104,7 @@ def test_nods_and_names_come_with_the_onset_of_their_word() -> None:
     named = one('<speak>one <mark name="x"/>two <break time="1s"/><mark name="y"/>three</speak>')
     at = words(named)
     assert named.marks == (MarkTime("x", at["two"][0]), MarkTime("y", pytest.approx(at["three"][0])))
-    assert at["three"][0] == pytest.approx(LEAD + 6 * LETTER + 1, abs=2 / RATE)
+    assert at["three"][0] == pytest.approx(LEAD_S + 6 * PHONE_S + 1, abs=2 / RATE_HZ)
 
 
 def test_a_mark_within_a_word_counts_for_it() -> None:
@@ -118,7 +118,7 @@ def test_words_of_numbers_are_counted_as_pronounced() -> None:
 
 
 def test_a_voice_that_counts_words_differently_is_followed_by_letters() -> None:
-    answer = one("well-known men-at-arms [nod]fought well-fed", FakeVoice(splits=True))
+    answer = one("well-known men-at-arms [nod]fought well-fed", LetterVoice(splits=True))
     assert answer.timeline.nods == (Nod(words(answer)["fought"][0]),)
 
 
@@ -147,19 +147,20 @@ def test_the_styles_of_a_text_are_known_beforehand() -> None:
 
 
 def test_nods_at_one_place_are_one() -> None:
-    assert one("one [nod 0.5][nod] [nod 0.3]two").timeline.nods == (Nod(LEAD + 3 * LETTER),)
+    assert one("one [nod 0.5][nod] [nod 0.3]two").timeline.nods == (Nod(LEAD_S + 3 * PHONE_S),)
 
 
 def test_speed_and_loudness() -> None:
-    voice = FakeVoice()
+    voice = LetterVoice()
     answer = one(
         '<speak>one <prosody rate="50%">two</prosody> <prosody volume="soft">three</prosody> four</speak>', voice
     )
     assert voice.said == [("one", 1.0), ("two", 0.5), ("three four", 1.0)]
     at, samples = words(answer), answer.speech.waveform.samples
-    assert at["two"][1] - at["two"][0] == pytest.approx(3 * LETTER / 0.5)
+    assert at["two"][1] - at["two"][0] == pytest.approx(3 * PHONE_S / 0.5)
     level = {
-        word: samples[round((start + 0.05) * RATE) : round((end - 0.05) * RATE)] for word, (start, end) in at.items()
+        word: samples[round((start + 0.05) * RATE_HZ) : round((end - 0.05) * RATE_HZ)]
+        for word, (start, end) in at.items()
     }
     np.testing.assert_allclose(level["three"], 0.6 * LEVEL, rtol=1e-5)
     for word in ("one", "two", "four"):
@@ -169,21 +170,21 @@ def test_speed_and_loudness() -> None:
 def test_emphasis_is_louder_with_a_nod() -> None:
     answer = one('<speak>one <emphasis level="strong">two</emphasis> four</speak>')
     start, end = words(answer)["two"]
-    loud = answer.speech.waveform.samples[round((start + 0.05) * RATE) : round((end - 0.05) * RATE)]
+    loud = answer.speech.waveform.samples[round((start + 0.05) * RATE_HZ) : round((end - 0.05) * RATE_HZ)]
     np.testing.assert_allclose(loud, 1.6 * LEVEL, rtol=1e-5)
     assert answer.timeline.nods == (Nod(start),)
 
 
 def test_spans_use_their_own_voice_at_the_sample_rate_of_the_first() -> None:
     asked: list[tuple[str | None, str]] = []
-    other = FakeVoice(rate=2 * RATE)
+    other = LetterVoice(rate=2 * RATE_HZ)
 
-    def voices(name: str | None, language: str) -> FakeVoice:
+    def voices(name: str | None, language: str) -> LetterVoice:
         asked.append((name, language))
         return other
 
     text = '<speak>one <lang xml:lang="de">zwei drei</lang> <voice gender="male">four</voice> [x]</speak>'
-    voice = FakeVoice()
+    voice = LetterVoice()
     (sentence,) = split_sentences(parse_marks(text), "en-us")
     answer = speak_sentence(voice, sentence, Request(text=text), voices)
     assert asked == [(None, "de"), ("espeak", "en-us")]
@@ -191,7 +192,7 @@ def test_spans_use_their_own_voice_at_the_sample_rate_of_the_first() -> None:
         ["one", "x"],
         ["zwei drei", "four"],
     )
-    assert answer.speech.waveform.rate == RATE
+    assert answer.speech.waveform.rate == RATE_HZ
     assert [word.text for word in answer.speech.words] == ["one", "zwei", "drei", "four", "x"]
     with pytest.raises(InputError, match="needs voices to speak them"):
         speak_sentence(voice, sentence, Request(text=text))
@@ -238,7 +239,7 @@ WORDS = st.lists(
 def test_times_of_marks_increase_and_lie_in_the_sound(texts: list, data: st.DataObject, splits: bool) -> None:
     kinds = [data.draw(st.sampled_from(["", "[nod]", "[pause 0.3]", "[pause 1][nod 0.5]"])) for _ in texts]
     text = " ".join(kind + word for kind, word in zip(kinds, texts, strict=True))
-    for answer in synthesise_sentences(f"[style:head=a]{text}[/style]", FakeVoice(splits)):
+    for answer in synthesise_sentences(f"[style:head=a]{text}[/style]", LetterVoice(splits)):
         nods = [nod.time for nod in answer.timeline.nods]
         assert nods == sorted(nods)
         assert all(0 <= time < answer.speech.phones.end for time in nods)
@@ -272,13 +273,13 @@ def test_any_text_is_cut_without_loss(bits: list) -> None:
 
 
 def test_silences_are_removed_and_inserted_exactly() -> None:
-    first, second = FakeVoice().speak("ab"), FakeVoice().speak("cd")
+    first, second = LetterVoice().speak("ab"), LetterVoice().speak("cd")
     short, cut = trim_silence(second, before=0.05, behind=0.1)
     assert cut == pytest.approx(0.15)
     assert short.phones.durations[[0, -1]] == pytest.approx([0.05, 0.1])
     both, begins = join_utterances([first, second], [1.0])
-    assert begins == pytest.approx([0.0, LEAD + 0.2 + 1.0 - LEAD])
-    assert silent_speech(0.5, RATE).phones.end == 0.5
+    assert begins == pytest.approx([0.0, LEAD_S + 0.2 + 1.0 - LEAD_S])
+    assert silent_speech(0.5, RATE_HZ).phones.end == 0.5
     assert len(both.words) == 2
 
 
@@ -301,11 +302,11 @@ def test_words_of_a_language_without_spaces_are_found_by_letters() -> None:
 
 def test_in_a_recording_marks_come_with_their_words() -> None:
     text = parse_marks("one [style:head=calm]two[/style] [nod]three")
-    speech = FakeVoice().speak(text.text)
+    speech = LetterVoice().speak(text.text)
     timeline, _ = resolve_recording_marks(text, speech.phones, speech.words, "en-us")
-    assert timeline.nods[0].time == pytest.approx(LEAD + 6 * LETTER)
+    assert timeline.nods[0].time == pytest.approx(LEAD_S + 6 * PHONE_S)
     assert [(span.start, span.end) for span in timeline.spans] == [
-        pytest.approx((LEAD + 3 * LETTER, LEAD + 6 * LETTER))
+        pytest.approx((LEAD_S + 3 * PHONE_S, LEAD_S + 6 * PHONE_S))
     ]
 
 

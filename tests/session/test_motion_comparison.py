@@ -5,9 +5,9 @@ import pytest
 
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
+from tests.world import World
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.comparison import MotionComparison, MotionPart, compare_motion, map_channels
-from tts2face.session.session import Session
 from tts2face.types import Trajectory
 
 FPS = 30.0
@@ -15,8 +15,8 @@ PHONES = PhoneSequence([SILENCE, "b", "ɑ", SILENCE], [0.0, 0.5, 1.0, 2.5, 3.0])
 
 
 @pytest.fixture(scope="module")
-def face() -> AnimatedFace:
-    return Session(palette=None).face
+def face(world: World) -> AnimatedFace:
+    return world.session(palette=None).face
 
 
 def motion(face: AnimatedFace, jaw: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What a project changes in its clip, with the shipped talker and head."""
+"""What a project changes in its clip."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from lexicon.errors import InputError
+from tests.world import VOICE, World
 from tts2face.gestures.elements import ChannelEdit
 from tts2face.gestures.timeline import Timeline
 from tts2face.lips.options import ExcludedToken
 from tts2face.request import Request
+from tts2face.session.named_models import Models
 from tts2face.session.prepared import SentenceEdges
 from tts2face.session.project import Project
 from tts2face.session.project_file import load_project, save_project
@@ -18,12 +20,12 @@ from tts2face.session.session import Session
 from tts2face.session.speech_stream import Piece
 
 TEXT = "Bob may move. Five maps were there. Bob may move."
-PROJECT = Project(request=Request(text=TEXT, voice="espeak"))
+PROJECT = Project(request=Request(text=TEXT, voice=VOICE))
 
 
 @pytest.fixture(scope="module")
-def session() -> Session:
-    return Session(memory_mb=100)
+def session(tones: World) -> Session:
+    return tones.session(memory_mb=100)
 
 
 @pytest.fixture(scope="module")
@@ -43,18 +45,20 @@ def dragged(piece: Piece, occurrence: int) -> SentenceEdges:
     return SentenceEdges(piece.text, occurrence, phones.phones, tuple(edges.tolist()))
 
 
-def test_memory_does_not_change_the_clip(session: Session, pieces: list[Piece]) -> None:
-    plain = Session().clip(PROJECT.prepare())
+def test_memory_does_not_change_the_clip(session: Session, world: World) -> None:
+    plain = world.session().clip(PROJECT.prepare())
     again = session.clip(PROJECT.prepare())
     np.testing.assert_array_equal(again.motion.values, plain.motion.values)
     np.testing.assert_array_equal(again.head.values, plain.head.values)
     np.testing.assert_array_equal(again.speech.waveform.samples, plain.speech.waveform.samples)
 
 
-def test_a_changed_timeline_with_memory_is_the_same_as_without(session: Session, pieces: list[Piece]) -> None:
-    painted = replace(PROJECT, request=Request(text=TEXT, voice="espeak", style="delighted", gain="head=2"))
+def test_a_changed_timeline_with_memory_is_the_same_as_without(
+    session: Session, pieces: list[Piece], world: World
+) -> None:
+    painted = replace(PROJECT, request=Request(text=TEXT, voice=VOICE, style="delighted", gain="head=2"))
     np.testing.assert_array_equal(
-        np.concatenate(moved(session, painted)), Session().clip(painted.prepare()).motion.values
+        np.concatenate(moved(session, painted)), world.session().clip(painted.prepare()).motion.values
     )
 
 
@@ -112,11 +116,12 @@ def test_an_excluded_example_is_not_used(session: Session, pieces: list[Piece]) 
 
 
 def test_the_command_renders_the_motion_of_the_project(
-    session: Session, pieces: list[Piece], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    session: Session, pieces: list[Piece], world: World, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from cli.main import run
 
-    project = replace(PROJECT, edges=(dragged(pieces[0], 0),), muted=frozenset({"blink"}))
+    models = Models(str(world.talker_file), str(world.face_file), palette=str(world.palette_file))
+    project = replace(PROJECT, models=models, edges=(dragged(pieces[0], 0),), muted=frozenset({"blink"}))
     save_project(project, tmp_path / "scene.json")
     assert run(["render", str(tmp_path / "scene.json"), "--export", str(tmp_path / "scene.npz"), "--quiet"]) == 0
     with np.load(tmp_path / "scene.npz") as track:

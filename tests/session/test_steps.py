@@ -5,18 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.world import World
 from tts2face.gestures.elements import ChannelEdit
 from tts2face.gestures.timeline import Timeline
 from tts2face.request import Request
 from tts2face.session.prepared import prepare
 from tts2face.session.session import Session
 
-TEXT = Request(text="Bob may [mark here]move. [volume 0.5]Five[/volume] maps.", voice="espeak", fps=29.97)
+TEXT = Request(text="Bob may [mark here]move. [volume 0.5]Five[/volume] maps.", fps=29.97)
 
 
 @pytest.fixture(scope="module")
-def session() -> Session:
-    return Session(memory_mb=100)
+def session(world: World) -> Session:
+    return world.session(memory_mb=100)
 
 
 @pytest.mark.parametrize("request_", [TEXT, Request(text="", idle=12.0, fps=29.97)], ids=["text", "idle"])

@@ -4,12 +4,12 @@ import pytest
 
 from lexicon.sentences import Sentence, split_sentences
 from lexicon.ssml import parse_marks
+from tests.world import World
 from tts2face.models.palette import PLAIN, Delivery, load_palette
 from tts2face.models.palette_editing import StyleMix, add_derivation, mix_styles
 from tts2face.request import Request
-from tts2face.session.session import Session
 from tts2face.session.speech import delivery_of, sentence_sound, speak_sentence
-from tts2face.sound.voice_pool import load_voice
+from tts2face.sound.voice_pool import VoicePool
 
 DELIVERIES = load_palette("starter").deliveries
 TEXT = "We were away a year ago."
@@ -43,8 +43,8 @@ def test_what_the_user_sets_replaces_the_style() -> None:
     assert delivery(style="depressed", volume=0.5) == Delivery(0.9, 0.0)
 
 
-def test_the_sound_is_slower_and_softer_and_the_motion_is_not_softer() -> None:
-    voice = load_voice("heart", "en-us")
+def test_the_sound_is_slower_and_softer_and_the_motion_is_not_softer(voices: VoicePool) -> None:
+    voice = voices.voice("heart", "en-us", {})
     plain, sad = (
         speak_sentence(voice, sentence(TEXT), Request(text=TEXT, style=style), deliveries=DELIVERIES)
         for style in (None, "depressed")
@@ -58,7 +58,7 @@ def test_the_sound_is_slower_and_softer_and_the_motion_is_not_softer() -> None:
     assert alone.samples.tobytes() == sad.sound.samples.tobytes()
 
 
-def test_a_style_of_ones_own_speaks_as_those_that_it_is_mixed_of() -> None:
+def test_a_style_of_ones_own_speaks_as_those_that_it_is_mixed_of(world: World) -> None:
     palette = load_palette("starter")
     half = mix_styles(palette, StyleMix("grid_s1", {"depressed": 0.5}))
     assert half.delivery.rate == pytest.approx(0.9**0.5)
@@ -67,7 +67,7 @@ def test_a_style_of_ones_own_speaks_as_those_that_it_is_mixed_of() -> None:
     seconds = []
     for name in ("sombre", "depressed", "neutral"):
         own = add_derivation(palette, "sombre", mix_styles(palette, StyleMix("grid_s1", {"depressed": 1.0})))
-        speech = Session(palette=own).clip(TEXT, style=name, voice="espeak", fps=10).speech
+        speech = world.session(palette=own).clip(TEXT, style=name, fps=10).speech
         seconds.append(speech.phones.edges[-2] - speech.phones.edges[1])
     assert seconds[0] == pytest.approx(seconds[1], abs=1e-6)
     assert seconds[0] > 1.05 * seconds[2]

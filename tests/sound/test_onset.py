@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 import tts2face
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
-from tests.session.fake_voice import LEAD, RATE, FakeVoice
+from tests.world import LEAD_S, RATE_HZ, LetterVoice
 from tts2face.session.joining import lead_in
 from tts2face.session.prepared import SentenceEdges
 from tts2face.sound import voice_pool
@@ -19,15 +19,15 @@ FRICATIVE_DB, BREATH_DB = -30.0, -32.0  # relative to the vowel: /f/ of the ship
 
 
 def noise(seconds: float, level_db: float, seed: int = 0) -> NDArray[np.float64]:
-    return np.random.default_rng(seed).normal(0.0, 0.25 * 10 ** (level_db / 20), round(seconds * RATE))
+    return np.random.default_rng(seed).normal(0.0, 0.25 * 10 ** (level_db / 20), round(seconds * RATE_HZ))
 
 
 def sound(*parts: NDArray[np.float64], floor_db: float = -90.0) -> Waveform:
-    samples = np.concatenate([*parts, noise(0.6, 0.0), np.zeros(round(0.3 * RATE))])
-    return Waveform(np.clip(samples + noise(len(samples) / RATE, floor_db, 1), -1.0, 1.0), RATE)
+    samples = np.concatenate([*parts, noise(0.6, 0.0), np.zeros(round(0.3 * RATE_HZ))])
+    return Waveform(np.clip(samples + noise(len(samples) / RATE_HZ, floor_db, 1), -1.0, 1.0), RATE_HZ)
 
 
-SILENT = np.zeros(round(0.3 * RATE))
+SILENT = np.zeros(round(0.3 * RATE_HZ))
 
 
 @pytest.mark.parametrize(
@@ -47,24 +47,24 @@ def test_an_onset_is_that_of_the_first_phone(parts: tuple, floor_db: float, onse
 
 
 def test_silence_has_no_onset() -> None:
-    for samples in (np.zeros(0), np.zeros(RATE)):
-        assert speech_onset(Waveform(samples, RATE)) == 0.0
+    for samples in (np.zeros(0), np.zeros(RATE_HZ)):
+        assert speech_onset(Waveform(samples, RATE_HZ)) == 0.0
 
 
 @pytest.mark.parametrize("lead", [0.0, 0.1, 0.35])
 def test_a_lead_moves_sound_phones_and_words_together(lead: float) -> None:
-    whole = FakeVoice().speak("one two")
+    whole = LetterVoice().speak("one two")
     short = lead_in(whole, lead)
-    cut = round((LEAD - lead) * RATE)
+    cut = round((LEAD_S - lead) * RATE_HZ)
     kept = short.waveform.samples[max(-cut, 0) + 40 :]  # beyond the fade
     np.testing.assert_array_equal(kept, whole.waveform.samples[max(cut, 0) + 40 :])
-    inner = short.phones.edges[2:-1] + cut / RATE
+    inner = short.phones.edges[2:-1] + cut / RATE_HZ
     np.testing.assert_allclose(inner, whole.phones.edges[2:-1], rtol=0, atol=1e-9)
     assert (short.phones.phones, short.words) == (whole.phones.phones, whole.words)
 
 
 def test_speech_that_begins_at_once_gets_a_silence_before_it() -> None:
-    at_once = Speech(Waveform(np.full(800, 0.2), RATE), PhoneSequence(["a"], [0.0, 0.1]), (WordSpan("a", 0, 1),))
+    at_once = Speech(Waveform(np.full(800, 0.2), RATE_HZ), PhoneSequence(["a"], [0.0, 0.1]), (WordSpan("a", 0, 1),))
     later = lead_in(at_once, 0.1)
     assert (later.phones.phones, later.words) == ((SILENCE, "a"), (WordSpan("a", 1, 2),))
     assert later.phones.edges == pytest.approx([0.0, 0.1, 0.2])
@@ -82,13 +82,13 @@ def test_edges_that_were_corrected_elsewhere_in_a_text_move_with_the_sound() -> 
 
 @pytest.fixture
 def fake(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(voice_pool, "load_voice", lambda *_: FakeVoice())
+    monkeypatch.setattr(voice_pool, "load_voice", lambda *_: LetterVoice())
 
 
 def test_only_the_first_sentence_of_a_clip_loses_the_silence_of_its_voice(fake: None) -> None:
     first, second = tts2face.Session().stream_speech("Hello. Bob.", fps=10)
     assert first.speech.phones.edges[1] == pytest.approx(0.1)
-    assert second.speech.phones.edges[1] == pytest.approx(LEAD)
+    assert second.speech.phones.edges[1] == pytest.approx(LEAD_S)
 
 
 def test_live_speech_begins_with_the_lead_unless_it_goes_on(fake: None) -> None:
@@ -98,7 +98,7 @@ def test_live_speech_begins_with_the_lead_unless_it_goes_on(fake: None) -> None:
     begins += [float(piece.speech.phones.edges[1]) for piece in live.say("Hello.")]
     live.rest()
     begins += [float(piece.speech.phones.edges[1]) for piece in live.say("Hello.")]
-    assert begins == pytest.approx([0.1, LEAD, 0.1, 0.1])
+    assert begins == pytest.approx([0.1, LEAD_S, 0.1, 0.1])
 
 
 @pytest.mark.parametrize(

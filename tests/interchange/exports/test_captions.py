@@ -11,7 +11,6 @@ from tests.interchange.exports.made import RATE, made_clip, made_stream, silent_
 from tests.packages import package
 from tts2face.interchange.exports.captions import MAX_CUE_CHARACTERS, MAX_CUE_S, MAX_LINE_CHARACTERS, sentence_cues
 from tts2face.interchange.exports.parts import Label
-from tts2face.session.session import Session
 from tts2face.types import Clip, Speech, Trajectory, Waveform
 
 pysubs2 = package("pysubs2")
@@ -112,9 +111,9 @@ def test_without_written_text_a_pause_ends_a_cue():
 
 def test_times_beyond_an_hour(tmp_path):
     n_frames = 3_700
-    samples = np.zeros(n_frames * 8000, np.float32)
+    samples = np.zeros(n_frames * 100, np.float32)
     phones = PhoneSequence(["sil", "ɑ"], [0.0, 3_661.25, float(n_frames)])
-    speech = Speech(Waveform(samples, 8000), phones, (WordSpan("ah", 1, 2),))
+    speech = Speech(Waveform(samples, 100), phones, (WordSpan("ah", 1, 2),))
     still = Trajectory(("a",), np.zeros((n_frames, 1)), 1.0)
     head = silent_clip(n_frames, 1.0).head
     tts2face.export(Clip(still, head, speech), [tmp_path / "a.vtt", tmp_path / "a.srt"])
@@ -122,8 +121,8 @@ def test_times_beyond_an_hour(tmp_path):
     assert "01:01:01,250 --> 01:01:40,000" in (tmp_path / "a.srt").read_text()
 
 
-def test_a_session_gives_the_sentences_as_they_are_written(tmp_path):
-    session = Session(palette=None)
+def test_a_session_gives_the_sentences_as_they_are_written(world, tmp_path):
+    session = world.session(palette=None)
     text = 'Dr. Smith paid $3.50, "really"! [pause 0.2] And then he left.'
     session.export(text, [tmp_path / "a.srt", tmp_path / "a.karaoke.vtt"], fps=10)
     assert [line.text for line in read(tmp_path / "a.srt")] == ['Dr. Smith paid $3.50, "really"!', "And then he left."]

@@ -193,7 +193,7 @@ def test_memory_does_not_grow_with_length(format, tmp_path):
         return most
 
     peak(2)
-    few, many = peak(4), peak(24)  # 40 s and 4 minutes; motion and sound of these grow by 13 MB
+    few, many = peak(4), peak(12)  # 40 s and 2 minutes; motion and sound of these grow by 5 MB
     assert many - few < 1.5e6
 
 
