@@ -3,6 +3,8 @@
 import csv
 import json
 import re
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -27,10 +29,23 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def plain(folder: Path) -> Callable[[str], bytes]:
+    """Content of a file without options, which is made once for each name."""
+
+    @cache
+    def make(name: str) -> bytes:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(folder)
+            return report_bytes(name)
+
+    return make
+
+
 @pytest.fixture
 def here(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    for file in folder.iterdir():
+    for file in folder.glob("*.talker"):
         (tmp_path / file.name).symlink_to(file)
     return tmp_path
 
@@ -59,8 +74,8 @@ def test_the_page_is_complete_and_loads_nothing(here: Path) -> None:
     assert "p P" in html
 
 
-def test_the_matrix_is_a_table_of_numbers(here: Path) -> None:
-    rows = list(csv.reader(report_bytes("r.csv").decode().splitlines()))
+def test_the_matrix_is_a_table_of_numbers(plain: Callable[[str], bytes]) -> None:
+    rows = list(csv.reader(plain("r.csv").decode().splitlines()))
     assert rows[0][:2] == ["phone", "tokens"]
     assert rows[0][2:] == [row[0] for row in rows[1:]]
     matrix = np.array([row[2:] for row in rows[1:]], float)
@@ -69,8 +84,8 @@ def test_the_matrix_is_a_table_of_numbers(here: Path) -> None:
     assert {row[1] for row in rows[1:]} == {"60"}
 
 
-def test_the_json_equals_the_matrix(here: Path) -> None:
-    content = json.loads(report_bytes("r.json"))
+def test_the_json_equals_the_matrix(plain: Callable[[str], bytes], here: Path) -> None:
+    content = json.loads(plain("r.json"))
     rows = list(csv.reader(report_bytes("r.csv", "--labels", "ipa").decode().splitlines()))
     assert [phone["ipa"] for phone in content["phones"]] == rows[0][2:]
     np.testing.assert_array_equal(content["similarity"], np.array([row[2:] for row in rows[1:]], float))
@@ -105,10 +120,15 @@ def test_the_picture_is_a_png(here: Path) -> None:
         ("r.png", ("--compare", "other.talker")),
     ],
 )
-def test_each_option_changes_what_is_written(out: str, option: tuple[str, str], here: Path) -> None:
-    plain = report_bytes(out)
-    assert report_bytes(out) == plain
-    assert report_bytes(out, *option) != plain
+def test_each_option_changes_what_is_written(
+    out: str, option: tuple[str, str], plain: Callable[[str], bytes], here: Path
+) -> None:
+    assert report_bytes(out, *option) != plain(out)
+
+
+@pytest.mark.parametrize("out", ["r.html", "r.json", "r.csv", "r.png"])
+def test_the_same_options_write_the_same(out: str, plain: Callable[[str], bytes], here: Path) -> None:
+    assert report_bytes(out) == plain(out)
 
 
 def test_a_comparison_is_the_difference_of_the_matrices(here: Path) -> None:

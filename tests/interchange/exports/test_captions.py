@@ -11,7 +11,7 @@ from tests.interchange.exports.made import RATE, made_clip, made_stream, silent_
 from tests.packages import package
 from tts2face.interchange.exports.captions import MAX_CUE_CHARACTERS, MAX_CUE_S, MAX_LINE_CHARACTERS, sentence_cues
 from tts2face.interchange.exports.parts import Label
-from tts2face.types import Clip, Speech, Trajectory, Waveform
+from tts2face.types import Clip, Speech, Trajectory, Waveform, resting_head
 
 pysubs2 = package("pysubs2")
 
@@ -115,8 +115,7 @@ def test_times_beyond_an_hour(tmp_path):
     phones = PhoneSequence(["sil", "ɑ"], [0.0, 3_661.25, float(n_frames)])
     speech = Speech(Waveform(samples, 100), phones, (WordSpan("ah", 1, 2),))
     still = Trajectory(("a",), np.zeros((n_frames, 1)), 1.0)
-    head = silent_clip(n_frames, 1.0).head
-    tts2face.export(Clip(still, head, speech), [tmp_path / "a.vtt", tmp_path / "a.srt"])
+    tts2face.export(Clip(still, resting_head(n_frames, 1.0), speech), [tmp_path / "a.vtt", tmp_path / "a.srt"])
     assert "01:01:01.250 --> 01:01:40.000" in (tmp_path / "a.vtt").read_text()
     assert "01:01:01,250 --> 01:01:40,000" in (tmp_path / "a.srt").read_text()
 
