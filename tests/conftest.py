@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tts2face.session.session import Session
     from tts2face.sound.voice_pool import VoicePool
 
-pytest_plugins = ["tests.started", "tests.running"]
+pytest_plugins = ["tests.started", "tests.running", "tests.divided_work"]
 
 TESTS = Path(__file__).resolve().parent
 GROUPS = {  # name of a folder and of a marker: what the tests in it do
