@@ -28,7 +28,7 @@ from tts2face.serving.service.pool import InputQueue, WarmProcess, work_call
 from tts2face.serving.service.preparation import Preparation
 from tts2face.serving.service.server import Mount, create_app
 from tts2face.serving.service.settings import ServiceSettings
-from tts2face.serving.service.synthesis import Synthesis
+from tts2face.serving.service.synthesis import TASKS, Synthesis
 from tts2face.session.functions import SessionCache
 
 START_S = 60.0
@@ -47,6 +47,7 @@ class LocalProcess(WarmProcess):
     def __init__(self, handlers: Mapping[str, Handler]) -> None:
         super().__init__({}, Preparation((), 1), lambda: None)
         self._handlers, self.is_ready = handlers, True
+        self._changed = threading.Condition()
 
     async def run(self) -> None:
         """Nothing is to be started."""
@@ -54,7 +55,7 @@ class LocalProcess(WarmProcess):
     async def stream(self, work: Work, priority: int, inputs: InputQueue | None = None) -> AsyncIterator[Message]:
         """Messages of a work as they are made."""
         answers = Answers(asyncio.get_running_loop())
-        call = Call(Message(SYNTHESISE, work_call(work, priority)), answers, threading.Condition())  # type: ignore[arg-type]
+        call = Call(Message(SYNTHESISE, work_call(work, priority)), answers, self._changed)
         asked = asyncio.create_task(asyncio.to_thread(answer, call, self._handlers))
         given = asyncio.create_task(_pass_on(call, inputs)) if inputs is not None else None
         try:
@@ -91,10 +92,13 @@ class Answers(io.BytesIO):
 
 
 class SessionProcess(LocalProcess):
-    """Executes works with sessions of this process."""
+    """Executes works with sessions of this process; `tables` of further tasks as `synthesis.handlers` takes them."""
 
-    def __init__(self, sessions: SessionCache) -> None:
-        super().__init__({SYNTHESISE: Synthesis(sessions).synthesise})
+    def __init__(self, sessions: SessionCache, tables: Sequence[str] = ()) -> None:
+        tasks = dict(TASKS)
+        for table in tables:
+            tasks |= Program(table).load()
+        super().__init__({SYNTHESISE: Synthesis(sessions, tasks).synthesise})
 
 
 class TableProcess(LocalProcess):
@@ -130,11 +134,17 @@ def service_client(
         yield client
 
 
-def with_key(client: TestClient, secret: str) -> TestClient:
-    """Another client of the service of a client, with a key."""
-    other = TestClient(client.app, base_url="http://localhost", headers={"authorization": f"Bearer {secret}"})
+def another_client(client: TestClient, path: str = "", **headers: str) -> TestClient:
+    """Another client of the service of a client, which asks below a path."""
+    base = f"http://localhost/{path}"
+    other = TestClient(client.app, base_url=base, headers=headers, follow_redirects=False)
     other.portal = client.portal  # the thread of the server
     return other
+
+
+def with_key(client: TestClient, secret: str) -> TestClient:
+    """Another client of the service of a client, with a key."""
+    return another_client(client, authorization=f"Bearer {secret}")
 
 
 @contextmanager

@@ -1,20 +1,49 @@
-"""A running service with the studio and the harness, and a browser: one of each for each process of the tests."""
+"""Services with the studio, one of each kind for each process of the tests, and a browser.
+
+`closed` is in the process of the test and has keys; `studio_service` is a running one with the harness.
+"""
 
 from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
 import pytest
+from starlette.testclient import TestClient
 
 from tests.conftest import SHARED
 from tests.packages import needs
 from tests.running import RunningService
+from tests.serving.service.in_process import SessionProcess, service_client
 from tests.serving.studio.chromium import Browser, open_browser
 from tests.serving.studio.fake_camera import write_fake_media
 
 needs("nicegui")
 
+from tts2face.serving.service.keys import add_key
+from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.studio.app import STUDIO
+from tts2face.serving.studio.requests import TASKS
+from tts2face.session.functions import SessionCache
+
 SPOKEN = SHARED / "recordings" / "grid_s1" / "clips" / "bbaf2n.mkv"  # "bin blue at f two now"
+
+
+@pytest.fixture(scope="session")
+def keys(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Secrets of keys, and their file."""
+    path = tmp_path_factory.mktemp("keys") / "keys.toml"
+    return {"ann": add_key(path, "ann", ["speak"]), "bob": add_key(path, "bob", ["speak"]), "file": str(path),
+            "eva": add_key(path, "eva", ["speak", "build"]), "reader": add_key(path, "reader", ["admin"])}  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def closed(keys: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    """Client of a service with keys and the studio; NiceGUI takes one for each process."""
+    settings = ServiceSettings(
+        data=tmp_path_factory.mktemp("closed"), keys=Path(keys["file"]), workers=0, warm_studio=False
+    )
+    with service_client(settings, SessionProcess(SessionCache(1), TASKS), [STUDIO]) as client:
+        yield client
 
 
 @pytest.fixture(scope="module")

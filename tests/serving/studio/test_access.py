@@ -8,41 +8,16 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from tests.serving.service.in_process import TableProcess, service_client
+from tests.serving.service.in_process import another_client
 from tts2face.serving.service.exchange import POLICY
 from tts2face.serving.service.guard import COOKIE, cookie_key, set_cookie
-from tts2face.serving.service.keys import add_key
-from tts2face.serving.service.settings import ServiceSettings
 
 HTML = {"Accept": "text/html"}
 
 
-@pytest.fixture(scope="module")
-def keys(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    path = tmp_path_factory.mktemp("keys") / "keys.toml"
-    return {"ann": add_key(path, "ann", ["speak"]), "bob": add_key(path, "bob", ["speak"]), "file": str(path),
-            "reader": add_key(path, "reader", ["admin"])}  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("data")
-
-
-@pytest.fixture(scope="module")
-def closed(keys: dict[str, str], data: Path) -> Iterator[TestClient]:
-    """Client of a service with keys and the studio."""
-    from tts2face.serving.studio.app import STUDIO
-
-    settings = ServiceSettings(data=data, keys=Path(keys["file"]), workers=0, warm_studio=False)
-    with service_client(settings, TableProcess(), [STUDIO]) as client:
-        yield client
-
-
 @contextmanager
 def browser(closed: TestClient, key: str = "") -> Iterator[TestClient]:
-    client = TestClient(closed.app, base_url="http://localhost/studio/", follow_redirects=False, headers=HTML)
-    client.portal = closed.portal
+    client = another_client(closed, "studio/", **HTML)
     if key:
         assert client.post("/login", data={"key": key}).status_code == 303
     yield client
@@ -182,7 +157,7 @@ def test_styles_and_scripts_are_in_the_package() -> None:
     assert {"stage.js", "timeline.js", "clock.js", "preview.js"} <= {one.name for one in folder.glob("components/*.js")}
 
 
-def test_styles_and_takes_belong_to_a_key(closed: TestClient, keys: dict[str, str], data: Path) -> None:
+def test_styles_and_takes_belong_to_a_key(closed: TestClient, keys: dict[str, str]) -> None:
     mix = {"name": "anns", "mix": {"source": "grid_s1"}}
     with browser(closed, keys["ann"]) as ann, browser(closed, keys["bob"]) as bob:
         assert ann.post("/api/styles", json=mix).status_code == 201
@@ -191,10 +166,8 @@ def test_styles_and_takes_belong_to_a_key(closed: TestClient, keys: dict[str, st
         assert "is not one of your own styles" in bob.delete("/api/styles/anns").json()["error"]["message"]
         assert "you have no own styles yet" in bob.get("/api/styles/my-styles.palette").json()["error"]["message"]
         number = bob.post("/api/projects", json={"text": "Hello."}).json()["id"]
-        edit = {
-            "kind": "models",
-            "options": {"palette": f"{data}/studio/palettes/ann.styles/my-styles.palette"},
-        }
+        folder = closed.app.state.service.settings.data_folder  # type: ignore[attr-defined]
+        edit = {"kind": "models", "options": {"palette": f"{folder}/studio/palettes/ann.styles/my-styles.palette"}}
         answer = bob.post(f"/api/projects/{number}/edits", json={"edit": edit})
         assert "there is no palette" in answer.json()["error"]["message"]
         for address in ("/api/styles/take/0", "/api/takes/new"):

@@ -31,7 +31,6 @@ def phones(browser):
         return JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, 4, n))).phones""")
 
 
-@pytest.mark.smoke
 def test_mouth_moves_with_speech_and_rests_in_silence(page):
     rest, again = [page.mouth(time) for time in SILENCE_S]
     noise = np.abs(rest - again).mean()

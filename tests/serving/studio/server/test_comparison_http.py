@@ -126,26 +126,6 @@ def test_a_recording_is_compared_with_lips_made_from_its_words(
     assert len(compared(studio, number)[1]) == pytest.approx(len(session.talker.utterances[0].shape) / 25 * 30, abs=2)
 
 
-def test_what_cannot_be_compared_is_refused(studio: httpx.Client) -> None:
-    number = create(studio, TEXT)
-    for reference, reason in (
-        ({"kind": "settings", "request": {"text": "Other words."}}, "cannot change 'text'"),
-        ({"kind": "settings"}, "at least one"),
-        ({"kind": "settings", "models": {"talker": "nobody"}}, "nobody"),
-        ({"kind": "take"}, "import a Live Link file first"),
-        ({"kind": "guess"}, "is compared with kept, settings"),
-    ):
-        answer = compare(studio, number, **reference)
-        assert answer.status_code == 400
-        assert reason in answer.text
-    preview(studio, number)
-    assert compare(studio, number, kind="recording", recording="bbaf2n").status_code == 200
-    answer = studio.get(f"/api/projects/{number}/comparison/preview", params={"wait": 60})
-    assert answer.status_code == 409
-    assert "import its sound with its words first" in answer.text
-    assert studio.get(f"/api/projects/{number}/comparison/measures").status_code == 400
-
-
 def test_the_command_line_renders_a_compared_project_as_before(studio: httpx.Client) -> None:
     number = create(studio, TEXT)
     before = studio.get(f"/api/projects/{number}/project.json").json()

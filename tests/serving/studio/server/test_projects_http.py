@@ -54,33 +54,6 @@ def number(studio: httpx.Client) -> str:
     return create(studio)
 
 
-@pytest.mark.smoke
-def test_the_preview_is_the_clip_of_the_saved_project(studio: httpx.Client, number: str, data: Path) -> None:
-    header, *_ = preview(studio, number)
-    text, occurrence = header["sentences"][0][:2]
-    edge = header["phones"][2][2] + 0.02
-    for change in (
-        {"kind": "paint", "feature": "all", "style": "delighted", "start": 0.2, "end": 1.5},
-        {"kind": "edge", "text": text, "occurrence": occurrence, "index": 3, "time": edge},
-        {"kind": "pronounce", "word": "maps", "phones": "/mɑps/", "keep": False},
-        {"kind": "name", "name": "Edited"},
-    ):
-        assert edit(studio, number, change).status_code == 200
-    wait_until_saved(studio, number, data, "Edited")
-    header, motion, head, sound = preview(studio, number)
-    clip = Session().clip(load_project(project_file(data, number)).prepare())
-    assert tuple(header["channels"]) == clip.motion.channels
-    np.testing.assert_array_equal(motion, clip.motion.values)
-    np.testing.assert_array_equal(head, clip.head.values)
-    np.testing.assert_array_equal(sound, np.rint(clip.speech.waveform.samples * 32767).astype(np.int16))
-    assert header["rate"] == clip.speech.waveform.rate
-    pause = [one[3] for one in header["phones"]].index(1)  # a clip has one pause where two sentences meet
-    phones = header["phones"][:pause] + header["phones"][pause + 1 :]
-    assert [one[0] for one in phones] == list(clip.speech.phones.phones)
-    np.testing.assert_allclose([one[1] for one in phones], clip.speech.phones.edges[:-1], atol=1e-6)
-    assert [one[0] for one in header["words"]] == [word.text for word in clip.speech.words]
-
-
 def test_a_moved_edge_sends_the_frames_of_its_sentence(studio: httpx.Client, number: str) -> None:
     header, *_ = preview(studio, number)
     text, occurrence, begin, end = header["sentences"][1]
@@ -129,43 +102,6 @@ def test_what_is_wrong_is_said_and_the_last_clip_stays(studio: httpx.Client, num
     header, *_ = preview(studio, number)
     assert "there is nothing to say" in header["error"]
     assert header["n_frames"] == before["n_frames"]
-
-
-@pytest.mark.parametrize(
-    ("change", "reason"),
-    [
-        ({"kind": "request", "options": {"audio": "/etc/passwd"}}, "has no file '/etc/passwd' for audio"),
-        ({"kind": "request", "options": {"audio": "../../x/assets/recording.wav"}}, "has no file"),
-        ({"kind": "request", "options": {"dictionary": "/etc/passwd"}}, "for dictionary"),
-        ({"kind": "request", "options": {"timeline": "/etc/passwd"}}, "for timeline"),
-        ({"kind": "request", "options": {"voice": "/tmp/x.onnx"}}, "there is no voice"),
-        ({"kind": "models", "options": {"talker": "/tmp/x.talker"}}, "there is no talker"),
-        ({"kind": "models", "options": {"face": "../head"}}, "there is no face"),
-        ({"kind": "models", "options": {"hair": "../x.hair"}}, "there is no haircut"),
-        ({"kind": "picture", "options": {"background": "/etc/x.png"}}, "there is no background"),
-        ({"kind": "picture", "options": {"size": "4096x4096"}}, "more than 2100000 pixels"),
-    ],
-)
-def test_paths_of_clients_reach_no_file(studio: httpx.Client, number: str, change: dict[str, Any], reason: str) -> None:
-    answer = edit(studio, number, change)
-    assert answer.status_code == 400
-    assert reason in answer.json()["error"]["message"]
-    content = studio.get(f"/api/projects/{number}/project.json").json()
-    part = change["kind"]
-    imported = studio.post("/api/imports", files={
-        "file": ("p.json", json.dumps(content | {part: content.get(part, {}) | change["options"]}).encode()),
-    })  # fmt: skip
-    assert imported.status_code == 400
-    assert reason in imported.json()["error"]["message"]
-
-
-def test_two_tabs_do_not_edit_at_once(studio: httpx.Client, number: str) -> None:
-    change = {"kind": "name", "name": "A"}
-    assert edit(studio, number, change, tab="first").status_code == 200
-    for other in ("second", ""):
-        refused = edit(studio, number, change, tab=other)
-        assert (refused.status_code, "another tab" in refused.json()["error"]["message"]) == (400, True)
-    assert edit(studio, number, {"kind": "name", "name": "B"}, tab="first").status_code == 200
 
 
 def test_a_face_is_gltf_with_a_target_for_each_channel(studio: httpx.Client, number: str, tmp_path: Path) -> None:
@@ -266,23 +202,6 @@ def test_recordings_subtitles_texts_and_projects_are_imported(studio: httpx.Clie
     assert heard["sentences"][0][:2] == ["", 0]
     assert [one[0] for one in heard["words"]] == [one[0] for one in header["words"]]
     assert heard["duration"] == pytest.approx(header["duration"], abs=0.05)
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "reason"),
-    [
-        ("x.exe", b"MZ", "cannot be imported"), ("x.wav", b"no sound", "cannot be used"),
-        ("x.srt", b"nothing", "cannot be used"), ("x.json", b"{", "JSON"), ("x.txt", b"\xff\xfe\xff", "UTF-8"),
-    ],
-)  # fmt: skip
-def test_wrong_files_are_refused_and_leave_no_project(
-    studio: httpx.Client, name: str, content: bytes, reason: str
-) -> None:
-    before = studio.get("/api/projects").json()
-    answer = studio.post("/api/imports", files={"file": (name, content)})
-    assert answer.status_code in {400, 422}
-    assert reason in answer.json()["error"]["message"]
-    assert studio.get("/api/projects").json() == before
 
 
 def test_a_deleted_project_is_gone_from_disk(studio: httpx.Client, number: str, data: Path) -> None:

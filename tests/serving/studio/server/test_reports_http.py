@@ -42,16 +42,3 @@ def test_a_report_that_waits_or_runs_is_cancelled(studio: httpx.Client, data: Pa
     assert studio.delete(f"{REPORTS}/{number}").status_code == 204
     assert studio.get(REPORTS).json() == []
     eventually(lambda: not (data / "studio" / "reports" / number).exists(), 1.0)
-
-
-def test_what_cannot_be_reported_is_refused(studio: httpx.Client) -> None:
-    for content, reason in (
-        ({"kind": "beauty", "model": "grid_s1"}, "there is no report 'beauty'"),
-        ({"kind": "similarity", "model": "nobody"}, "nobody"),
-        ({"kind": "gestures", "model": "grid_s1"}, "grid_s1"),
-    ):
-        answer = studio.post(REPORTS, json=content)
-        assert answer.status_code == 400
-        assert reason in answer.text
-    assert studio.get(f"{REPORTS}/0123456789ab/page").status_code == 404
-    assert studio.delete(f"{REPORTS}/../reports").status_code in {404, 405}

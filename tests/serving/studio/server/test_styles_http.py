@@ -157,21 +157,6 @@ def test_a_take_becomes_a_style_and_is_deleted(owned: httpx.Client, data: Path, 
     assert [path.name for path in folder.rglob("*") if path.is_file()] == []
 
 
-@pytest.mark.parametrize(
-    ("change", "reason"),
-    [
-        ({"name": "mine", "mix": {"source": "nobody"}}, "there is no recorded style 'nobody'"),
-        ({"name": "mine", "mix": {"source": "grid_s1", "speed": 2}}, "the mix: there is no 'speed' here; choose"),
-        ({"name": "a=b", "mix": MIX}, "a style cannot be called 'a=b'"),
-        ({"name": "mine"}, "there is no checked take; record or upload one"),
-    ],
-)
-def test_wrong_styles(owned: httpx.Client, change: dict[str, Any], reason: str) -> None:
-    answer = owned.post("/api/styles", json=change)
-    assert answer.status_code == 400
-    assert reason in answer.json()["error"]["message"]
-
-
 def test_a_mix_is_seen_before_it_is_kept(owned: httpx.Client) -> None:
     def drawn(mixed: Any) -> httpx.Response:
         return owned.get("/api/styles/mix.webp", params={"mix": json.dumps(mixed)})
@@ -180,9 +165,3 @@ def test_a_mix_is_seen_before_it_is_kept(owned: httpx.Client) -> None:
     assert annoyed == owned.get("/api/styles/annoyed/swatch.webp").content
     assert drawn(MIX).content != annoyed
     assert "the mix: give an object in curly brackets" in drawn([]).json()["error"]["message"]
-
-
-def test_shipped_styles_stay(owned: httpx.Client) -> None:
-    assert "is not one of your own styles" in owned.delete("/api/styles/delighted").json()["error"]["message"]
-    answer = owned.put("/api/styles/take/0", content=b"x", headers={"Content-Type": "application/pdf"})
-    assert "a take must be" in answer.json()["error"]["message"]
