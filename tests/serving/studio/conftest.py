@@ -19,18 +19,14 @@ from tests.serving.studio.fake_camera import write_fake_media
 
 needs("nicegui")
 
-from tts2face.serving.service.keys import add_key
-from tts2face.serving.service.settings import ServiceSettings
-from tts2face.serving.studio.app import STUDIO
-from tts2face.serving.studio.requests import TASKS
-from tts2face.session.functions import SessionCache
-
 SPOKEN = SHARED / "recordings" / "grid_s1" / "clips" / "bbaf2n.mkv"  # "bin blue at f two now"
 
 
 @pytest.fixture(scope="session")
 def keys(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Secrets of keys, and their file."""
+    from tts2face.serving.service.keys import add_key
+
     path = tmp_path_factory.mktemp("keys") / "keys.toml"
     return {"ann": add_key(path, "ann", ["speak"]), "bob": add_key(path, "bob", ["speak"]), "file": str(path),
             "eva": add_key(path, "eva", ["speak", "build"]), "reader": add_key(path, "reader", ["admin"])}  # fmt: skip
@@ -39,6 +35,11 @@ def keys(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 @pytest.fixture(scope="session")
 def closed(keys: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     """Client of a service with keys and the studio; NiceGUI takes one for each process."""
+    from tts2face.serving.service.settings import ServiceSettings
+    from tts2face.serving.studio.app import STUDIO
+    from tts2face.serving.studio.requests import TASKS
+    from tts2face.session.functions import SessionCache
+
     settings = ServiceSettings(
         data=tmp_path_factory.mktemp("closed"), keys=Path(keys["file"]), workers=0, warm_studio=False
     )

@@ -1,4 +1,7 @@
-"""A minute of the soak of `tests/bench/bench_soak.py`: answers are as expected, no job is lost, nothing is left."""
+"""Some seconds and, nightly, a minute of the soak of `tests/bench/bench_soak.py`.
+
+Answers are as expected, no job is lost, nothing is left.
+"""
 
 from pathlib import Path
 
@@ -9,7 +12,8 @@ from tests.packages import reason
 pytest.importorskip("dbos", reason=reason("dbos"))
 pytest.importorskip("fastapi", reason=reason("fastapi"))
 
-from tests.bench.bench_soak import check, run_soak
+from tests.bench.bench_soak import Report, check, run_soak
+from tests.bench.soak_traffic import KINDS
 from tests.serving.work.conftest import Postgres
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="needs /proc")
@@ -24,12 +28,24 @@ MOST_GROWTH = {
 }  # fmt: skip
 
 
-def test_a_short_soak_loses_nothing_and_leaves_nothing_behind(request: pytest.FixtureRequest) -> None:
+def assert_nothing_is_left(report: Report) -> None:
+    """Answers and jobs are as expected, and what the server holds has not grown."""
+    check(report)
+    grown = {name: after - before for name, before, after in report.rows()}
+    assert {name: more for name, more in grown.items() if more > MOST_GROWTH[name]} == {}
+
+
+@pytest.mark.nightly
+def test_a_soak_loses_nothing_and_leaves_nothing_behind(request: pytest.FixtureRequest) -> None:
+    """With all attacks."""
     try:
         postgres: Postgres | None = request.getfixturevalue("postgres")
     except pytest.skip.Exception:
         postgres = None  # a SQLite file, which is never away
-    report = run_soak(N_REQUESTS, n_warm=N_WARM, postgres=postgres, away_s=AWAY_S)
-    check(report)
-    grown = {name: after - before for name, before, after in report.rows()}
-    assert {name: more for name, more in grown.items() if more > MOST_GROWTH[name]} == {}
+    assert_nothing_is_left(run_soak(N_REQUESTS, n_warm=N_WARM, postgres=postgres, away_s=AWAY_S))
+
+
+def test_a_short_soak_loses_nothing_and_leaves_nothing_behind() -> None:
+    """Requests of each kind while a synthesis process and a worker are killed."""
+    attacks = ("synthesis processes", "worker")
+    assert_nothing_is_left(run_soak(3 * len(KINDS), n_warm=2 * len(KINDS), postgres=None, attacks=attacks))
