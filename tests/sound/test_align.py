@@ -114,30 +114,38 @@ def test_confidence_tells_a_wrong_word_from_right_ones(aligner: Aligner, sound: 
 
 @pytest.mark.parametrize("kind", ["pink", "babble"])
 def test_edges_hold_in_noise(aligner: Aligner, kind: str) -> None:
-    """At 10 dB, edges of a voice of another make stay within 15 ms in the mean, and none but the end beyond 0.1 s.
+    """At 10 dB, 168 edges of a voice of another make: 11 ms in the mean, where none counts more than 50 ms.
 
-    Of the babble of the same sentence, an /s/ may follow the last one at once.
+    Another processor's last bits may move an edge by 0.2 s, which is 0.3 ms of this mean; edges that were all 10 ms
+    later would make it 15.5 ms and more.
     """
-    speech = load_voice("heart", "en-us").speak("The third witness slowly carved a box of matches.")
-    rng, samples = np.random.default_rng(0), speech.waveform.samples
+    voice = load_voice("heart", "en-us")
+    speech = voice.speak("The third witness slowly carved a box of matches.")
+    other = voice.speak("We were away a year ago, but Bob may move five big maps.").waveform.samples
+    spans = [(word.text, [speech.phones.phones[word.first : word.last]]) for word in speech.words]
+    found = [aligner.align(add_noise(speech.waveform, kind, other, seed), spans) for seed in range(4)]
+    apart = np.concatenate([
+        np.abs(one.phones.edges[mine.first : mine.last + 1] - speech.phones.edges[true.first : true.last + 1])
+        for one in found
+        for mine, true in zip(one.words, speech.words, strict=True)
+    ])  # fmt: skip
+    assert np.mean([word.confidence for one in found for word in one.words]) > 0.7
+    assert np.minimum(apart, 0.05).mean() < 0.0135
+    assert np.count_nonzero(apart > 0.1) <= 2
+
+
+def add_noise(sound: Waveform, kind: str, other: np.ndarray, seed: int) -> Waveform:
+    """Sound with pink noise, or six copies of another at the same time, at 10 dB of its loud samples."""
+    rng, samples = np.random.default_rng(seed), sound.samples
     if kind == "pink":
         spectrum = np.fft.rfft(rng.normal(size=len(samples)))
         noise = np.fft.irfft(spectrum / np.sqrt(np.maximum(np.arange(len(spectrum)), 20)), len(samples))
     else:
-        noise = np.sum([np.roll(samples, int(rng.integers(len(samples)))) for _ in range(6)], axis=0)
+        said = np.resize(other, len(samples))
+        noise = np.sum([np.roll(said, int(rng.integers(len(said)))) for _ in range(6)], axis=0)
     loud = samples[np.abs(samples) > 0.02 * np.abs(samples).max()]
     noisy = samples + noise / noise.std() * np.sqrt(np.square(loud).mean() / 10)
-    damaged = Waveform((noisy * 0.9 / np.abs(noisy).max()).astype(np.float32), speech.waveform.rate)
-    spans = [(word.text, [speech.phones.phones[word.first : word.last]]) for word in speech.words]
-    found = aligner.align(damaged, spans)
-    assert np.mean([word.confidence for word in found.words]) > 0.7
-    apart = [
-        np.abs(found.phones.edges[mine.first : mine.last + 1] - speech.phones.edges[other.first : other.last + 1])
-        for mine, other in zip(found.words, speech.words, strict=True)
-    ]
-    assert np.concatenate(apart).mean() < 0.015
-    assert np.concatenate(apart)[:-1].max() < 0.1
-    assert apart[-1][-1] < 0.2
+    return Waveform((noisy * 0.9 / np.abs(noisy).max()).astype(np.float32), sound.rate)
 
 
 def test_a_diphthong_that_ends_as_another_vowel_is_not_a_pause(aligner: Aligner, shared_recordings: Path) -> None:
