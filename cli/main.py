@@ -38,6 +38,7 @@ from cli.process import (
     error_message,
     exit_code,
     pause_collection,
+    release_frames,
     repair_streams,
     return_large_blocks,
     signal_exit_code,
@@ -228,6 +229,7 @@ def run(arguments: Sequence[str]) -> int:
             _call(arguments)
     except BaseException as ended:
         INTERRUPTION.end()
+        release_frames(ended)
         if INTERRUPTION.number or isinstance(ended, KeyboardInterrupt):  # whatever the interruption has led to
             what_remains = "; ".join(getattr(ended, "__notes__", ())) or UNCHANGED
             write_message(f"\n{INTERRUPTED.format(what_remains)}")

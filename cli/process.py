@@ -14,6 +14,7 @@ import signal
 import sys
 import threading
 import time
+import traceback
 import weakref
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -60,6 +61,22 @@ def error_message(error: Exception) -> str:
         path = path if len(path) <= MAX_QUOTED_CHARACTERS else f"{path[:MAX_QUOTED_CHARACTERS]}..."
         return f"cannot use {path}: {reason}; check the path"
     return " ".join(str(error).split())
+
+
+def release_frames(error: BaseException) -> None:
+    """Release the variables of all functions that an error has ended.
+
+    An error and its traceback hold each other, and their garbage is not collected at the exit. Libraries in native code
+    list on standard error what of theirs is then still there (nanobind, by which soxr is made).
+    """
+    seen: set[BaseException] = set()
+    waiting: list[BaseException | None] = [error]
+    while waiting:
+        one = waiting.pop()
+        if one is not None and one not in seen:
+            seen.add(one)
+            traceback.clear_frames(one.__traceback__)
+            waiting += [one.__cause__, one.__context__]
 
 
 class Terminated(KeyboardInterrupt):
