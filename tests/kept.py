@@ -9,7 +9,6 @@ import hashlib
 import os
 import pickle
 import platform
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -50,19 +49,6 @@ def _no_function() -> None:
     """What stands for a function that was left out."""
 
 
-def kept_folder(make: Callable[[Path], None]) -> Path:
-    """A folder that a function fills, which nobody changes."""
-    entry = _folder() / f"{make.__name__}-{_digest(make)}"
-    with _locked(entry):
-        if not entry.is_dir():
-            partial = entry.with_suffix(".partial")
-            shutil.rmtree(partial, ignore_errors=True)
-            partial.mkdir()
-            make(partial)
-            partial.rename(entry)
-    return entry
-
-
 def _folder() -> Path:
     given = os.environ.get("TTS2FACE_TEST_CACHE")
     folder = Path(given) if given else user_cache() / "tests"
@@ -79,7 +65,7 @@ def _locked(entry: Path) -> Iterator[None]:
         os.utime(entry)
         for other in entry.parent.iterdir():
             if time.time() - other.stat().st_mtime > UNUSED_S:
-                shutil.rmtree(other) if other.is_dir() else other.unlink()
+                other.unlink()
 
 
 @functools.cache

@@ -18,12 +18,13 @@ from tts2face.models.gaze import STATES
 from tts2face.models.palette import write_palette
 
 pytestmark = pytest.mark.needs("matplotlib")
+N_RECORDINGS = 20  # three seconds each
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("palettes") / "made.palette"
-    write_palette(file, made_palette())
+    write_palette(file, made_palette(N_RECORDINGS))
     return file
 
 
@@ -53,7 +54,7 @@ def test_the_page_is_complete_and_loads_nothing(here: Path) -> None:
     for heading, n in (("Distributions", 2), ("Spectra, sound, seeds", 2), ("Clips of 10 minutes", 1)):
         assert html.count(f"<h3>{heading}</h3>") == n
     assert "Calm with a larger head and faster blinks." in html
-    assert "48 training recordings, 12 held out." in html
+    assert f"{N_RECORDINGS * 4 // 5} training recordings, {N_RECORDINGS // 5} held out." in html
     assert not re.search(r"http|<(script|link|img)|url\((?!#)|@import|\bnan\b", html)
     # of each style 10 distributions and 2 spectra; of the measured one 3 of repetition
     assert html.count("<svg") == html.count("</svg>") == 2 * (10 + 2) + 3
@@ -114,7 +115,7 @@ def test_the_same_options_write_the_same(plain: bytes, here: Path) -> None:
         ("made.palette", "g.pdf", (), "a report is written as .html, .csv, .json, .png, not g.pdf"),
         ("made.palette", "nowhere/g.html", (), "there is no folder nowhere"),
         ("made.palette", "g.html", ("--held-out", "1"), "one in 1 recordings cannot be held out"),
-        ("made.palette", "g.html", ("--held-out", "50"), "of 60 recordings one in 50 cannot be held out"),
+        ("made.palette", "g.html", ("--held-out", "50"), f"of {N_RECORDINGS} recordings one in 50 cannot be held out"),
         ("made.palette", "g.html", ("--held-out", "2.5"), '"2.5" is not a whole number'),
         ("made.palette", "g.html", ("--people", "."), "there are no recordings of gaze in .; give the folder"),
         ("made.palette", "g.html", ("--halves", "0"), "at least 1 halving, not 0"),

@@ -9,13 +9,15 @@ from pathlib import Path
 
 import pytest
 
+from cli.main import run
 from cli.process import UNCHANGED
 from tests.running import eventually
 from tests.started import running_processes
+from tests.world import World
 
 COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
 ROOT = str(Path(__file__).parents[3])
-TEXT = "This is a rather long sentence that takes some time to speak. " * 20
+TEXT = "This is a rather long sentence that takes some time to speak. " * 200
 PATIENCE_S = 120.0
 POOL = """
 import os, sys, time
@@ -77,11 +79,12 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def start_command(here: Path) -> "subprocess.Popen[str]":
+def start_command(here: Path, world: World) -> "subprocess.Popen[str]":
     """A command that has begun to write x.mp4."""
     process = subprocess.Popen(
-        [*COMMAND, TEXT, "--out", "x.mp4", "--size", "64x64"], stderr=subprocess.PIPE, text=True, cwd=here
-    )
+        [*COMMAND, TEXT, "--out", "x.mp4", "--size", "64x64", *world.flags],
+        stderr=subprocess.PIPE, text=True, cwd=here, env={**os.environ, **world.environment},
+    )  # fmt: skip
     eventually(lambda: list(here.glob(".x*")) or process.poll() is not None)
     assert process.poll() is None
     return process
@@ -90,10 +93,10 @@ def start_command(here: Path) -> "subprocess.Popen[str]":
 @pytest.mark.parametrize(
     ("name", "code"), [("SIGINT", 130), pytest.param("SIGTERM", 143, marks=pytest.mark.smoke), ("SIGHUP", 129)]
 )
-def test_a_signal_leaves_no_files_and_no_processes(tmp_path: Path, name: str, code: int) -> None:
+def test_a_signal_leaves_no_files_and_no_processes(tmp_path: Path, world: World, name: str, code: int) -> None:
     earlier = tmp_path / "x.mp4"
     earlier.write_bytes(b"of an earlier run")
-    with start_command(tmp_path) as process:
+    with start_command(tmp_path, world) as process:
         process.send_signal(getattr(signal, name))
         _, message = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == code
@@ -157,11 +160,12 @@ def test_compiled_code_that_does_not_return_ends_with_the_process(tmp_path: Path
     assert list(tmp_path.iterdir()) == []
 
 
-def test_files_of_a_killed_command_are_removed_by_the_next_one(tmp_path: Path) -> None:
-    with start_command(tmp_path) as process:
+def test_files_of_a_killed_command_are_removed_by_the_next_one(tmp_path: Path, tones: World) -> None:
+    with start_command(tmp_path, tones) as process:
         process.kill()
     assert list(tmp_path.glob(".x*"))
-    subprocess.run([*COMMAND, "Hi.", "--out", "x.mp4", "--size", "64x64", "--fps", "5"], check=True, cwd=tmp_path)
+    out = ["--out", str(tmp_path / "x.mp4"), "--size", "64x64", "--fps", "5"]
+    assert run(["Hi.", *tones.flags, *out]) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["x.mp4"]
 
 

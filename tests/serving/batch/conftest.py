@@ -4,8 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
 from tests.session.fake_voice import FakeVoice
+
 from tts2face.picture.options import Picture
 from tts2face.request import Request
 from tts2face.serving.batch.options import BatchOptions

@@ -6,12 +6,12 @@ import time
 from pathlib import Path
 
 import pytest
+from tests.session.fake_voice import FakeVoice
 
 from cli.main import run
 from lexicon.errors import DataError, InputError
 from tests.packages import needs
 from tests.serving.batch.conftest import Planner
-from tests.session.fake_voice import FakeVoice
 from tts2face.serving.batch.run import MIN_AGE_S, SEGMENT_FOLDER, prune_segments, run_batch
 from tts2face.serving.batch.segment import SegmentResult
 from tts2face.serving.batch.store import Store, open_store

@@ -8,12 +8,12 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
+from tests.session.fake_voice import LETTER, FakeVoice
 
 from lexicon.errors import BackendError, InputError
 from tests.picture.tiny_talker import own_talker
 from tests.serving.batch.build.test_run import AAC_SMEAR_S, decoded, manifest, spans
 from tests.serving.batch.conftest import FPS, SMALL, SRT, Planner
-from tests.session.fake_voice import LETTER, FakeVoice
 from tts2face import load_clip
 from tts2face.interchange.exports import table
 from tts2face.interchange.exports.table import batch_format, sound_name

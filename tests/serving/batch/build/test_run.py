@@ -12,11 +12,11 @@ from typing import ClassVar
 import av
 import numpy as np
 import pytest
+from tests.session.fake_voice import LETTER, FakeVoice
 
 from cli.main import run
 from lexicon.errors import BackendError, InputError
 from tests.serving.batch.conftest import FPS, SRT, Planner
-from tests.session.fake_voice import LETTER, FakeVoice
 from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.batch import engine as engines
 from tts2face.serving.batch.engine import LocalEngine, Rendered

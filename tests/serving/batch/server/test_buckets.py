@@ -16,6 +16,8 @@ from tests.packages import needs, reason
 
 pytest.importorskip("obstore", reason=reason("obstore"))
 
+from tests.session.fake_voice import FakeVoice
+
 from cli.main import run
 from lexicon.errors import BackendError, InputError
 from tests.running import eventually
@@ -30,7 +32,6 @@ from tests.serving.batch.emulators import (
     start_azurite,
     start_moto,
 )
-from tests.session.fake_voice import FakeVoice
 from tts2face.serving.batch import engine as engines
 from tts2face.serving.batch import store
 from tts2face.serving.batch.run import run_batch
