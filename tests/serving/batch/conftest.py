@@ -4,8 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from tests.session.fake_voice import FakeVoice
 
+from tests.world import LetterVoice
 from tts2face.picture.options import Picture
 from tts2face.request import Request
 from tts2face.serving.batch.options import BatchOptions
@@ -24,12 +24,12 @@ Planner = Callable[..., Plan]
 
 
 @pytest.fixture
-def voices(monkeypatch: pytest.MonkeyPatch) -> list[FakeVoice]:
-    """Voices that were loaded; each speaks with `FakeVoice`."""
-    loaded: list[FakeVoice] = []
+def voices(monkeypatch: pytest.MonkeyPatch) -> list[LetterVoice]:
+    """Voices that were loaded; each speaks with `LetterVoice`."""
+    loaded: list[LetterVoice] = []
 
-    def load(*_: object) -> FakeVoice:
-        loaded.append(FakeVoice())
+    def load(*_: object) -> LetterVoice:
+        loaded.append(LetterVoice())
         return loaded[-1]
 
     monkeypatch.setattr(voice_pool, "load_voice", load)

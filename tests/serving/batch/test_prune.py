@@ -6,12 +6,12 @@ import time
 from pathlib import Path
 
 import pytest
-from tests.session.fake_voice import FakeVoice
 
 from cli.main import run
 from lexicon.errors import DataError, InputError
 from tests.packages import needs
 from tests.serving.batch.conftest import Planner
+from tests.world import LetterVoice
 from tts2face.serving.batch.run import MIN_AGE_S, SEGMENT_FOLDER, prune_segments, run_batch
 from tts2face.serving.batch.segment import SegmentResult
 from tts2face.serving.batch.store import Store, open_store
@@ -72,7 +72,7 @@ def test_unfinished_files_of_killed_processes_are_removed(tmp_path: Path) -> Non
 
 
 def test_the_segments_of_a_batch_stay_and_it_runs_again_without_rendering(
-    plan_of: Planner, voices: list[FakeVoice], tmp_path: Path
+    plan_of: Planner, voices: list[LetterVoice], tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
     plan = plan_of(per="file")

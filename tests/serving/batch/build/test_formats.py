@@ -8,12 +8,12 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from tests.session.fake_voice import LETTER, FakeVoice
 
 from lexicon.errors import BackendError, InputError
 from tests.picture.tiny_talker import own_talker
 from tests.serving.batch.build.test_run import AAC_SMEAR_S, decoded, manifest, spans
 from tests.serving.batch.conftest import FPS, SMALL, SRT, Planner
+from tests.world import PHONE_S, LetterVoice
 from tts2face import load_clip
 from tts2face.interchange.exports import table
 from tts2face.interchange.exports.table import batch_format, sound_name
@@ -33,7 +33,7 @@ CUES = ((0.5, "Hello there"), (2.5, "Good morning to you all"), (10.0, "Bob may 
 
 @pytest.mark.parametrize("kind", ["webm", "mov"])
 def test_other_containers_are_joined_frame_by_frame(
-    kind: str, plan_of: Planner, voices: list[FakeVoice], tmp_path: Path
+    kind: str, plan_of: Planner, voices: list[LetterVoice], tmp_path: Path
 ) -> None:
     result = run_batch(plan_of(per="file", format=kind), tmp_path / "out")
     assert (result.n_made, result.failed) == (1, ())
@@ -51,7 +51,7 @@ def test_other_containers_are_joined_frame_by_frame(
         assert min(abs(one - begin) for one in begins) < AAC_SMEAR_S
 
 
-def test_webm_keeps_transparency(tmp_path: Path, voices: list[FakeVoice]) -> None:
+def test_webm_keeps_transparency(tmp_path: Path, voices: list[LetterVoice]) -> None:
     (tmp_path / "one.srt").write_text(SRT, encoding="utf-8")
     picture = Picture(size="64x64", supersampling=1, background="transparent")
     options, request = BatchOptions(per="scene", format="webm"), Request(fps=FPS)
@@ -69,7 +69,7 @@ def test_webm_keeps_transparency(tmp_path: Path, voices: list[FakeVoice]) -> Non
 
 
 def test_exports_have_the_frames_and_times_of_the_film(
-    plan_of: Planner, voices: list[FakeVoice], tmp_path: Path
+    plan_of: Planner, voices: list[LetterVoice], tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
     exports = ("track.json", "wav", "words.srt", "azure", "glb")
@@ -83,7 +83,7 @@ def test_exports_have_the_frames_and_times_of_the_film(
         at = begin
         for word in text.split():
             expected.append((word.lower(), at))
-            at += len(word) * LETTER / cue["rate"]
+            at += len(word) * PHONE_S / cue["rate"]
     assert [text.lower().strip(".") for text, _ in words] == [text for text, _ in expected]
     assert np.allclose([time for _, time in words], [time for _, time in expected], atol=1e-4)
     with wave.open(str(out / "one.wav")) as file:
@@ -101,7 +101,7 @@ def test_exports_have_the_frames_and_times_of_the_film(
     assert abs(last / 1e7 - 12.5) < 1e-3
 
 
-def test_exports_are_made_again_only_where_needed(plan_of: Planner, voices: list[FakeVoice], tmp_path: Path) -> None:
+def test_exports_are_made_again_only_where_needed(plan_of: Planner, voices: list[LetterVoice], tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert run_batch(plan_of(), out).n_rendered == 3
     added = run_batch(plan_of(exports=("csv", "textgrid")), out)
@@ -116,7 +116,7 @@ def test_exports_are_made_again_only_where_needed(plan_of: Planner, voices: list
 
 
 @pytest.mark.smoke
-def test_exports_alone_draw_nothing(plan_of: Planner, voices: list[FakeVoice], tmp_path: Path) -> None:
+def test_exports_alone_draw_nothing(plan_of: Planner, voices: list[LetterVoice], tmp_path: Path) -> None:
     out = tmp_path / "out"
     plan = plan_of(per="film", format="none", exports=("npz", "bvh"))
     assert {segment.medium for segment in plan.segments.values()} == {"track"}
@@ -188,7 +188,7 @@ def test_sound_beside_keeps_points_in_the_name() -> None:
     assert sound_name("hello.rhubarb.json") == "hello.wav"
 
 
-def test_speech_that_is_cut_keeps_its_phones(plan_of: Planner, voices: list[FakeVoice], tmp_path: Path) -> None:
+def test_speech_that_is_cut_keeps_its_phones(plan_of: Planner, voices: list[LetterVoice], tmp_path: Path) -> None:
     text = (
         "1\n00:00:00,500 --> 00:00:01,000\nHello there you lot of people.\n\n2\n00:00:01,000 --> 00:00:02,000\nBye.\n"
     )

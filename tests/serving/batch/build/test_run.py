@@ -12,11 +12,11 @@ from typing import ClassVar
 import av
 import numpy as np
 import pytest
-from tests.session.fake_voice import LETTER, FakeVoice
 
 from cli.main import run
 from lexicon.errors import BackendError, InputError
 from tests.serving.batch.conftest import FPS, SRT, Planner
+from tests.world import PHONE_S, LetterVoice
 from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.batch import engine as engines
 from tts2face.serving.batch.engine import LocalEngine, Rendered
@@ -55,7 +55,7 @@ def manifest(folder: Path) -> dict:
 
 @pytest.mark.parametrize("begin", ["100", "200"])
 def test_a_silence_of_one_or_two_frames_is_joined(
-    plan_of: Planner, voices: list[FakeVoice], tmp_path: Path, begin: str
+    plan_of: Planner, voices: list[LetterVoice], tmp_path: Path, begin: str
 ) -> None:
     """Its encoder reorders no frames, in contrast to that of the following segment."""
     text = f"1\n00:00:00,{begin} --> 00:00:02,000\nHello there.\n"
@@ -64,7 +64,7 @@ def test_a_silence_of_one_or_two_frames_is_joined(
     decoded(tmp_path / "out" / "one.mp4")
 
 
-def test_a_file_is_in_sync_at_every_cue(plan_of: Planner, voices: list[FakeVoice], tmp_path: Path) -> None:
+def test_a_file_is_in_sync_at_every_cue(plan_of: Planner, voices: list[LetterVoice], tmp_path: Path) -> None:
     result = run_batch(plan_of(per="file"), tmp_path / "out")
     assert (result.n_made, result.failed) == (1, ())
     pictures, samples, rate = decoded(tmp_path / "out" / "one.mp4")
@@ -75,12 +75,12 @@ def test_a_file_is_in_sync_at_every_cue(plan_of: Planner, voices: list[FakeVoice
     assert len(heard) == 3
     for (begin, end), cue, letters in zip(heard, entry["cues"], (10, 19, 10), strict=True):
         assert abs(begin - cue["begin_s"]) < AAC_SMEAR_S
-        assert abs(end - cue["begin_s"] - letters * LETTER / cue["rate"]) < AAC_SMEAR_S
+        assert abs(end - cue["begin_s"] - letters * PHONE_S / cue["rate"]) < AAC_SMEAR_S
         assert abs(end - cue["begin_s"] - cue["speech_s"]) < HALF_FRAME_S
     assert [cue["rate"] > 1.0 for cue in entry["cues"]] == [False, True, False]
 
 
-def test_silence_shows_a_living_face(plan_of: Planner, voices: list[FakeVoice], tmp_path: Path) -> None:
+def test_silence_shows_a_living_face(plan_of: Planner, voices: list[LetterVoice], tmp_path: Path) -> None:
     run_batch(plan_of(per="file"), tmp_path / "out")
     pictures = decoded(tmp_path / "out" / "one.mp4")[0].astype(int)
     silence = pictures[52:98]
@@ -88,7 +88,7 @@ def test_silence_shows_a_living_face(plan_of: Planner, voices: list[FakeVoice], 
 
 
 @pytest.mark.smoke
-def test_cues_become_clips_of_their_length(plan_of: Planner, voices: list[FakeVoice], tmp_path: Path) -> None:
+def test_cues_become_clips_of_their_length(plan_of: Planner, voices: list[LetterVoice], tmp_path: Path) -> None:
     out = tmp_path / "out"
     run_batch(plan_of(max_rate=1.1, overflow="report"), out)
     rows = list(csv.DictReader((out / "manifest.csv").read_text().splitlines()))
@@ -107,7 +107,7 @@ def test_cues_become_clips_of_their_length(plan_of: Planner, voices: list[FakeVo
 
 @pytest.mark.smoke
 def test_a_second_run_does_nothing_and_a_changed_cue_renders_one(
-    plan_of: Planner, voices: list[FakeVoice], tmp_path: Path
+    plan_of: Planner, voices: list[LetterVoice], tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
     assert run_batch(plan_of(), out).n_rendered == 3
@@ -123,7 +123,7 @@ def test_a_second_run_does_nothing_and_a_changed_cue_renders_one(
 
 
 def test_one_changed_cue_of_a_film_renders_one_segment(
-    plan_of: Planner, voices: list[FakeVoice], tmp_path: Path
+    plan_of: Planner, voices: list[LetterVoice], tmp_path: Path
 ) -> None:
     assert run_batch(plan_of(per="film"), tmp_path / "out").n_rendered == 5
     assert run_batch(plan_of(SRT.replace("Hello", "Hallo"), per="film"), tmp_path / "out").n_rendered == 1
@@ -144,7 +144,7 @@ class FailingEngine:
 
 @pytest.mark.smoke
 def test_a_failed_segment_is_named_and_the_rest_goes_on(
-    plan_of: Planner, voices: list[FakeVoice], tmp_path: Path
+    plan_of: Planner, voices: list[LetterVoice], tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
     result = run_batch(plan_of(), out, engine=FailingEngine("Hello"))
@@ -156,7 +156,7 @@ def test_a_failed_segment_is_named_and_the_rest_goes_on(
 @pytest.mark.smoke
 @pytest.mark.parametrize("name", ["taken", "taken/clips"])
 def test_a_folder_that_cannot_be_written_is_named_before_anything_is_rendered(
-    name: str, plan_of: Planner, voices: list[FakeVoice], tmp_path: Path
+    name: str, plan_of: Planner, voices: list[LetterVoice], tmp_path: Path
 ) -> None:
     (tmp_path / "taken").write_text("a file")
     with pytest.raises(BackendError, match=rf"cannot write the folder .*{name}: .*; choose another --out"):
@@ -178,7 +178,7 @@ class InterruptedEngine:
 
 @pytest.mark.smoke
 def test_an_interrupted_batch_keeps_what_is_finished_and_says_how_to_continue(
-    voices: list[FakeVoice], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    voices: list[LetterVoice], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "one.srt").write_text(SRT, encoding="utf-8")
     out = tmp_path / "clips"
@@ -193,7 +193,7 @@ def test_an_interrupted_batch_keeps_what_is_finished_and_says_how_to_continue(
     assert "made 2 clips" in capsys.readouterr().err
 
 
-def test_a_recording_is_used_in_place_of_a_voice(plan_of: Planner, voices: list[FakeVoice], tmp_path: Path) -> None:
+def test_a_recording_is_used_in_place_of_a_voice(plan_of: Planner, voices: list[LetterVoice], tmp_path: Path) -> None:
     recordings = tmp_path / "dub"
     recordings.mkdir()
     run_batch(plan_of(), tmp_path / "spoken")
@@ -275,7 +275,7 @@ def test_an_error_of_a_full_disk_is_tried_again(
     assert rendered.result is not None
 
 
-def test_a_damaged_result_is_rendered_again(plan_of: Planner, voices: list[FakeVoice], tmp_path: Path) -> None:
+def test_a_damaged_result_is_rendered_again(plan_of: Planner, voices: list[LetterVoice], tmp_path: Path) -> None:
     out = tmp_path / "out"
     run_batch(plan_of(), out)
     for path in (out / SEGMENT_FOLDER).glob("??/*.json"):
@@ -354,7 +354,7 @@ def test_a_child_process_renders_the_same_bytes_and_dies_alone(plan_of: Planner,
 
 @pytest.mark.smoke
 def test_the_command_plans_makes_and_reports(
-    voices: list[FakeVoice], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    voices: list[LetterVoice], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("one.srt").write_text(SRT.replace("\n\n2", "\n2"), encoding="utf-8")

@@ -16,7 +16,6 @@ from tests.packages import needs, reason
 
 pytest.importorskip("obstore", reason=reason("obstore"))
 
-from tests.session.fake_voice import FakeVoice
 
 from cli.main import run
 from lexicon.errors import BackendError, InputError
@@ -32,6 +31,7 @@ from tests.serving.batch.emulators import (
     start_azurite,
     start_moto,
 )
+from tests.world import LetterVoice
 from tts2face.serving.batch import engine as engines
 from tts2face.serving.batch import store
 from tts2face.serving.batch.run import run_batch
@@ -150,7 +150,7 @@ def test_a_stored_movie_is_not_replaced(bucket: Bucket, tmp_path: Path) -> None:
 
 
 def test_a_batch_keeps_its_segments_in_a_bucket(
-    bucket: Bucket, voices: list[FakeVoice], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    bucket: Bucket, voices: list[LetterVoice], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     assert run(batch(bucket.url, tmp_path)) == 0
     assert {path.name for path in (tmp_path / "clips").iterdir()} == {
@@ -224,7 +224,7 @@ def test_a_result_without_its_movie_is_removed(bucket: Bucket, tmp_path: Path) -
 
 
 def test_a_missing_bucket_is_named_before_anything_is_rendered(
-    bucket: Bucket, voices: list[FakeVoice], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    bucket: Bucket, voices: list[LetterVoice], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     assert run(batch(bucket.missing_url, tmp_path)) == 4
     message = capfd.readouterr().err
@@ -235,7 +235,7 @@ def test_a_missing_bucket_is_named_before_anything_is_rendered(
 @pytest.mark.parametrize("bucket", ["s3", "az"], indirect=True)
 def test_wrong_credentials_are_one_sentence(
     bucket: Bucket,
-    voices: list[FakeVoice],
+    voices: list[LetterVoice],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
@@ -266,7 +266,7 @@ def test_missing_credentials_are_named(bucket: Bucket, monkeypatch: pytest.Monke
 
 
 def test_a_store_that_cannot_be_reached_is_reported_in_time(
-    bucket: Bucket, voices: list[FakeVoice], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    bucket: Bucket, voices: list[LetterVoice], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     bucket.relay.fail()
     began = time.monotonic()
@@ -306,7 +306,7 @@ def test_work_pauses_while_the_store_is_away(bucket: Bucket, plan_of: Planner) -
 
 @pytest.mark.usefixtures("is_impatient")
 def test_a_clip_whose_segments_cannot_be_read_fails_with_the_reason(
-    bucket: Bucket, plan_of: Planner, voices: list[FakeVoice], tmp_path: Path
+    bucket: Bucket, plan_of: Planner, voices: list[LetterVoice], tmp_path: Path
 ) -> None:
     opened = open_store(bucket.url)
     run_batch(plan_of(), tmp_path / "out", store=opened)
