@@ -1,5 +1,6 @@
 """Forced alignment."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,37 +11,34 @@ from lexicon.dictionary import parse_dictionary
 from lexicon.errors import DataError
 from lexicon.sequence import enforce_increasing
 from tests.rendered_takes import manifest_rows
-from tts2face.sound.alignment import Aligner
+from tests.sound.conftest import HEARD_TOGETHER
+from tts2face.sound.alignment import Aligner, HeardSound
 from tts2face.sound.recogniser import RATE
 from tts2face.sound.transcript import pronounce_transcript
 from tts2face.sound.voice_pool import load_voice
 from tts2face.types import Waveform
 from tts2face.video.media import read_sound
 
+pytestmark = HEARD_TOGETHER
 WORDS = [("bob", [("b", "ɑ", "b")]), ("may", [("m", "eɪ")]), ("read", [("ɹ", "i", "d"), ("ɹ", "ɛ", "d")])]
 
 
 @pytest.fixture(scope="module")
-def aligner() -> Aligner:
-    return Aligner()
+def heard(aligner: Aligner) -> HeardSound:
+    return aligner.hear(load_voice("heart", "en-us").speak("Bob may read.").waveform)
 
 
-@pytest.fixture(scope="module")
-def sound() -> Waveform:
-    return load_voice("heart", "en-us").speak("Bob may read.").waveform
-
-
-def test_phones_cover_the_sound_and_words_their_phones(aligner: Aligner, sound: Waveform) -> None:
-    found = aligner.align(sound, WORDS)
+def test_phones_cover_the_sound_and_words_their_phones(aligner: Aligner, heard: HeardSound) -> None:
+    found = aligner.align(heard, WORDS)
     assert found.phones.start == 0.0
-    assert found.phones.end == sound.duration
+    assert found.phones.end == heard.sound.duration
     spoken = ["".join(found.phones.phones[word.first : word.last]) for word in found.words]
     assert spoken == ["bɑb", "meɪ", "ɹid"]
 
 
-def test_of_several_pronunciations_the_fitting_one_is_taken(aligner: Aligner, sound: Waveform) -> None:
+def test_of_several_pronunciations_the_fitting_one_is_taken(aligner: Aligner, heard: HeardSound) -> None:
     swapped = [*WORDS[:2], ("read", [("ɹ", "ɛ", "d"), ("ɹ", "i", "d")])]
-    found = aligner.align(sound, swapped)
+    found = aligner.align(heard, swapped)
     assert found.phones.phones[found.words[2].first : found.words[2].last] == ("ɹ", "i", "d")
 
 
@@ -58,24 +56,25 @@ def test_the_user_s_pronunciation_has_no_weak_form() -> None:
     assert pronounce_transcript("and at", "en-us", own) == (("and", (("b", "ɑ"),)), ("at", (("æ", "t"), ("ə", "t"))))
 
 
-def test_silence_before_moves_every_edge_by_its_length(aligner: Aligner, sound: Waveform) -> None:
+def test_silence_before_moves_every_edge_by_its_length(aligner: Aligner, heard: HeardSound) -> None:
     """20 ms: two frames of the model on either side."""
+    sound = heard.sound
     later = Waveform(np.concatenate([np.zeros(round(0.3 * sound.rate)), sound.samples]), sound.rate)
-    plain, moved = aligner.align(sound, WORDS), aligner.align(later, WORDS)
+    plain, moved = aligner.align(heard, WORDS), aligner.align(later, WORDS)
     first, last = plain.words[0].first, plain.words[-1].last
     shift = moved.words[0].first - first
     edges = moved.phones.edges[first + shift : last + shift + 1] - plain.phones.edges[first : last + 1]
     assert edges == pytest.approx(np.full(len(edges), 0.3), abs=0.02)
 
 
-def test_level_does_not_matter(aligner: Aligner, sound: Waveform) -> None:
-    quiet = Waveform(sound.samples * 0.1, sound.rate)
-    assert aligner.align(quiet, WORDS).phones.edges == pytest.approx(aligner.align(sound, WORDS).phones.edges, abs=0.02)
+def test_level_does_not_matter(aligner: Aligner, heard: HeardSound) -> None:
+    quiet = Waveform(heard.sound.samples * 0.1, heard.sound.rate)
+    assert aligner.align(quiet, WORDS).phones.edges == pytest.approx(aligner.align(heard, WORDS).phones.edges, abs=0.02)
 
 
-def test_no_words_are_refused(aligner: Aligner, sound: Waveform) -> None:
+def test_no_words_are_refused(aligner: Aligner, heard: HeardSound) -> None:
     with pytest.raises(DataError, match="no word to align"):
-        aligner.align(sound, [])
+        aligner.align(heard, [])
 
 
 def test_sound_that_is_too_short_for_the_words_is_refused(aligner: Aligner) -> None:
@@ -83,10 +82,12 @@ def test_sound_that_is_too_short_for_the_words_is_refused(aligner: Aligner) -> N
         aligner.align(Waveform(np.zeros(1600), 16000), [WORDS[0]] * 30)
 
 
-def test_words_that_are_not_said_are_left_out_and_others_stay_where_they_are(aligner: Aligner, sound: Waveform) -> None:
+def test_words_that_are_not_said_are_left_out_and_others_stay_where_they_are(
+    aligner: Aligner, heard: HeardSound
+) -> None:
     absent = ("elephants", [("ɛ", "l", "ə", "f", "ə", "n", "t", "s")])
-    found = aligner.align(sound, [*WORDS[:2], absent, WORDS[2]], may_lack=True)
-    plain = aligner.align(sound, WORDS)
+    found = aligner.align(heard, [*WORDS[:2], absent, WORDS[2]], may_lack=True)
+    plain = aligner.align(heard, WORDS)
     assert [word.text for word in found.words] == ["bob", "may", "read"]
     assert [mismatch.words for mismatch in found.mismatches] == [("elephants",)]
     assert found.phones.edges == pytest.approx(plain.phones.edges, abs=0.015)
@@ -106,9 +107,9 @@ def test_speech_that_is_not_written_is_stepped_over_and_told(aligner: Aligner) -
     assert "is not in the text" in mismatch.sentence
 
 
-def test_confidence_tells_a_wrong_word_from_right_ones(aligner: Aligner, sound: Waveform) -> None:
+def test_confidence_tells_a_wrong_word_from_right_ones(aligner: Aligner, heard: HeardSound) -> None:
     wrong = ("jump", [("dʒ", "ʌ", "m", "p")])
-    found = aligner.align(sound, [WORDS[0], wrong, WORDS[2]])
+    found = aligner.align(heard, [WORDS[0], wrong, WORDS[2]])
     assert [word.is_doubtful for word in found.words] == [False, True, False]
 
 
@@ -183,10 +184,11 @@ def test_edges_increase(edges: list[float], moved: list[float]) -> None:
     assert enforce_increasing(np.array(edges)) == pytest.approx(moved)
 
 
-def test_recordings_agree_with_their_word_times(aligner: Aligner, takes: Path) -> None:
+def test_recordings_agree_with_their_word_times(
+    aligner: Aligner, hear_take: Callable[[Path], HeardSound], takes: Path
+) -> None:
     """GRID's own word times: median within 20 ms (they are themselves automatic); a wrong transcript fits worse."""
     from lexicon.dictionary import cmudict_lookup
-    from tts2face.video.media import read_sound
 
     rows = manifest_rows(takes)
     rows = rows[:200:20] if len(rows) >= 200 else rows[:10]
@@ -194,14 +196,14 @@ def test_recordings_agree_with_their_word_times(aligner: Aligner, takes: Path) -
     right: list[float] = []
     wrong: list[float] = []
     for row, other in zip(rows, rows[1:] + rows[:1], strict=True):
-        sound = read_sound(takes / "clips" / f"{row['clip']}.mkv", 16000)
+        heard = hear_take(takes / "clips" / f"{row['clip']}.mkv")
         transcripts = []
         for transcript in (row["transcript"], other["transcript"]):
             words = [word for word in transcript.split() if len(word) > 1]
             transcripts.append([(word, [tuple(s.phone for s in cmudict_lookup(word) or ())]) for word in words])
-        found = aligner.align(sound, transcripts[0])
+        found = aligner.align(heard, transcripts[0])
         right.append(float(np.mean([word.confidence for word in found.words])))
-        wrong.append(float(np.mean([word.confidence for word in aligner.align(sound, transcripts[1]).words])))
+        wrong.append(float(np.mean([word.confidence for word in aligner.align(heard, transcripts[1]).words])))
         known = [line.split() for line in (takes / "align" / f"{row['clip']}.align").read_text().splitlines()]
         starts = {word: int(start) / 25000 for start, _, word in known}
         errors += [found.phones.edges[word.first] - starts[word.text] for word in found.words if word.text in starts]

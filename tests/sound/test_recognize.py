@@ -1,5 +1,6 @@
 """Recognition of phones in real speech without a transcript."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -7,17 +8,20 @@ import pytest
 
 from corpus_tools.recordings.folder import Recording, pronounce_recording
 from tests.rendered_takes import manifest_rows
-from tts2face.sound.recogniser import ENGLISH, FRAME_S, PART_S, PhoneRecogniser
+from tests.sound.conftest import HEARD_TOGETHER
+from tts2face.sound.alignment import Aligner, HeardSound
+from tts2face.sound.recogniser import ENGLISH, FRAME_S, PhoneRecogniser
 from tts2face.sound.voice_pool import load_voice
 from tts2face.types import Waveform
-from tts2face.video.media import read_sound
 
+pytestmark = HEARD_TOGETHER
+PART_S = 7.0  # of a sound in one call, instead of 24
 EDITED = 0.4  # of the phones: 0.285 over 100 sentences of this talker (docs/decisions/036-raw-recordings.md)
 
 
 @pytest.fixture(scope="module")
-def recogniser() -> PhoneRecogniser:
-    return PhoneRecogniser()
+def recogniser(aligner: Aligner) -> PhoneRecogniser:
+    return aligner.recogniser
 
 
 def edits(written: list[str], recognised: list[str]) -> int:
@@ -30,7 +34,7 @@ def edits(written: list[str], recognised: list[str]) -> int:
     return row[-1]
 
 
-def test_most_phones_of_sentences_are_recognised(recogniser: PhoneRecogniser, takes: Path) -> None:
+def test_most_phones_of_sentences_are_recognised(hear_take: Callable[[Path], HeardSound], takes: Path) -> None:
     rows = manifest_rows(takes)
     rows = rows[::80] if len(rows) >= 80 else rows
     wrong = total = 0
@@ -39,7 +43,7 @@ def test_most_phones_of_sentences_are_recognised(recogniser: PhoneRecogniser, ta
         words = pronounce_recording(Recording(row["clip"], video, row["transcript"], is_spelling=True))
         assert words is not None
         written = [phone for _, ways in words for phone in ways[0]]
-        recognised = [phone for word in recogniser.hear(read_sound(video, 16_000)).words() for phone in word]
+        recognised = [phone for word in hear_take(video).words() for phone in word]
         wrong, total = wrong + edits(written, recognised), total + len(written)
     assert wrong / total < EDITED
 
@@ -48,7 +52,8 @@ def test_silence_holds_no_word(recogniser: PhoneRecogniser) -> None:
     assert recogniser.hear(Waveform(np.zeros(0), 16_000)).words() == ()
 
 
-def test_a_long_sound_is_heard_as_its_parts(recogniser: PhoneRecogniser) -> None:
+def test_a_long_sound_is_heard_as_its_parts(recogniser: PhoneRecogniser, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tts2face.sound.recogniser.PART_S", PART_S)
     voice = load_voice("heart", "en-us")
     spoken = voice.speak("Nobody saw the dog again.").waveform.samples
     long = Waveform(np.concatenate([spoken] * int(1.5 * PART_S / (len(spoken) / voice.sample_rate))), voice.sample_rate)
