@@ -1,5 +1,6 @@
 """Pictures of shipped faces, and where their landmarks lie in them."""
 
+from dataclasses import astuple
 from functools import cache
 
 import numpy as np
@@ -11,6 +12,7 @@ from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT
 from tts2face.photo.eyes import SIDES
 from tts2face.photo.found_face import FoundFace, PhotographedFace
 from tts2face.photo.photograph import Photograph
+from tts2face.photo.speaking_photo import speaking_photo
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw
@@ -57,6 +59,19 @@ def found_in(name: str, side: int, **weights: float) -> FoundFace:
     places = projected(name, side, **weights)
     eyes = float(np.linalg.norm(places[EYE_OUTER_LEFT, :2] - places[EYE_OUTER_RIGHT, :2]))
     return FoundFace(places, 0.0, (0.0, 0.0, 0.0), eyes, 1)
+
+
+def speaking(picture: Photograph, found: FoundFace) -> Face:
+    """The bald shipped head as Ada in a picture; pictures of the same content give one face, made once."""
+    parts = (*astuple(picture), found.landmarks)
+    key = tuple(part.tobytes() + str(part.shape).encode() if isinstance(part, np.ndarray) else part for part in parts)
+    if key not in _SPEAKING:
+        metadata = {"name": "Ada", "consent": {"statement": "drawn"}}
+        _SPEAKING[key] = speaking_photo(photographed(picture, found), load_face("head", hair="bald"), metadata)
+    return _SPEAKING[key]
+
+
+_SPEAKING: dict[tuple[object, ...], Face] = {}
 
 
 def photographed(picture: Photograph, found: FoundFace, smile: float = 0.0) -> PhotographedFace:

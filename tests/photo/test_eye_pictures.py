@@ -1,18 +1,18 @@
 """Eyes of a picture: catchlights stay nearly where the lamp is, while the iris moves under them."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
-from tests.photo.pictures import found_in, photographed, still
+from tests.photo.pictures import found_in, speaking, still
 from tts2face.models.face import Face
-from tts2face.models.face_loading import load_face
 from tts2face.photo.eyes import IRISES
 from tts2face.photo.found_face import FoundFace
 from tts2face.photo.photograph import Photograph
 from tts2face.photo.shapes import EYES
-from tts2face.photo.speaking_photo import speaking_photo
 from tts2face.picture.options import Picture
-from tts2face.picture.renderer import mesh_renderer
+from tts2face.picture.renderer import MeshRenderer, mesh_renderer
 
 SIDE, NAME = 800, "head"
 ASIDE = {"eyeLookOutLeft": 0.8, "eyeLookInRight": 0.8}  # to the right in the picture
@@ -37,15 +37,15 @@ def painted(found: FoundFace, eyes: tuple[int, ...]) -> tuple[np.ndarray, list[n
     return pixels, middles, radius
 
 
-def speaking(pixels: np.ndarray, found: FoundFace) -> Face:
-    seen = photographed(Photograph(pixels, None, 1.0), found)
-    return speaking_photo(seen, load_face("head", hair="bald"), {"name": "Ada"})
+@cache
+def renderer_of(face: Face) -> MeshRenderer:
+    return mesh_renderer(face, Picture())
 
 
 def spots(face: Face, middles: list[np.ndarray], radius: float, **weights: float) -> np.ndarray:
     """Places (2, 2) of the bright spot in each eye; NaN where there is none."""
     weighted = np.array([weights.get(name, 0.0) for name in face.shape_names], np.float32)
-    grey = mesh_renderer(face, Picture()).draw(weighted).astype(float).mean(axis=2)
+    grey = renderer_of(face).draw(weighted).astype(float).mean(axis=2)
     found = np.full((2, 2), np.nan)
     for eye, middle in enumerate(middles):
         x, y = (middle - radius).round().astype(int)
@@ -64,7 +64,7 @@ def test_catchlights_follow_the_iris_in_part_where_both_eyes_have_some(found: Fo
     ways = []
     for eyes, n_patches in (((0, 1), 4), ((0,), 2)):
         pixels, middles, radius = painted(found, eyes)
-        face = speaking(pixels, found)
+        face = speaking(Photograph(pixels, None, 1.0), found)
         assert [part.name for part in face.parts].count(EYES) == n_patches
         ways.append(spots(face, middles, radius, **ASIDE) - spots(face, middles, radius))
     (staying, other), (following, none) = ways
@@ -76,8 +76,8 @@ def test_catchlights_follow_the_iris_in_part_where_both_eyes_have_some(found: Fo
 
 def test_at_rest_they_are_those_of_the_picture(found: FoundFace) -> None:
     pixels, middles, _ = painted(found, (0, 1))
-    face = speaking(pixels, found)
-    shown = mesh_renderer(face, Picture()).draw(np.zeros(len(face.shape_names), np.float32))
+    face = speaking(Photograph(pixels, None, 1.0), found)
+    shown = renderer_of(face).draw(np.zeros(len(face.shape_names), np.float32))
     for middle in middles:
         x, y = middle.round().astype(int)
         part = np.s_[y - 5 : y + 6, x - 8 : x + 9]

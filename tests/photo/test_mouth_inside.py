@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 
-from tests.photo.pictures import found_in, photographed, still
+from tests.photo.pictures import found_in, speaking, still
 from tts2face.models.face import Face
-from tts2face.models.face_loading import load_face
 from tts2face.photo.photograph import Photograph
-from tts2face.photo.speaking_photo import speaking_photo
 
-SIDE, NAME = 320, "head"
+SIDE, NAME = 400, "head"
 
 
 @pytest.fixture(scope="module")
@@ -18,14 +16,8 @@ def faces() -> dict[str, Face]:
     coloured = still(NAME, SIDE)
     grey = np.repeat(coloured.mean(axis=2, keepdims=True), 3, axis=2).astype(np.uint8)
     pictures = {"coloured": coloured, "grey": grey, "dark": (coloured * 0.6).astype(np.uint8)}
-    return {
-        name: speaking_photo(
-            photographed(Photograph(pixels, None, 1.0), found_in(NAME, SIDE)),
-            load_face("head", hair="bald"),
-            {"name": "Ada"},
-        )
-        for name, pixels in pictures.items()
-    }
+    found = found_in(NAME, SIDE)
+    return {name: speaking(Photograph(pixels, None, 1.0), found) for name, pixels in pictures.items()}
 
 
 def inside(face: Face, part_name: str) -> np.ndarray:
