@@ -67,6 +67,7 @@ def drawn_person(identity: str | None, hair: str | None, colour: str | None) -> 
     return person, draw(person, np.zeros(len(person.shape_names)), picture=picture)
 
 
+@cache
 def seen_look(
     identity: str | None, hair: str | None, colour: str | None, gains: tuple[float, ...] = (1, 1, 1), size: int = 1
 ) -> PersonLook:
