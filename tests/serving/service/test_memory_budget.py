@@ -1,5 +1,6 @@
 """Sessions of a process within a memory budget."""
 
+import gc
 import subprocess
 import sys
 from typing import Any
@@ -14,20 +15,27 @@ MB = 1_000_000
 
 
 class FakeSession:
-    """A session that takes 100 MB while anything holds it."""
+    """A session that takes 100 MB while anything holds it; it holds itself in a circle, as sessions do."""
 
     alive: "set[int]" = set()  # noqa: RUF012 - of the class
 
     def __init__(self, talker: str, *_: Any, **__: Any) -> None:
-        self.talker = talker
+        self.talker, self.itself = talker, self
         FakeSession.alive.add(id(self))
 
     def __del__(self) -> None:
         FakeSession.alive.discard(id(self))
 
 
+@pytest.fixture(scope="module")
+def few_objects() -> None:
+    """Python's collector leaves out the objects of all other tests, through which it looks for 0.3 s each time."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.fixture
-def memory(monkeypatch: pytest.MonkeyPatch) -> None:
+def memory(few_objects: None, monkeypatch: pytest.MonkeyPatch) -> None:
     FakeSession.alive.clear()
     monkeypatch.setattr("tts2face.session.session.Session", FakeSession)
     monkeypatch.setattr(functions, "resident_bytes", lambda: 100 * MB * len(FakeSession.alive))

@@ -18,10 +18,10 @@ from tts2face.serving.work.uploaded_file import PICTURE, SOUND, SUBTITLES
 RATE = 16_000
 
 
-def decode(kind: str, content: bytes, folder: Path, limit: float) -> tuple[str, Path]:
+def decode(kind: str, content: bytes, folder: Path, limit: float, **options: bool) -> tuple[str, Path]:
     given, decoded = folder / "given", folder / "decoded"
     given.write_bytes(content)
-    return refusal(kind, given, decoded, limit), decoded
+    return refusal(kind, given, decoded, limit, **options), decoded
 
 
 def wav(seconds: float = 1.0, level: float = 0.3) -> bytes:
@@ -54,8 +54,10 @@ def png_bomb(side: int) -> bytes:
     )
 
 
-def test_sound_becomes_plain_sound(tmp_path: Path) -> None:
-    message, path = decode("sound", wav(), tmp_path, 10.0)
+@pytest.mark.parametrize("is_limited", [False, True])
+def test_sound_becomes_plain_sound(tmp_path: Path, is_limited: bool) -> None:
+    """In the process of the test, as those below, and in a child within its limits."""
+    message, path = decode("sound", wav(), tmp_path, 10.0, is_limited=is_limited)
     assert message == ""
     with wave.open(str(path)) as file:
         assert (file.getframerate(), file.getnchannels()) == (48_000, 1)
@@ -96,7 +98,7 @@ def test_wrong_files_are_refused(tmp_path: Path, kind: str, content: bytes, limi
 
 def test_a_decoder_cannot_take_the_memory_of_the_machine(tmp_path: Path) -> None:
     """A picture within the limit of pixels but beyond that of memory ends its process only."""
-    message, _ = decode("picture", png_bomb(30_000), tmp_path, 1e9)
+    message, _ = decode("picture", png_bomb(30_000), tmp_path, 1e9, is_limited=True)
     assert message
     assert "Traceback" not in message
 

@@ -9,8 +9,7 @@ import pytest
 
 from tests.processes.answered import answered
 from tts2face.processes.message import ERROR, RESULT
-from tts2face.serving.service import synthesis
-from tts2face.serving.service.logs import JSON_LINES
+from tts2face.serving.service import pool, synthesis
 from tts2face.serving.service.messages import SYNTHESISE, Work
 from tts2face.serving.service.pool import LINES_COST, MOVIE_COST, SOUND_COST, WarmProcess, work_cost
 from tts2face.serving.service.preparation import Preparation
@@ -23,12 +22,14 @@ READY_TIMEOUT_S = 120.0
 GIVEN = {"given": lambda *_: iter([Chunk(b"a", 2.0)])}  # a table of tasks
 
 
-def test_the_end_of_a_process_is_not_taken_from_asyncio(caplog: pytest.LogCaptureFixture) -> None:
+def test_the_end_of_a_process_is_not_taken_from_asyncio(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Asyncio warns of an unknown child process if something else has read its exit status."""
+    monkeypatch.setattr(pool, "PROGRAM", "tests.processes.handlers:served")
 
     async def run() -> None:
-        settings = {"n_sessions": 1, "log_format": JSON_LINES, "log_text": False, "memory_mb": 0, "sentences_mb": 0}
-        process = WarmProcess(settings, Preparation((), 1), lambda: None)
+        process = WarmProcess({}, Preparation((), 1), lambda: None)
         running = asyncio.create_task(process.run())
         async with asyncio.timeout(READY_TIMEOUT_S):
             for number in range(3):

@@ -1,12 +1,16 @@
 """Jobs of kind ``talker`` with a stub in place of the builder: ends of the builder, names, quotas, repetitions."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from corpus_tools.tools.talker import BuildOrder
 from lexicon.errors import DataError
+from tests.models.made import write_made_talker
+from tests.serving.work.stub_builder import MADE, ORDER
 from tts2face.serving.work import kinds
 from tts2face.serving.work.blobs import open_blobs
 from tts2face.serving.work.connection import DatabaseAwayError
@@ -28,6 +32,7 @@ def run(tmp_path: Path, events: list[dict[str, Any]], monkeypatch: pytest.Monkey
     """Function that executes a job."""
     monkeypatch.setattr(kinds, "BUILDER", "tests.serving.work.stub_builder:HANDLERS")
     (tmp_path / "a.mp4").write_bytes(b"video")
+    write_made_talker(tmp_path / MADE, has_face=False)
     blobs = open_blobs(tmp_path / "store", "resources")
 
     def execute(name: str = "anna", order: str = "1", n_resources: int = 5, check: Any = lambda: None) -> Products:
@@ -57,6 +62,7 @@ def test_a_talker_is_stored_once_however_often_its_job_runs(
 ) -> None:
     """A worker that dies after it has stored the talker is followed by another, which runs the job again."""
     first = run()
+    assert BuildOrder(**json.loads((tmp_path / ORDER).read_text())).name == "anna"  # what the builder takes
     assert [one.name for one in first.files] == ["anna.talker"]
     assert events == [
         {"type": "progress", "stage": "reading recordings", "done": 0, "of": 0},

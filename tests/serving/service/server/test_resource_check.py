@@ -33,10 +33,12 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return write_made_models(tmp_path_factory.mktemp("resources"), WORDS)
 
 
-def check(kind: str, source: Path, folder: Path, most: float = MOST_BYTES) -> tuple[str, Path]:
+def check(
+    kind: str, source: Path, folder: Path, most: float = MOST_BYTES, *, is_limited: bool = False
+) -> tuple[str, Path]:
     checked = folder / "checked"
     checked.mkdir()
-    return refusal(kind, source, checked, most), checked
+    return refusal(kind, source, checked, most, is_limited=is_limited), checked
 
 
 @pytest.mark.parametrize(
@@ -44,7 +46,7 @@ def check(kind: str, source: Path, folder: Path, most: float = MOST_BYTES) -> tu
     [
         ("talker", {"n_utterances": 6, "has_own_face": False, "language": "not stated"}),
         ("face", {"identities": ["older"], "summary": "mesh with 4 shapes"}),
-        pytest.param("palette", {}, marks=pytest.mark.smoke),
+        ("palette", {}),
         ("dictionary", {"n_words": 2}),
     ],
 )
@@ -263,7 +265,7 @@ def test_a_face_that_unpacks_to_gigabytes_ends_its_process_only(files: dict[str,
     arrays["limits"] = np.concatenate([arrays["limits"], np.zeros((n - moved, 2), np.float32)])
     write_tensors(tmp_path / "large.face", "face", 1, arrays, header)
     assert (tmp_path / "large.face").stat().st_size < 20e6
-    message, _ = check("face", tmp_path / "large.face", tmp_path)
+    message, _ = check("face", tmp_path / "large.face", tmp_path, is_limited=True)
     assert ("Traceback" in message, "memory" in message) == (False, True), message
 
 
