@@ -1,11 +1,13 @@
 """Compilation of all kernels at the first run on a machine; later runs load them from the disk cache.
 
-numba compiles one kernel at a time in each process. So a command compiles the kernels of motion, of gestures and of
-strands in child processes, beside the other drawing kernels; a server divides them among its synthesis processes.
+numba compiles one kernel at a time in each process. So a command compiles the kernels of motion, of gestures, of sound
+and of strands in a child process for each further core, beside the other drawing kernels, and itself what is left after
+these; a server divides them among its synthesis processes.
 """
 
 import threading
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -20,16 +22,19 @@ from tts2face.lips import contacts
 from tts2face.models.face import Face, keep_parts
 from tts2face.models.face_loading import load_face
 from tts2face.models.talker import load_talker
+from tts2face.numeric.reuse import available_cores
 from tts2face.picture.options import Picture
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.parent import Child
 from tts2face.processes.program import Program
 from tts2face.session.named_models import Models
+from tts2face.sound import segments
 
 COMPILE_TIMEOUT_S = 120.0
 Kernel = tuple[ModuleType, str]
 MOTION: Kernel = (contacts, "_closest_rows")  # one of the last that `compile_motion` compiles, and nothing else needs
 GESTURES: Kernel = (field_kernels, "generate_frames")
+SOUND: Kernel = (segments, "_search")
 
 
 def kernels_are_compiled(drawn: Face | None) -> bool:
@@ -55,32 +60,35 @@ def _is_compiled(module: ModuleType, name: str) -> bool:
 def compile_kernels(drawn: Face | None) -> None:
     """Compile all kernels that a clip of a face needs; None for a clip without pictures.
 
-    If a child process fails, its kernels are compiled at their first use.
+    This process compiles those of pictures, and then, in turn with a child for each further core, the others. If a
+    child fails, its kernels are compiled at their first use.
     """
     from tts2face.picture.surface import STRANDS
 
     has_strands = drawn is not None and not drawn.light
-    works = ["compile_motion", "compile_gestures", *(["compile_strands"] if has_strands else [])]
-    children = [Child(Program(f"{__name__}:HANDLERS")) for _ in works]
-    threads = [
-        threading.Thread(target=_compile, args=(child, work), daemon=True)
-        for child, work in zip(children, works, strict=True)
-    ]
+    works = deque(name for name, work in WORKS.items() if has_strands or work is not compile_strands)
+    children = [Child(Program(f"{__name__}:HANDLERS")) for _ in range(min(available_cores() - 1, len(works)))]
+    threads = [threading.Thread(target=_compile, args=(child, works), daemon=True) for child in children]
     for thread in threads:
         thread.start()
     try:
         if drawn is not None:
             compile_pictures(keep_parts(drawn, lambda part: part.kind != STRANDS) if has_strands else drawn)
+        with suppress(IndexError):  # the children have taken the rest
+            while True:
+                WORKS[works.popleft()]()
         for thread in threads:
             thread.join()
     finally:
+        works.clear()
         for child in children:
             child.close()
 
 
-def _compile(child: Child, work: str) -> None:
-    with suppress(BackendError):  # its kernels are compiled at their first use
-        child.call(work, {}, timeout_s=COMPILE_TIMEOUT_S)
+def _compile(child: Child, works: deque[str]) -> None:
+    with suppress(BackendError, IndexError):  # its kernels are compiled at their first use; no work is left
+        while True:
+            child.call(works.popleft(), {}, timeout_s=COMPILE_TIMEOUT_S)
 
 
 def compile_pictures(face: Face) -> None:
@@ -122,10 +130,18 @@ def compile_motion() -> None:
 
 
 def compile_gestures() -> None:
-    """Compile the kernels of gestures, of the level of sound and of edges by three frames of gestures."""
+    """Compile the kernels of gestures by three frames of them."""
     from tts2face.gestures.stream import GestureFields, GestureStream
     from tts2face.gestures.timeline import Timeline
     from tts2face.models.palette import load_palette
+    from tts2face.types import Waveform
+
+    gestures = GestureStream(GestureFields(load_palette("starter")), style="grid_s1", seed=0, fps=30.0)
+    gestures.next(Waveform(np.zeros(1600), 16_000), 3, Timeline())
+
+
+def compile_sound() -> None:
+    """Compile the kernels of the level of sound and of edges."""
     from tts2face.models.phone_classifier import load_phone_classifier
     from tts2face.sound.level import block_powers
     from tts2face.sound.segments import StatedPhone, find_edges
@@ -135,25 +151,21 @@ def compile_gestures() -> None:
     block_powers(sound)
     stated = [StatedPhone(SILENCE, 0.0), StatedPhone("ə", 0.03, 0.03), StatedPhone(SILENCE, 0.06)]
     find_edges(sound, stated, load_phone_classifier("heart"))
-    gestures = GestureStream(GestureFields(load_palette("starter")), style="grid_s1", seed=0, fps=30.0)
-    gestures.next(sound, 3, Timeline())  # the last one: `GESTURES` tells that all are compiled
 
 
-def _motion(_: Call) -> dict[str, Any]:
+def _motion() -> None:
     if not _is_compiled(*MOTION):
         compile_motion()
-    return {}
 
 
-def _gestures(_: Call) -> dict[str, Any]:
+def _gestures() -> None:
     if not _is_compiled(*GESTURES):
         compile_gestures()
-    return {}
 
 
-def _strands(_: Call) -> dict[str, Any]:
-    compile_strands()
-    return {}
+def _sound() -> None:
+    if not _is_compiled(*SOUND):
+        compile_sound()
 
 
 def _pictures(call: Call) -> dict[str, Any]:
@@ -164,7 +176,18 @@ def _pictures(call: Call) -> dict[str, Any]:
     return {}
 
 
-HANDLERS: Mapping[str, Handler] = MappingProxyType({
-    "compile_motion": _motion, "compile_gestures": _gestures, "compile_strands": _strands,
-    "compile_pictures": _pictures,
+def _handler(work: Callable[[], None]) -> Handler:
+    def handle(_: Call) -> dict[str, Any]:
+        work()
+        return {}
+
+    return handle
+
+
+WORKS: Mapping[str, Callable[[], None]] = MappingProxyType({
+    "compile_motion": _motion, "compile_strands": compile_strands, "compile_gestures": _gestures,
+    "compile_sound": _sound,
 })  # fmt: skip
+HANDLERS: Mapping[str, Handler] = MappingProxyType(
+    {name: _handler(work) for name, work in WORKS.items()} | {"compile_pictures": _pictures}
+)

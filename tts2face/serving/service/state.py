@@ -138,7 +138,7 @@ class ServiceState:
         """What synthesis processes prepare: the longest compilation first, then the voice and the models of a movie."""
         works = {"voice": self.work(kind="speech", request={"text": WARM_TEXT}),
                  "models": self.work(format="mp4", request={"text": WARM_TEXT})}  # fmt: skip
-        kernels = {f"kernels of {part}": f"compile_{part}" for part in ("pictures", "motion", "gestures")}
+        kernels = {f"kernels of {part}": f"compile_{part}" for part in ("pictures", "motion", "gestures", "sound")}
         return (
             *(Step(name, call, works["models"].models, is_shared=True) for name, call in kernels.items()),
             *(Step(name, SYNTHESISE, work_call(work)) for name, work in works.items()),
