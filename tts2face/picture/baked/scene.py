@@ -226,6 +226,7 @@ class LitScene:
         buffers.frame += 1
         eyes = (self._eye_rows(weights, head), surface.eye_texture, self.camera)
         light = (self._lamps(head), surface.light.sky, self.view)
+        eye_bands = self._eye_bands(buffers)
         for number, first in enumerate(range(0, len(pixels), rows)):
             band = pixels[first : first + rows]
             nearest = buffers.nearest[: len(band) * side]
@@ -237,8 +238,9 @@ class LitScene:
             count = list_fragments(nearest, place, surface.piece_of, (*found, buffers.samples, buffers.keys), starts)
             if count:
                 self._colour(found, count, buffers)
-                shapes = (buffers.table, surface.triangles, surface.eye_of)
-                colour_eyes(found, count, shapes, eyes, light, buffers.values[AT_RED:])
+                if eye_bands[0] <= number < eye_bands[1]:
+                    shapes = (buffers.table, surface.triangles, surface.eye_of)
+                    colour_eyes(found, count, shapes, eyes, light, buffers.values[AT_RED:])
                 fragments, colours = (starts, buffers.samples, side * side), buffers.values[AT_RED:]
                 if self.wall is None:
                     compose(*fragments, colours, band)
@@ -254,6 +256,12 @@ class LitScene:
         order = np.zeros(ends[-1], np.int32)
         fill_bands(buffers.bands, ends.copy(), order)
         return order, ends
+
+    def _eye_bands(self, buffers: LitBuffers) -> tuple[int, int]:
+        """The first of the bands that show eyeballs, and one past the last."""
+        bands = buffers.bands[self.surface.eye_of >= 0]
+        bands = bands[bands[:, 1] > bands[:, 0]]
+        return (int(bands[:, 0].min()), int(bands[:, 1].max())) if len(bands) else (0, 0)
 
     def _colour(self, found: Any, count: int, buffers: LitBuffers) -> None:
         """Write the colours of fragments; on eyeballs, the light."""
