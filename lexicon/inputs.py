@@ -110,7 +110,7 @@ def _convert_single(name: str, value: Any, kind: Any) -> Any:
     return value if is_right else check_type(name, value, kind)
 
 
-def _convert_list(name: str, value: Any, kind: type, inner: tuple[Any, ...]) -> Any:
+def _convert_list(name: str, value: Any, kind: Any, inner: tuple[Any, ...]) -> Any:
     """A tuple or set of values of one type, or a tuple of one type for each of its values."""
     if not isinstance(value, list | kind):
         raise InputError(f"{name} must be {EXPECTED[list]}, not {format_value(value)}")

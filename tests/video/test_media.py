@@ -1,4 +1,5 @@
 import os
+import struct
 import subprocess
 import sys
 from fractions import Fraction
@@ -115,3 +116,14 @@ def test_damaged_films_are_read_or_refused_in_bounded_memory_and_time(name, rend
     assert done.returncode == 0, done.stderr
     assert len(done.stdout.splitlines()) == 40
     assert "refused" in done.stdout
+
+
+def test_metadata_that_are_not_utf_8_do_no_harm(tmp_path: Path) -> None:
+    def chunk(name: bytes, content: bytes) -> bytes:
+        return name + struct.pack("<I", len(content)) + content
+
+    path = tmp_path / "named.wav"
+    title = chunk(b"LIST", b"INFO" + chunk(b"INAM", "Grüße ".encode("latin-1")))
+    form = chunk(b"fmt ", struct.pack("<HHIIHH", 1, 1, 8000, 16000, 2, 16))
+    path.write_bytes(chunk(b"RIFF", b"WAVE" + form + title + chunk(b"data", bytes(16_000))))
+    assert read_sound(path, 8000).duration == 1.0

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lexicon.errors import DataError
 from tts2face.models.appearance import Appearance, Plate, TextureModel
 from tts2face.picture.options import SIDE_LIMITS_PX, Picture
+from tts2face.video.media import metadata_options
 
 if TYPE_CHECKING:
     from PIL.Image import Image as PilImage
@@ -139,7 +140,7 @@ def _decode_video(plate: Plate) -> Iterator[NDArray[np.uint8]]:
 
     n_frames = 0
     try:
-        with av.open(io.BytesIO(plate.video.tobytes()), "r", format="mp4", metadata_errors="replace") as container:
+        with av.open(io.BytesIO(plate.video.tobytes()), "r", format="mp4", **metadata_options()) as container:
             stream = container.streams.video[0]
             size = stream.width, stream.height
             for frame in container.decode(stream) if max(size) <= MAX_VIDEO_SIDE_PX else ():

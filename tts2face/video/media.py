@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 Stream = TypeVar("Stream", "AudioStream", "VideoStream")
 
+AV_WITHOUT_OPTION = 19  # version of PyAV from which on other characters in metadata never raise
 MAX_SHORTFALL_S = 0.25  # a file that ends this much before its stated end is truncated; codecs pad by less
 MAX_DELAY_S = 60.0  # largest start time of the sound; larger values indicate damage
 MAX_FPS = 240.0  # upper limit of cameras; higher stated rates are those of the file's time base
@@ -151,6 +152,13 @@ def _first_sample_time(frame: "AudioFrame", path: Path) -> float:
     return start
 
 
+def metadata_options() -> dict[str, Any]:
+    """Arguments of `av.open` for metadata that are not UTF-8, which older programs write."""
+    import av
+
+    return {"metadata_errors": "replace"} if int(av.__version__.partition(".")[0]) < AV_WITHOUT_OPTION else {}
+
+
 @contextmanager
 def _open_container(path: Path) -> Iterator["InputContainer"]:
     import av
@@ -161,7 +169,7 @@ def _open_container(path: Path) -> Iterator["InputContainer"]:
     if path.stat().st_size == 0:
         raise DataError(f"{path} is empty (0 bytes); copy or record it again")
     try:
-        with av.open(str(path), metadata_errors="replace") as container:
+        with av.open(str(path), **metadata_options()) as container:
             yield container
     except (av.FFmpegError, OSError) as broken:
         reason = getattr(broken, "strerror", None) or broken
