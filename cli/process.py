@@ -40,7 +40,8 @@ HANDLED_S = 2.0  # after which compiled code that does not return is ended with 
 SHOW_CURSOR = b"\x1b[?25h"  # a progress bar hides it
 INTERRUPTED = "tts2face: interrupted; {}"
 UNCHANGED = "an output that was not complete yet is as it was before"  # also after the first of several outputs
-TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3  # parameter numbers of mallopt in glibc's malloc.h
+TRIM_THRESHOLD, MMAP_THRESHOLD, MOST_ARENAS = -1, -3, -8  # parameter numbers of mallopt in glibc's malloc.h
+N_ARENAS = 2  # heaps from which threads allocate; one for each thread takes 14 MB more in a clip
 LARGE_BYTES = 1 << 20  # arrays of at least this size are mapped one by one; pictures of 512 x 512 are smaller
 
 
@@ -251,7 +252,8 @@ def return_large_blocks() -> bool:
     set_option = getattr(ctypes.CDLL(None), "mallopt", None)  # glibc
     if set_option is None:
         return False
-    return all(set_option(option, LARGE_BYTES) == 1 for option in (MMAP_THRESHOLD, TRIM_THRESHOLD))
+    values = {MMAP_THRESHOLD: LARGE_BYTES, TRIM_THRESHOLD: LARGE_BYTES, MOST_ARENAS: N_ARENAS}
+    return all(set_option(option, value) == 1 for option, value in values.items())
 
 
 def pause_collection() -> None:

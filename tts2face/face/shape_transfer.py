@@ -12,6 +12,7 @@ from tts2face.face.deformation import axis_scales, landmark_motion, landmark_pos
 from tts2face.models.face import Eye, Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, N_LANDMARKS, N_MESH_LANDMARKS
+from tts2face.numeric.arrays import append_rows
 from tts2face.numeric.splines import fit_local_interpolant
 from tts2face.storage.tensors import computed_once
 
@@ -107,7 +108,7 @@ def append_shapes(face: Face, names: Sequence[str], shapes: Float32Array, limits
     return replace(
         face,
         shape_names=(*face.shape_names, *names),
-        shapes=np.concatenate([face.shapes, shapes]),
+        shapes=append_rows(face.shapes, shapes),
         limits=np.concatenate([face.limits, limits.astype(np.float32)]),
     )
 

@@ -24,6 +24,7 @@ from tts2face.models.baked_light import (
     HairTint,
     fills_pages,
 )
+from tts2face.numeric.arrays import zeros_with_room
 from tts2face.storage.media_files import JPEG_QUALITY, decode_colours, encode_colours
 from tts2face.storage.schema import MAX_MM, Contents, Tensor, anything, number, record, table, whole
 from tts2face.storage.tensors import pack_arrays, unpack_arrays
@@ -202,6 +203,7 @@ def _tint(contents: Contents, n_vertices: int, side: int) -> HairTint | None:
 
 STEPS_PER_SHAPE = 32000.0  # 16-bit steps of a shape's largest displacement, at most
 MAX_STEP_MM = 0.1  # 16 bits of it are 3 m
+ROOM = 32  # further shapes for which faces have room; a palette adds about 15
 TRIPLE = np.dtype("V12")  # displacement of a vertex: rows are copied as one item each, in half of the time
 MAX_CELLS = 100_000_000  # shapes x vertices: 1.2 GB when read; a head has 1.4 million
 
@@ -250,7 +252,7 @@ def pack_shapes(shapes: Iterable[NDArray[np.floating]], least_mm: float) -> dict
 def unpack_shapes(arrays: Mapping[str, NDArray[Any]], n_vertices: int) -> NDArray[np.float32]:
     """Displacements (K, V, 3) of what `pack_shapes` returned."""
     counts, steps = arrays["shape_counts"], arrays["shape_steps"]
-    shapes = np.zeros((len(counts), n_vertices, 3), np.float32)
+    shapes = zeros_with_room(len(counts), ROOM, (n_vertices, 3))
     bounds = np.concatenate([[0], np.cumsum(counts)])
     for at, step in enumerate(steps):
         span = slice(bounds[at], bounds[at + 1])

@@ -3,6 +3,8 @@
 sRGB values and linear light (IEC 61966-2-1).
 """
 
+import threading
+import weakref
 from typing import Any, TypeVar
 
 import numpy as np
@@ -16,6 +18,34 @@ def ordered_product(a: NDArray[np.floating], b: NDArray[np.floating]) -> FloatAr
     """Matrix product whose result is bit-identical for any number of threads, unlike that of a threaded BLAS."""
     summed: FloatArray = np.einsum("...k,kj->...j" if b.ndim > 1 else "...k,k->...", a, b)
     return summed
+
+
+_N_USED: dict[int, int] = {}  # rows that arrays of `zeros_with_room` have given away, by their numbers
+_LOCK = threading.Lock()
+
+
+def zeros_with_room(n_rows: int, room: int, row: tuple[int, ...]) -> NDArray[np.float32]:
+    """Zeros (n, ...) that `append_rows` extends in place by up to `room` rows, which take no memory before."""
+    whole = np.zeros((n_rows + room, *row), np.float32)
+    _N_USED[id(whole)] = n_rows
+    weakref.finalize(whole, _N_USED.pop, id(whole), None)
+    return whole[:n_rows]
+
+
+def append_rows(rows: NDArray[np.float32], more: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Rows (n, ...) with (m, ...) behind them: in the same memory where it has room, which only one caller gets."""
+    whole, n = rows.base, len(rows) + len(more)
+    if whole is None or whole.shape[1:] != rows.shape[1:] or whole.ctypes.data != rows.ctypes.data or n > len(whole):
+        return np.concatenate([rows, more])
+    with _LOCK:
+        is_last = _N_USED.get(id(whole)) == len(rows)
+        if is_last:
+            _N_USED[id(whole)] = n
+    if not is_last:
+        return np.concatenate([rows, more])
+    whole[len(rows) : n] = more
+    extended: NDArray[np.float32] = whole[:n]
+    return extended
 
 
 def true_runs(values: NDArray[np.bool_]) -> NDArray[np.int64]:

@@ -42,4 +42,5 @@ def gaussian(values: NDArray[np.floating], sigma: float) -> NDArray[np.floating]
     sums = held[half : half + n] * weights[half]
     for at in range(half):
         sums += (held[at : at + n] + held[2 * half - at : 2 * half - at + n]) * weights[at]
-    return sums.astype(values.dtype)
+    smooth: NDArray[np.floating] = sums.astype(values.dtype)
+    return smooth

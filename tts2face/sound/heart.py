@@ -269,7 +269,9 @@ def open_network(model: bytes) -> Any:
         CACHE_KIND, CACHE_VERSION, [np.frombuffer(model, np.uint8), DURATION_TENSOR, onnxruntime.__version__],
         lambda: {"graph": _optimised(model)}, lambda found: "graph" in found and found["graph"].dtype == np.uint8,
     )  # fmt: skip
-    return _session(kept["graph"].tobytes(), levels.ORT_ENABLE_ALL)
+    session = _session(kept["graph"].tobytes(), levels.ORT_ENABLE_ALL)
+    session._model_bytes = None  # kept for a start on another provider: the size of the model, for as long as it lasts
+    return session
 
 
 def _optimised(model: bytes) -> NDArray[np.uint8]:
