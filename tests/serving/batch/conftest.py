@@ -11,6 +11,7 @@ from tts2face.request import Request
 from tts2face.serving.batch.options import BatchOptions
 from tts2face.serving.batch.output import Plan
 from tts2face.serving.batch.plan import plan_batch
+from tts2face.session.named_models import Models
 from tts2face.sound import voice_pool
 
 FPS = 10
@@ -40,11 +41,18 @@ def voices(monkeypatch: pytest.MonkeyPatch) -> list[LetterVoice]:
 def plan_of(tmp_path: Path) -> Planner:
     """Plan of subtitles in ``one.srt`` with batch options by name."""
 
-    def plan(content: str = SRT, *, name: str = "one.srt", cast: object = None, **options: object) -> Plan:
+    def plan(
+        content: str = SRT,
+        *,
+        name: str = "one.srt",
+        cast: object = None,
+        models: Models | None = None,
+        **options: object,
+    ) -> Plan:
         path = tmp_path / name
         path.parent.mkdir(exist_ok=True)
         path.write_text(content, encoding="utf-8")
         request = Request(fps=FPS)
-        return plan_batch([path], BatchOptions(**options), request=request, picture=SMALL, cast=cast)
+        return plan_batch([path], BatchOptions(**options), request=request, picture=SMALL, models=models, cast=cast)
 
     return plan

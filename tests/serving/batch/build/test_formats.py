@@ -133,9 +133,9 @@ def test_exports_alone_draw_nothing(plan_of: Planner, voices: list[LetterVoice],
 @pytest.mark.smoke
 def test_faces_of_one_export_must_be_equal(plan_of: Planner) -> None:
     cast = Cast(roles=(Role({"speaker": "ANN"}, {"face": "head"}),))
-    assert len(plan_of(cast=cast, exports=("glb",)).outputs) == 3
+    assert len(plan_of(cast=cast, models=None, exports=("glb",)).outputs) == 3
     with pytest.raises(InputError, match=r"one-scene-001 shows 2 faces \(head starter, ada starter\)"):
-        plan_of(cast=cast, per="scene", exports=("glb",))
+        plan_of(cast=cast, models=None, per="scene", exports=("glb",))
 
 
 @pytest.mark.smoke

@@ -16,7 +16,7 @@ import pytest
 from cli.main import run
 from lexicon.errors import BackendError, InputError
 from tests.serving.batch.conftest import FPS, SRT, Planner
-from tests.world import PHONE_S, LetterVoice
+from tests.world import PHONE_S, LetterVoice, World
 from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.batch import engine as engines
 from tts2face.serving.batch.engine import LocalEngine, Rendered
@@ -178,11 +178,15 @@ class InterruptedEngine:
 
 @pytest.mark.smoke
 def test_an_interrupted_batch_keeps_what_is_finished_and_says_how_to_continue(
-    voices: list[LetterVoice], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    voices: list[LetterVoice],
+    world: World,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (tmp_path / "one.srt").write_text(SRT, encoding="utf-8")
     out = tmp_path / "clips"
-    words = ["batch", str(tmp_path / "one.srt"), "--out", str(out), "--size", "64x64", "--fps", "10"]
+    words = ["batch", str(tmp_path / "one.srt"), "--out", str(out), "--size", "64x64", "--fps", "10", *world.models]
     with monkeypatch.context() as patch:
         patch.setattr(engines, "LocalEngine", InterruptedEngine)
         assert run(words) == 130
@@ -354,11 +358,16 @@ def test_a_child_process_renders_the_same_bytes_and_dies_alone(plan_of: Planner,
 
 @pytest.mark.smoke
 def test_the_command_plans_makes_and_reports(
-    voices: list[LetterVoice], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    voices: list[LetterVoice],
+    world: World,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("one.srt").write_text(SRT.replace("\n\n2", "\n2"), encoding="utf-8")
-    words = ["batch", "one.srt", "--out", "clips", "--size", "64x64", "--fps", "10", "--supersampling", "1"]
+    small = ["--size", "64x64", "--fps", "10", "--supersampling", "1"]
+    words = ["batch", "one.srt", "--out", "clips", *small, *world.models]
     assert run([*words, "--dry-run"]) == 0
     printed = capsys.readouterr()
     assert "3 cues, 0 of them silent; 3 clips, 3 to make" in printed.out

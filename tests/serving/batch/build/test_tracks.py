@@ -2,7 +2,7 @@
 
 import json
 import wave
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import av
@@ -12,6 +12,7 @@ import pytest
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE
 from tests.serving.batch.conftest import SMALL
+from tests.world import World
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.request import Request
 from tts2face.serving.batch.options import BatchOptions
@@ -19,6 +20,7 @@ from tts2face.serving.batch.output import Plan
 from tts2face.serving.batch.plan import plan_batch
 from tts2face.serving.batch.run import run_batch
 from tts2face.serving.batch.windows import cue_windows
+from tts2face.session.named_models import Models
 from tts2face.session.session import Session
 from tts2face.types import Clip, exact_rate, first_sample
 
@@ -30,9 +32,9 @@ SENTENCES = ((1.0, "Bob may move five big maps."), (3.6, "We were away a year ag
 
 
 @pytest.fixture(scope="module")
-def spoken() -> list[Sentence]:
+def spoken(world: World) -> list[Sentence]:
     """For each sentence: begin in the film, samples, seconds of its first phone, after its last, and of its words."""
-    session, found = Session(), []
+    session, found = world.session(), []
     for begin, text in SENTENCES:
         speech = session.clip(text, voice="espeak").speech
         import soxr
@@ -72,9 +74,16 @@ def read_wav(path: Path) -> np.ndarray:
         return np.frombuffer(file.readframes(-1), "<i2") / 32767.0
 
 
-def plan(dub: Path, **options: object) -> Plan:
-    request = Request(fps=FPS, gestures="none")
-    return plan_batch([dub.parent / "one.srt"], BatchOptions(audio=dub, **options), request=request, picture=SMALL)
+@pytest.fixture
+def plan(dub: Path, world: World) -> Callable[..., Plan]:
+    """Plan of the dubbed file with batch options by name, on the made models."""
+    models = Models(str(world.talker_file), str(world.face_file), palette=str(world.palette_file))
+
+    def make(**options: object) -> Plan:
+        given = {"request": Request(fps=FPS, gestures="none"), "picture": SMALL, "models": models}
+        return plan_batch([dub.parent / "one.srt"], BatchOptions(audio=dub, **options), **given)
+
+    return make
 
 
 def decoded_sound(path: Path) -> np.ndarray:
@@ -108,9 +117,9 @@ def clips(monkeypatch: pytest.MonkeyPatch) -> list[list[Clip]]:
 
 @pytest.mark.parametrize("per", ["scene", "file", pytest.param("film", marks=pytest.mark.smoke)])
 def test_lips_and_sound_follow_the_track_within_a_frame(
-    per: str, dub: Path, spoken: list, clips: list[list[Clip]], tmp_path: Path
+    per: str, plan: Callable[..., Plan], dub: Path, spoken: list, clips: list[list[Clip]], tmp_path: Path
 ) -> None:
-    planned = plan(dub, per=per)
+    planned = plan(per=per)
     result = run_batch(planned, tmp_path / "out")
     assert result.failed == ()
     entries = json.loads((tmp_path / "out" / "manifest.json").read_text())["outputs"]
@@ -136,8 +145,10 @@ def test_lips_and_sound_follow_the_track_within_a_frame(
     assert np.median(np.abs(errors)) < 0.5 / FPS  # single words have the aligner's own error
 
 
-def test_a_clip_of_a_cue_includes_the_margins_of_its_speech(dub: Path, tmp_path: Path, spoken: list) -> None:
-    result = run_batch(plan(dub), tmp_path / "out")
+def test_a_clip_of_a_cue_includes_the_margins_of_its_speech(
+    plan: Callable[..., Plan], tmp_path: Path, spoken: list
+) -> None:
+    result = run_batch(plan(), tmp_path / "out")
     assert (result.n_made, result.failed) == (3, ())
     entries = json.loads((tmp_path / "out" / "manifest.json").read_text())["outputs"]
     for entry, (begin, _, first, last, _) in zip(entries, spoken, strict=True):
@@ -146,20 +157,22 @@ def test_a_clip_of_a_cue_includes_the_margins_of_its_speech(dub: Path, tmp_path:
         assert abs(entry["cues"][0]["begin_s"] - begin - first - EARLY_S) <= 0.5 / FPS + 1e-3
 
 
-def test_only_cues_whose_sound_changed_are_rendered_again(dub: Path, tmp_path: Path) -> None:
-    assert run_batch(plan(dub, per="file"), tmp_path / "out").n_rendered > 3
+def test_only_cues_whose_sound_changed_are_rendered_again(plan: Callable[..., Plan], dub: Path, tmp_path: Path) -> None:
+    assert run_batch(plan(per="file"), tmp_path / "out").n_rendered > 3
     track = read_wav(dub / "one.wav")
     track[round(1.5 * RATE) : round(1.6 * RATE)] *= 0.5
     write_wav(dub / "one.wav", track)
-    again = run_batch(plan(dub, per="file"), tmp_path / "out")
+    again = run_batch(plan(per="file"), tmp_path / "out")
     assert (again.n_rendered, again.n_made) == (1, 1)
 
 
-def test_other_words_and_silence_in_the_track_are_warnings(dub: Path, tmp_path: Path) -> None:
+def test_other_words_and_silence_in_the_track_are_warnings(
+    plan: Callable[..., Plan], dub: Path, tmp_path: Path
+) -> None:
     text = (tmp_path / "one.srt").read_text()
     text = text.replace("We were away a year ago.", "Nobody expects such extraordinarily complicated vocabulary here.")
     (tmp_path / "one.srt").write_text(text + "\n4\n00:00:06,500 --> 00:00:08,000\nThis is not said.\n")
-    result = run_batch(plan(dub), tmp_path / "out")
+    result = run_batch(plan(), tmp_path / "out")
     assert result.failed == ()
     assert [("other words" in one, "no speech here (it is silent)" in one) for one in result.warnings] == [
         (True, False),
@@ -168,17 +181,17 @@ def test_other_words_and_silence_in_the_track_are_warnings(dub: Path, tmp_path: 
 
 
 @pytest.mark.smoke
-def test_recordings_of_a_file_and_of_its_cues_are_not_mixed(dub: Path) -> None:
+def test_recordings_of_a_file_and_of_its_cues_are_not_mixed(plan: Callable[..., Plan], dub: Path) -> None:
     write_wav(dub / "one-0001.wav", np.zeros(RATE))
     with pytest.raises(InputError, match=r"one\.wav is a recording of the whole of .*one-0001\.wav one of a cue"):
-        plan(dub)
+        plan()
 
 
 @pytest.mark.smoke
-def test_two_recordings_of_a_file_are_refused(dub: Path) -> None:
+def test_two_recordings_of_a_file_are_refused(plan: Callable[..., Plan], dub: Path) -> None:
     (dub / "one.mp3").write_bytes(b"")
     with pytest.raises(InputError, match=r"are both recordings of"):
-        plan(dub)
+        plan()
 
 
 @pytest.mark.smoke
@@ -191,8 +204,8 @@ def test_margins_share_gaps() -> None:
 
 
 @pytest.mark.smoke
-def test_sample_positions_are_those_of_frames(dub: Path) -> None:
-    for segment in plan(dub, per="file").segments.values():
+def test_sample_positions_are_those_of_frames(plan: Callable[..., Plan]) -> None:
+    for segment in plan(per="file").segments.values():
         if segment.audio_begin is not None:
             assert segment.audio_begin % (RATE // FPS) == 0
             assert segment.audio_end - segment.audio_begin == first_sample(segment.window_frames, RATE, exact_rate(FPS))
