@@ -20,7 +20,7 @@ from tts2face.video.take import read_livelink
 
 SMALL = {"size": "64x64", "fps": 5}
 OWN = [f"all{one.suffixes[0]}" for one in FORMATS if one.package is None]
-OF_EXTRAS = ["all.track.json", *(f"all{one.suffixes[0]}" for one in FORMATS if one.package)]
+OF_EXTRAS = ["all.track.json", "all.wav", *(f"all{one.suffixes[0]}" for one in FORMATS if one.package)]
 OF_ANY_EXTRA = pytest.mark.needs(*{one.package for one in FORMATS if one.package})
 
 
