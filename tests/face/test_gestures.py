@@ -47,6 +47,12 @@ def speech_motion(name: str, articulation: str = "natural") -> Trajectory:
     return session.clip(Request(text=BILABIALS, gestures="none", articulation=articulation)).motion
 
 
+@cache
+def spoken_weights(name: str, articulation: str = "natural") -> np.ndarray:
+    """Shape weights (T, K) of speech without gestures."""
+    return prepared_face(name).perform(speech_motion(name, articulation), {}).motion.values
+
+
 def silence(face: Face, n_frames: int = 1) -> Trajectory:
     return Trajectory(face.shape_names, np.zeros((n_frames, len(face.shape_names))), 25.0)
 
@@ -95,7 +101,7 @@ def lid_openings(face: Face, weights: np.ndarray) -> np.ndarray:
 def test_an_expression_never_opens_closed_lips(name: str, weights: dict[str, float], gains: dict[str, float]) -> None:
     """The case that the paper warns about (section 7), on speech with many /p b m/."""
     face, speech = prepared_face(name), speech_motion(name)
-    plain = gaps(face.face, face.perform(speech, {}).motion.values)
+    plain = gaps(face.face, spoken_weights(name))
     moved = gaps(face.face, face.perform(speech, expression_gestures(len(speech), **weights), gains).motion.values)
     closed = plain <= CONTACT_MM
     assert closed[:, 5].sum() > 20
@@ -107,7 +113,7 @@ def test_an_expression_never_opens_closed_lips(name: str, weights: dict[str, flo
 def test_lips_that_close_in_clear_articulation_stay_closed(name: str) -> None:
     """Corners of a rounded mouth touch while its middle is open; here the middle counts."""
     face, speech = prepared_face(name), speech_motion(name, "clear")
-    plain = gaps(face.face, face.perform(speech, {}).motion.values)
+    plain = gaps(face.face, spoken_weights(name, "clear"))
     gestures = expression_gestures(len(speech), happy=1.0, surprised=1.0)
     moved = gaps(face.face, face.perform(speech, gestures, {"jaw": 1.5}).motion.values)
     closed = plain[:, 5] <= CONTACT_MM
@@ -120,16 +126,16 @@ def test_neutral_gestures_do_not_change_speech(name: str) -> None:
     face, speech = prepared_face(name), speech_motion(name)
     calm = expression_gestures(len(speech), sad=0.05, happy=0.15, afraid=0.02, angry=0.05, surprised=0.1)
     calm |= {"blink": np.zeros((len(speech), 2), np.float32), "cheeks": np.full((len(speech), 2), 0.5, np.float32)}
-    plain, moved = (face.perform(speech, gestures).motion.values for gestures in ({}, calm))
+    plain, moved = spoken_weights(name), face.perform(speech, calm).motion.values
     for measured in (lambda weights: gaps(face.face, weights)[:, 5], lambda weights: width(face.face, weights)):
         assert np.corrcoef(measured(plain), measured(moved))[0, 1] > 0.99
 
 
 def test_a_smile_keeps_rounded_lips_round() -> None:
     face, speech = prepared_face("head"), speech_motion("head")
+    gestures = expression_gestures(len(speech), happy=1)
     plain, smiling = (
-        width(face.face, face.perform(speech, gestures).motion.values)
-        for gestures in ({}, expression_gestures(len(speech), happy=1))
+        width(face.face, weights) for weights in (spoken_weights("head"), face.perform(speech, gestures).motion.values)
     )
     roundest = plain.argmin()
     rest = width(face.face, np.zeros((1, len(face.face.shape_names))))[0]
@@ -142,7 +148,7 @@ def test_a_smile_keeps_rounded_lips_round() -> None:
 def test_a_smile_lasts_while_lips_close_and_round(name: str) -> None:
     face, speech = prepared_face(name), speech_motion(name, "clear")
     smiles = [face.face.shape_names.index(shape) for shape in ("mouthSmileLeft", "mouthSmileRight")]
-    spoken = face.perform(speech, {}).motion.values
+    spoken = spoken_weights(name, "clear")
     moved = face.perform(speech, expression_gestures(len(speech), happy=1)).motion.values
     alone = face.perform(silence(load_face(name)), expression_gestures(1, happy=1)).motion.values[0, smiles].mean()
     smile = moved[:, smiles].mean(axis=1)
