@@ -36,9 +36,11 @@ def shipped_packages() -> list[str]:
 
 
 def imported_modules(path: Path) -> set[str]:
-    """Modules that a file imports anywhere, also inside functions."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    """Modules that a file imports anywhere, also inside functions; nothing of a file that names no builder."""
+    found, text = set(), path.read_text(encoding="utf-8")
+    if not any(name in text for name in (*BUILDERS, "from corpus_tools import")):
+        return found
+    for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             found |= {name.name for name in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module:

@@ -15,6 +15,9 @@ from tts2face.picture.camera import camera_matrices
 from tts2face.picture.options import Picture, parse_camera
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
+ONE_PROCESS = pytest.mark.xdist_group("vtk")  # imports VTK, which takes 1.5 s
+pytestmark = ONE_PROCESS
+
 
 def clip_of(face):
     motion = np.linspace(0, 1, 3)[:, None] * [1, 0, 0, 0]

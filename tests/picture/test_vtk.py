@@ -12,6 +12,7 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from tests.face.people import load_plain
 from tests.packages import needs
 from tests.picture.test_cutouts import face_with_sheet, without_sheet
+from tests.picture.test_view import ONE_PROCESS
 from tests.picture.tiny_face import tiny_face
 from tts2face.picture import vtk_renderer as vtk
 from tts2face.picture.options import NUMBA, PYVISTA, Picture
@@ -19,7 +20,7 @@ from tts2face.picture.renderer import mesh_renderer
 from tts2face.processes.program import Program
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
-pytestmark = pytest.mark.usefixtures("few_directions")
+pytestmark = [pytest.mark.usefixtures("few_directions"), ONE_PROCESS]
 BOUND = 2.0  # of 255: mean difference between the renderers' pictures; VTK interpolates highlights of vertices
 TURNED = np.array([0.05, 0.2, 0.0, 3.0, 0.0, 0.0])
 
