@@ -21,6 +21,7 @@ START_TIMEOUT_S = 180.0
 PREFIX = "TTS2FACE_SERVE_"  # of variables with settings
 # NiceGUI takes part in tests of its own where it finds pytest's variables.
 REMOVED = (PREFIX, "OTEL_", "PYTEST")
+TABLE_PROGRAM = ("-m", "tests.serving.service.table_synthesis")  # a service whose synthesis processes load no models
 HostService = Callable[..., "AbstractContextManager[HostedService]"]
 
 

@@ -3,7 +3,6 @@
 import os
 import sys
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -69,16 +68,6 @@ def _write(call: Call) -> dict[str, Any]:
 def named(**settings: Any) -> dict[str, Handler]:
     """A handler that answers with the settings."""
     return {"settings": lambda _: settings}
-
-
-def _serve(call: Call) -> Mapping[str, Any]:
-    call.event({})
-    return call.more().content
-
-
-def served(**_: Any) -> dict[str, Handler]:
-    """Handlers of a process that loads nothing, in place of a synthesis process."""
-    return {"serve": _serve}
 
 
 HANDLERS: dict[str, Handler] = {

@@ -26,7 +26,7 @@ def test_the_end_of_a_process_is_not_taken_from_asyncio(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Asyncio warns of an unknown child process if something else has read its exit status."""
-    monkeypatch.setattr(pool, "PROGRAM", "tests.processes.handlers:served")
+    monkeypatch.setattr(pool, "PROGRAM", "tests.serving.service.table_synthesis:handlers")
 
     async def run() -> None:
         process = WarmProcess({}, Preparation((), 1), lambda: None)

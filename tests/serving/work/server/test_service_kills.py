@@ -17,7 +17,7 @@ from tests.packages import reason
 pytest.importorskip("dbos", reason=reason("dbos"))
 pytest.importorskip("fastapi", reason=reason("fastapi"))
 
-from tests.running import ServeProcess, eventually
+from tests.running import TABLE_PROGRAM, ServeProcess, eventually
 from tests.serving.service.job_requests import wait_for_database
 from tests.serving.service.receiver import Receiver
 from tests.serving.work.watch import StoreWatch, ends_of_jobs
@@ -45,7 +45,7 @@ class Machines:
         self.start_worker()
 
     def start_server(self) -> None:
-        self.server = ServeProcess(environment=self.environment)
+        self.server = ServeProcess(environment=self.environment, program=TABLE_PROGRAM)
         wait_for_database(self.server.url)
         self.api = httpx.Client(base_url=self.server.url, timeout=60.0)
 
