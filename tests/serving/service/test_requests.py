@@ -20,7 +20,7 @@ from tests.serving.service.in_process import (
     working,
 )
 from tests.serving.service.job_requests import CLIP, finished, submit
-from tests.serving.service.test_uploads import wav
+from tests.serving.service.test_uploads import png, png_bomb, wav
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.session.functions import SessionCache
@@ -218,6 +218,33 @@ def test_refusals_show_no_path_of_the_server(
     assert "/" not in message.replace("and/or", "")
     assert tempfile.gettempdir() not in message
     assert str(data) not in message
+
+
+@pytest.mark.parametrize(
+    ("form", "files", "status", "reason"),
+    [
+        ({}, {"audio": ("a.wav", b"no sound")}, 422, "audio cannot be used: it is no sound"),
+        ({}, {"background": ("b.png", png_bomb(60_000))}, 422, "background cannot be used: it has 60000 x 60000"),
+        ({}, {"timeline": ("t.json", b"{")}, 422, "t"),
+        ({}, {"timeline": ("t.json", b"[" * 100_000)}, 422, "t"),
+        ({"request": '{"partner": "/etc/passwd"}'}, {"background": ("b.png", png(4, 4))}, 422, "partner"),
+        ({}, {"song": ("s.wav", b"x")}, 422, "there is no part 'song'"),
+        ({"request": "{"}, {"audio": ("a.wav", wav())}, 422, "JSON"),
+        ({"request": "{}", "audio": "text"}, {"background": ("b.png", png(4, 4))}, 422, "audio must be a file"),
+    ],
+)
+def test_wrong_forms_are_refused(
+    client: TestClient, form: dict[str, str], files: dict[str, tuple[str, bytes]], status: int, reason: str
+) -> None:
+    response = client.post("/v1/clips", data={"request": '{"text": "Hello."}'} | form, files=files)
+    assert (response.status_code, reason in response.json()["error"]["message"]) == (status, True), response.text
+
+
+@pytest.mark.parametrize("kind", ["talker", "face", "palette", "dictionary"])
+@pytest.mark.parametrize("name", ["nobody", "../../etc/passwd", "/etc/passwd", "x" * 10_000])
+def test_unknown_names_are_refused(client: TestClient, kind: str, name: str) -> None:
+    answer = client.post("/v1/clips", json={"text": TEXT, "format": "curves", kind: name})
+    assert (answer.status_code, f"there is no {kind}" in answer.text, len(answer.text) < 500) == (400, True, True)
 
 
 # Lists

@@ -8,10 +8,9 @@ from pathlib import Path
 import av
 import httpx
 import numpy as np
-import pytest
 
 import tts2face
-from tests.serving.service.test_uploads import png, png_bomb, wav
+from tests.serving.service.test_uploads import png, wav
 
 
 def movie_bytes() -> bytes:
@@ -65,23 +64,3 @@ def test_a_face_listens_to_an_uploaded_partner(client: httpx.Client) -> None:
     response = client.post("/v1/clips", data=form, files={"partner": ("other.wav", wav())})
     assert response.status_code == 200, response.text
     assert len(response.text.splitlines()) == 1 + 90
-
-
-@pytest.mark.parametrize(
-    ("data", "files", "status", "reason"),
-    [
-        ({}, {"audio": ("a.wav", b"no sound")}, 422, "audio cannot be used: it is no sound"),
-        ({}, {"background": ("b.png", png_bomb(60_000))}, 422, "background cannot be used: it has 60000 x 60000"),
-        ({}, {"timeline": ("t.json", b"{")}, 422, "t"),
-        ({}, {"timeline": ("t.json", b"[" * 100_000)}, 422, "t"),
-        ({"request": '{"partner": "/etc/passwd"}'}, {"background": ("b.png", png(4, 4))}, 422, "partner"),
-        ({}, {"song": ("s.wav", b"x")}, 422, "there is no part 'song'"),
-        ({"request": "{"}, {"audio": ("a.wav", wav())}, 422, "JSON"),
-        ({"request": "{}", "audio": "text"}, {"background": ("b.png", png(4, 4))}, 422, "audio must be a file"),
-    ],
-)
-def test_wrong_forms_are_refused(
-    client: httpx.Client, data: dict[str, str], files: dict[str, tuple[str, bytes]], status: int, reason: str
-) -> None:
-    response = client.post("/v1/clips", data={"request": '{"text": "Hello."}'} | data, files=files)
-    assert (response.status_code, reason in response.json()["error"]["message"]) == (status, True), response.text
