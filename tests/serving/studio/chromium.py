@@ -3,9 +3,11 @@
 import base64
 import io
 import json
+import os
 import shutil
 import socket
 import subprocess
+import tempfile
 import urllib.error
 import urllib.request
 from collections.abc import Iterator, Sequence
@@ -77,9 +79,11 @@ class Browser:
 
     def __init__(self, size: tuple[int, int] = (1280, 1180), arguments: Sequence[str] = ()) -> None:
         port = free_port()
+        own_files = {"XDG_CONFIG_HOME": tempfile.gettempdir()}  # its reports of crashes end with the run
         self._driver = subprocess.Popen(
-            ["chromedriver", f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
+            ["chromedriver", f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            env=os.environ | own_files,
+        )  # fmt: skip
         self._root = f"http://127.0.0.1:{port}"
         eventually(self._is_ready, 30, "chromedriver starts")
         options = {"args": [*ARGUMENTS, f"--window-size={size[0]},{size[1]}", *arguments]}
