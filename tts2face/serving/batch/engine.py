@@ -16,7 +16,7 @@ from typing import Protocol
 
 from lexicon.errors import BackendError, Tts2faceError
 from tts2face.processes.parent import ChildEndedError
-from tts2face.serving.batch.render import RenderProcess
+from tts2face.serving.batch.render_process import RenderProcess
 from tts2face.serving.batch.segment import SEGMENT_SUFFIX, Segment, SegmentResult
 from tts2face.serving.batch.store import Store, wait_for_store
 

@@ -1,8 +1,6 @@
 """Rendering of one segment with the sessions of this process.
 
 Requests for the recordings of segments: the words where the recording contains them, else the sound alone.
-
-A child process that renders segments, so that a crash or a lack of memory ends one segment and not the batch.
 """
 
 import time
@@ -24,9 +22,8 @@ from tts2face.picture.options import Picture
 from tts2face.picture.own_face import OwnFaceRenderer
 from tts2face.picture.renderer import FrameRenderer
 from tts2face.processes.child import Call, Handler
-from tts2face.processes.parent import Child
-from tts2face.processes.program import Program
 from tts2face.request import IDLE_LIMITS_S, Request
+from tts2face.serving.batch.render_process import RENDER
 from tts2face.serving.batch.segment import (
     ALPHA_MOVIE,
     FILE_PREFIX,
@@ -34,7 +31,6 @@ from tts2face.serving.batch.segment import (
     Segment,
     SegmentResult,
     open_track,
-    result_from_json,
     segment_from_json,
 )
 from tts2face.serving.batch.windows import Fit, Limits, fit_speech
@@ -211,36 +207,6 @@ def _length(segment: Segment, fit: Fit, fps: float) -> tuple[int, list[str]]:
     if segment.fills_slot and segment.slot_frames is not None:
         return segment.slot_frames, warnings
     return max(segment.window_frames, frame_count(max(fit.speech_s, 1e-3), fps)), warnings
-
-
-RENDER = "render"  # name of the call
-
-
-class RenderProcess(Child):
-    """A child process with sessions of its own; one segment at a time.
-
-    Parameters
-    ----------
-    core
-        Core to which the child is bound, so that several of them do not compete; None: all cores.
-    """
-
-    def __init__(self, core: int | None = None) -> None:
-        super().__init__(Program(f"{__name__}:HANDLERS", core=core))
-
-    def render(self, segment: Segment, out: Path) -> SegmentResult:
-        """Render a segment in the child; a child that ended is started again at the next call.
-
-        Raises
-        ------
-        InputError, DataError, BackendError
-            As `SegmentRenderer.render`.
-        ChildEndedError
-            The child ended.
-        BackendError
-            The process was closed.
-        """
-        return result_from_json(self.call(RENDER, {"segment": segment.as_json(), "out": str(out)}).content)
 
 
 @lru_cache(maxsize=1)

@@ -35,7 +35,7 @@ from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.batch.engine import Message, Renders, render_into
-from tts2face.serving.batch.render import RenderProcess
+from tts2face.serving.batch.render_process import RenderProcess
 from tts2face.serving.batch.segment import Segment, SegmentResult, segment_from_json
 from tts2face.serving.batch.store import Store, open_store, wait_for_store
 from tts2face.serving.work.blobs import BlobStore, place_segment_files

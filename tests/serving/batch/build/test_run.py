@@ -20,7 +20,8 @@ from tests.world import PHONE_S, LetterVoice, World
 from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.batch import engine as engines
 from tts2face.serving.batch.engine import LocalEngine, Rendered
-from tts2face.serving.batch.render import RenderProcess, SegmentRenderer
+from tts2face.serving.batch.render import SegmentRenderer
+from tts2face.serving.batch.render_process import RenderProcess
 from tts2face.serving.batch.run import SEGMENT_FOLDER, run_batch
 from tts2face.serving.batch.segment import Segment, SegmentResult
 from tts2face.serving.batch.store import Store, open_store
