@@ -2,7 +2,8 @@
 
 Run: ``python tests/bench/bench_clip.py`` (``--minutes 10`` for the long text). A reference loop of plain numpy runs
 before and after, so that figures of different machines and times can be compared. ``--start`` prints only the processor
-time of commands in new processes; with ``--beside ../other``, in turn with those of another working copy.
+time of commands in new processes, ``--first`` time and processor time of the very first clip; with ``--beside
+../other``, in turn with those of another working copy.
 """
 
 import argparse
@@ -25,6 +26,7 @@ from tts2face.request import Request
 from tts2face.session.session import Session
 
 COMMAND = "from cli.main import main; main()"
+HOMES = ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")  # other places of compiled kernels
 SHORT = "We were away a year ago, but Bob may move five big maps."
 TEN_SECONDS = f"{SHORT} Peter Piper picked a peck of pickled peppers, and she sells sea shells by the shore."
 
@@ -74,7 +76,12 @@ MeshRenderer.frames = first
 from cli.main import run
 run(sys.argv[1:])
 """
-STARTS = {"wav": ("start.wav", COMMAND), "csv": ("start.csv", COMMAND), "first frame": ("start.mp4", FIRST_FRAME)}
+STARTS = {
+    "wav": ("start.wav", COMMAND),
+    "csv": ("start.csv", COMMAND),
+    "first frame": ("start.mp4", FIRST_FRAME),
+    "clip": ("start.mp4", COMMAND),
+}
 
 
 def start_cpu(folder: Path, trees: list[Path], n_runs: int = 5) -> None:
@@ -132,14 +139,21 @@ def cold_start(folder: Path) -> None:
     print(f"cold start to the first frame: {np.median(spent):.2f} s ({min(spent):.2f}-{max(spent):.2f})")
 
 
-def first_run(folder: Path) -> None:
-    """Time of the command "Hi." with an empty kernel cache, to its end, and processor time of all its processes."""
-    before, began = child_cpu_s(), time.perf_counter()
-    with tempfile.TemporaryDirectory() as cache:
-        arguments = ["Hi.", "--out", str(folder / "first_run.mp4"), "--quiet"]
-        environment = dict(os.environ, NUMBA_CACHE_DIR=cache)
-        subprocess.run([sys.executable, "-c", COMMAND, *arguments], check=True, capture_output=True, env=environment)
-    print(f"very first run: {time.perf_counter() - began:.1f} s, {child_cpu_s() - before:.1f} s of processor time")
+def first_run(folder: Path, trees: list[Path], n_runs: int = 7) -> None:
+    """Median time of the first clip of all, in an empty home, and processor time of all its processes."""
+    spent: dict[Path, list[tuple[float, float]]] = {tree: [] for tree in trees}
+    for _ in range(n_runs):
+        for tree in trees:
+            before, began = child_cpu_s(), time.perf_counter()
+            with tempfile.TemporaryDirectory() as home:
+                kept = {name: value for name, value in os.environ.items() if name not in HOMES}
+                environment = kept | {"HOME": home, "PYTHONPATH": str(tree.resolve())}
+                arguments = ["-c", COMMAND, SHORT, "--out", str(folder / "first_run.mp4"), "--quiet"]
+                subprocess.run([sys.executable, *arguments], check=True, capture_output=True, env=environment, cwd=tree)
+            spent[tree].append((time.perf_counter() - began, child_cpu_s() - before))
+    for tree in trees:
+        seconds, of_processor = np.median(spent[tree], axis=0)
+        print(f"very first clip: {tree} {seconds:.1f} s, {of_processor:.1f} s of processor time")
 
 
 def child_cpu_s() -> float:
@@ -165,18 +179,23 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=0.0, help="also speak a text of so many minutes")
     parser.add_argument("--start", action="store_true", help="processor time of commands in new processes only")
+    parser.add_argument("--first", action="store_true", help="the very first clip only, median of seven")
     parser.add_argument("--beside", type=Path, help="another working copy, whose commands run in turn with these")
     chosen = parser.parse_args()
     minutes = chosen.minutes
+    trees = [Path.cwd(), *([chosen.beside] if chosen.beside else [])]
     with tempfile.TemporaryDirectory() as name:
-        start_cpu(Path(name), [Path.cwd(), *([chosen.beside] if chosen.beside else [])])
+        if chosen.first:
+            first_run(Path(name), trees)
+            return
+        start_cpu(Path(name), trees)
         if chosen.start:
             return
         if minutes:
             long_text(Path(name), minutes)
         whole_clip(Path(name))
         cold_start(Path(name))
-        first_run(Path(name))
+        first_run(Path(name), trees, n_runs=1)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,12 @@
 """Cache folder of the compiled kernels where the package cannot be written."""
 
+import gc
 import logging
 import os
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,6 +17,7 @@ import pytest
 from numba.core.dispatcher import Dispatcher
 
 from cli.process import COMPILATION, compilation_messages, progress_bar
+from lexicon.errors import BackendError
 from tests.picture.film.lit_face import lit_tiny_face
 from tests.processes.answered import answered
 from tts2face.gestures import field_kernels
@@ -121,6 +124,43 @@ def test_kernels_on_disk_are_not_compiled_again(indexes, monkeypatch):
 def test_a_face_without_mesh_has_no_pictures_to_compile(monkeypatch):
     monkeypatch.setattr(warm_up, "compile_pictures", pytest.fail)
     answered(warm_up.HANDLERS["compile_pictures"], {"face": OWN_FACE})
+
+
+def test_a_command_and_its_children_share_the_works(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[str] = []
+
+    class Fake:
+        def __init__(self, _: object) -> None:
+            made.append("child")
+
+        def call(self, work: str, _: object, *, timeout_s: float) -> None:
+            made.append(work)
+            raise BackendError(f"{work} took {timeout_s} s")
+
+        def close(self) -> None:
+            made.append("closed")
+
+    works = ["compile_motion", "compile_gestures", "compile_sound"]
+    monkeypatch.setattr(warm_up, "Child", Fake)
+    monkeypatch.setattr(warm_up, "WORKS", {name: partial(made.append, name) for name in works})
+    monkeypatch.setattr(warm_up, "compile_pictures", lambda _: made.append("compile_pictures"))
+    for cores in (1, 2, 8):
+        made.clear()
+        monkeypatch.setattr(warm_up, "available_cores", lambda cores=cores: cores)
+        warm_up.compile_kernels(lit_tiny_face())
+        assert sorted(made) == sorted(
+            [*["child", "closed"] * min(cores - 1, 3), "compile_pictures", *works]
+        )  # each once, though a child failed
+
+
+def test_garbage_is_collected_again_after_a_compilation() -> None:
+    assert gc.isenabled()
+    compilation.COMPILATIONS.on_start(None)
+    compilation.COMPILATIONS.on_start(None)
+    compilation.COMPILATIONS.on_end(None)
+    assert not gc.isenabled()
+    compilation.COMPILATIONS.on_end(None)
+    assert gc.isenabled()
 
 
 CALLER = """
