@@ -2,8 +2,8 @@
 
 Run: ``python tests/bench/bench_clip.py`` (``--minutes 10`` for the long text). A reference loop of plain numpy runs
 before and after, so that figures of different machines and times can be compared. ``--start`` prints only the processor
-time of commands in new processes, ``--first`` time and processor time of the very first clip; with ``--beside
-../other``, in turn with those of another working copy.
+time and peak memory of commands in new processes, ``--first`` time and processor time of the very first clip; with
+``--beside ../other``, in turn with those of another working copy.
 """
 
 import argparse
@@ -84,32 +84,44 @@ STARTS = {
 }
 
 
-def start_cpu(folder: Path, trees: list[Path], n_runs: int = 5) -> None:
-    """Median processor seconds of one sentence in a new process on one core, with compiled kernels on disk."""
+def start_cpu(folder: Path, trees: list[Path], n_runs: int = 7) -> None:
+    """Median processor seconds and peak memory of one sentence in a new process on one core, with kernels on disk."""
     for what, (name, code) in STARTS.items():
-        spent: dict[Path, list[float]] = {tree: [] for tree in trees}
+        used: dict[Path, list[tuple[float, float]]] = {tree: [] for tree in trees}
         for run in range(n_runs + 1):
             for tree in trees:
                 (folder / name).unlink(missing_ok=True)
-                seconds = _cpu_of(["-c", code, SHORT, "--out", str(folder / name), "--quiet"], tree)
+                found = _use_of(["-c", code, SHORT, "--out", str(folder / name), "--quiet"], tree)
                 if run:  # the first one warms the disk
-                    spent[tree].append(seconds)
-        medians = [float(np.median(spent[tree])) for tree in trees]
-        print(f"{what}: " + "; ".join(f"{tree} {median:.2f} s" for tree, median in zip(trees, medians, strict=True)))
+                    used[tree].append(found)
+        medians = [np.median(used[tree], axis=0) for tree in trees]
+        shown = (f"{tree} {cpu:.2f} s, {peak:.0f} MB" for tree, (cpu, peak) in zip(trees, medians, strict=True))
+        print(f"{what}: {'; '.join(shown)}")
         if len(medians) > 1:
-            print(f"    {medians[0] / medians[1]:.2f} of the other's")
+            print("    {:.3f} and {:.3f} of the other's".format(*(medians[0] / medians[1])))
 
 
-def _cpu_of(arguments: list[str], tree: Path) -> float:
-    """Processor seconds of a Python process in a working copy: those it prints, or those until it ends."""
+def _use_of(arguments: list[str], tree: Path) -> tuple[float, float]:
+    """Processor seconds of a Python process in a working copy, those it prints or those until it ends; its peak in MB.
+
+    Raises
+    ------
+    RuntimeError
+        It failed.
+    """
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     environment["PYTHONPATH"] = str(tree.resolve())
-    before = child_cpu_s()
-    done = subprocess.run(
-        [sys.executable, *arguments], check=True, capture_output=True, text=True, env=environment, cwd=tree,
-        preexec_fn=lambda: os.sched_setaffinity(0, {max(os.sched_getaffinity(0))}),
-    )  # fmt: skip
-    return float(done.stdout) if done.stdout else child_cpu_s() - before
+    with tempfile.TemporaryFile("w+") as printed:
+        child = subprocess.Popen(
+            [sys.executable, *arguments], stdout=printed, env=environment, cwd=tree,
+            preexec_fn=lambda: os.sched_setaffinity(0, {max(os.sched_getaffinity(0))}),
+        )  # fmt: skip
+        _, status, usage = os.wait4(child.pid, 0)
+        if status:
+            raise RuntimeError(f"{tree}: {' '.join(arguments[2:])} failed with {status}")
+        printed.seek(0)
+        stated = printed.read()
+    return float(stated) if stated else usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
 
 
 def cold_start(folder: Path) -> None:
