@@ -114,7 +114,7 @@ def _use_of(arguments: list[str], tree: Path) -> tuple[float, float]:
     with tempfile.TemporaryFile("w+") as printed:
         child = subprocess.Popen(
             [sys.executable, *arguments], stdout=printed, env=environment, cwd=tree,
-            preexec_fn=lambda: os.sched_setaffinity(0, {max(os.sched_getaffinity(0))}),
+            preexec_fn=lambda: os.sched_setaffinity(0, {max(os.sched_getaffinity(0))}),  # noqa: PLW1509 - no threads
         )  # fmt: skip
         _, status, usage = os.wait4(child.pid, 0)
         if status:
