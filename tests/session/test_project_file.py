@@ -141,7 +141,7 @@ def test_an_option_of_a_wrong_type_is_refused_by_its_name(tmp_path: Path) -> Non
 
 
 def test_a_name_of_another_type_is_refused() -> None:
-    with pytest.raises(InputError, match="the name must be a text in quotes, not 7"):
+    with pytest.raises(InputError, match="name must be a text in quotes, not 7"):
         Project(name=7)  # type: ignore[arg-type]
 
 
