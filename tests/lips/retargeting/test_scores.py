@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError
+from tests.picture.tiny_face import tiny_face
 from tts2face.lips.retargeting import BILABIALS, Retargeter, build_retargeter
 from tts2face.lips.score_matching import REST_TOLERANCE, build_score_matching, scaled_scores
 from tts2face.models.face import Face
@@ -73,7 +74,7 @@ def test_mouth_scores_average_both_sides() -> None:
     assert scores[0] == pytest.approx([0, 0.05, 0.1, 0.175, 0.275, 0.375, 0.475])
 
 
-def test_maps_return_from_files(tmp_path: Path, talker: Talker, head: Face) -> None:
+def test_maps_return_from_files(tmp_path: Path, talker: Talker) -> None:
     small = replace(talker, utterances=talker.utterances[:2])
     scores = made_map(speech_channels(talker.model))
     write_talker(tmp_path / "a.talker", replace(small, scores=scores))
@@ -83,8 +84,8 @@ def test_maps_return_from_files(tmp_path: Path, talker: Talker, head: Face) -> N
     assert np.array_equal(again.direct, scores.direct)
     write_talker(tmp_path / "b.talker", replace(small, scores=None))
     assert read_talker(tmp_path / "b.talker").scores is None
-    of_face = made_map(("jawOpen", "mouthPucker"))
-    write_face(tmp_path / "a.face", replace(head, scores=of_face))
+    of_face = made_map(("jawOpen", "mouthSmileLeft"))
+    write_face(tmp_path / "a.face", replace(tiny_face(), scores=of_face))
     read = read_face(tmp_path / "a.face").scores
     assert read is not None
     assert read.inputs == of_face.inputs
