@@ -18,6 +18,7 @@ from corpus_tools.dense.person_look import part_colour
 from lexicon.errors import BackendError
 from tests.models.made import write_made_face
 from tests.photo.pictures import still
+from tests.serving.service.in_process import decoding_here
 from tests.serving.work.conftest import database, postgres  # noqa: F401 - fixtures
 from tts2face.models.face_file import read_face
 from tts2face.serving.service.errors import RefusedError
@@ -34,6 +35,13 @@ from tts2face.serving.work.run import RESOURCES
 WORDS = b"Siobhan  SH IH0 V AO1 N\n"
 OTHER_WORDS = b"Nguyen  N UW1 Y EH0 N\n"
 Ask = Callable[..., httpx.Response]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def decoding() -> Iterator[None]:
+    """Uploads are checked in this process."""
+    with decoding_here():
+        yield
 
 
 @pytest.fixture
