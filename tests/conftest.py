@@ -36,6 +36,7 @@ GROUPS = {  # name of a folder and of a marker: what the tests in it do
 NIGHTLY = "nightly"  # marker of tests that take minutes, of which others do a little; they are in no other group
 DEFAULT = f"smoke or not ({' or '.join((*GROUPS, NIGHTLY))})"  # as in pyproject.toml
 SHARED_SERVER = "host"  # fixture
+SMOKE = ("smoke", "tests.face.people")  # in the text of a module with tests that run by default in a folder of a group
 LONGEST_NAME = 200  # characters of a value in the name of a test
 SENTENCES_HEARD = 64
 SKIPPED = "tts2face/skipped"  # in pytest's cache
@@ -160,6 +161,19 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "needs(*modules): tests that import these modules (tests/packages.py)")
     if config.args_source == pytest.Config.ArgsSource.ARGS and config.option.markexpr == DEFAULT:
         config.option.markexpr = ""
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave modules out whose tests the default run would only deselect: reading a fourth of all costs seconds."""
+    return True if config.option.markexpr == DEFAULT and not may_run_by_default(collection_path) else None
+
+
+def may_run_by_default(path: Path) -> bool:
+    """Whether a module of tests is in no folder of a group, or names what runs by default all the same."""
+    if path.suffix != ".py" or GROUPS.keys().isdisjoint(path.relative_to(TESTS).parts[:-1]):
+        return True
+    text = path.read_text(encoding="utf-8")
+    return any(one in text for one in SMOKE)
 
 
 @pytest.hookimpl(tryfirst=True)

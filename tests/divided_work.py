@@ -28,7 +28,8 @@ def pytest_collection(session: pytest.Session) -> None:
     if (place := _place(session.config)) is None or sys.dont_write_bytecode:
         return
     number, count = place
-    paths = sorted(TESTS.rglob("test_*.py"))
+    ignored, config = session.config.hook.pytest_ignore_collect, session.config
+    paths = [path for path in sorted(TESTS.rglob("test_*.py")) if not ignored(collection_path=path, config=config)]
     for path in paths[number * len(paths) // count : (number + 1) * len(paths) // count]:
         with suppress(Exception, pytest.skip.Exception):  # which collection tells
             import_module(".".join(path.relative_to(TESTS.parent).with_suffix("").parts))

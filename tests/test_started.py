@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests import started
-from tests.conftest import DEFAULT, GROUPS, NIGHTLY, TESTS
+from tests.conftest import DEFAULT, GROUPS, NIGHTLY, SMOKE, TESTS, may_run_by_default
 from tests.running import eventually
 
 STARTS = """
@@ -52,6 +52,16 @@ def test_the_default_run_leaves_out_the_groups(pytestconfig: pytest.Config) -> N
     )
     assert all(f"@pytest.mark.{name}: tests in folders of this name" in shown.stdout for name in GROUPS)
     assert f"@pytest.mark.{NIGHTLY}: " in shown.stdout
+
+
+def test_what_runs_by_default_in_a_folder_of_a_group_is_named_in_its_module() -> None:
+    """By the marker, or by the list that gives it: other modules there are not read by a default run."""
+    marking = [path for path in TESTS.rglob("*.py") if "mark.smoke" in path.read_text(encoding="utf-8")]
+    lists = {path.relative_to(TESTS.parent) for path in marking if not path.name.startswith("test_")}
+    assert {".".join(path.with_suffix("").parts) for path in lists} == {name for name in SMOKE if "." in name}
+    assert all(may_run_by_default(path) for path in marking)
+    assert may_run_by_default(TESTS / "face/build/test_people.py")
+    assert not may_run_by_default(TESTS / "build/test_rendered_takes.py")
 
 
 def test_nightly_tests_are_in_no_other_group(request: pytest.FixtureRequest) -> None:

@@ -11,10 +11,11 @@ from safetensors.numpy import load_file
 
 from lexicon.errors import DataError, InputError
 from tests.face.posing import posed_vertices
-from tts2face.models import face_file
+from tts2face.models import face_file, face_loading
 from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Texture
 from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_loading import load_face
+from tts2face.numeric.reuse import Shared
 from tts2face.session.catalogue import IdentityEntry, identities
 from tts2face.storage import files
 from tts2face.storage.files import find_file
@@ -99,6 +100,7 @@ def test_an_earlier_face_whose_arrays_are_not_packed_is_the_same(written: tuple[
 def test_textures_of_a_shipped_face_are_decoded_when_one_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     decoded = Mock(side_effect=face_file.decode_colours)
     monkeypatch.setattr(face_file, "decode_colours", decoded)
+    monkeypatch.setattr(face_loading, "_FACES", Shared())  # no other test has read it
     face = load_face("head", "mei")
     assert (len(face.textures) > 1, decoded.call_count) == (True, 0)
     shapes = [texture.pixels.shape for texture in face.textures]

@@ -120,7 +120,7 @@ def test_words_of_another_script_are_refused(text: str, language: str, reason: s
         ("नमस्ते।", "hi"),
         ("hello Ω мир", "ru"),
         ("π, 5 µm, kΩ, μΩ, ℓ, Å, ㎛, Ж, א, あ, ä ﬁ Ａ", "en-us"),
-        ("今日は", "ja"),
+        pytest.param("今日は", "ja", marks=pytest.mark.needs("pyopenjtalk")),
         ("Здраво zdravo", "sr"),
     ],
 )
