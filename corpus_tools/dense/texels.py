@@ -210,7 +210,9 @@ def polygon_depth(places: Floats, polygon: Floats, most: float) -> Floats:
     low, high = polygon.min(axis=0) - most, polygon.max(axis=0) + most
     near = np.flatnonzero(((places > low) & (places < high)).all(axis=1))
     depth = np.full(len(places), -most)
-    depth[near] = _polygon_depths(places[near], polygon, np.zeros(len(near)))
+    found = np.zeros(len(near))
+    _polygon_depths(places[near], polygon, found)
+    depth[near] = found
     clipped: Floats = np.clip(depth, -most, most)
     return clipped
 
@@ -232,7 +234,6 @@ def _polygon_depths(places, polygon, depths):  # type: ignore[no-untyped-def]
                 is_inside = not is_inside
             ax, ay = bx, by
         depths[number] = least if is_inside else -least
-    return depths
 
 
 def soften_edges(share: Floats, texels: Texels, side: int) -> Floats:

@@ -37,7 +37,9 @@ def token_samples(tokens: Tokens) -> NDArray[np.float32]:
     starts, ends = tokens.spans[:, 1:2], tokens.spans[:, 2:3]
     positions = (starts + (ends - starts) * steps) * tokens.fps
     bounds = np.stack([tokens.first_frame[tokens.utterance], tokens.first_frame[tokens.utterance + 1]], axis=1)
-    return np.asarray(sample_tokens(tokens.frames, bounds, positions))
+    samples = np.zeros((*positions.shape, tokens.frames.shape[1]), np.float32)
+    sample_tokens(tokens.frames, bounds, positions, samples)
+    return samples
 
 
 def phone_similarity(

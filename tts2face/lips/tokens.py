@@ -140,9 +140,9 @@ def read_motion(frames: Float32Array, first: int, last: int, at: float, out: Flo
 
 @kernel
 def sample_tokens(
-    frames: Float32Array, bounds: NDArray[np.int64], positions: NDArray[np.float64]
-) -> NDArray[np.float32]:
-    """(N, S, D) recorded motion of N tokens at S frame positions each.
+    frames: Float32Array, bounds: NDArray[np.int64], positions: NDArray[np.float64], out: Float32Array
+) -> None:
+    """Write the recorded motion of N tokens at S frame positions each.
 
     Parameters
     ----------
@@ -151,12 +151,11 @@ def sample_tokens(
         First row of the token's utterance and the row behind its last.
     positions : (N, S)
         Frames from the utterance's first.
+    out : (N, S, D)
     """
-    out = np.zeros((positions.shape[0], positions.shape[1], frames.shape[1]), np.float32)
     for n in range(positions.shape[0]):
         for s in range(positions.shape[1]):
             read_motion(frames, bounds[n, 0], bounds[n, 1], positions[n, s], out[n, s])
-    return out
 
 
 # Glottal sounds have no lip shape: lips and tongue are already in the position of the next phone.

@@ -1,80 +1,162 @@
-"""Decorators that compile kernels with numba, and the cache of compiled code.
+"""Decorators for kernels, which are compiled with numba, and the cache of compiled code.
 
-All kernels of the package use these decorators; numba is imported in this module only. Compiled code is kept in the
-user's cache folder, by the content of the module and of what it takes from others: installations of the same code share
-it, and a changed module is never used with the code of an earlier one. If the folder cannot be written, a private
-temporary folder takes its place.
-
-Compilation delays a first run by up to half a minute; it is logged at the level INFO.
+All kernels of the package use these decorators. Compiled code is kept in the user's cache folder, by the content of the
+module and of what it takes from others, the processor, and the compiler: installations of the same code share it, and a
+changed module is never used with the code of an earlier one. If the folder cannot be written, a private temporary
+folder takes its place. A process whose kernels are all in the cache imports neither numba nor LLVM.
 
 Switch for ONNX Runtime's telemetry, which would send data and write to the user's home folder.
 """
 
-import gc
+import ctypes
 import hashlib
 import importlib
-import inspect
-import logging
 import os
+import platform
 import shutil
 import stat
+import struct
+import sys
 import tempfile
-import time
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Sequence
+from functools import cache, update_wrapper
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
-import numba
 import numpy as np
-from numba.core import entrypoints, event, typed_passes, untyped_passes
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, _CacheLocator
-from numba.core.compiler import CompilerBase
-from numba.core.compiler_machinery import PassManager
-from numba.core.dispatcher import Dispatcher
-from numba.core.runtime import rtsys
 
-from tts2face.storage.files import user_cache
+from tts2face.numeric.object_code import load_object
+from tts2face.storage.files import user_cache, write_atomically
+
+if TYPE_CHECKING:
+    from tts2face.numeric.compiler import Compiled
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
-LOG = logging.getLogger(__name__)
-REPORT_S = 5.0  # between two messages of a compilation
 CACHE_VARIABLE = "NUMBA_CACHE_DIR"  # set by the user
 N_VERSIONS = 4  # of the compiled kernels of a module that are kept
-# Extensions of other packages are not loaded: no kernel uses their types, and looking for them takes 20 ms of a start.
-entrypoints._already_initialized = True
+SUFFIX = ".kernel"  # of a file with the code of one kernel for one kind of arguments
+ENTRY = "entry"  # the function of an object that is called
+LAYOUT = 0x503  # flags of an array that matter: C and Fortran order, aligned, writable
+SCALARS = {bool: -1, int: -2, float: -3}  # in the key of a call
+CODES = {"O": ctypes.py_object, "?": ctypes.c_bool, "d": ctypes.c_double, "f": ctypes.c_float} | {
+    code: getattr(ctypes, f"c_{sign}int{bits}")
+    for codes, sign in (("bhiq", ""), ("BHIQ", "u"))
+    for code, bits in zip(codes, (8, 16, 32, 64), strict=True)
+}
+_loading = threading.RLock()
 
 
-class ModuleLocator(_CacheLocator):  # type: ignore[misc]
-    """Folder of the compiled kernels of a module: its name and a hash of all that its kernels are compiled of."""
+class Kernel(Generic[Arguments, Result]):
+    """A function that is compiled at its first call with arguments of new types, and runs without the GIL.
 
-    def __init__(self, function: Callable[..., Any], path: str) -> None:
-        self._function, self._py_file = function, path
-        self._stamp = _stamp(path, function.__globals__)
+    Arguments are arrays, numbers, and tuples of them; results are numbers, a tuple of numbers, or None.
+    """
 
-    @classmethod
-    def from_function(cls, function: Callable[..., Any], path: str) -> "ModuleLocator":
-        """As numba asks for a locator."""
-        return cls(function, path)
+    def __init__(
+        self, function: Callable[Arguments, Result], *, is_inlined: bool = False, reorders_sums: bool = False
+    ) -> None:
+        update_wrapper(self, function)
+        self.py_func, self.is_inlined, self.reorders_sums = function, is_inlined, reorders_sums
+        self._calls: dict[tuple[int, ...], tuple[Callable[..., int], str, bool]] = {}
+        self.n_from_cache = 0  # kinds of arguments whose code was in the cache
 
-    def get_cache_path(self) -> str:
-        """Folder of the compiled code."""
-        return str(FOLDER / f"{Path(self._py_file).stem}-{self._stamp}")
+    def __call__(self, *arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
+        """Call the compiled code.
 
-    def get_source_stamp(self) -> str:
-        """By which numba knows that compiled code is valid."""
-        return self._stamp
+        Raises
+        ------
+        MemoryError
+            The code could not allocate memory.
+        """
+        flat: list[Any] = []
+        key: list[int] = []
+        _flatten(arguments, flat, key)
+        try:
+            function, results, is_tuple = self._calls[tuple(key)]
+        except KeyError:
+            function, results, is_tuple = self._load(tuple(key), arguments)
+        if not results:
+            if function(*flat):
+                raise MemoryError(f"{self.py_func.__qualname__} lacks memory")
+            return None  # type: ignore[return-value]
+        found = ctypes.create_string_buffer(struct.calcsize(results))
+        if function(*flat, found):
+            raise MemoryError(f"{self.py_func.__qualname__} lacks memory")
+        numbers: Any = struct.unpack(results, found)
+        return numbers if is_tuple else numbers[0]  # type: ignore[no-any-return]
 
-    def get_disambiguator(self) -> str:
-        """Line of the function, as several of a module may have one name."""
-        return str(self._function.__code__.co_firstlineno)
+    def files(self) -> list[Path]:
+        """Files with the compiled code of this version."""
+        return list(self._folder().glob(f"{self._stem()}-*{SUFFIX}"))
 
-    def ensure_cache_path(self) -> None:
-        """Create the folder before code is saved, and remove those of the oldest versions of the module."""
-        super().ensure_cache_path()
-        versions = sorted(FOLDER.glob(f"{Path(self._py_file).stem}-*"), key=_time_of_change)
-        for folder in versions[:-N_VERSIONS]:
-            shutil.rmtree(folder, ignore_errors=True)
+    def _folder(self) -> Path:
+        path = self.py_func.__code__.co_filename
+        return FOLDER / f"{Path(path).stem}-{_stamp(path, self.py_func.__globals__)}"
+
+    def _stem(self) -> str:
+        return f"{self.py_func.__name__}-{self.py_func.__code__.co_firstlineno}"  # several may have one name
+
+    def _load(self, key: tuple[int, ...], arguments: Sequence[Any]) -> tuple[Callable[..., int], str, bool]:
+        with _loading:
+            if key in self._calls:
+                return self._calls[key]
+            kind = hashlib.sha256(f"{key} {_machine()}".encode()).hexdigest()[:16]
+            path = self._folder() / f"{self._stem()}-{kind}{SUFFIX}"
+            try:
+                arguments_code, results, is_tuple, code = path.read_bytes().split(b"\n", 3)
+                self.n_from_cache += 1
+            except (OSError, ValueError):
+                compiled = self._compile(arguments)
+                parts = [compiled.arguments.encode(), compiled.results.encode(), b"1" * compiled.is_tuple]
+                arguments_code, results, is_tuple, code = *parts, compiled.code
+                _keep(path, b"\n".join([*parts, code]))
+            types = [CODES[one] for one in arguments_code.decode()]
+            prototype = ctypes.CFUNCTYPE(ctypes.c_int, *types, *([ctypes.c_char_p] if results else []))
+            function = prototype(load_object(code, ENTRY))
+            self._calls[key] = function, results.decode(), bool(is_tuple)
+            return self._calls[key]
+
+    def _compile(self, arguments: Sequence[Any]) -> "Compiled":
+        found: Compiled = importlib.import_module("tts2face.numeric.compiler").compile_kernel(self, tuple(arguments))
+        return found
+
+
+def _flatten(values: Sequence[Any], flat: list[Any], key: list[int]) -> None:
+    """Append the arrays and numbers that arguments hold, and what code depends on: types, and the layout of arrays."""
+    for value in values:
+        kind = type(value)
+        if kind is np.ndarray:
+            flat.append(value)
+            layout, dtype = value.flags.num & LAYOUT, value.dtype
+            key.append((layout & ~2 if layout & 1 else layout) | value.ndim << 12 | dtype.num << 20 | dtype.isnative)
+        elif kind in SCALARS:
+            flat.append(value)
+            key.append(SCALARS[kind])
+        elif kind is tuple:
+            key.append(-64 - len(value))
+            _flatten(value, flat, key)
+        elif isinstance(value, np.ndarray):
+            _flatten((np.asarray(value),), flat, key)
+        else:  # a number of numpy: of the same type as Python's, or of a type of its own
+            number = value.item()
+            flat.append(number)
+            is_same = value.dtype.itemsize == 8 and value.dtype.kind in "if"
+            key.append(SCALARS[type(number)] if is_same or value.dtype.kind == "b" else -4 - value.dtype.num)
+
+
+def _keep(path: Path, content: bytes) -> None:
+    """Write a file of the cache if that is possible, and remove the folders of the oldest versions of its module."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, content)
+    except OSError:
+        return
+    versions = sorted(path.parent.parent.glob(f"{path.parent.name.rpartition('-')[0]}-*"), key=_time_of_change)
+    for folder in versions[:-N_VERSIONS]:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _time_of_change(path: Path) -> float:
@@ -84,20 +166,43 @@ def _time_of_change(path: Path) -> float:
         return 0.0
 
 
+@cache
+def _machine() -> str:
+    """What compiled code depends on besides its source: processor, compiler, and settings of the compiler."""
+    settings = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_") and item[0] != CACHE_VARIABLE)
+    versions = []
+    for package in ("numba", "llvmlite"):
+        spec = find_spec(package)
+        if spec is not None and spec.origin is not None:
+            versions.append(Path(spec.origin).with_name("_version.py").read_bytes())
+    return repr((_processor(), versions, settings, sys.version_info[:2], sys.platform, platform.machine()))
+
+
+def _processor() -> object:
+    """Name and features of the processor."""
+    try:
+        with Path("/proc/cpuinfo").open("rb") as file:
+            first = file.read(8192).split(b"\n\n")[0]  # all cores have the same
+        lines = [line for line in first.split(b"\n") if line.startswith((b"model", b"cpu family", b"flags"))]
+    except OSError:
+        lines = []
+    if any(line.startswith(b"flags") for line in lines):
+        return lines
+    llvm = importlib.import_module("llvmlite.binding")
+    llvm.initialize_native_target()
+    return llvm.get_host_cpu_name(), sorted(llvm.get_host_cpu_features().items())
+
+
 _stamps: dict[str, str] = {}  # by the path of the module
 
 
 def _stamp(path: str, names: dict[str, Any]) -> str:
-    """Hash of a module's name and text, of the modules of the kernels that it imports, and of imported constants.
-
-    numba looks at the text of the module alone, keeps code that calls kernels of another module as it was, and finds a
-    kernel's module by its name.
-    """
+    """Hash of a module's name and text, of the modules of the kernels that it imports, and of imported constants."""
     if path not in _stamps:
         found = hashlib.sha256(names["__name__"].encode() + Path(path).read_bytes())
         for name, value in sorted(names.items()):
-            if isinstance(value, Dispatcher):
-                other = inspect.getfile(value.py_func)
+            if isinstance(value, Kernel):
+                other = value.py_func.__code__.co_filename
                 found.update(_stamp(other, value.py_func.__globals__).encode() if other != path else b"")
             elif isinstance(value, np.ndarray):
                 found.update(name.encode() + value.tobytes())
@@ -107,89 +212,23 @@ def _stamp(path: str, names: dict[str, Any]) -> str:
     return _stamps[path]
 
 
-class KernelCacheImpl(CompileResultCacheImpl):  # type: ignore[misc]
-    """What numba keeps of a kernel, in the folder of its module."""
-
-    _locator_classes = [ModuleLocator]  # noqa: RUF012 - as numba declares it
-
-
-class KernelCache(FunctionCache):  # type: ignore[misc]
-    """Compiled code of a kernel on disk, which is loaded without the compiler.
-
-    numba's own class first registers all that its compiler can compile, which takes most of the time of the first
-    kernel of a process. Compiled code needs its run time only, and the compiler registers everything itself.
-    """
-
-    _impl_class = KernelCacheImpl
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Compiled code for a signature; None if it is not in the cache."""
-        rtsys.initialize(target_context)
-        with self._guard_against_spurious_io_errors():
-            return self._load_overload(sig, target_context)
-
-
-class KernelCompiler(CompilerBase):  # type: ignore[misc]
-    """numba's compiler without the passes that change nothing in a kernel.
-
-    Those are for closures, exceptions, expressions over whole arrays, and literal arguments. After each pass numba
-    analyses the function again, which takes a tenth of the time of compiling it.
-    """
-
-    PASSES = (
-        untyped_passes.TranslateByteCode,
-        untyped_passes.FixupArgs,
-        untyped_passes.IRProcessing,
-        untyped_passes.GenericRewrites,
-        untyped_passes.InlineInlinables,
-        untyped_passes.ReconstructSSA,
-        typed_passes.NopythonTypeInference,
-        typed_passes.PreLowerStripPhis,
-        typed_passes.IRLegalization,
-        typed_passes.NativeLowering,
-        typed_passes.NoPythonBackend,
-    )
-
-    def define_pipelines(self) -> list[Any]:
-        """As numba asks for the passes."""
-        passes = PassManager("kernel")
-        for one in self.PASSES:
-            passes.add_pass(one, one.__name__)
-        passes.finalize()
-        return [passes]
-
-
-def kernel(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+def kernel(function: Callable[Arguments, Result]) -> Kernel[Arguments, Result]:
     """Compile a function at its first call, cache the code on disk, and release the GIL while it runs."""
-    return _compiled(function, fastmath=False)
+    return Kernel(function)
 
 
-def vectorized_kernel(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+def vectorized_kernel(function: Callable[Arguments, Result]) -> Kernel[Arguments, Result]:
     """Compile a kernel with `fastmath`, which vectorises loops over long arrays by reordering sums.
 
-    Such a kernel calls only inlined ones: which others the compiler inlines depends on what is in the cache, and with
-    `fastmath` the result would, too.
+    Such a kernel calls only inlined ones: which others the compiler inlines depends on what has been compiled before,
+    and with `fastmath` the result would, too.
     """
-    return _compiled(function, fastmath=True)
+    return Kernel(function, reorders_sums=True)
 
 
-def inlined_kernel(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+def inlined_kernel(function: Callable[Arguments, Result]) -> Kernel[Arguments, Result]:
     """Compile a function inline in each kernel that calls it."""
-    compiled: Callable[Arguments, Result] = numba.njit(inline="always", error_model="numpy")(function)
-    return compiled
-
-
-def _compiled(function: Callable[Arguments, Result], *, fastmath: bool) -> Callable[Arguments, Result]:
-    compiled: Any = numba.njit(
-        nogil=True,
-        error_model="numpy",
-        fastmath=fastmath,
-        no_cfunc_wrapper=True,  # nobody calls a kernel from C
-        pipeline_class=KernelCompiler,
-    )(function)
-    compiled._cache = KernelCache(function)
-    found: Callable[Arguments, Result] = compiled
-    return found
+    return Kernel(function, is_inlined=True)
 
 
 def cache_folder() -> Path:
@@ -228,42 +267,6 @@ def _private_folder() -> Path:
 
 
 FOLDER = cache_folder()
-
-
-class _Compilations(event.Listener):  # type: ignore[misc]
-    """Logs that functions are compiled: the first one, and now and then how many there have been.
-
-    Meanwhile no garbage is looked for: a compilation makes 100,000 of objects that live as long as it, and looking
-    through them takes a tenth of its time. numba lets one thread compile at a time.
-    """
-
-    def __init__(self) -> None:
-        self.n_functions, self._next_s = 0, 0.0
-        self._depth, self._collects = 0, False
-
-    def on_start(self, event: Any) -> None:
-        """Count the function whose compilation begins; functions from the disk cache never come here."""
-        self.n_functions += 1
-        if self._depth == 0:
-            self._collects = gc.isenabled()
-            gc.disable()
-        self._depth += 1
-        if time.monotonic() >= self._next_s:
-            so_far = "" if self.n_functions == 1 else f": {self.n_functions} functions so far"
-            LOG.info(
-                "compiling kernels, once on this machine%s", so_far, extra={"fields": {"functions": self.n_functions}}
-            )
-            self._next_s = time.monotonic() + REPORT_S
-
-    def on_end(self, event: Any) -> None:
-        """Collect garbage again after the outermost function."""
-        self._depth -= 1
-        if self._depth == 0 and self._collects:
-            gc.enable()
-
-
-COMPILATIONS = _Compilations()
-event.register("numba:compile", COMPILATIONS)
 
 
 VARIABLE = "ORT_DISABLE_TELEMETRY"  # read when the native library is loaded

@@ -9,7 +9,6 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any
 
@@ -53,8 +52,7 @@ def _drawing_kernel(drawn: Face) -> "Kernel":
 
 
 def _is_compiled(module: ModuleType, name: str) -> bool:
-    folder = Path(str(getattr(module, name).stats.cache_path))
-    return any(folder.glob(f"{module.__name__.rpartition('.')[2]}.{name}-*.nbi"))
+    return bool(getattr(module, name).files())
 
 
 def compile_kernels(drawn: Face | None) -> None:

@@ -78,7 +78,7 @@ def block_powers(sound: Waveform) -> Floats:
     weighted = np.zeros(max(len(sound.samples), block))
     weighted[: len(sound.samples)] = sound.samples
     for numerator, denominator in k_weighting(sound.rate):
-        weighted = filter_biquad(numerator, denominator, weighted)
+        filter_biquad(numerator, denominator, weighted)
     sums = np.concatenate([[0.0], np.cumsum(np.square(weighted))])
     begins = np.arange(0, len(weighted) - block + 1, step)
     powers: Floats = np.maximum(sums[begins + block] - sums[begins], 0.0) / block
@@ -108,19 +108,17 @@ def k_weighting(rate: int) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]
 
 
 @kernel
-def filter_biquad(numerator: Floats, denominator: Floats, samples: Floats) -> Floats:
-    """Filter samples (n,) by a second-order section from rest (transposed direct form II).
+def filter_biquad(numerator: Floats, denominator: Floats, samples: Floats) -> None:
+    """Replace samples (n,) by those filtered with a second-order section from rest (transposed direct form II).
 
     numerator, denominator: (3,) coefficients; the first one of the denominator is 1.
     """
-    filtered = np.empty_like(samples)
     first = second = 0.0
     for n, sample in enumerate(samples):
         output = first + numerator[0] * sample
         first = second + numerator[1] * sample - denominator[1] * output
         second = numerator[2] * sample - denominator[2] * output
-        filtered[n] = output
-    return filtered
+        samples[n] = output
 
 
 @cache

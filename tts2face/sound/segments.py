@@ -111,8 +111,9 @@ def divide(log_probabilities: NDArray[np.floating], segments: Segments) -> list[
     shape = (len(bounds), int((bounds[:, 1] - bounds[:, 0]).max()) + 1)
     score, entered, before = np.full(shape, -np.inf), np.full(shape, -1), np.zeros(shape, np.int64)
     score[0, 0] = 0.0
+    space = np.zeros(shape[1]), np.zeros(shape[1]), np.zeros(shape[1], np.int64)
     costs = segments.passed, segments.taken, segments.durations, segments.begins, segments.ends
-    _search(sums, (segments.labels, segments.joints, segments.shortest, bounds), costs, (score, entered, before))
+    _search(sums, (segments.labels, segments.joints, segments.shortest, bounds), costs, (score, entered, before), space)
     joint, frame, found = len(bounds) - 1, int(bounds[-1, 1]), []
     while joint > 0:
         segment = int(entered[joint, frame - bounds[joint, 0]])
@@ -126,22 +127,26 @@ def divide(log_probabilities: NDArray[np.floating], segments: Segments) -> list[
 
 
 @kernel
-def _search(sums, segments, costs, found):  # type: ignore[no-untyped-def]
-    """Write the score (J, W) of the best division up to each joint at each frame, its last segment, and its begin."""
+def _search(sums, segments, costs, found, space):  # type: ignore[no-untyped-def]
+    """Write the score (J, W) of the best division up to each joint at each frame, its last segment, and its begin.
+
+    `space` holds three arrays (W,), which are overwritten.
+    """
     labels, joints, shortest, bounds = segments
     passed, taken, durations, begins, ends = costs
     score, entered, before = found
+    all_starts, reached, begin = space
     for n in range(len(labels)):
         label, source, target = labels[n], joints[n, 0], joints[n, 1]
         (earliest, latest), (low, high) = bounds[source], bounds[target]
         so_far = score[source, : latest - earliest + 1]
-        starts = np.empty_like(so_far)
-        for at in range(len(starts)):  # loading a kernel with whole arrays imports 50 ms of numba
+        starts = all_starts[: len(so_far)]
+        for at in range(len(starts)):  # whole arrays would take long to compile
             starts[at] = so_far[at] + taken[n] + begins[n, at] - sums[earliest + at, label]
         if durations[n, 0] > 0.0:
-            reached, begin = _end_unlimited(starts, (earliest, low, high), shortest[n])
+            _end_unlimited(starts, (earliest, low, high), shortest[n], reached, begin)
         else:
-            reached, begin = _end_limited(starts, (earliest, low, high), shortest[n], durations[n])
+            _end_limited(starts, (earliest, low, high), shortest[n], durations[n], (reached, begin))
         for end in range(low, high + 1):
             at = end - low
             value, start = reached[at] + sums[end, label] + ends[n, at], begin[at]
@@ -152,24 +157,23 @@ def _search(sums, segments, costs, found):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _end_limited(starts, frames, shortest, durations):  # type: ignore[no-untyped-def]
-    """Best score of a segment that ends in each frame from `low` to `high`, and its begin, by scores of its begins."""
+def _end_limited(starts, frames, shortest, durations, out):  # type: ignore[no-untyped-def]
+    """Write the best score of a segment that ends in each frame from `low` to `high`, and its begin, by scores of its begins."""
     earliest, low, high = frames
-    reached, begin = np.full(high - low + 1, -np.inf), np.zeros(high - low + 1, np.int64)
+    reached, begin = out
     for end in range(low, high + 1):
+        reached[end - low], begin[end - low] = -np.inf, 0
         first, last = max(end - len(durations) + 1, earliest), min(end - shortest, earliest + len(starts) - 1)
         for at in range(first, last + 1):
             value = starts[at - earliest] + durations[end - at]
             if value > reached[end - low]:
                 reached[end - low], begin[end - low] = value, at
-    return reached, begin
 
 
 @kernel
-def _end_unlimited(starts, frames, shortest):  # type: ignore[no-untyped-def]
+def _end_unlimited(starts, frames, shortest, reached, begin):  # type: ignore[no-untyped-def]
     """As `_end_limited`, of a segment of any duration."""
     earliest, low, high = frames
-    reached, begin = np.full(high - low + 1, -np.inf), np.zeros(high - low + 1, np.int64)
     best, best_at, at = -np.inf, earliest, earliest
     for end in range(low, high + 1):
         while at <= min(end - shortest, earliest + len(starts) - 1):
@@ -177,7 +181,6 @@ def _end_unlimited(starts, frames, shortest):  # type: ignore[no-untyped-def]
                 best, best_at = starts[at - earliest], at
             at += 1
         reached[end - low], begin[end - low] = best, best_at
-    return reached, begin
 
 
 def find_edges(sound: Waveform, stated: Sequence[StatedPhone], classifier: PhoneClassifier) -> Floats:

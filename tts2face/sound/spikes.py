@@ -39,8 +39,9 @@ def find_spikes(log_probabilities: NDArray[np.float32], words: Pronounced, unsai
     between = states.between
     emitted[:, between] = np.maximum(emitted[:, between], UNWRITTEN)
     arcs = np.cumsum([0, *map(len, states.before)]), np.concatenate(states.before), np.concatenate(states.costs)
-    found: Floats = _entry_probabilities(emitted, arcs, np.array(states.ends))[:, states.phones]
-    return found
+    entered = np.zeros(emitted.shape)
+    _entry_probabilities(emitted, arcs, np.array(states.ends), entered)
+    return entered[:, states.phones]
 
 
 class _States:
@@ -76,10 +77,10 @@ class _States:
 
 
 @kernel
-def _entry_probabilities(emitted, arcs, ends):  # type: ignore[no-untyped-def]
-    """Probabilities (T, S) that states are entered in each frame, by forward and backward sums of log probabilities."""
+def _entry_probabilities(emitted, arcs, ends, entered):  # type: ignore[no-untyped-def]
+    """Write the probabilities (T, S) that states are entered in each frame, by forward and backward sums of log probabilities."""
     n_frames, n_states = emitted.shape
-    entered, inside = np.zeros((n_frames, n_states)), np.full(n_states, -np.inf)
+    inside = np.full(n_states, -np.inf)
     reached = np.full(n_states, -np.inf)
     reached[0] = 0.0
     _add_forward(arcs, reached.copy(), reached)
@@ -101,7 +102,6 @@ def _entry_probabilities(emitted, arcs, ends):  # type: ignore[no-untyped-def]
             behind = left.copy()
             _add_backward(arcs, left, behind)
         entered[t] = np.exp(np.minimum(entered[t] + behind - whole, 0.0))
-    return entered
 
 
 @kernel

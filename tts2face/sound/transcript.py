@@ -54,7 +54,8 @@ def assign_words(words: Sequence[Phones], recognised: Sequence[Phones]) -> NDArr
     part_of_sounded = np.repeat(np.arange(len(recognised)), [len(phones) for phones in recognised])
     if not len(sounded) or not len(written):
         return np.zeros(len(words), np.int64)
-    partner = _match_phones(written, sounded, max(BAND, abs(len(written) - len(sounded)) + BAND // 4))
+    partner = np.zeros(len(written), np.int64)
+    _match_phones(written, sounded, max(BAND, abs(len(written) - len(sounded)) + BAND // 4), partner)
     places = part_of_sounded[np.clip(partner, 0, len(sounded) - 1)]
     ends = np.cumsum([len(word) for word in words])
     found = [
@@ -65,8 +66,10 @@ def assign_words(words: Sequence[Phones], recognised: Sequence[Phones]) -> NDArr
 
 
 @kernel
-def _match_phones(written: NDArray[np.int64], sounded: NDArray[np.int64], band: int) -> NDArray[np.int64]:
-    """(N,) index of the recognised phone that is matched with each written one, or of the phone before it."""
+def _match_phones(
+    written: NDArray[np.int64], sounded: NDArray[np.int64], band: int, partner: NDArray[np.int64]
+) -> None:
+    """Write the index (N,) of the recognised phone that is matched with each written one, or of the phone before it."""
     n, m, width = len(written), len(sounded), 2 * band + 1
     steps = np.full((n + 1, width), DELETED, np.uint8)
     before = np.full(width, np.inf, np.float32)
@@ -76,8 +79,7 @@ def _match_phones(written: NDArray[np.int64], sounded: NDArray[np.int64], band: 
     for i in range(1, n + 1):
         low, low_before = i * m // n - band, (i - 1) * m // n - band
         before = _cost_row(written[i - 1], sounded, before, (low, low_before), steps[i])
-    partners: NDArray[np.int64] = _trace_back(steps, m, band)
-    return partners
+    _trace_back(steps, m, band, partner)
 
 
 @kernel
@@ -107,9 +109,8 @@ def _cost_row(
 
 
 @kernel
-def _trace_back(steps: NDArray[np.uint8], m: int, band: int) -> NDArray[np.int64]:
+def _trace_back(steps: NDArray[np.uint8], m: int, band: int, partner: NDArray[np.int64]) -> None:
     n = len(steps) - 1
-    partner = np.zeros(n, np.int64)
     i, j = n, m
     while i > 0:
         step = steps[i, j - (i * m // n - band)]
@@ -119,7 +120,6 @@ def _trace_back(steps: NDArray[np.uint8], m: int, band: int) -> NDArray[np.int64
             partner[i - 1] = max(j - 1, 0)
             i -= 1
             j -= step == MATCHED
-    return partner
 
 
 MAX_ALIGNED_S = 60.0  # time of the search grows with the square of the length

@@ -156,7 +156,8 @@ def align_phones(
             for side in (-1, 1)
         )
         costs = _window_costs(features, means, silent, low, high, model)
-        ends, cost = _search_edges(costs, low, high, (log_durations, is_optional, silent, longest))
+        ends = np.zeros(len(low) + 1, np.int64)
+        cost = _search_edges(costs, low, high, (log_durations, is_optional, silent, longest), ends)
         if cost < UNREACHED:
             return (ends[1:] - 0.5) / RATE_HZ, cost / n_frames  # an edge lies halfway between two frames
     raise DataError(f"{len(labels)} phones do not fit into {n_frames / RATE_HZ:.1f} s of lips; check the text")
@@ -220,8 +221,8 @@ def _window_costs(
 
 
 @kernel
-def _search_edges(costs, low, high, rules):  # type: ignore[no-untyped-def]
-    """Cheapest ends (N + 1,) in frames, the first is the start; and the cost."""
+def _search_edges(costs, low, high, rules, ends):  # type: ignore[no-untyped-def]
+    """Write the cheapest ends (N + 1,) in frames, of which the first is the start; the result is the cost."""
     log_durations, is_optional, silent, longest = rules
     n = len(low)
     best = np.full(high[-1] + 1, 1e18)
@@ -237,13 +238,12 @@ def _search_edges(costs, low, high, rules):  # type: ignore[no-untyped-def]
             if cost < reached[end]:
                 reached[end], begins[i, end - low[i]] = cost, start
         best = reached
-    ends = np.zeros(n + 1, np.int64)
     ends[n] = low[n - 1] + np.argmin(best[low[n - 1] : high[n - 1] + 1])
     least = best[ends[n]]
     if least < UNREACHED:
         for i in range(n - 1, -1, -1):
             ends[i] = begins[i, ends[i + 1] - low[i]]
-    return ends, least
+    return least
 
 
 @kernel

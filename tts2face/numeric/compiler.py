@@ -1,0 +1,270 @@
+"""Compilation of kernels with numba, which is imported in this module only: when a kernel is not in the cache.
+
+Compilation delays a first run by up to half a minute; it is logged at the level INFO.
+"""
+
+import gc
+import logging
+import time
+from types import FunctionType
+from typing import Any, NamedTuple
+
+import llvmlite.binding as llvm
+import numba
+from llvmlite import ir
+from numba.core import entrypoints, event, lowering, typed_passes, types, untyped_passes
+from numba.core.compiler import CompilerBase
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.registry import cpu_target
+from numba.core.runtime import rtsys
+from numba.np.arrayobj import populate_array
+
+LOG = logging.getLogger("tts2face.numeric.kernels")
+REPORT_S = 5.0  # between two messages of a compilation
+ENTRY = "entry"  # the function of an object that is called
+# Extensions of other packages are not loaded: no kernel uses their types, and looking for them takes 20 ms of a start.
+entrypoints._already_initialized = True
+
+
+class Compiled(NamedTuple):
+    """A kernel for one kind of arguments.
+
+    Parameters
+    ----------
+    arguments
+        Codes of the types of the arguments, in which tuples are replaced by what they hold: ``O`` is an array, others
+        as in `ctypes`' ``_type_``.
+    results
+        Codes, as in `struct`, of the results, 8 bytes each.
+    is_tuple
+        Whether the results are a tuple.
+    code
+        Object file in which `ENTRY` has these arguments and, if there are results, their address. It returns 0 unless
+        memory is short.
+    """
+
+    arguments: str
+    results: str
+    is_tuple: bool
+    code: bytes
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class KernelLowering(typed_passes.BaseNativeLowering):  # type: ignore[misc]
+    """Lowering of a function that is called by others only; machine code is made for whole kernels."""
+
+    _name = "kernel_lowering"
+    lowering_class = lowering.Lower
+
+    def run_pass(self, state: Any) -> bool:
+        """As numba asks for a pass."""
+        state.flags.no_compile = True
+        super().run_pass(state)
+        lowered = state["cr"]
+        key = object().__sizeof__  # by which numba finds the function, in place of what Python would call: any built-in
+        state.targetctx.insert_user_function(key, lowered.fndesc, [state.library])
+        state["cr"] = lowered._replace(cfunc=key)
+        return True
+
+
+class KernelCompiler(CompilerBase):  # type: ignore[misc]
+    """numba's compiler without the passes that change nothing in a kernel.
+
+    Those are for closures, exceptions, expressions over whole arrays, and literal arguments. After each pass numba
+    analyses the function again, which takes a tenth of the time of compiling it.
+    """
+
+    PASSES = (
+        untyped_passes.TranslateByteCode,
+        untyped_passes.FixupArgs,
+        untyped_passes.IRProcessing,
+        untyped_passes.GenericRewrites,
+        untyped_passes.InlineInlinables,
+        untyped_passes.ReconstructSSA,
+        typed_passes.NopythonTypeInference,
+        typed_passes.PreLowerStripPhis,
+        typed_passes.IRLegalization,
+        KernelLowering,
+        typed_passes.NoPythonBackend,
+    )
+
+    def define_pipelines(self) -> list[Any]:
+        """As numba asks for the passes."""
+        passes = PassManager("kernel")
+        for one in self.PASSES:
+            passes.add_pass(one, one.__name__)
+        passes.finalize()
+        return [passes]
+
+
+_dispatchers: dict[Any, Any] = {}  # by kernel
+
+
+def compile_kernel(kernel: Any, arguments: tuple[Any, ...]) -> Compiled:
+    """Compile a kernel for the types of its arguments."""
+    with global_compiler_lock:
+        dispatcher = _dispatcher(kernel)
+        signature = tuple(numba.typeof(value) for value in arguments)
+        dispatcher.compile(signature)
+        found = dispatcher.overloads[signature]
+        context, library = found.target_context, found.library
+        if library._finalized:  # another kernel, which calls this one, has taken it
+            library = context.codegen().create_library(ENTRY)
+            library.add_linking_library(found.library)
+        module, codes, results = _entry(context, found.fndesc)
+        library.add_ir_module(module)
+        library.finalize()
+        code = context.codegen()._tm.emit_object(library._final_module)
+        return Compiled(codes, results, isinstance(found.fndesc.restype, types.BaseTuple), code)
+
+
+def _dispatcher(kernel: Any) -> Any:
+    """numba's object for a kernel; the kernels that it calls are replaced by theirs."""
+    if kernel not in _dispatchers:
+        function, known = kernel.py_func, dict(kernel.py_func.__globals__)
+        for name in function.__code__.co_names:
+            if isinstance(known.get(name), type(kernel)):
+                known[name] = _dispatcher(known[name])
+        copy = FunctionType(function.__code__, known, function.__name__, function.__defaults__, function.__closure__)
+        options: dict[str, Any] = {"inline": "always"} if kernel.is_inlined else {"fastmath": kernel.reorders_sums}
+        _dispatchers[kernel] = numba.njit(
+            _nrt=_allocates(kernel),
+            error_model="numpy",
+            no_cfunc_wrapper=True,
+            no_cpython_wrapper=True,
+            pipeline_class=KernelCompiler,
+            **options,
+        )(copy)
+    return _dispatchers[kernel]
+
+
+# Names of numpy's functions that make arrays. Where a kernel uses none, numba counts no references to its arrays; one
+# that allocates in another way is refused by numba.
+ALLOCATING = {"zeros", "ones", "full", "empty_like", "zeros_like", "full_like", "copy"}
+
+
+def _allocates(kernel: Any) -> bool:
+    """Whether a kernel, or one that it calls, allocates arrays."""
+    names, known = kernel.py_func.__code__.co_names, kernel.py_func.__globals__
+    called = [known[name] for name in names if isinstance(known.get(name), type(kernel))]
+    return not ALLOCATING.isdisjoint(names) or any(map(_allocates, called))
+
+
+def _entry(context: Any, described: Any) -> tuple[Any, str, str]:
+    """Module with a function that takes arrays as numpy's objects, calls a kernel and stores its results."""
+    module = context.create_module(ENTRY)
+    call, pointer = context.call_conv, ir.IntType(8).as_pointer()
+    kernel = ir.Function(module, call.get_function_type(described.restype, described.argtypes), described.llvm_func_name)
+    leaves = [leaf for given in described.argtypes for leaf in _leaves(given)]
+    results = _leaves(described.restype) if described.restype != types.none else []
+    passed = [pointer if isinstance(leaf, types.Array) else context.get_argument_type(leaf) for leaf in leaves]
+    entry = ir.Function(module, ir.FunctionType(ir.IntType(32), [*passed, *([pointer] if results else [])]), ENTRY)
+    builder = ir.IRBuilder(entry.append_basic_block())
+    values = iter([_value(context, builder, leaf, given) for leaf, given in zip(leaves, entry.args, strict=False)])
+
+    def whole(kind: Any) -> Any:
+        if isinstance(kind, types.BaseTuple):
+            return context.make_tuple(builder, kind, [whole(one) for one in kind])
+        return next(values)
+
+    whole_values = [whole(kind) for kind in described.argtypes]
+    status, found = call.call_function(
+        builder, kernel, described.restype, described.argtypes, whole_values, attrs=("noinline",)
+    )
+    with builder.if_then(status.is_error, likely=False):
+        builder.ret(ir.Constant(ir.IntType(32), 1))
+    for n, leaf in enumerate(results):
+        value = builder.extract_value(found, n) if isinstance(described.restype, types.BaseTuple) else found
+        wide = types.float64 if isinstance(leaf, types.Float) else types.int64
+        value = context.cast(builder, value, leaf, wide)
+        place = builder.gep(entry.args[-1], [ir.Constant(ir.IntType(64), 8 * n)])
+        builder.store(value, builder.bitcast(place, value.type.as_pointer()))
+    builder.ret(ir.Constant(ir.IntType(32), 0))
+    return module, "".join(map(_argument_code, leaves)), "".join(map(_result_code, results))
+
+
+def _leaves(kind: Any) -> list[Any]:
+    """Types that a type consists of."""
+    return [leaf for one in kind for leaf in _leaves(one)] if isinstance(kind, types.BaseTuple) else [kind]
+
+
+CODES = {
+    types.boolean: "?", types.int8: "b", types.int16: "h", types.int32: "i", types.int64: "q",
+    types.uint8: "B", types.uint16: "H", types.uint32: "I", types.uint64: "Q", types.float32: "f", types.float64: "d",
+}  # fmt: skip
+
+
+def _argument_code(kind: Any) -> str:
+    return "O" if isinstance(kind, types.Array) else CODES[kind]
+
+
+def _result_code(kind: Any) -> str:
+    return "?7x" if kind == types.boolean else "d" if isinstance(kind, types.Float) else "q"
+
+
+def _value(context: Any, builder: Any, kind: Any, given: Any) -> Any:
+    """An argument as numba's code takes it: of an array its place, shape and strides, which numpy's object begins with.
+
+    ``PyArrayObject_fields`` of numpy's C API: the head of an object, data, number of dimensions, shape, strides.
+    """
+    if not isinstance(kind, types.Array):
+        return context.data_model_manager[kind].from_argument(builder, given)
+    size, word = ir.IntType(64), ir.IntType(64)
+
+    def field(n: int, of: Any) -> Any:
+        place = builder.gep(given, [ir.Constant(size, object.__basicsize__ + 8 * n)])
+        return builder.load(builder.bitcast(place, of.as_pointer()))
+
+    lengths, steps = field(2, word.as_pointer()), field(3, word.as_pointer())
+    shape, strides = (
+        [builder.load(builder.gep(first, [ir.Constant(size, axis)])) for axis in range(kind.ndim)]
+        for first in (lengths, steps)
+    )
+    array = context.make_array(kind)(context, builder)
+    data = builder.bitcast(field(0, ir.IntType(8).as_pointer()), array.data.type)
+    width = context.get_abi_sizeof(context.get_data_type(kind.dtype))
+    populate_array(array, data, shape, strides, ir.Constant(word, width), meminfo=None)
+    return array._getvalue()
+
+
+def symbol_address(name: str) -> int:
+    """Address of a function of numba's run time, by which kernels allocate memory."""
+    rtsys.initialize(cpu_target.target_context)
+    return int(llvm.address_of_symbol(name) or 0)
+
+
+class _Compilations(event.Listener):  # type: ignore[misc]
+    """Logs that functions are compiled: the first one, and now and then how many there have been.
+
+    Meanwhile no garbage is looked for: a compilation makes 100,000 of objects that live as long as it, and looking
+    through them takes a tenth of its time. numba lets one thread compile at a time.
+    """
+
+    def __init__(self) -> None:
+        self.n_functions, self._next_s = 0, 0.0
+        self._depth, self._collects = 0, False
+
+    def on_start(self, event: Any) -> None:
+        """Count the function whose compilation begins; functions from the disk cache never come here."""
+        self.n_functions += 1
+        if self._depth == 0:
+            self._collects = gc.isenabled()
+            gc.disable()
+        self._depth += 1
+        if time.monotonic() >= self._next_s:
+            so_far = "" if self.n_functions == 1 else f": {self.n_functions} functions so far"
+            LOG.info(
+                "compiling kernels, once on this machine%s", so_far, extra={"fields": {"functions": self.n_functions}}
+            )
+            self._next_s = time.monotonic() + REPORT_S
+
+    def on_end(self, event: Any) -> None:
+        """Collect garbage again after the outermost function."""
+        self._depth -= 1
+        if self._depth == 0 and self._collects:
+            gc.enable()
+
+
+COMPILATIONS = _Compilations()
+event.register("numba:compile", COMPILATIONS)
