@@ -3,18 +3,19 @@
 import gc
 import logging
 import os
+import platform
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from types import SimpleNamespace
 
 import numba
 import numpy as np
 import pytest
-from numba.core.dispatcher import Dispatcher
+from numba.core.errors import NumbaError
 
 from cli.process import COMPILATION, compilation_messages, progress_bar
 from lexicon.errors import BackendError
@@ -22,8 +23,9 @@ from tests.picture.film.lit_face import lit_tiny_face
 from tests.processes.answered import answered
 from tts2face.gestures import field_kernels
 from tts2face.lips import contacts
+from tts2face.numeric import compiler, object_code
 from tts2face.numeric import kernels as compilation
-from tts2face.numeric.kernels import CACHE_VARIABLE, cache_folder
+from tts2face.numeric.kernels import CACHE_VARIABLE, Kernel, cache_folder, inlined_kernel, kernel
 from tts2face.picture.baked import surface
 from tts2face.picture.kernels import raster, shade, strands
 from tts2face.picture.kernels import strands as strand_light
@@ -78,19 +80,18 @@ def test_a_folder_that_the_user_sets_is_kept(monkeypatch):
 
 @pytest.fixture
 def indexes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> dict[str, Path]:
-    """Index files of a kernel of motion and of one of each kind of drawing, which do not exist."""
-    stats = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path)))
-    monkeypatch.setattr(raster, "draw_band", stats)
-    monkeypatch.setattr(surface, "find_nearest", stats)
-    monkeypatch.setattr(contacts, "_closest_rows", stats)
-    monkeypatch.setattr(field_kernels, "generate_frames", stats)
-    names = {
-        "motion": "contacts._closest_rows",
-        "gestures": "field_kernels.generate_frames",
-        "lamps": "raster.draw_band",
-        "baked": "surface.find_nearest",
+    """Files of a kernel of motion and of one of each kind of drawing, which do not exist."""
+    monkeypatch.setattr(compilation, "FOLDER", tmp_path)
+    kernels = {
+        "motion": contacts._closest_rows,
+        "gestures": field_kernels.generate_frames,
+        "lamps": raster.draw_band,
+        "baked": surface.find_nearest,
     }
-    return {what: tmp_path / f"{name}-1.py311.nbi" for what, name in names.items()}
+    files = {what: one._folder() / f"{one._stem()}-0{compilation.SUFFIX}" for what, one in kernels.items()}
+    for file in files.values():
+        file.parent.mkdir(exist_ok=True)
+    return files
 
 
 def test_kernels_count_as_compiled_once_they_lie_on_disk(indexes):
@@ -155,11 +156,11 @@ def test_a_command_and_its_children_share_the_works(monkeypatch: pytest.MonkeyPa
 
 def test_garbage_is_collected_again_after_a_compilation() -> None:
     assert gc.isenabled()
-    compilation.COMPILATIONS.on_start(None)
-    compilation.COMPILATIONS.on_start(None)
-    compilation.COMPILATIONS.on_end(None)
+    compiler.COMPILATIONS.on_start(None)
+    compiler.COMPILATIONS.on_start(None)
+    compiler.COMPILATIONS.on_end(None)
     assert not gc.isenabled()
-    compilation.COMPILATIONS.on_end(None)
+    compiler.COMPILATIONS.on_end(None)
     assert gc.isenabled()
 
 
@@ -179,7 +180,7 @@ SCALE = {scale}
 def value():
     return {value}
 """
-CALL = "from {room}.caller import twice; print(twice(), sum(twice.stats.cache_hits.values()))"
+CALL = "from {room}.caller import twice; print(twice(), twice.n_from_cache)"
 ROOT = Path(__file__).parents[2]
 
 
@@ -204,7 +205,7 @@ def test_installations_share_code_that_is_compiled_of_the_same(tmp_path, monkeyp
         with monkeypatch.context() as path:
             path.syspath_prepend(package.parent)
             twice = import_module(f"{package.name}.caller").twice
-        return twice(), sum(twice.stats.cache_hits.values())
+        return twice(), twice.n_from_cache
 
     assert call("one", 1, 2) == (4, 0)
     assert call("two", 1, 2) == (4, 1)
@@ -225,36 +226,151 @@ def test_installations_share_code_that_is_compiled_of_the_same(tmp_path, monkeyp
 @pytest.mark.parametrize("module", [raster, shade, strand_light, strands], ids=lambda module: module.__name__)
 def test_kernels_that_may_reorder_sums_call_inlined_ones_only(module):
     for found in vars(module).values():
-        if isinstance(found, Dispatcher) and found.targetoptions.get("fastmath"):
+        if isinstance(found, Kernel) and found.reorders_sums:
             called = [found.py_func.__globals__.get(name) for name in found.py_func.__code__.co_names]
-            kernels = [kernel for kernel in called if isinstance(kernel, Dispatcher)]
-            assert all(kernel.targetoptions.get("inline") == "always" for kernel in kernels)
+            assert all(one.is_inlined for one in called if isinstance(one, Kernel))
 
 
 def test_some_kernels_may_reorder_sums():
-    assert shade.shade_fragments.targetoptions["fastmath"]
+    assert shade.shade_fragments.reorders_sums
 
 
 COMPILED_ONLY = """
 import sys
 import numpy as np
 from tts2face.sound.level import filter_biquad
-filtered = filter_biquad(np.ones(3), np.ones(3), np.ones(4))
-print(filtered.tolist(), sum(filter_biquad.stats.cache_hits.values()), "numba.np.linalg" in sys.modules)
+samples = np.ones(4)
+filter_biquad(np.ones(3), np.ones(3), samples)
+print(samples.tolist(), filter_biquad.n_from_cache, {"numba", "llvmlite"} & set(sys.modules))
 """
 
 
 def test_a_compiled_kernel_is_loaded_without_the_compiler():
-    ones = np.ones(3)
-    wanted = filter_biquad(ones, ones, np.ones(4)).tolist()  # compiles it where the cache is empty
+    ones, samples = np.ones(3), np.ones(4)
+    filter_biquad(ones, ones, samples)  # compiles it where the cache is empty
     found = subprocess.run([sys.executable, "-c", COMPILED_ONLY], check=True, capture_output=True, text=True)
-    assert found.stdout.split("\n")[0] == f"{wanted} 1 False"
+    is_elf = sys.platform == "linux" and platform.machine() == "x86_64"
+    loaded = set() if is_elf else {"llvmlite"}
+    assert found.stdout.split("\n")[0] == f"{samples.tolist()} 1 {loaded}"
+
+
+@inlined_kernel
+def _square(x: float) -> float:
+    return x * x
+
+
+@kernel
+def _sum_squares(values, scale):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for n in range(len(values)):
+        total += _square(values[n]) * scale
+    return total
+
+
+@kernel
+def _measure(both, step, is_added, out):  # type: ignore[no-untyped-def]
+    """Uses all kinds of arguments, a function of the C library, and memory; returns all kinds of results."""
+    values, table = both
+    space = np.zeros(len(values))
+    for n in range(0, len(values), step):
+        space[n] = np.exp(values[n]) + table[n, 1]
+        out[n] = space[n] if is_added else -space[n]
+    return len(values), np.float32(_sum_squares(space, 2.0)), is_added
+
+
+@kernel
+def _first(values):  # type: ignore[no-untyped-def]
+    return len(values)
+
+
+@kernel
+def _last(table):  # type: ignore[no-untyped-def]
+    return table[table.shape[0] - 1, table.shape[1] - 1]
+
+
+VALUES, TABLE = np.linspace(0.0, 1.0, 6), np.arange(12, dtype=np.float32).reshape(6, 2)
+READ_ONLY = VALUES.copy()
+READ_ONLY.flags.writeable = False
+
+
+@pytest.mark.parametrize("is_loaded_by_llvm", [False, True])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ((VALUES, TABLE), 1, True),
+        ((VALUES[::-1], np.asfortranarray(TABLE)), 2, False),
+        ((READ_ONLY[:4:2], TABLE[::2]), np.int64(1), np.bool_(True)),
+        ((VALUES.astype(np.float32), TABLE), np.uint8(3), False),
+    ],
+)
+def test_a_kernel_computes_what_its_text_says(monkeypatch, tmp_path, arguments, is_loaded_by_llvm):
+    """Compiled, and again from the cache; by both loaders of object code."""
+    if is_loaded_by_llvm:
+        monkeypatch.setattr(object_code, "machine", lambda: "another")
+    monkeypatch.setattr(compilation, "FOLDER", tmp_path)
+    n = len(arguments[0][0])
+    wanted, shown = np.zeros(n), np.zeros(n)
+    results = _measure.py_func(*arguments, wanted)
+    for n_from_cache in (0, 1):
+        measure = Kernel(_measure.py_func)
+        found = measure(*arguments, shown)
+        assert found == results
+        assert [type(one) for one in found] == [int, float, bool]
+        np.testing.assert_allclose(shown, wanted, rtol=1e-12)
+        assert measure.n_from_cache == n_from_cache
+
+
+def test_a_kernel_says_that_memory_is_short(monkeypatch):
+    measure = Kernel(_measure.py_func)
+    out = np.zeros(6)
+    measure((VALUES, TABLE), 1, True, out)
+    ((key, (_, *rest)),) = measure._calls.items()
+    monkeypatch.setitem(measure._calls, key, (lambda *_: 1, *rest))
+    with pytest.raises(MemoryError, match="_measure lacks memory"):
+        measure((VALUES, TABLE), 1, True, out)
+
+
+def test_damaged_code_is_compiled_again(monkeypatch, tmp_path):
+    monkeypatch.setattr(compilation, "FOLDER", tmp_path)
+    assert Kernel(_sum_squares.py_func)(VALUES, 2.0) == _sum_squares(VALUES, 2.0)
+    (file,) = tmp_path.glob("*/*")
+    for content in (b"", b"OO", file.read_bytes()[:-100]):
+        file.write_bytes(content)
+        again = Kernel(_sum_squares.py_func)
+        assert again(VALUES, 2.0) == _sum_squares(VALUES, 2.0)
+        assert again.n_from_cache == 0
+
+
+@pytest.mark.parametrize(
+    ("argument", "name"), [("text", "str"), (np.zeros(2, complex), "complex"), (np.zeros(2, "i4,f4"), "Record")]
+)
+def test_an_argument_of_another_kind_is_refused(argument, name):
+    with pytest.raises(TypeError, match=f"a kernel takes arrays, numbers and tuples of them, not .*{name}"):
+        _first(argument)
+
+
+def test_arrays_of_another_order_or_byte_order_have_code_of_their_own():
+    table = np.arange(6.0).reshape(2, 3)
+    for shown in (table, table.T, np.asfortranarray(table), table[:, ::-1], table[::-1, ::2], table[:1], table[:, :1]):
+        assert _last(shown) == shown[-1, -1]
+    with pytest.raises(NumbaError):
+        _last(table.astype(table.dtype.newbyteorder()))
+
+
+def test_threads_load_a_kernel_once(monkeypatch):
+    fresh, loaded = Kernel(_sum_squares.py_func), []
+    load = compilation.load_object
+    monkeypatch.setattr(compilation, "load_object", lambda *given: loaded.append(1) or load(*given))
+    with ThreadPoolExecutor(4) as pool:
+        found = set(pool.map(lambda _: fresh(VALUES, 2.0), range(8)))
+    assert found == {_sum_squares(VALUES, 2.0)}
+    assert len(loaded) == 1
 
 
 def test_compilation_is_announced_with_its_progress_unless_quiet(monkeypatch, capsys):
     """By whatever command compiles, also within its progress bar, and once."""
-    monkeypatch.setattr(compilation, "REPORT_S", 0.0)
-    monkeypatch.setattr(compilation.COMPILATIONS, "_next_s", 0.0)
+    monkeypatch.setattr(compiler, "REPORT_S", 0.0)
+    monkeypatch.setattr(compiler.COMPILATIONS, "_next_s", 0.0)
     with compilation_messages(), progress_bar("rendering"):
         numba.njit(lambda x: x + 1)(1)
         numba.njit(lambda x: x + 2)(1)

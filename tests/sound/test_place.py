@@ -37,8 +37,9 @@ def test_the_path_is_the_cheapest(seed: int) -> None:
     generator = np.random.default_rng(seed)
     written, sounded = ("".join(generator.choice(list("pba"), generator.integers(1, 9))) for _ in range(2))
     numbers = {phone: number for number, phone in enumerate("pba")}
-    partners = place._match_phones(
-        np.array([numbers[one] for one in written]), np.array([numbers[one] for one in sounded]), 20
+    partners = np.zeros(len(written), np.int64)
+    place._match_phones(
+        np.array([numbers[one] for one in written]), np.array([numbers[one] for one in sounded]), 20, partners
     )
     assert (np.diff(partners) >= 0).all()
     costs = []

@@ -4,10 +4,9 @@ Compilation delays a first run by up to half a minute; it is logged at the level
 """
 
 import gc
-import logging
 import time
 from types import FunctionType
-from typing import Any, NamedTuple
+from typing import Any
 
 import llvmlite.binding as llvm
 import numba
@@ -16,38 +15,18 @@ from numba.core import entrypoints, event, lowering, typed_passes, types, untype
 from numba.core.compiler import CompilerBase
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.imputils import impl_ret_borrowed
 from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
+from numba.core.types.containers import BaseTuple
+from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
-LOG = logging.getLogger("tts2face.numeric.kernels")
+from tts2face.numeric.kernels import BLOCK, ENTRY, LOG, Compiled, Intrinsic
+
 REPORT_S = 5.0  # between two messages of a compilation
-ENTRY = "entry"  # the function of an object that is called
 # Extensions of other packages are not loaded: no kernel uses their types, and looking for them takes 20 ms of a start.
 entrypoints._already_initialized = True
-
-
-class Compiled(NamedTuple):
-    """A kernel for one kind of arguments.
-
-    Parameters
-    ----------
-    arguments
-        Codes of the types of the arguments, in which tuples are replaced by what they hold: ``O`` is an array, others
-        as in `ctypes`' ``_type_``.
-    results
-        Codes, as in `struct`, of the results, 8 bytes each.
-    is_tuple
-        Whether the results are a tuple.
-    code
-        Object file in which `ENTRY` has these arguments and, if there are results, their address. It returns 0 unless
-        memory is short.
-    """
-
-    arguments: str
-    results: str
-    is_tuple: bool
-    code: bytes
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -116,16 +95,18 @@ def compile_kernel(kernel: Any, arguments: tuple[Any, ...]) -> Compiled:
         library.add_ir_module(module)
         library.finalize()
         code = context.codegen()._tm.emit_object(library._final_module)
-        return Compiled(codes, results, isinstance(found.fndesc.restype, types.BaseTuple), code)
+        return Compiled(codes, results, isinstance(found.fndesc.restype, BaseTuple), code)
 
 
 def _dispatcher(kernel: Any) -> Any:
-    """numba's object for a kernel; the kernels that it calls are replaced by theirs."""
+    """Numba's object for a kernel; the kernels that it calls are replaced by theirs."""
     if kernel not in _dispatchers:
         function, known = kernel.py_func, dict(kernel.py_func.__globals__)
         for name in function.__code__.co_names:
             if isinstance(known.get(name), type(kernel)):
                 known[name] = _dispatcher(known[name])
+            elif isinstance(known.get(name), Intrinsic):
+                known[name] = INTRINSICS[known[name].name]
         copy = FunctionType(function.__code__, known, function.__name__, function.__defaults__, function.__closure__)
         options: dict[str, Any] = {"inline": "always"} if kernel.is_inlined else {"fastmath": kernel.reorders_sums}
         _dispatchers[kernel] = numba.njit(
@@ -155,7 +136,9 @@ def _entry(context: Any, described: Any) -> tuple[Any, str, str]:
     """Module with a function that takes arrays as numpy's objects, calls a kernel and stores its results."""
     module = context.create_module(ENTRY)
     call, pointer = context.call_conv, ir.IntType(8).as_pointer()
-    kernel = ir.Function(module, call.get_function_type(described.restype, described.argtypes), described.llvm_func_name)
+    kernel = ir.Function(
+        module, call.get_function_type(described.restype, described.argtypes), described.llvm_func_name
+    )
     leaves = [leaf for given in described.argtypes for leaf in _leaves(given)]
     results = _leaves(described.restype) if described.restype != types.none else []
     passed = [pointer if isinstance(leaf, types.Array) else context.get_argument_type(leaf) for leaf in leaves]
@@ -164,7 +147,7 @@ def _entry(context: Any, described: Any) -> tuple[Any, str, str]:
     values = iter([_value(context, builder, leaf, given) for leaf, given in zip(leaves, entry.args, strict=False)])
 
     def whole(kind: Any) -> Any:
-        if isinstance(kind, types.BaseTuple):
+        if isinstance(kind, BaseTuple):
             return context.make_tuple(builder, kind, [whole(one) for one in kind])
         return next(values)
 
@@ -175,7 +158,7 @@ def _entry(context: Any, described: Any) -> tuple[Any, str, str]:
     with builder.if_then(status.is_error, likely=False):
         builder.ret(ir.Constant(ir.IntType(32), 1))
     for n, leaf in enumerate(results):
-        value = builder.extract_value(found, n) if isinstance(described.restype, types.BaseTuple) else found
+        value = builder.extract_value(found, n) if isinstance(described.restype, BaseTuple) else found
         wide = types.float64 if isinstance(leaf, types.Float) else types.int64
         value = context.cast(builder, value, leaf, wide)
         place = builder.gep(entry.args[-1], [ir.Constant(ir.IntType(64), 8 * n)])
@@ -186,7 +169,7 @@ def _entry(context: Any, described: Any) -> tuple[Any, str, str]:
 
 def _leaves(kind: Any) -> list[Any]:
     """Types that a type consists of."""
-    return [leaf for one in kind for leaf in _leaves(one)] if isinstance(kind, types.BaseTuple) else [kind]
+    return [leaf for one in kind for leaf in _leaves(one)] if isinstance(kind, BaseTuple) else [kind]
 
 
 CODES = {
@@ -196,6 +179,8 @@ CODES = {
 
 
 def _argument_code(kind: Any) -> str:
+    if (kind.dtype if isinstance(kind, types.Array) else kind) not in CODES:
+        raise TypeError(f"a kernel takes arrays, numbers and tuples of them, not {kind}")
     return "O" if isinstance(kind, types.Array) else CODES[kind]
 
 
@@ -232,6 +217,52 @@ def symbol_address(name: str) -> int:
     """Address of a function of numba's run time, by which kernels allocate memory."""
     rtsys.initialize(cpu_target.target_context)
     return int(llvm.address_of_symbol(name) or 0)
+
+
+@intrinsic
+def flat_view(_: Any, array: Any) -> Any:
+    """View (n,) of a contiguous array of any shape; numba's own calls its run time."""
+
+    def view(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        kind, of = signature.return_type, signature.args[0]
+        whole = context.make_array(of)(context, builder, given[0])
+        width = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(of.dtype)))
+        found = context.make_array(kind)(context, builder)
+        populate_array(found, whole.data, [whole.nitems], [width], width, meminfo=whole.meminfo)
+        return impl_ret_borrowed(context, builder, kind, found._getvalue())
+
+    return types.Array(array.dtype, 1, "C", readonly=not array.mutable)(array), view
+
+
+@intrinsic
+def write_larger(_: Any, array: Any, at: Any, count: Any, value: Any, step: Any) -> Any:
+    """Write value + i step to the first `count` of `BLOCK` entries from the one at a place on, where it is larger.
+
+    For kernels: a contiguous array of int64, whose first entry is at 0, and four of int64. A loop would be unrolled
+    before the vectoriser sees it: it takes three times as long.
+    """
+
+    def write(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        numbers = ir.VectorType(ir.IntType(64), BLOCK)
+        none, every = ir.Constant(numbers, None), ir.Constant(ir.VectorType(ir.IntType(32), BLOCK), None)
+        index = ir.Constant(numbers, list(range(BLOCK)))
+        held, first, n, start, more = given
+        entries = builder.gep(context.make_array(signature.args[0])(context, builder, held).data, [first])
+        entries = builder.bitcast(entries, numbers.as_pointer())
+        count, value, step = (
+            builder.shuffle_vector(builder.insert_element(none, one, ir.IntType(32)(0)), none, every)
+            for one in (n, start, more)
+        )
+        own = builder.add(value, builder.mul(step, index))
+        own = builder.select(builder.icmp_signed("<", index, count), own, none)
+        old = builder.load(entries, align=8)
+        builder.store(builder.select(builder.icmp_signed(">", own, old), own, old), entries, align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, *[types.int64] * 4), write
+
+
+INTRINSICS = {"flat_view": flat_view, "write_larger": write_larger}
 
 
 class _Compilations(event.Listener):  # type: ignore[misc]

@@ -11,6 +11,7 @@ Switch for ONNX Runtime's telemetry, which would send data and write to the user
 import ctypes
 import hashlib
 import importlib
+import logging
 import os
 import platform
 import shutil
@@ -19,22 +20,21 @@ import struct
 import sys
 import tempfile
 import threading
+import zlib
 from collections.abc import Callable, Sequence
 from functools import cache, update_wrapper
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
+from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
 
 from tts2face.numeric.object_code import load_object
 from tts2face.storage.files import user_cache, write_atomically
 
-if TYPE_CHECKING:
-    from tts2face.numeric.compiler import Compiled
-
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
+LOG = logging.getLogger(__name__)
 CACHE_VARIABLE = "NUMBA_CACHE_DIR"  # set by the user
 N_VERSIONS = 4  # of the compiled kernels of a module that are kept
 SUFFIX = ".kernel"  # of a file with the code of one kernel for one kind of arguments
@@ -46,7 +46,45 @@ CODES = {"O": ctypes.py_object, "?": ctypes.c_bool, "d": ctypes.c_double, "f": c
     for codes, sign in (("bhiq", ""), ("BHIQ", "u"))
     for code, bits in zip(codes, (8, 16, 32, 64), strict=True)
 }
+BLOCK = 8  # entries that `write_larger` writes at once
 _loading = threading.RLock()
+
+
+class Intrinsic:
+    """A function of `tts2face.numeric.compiler` for kernels, which writes instructions of LLVM itself."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __call__(self, *_: Any) -> Any:
+        """Only kernels can call it."""
+        raise TypeError(f"{self.name} is called by compiled kernels only")
+
+
+flat_view, write_larger = Intrinsic("flat_view"), Intrinsic("write_larger")
+
+
+class Compiled(NamedTuple):
+    """A kernel for one kind of arguments.
+
+    Parameters
+    ----------
+    arguments
+        Codes of the types of the arguments, in which tuples are replaced by what they hold: ``O`` is an array, others
+        as in `ctypes`' ``_type_``.
+    results
+        Codes, as in `struct`, of the results, 8 bytes each.
+    is_tuple
+        Whether the results are a tuple.
+    code
+        Object file in which `ENTRY` has these arguments and, if there are results, their address. It returns 0 unless
+        memory is short.
+    """
+
+    arguments: str
+    results: str
+    is_tuple: bool
+    code: bytes
 
 
 class Kernel(Generic[Arguments, Result]):
@@ -106,22 +144,16 @@ class Kernel(Generic[Arguments, Result]):
             kind = hashlib.sha256(f"{key} {_machine()}".encode()).hexdigest()[:16]
             path = self._folder() / f"{self._stem()}-{kind}{SUFFIX}"
             try:
-                arguments_code, results, is_tuple, code = path.read_bytes().split(b"\n", 3)
+                found = _read(path)
                 self.n_from_cache += 1
             except (OSError, ValueError):
-                compiled = self._compile(arguments)
-                parts = [compiled.arguments.encode(), compiled.results.encode(), b"1" * compiled.is_tuple]
-                arguments_code, results, is_tuple, code = *parts, compiled.code
-                _keep(path, b"\n".join([*parts, code]))
-            types = [CODES[one] for one in arguments_code.decode()]
-            prototype = ctypes.CFUNCTYPE(ctypes.c_int, *types, *([ctypes.c_char_p] if results else []))
-            function = prototype(load_object(code, ENTRY))
-            self._calls[key] = function, results.decode(), bool(is_tuple)
+                found = importlib.import_module("tts2face.numeric.compiler").compile_kernel(self, tuple(arguments))
+                _keep(path, found)
+            types = [CODES[one] for one in found.arguments]
+            prototype = ctypes.CFUNCTYPE(ctypes.c_int, *types, *([ctypes.c_char_p] if found.results else []))
+            function = prototype(load_object(found.code, ENTRY))
+            self._calls[key] = function, found.results, found.is_tuple
             return self._calls[key]
-
-    def _compile(self, arguments: Sequence[Any]) -> "Compiled":
-        found: Compiled = importlib.import_module("tts2face.numeric.compiler").compile_kernel(self, tuple(arguments))
-        return found
 
 
 def _flatten(values: Sequence[Any], flat: list[Any], key: list[int]) -> None:
@@ -131,7 +163,8 @@ def _flatten(values: Sequence[Any], flat: list[Any], key: list[int]) -> None:
         if kind is np.ndarray:
             flat.append(value)
             layout, dtype = value.flags.num & LAYOUT, value.dtype
-            key.append((layout & ~2 if layout & 1 else layout) | value.ndim << 12 | dtype.num << 20 | dtype.isnative)
+            layout = layout & ~2 if layout & 1 else layout  # rows of one entry are in both orders
+            key.append(layout | dtype.isnative << 2 | value.ndim << 12 | dtype.num << 20)
         elif kind in SCALARS:
             flat.append(value)
             key.append(SCALARS[kind])
@@ -140,18 +173,30 @@ def _flatten(values: Sequence[Any], flat: list[Any], key: list[int]) -> None:
             _flatten(value, flat, key)
         elif isinstance(value, np.ndarray):
             _flatten((np.asarray(value),), flat, key)
-        else:  # a number of numpy: of the same type as Python's, or of a type of its own
+        elif isinstance(value, np.number | np.bool):
             number = value.item()
             flat.append(number)
-            is_same = value.dtype.itemsize == 8 and value.dtype.kind in "if"
+            is_same = value.dtype.itemsize == 8 and value.dtype.kind in "if"  # as Python's own
             key.append(SCALARS[type(number)] if is_same or value.dtype.kind == "b" else -4 - value.dtype.num)
+        else:
+            raise TypeError(f"a kernel takes arrays, numbers and tuples of them, not {kind.__name__}")
 
 
-def _keep(path: Path, content: bytes) -> None:
+def _read(path: Path) -> Compiled:
+    """Compiled code from a file of the cache; raises a ValueError if it is damaged."""
+    stated, _, content = path.read_bytes().partition(b"\n")
+    if stated != b"%d" % zlib.crc32(content):
+        raise ValueError(path)
+    arguments, results, is_tuple, code = content.split(b"\n", 3)
+    return Compiled(arguments.decode(), results.decode(), bool(is_tuple), code)
+
+
+def _keep(path: Path, found: Compiled) -> None:
     """Write a file of the cache if that is possible, and remove the folders of the oldest versions of its module."""
+    content = b"\n".join([found.arguments.encode(), found.results.encode(), b"1" * found.is_tuple, found.code])
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, content)
+        write_atomically(path, b"%d\n" % zlib.crc32(content) + content)
     except OSError:
         return
     versions = sorted(path.parent.parent.glob(f"{path.parent.name.rpartition('-')[0]}-*"), key=_time_of_change)
@@ -169,13 +214,14 @@ def _time_of_change(path: Path) -> float:
 @cache
 def _machine() -> str:
     """What compiled code depends on besides its source: processor, compiler, and settings of the compiler."""
+    compiler = Path(__file__).with_name("compiler.py").read_bytes()
     settings = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_") and item[0] != CACHE_VARIABLE)
     versions = []
     for package in ("numba", "llvmlite"):
         spec = find_spec(package)
         if spec is not None and spec.origin is not None:
             versions.append(Path(spec.origin).with_name("_version.py").read_bytes())
-    return repr((_processor(), versions, settings, sys.version_info[:2], sys.platform, platform.machine()))
+    return repr((_processor(), compiler, versions, settings, sys.version_info[:2], sys.platform, platform.machine()))
 
 
 def _processor() -> object:

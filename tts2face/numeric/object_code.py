@@ -10,10 +10,10 @@ from platform import machine
 from typing import Any, NamedTuple
 
 # ELF (System V ABI, AMD64 supplement): what LLVM writes for x86-64 Linux.
-HEADER, SECTION, SYMBOL, RELOCATION = "<40xQ12xHH", "<4xIQ8xQQIIQ8x", "<IBxHQQ", "<QIIq"
+HEADER, SECTION, SYMBOL, RELOCATION = "<40xQ12xHH", "<4xIQ8xQQIIQ8x", "<I2xHQ8x", "<QIIq"
 WRITABLE, ALLOCATED = 1, 2  # flags of sections
 SYMBOLS, ADDENDS, EMPTY = 2, 4, 8  # types of sections
-UNDEFINED, ABSOLUTE, COMMON = 0, 0xFFF1, 0xFFF2  # numbers that stand for no section
+UNDEFINED = 0  # in place of the number of a section
 FIELDS = {1: (8, False), 2: (4, True), 4: (4, True), 24: (8, True)}  # size, and whether relative, by type of relocation
 READ_EXECUTE = 5  # of mprotect
 _mapped: list[Any] = []  # memory that holds code for as long as the process runs
@@ -51,37 +51,37 @@ def _load(code: bytes, name: str) -> int:
         raise UnknownObject
     table, n_sections, _ = struct.unpack_from(HEADER, code)
     sections = [Section(*struct.unpack_from(SECTION, code, table + 64 * n)) for n in range(n_sections)]
-    symbols = next(section for section in sections if section.kind == SYMBOLS)
-    names = sections[symbols.link].at
-    listed = list(struct.iter_unpack(SYMBOL, code[symbols.at : symbols.at + symbols.size]))
     places, n_fixed, size = _arrange(sections)
-    commons = {}
-    for number, (*_, section, align, length) in enumerate(listed):
-        if section == COMMON:
-            commons[number], size = -(-size // align) * align, -(-size // align) * align + length
     memory = mmap.mmap(-1, size)
     base = ctypes.addressof(ctypes.c_char.from_buffer(memory))
     for number, at in places.items():
         section = sections[number]
         if section.kind != EMPTY:
             memory[at : at + section.size] = code[section.at : section.at + section.size]
-    addresses, wanted = [], 0
-    for number, (at_name, _, section, value, _) in enumerate(listed):
-        text = code[names + at_name : code.index(b"\0", names + at_name)].decode()
-        if section in places:
-            addresses.append(base + places[section] + value)
-        elif section == UNDEFINED and text:
-            addresses.append(_address(text))
-        else:
-            addresses.append(value if section == ABSOLUTE else base + commons.get(number, 0))
-        wanted = addresses[-1] if text == name else wanted
+    names, addresses = _find_symbols(code, sections, {number: base + at for number, at in places.items()})
     for section in sections:
         if section.kind == ADDENDS and section.info in places:
             _relocate(memory, (base, places[section.info]), code[section.at : section.at + section.size], addresses)
-    _mapped.append(memory)
     if _process().mprotect(ctypes.c_void_p(base), ctypes.c_size_t(n_fixed), READ_EXECUTE):
         raise UnknownObject
-    return wanted
+    _mapped.append(memory)
+    return addresses[names.index(name)]
+
+
+def _find_symbols(code: bytes, sections: list[Section], begins: dict[int, int]) -> tuple[list[str], list[int]]:
+    """Names and addresses of the symbols of an object whose sections begin at known addresses; 0 where there is none.
+
+    Common symbols have none: they are numba's, for calls of the interpreter, and nothing in a kernel refers to them.
+    """
+    table = next(section for section in sections if section.kind == SYMBOLS)
+    texts, names, addresses = sections[table.link].at, [], []
+    for at_name, section, value in struct.iter_unpack(SYMBOL, code[table.at : table.at + table.size]):
+        names.append(code[texts + at_name : code.index(b"\0", texts + at_name)].decode())
+        if section in begins:
+            addresses.append(begins[section] + value)
+        else:
+            addresses.append(_address(names[-1]) if section == UNDEFINED and names[-1] else 0)
+    return names, addresses
 
 
 def _arrange(sections: list[Section]) -> tuple[dict[int, int], int, int]:
@@ -100,10 +100,10 @@ def _arrange(sections: list[Section]) -> tuple[dict[int, int], int, int]:
 
 
 def _relocate(memory: Any, at: tuple[int, int], table: bytes, addresses: list[int]) -> None:
-    """Write the addresses that a section refers to; `at` is the address of the memory, and the section's place in it."""
+    """Write the addresses that a section refers to; `at` is the memory's address and the section's place in it."""
     base, begin = at
     for offset, kind, symbol, addend in struct.iter_unpack(RELOCATION, table):
-        if kind not in FIELDS:
+        if kind not in FIELDS or not addresses[symbol]:
             raise UnknownObject
         size, is_relative = FIELDS[kind]
         place = begin + offset

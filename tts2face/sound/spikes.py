@@ -78,7 +78,7 @@ class _States:
 
 @kernel
 def _entry_probabilities(emitted, arcs, ends, entered):  # type: ignore[no-untyped-def]
-    """Write the probabilities (T, S) that states are entered in each frame, by forward and backward sums of log probabilities."""
+    """Write the probabilities (T, S) that states are entered in each frame, by sums forward and backward in time."""
     n_frames, n_states = emitted.shape
     inside = np.full(n_states, -np.inf)
     reached = np.full(n_states, -np.inf)

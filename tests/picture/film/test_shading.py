@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
+from tts2face.numeric.kernels import BLOCK
 from tts2face.picture.baked.shading import (
     CHANGE_CODING,
     COLOUR_CODING,
@@ -17,7 +18,6 @@ from tts2face.picture.baked.shading import (
     list_fragments,
 )
 from tts2face.picture.baked.surface import (
-    BLOCK,
     LIGHT_STEP,
     N_COLUMNS,
     NEAR,

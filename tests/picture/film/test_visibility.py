@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from tts2face.numeric.kernels import BLOCK
 from tts2face.picture.baked.surface import (
-    BLOCK,
     N_COLUMNS,
+    N_SPAN_VALUES,
     NEAR,
     TRIANGLE_MASK,
     X,
@@ -80,7 +81,7 @@ def test_bands_of_rows_show_what_the_whole_picture_shows(rows: int) -> None:
     order = np.zeros(ends[-1], np.int32)
     fill_bands(bands, ends.copy(), order)
     assert len(order) < len(counts) * 200
-    shown = np.zeros((2, rows + BLOCK), np.float32)
+    shown = np.zeros(N_SPAN_VALUES, np.int64)
     edges = []
     for number, near in enumerate(np.split(order, ends[:-1])):
         assert (np.diff(near) > 0).all()

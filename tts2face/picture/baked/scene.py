@@ -15,6 +15,7 @@ from tts2face.face.body import DILATION, PUPIL_SHAPE
 from tts2face.face.deformation import eye_rotations, head_transform
 from tts2face.models.baked_light import LEAST_SIDE, N_BALL_TERMS, N_PAGES, N_TERMS, BakedLight, equal_limits
 from tts2face.models.face import Face
+from tts2face.numeric.kernels import BLOCK
 from tts2face.picture.baked.cut_out import compose_over, find_covers
 from tts2face.picture.baked.eyes import CENTRE, N_EYE_COLUMNS, PUPIL, TURN, colour_eyes
 from tts2face.picture.baked.response import LightTerms, TermBuffers, add_responses, light_terms, still_eyes
@@ -32,7 +33,7 @@ from tts2face.picture.baked.shading import (
     list_fragments,
 )
 from tts2face.picture.baked.surface import (
-    BLOCK,
+    N_SPAN_VALUES,
     NEAR,
     RED,
     TEXELS_A_PIXEL,
@@ -126,7 +127,7 @@ class LitBuffers:
     table: Float32Array
     bands: NDArray[np.int16]
     nearest: NDArray[np.int64]
-    ends: Float32Array
+    spans: NDArray[np.int64]
     keys: NDArray[np.int64]
     triangle: NDArray[np.int32]
     place: Float32Array
@@ -187,7 +188,7 @@ class LitScene:
             band_rows=rows,
             table=surface.template.copy(),
             bands=np.zeros((n_triangles, 2), np.int16),
-            ends=np.zeros((2, rows * side + BLOCK), np.float32),
+            spans=np.zeros(N_SPAN_VALUES, np.int64),
             keys=np.zeros(side * side, np.int64),
             nearest=np.zeros((rows * side, picture.width * side + BLOCK), np.int64),
             triangle=np.zeros(n_fragments, np.int32),
@@ -231,7 +232,7 @@ class LitScene:
             band = pixels[first : first + rows]
             nearest = buffers.nearest[: len(band) * side]
             near = order[ends[number - 1] if number else 0 : ends[number]]
-            columns = find_nearest(buffers.table, surface.triangles, near, first * side, nearest, buffers.ends)
+            columns = find_nearest(buffers.table, surface.triangles, near, first * side, nearest, buffers.spans)
             place = (side, first * side, *columns)
             found = (buffers.triangle, *buffers.place)
             starts = buffers.pixels[: band.shape[0] * band.shape[1] + 1]

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tts2face.numeric.kernels import kernel, vectorized_kernel
+from tts2face.numeric.kernels import flat_view, kernel, vectorized_kernel
 from tts2face.picture.baked.surface import LIGHT_BITS, LIGHT_STEP, LIGHT_ZERO, TRIANGLE_BITS, TRIANGLE_MASK, U, X, Y
 
 Array = NDArray[Any]
@@ -44,7 +44,7 @@ def list_fragments(
     side, first_row, first_column, end_column = place
     height, stride = nearest.shape[0] // side, nearest.shape[1]
     width = (len(pixels) - 1) // height
-    line = nearest.reshape(-1)
+    line = flat_view(nearest)
     middle, n_samples = np.float32(side - 1) / np.float32(2), side * side
     half = n_samples // 2 // side * stride + n_samples // 2 % side
     count = 0

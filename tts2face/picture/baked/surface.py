@@ -20,7 +20,7 @@ from tts2face.face.deformation import FaceRig, build_rig
 from tts2face.models.baked_light import BLACK_SHARE, N_PAGES, BakedLight
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import connected_pieces, decode_srgb
-from tts2face.numeric.kernels import kernel, vectorized_kernel
+from tts2face.numeric.kernels import BLOCK, flat_view, kernel, vectorized_kernel, write_larger
 
 Array = NDArray[Any]
 
@@ -30,8 +30,7 @@ TRIANGLE_BITS = 20
 MAX_TRIANGLES = (1 << TRIANGLE_BITS) - 2
 TRIANGLE_MASK = (1 << TRIANGLE_BITS) - 1  # of the triangle's number plus one in a sample
 DEPTH_SCALE = np.float32(2.0**41)  # of 1/z in 1/mm: 43 bits beside the triangle's, from 1 mm to 100 m
-BLOCK = 4  # samples at once, without a branch: spans are three to five long on average
-FIRST_OF_BLOCK = np.where(np.arange(BLOCK) < np.arange(BLOCK + 1)[:, None], -1, 0)  # all bits of the first n samples
+AT, COUNT, DEPTH, N_SPAN_VALUES = 0, BLOCK, 2 * BLOCK, 3 * BLOCK  # of the spans of a block of rows, in one array
 LEAST_AREA = np.float32(1e-3)  # twice that of a triangle that is drawn, in samples
 
 
@@ -100,7 +99,7 @@ def fill_bands(bands: Array, ends: Array, order: Array) -> None:
 
 @kernel
 def find_nearest(
-    table: Array, triangles: Array, order: Array, first_row: int, nearest: Array, ends: Array
+    table: Array, triangles: Array, order: Array, first_row: int, nearest: Array, spans: Array
 ) -> tuple[int, int]:
     """Write the nearest triangle that faces the camera in each sample; returns the columns [first, end) that hold any.
 
@@ -116,72 +115,72 @@ def find_nearest(
         The picture's row of samples that is the first of `nearest`.
     nearest : (H, W + BLOCK) int64
         Out: 1/z in the high bits, the triangle's number plus one in the low ones; the largest wins. 0 where none is.
-    ends : (2, H + BLOCK)
-        Scratch space: both ends of a triangle's spans.
+    spans : (N_SPAN_VALUES,) int64
+        Scratch space: the first sample of each span of a triangle, their number, and the value of the first.
+
+    Notes
+    -----
+    A triangle takes no branch that its shape decides: the processor would guess it wrongly. Its edges are sorted by
+    conditional values, `BLOCK` rows have their spans at once, and a span its first `BLOCK` samples, of which few have
+    more; spans without any change none.
     """
     height, stride = nearest.shape
-    line = nearest.reshape(-1)
+    line = flat_view(nearest)
     for sample in range(len(line)):
         line[sample] = 0
     top_row, end_row = np.float32(first_row), np.float32(first_row + height - 1)
-    left_end, right_end = np.float32(0), np.float32(stride - BLOCK - 1)
-    first_column, last_column = stride, -1
+    zero, left_end, right_end = np.float32(0), np.float32(0), np.float32(stride - BLOCK - 1)
+    beyond = right_end + np.float32(1)
+    first_column, last_column = np.float32(stride), np.float32(-1)
     for t in order:
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay, bx, by, cx, cy = table[a, X], table[a, Y], table[b, X], table[b, Y], table[c, X], table[c, Y]
+        az, bz, cz = table[a, NEAR], table[b, NEAR], table[c, NEAR]
         area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-        if area > -LEAST_AREA:
-            continue
         low, high = np.ceil(max(min(ay, by, cy), top_row)), np.floor(min(max(ay, by, cy), end_row))
         from_column, to_column = np.ceil(max(min(ax, bx, cx), left_end)), np.floor(min(max(ax, bx, cx), right_end))
-        if low > high or from_column > to_column:
+        if (area > -LEAST_AREA) | (low > high) | (from_column > to_column) | (min(az, bz, cz) <= 0):
             continue
-        az, bz, cz = table[a, NEAR], table[b, NEAR], table[c, NEAR]
-        if min(az, bz, cz) <= 0:
-            continue
-        first_column, last_column = min(first_column, int(from_column)), max(last_column, int(to_column))
+        first_column, last_column = min(first_column, from_column), max(last_column, to_column)
         inverse = np.float32(1) / area
         across = ((bz - az) * (cy - ay) - (cz - az) * (by - ay)) * inverse
         along = ((cz - az) * (bx - ax) - (bz - az) * (cx - ax)) * inverse
         origin = az - across * ax - along * ay
-        if by < ay:
-            ax, ay, bx, by = bx, by, ax, ay
-        if cy < by:
-            bx, by, cx, cy = cx, cy, bx, by
-            if by < ay:
-                ax, ay, bx, by = bx, by, ax, ay
-        whole = (cx - ax) / (cy - ay)
-        upper = (bx - ax) / (by - ay) if by > ay else np.float32(0)
-        lower = (cx - bx) / (cy - by) if cy > by else np.float32(0)
-        step = np.int64(across * DEPTH_SCALE) << TRIANGLE_BITS
-        number = np.int64(t + 1)
-        top, n_rows = int(low) - first_row, int(high) + 1 - int(low)
-        for block in range(0, n_rows, BLOCK):  # ends of the spans, of several rows at once
-            for row in range(block, block + BLOCK):
-                y = low + np.float32(row)
+        step, number = np.int64(across * DEPTH_SCALE) << TRIANGLE_BITS, np.int64(t + 1)
+        swap = by < ay
+        ax, bx, ay, by = bx if swap else ax, ax if swap else bx, by if swap else ay, ay if swap else by
+        swap = cy < by
+        bx, cx, by, cy = cx if swap else bx, bx if swap else cx, cy if swap else by, by if swap else cy
+        swap = by < ay
+        ax, bx, ay, by = bx if swap else ax, ax if swap else bx, by if swap else ay, ay if swap else by
+        whole, upper, lower = (cx - ax) / (cy - ay), (bx - ax) / (by - ay), (cx - bx) / (cy - by)
+        upper, lower = upper if by > ay else zero, lower if cy > by else zero
+        first, n_rows = (int(low) - first_row) * stride, int(high) + 1 - int(low)
+        for block in range(0, n_rows, BLOCK):
+            for row in range(BLOCK):
+                y = low + np.float32(block + row)
                 one_side, below = ax + whole * (y - ay), bx + lower * (y - by)
                 other = ax + upper * (y - ay) if y < by else below
-                ends[0, row] = np.ceil(max(min(one_side, other), left_end))
-                ends[1, row] = np.floor(min(max(one_side, other), right_end))
-        for row in range(n_rows):
-            left, y = ends[0, row], low + np.float32(row)
-            count = int(ends[1, row]) + 1 - int(left)
-            depth = np.int64((origin + across * left + along * y) * DEPTH_SCALE) << TRIANGLE_BITS | number
-            at = np.uint64((top + row) * stride + int(left))
-            while count > 0:
-                n = min(count, BLOCK)
-                for i in range(BLOCK):
-                    own, old = (depth + i * step) & FIRST_OF_BLOCK[n, i], line[at + np.uint64(i)]
-                    line[at + np.uint64(i)] = own if own > old else old
-                depth, at, count = depth + BLOCK * step, at + np.uint64(BLOCK), count - BLOCK
-    return min(first_column, last_column + 1), last_column + 1
+                left = np.ceil(max(min(one_side, other), left_end))
+                right = np.floor(min(max(one_side, other), right_end))
+                spans[AT + row] = first + (block + row) * stride + np.int64(min(left, beyond))
+                spans[COUNT + row] = np.int64(right) + 1 - np.int64(left)
+                depth = np.int64((origin + across * left + along * y) * DEPTH_SCALE)
+                spans[DEPTH + row] = depth << TRIANGLE_BITS | number
+            for row in range(min(BLOCK, n_rows - block)):
+                at, count, depth = spans[AT + row], spans[COUNT + row], spans[DEPTH + row]
+                write_larger(nearest, at, count, depth, step)
+                while count > BLOCK:
+                    at, count, depth = at + BLOCK, count - BLOCK, depth + BLOCK * step
+                    write_larger(nearest, at, count, depth, step)
+    return int(min(first_column, last_column + 1)), int(last_column) + 1
 
 
 def nearest_triangles(table: Array, triangles: Array, shape: tuple[int, int]) -> tuple[NDArray[np.int64], int, int]:
     """Samples (H, W + BLOCK) of a whole picture (H, W), and the columns with any, as `find_nearest` writes them."""
     nearest = np.zeros((shape[0], shape[1] + BLOCK), np.int64)
-    ends = np.zeros((2, shape[0] + BLOCK), np.float32)
-    return nearest, *find_nearest(table, triangles, np.arange(len(triangles), dtype=np.int32), 0, nearest, ends)
+    every, spans = np.arange(len(triangles), dtype=np.int32), np.zeros(N_SPAN_VALUES, np.int64)
+    return nearest, *find_nearest(table, triangles, every, 0, nearest, spans)
 
 
 LIGHT_BITS, LIGHT_MASK = 10, 1023  # of each of the three numbers in a texel of changing light
