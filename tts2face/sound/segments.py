@@ -158,7 +158,7 @@ def _search(sums, segments, costs, found, space):  # type: ignore[no-untyped-def
 
 @kernel
 def _end_limited(starts, frames, shortest, durations, out):  # type: ignore[no-untyped-def]
-    """Write the best score of a segment that ends in each frame from `low` to `high`, and its begin, from its begins."""
+    """Write the best score of a segment that ends in each frame from `low` to `high`, and the begin that gives it."""
     earliest, low, high = frames
     reached, begin = out
     for end in range(low, high + 1):
