@@ -73,8 +73,9 @@ def test_values_are_linear_over_a_triangle() -> None:
     gradient = np.array([[0.01, 0.02], [0.03, -0.01], [1.5, 0.0], [0.0, -2.0], [3.0, 1.0]])
     table[:, U:] = table[:, :2] @ gradient.T + 5
     planes, values = np.zeros((1, 3, N_VALUES), np.float32), np.zeros((N_VALUES, len(triangle)), np.float32)
-    lay_planes(triangle, len(triangle), table, np.array([[0, 1, 2]], np.int32), (np.zeros(1, np.int32), 1), planes)
-    evaluate(triangle, across, down, len(triangle), planes, values)
+    found = (np.full(len(triangle), -1, np.int32), np.zeros(1, np.int32), np.zeros(1, np.int32))
+    lay_planes(triangle, len(triangle), table, np.array([[0, 1, 2]], np.int32), found, planes)
+    evaluate(found[0], across, down, len(triangle), planes, values)
     assert values == pytest.approx(gradient @ [across, down] + 5, abs=1e-3)
 
 

@@ -133,8 +133,8 @@ class LitBuffers:
     place: Float32Array
     samples: NDArray[np.int32]
     pixels: NDArray[np.int32]
-    done: NDArray[np.int32]
-    frame: int
+    plane_of: NDArray[np.int32]
+    triangle_of: NDArray[np.int32]
     planes: Float32Array
     values: Float32Array
     texel: NDArray[np.int32]
@@ -195,8 +195,8 @@ class LitScene:
             place=np.zeros((2, n_fragments), np.float32),
             samples=np.zeros(n_fragments, np.int32),
             pixels=np.zeros(picture.width * rows + 1, np.int32),
-            done=np.zeros(n_triangles, np.int32),
-            frame=0,
+            plane_of=np.zeros(n_triangles, np.int32),
+            triangle_of=np.zeros(n_triangles, np.int32),
             planes=np.zeros((n_triangles, 3, N_VALUES), np.float32),
             values=np.zeros((N_VALUES, n_fragments), np.float32),
             texel=np.zeros(n_fragments, np.int32),
@@ -224,7 +224,6 @@ class LitScene:
         buffers.table[surface.behind, NEAR] *= BEHIND_SHARE
         rows = buffers.band_rows
         order, ends = self._sort(len(pixels) * side, buffers)
-        buffers.frame += 1
         eyes = (self._eye_rows(weights, head), surface.eye_texture, self.camera)
         light = (self._lamps(head), surface.light.sky, self.view)
         eye_bands = self._eye_bands(buffers)
@@ -260,16 +259,16 @@ class LitScene:
 
     def _eye_bands(self, buffers: LitBuffers) -> tuple[int, int]:
         """The first of the bands that show eyeballs, and one past the last."""
-        bands = buffers.bands[self.surface.eye_of >= 0]
+        bands = buffers.bands[self.surface.of_eyes]
         bands = bands[bands[:, 1] > bands[:, 0]]
         return (int(bands[:, 0].min()), int(bands[:, 1].max())) if len(bands) else (0, 0)
 
     def _colour(self, found: Any, count: int, buffers: LitBuffers) -> None:
         """Write the colours of fragments; on eyeballs, the light."""
         surface, values = self.surface, buffers.values
-        marks = (buffers.done, buffers.frame)
-        lay_planes(buffers.triangle, count, buffers.table, surface.triangles, marks, buffers.planes)
-        evaluate(found[0], found[1], found[2], count, buffers.planes, values)
+        numbers = (buffers.texel, buffers.plane_of, buffers.triangle_of)
+        lay_planes(buffers.triangle, count, buffers.table, surface.triangles, numbers, buffers.planes)
+        evaluate(buffers.texel, found[1], found[2], count, buffers.planes, values)
         read = [(self.texels, self.texture_size, COLOUR_CODING)]
         if surface.light.changes_in_texels:
             width = surface.light.turn_side

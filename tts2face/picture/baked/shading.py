@@ -46,54 +46,53 @@ def list_fragments(
     width = (len(pixels) - 1) // height
     line = flat_view(nearest)
     middle, n_samples = np.float32(side - 1) / np.float32(2), side * side
-    half = n_samples // 2 // side * stride + n_samples // 2 % side
+    half = np.uint64(n_samples // 2 // side * stride + n_samples // 2 % side)
+    one, below = np.uint64(1), np.uint64(stride)
+    places=np.zeros((3,n_samples),np.int64)
+    for s in range(n_samples):
+        places[0,s],places[1,s],places[2,s]=s%side,s//side,s//side*stride+s%side
     count = 0
-    a = b = c = d = np.int64(0)
     first_pixel, end_pixel = first_column // side, (end_column + side - 1) // side
     for row in range(height):
         for column in range(first_pixel):
             pixels[row * width + column] = count
         for column in range(first_pixel, end_pixel):
             pixels[row * width + column] = count
-            at = side * (row * stride + column)
+            at = np.uint64(side * (row * stride + column))
             if side == 2:  # as the loop, written out
-                a, b, c, d = line[at], line[at + 1], line[at + stride], line[at + stride + 1]
-                least, most = min(a, b, c, d), max(a, b, c, d)
+                a, b, c, d = line[at], line[at + one], line[at + below], line[at + below + one]
+                least, most, piece = min(a, b, c, d), max(a, b, c, d), piece_of[(a & TRIANGLE_MASK) - 1]
+                is_one = (piece_of[(b & TRIANGLE_MASK) - 1] == piece) & (piece_of[(c & TRIANGLE_MASK) - 1] == piece)
+                is_one &= piece_of[(d & TRIANGLE_MASK) - 1] == piece
             else:
-                least, most = line[at], line[at]
+                least, most, piece, is_one = line[at], line[at], piece_of[(line[at] & TRIANGLE_MASK) - 1], True
                 for s in range(1, n_samples):
-                    key = line[at + s // side * stride + s % side]
+                    key = line[at + np.uint64(s // side * stride + s % side)]
                     least, most = min(least, key), max(most, key)
+                    is_one &= piece_of[(key & TRIANGLE_MASK) - 1] == piece
             if most == 0:
                 continue
             x, y = np.float32(side * column), np.float32(side * row + first_row)
-            if least > 0 and (most - least) >> TRIANGLE_BITS <= (least >> TRIANGLE_BITS) >> SAME_DEPTH_BITS:
-                piece, is_one = piece_of[(most & TRIANGLE_MASK) - 1], True
-                if side == 2:
-                    is_one = piece_of[(a & TRIANGLE_MASK) - 1] == piece and piece_of[(b & TRIANGLE_MASK) - 1] == piece
-                    is_one = is_one and piece_of[(c & TRIANGLE_MASK) - 1] == piece
-                    is_one = is_one and piece_of[(d & TRIANGLE_MASK) - 1] == piece
-                else:
-                    for s in range(n_samples):
-                        is_one &= piece_of[(line[at + s // side * stride + s % side] & TRIANGLE_MASK) - 1] == piece
-                if is_one:
-                    triangle[count] = (line[at + half] & TRIANGLE_MASK) - 1
-                    across[count], down[count], samples[count] = x + middle, y + middle, n_samples
-                    count += 1
-                    continue
+            is_one &= (least > 0) & ((most - least) >> TRIANGLE_BITS <= (least >> TRIANGLE_BITS) >> SAME_DEPTH_BITS)
+            if is_one:
+                triangle[count] = (line[at + half] & TRIANGLE_MASK) - 1
+                across[count], down[count], samples[count] = x + middle, y + middle, n_samples
+                count += 1
+                continue
             for s in range(n_samples):
-                keys[s] = line[at + s // side * stride + s % side]
+                keys[s] = line[at + np.uint64(places[2, s])]
             for first in range(n_samples):
                 if keys[first] == 0:
                     continue
                 own, depth = (keys[first] & TRIANGLE_MASK) - 1, keys[first] >> TRIANGLE_BITS
+                piece, reach = piece_of[own], depth >> SAME_DEPTH_BITS
                 n, total_right, total_below = 0, 0, 0
                 for s in range(first, n_samples):
-                    if keys[s] == 0 or piece_of[(keys[s] & TRIANGLE_MASK) - 1] != piece_of[own]:
-                        continue
-                    if abs((keys[s] >> TRIANGLE_BITS) - depth) <= depth >> SAME_DEPTH_BITS:
-                        n, total_right, total_below = n + 1, total_right + s % side, total_below + s // side
-                        keys[s] = 0
+                    key = keys[s]
+                    same = (piece_of[(key & TRIANGLE_MASK) - 1] == piece) & (key != 0)
+                    same &= abs((key >> TRIANGLE_BITS) - depth) <= reach
+                    n, total_right, total_below = n + same, total_right + same * places[0, s], total_below + same * places[1, s]
+                    keys[s] = 0 if same else key
                 share = np.float32(1) / np.float32(n)
                 triangle[count], samples[count] = own, n
                 across[count], down[count] = x + np.float32(total_right) * share, y + np.float32(total_below) * share
@@ -106,20 +105,24 @@ def list_fragments(
 
 @kernel
 def lay_planes(
-    triangle: Array, count: int, table: Array, triangles: Array, mark: tuple[Array, int], planes: Array
+    triangle: Array, count: int, table: Array, triangles: Array, found: tuple[Array, Array, Array], planes: Array
 ) -> None:
     """Write the plane (3, 5) of each value over the picture of the triangles of fragments: at 0, per column, per row.
 
     From one sample to the next, light changes by no more than within the triangle: a fragment may lie beside one that
-    is narrower, as at the rims of lips. `mark` (F,) and a number that it does not hold yet tell which are done.
+    is narrower, as at the rims of lips. `found` are the number of the plane of each fragment, that of each triangle
+    (F,), and the triangle of each plane: those of the last two that do not agree are of other fragments.
     """
-    done, frame = mark
-    zero, third = np.float32(0), np.float32(1 / 3)
+    plane, plane_of, triangle_of = found
+    zero, third, n = np.float32(0), np.float32(1 / 3), 0
     for i in range(count):
         t = triangle[i]
-        if done[t] == frame:
+        own = plane_of[t]
+        if own < n and triangle_of[own] == t:
+            plane[i] = own
             continue
-        done[t] = frame
+        plane[i] = plane_of[t] = n
+        triangle_of[n] = t
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay = table[a, X], table[a, Y]
         bx, by, cx, cy = table[b, X] - ax, table[b, Y] - ay, table[c, X] - ax, table[c, Y] - ay
@@ -132,14 +135,15 @@ def lay_planes(
             if k >= AT_RED and steep > span:
                 columns, rows = columns * (span / steep), rows * (span / steep)
                 at, x, y = at + (e1 + e2) * third, ax + (bx + cx) * third, ay + (by + cy) * third
-            planes[t, 0, k], planes[t, 1, k], planes[t, 2, k] = at - columns * x - rows * y, columns, rows
+            planes[n, 0, k], planes[n, 1, k], planes[n, 2, k] = at - columns * x - rows * y, columns, rows
+        n += 1
 
 
 @vectorized_kernel
-def evaluate(triangle: Array, across: Array, down: Array, count: int, planes: Array, values: Array) -> None:
-    """Write the values (5, N) of fragments."""
+def evaluate(plane: Array, across: Array, down: Array, count: int, planes: Array, values: Array) -> None:
+    """Write the values (5, N) of fragments by the numbers of their planes."""
     for i in range(count):
-        t, x, y = np.uint64(triangle[i]), across[i], down[i]
+        t, x, y = np.uint64(plane[i]), across[i], down[i]
         for k in range(N_VALUES):
             values[k, i] = planes[t, 0, k] + planes[t, 1, k] * x + planes[t, 2, k] * y
 

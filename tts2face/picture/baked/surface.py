@@ -73,18 +73,18 @@ def find_bands(table: Array, triangles: Array, rows: tuple[int, int], bands: Arr
     counts : (B,)
         Out.
     """
-    height, band_rows = rows
+    bottom, zero, band_rows = np.float32(rows[0] - 1), np.float32(0), np.uint32(rows[1])
     for band in range(len(counts)):
         counts[band] = 0
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         ax, ay, bx, by, cx, cy = table[a, X], table[a, Y], table[b, X], table[b, Y], table[c, X], table[c, Y]
-        low, high = np.ceil(min(ay, by, cy)), np.floor(max(ay, by, cy))
-        bands[t, 1] = bands[t, 0] = 0
-        if (bx - ax) * (cy - ay) - (cx - ax) * (by - ay) > -LEAST_AREA or low > high or high < 0 or low >= height:
-            continue
-        bands[t, 0], bands[t, 1] = max(int(low), 0) // band_rows, min(int(high), height - 1) // band_rows + 1
-        for band in range(bands[t, 0], bands[t, 1]):
+        low, high = np.ceil(max(min(ay, by, cy), zero)), np.floor(min(max(ay, by, cy), bottom))
+        shown = ((bx - ax) * (cy - ay) - (cx - ax) * (by - ay) <= -LEAST_AREA) & (low <= high)
+        first = np.int64(np.uint32(min(low, bottom)) // band_rows)
+        end = np.int64(np.uint32(max(high, zero)) // band_rows) + 1 if shown else first
+        bands[t, 0], bands[t, 1] = first, end
+        for band in range(first, end):
             counts[band] += 1
 
 
@@ -237,6 +237,8 @@ class LitSurface:
         Rows of the table, counter-clockwise as they are drawn.
     piece_of, eye_of : (D,)
         Connected piece of each triangle, such as a lock of hair; its eye, -1 of none.
+    of_eyes : (E,)
+        Triangles of the eyes.
     eye_texture : (S, S, 3)
         Linear light.
     """
@@ -250,6 +252,7 @@ class LitSurface:
     triangles: NDArray[np.int32]
     piece_of: NDArray[np.int32]
     eye_of: NDArray[np.int32]
+    of_eyes: NDArray[np.intp]
     eye_texture: NDArray[np.float32]
 
 
@@ -299,6 +302,7 @@ def build_surface(face: Face, light: BakedLight) -> LitSurface:
         triangles=np.ascontiguousarray(row_of[keys]),
         piece_of=_pieces(face, corners),
         eye_of=eye_of,
+        of_eyes=np.flatnonzero(eye_of >= 0),
         eye_texture=(decode_srgb(picture / 255.0) * light.eye_gain).astype(np.float32),
     )
 
