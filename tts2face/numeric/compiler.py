@@ -4,6 +4,7 @@ Compilation delays a first run by up to half a minute; it is logged at the level
 """
 
 import gc
+import importlib
 import time
 from types import FunctionType
 from typing import Any
@@ -12,6 +13,7 @@ import llvmlite.binding as llvm
 import numba
 from llvmlite import ir
 from numba.core import entrypoints, event, lowering, typed_passes, types, untyped_passes
+from numba.core.codegen import CPUCodeLibrary
 from numba.core.compiler import CompilerBase
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import PassManager, register_pass
@@ -20,6 +22,7 @@ from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 from numba.core.types.containers import BaseTuple
 from numba.extending import intrinsic
+from numba.np import linalg
 from numba.np.arrayobj import populate_array
 
 from tts2face.numeric.kernels import BLOCK, ENTRY, LOG, Compiled, Intrinsic
@@ -27,6 +30,17 @@ from tts2face.numeric.kernels import BLOCK, ENTRY, LOG, Compiled, Intrinsic
 REPORT_S = 5.0  # between two messages of a compilation
 # Extensions of other packages are not loaded: no kernel uses their types, and looking for them takes 20 ms of a start.
 entrypoints._already_initialized = True
+# Nor is scipy.linalg, for 130 ms, to see whether it is there: it is one of this program's own requirements.
+_ensure_blas, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+importlib.import_module("numba.np.arraymath")
+linalg.ensure_blas = _ensure_blas
+
+
+class KernelLibrary(CPUCodeLibrary):  # type: ignore[misc]
+    """Optimised code that others are linked with; only a whole kernel becomes machine code, in an object file."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -39,6 +53,7 @@ class KernelLowering(typed_passes.BaseNativeLowering):  # type: ignore[misc]
     def run_pass(self, state: Any) -> bool:
         """As numba asks for a pass."""
         state.flags.no_compile = True
+        state.library = KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         super().run_pass(state)
         lowered = state["cr"]
         key = object().__sizeof__  # by which numba finds the function, in place of what Python would call: any built-in
@@ -89,7 +104,7 @@ def compile_kernel(kernel: Any, arguments: tuple[Any, ...]) -> Compiled:
         found = dispatcher.overloads[signature]
         context, library = found.target_context, found.library
         if library._finalized:  # another kernel, which calls this one, has taken it
-            library = context.codegen().create_library(ENTRY)
+            library = KernelLibrary(context.codegen(), ENTRY)
             library.add_linking_library(found.library)
         module, codes, results = _entry(context, found.fndesc)
         library.add_ir_module(module)
