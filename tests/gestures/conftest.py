@@ -1,11 +1,12 @@
 """The made palette with recordings that are long enough for statistics."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
 from tests.world import World, made_style
-from tts2face.models.palette import Derivation, FeatureChange, Palette
+from tts2face.models.palette import Derivation, FeatureChange, Palette, load_palette
 
 LENGTHS = (90,) * 20  # frames
 
@@ -20,3 +21,18 @@ def palette(world: World) -> Palette:
     }
     styles = {"calm": made_style(1, lengths=LENGTHS), "wild": made_style(2, 3.0, LENGTHS)}
     return replace(world.palette, styles=styles, derivations={"double": Derivation("calm", changes, "calm, larger")})
+
+
+@pytest.fixture(scope="session")
+def starter_of() -> Callable[..., Palette]:
+    """The starter palette with some of its features, whose motion is the same without the others."""
+
+    def only(*features: str) -> Palette:
+        starter = load_palette("starter")
+        kept = {
+            name: replace(style, motion={one: style.motion[one] for one in features})
+            for name, style in starter.styles.items()
+        }
+        return replace(starter, styles=kept)
+
+    return only

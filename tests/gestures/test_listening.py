@@ -1,6 +1,7 @@
 """What a listener does: nods and raised brows, a still head, few blinks, and the mood it shows."""
 
 import wave
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from tts2face.gestures.listening import (
 )
 from tts2face.gestures.stream import GestureFields, GestureStream
 from tts2face.gestures.timeline import Timeline
-from tts2face.models.palette import EXPRESSIONS, load_palette
+from tts2face.models.palette import EXPRESSIONS, Palette
 from tts2face.request import Request
 from tts2face.session.prepared import prepare
 from tts2face.storage.media_files import pcm_bytes
@@ -93,11 +94,6 @@ def test_responses_to_speech_are_apart_and_not_too_many() -> None:
     assert 6 <= len(times) / (12 * 3.1 / 60) <= 13
 
 
-@pytest.fixture(scope="module")
-def fields() -> GestureFields:
-    return GestureFields(load_palette("starter"))
-
-
 @pytest.mark.parametrize(("style", "fps"), [("neutral", 30.0), ("depressed", 29.97)])
 def test_listening_in_short_pieces_is_as_at_once(world: World, style: str, fps: float) -> None:
     n_pieces, n, fields = 30, 6, GestureFields(world.palette)
@@ -114,15 +110,18 @@ def test_listening_in_short_pieces_is_as_at_once(world: World, style: str, fps: 
 
 
 @pytest.fixture(scope="module")
-def clips(fields: GestureFields) -> dict[str, dict[str, np.ndarray]]:
+def clips(starter_of: Callable[..., Palette]) -> dict[str, dict[str, np.ndarray]]:
     """Silence of two minutes, with a face that listens and one that does not."""
     silence = Waveform(np.zeros(120 * 8000), 8000)
+    mood, face = (GestureFields(starter_of("expression", *more)) for more in ((), ("blink", "gaze", "head")))
     return {
         f"{style}{' listens' if timeline.listens else ''}": GestureStream(fields, style=style, seed=2, fps=FPS).next(
             silence, round(120 * FPS), timeline
         )
-        for style, timeline in (("neutral", Timeline()), ("neutral", HEARD), ("depressed", HEARD))
-    }
+        for fields, style, timeline in (
+            (face, "neutral", Timeline()), (face, "neutral", HEARD), (mood, "depressed", HEARD)
+        )
+    }  # fmt: skip
 
 
 def test_listeners_blink_less_and_hold_the_head_still(clips) -> None:

@@ -1,6 +1,6 @@
 """Derived styles blink and move for viewers; recorded styles and ``measured`` as the recorded person does."""
 
-from dataclasses import replace
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -77,10 +77,8 @@ def test_derived_styles_blink_as_in_conversation_and_measured_as_recorded(neutra
 
 
 @pytest.fixture(scope="module")
-def idle(starter: Palette):
-    """Of the lids alone, whose motion is the same without the other features."""
-    lids = {name: replace(style, motion={"blink": style.motion["blink"]}) for name, style in starter.styles.items()}
-    seconds, fields = 480, GestureFields(replace(starter, styles=lids))
+def idle(starter_of: Callable[..., Palette]):
+    seconds, fields = 480, GestureFields(starter_of("blink"))
     silence = Waveform(np.zeros(seconds * RATE), RATE)
     return GestureStream(fields, style="neutral", seed=0, fps=FPS).next(silence, round(seconds * FPS), Timeline())
 

@@ -72,15 +72,17 @@ def perlin_noise(times: NDArray[np.float64], key: int) -> NDArray[np.float64]:
 
 
 def blink_closure(times: NDArray[np.float64], rate: float, key: int) -> NDArray[np.float64]:
-    """(T,) closure of the lids in [0, 1]: raised cosines at random times, on average `rate` per second."""
+    """(T,) closure of the lids at rising times, in [0, 1]: raised cosines at random, on average `rate` per second."""
     cell = BLINK_DURATION_S / 2
     first = int(np.floor(times[0] / cell)) - 2
     numbers = np.arange(first, int(np.floor(times[-1] / cell)) + 1)
     begins = numbers[(_hash_noise(numbers, key, 0) + 1) / 2 < rate * cell] * cell
     shut = np.zeros(len(times))
-    for begin in begins:
-        distance = np.abs(times - begin - BLINK_DURATION_S / 2) / (BLINK_DURATION_S / 2)
-        shut = np.maximum(shut, np.where(distance < 1, 0.5 + 0.5 * np.cos(np.pi * distance), 0.0))
+    nearby = np.searchsorted(times, np.add.outer(begins, (-cell, BLINK_DURATION_S + cell))).tolist()
+    for begin, (first, last) in zip(begins, nearby, strict=True):
+        distance = np.abs(times[first:last] - begin - BLINK_DURATION_S / 2) / (BLINK_DURATION_S / 2)
+        closure = np.where(distance < 1, 0.5 + 0.5 * np.cos(np.pi * distance), 0.0)
+        shut[first:last] = np.maximum(shut[first:last], closure)
     return shut
 
 

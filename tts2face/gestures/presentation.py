@@ -127,13 +127,17 @@ class LowPass:
 
     def filter(self, values: FloatArray) -> FloatArray:
         """Filtered values (n, k) of the next values (n, k)."""
-        filtered = np.zeros(values.shape)
-        for at in range(len(values)):
-            filtered[at] = values[at]
-            for number in range(SMOOTHING_STAGES):
-                self._stages[number] += self._share * (filtered[at] - self._stages[number])
-                filtered[at] = self._stages[number]
-        return filtered
+        share, stages = float(self._share), self._stages.T.tolist()  # Python's numbers cost less than rows
+        columns = np.asarray(values, np.float64).T.tolist()
+        for column, stage in zip(columns, stages, strict=True):
+            for at, value in enumerate(column):
+                passed = value
+                for number in range(SMOOTHING_STAGES):
+                    stage[number] += share * (passed - stage[number])
+                    passed = stage[number]
+                column[at] = passed
+        self._stages = np.array(stages).T
+        return np.array(columns).T.reshape(values.shape)
 
 
 def filtered_spread(values: FloatArray, cutoff_hz: float) -> FloatArray:

@@ -328,11 +328,12 @@ def intensity_track(sound: Waveform) -> IntensityTrack:
     centres = np.asarray(first + np.arange(n_frames) * STEP_S, np.float64)
     nearest = np.floor((centres - 0.5 * period) / period + 1.5) - 1.0  # rounds ties as Praat does
     samples = sound.samples.astype(np.float64)
-    powers = np.zeros(n_frames)
-    for frame, centre in enumerate(nearest.astype(int)):
+    powers, whole = np.zeros(n_frames), window.sum()
+    for frame, centre in enumerate(nearest.astype(int).tolist()):
         begin, end = max(centre - half, 0), min(centre + half + 1, len(samples))
         part, weights = samples[begin:end], window[begin - centre + half : end - centre + half]
-        powers[frame] = np.square(part - part.mean()) @ weights / weights.sum()
+        rest = part - np.add.reduce(part) / len(part)
+        powers[frame] = np.dot(rest * rest, weights) / (whole if len(weights) == len(window) else weights.sum())
     levels = 10.0 * np.log10(np.maximum(powers / THRESHOLD_POWER, 10 ** (MIN_INTENSITY_DB / 10)))
     levels = 10.0 * np.log10(np.maximum(powers / THRESHOLD_POWER, 10 ** (MIN_INTENSITY_DB / 10)))
     return IntensityTrack(centres, levels)
