@@ -178,10 +178,10 @@ def normalise_loudness(sounds: Sequence[Waveform]) -> list[Waveform]:
     peaks = [oversampled_peaks(sound.samples) for sound in sounds]
     gain_db, found = 0.0, list(sounds)
     for _ in range(MOST_STEPS):
-        missing = LOUDNESS_LUFS - loudness
-        if abs(missing) <= TOLERANCE_LU:
-            break
+        missing, before_db = LOUDNESS_LUFS - loudness, gain_db
         gain_db = min(gain_db + missing, MOST_GAIN_DB)
+        if abs(missing) <= TOLERANCE_LU or gain_db == before_db:  # of the same gain a step makes the same sound
+            break
         gain = 10 ** (gain_db / 20)
         found = [
             Waveform(gain * sound.samples * _limiting_gain(gain * peak, sound.rate), sound.rate)
