@@ -38,6 +38,7 @@ from tests.face.posing import posed_vertices
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import read_face
 from tts2face.models.face_loading import load_face
+from tts2face.models.face_names import BALD
 from tts2face.models.hair import EYE_COLOURS, HAIR_COLOURS, parse_hair_colour
 from tts2face.models.landmarks import N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.numeric.arrays import decode_srgb, encode_srgb
@@ -73,7 +74,7 @@ def seen_look(
 ) -> PersonLook:
     """Look of a drawn person in one picture, in light that multiplies its channels, at a `size`-th of its size."""
     person, picture = drawn_person(identity, hair, colour)
-    bare = read_face(find_file("head", "face"), identity)
+    bare = load_face("head", identity, hair=BALD)
     lit = encode_srgb(decode_srgb(picture / 255.0) * gains)
     lens = camera_matrices(parse_camera(CAMERA), person, (SIDE_PX, SIDE_PX))
     marks = face_landmarks(bare, bare.vertices.astype(np.float64))[:N_LANDMARKS]
@@ -218,6 +219,7 @@ def test_drawn_peoples_hair_is_found(
         assert min(off, key=off.__getitem__) in names
 
 
+WORN = {"erik": ("short02", "dark-blond"), "mei": ("bob02", "blond"), "kofi": ("cropped", "black")}
 WARM, COLD = (1.25, 1.0, 0.6), (0.9, 1.0, 1.35)
 
 
@@ -236,7 +238,7 @@ WARM, COLD = (1.25, 1.0, 0.6), (0.9, 1.0, 1.35)
 def test_a_coloured_light_is_told_from_drawn_people(
     identity: str, gains: tuple[float, float, float], is_told: bool
 ) -> None:
-    plain, lit = seen_look(identity, None, None), seen_look(identity, None, None, gains)
+    plain, lit = seen_look(identity, *WORN[identity]), seen_look(identity, *WORN[identity], gains)
     wanted = np.log(gains[2])
     if is_told:
         assert lit.cast[1] - plain.cast[1] == pytest.approx(wanted, abs=0.2)
@@ -247,21 +249,21 @@ def test_a_coloured_light_is_told_from_drawn_people(
 
 
 def test_blue_eyes_are_blue_and_dark_eyes_brown() -> None:
-    blue, dark = seen_look("erik", None, None).iris.astype(int), seen_look("amara", None, None).iris.astype(int)
+    blue, dark = (seen_look(name, *WORN[name]).iris.astype(int) for name in ("erik", "kofi"))
     assert blue[2] > blue[0] + 8
     assert dark[0] > dark[2]
     assert blue.sum() > 2 * dark.sum()
 
 
 def test_small_eyes_are_brown_and_said_to_be_unseen() -> None:
-    look = seen_look("erik", None, None, size=3)
+    look = seen_look("erik", *WORN["erik"], size=3)
     np.testing.assert_array_equal(look.iris, parse_hex(NEUTRAL_IRIS))
     assert look.summary().endswith("eyes too small to tell their colour")
-    assert look.length == "flat"
+    assert look.length == "short"
 
 
 def test_a_head_is_drawn_as_the_person_looks(head: Face) -> None:
-    look = replace(seen_look("ravi", None, None), iris=parse_hex("58402f"), shirt=parse_hex("6a6b6d"))
+    look = replace(seen_look("ravi", "short01", "black"), iris=parse_hex("58402f"), shirt=parse_hex("6a6b6d"))
     dressed = dress_head(head, look)
     assert dressed.hairdo == look.hairdo == Hairdo("short02", look.hairdo.colour)
     np.testing.assert_allclose(part_colour(dressed, "iris"), look.iris, atol=3)
