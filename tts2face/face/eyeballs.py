@@ -133,10 +133,16 @@ def _bind_followers(
     edges = np.flatnonzero(beyond < ROOT_MM)
     if len(edges) < N_ROOTS or not len(followers):
         return np.zeros(0, np.int64), np.zeros((0, N_ROOTS), np.int64), np.zeros((0, N_ROOTS), np.float32)
-    off = face.vertices[followers].astype(np.float64)[:, None] - face.vertices[lids[edges]]
-    apart = np.sqrt(off[..., 0] ** 2 + off[..., 1] ** 2 + off[..., 2] ** 2)  # a tree costs more to import than this
-    nearest = np.argsort(apart, axis=1, kind="stable")[:, :N_ROOTS]
-    distance = np.take_along_axis(apart, nearest, axis=1)
+    x, y, z = (
+        face.vertices[followers, k].astype(np.float64)[:, None] - face.vertices[lids[edges], k] for k in range(3)
+    )
+    apart = np.sqrt(x**2 + y**2 + z**2)  # a tree costs more to import than this
+    nearest, distance = np.zeros((len(apart), N_ROOTS), np.int64), np.zeros((len(apart), N_ROOTS))
+    rows = np.arange(len(apart))
+    for k in range(N_ROOTS):  # sorting all takes longer
+        nearest[:, k] = apart.argmin(axis=1)
+        distance[:, k] = apart[rows, nearest[:, k]]
+        apart[rows, nearest[:, k]] = np.inf
     is_near = distance[:, 0] < FOLLOWER_REACH_MM
     share = 1.0 / np.maximum(distance[is_near], 0.05) ** 2
     share /= share.sum(axis=1, keepdims=True)
