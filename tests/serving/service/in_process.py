@@ -28,6 +28,7 @@ from tts2face.serving.service.pool import InputQueue, WarmProcess, work_call
 from tts2face.serving.service.preparation import Preparation
 from tts2face.serving.service.server import Mount, create_app
 from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.service.state import ServiceState
 from tts2face.serving.service.synthesis import TASKS, Synthesis
 from tts2face.session.functions import SessionCache
 
@@ -128,9 +129,10 @@ def service_client(
 ) -> Iterator[TestClient]:
     """Client of a service with its database, and with the workers that `settings` asks for."""
     app = create_app(settings, mounts)
-    app.state.service.pool.processes[:] = [process]
+    service: ServiceState = app.state.service
+    service.pool.processes[:] = [process]
     with TestClient(app, base_url="http://localhost", follow_redirects=False) as client:
-        eventually(lambda: client.get("/readyz").json()["checks"]["database"], START_S)
+        eventually(lambda: client.portal and client.portal.call(service.jobs.is_reachable), START_S)
         yield client
 
 
