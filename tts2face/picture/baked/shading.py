@@ -91,7 +91,9 @@ def list_fragments(
                     key = keys[s]
                     same = (piece_of[(key & TRIANGLE_MASK) - 1] == piece) & (key != 0)
                     same &= abs((key >> TRIANGLE_BITS) - depth) <= reach
-                    n, total_right, total_below = n + same, total_right + same * places[0, s], total_below + same * places[1, s]
+                    n += same
+                    total_right += same * places[0, s]
+                    total_below += same * places[1, s]
                     keys[s] = 0 if same else key
                 share = np.float32(1) / np.float32(n)
                 triangle[count], samples[count] = own, n
