@@ -39,6 +39,12 @@ linalg.ensure_blas = _ensure_blas
 class KernelLibrary(CPUCodeLibrary):  # type: ignore[misc]
     """Optimised code that others are linked with; only a whole kernel becomes machine code, in an object file."""
 
+    is_whole = False  # others are optimised within what calls them
+
+    def _optimize_final_module(self) -> None:
+        if self.is_whole:
+            super()._optimize_final_module()
+
     def _finalize_final_module(self) -> None:
         self._finalized = True
 
@@ -108,6 +114,7 @@ def compile_kernel(kernel: Any, arguments: tuple[Any, ...]) -> Compiled:
             library.add_linking_library(found.library)
         module, codes, results = _entry(context, found.fndesc)
         library.add_ir_module(module)
+        library.is_whole = True
         library.finalize()
         code = context.codegen()._tm.emit_object(library._final_module)
         return Compiled(codes, results, isinstance(found.fndesc.restype, BaseTuple), code)
