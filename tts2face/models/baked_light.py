@@ -192,16 +192,16 @@ class BakedLight(HairLight):
             self,
             rows=self.rows[rows],
             base=self.base[rows],
-            responses=self.responses[:, :, rows],
-            limits=self.limits[:, :, rows],
+            responses=self.responses.compress(rows, axis=2),  # in C order, which an index of the last axis is not
+            limits=self.limits.compress(rows, axis=2),
             partners=self.partners[np.concatenate([rows, balls])],
             mouth_rows=self.mouth_rows[mouth],
             mouth_base=self.mouth_base[mouth],
-            mouth_responses=self.mouth_responses[:, :, mouth],
-            mouth_limits=self.mouth_limits[:, :, mouth],
+            mouth_responses=self.mouth_responses.compress(mouth, axis=2),
+            mouth_limits=self.mouth_limits.compress(mouth, axis=2),
             ball_rows=self.ball_rows[balls],
             ball_base=self.ball_base[balls],
-            ball_responses=self.ball_responses[:, :, balls],
+            ball_responses=self.ball_responses.compress(balls, axis=2),
         )
 
     def with_hair(self, worn: HairLight) -> "BakedLight":
@@ -249,7 +249,9 @@ def quantised(
 def equal_limits(most: float, n: int) -> NDArray[np.int8]:
     """(2, 3, n) limits of a change of light by `most` of 255; none is reached from 254 on."""
     steps = min(round(most / LIMIT_STEP), 127)
-    return np.tile(np.array([-steps, steps], np.int8)[:, None, None], (1, 3, n))
+    limits: NDArray[np.int8] = np.tile(np.array([-steps, steps], np.int8)[:, None, None], (1, 3, n))
+    limits.setflags(write=False)  # as other limits are, so that kernels are compiled once
+    return limits
 
 
 def _make_read_only(record: Any) -> None:
