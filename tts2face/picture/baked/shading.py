@@ -206,32 +206,31 @@ def compose(pixels: Array, samples: Array, n_samples: int, colour: Array, pictur
 
     Colours (3, N) are mixed as displayed.
     """
-    height, width, channels = picture.shape
+    n_pixels, channels, line = len(pixels) - 1, picture.shape[2], picture.reshape(-1)
     part, half, zero, most = np.float32(1) / np.float32(n_samples), np.float32(0.5), np.float32(0), np.float32(255)
-    pixel = 0
-    for row in range(height):
-        for column in range(width):
-            first, end = pixels[pixel], pixels[pixel + 1]
-            pixel += 1
-            if first == end:
-                continue
-            red, green, blue, seen = zero, zero, zero, 0
-            for i in range(first, end):
-                share = np.float32(samples[i]) * part
-                seen += samples[i]
-                red += share * min(max(colour[0, i], zero), most)
-                green += share * min(max(colour[1, i], zero), most)
-                blue += share * min(max(colour[2, i], zero), most)
-            if channels == 4:
-                cover = np.float32(seen) * part
-                picture[row, column, 3] = np.uint8(cover * most + half)
-                scale = np.float32(1) / cover
-                red, green, blue = red * scale, green * scale, blue * scale
-            elif seen < n_samples:
-                rest = np.float32(1) - np.float32(seen) * part
-                red += rest * np.float32(picture[row, column, 0])
-                green += rest * np.float32(picture[row, column, 1])
-                blue += rest * np.float32(picture[row, column, 2])
-            picture[row, column, 0] = np.uint8(red + half)
-            picture[row, column, 1] = np.uint8(green + half)
-            picture[row, column, 2] = np.uint8(blue + half)
+    first, one, two, three = pixels[0], np.uint64(1), np.uint64(2), np.uint64(3)
+    for pixel in range(n_pixels):
+        end = pixels[pixel + 1]
+        if first == end:
+            continue
+        red, green, blue, seen = zero, zero, zero, 0
+        for i in range(first, end):
+            share = np.float32(samples[i]) * part
+            seen += samples[i]
+            red += share * min(max(colour[0, i], zero), most)
+            green += share * min(max(colour[1, i], zero), most)
+            blue += share * min(max(colour[2, i], zero), most)
+        first, at = end, np.uint64(pixel * channels)
+        if channels == 4:
+            cover = np.float32(seen) * part
+            line[at + three] = np.uint8(cover * most + half)
+            scale = np.float32(1) / cover
+            red, green, blue = red * scale, green * scale, blue * scale
+        elif seen < n_samples:
+            rest = np.float32(1) - np.float32(seen) * part
+            red += rest * np.float32(line[at])
+            green += rest * np.float32(line[at + one])
+            blue += rest * np.float32(line[at + two])
+        line[at] = np.uint8(np.int32(red + half))
+        line[at + one] = np.uint8(np.int32(green + half))
+        line[at + two] = np.uint8(np.int32(blue + half))
