@@ -6,7 +6,7 @@ Lids move and change their texture as in the recorded blinks of the talker. Gaze
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,8 @@ from tts2face.models.landmarks import (
     EYELID_LANDMARKS,
     LID_RINGS,
     LIP_LANDMARKS,
-    eye_aperture,
+    eyelid_numbers,
+    lid_aperture,
 )
 from tts2face.models.palette import EXPRESSIONS, REGION_FEATURES, Palette
 from tts2face.models.talker import ShapeModel, Talker, require_appearance, speech_channels
@@ -259,8 +260,9 @@ def _lid_model(talker: Talker, appearance: Appearance) -> tuple[FloatArray, Floa
 
 def _mean_eye_openings(model: ShapeModel, shapes: Float32Array) -> FloatArray:
     """Mean opening (T,) of both eyes, relative to their width."""
-    landmarks = model.shapes(shapes)
-    left, right = (eye_aperture(landmarks, side) for side in EYELID_LANDMARKS)
+    numbers = {side: eyelid_numbers(side) for side in EYELID_LANDMARKS}  # all landmarks of an hour: 1 GB
+    eyes = (replace(model, mean=model.mean[rows], basis=model.basis[:, rows]) for rows in numbers.values())
+    left, right = (lid_aperture(eye.shapes(shapes)) for eye in eyes)
     return (left + right) / 2
 
 

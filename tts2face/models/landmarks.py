@@ -79,6 +79,16 @@ def inner_lip_gaps(landmarks: NDArray[np.floating]) -> NDArray[np.float64]:
 
 def eye_aperture(landmarks: NDArray[np.floating], side: str) -> NDArray[np.float64]:
     """Lid distance (T,) over the width of an eye; `side` is ``Left`` or ``Right``."""
+    return lid_aperture(landmarks[:, eyelid_numbers(side)])
+
+
+def eyelid_numbers(side: str) -> list[int]:
+    """Landmarks of an eye for `lid_aperture`: three of the upper lid, three of the lower one, both corners."""
     upper, lower, outer, inner = EYELID_LANDMARKS[side]
-    height = np.linalg.norm(landmarks[:, list(upper)] - landmarks[:, list(lower)], axis=2).mean(axis=1)
-    return np.asarray(height / np.linalg.norm(landmarks[:, outer] - landmarks[:, inner], axis=1), np.float64)
+    return [*upper, *lower, outer, inner]
+
+
+def lid_aperture(lids: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Lid distance (T,) over the width of an eye whose `eyelid_numbers` are at (T, 8, 3)."""
+    height = np.linalg.norm(lids[:, :3] - lids[:, 3:6], axis=2).mean(axis=1)
+    return np.asarray(height / np.linalg.norm(lids[:, 6] - lids[:, 7], axis=1), np.float64)
