@@ -13,7 +13,7 @@ from tts2face.session.functions import SessionCache, load_clip, write_clip
 from tts2face.session.named_models import Models
 from tts2face.session.session import Session
 
-SESSIONS = SessionCache()  # of the shipped models, one at a time; what was made before does not change a result
+SESSIONS = SessionCache(3)  # of the shipped models; what was made before does not change a result
 SMALL = {"size": "64x64", "supersampling": 1}
 PICTURE = Picture(**SMALL)
 CHEAP = {"voice": "espeak", "fps": 10.0}
