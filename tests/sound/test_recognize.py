@@ -11,7 +11,7 @@ from tests.rendered_takes import manifest_rows
 from tests.sound.conftest import HEARD_TOGETHER
 from tts2face.sound.alignment import Aligner, HeardSound
 from tts2face.sound.recogniser import ENGLISH, FRAME_S, PhoneRecogniser
-from tts2face.sound.voice_pool import load_voice
+from tts2face.sound.voice import Voice
 from tts2face.types import Waveform
 
 pytestmark = HEARD_TOGETHER
@@ -52,13 +52,14 @@ def test_silence_holds_no_word(recogniser: PhoneRecogniser) -> None:
     assert recogniser.hear(Waveform(np.zeros(0), 16_000)).words() == ()
 
 
-def test_a_long_sound_is_heard_as_its_parts(recogniser: PhoneRecogniser, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_sound_is_heard_as_its_parts(
+    recogniser: PhoneRecogniser, heart: Voice, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("tts2face.sound.recogniser.PART_S", PART_S)
-    voice = load_voice("heart", "en-us")
-    spoken = voice.speak("Nobody saw the dog again.").waveform.samples
-    long = Waveform(np.concatenate([spoken] * int(1.5 * PART_S / (len(spoken) / voice.sample_rate))), voice.sample_rate)
+    spoken = heart.speak("Nobody saw the dog again.").waveform.samples
+    long = Waveform(np.concatenate([spoken] * int(1.5 * PART_S / (len(spoken) / heart.sample_rate))), heart.sample_rate)
     heard = recogniser.hear(long)
     assert len(heard.log_probabilities(tuple(ENGLISH))) == pytest.approx(long.duration / FRAME_S, abs=3)
-    once = recogniser.hear(Waveform(spoken, voice.sample_rate)).words()
+    once = recogniser.hear(Waveform(spoken, heart.sample_rate)).words()
     words = heard.words()
     assert len(words) == pytest.approx(len(once) * len(long.samples) / len(spoken), abs=2)
