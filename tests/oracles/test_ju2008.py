@@ -20,15 +20,15 @@ def recordings(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return smooth[:, :2], smooth[:, 2:], np.full(N, LENGTH, np.int32)
 
 
+MOMENTS = np.array([moment for moment in range(N * LENGTH) if moment % LENGTH >= H])
+BEFORE = MOMENTS[:, None] - H + np.arange(H)  # the h frames before each in its recording
+
+
 def distances(made: Field, shown: np.ndarray, loudness: np.ndarray) -> dict[int, float]:
     """dist(t, t') of every recorded frame with h frames before it in its recording; alpha is in `heard` already."""
-    found = {}
-    for moment in range(N * LENGTH):
-        if moment % LENGTH >= H:
-            before = slice(moment - H, moment)
-            of_sound = np.square(loudness.astype(float) - made.prosody[before]).sum()
-            found[moment] = float(of_sound + np.square(shown.astype(float) - made.values[before]).sum())
-    return found
+    of_sound = np.square(loudness.astype(float) - made.prosody[BEFORE]).sum(axis=(1, 2))
+    of_motion = np.square(shown.astype(float) - made.values[BEFORE]).sum(axis=(1, 2))
+    return dict(zip(MOMENTS.tolist(), (of_sound + of_motion).tolist(), strict=True))
 
 
 def draw_frame(away: dict[int, float], sigma: float, chance: float) -> int:
