@@ -37,6 +37,11 @@ def child() -> Iterator[Child]:
     made.close()
 
 
+def growing_waits_s() -> Iterator[float]:
+    """Timeouts for a child that has started; on a busy machine it may have said nothing in the first ones."""
+    return (0.1 * 2**n for n in count())
+
+
 def is_running(process: int) -> bool:
     return process in running_processes()
 
@@ -75,7 +80,8 @@ def test_a_caller_who_leaves_ends_the_child(child: Child) -> None:
     with pytest.raises(KeyError):
         child.call("sleep", {}, on_event=leave)
     assert not is_running(processes[0])
-    waits_s = count(1)  # on a busy machine a child may have said nothing in a second
+    child.call("double", {"n": 1})
+    waits_s = growing_waits_s()
     while len(processes) < 2:
         with pytest.raises(ChildEndedError):
             child.call(
@@ -114,8 +120,9 @@ def test_a_missing_tool_is_named() -> None:
 
 def test_a_child_ends_with_its_parent() -> None:
     code = (
-        "from tts2face.processes.parent import Child; from tests.processes.test_children import PROGRAM;"
-        "Child(PROGRAM).call('sleep', {}, on_event=lambda event: print(event.content['pid'], flush=True))"
+        "from tts2face.processes.parent import Child; from tts2face.processes.program import Program;"
+        f"Child(Program({PROGRAM.handlers!r}))"
+        ".call('sleep', {}, on_event=lambda event: print(event.content['pid'], flush=True))"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as parent:
         assert parent.stdout is not None
@@ -170,7 +177,8 @@ def test_asyncio_has_the_same_errors_and_ends() -> None:
         with pytest.raises(ChildEndedError, match="out of luck"):
             await child.call("die", {})
         processes: list[int] = []
-        waits_s = count(1)  # on a busy machine a child may have said nothing in a second
+        await child.call("double", {"n": 4})
+        waits_s = growing_waits_s()
         while not processes:
             began = time.monotonic()
             with pytest.raises(TimeoutError):
@@ -253,7 +261,7 @@ def test_a_call_that_nobody_reads_is_paused(monkeypatch: pytest.MonkeyPatch) -> 
             before = -1
             while before != call.n_bytes or not call.is_paused:
                 before = call.n_bytes
-                await asyncio.sleep(0.3)
+                await asyncio.sleep(0.1)
             assert call.n_bytes < 64 << 20
             assert [(await anext(messages)).content["number"] for _ in range(100)] == list(range(1, 101))
         await child.close()

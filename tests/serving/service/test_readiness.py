@@ -12,7 +12,7 @@ from starlette.testclient import TestClient
 
 from tests.running import eventually
 from tests.serving.service.in_process import TableProcess, service_client
-from tts2face.serving.service import readiness
+from tts2face.serving.service import job_service, readiness
 from tts2face.serving.service.preparation import Preparation, Step
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.work.changes import JobChanges
@@ -105,6 +105,7 @@ def test_what_is_still_prepared_is_named(client: TestClient) -> None:
 
 def test_workers_that_have_ended_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(readiness, "LOOK_S", 0.0)
+    monkeypatch.setattr(job_service, "SUPERVISE_S", 0.02)
     with service_client(ServiceSettings(workers=1, data=tmp_path), TableProcess()) as client:
         eventually(lambda: ready(client)[0] == 200)
         jobs = client.app.state.service.jobs  # type: ignore[attr-defined]
