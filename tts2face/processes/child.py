@@ -10,11 +10,13 @@ from collections import defaultdict, deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO, NoReturn
+from typing import TYPE_CHECKING, Any, BinaryIO, NoReturn
 
 from lexicon.errors import Tts2faceError
 from tts2face.processes.message import CONTROLS, ERROR, EVENT, MORE, PAUSE, RESULT, STOP, Message, read_message
-from tts2face.types import Progress
+
+if TYPE_CHECKING:  # a child that needs no types of sound and motion starts without them
+    from tts2face.types import Progress
 
 Handler = Callable[["Call"], Mapping[str, Any] | Message]
 
@@ -66,7 +68,7 @@ class Call:
         """Tell the caller something before the result."""
         self.send(Message(EVENT, content, payload))
 
-    def stage(self, name: str) -> Progress:
+    def stage(self, name: str) -> "Progress":
         """Progress callback of a stage, which sends ``stage``, ``done`` and ``of``; equal ones are sent once."""
         sent = [(0, 0)]
 

@@ -19,6 +19,7 @@ from lexicon.errors import BackendError, InputError
 from tests.packages import needs
 from tests.running import eventually
 from tests.serving.work.conftest import ROOT, Postgres, StartWorker
+from tests.world import World
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.work.client import cancel_jobs, list_jobs, prune_jobs, retry_jobs, show_job
@@ -306,11 +307,13 @@ def test_a_worker_of_a_file_opens_no_connection(segments: Segments, tmp_path: Pa
 
 
 @pytest.mark.smoke
-def test_the_batch_command_works_with_a_database(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_batch_command_works_with_a_database(
+    world: World, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     subtitles = tmp_path / "one.srt"
     subtitles.write_text("1\n00:00:00,000 --> 00:00:01,000\nHello.\n\n2\n00:00:01,000 --> 00:00:02,000\nBob.\n")
     words = ["batch", str(subtitles), "--out", str(tmp_path / "out"), "--size", "64x64", "--fps", "5", "--voice",
-             "espeak", "--supersampling", "1", "--database", str(tmp_path / "jobs.sqlite")]  # fmt: skip
+             "espeak", "--supersampling", "1", "--database", str(tmp_path / "jobs.sqlite"), *world.models]  # fmt: skip
     assert run([*words, "--quiet"]) == 0, capsys.readouterr().err
     entries = json.loads((tmp_path / "out" / "manifest.json").read_text())["outputs"]
     assert [one["status"] for one in entries] == ["done", "done"]
