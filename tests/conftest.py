@@ -100,6 +100,16 @@ def heard_once() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="module")
+def drafted() -> Iterator[None]:
+    """Files are deflated as drafts, at a fifth of the time: for tests of what is in them, which are a little larger."""
+    from tts2face.storage import tensors
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tensors, "LEVEL", tensors.DRAFT_LEVEL)
+        yield
+
+
 @pytest.fixture(scope="session")
 def world(tmp_path_factory: pytest.TempPathFactory) -> "World":
     """The small made world, see `tests.world`."""

@@ -4,6 +4,7 @@ from dataclasses import astuple
 from functools import cache
 
 import numpy as np
+import pytest
 
 from tts2face.face.deformation import moved_landmarks
 from tts2face.models.face import Face
@@ -18,6 +19,7 @@ from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw
 from tts2face.types import Trajectory
 
+ONE_PROCESS = pytest.mark.xdist_group("photo")  # modules with the same picture of 400 pixels, drawn once
 SMILE = {
     **{f"{shape}{side}": weight for shape, weight in (("mouthSmile", 0.9), ("mouthUpperUp", 0.35)) for side in SIDES},
     **{f"mouthLowerDown{side}": 0.5 for side in SIDES},

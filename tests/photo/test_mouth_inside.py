@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from tests.photo.pictures import found_in, speaking, still
+from tests.photo.pictures import ONE_PROCESS, found_in, speaking, still
 from tts2face.models.face import Face
 from tts2face.photo.photograph import Photograph
+
+pytestmark = ONE_PROCESS
 
 SIDE, NAME = 400, "head"
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lexicon.errors import DataError, InputError
-from tests.photo.pictures import found_in, photographed, still
+from tests.photo.pictures import ONE_PROCESS, found_in, photographed, still
 from tts2face.face.deformation import landmark_positions
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
@@ -16,6 +16,8 @@ from tts2face.models.landmarks import INNER_LIP_UPPER, LEFT_LIDS, LOWER_LIP_INNE
 from tts2face.photo.fit import NOTHING_GIVEN, PhotoFit, parse_fit, read_fit, write_fit
 from tts2face.photo.photograph import Photograph
 from tts2face.photo.speaking_photo import speaking_photo
+
+pytestmark = ONE_PROCESS
 
 SIDE, NAME, REDUCED_BY = 400, "head", 2.0
 SHIFT = np.array([0.0, 6.0])  # pixels of the file, three of the picture

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from lexicon.errors import DataError, InputError
 from tests.interchange.exports.test_stage_glb import Read
-from tests.photo.pictures import found_in, speaking, still
+from tests.photo.pictures import ONE_PROCESS, found_in, speaking, still
 from tts2face.face.deformation import REST_HEAD, moved_landmarks
 from tts2face.interchange.exports.stage_glb import stage_glb
 from tts2face.models.face import Face
@@ -25,6 +25,8 @@ from tts2face.picture.baked.surface import NEAR, TRIANGLE_MASK, nearest_triangle
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import MeshRenderer, draw, mesh_renderer
 from tts2face.session.session import Session
+
+pytestmark = [pytest.mark.usefixtures("drafted"), ONE_PROCESS]
 
 SIDE = 400
 NAME = "head"
@@ -327,7 +329,7 @@ def placed(side: int, corner: tuple[int, int], size: tuple[int, int]) -> tuple[P
 @pytest.mark.parametrize(
     ("side", "corner", "size"),
     [
-        (150, (850, 450), (1920, 1080)),  # a small face in a large picture
+        (100, (567, 300), (1280, 720)),  # a small face in a large picture
         (300, (-70, 20), (401, 351)),  # cut by the edge, in a picture of odd sides
         (64, (0, 0), (64, 64)),
     ],
