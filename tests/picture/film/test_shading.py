@@ -38,7 +38,7 @@ def draw_list(points, triangles, part_of, side):
     nearest, *columns = nearest_triangles(table, np.array(triangles, np.int32), (side * SIZE, side * SIZE))
     n = (side * SIZE) ** 2
     found = (np.zeros(n, np.int32), np.zeros(n, np.float32), np.zeros(n, np.float32), np.zeros(n, np.int32))
-    keys = np.zeros(side * side, np.int64)
+    keys = np.zeros((4, side * side), np.int64)
     pixels = np.zeros(SIZE * SIZE + 1, np.int32)
     count = list_fragments(nearest, (side, 0, *columns), np.array(part_of, np.int32), (*found, keys), pixels)
     return table, nearest, [one[:count] for one in found], pixels

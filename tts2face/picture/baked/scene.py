@@ -189,7 +189,7 @@ class LitScene:
             table=surface.template.copy(),
             bands=np.zeros((n_triangles, 2), np.int16),
             spans=np.zeros(N_SPAN_VALUES, np.int64),
-            keys=np.zeros(side * side, np.int64),
+            keys=np.zeros((4, side * side), np.int64),
             nearest=np.zeros((rows * side, picture.width * side + BLOCK), np.int64),
             triangle=np.zeros(n_fragments, np.int32),
             place=np.zeros((2, n_fragments), np.float32),

@@ -36,11 +36,12 @@ def list_fragments(
     piece_of : (F,)
     found
         Out, for each fragment: its triangle, its place (x, y) in samples, and the number of its samples. Last, scratch
-        space for the samples (side side,) of a pixel.
+        space (4, side side) for the samples of a pixel.
     pixels : (H W + 1,)
         Out: the first fragment of each pixel.
     """
-    triangle, across, down, samples, keys = found
+    triangle, across, down, samples, scratch = found
+    keys, right, low, way = scratch[0], scratch[1], scratch[2], scratch[3]
     side, first_row, first_column, end_column = place
     height, stride = nearest.shape[0] // side, nearest.shape[1]
     width = (len(pixels) - 1) // height
@@ -48,16 +49,15 @@ def list_fragments(
     middle, n_samples = np.float32(side - 1) / np.float32(2), side * side
     half = np.uint64(n_samples // 2 // side * stride + n_samples // 2 % side)
     one, below = np.uint64(1), np.uint64(stride)
-    places=np.zeros((3,n_samples),np.int64)
     for s in range(n_samples):
-        places[0,s],places[1,s],places[2,s]=s%side,s//side,s//side*stride+s%side
-    count = 0
+        right[s], low[s], way[s] = s % side, s // side, s // side * stride + s % side
+    count = np.uint64(0)
     first_pixel, end_pixel = first_column // side, (end_column + side - 1) // side
     for row in range(height):
         for column in range(first_pixel):
             pixels[row * width + column] = count
         for column in range(first_pixel, end_pixel):
-            pixels[row * width + column] = count
+            pixels[np.uint64(row * width + column)] = count
             at = np.uint64(side * (row * stride + column))
             if side == 2:  # as the loop, written out
                 a, b, c, d = line[at], line[at + one], line[at + below], line[at + below + one]
@@ -77,10 +77,10 @@ def list_fragments(
             if is_one:
                 triangle[count] = (line[at + half] & TRIANGLE_MASK) - 1
                 across[count], down[count], samples[count] = x + middle, y + middle, n_samples
-                count += 1
+                count += one
                 continue
             for s in range(n_samples):
-                keys[s] = line[at + np.uint64(places[2, s])]
+                keys[s] = line[at + np.uint64(way[s])]
             for first in range(n_samples):
                 if keys[first] == 0:
                     continue
@@ -91,18 +91,20 @@ def list_fragments(
                     key = keys[s]
                     same = (piece_of[(key & TRIANGLE_MASK) - 1] == piece) & (key != 0)
                     same &= abs((key >> TRIANGLE_BITS) - depth) <= reach
-                    n += same
-                    total_right += same * places[0, s]
-                    total_below += same * places[1, s]
+                    n, total_right, total_below = (
+                        n + same,
+                        total_right + same * right[s],
+                        total_below + same * low[s],
+                    )
                     keys[s] = 0 if same else key
                 share = np.float32(1) / np.float32(n)
                 triangle[count], samples[count] = own, n
                 across[count], down[count] = x + np.float32(total_right) * share, y + np.float32(total_below) * share
-                count += 1
+                count += one
         for column in range(end_pixel, width):
             pixels[row * width + column] = count
     pixels[height * width] = count
-    return count
+    return int(count)
 
 
 @kernel
@@ -118,14 +120,14 @@ def lay_planes(
     plane, plane_of, triangle_of = found
     zero, third, n = np.float32(0), np.float32(1 / 3), 0
     for i in range(count):
-        t = triangle[i]
+        t = np.uint64(triangle[i])
         own = plane_of[t]
-        if own < n and triangle_of[own] == t:
+        if own < n and triangle_of[own] == triangle[i]:
             plane[i] = own
             continue
         plane[i] = plane_of[t] = n
-        triangle_of[n] = t
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        triangle_of[n] = triangle[i]
+        a, b, c = np.uint64(triangles[t, 0]), np.uint64(triangles[t, 1]), np.uint64(triangles[t, 2])
         ax, ay = table[a, X], table[a, Y]
         bx, by, cx, cy = table[b, X] - ax, table[b, Y] - ay, table[c, X] - ax, table[c, Y] - ay
         inverse = np.float32(1) / (bx * cy - cx * by)

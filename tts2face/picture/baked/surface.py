@@ -77,7 +77,7 @@ def find_bands(table: Array, triangles: Array, rows: tuple[int, int], bands: Arr
     for band in range(len(counts)):
         counts[band] = 0
     for t in range(len(triangles)):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        a, b, c = np.uint64(triangles[t, 0]), np.uint64(triangles[t, 1]), np.uint64(triangles[t, 2])
         ax, ay, bx, by, cx, cy = table[a, X], table[a, Y], table[b, X], table[b, Y], table[c, X], table[c, Y]
         low, high = np.ceil(max(min(ay, by, cy), zero)), np.floor(min(max(ay, by, cy), bottom))
         shown = ((bx - ax) * (cy - ay) - (cx - ax) * (by - ay) <= -LEAST_AREA) & (low <= high)
@@ -133,7 +133,7 @@ def find_nearest(
     beyond = right_end + np.float32(1)
     first_column, last_column = np.float32(stride), np.float32(-1)
     for t in order:
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        a, b, c = np.uint64(triangles[t, 0]), np.uint64(triangles[t, 1]), np.uint64(triangles[t, 2])
         ax, ay, bx, by, cx, cy = table[a, X], table[a, Y], table[b, X], table[b, Y], table[c, X], table[c, Y]
         az, bz, cz = table[a, NEAR], table[b, NEAR], table[c, NEAR]
         area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
