@@ -21,19 +21,22 @@ from cli.process import COMPILATION, compilation_messages, progress_bar
 from lexicon.errors import BackendError
 from tests.picture.film.lit_face import lit_tiny_face
 from tests.processes.answered import answered
+from tts2face.face import deformation, eyeballs
 from tts2face.gestures import field_kernels
-from tts2face.lips import contacts
-from tts2face.numeric import compiler, object_code
+from tts2face.lips import blending, contacts, token_search, tokens
+from tts2face.models import networks
+from tts2face.numeric import compiler, least_squares, object_code
 from tts2face.numeric import kernels as compilation
 from tts2face.numeric.kernels import CACHE_VARIABLE, Kernel, cache_folder, inlined_kernel, kernel
-from tts2face.picture.baked import surface
-from tts2face.picture.kernels import raster, shade, strands
+from tts2face.picture.baked import cut_out, eyes, response, shading, surface
+from tts2face.picture.kernels import fragments, raster, shade, strands
 from tts2face.picture.kernels import strands as strand_light
 from tts2face.request import OWN_FACE
 from tts2face.serving.service.logs import LineFormatter
 from tts2face.session import warm_up
 from tts2face.session.named_models import Models
 from tts2face.session.warm_up import kernels_are_compiled
+from tts2face.sound import level, segments
 from tts2face.sound.level import filter_biquad
 
 
@@ -233,6 +236,26 @@ def test_kernels_that_may_reorder_sums_call_inlined_ones_only(module):
 
 def test_some_kernels_may_reorder_sums():
     assert shade.shade_fragments.reorders_sums
+
+
+CLIP = (
+    surface, shading, eyes, response, cut_out, fragments, deformation, eyeballs, blending, contacts, token_search, tokens,
+    networks, least_squares, field_kernels, segments, level,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("module", CLIP, ids=lambda module: module.__name__)
+def test_kernels_of_a_clip_need_nothing_of_numba(module):
+    """Kernels that allocate or reshape call numba's run time, which takes 200 ms and 60 MB of each command."""
+    kernels = [found for found in vars(module).values() if isinstance(found, Kernel)]
+    assert kernels
+    assert not [one.__name__ for one in kernels if compiler._allocates(one)]
+    assert not [one.__name__ for one in kernels if "reshape" in one.py_func.__code__.co_names]
+
+
+def test_kernels_that_allocate_are_known():
+    assert compiler._allocates(raster.draw_band)
+    assert not compiler._allocates(raster.tile_depths)
 
 
 COMPILED_ONLY = """
