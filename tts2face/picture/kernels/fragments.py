@@ -44,7 +44,7 @@ PIXEL_X, PIXEL_Y, PIXEL_ENDS = 0, 1, 2  # columns of the pixel table; from 2 on:
 def face_normals(vertex: Array, triangles: Array, normals: Array) -> None:
     """Write normals (F, 3) of triangles in camera space, each of a length of twice the triangle's area."""
     for t in range(len(triangles)):
-        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        a, b, c = np.uint64(triangles[t, 0]), np.uint64(triangles[t, 1]), np.uint64(triangles[t, 2])
         ux, uy, uz = vertex[b, 0] - vertex[a, 0], vertex[b, 1] - vertex[a, 1], vertex[b, 2] - vertex[a, 2]
         vx, vy, vz = vertex[c, 0] - vertex[a, 0], vertex[c, 1] - vertex[a, 1], vertex[c, 2] - vertex[a, 2]
         normals[t, 0], normals[t, 1], normals[t, 2] = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
@@ -56,7 +56,7 @@ def vertex_normals(flat: Array, starts: Array, members: Array, vertex: Array) ->
     for v in range(len(vertex)):
         x, y, z = np.float32(0), np.float32(0), np.float32(0)
         for i in range(starts[v], starts[v + 1]):
-            t = members[i]
+            t = np.uint64(members[np.uint64(i)])
             x, y, z = x + flat[t, 0], y + flat[t, 1], z + flat[t, 2]
         scale = np.float32(1) / np.sqrt(x * x + y * y + z * z + np.float32(1e-20))
         vertex[v, NORMAL], vertex[v, NORMAL + 1], vertex[v, NORMAL + 2] = x * scale, y * scale, z * scale
