@@ -1,5 +1,6 @@
 """The command line as a person uses it."""
 
+import io
 import json
 import os
 import re
@@ -15,7 +16,7 @@ from cli.main import run
 from cli.process import EXIT_CODES
 from lexicon import errors
 from tests.running import eventually
-from tests.world import VOICE, World
+from tests.world import World
 from tts2face.picture.options import Picture
 from tts2face.request import Request
 
@@ -126,17 +127,12 @@ def test_text_from_a_file(tones: World, here: Path, capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.parametrize("words", [[], ["-"]])
-def test_text_from_standard_input(words: list[str], world: World, here: Path) -> None:
-    done = subprocess.run(
-        [*COMMAND, *words, "--voice", VOICE, "--out", "said.wav"],
-        input="Hello.",
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, **world.environment},
-    )
-    assert done.returncode == 0, done.stderr
-    assert re.search(WROTE, done.stderr)
+def test_text_from_standard_input(
+    words: list[str], tones: World, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"Hello.")))
+    assert run([*words, *tones.flags, "--out", "said.wav"]) == 0
+    assert re.search(WROTE, capsys.readouterr().err)
     assert (here / "said.wav").stat().st_size > 1000
 
 
