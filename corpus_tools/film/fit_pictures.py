@@ -95,13 +95,13 @@ def _missing(
     if not isinstance(scene, LitScene):
         raise TypeError("the face has no baked light")
     n, m = len(scene.surface.light.rows), len(scene.surface.light.mouth_rows)
-    buffers = scene.terms.allocate_buffers()
+    buffers = scene.surface.terms.allocate_buffers()
     found: tuple[list[Missing], list[Missing]] = ([], [])
     for pose in poses:
         shares, pixels = _shares(scene, pose, pictures[pose.name][:, :, 3] == 255)
         drawn = over_grey(renderer.draw(pose.weights, pose.head))[pixels].astype(np.float64)
         light = np.clip(over_grey(pictures[pose.name])[pixels] - drawn, -MOST_MISSING, MOST_MISSING)
-        scene.terms.update(scene.deform(pose.weights), buffers)
+        scene.surface.terms.update(scene.deform(pose.weights), buffers)
         for own, span, terms in (
             (found[0], slice(0, n), buffers.terms[:, :n]),
             (found[1], slice(n, n + m), buffers.mouth),

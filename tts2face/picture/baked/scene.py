@@ -18,7 +18,7 @@ from tts2face.models.face import Face
 from tts2face.numeric.kernels import BLOCK
 from tts2face.picture.baked.cut_out import compose_over, find_covers
 from tts2face.picture.baked.eyes import CENTRE, N_EYE_COLUMNS, PUPIL, TURN, colour_eyes
-from tts2face.picture.baked.response import LightTerms, TermBuffers, add_responses, light_terms, still_eyes
+from tts2face.picture.baked.response import TermBuffers, add_responses, still_eyes
 from tts2face.picture.baked.shading import (
     AT_RED,
     CHANGE_CODING,
@@ -166,7 +166,6 @@ class LitScene:
     texture_size: tuple[int, int]
     from_camera: Float32Array
     view: Float32Array
-    terms: LightTerms
     bases: tuple[Float32Array, ...]
     answers: tuple[Any, ...]
     turns: Cardinal
@@ -203,7 +202,7 @@ class LitScene:
             share=np.zeros((2, n_fragments), np.float32),
             corners=np.zeros((4, n_fragments), np.int32),
             covers=np.zeros(n_fragments if self.wall is not None else 0, np.float32),
-            terms=self.terms.allocate_buffers(),
+            terms=self.surface.terms.allocate_buffers(),
             light=np.zeros((3, len(light.rows)), np.float32),
             mouth=np.zeros((3, len(light.mouth_rows)), np.float32),
             balls=np.zeros((3, len(light.ball_rows)), np.float32),
@@ -303,7 +302,7 @@ class LitScene:
     def light_pose(self, points: Float32Array, head: Float32Array, buffers: LitBuffers) -> None:
         """Write the light of vertices of `deform` and a head pose into the table and the texels of change."""
         light, found = self.surface.light, buffers.terms
-        self.terms.update(points, found)
+        self.surface.terms.update(points, found)
         of_balls = (N_TERMS - N_BALL_TERMS, len(light.rows))
         places = ((found.terms, (0, 0)), (found.mouth, (0, 0)), (found.terms, of_balls))
         at = 0
@@ -358,9 +357,8 @@ def build_lit_scene(
     covers: NDArray[np.uint8] | None = None,
 ) -> LitScene:
     """Scene of a face with baked light, whose pages may have a cover (2, H, W), before a background (H, W, 3)."""
-    side, light = picture.samples_per_side, face.light[0].of_drawn(face.triangles)
-    surface = build_surface(face, light)
-    level = _level(surface, optics, side)
+    side, surface = picture.samples_per_side, build_surface(face)
+    light, level = surface.light, _level(surface, optics, side)
     texels, size = stack_pages(light.pages, level, covers)
     return LitScene(
         face=face,
@@ -373,7 +371,6 @@ def build_lit_scene(
         texture_size=size,
         from_camera=_from_camera(light, picture.view.yaw_deg),
         view=light.view.astype(np.float32),
-        terms=light_terms(face, surface.rig, light),
         bases=tuple(_planes(base) for base in (light.base, light.mouth_base, light.ball_base)),
         answers=(
             (light.responses, light.response_sizes, light.limits),

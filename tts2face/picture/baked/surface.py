@@ -21,6 +21,8 @@ from tts2face.models.baked_light import BLACK_SHARE, N_PAGES, BakedLight
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import connected_pieces, decode_srgb
 from tts2face.numeric.kernels import BLOCK, flat_view, kernel, vectorized_kernel, write_larger
+from tts2face.numeric.reuse import shared
+from tts2face.picture.baked.response import LightTerms, light_terms
 
 Array = NDArray[Any]
 
@@ -219,7 +221,7 @@ OPAQUE, COVER_SHIFT = 255, 24  # cover of pages without any, and its bits in a t
 TEXELS_A_PIXEL = 1.0  # beyond which the next smaller texels are read
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class LitSurface:
     """Constant arrays for drawing a face with baked light.
 
@@ -242,11 +244,14 @@ class LitSurface:
         Triangles of the eyes.
     eye_texture : (S, S, 3)
         Linear light.
+    terms
+        Of the vertices that are lit.
     """
 
     face: Face
     light: BakedLight
     rig: FaceRig
+    terms: LightTerms
     source: NDArray[np.int32]
     behind: NDArray[np.bool_]
     template: NDArray[np.float32]
@@ -257,14 +262,16 @@ class LitSurface:
     eye_texture: NDArray[np.float32]
 
 
-def build_surface(face: Face, light: BakedLight) -> LitSurface:
-    """Surface of a face.
+@shared
+def build_surface(face: Face) -> LitSurface:
+    """Surface of a face with baked light.
 
     Raises
     ------
     DataError
         The face has more triangles than a picture can tell apart.
     """
+    light, rig = face.light[0].of_drawn(face.triangles), build_rig(face)
     if len(light.triangles) > MAX_TRIANGLES:
         raise DataError(f"a face with light may have {MAX_TRIANGLES} triangles, not {len(light.triangles)}")
     backs = light.triangles < 0
@@ -296,7 +303,8 @@ def build_surface(face: Face, light: BakedLight) -> LitSurface:
     return LitSurface(
         face=face,
         light=light,
-        rig=build_rig(face),
+        rig=rig,
+        terms=light_terms(face, rig, light),
         source=source,
         behind=(page_of[order] != 0) if face.photograph is not None else np.zeros(len(order), bool),
         template=template,
