@@ -30,6 +30,11 @@ class StyleRun:
     voice: str | None = None
     language: str | None = None
 
+    def is_spoken_as(self, other: "StyleRun") -> bool:
+        """Whether all but the start is that of another run."""
+        here, there = ((one.styles, one.rate, one.volume, one.voice, one.language) for one in (self, other))
+        return here == there
+
 
 @dataclass(frozen=True, slots=True)
 class PauseMark:
@@ -217,8 +222,8 @@ class MarkedTextBuilder:
             raise InputError(f"{self._open_spans[-1].shown} is not closed; add its end")
         runs: list[StyleRun] = []
         for run in self._runs:
-            merged = replace(run, language=None) if run.language == base_language else run
-            if not runs or replace(runs[-1], start=run.start) != merged:
+            merged = replace(run, language=None) if run.language and run.language == base_language else run
+            if not runs or not runs[-1].is_spoken_as(merged):
                 runs.append(merged)
         return MarkedText("".join(self._pieces), tuple(runs), tuple(self._marks), language)
 
@@ -234,5 +239,5 @@ class MarkedTextBuilder:
         if self._runs[-1].start == run.start:
             self._runs.pop()
         last = self._runs[-1] if self._runs else None
-        if last is None or replace(last, start=run.start) != run:
+        if last is None or not last.is_spoken_as(run):
             self._runs.append(run)
