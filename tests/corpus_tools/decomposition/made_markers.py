@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import dataclass
+from math import isnan
 from pathlib import Path
 
 import c3d
@@ -88,8 +89,8 @@ def write_table(path: Path, names: tuple[str, ...], points: np.ndarray, first: s
     """Points (T, M, 3) in mm; gaps are empty cells."""
     header = [first, *(f"{name}_{axis}" for name in names for axis in "xyz")]
     lines = [",".join(header)]
-    for frame, row in enumerate(points.reshape(len(points), -1)):
+    for frame, row in enumerate(points.reshape(len(points), -1).tolist()):
         at = f"{frame / FPS:.4f}" if first == "time" else str(frame + 1)
-        lines.append(",".join([at, *("" if np.isnan(value) else f"{value:.5f}" for value in row)]))
+        lines.append(",".join([at, *("" if isnan(value) else f"{value:.5f}" for value in row)]))
     path.write_text("\n".join(lines) + "\n")
     return path

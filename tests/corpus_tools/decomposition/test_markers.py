@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from corpus_tools.decomposition.capture import FaceRecording
 from corpus_tools.decomposition.marker_face import MAX_MARKER_GAP_S, fill_marker_gaps
 from corpus_tools.decomposition.marker_files import read_c3d, read_markers
 from corpus_tools.decomposition.markers import (
@@ -22,6 +23,13 @@ from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.numeric.arrays import true_runs
 
 REST = slice(0, 60)  # the made performance's frames at rest
+
+
+@pytest.fixture(scope="module")
+def whole(made: Made, face: Face, marker_set: MarkerSet, tmp_path_factory: pytest.TempPathFactory) -> FaceRecording:
+    """The made take without gaps, read from a table."""
+    path = write_table(tmp_path_factory.mktemp("whole") / "whole.csv", made.names, made.points)
+    return read_marker_recording(path, face, marker_set)
 
 
 def at_rest(made: Made, path: Path) -> Path:
@@ -81,8 +89,9 @@ def test_lips_open_and_lids_close_although_no_marker_lies_inside_them(
     assert found.notes == ("the median of the recording is used as the face at rest",)
 
 
-def test_gaps_are_filled_and_reported(made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path) -> None:
-    whole = read_marker_recording(write_table(tmp_path / "whole.csv", made.names, made.points), face, marker_set)
+def test_gaps_are_filled_and_reported(
+    made: Made, whole: FaceRecording, face: Face, marker_set: MarkerSet, tmp_path: Path
+) -> None:
     points = made.points.copy()
     points[100:115, made.names.index("LBRO2")] = np.nan
     points[:5, made.names.index("JAW1")] = np.nan
@@ -152,9 +161,8 @@ def test_a_head_that_is_not_rigid_is_refused(made: Made, face: Face, marker_set:
 
 
 def test_a_pose_that_no_three_markers_show_is_interpolated_and_reported(
-    made: Made, face: Face, marker_set: MarkerSet, tmp_path: Path
+    made: Made, whole: FaceRecording, face: Face, marker_set: MarkerSet, tmp_path: Path
 ) -> None:
-    whole = read_marker_recording(write_table(tmp_path / "whole.csv", made.names, made.points), face, marker_set)
     points = made.points.copy()
     head = [made.names.index(name) for name in marker_set.head]
     points[200:210, head[:5]] = np.nan

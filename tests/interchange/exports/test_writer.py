@@ -192,8 +192,8 @@ def test_memory_does_not_grow_with_length(format, tmp_path):
         tracemalloc.stop()
         return most
 
-    peak(2)
-    few, many = peak(4), peak(12)  # 40 s and 2 minutes; motion and sound of these grow by 5 MB
+    peak(1)
+    few, many = peak(3), peak(9)  # 30 s and 90 s; motion and sound of these grow by 4 MB
     assert many - few < 1.5e6
 
 

@@ -11,10 +11,11 @@ from cli.main import run
 from lexicon.errors import DataError, InputError
 from tests.packages import needs
 from tests.serving.batch.conftest import Planner
-from tests.world import LetterVoice
+from tests.world import LetterVoice, World
 from tts2face.serving.batch.run import MIN_AGE_S, SEGMENT_FOLDER, prune_segments, run_batch
 from tts2face.serving.batch.segment import SegmentResult
 from tts2face.serving.batch.store import Store, open_store
+from tts2face.session.named_models import Models
 
 WEEK_S = 7 * 86_400.0
 
@@ -72,10 +73,11 @@ def test_unfinished_files_of_killed_processes_are_removed(tmp_path: Path) -> Non
 
 
 def test_the_segments_of_a_batch_stay_and_it_runs_again_without_rendering(
-    plan_of: Planner, voices: list[LetterVoice], tmp_path: Path
+    plan_of: Planner, voices: list[LetterVoice], world: World, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    plan = plan_of(per="file")
+    models = Models(str(world.talker_file), str(world.face_file), palette=str(world.palette_file))
+    plan = plan_of(per="file", models=models)
     run_batch(plan, out)
     age(out / SEGMENT_FOLDER, 2 * WEEK_S)
     pruned = prune_segments(open_store(out / SEGMENT_FOLDER), [out], (), WEEK_S)
