@@ -239,8 +239,8 @@ def test_some_kernels_may_reorder_sums():
 
 
 CLIP = (
-    surface, shading, eyes, response, cut_out, fragments, deformation, eyeballs, blending, contacts, token_search, tokens,
-    networks, least_squares, field_kernels, segments, level,
+    surface, shading, eyes, response, cut_out, fragments, deformation, eyeballs, blending, contacts, token_search,
+    tokens, networks, least_squares, field_kernels, segments, level,
 )  # fmt: skip
 
 

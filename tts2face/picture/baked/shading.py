@@ -208,7 +208,7 @@ def compose(pixels: Array, samples: Array, n_samples: int, colour: Array, pictur
 
     Colours (3, N) are mixed as displayed.
     """
-    n_pixels, channels, line = len(pixels) - 1, picture.shape[2], picture.reshape(-1)
+    n_pixels, channels, line = len(pixels) - 1, picture.shape[2], flat_view(picture)
     part, half, zero, most = np.float32(1) / np.float32(n_samples), np.float32(0.5), np.float32(0), np.float32(255)
     first, one, two, three = pixels[0], np.uint64(1), np.uint64(2), np.uint64(3)
     for pixel in range(n_pixels):
