@@ -268,7 +268,7 @@ def resume_collection() -> None:
         gc.enable()
 
 
-COMPILATION = "tts2face.numeric.kernels"  # name of its logger; the module itself would load numba
+COMPILATION = "tts2face.numeric.kernels"  # name of its logger; the module itself would load numpy
 Progress = Callable[[int, int], None]  # as in `tts2face.types`, which would load numpy for --help
 
 
