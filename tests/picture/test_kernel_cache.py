@@ -343,6 +343,23 @@ def test_a_kernel_computes_what_its_text_says(monkeypatch, tmp_path, arguments, 
         assert measure.n_from_cache == n_from_cache
 
 
+@kernel
+def _add_whole(values, out):  # type: ignore[no-untyped-def]
+    out[:] = values + out
+
+
+@kernel
+def _call_add_whole(values, out):  # type: ignore[no-untyped-def]
+    _add_whole(values, out)
+
+
+@pytest.mark.parametrize("add", [_add_whole, _call_add_whole])
+def test_kernels_may_use_whole_arrays(add):
+    out = np.ones(6)
+    add(VALUES, out)
+    np.testing.assert_array_equal(out, VALUES + 1.0)
+
+
 def test_a_kernel_says_that_memory_is_short(monkeypatch):
     measure = Kernel(_measure.py_func)
     out = np.zeros(6)

@@ -17,6 +17,7 @@ from numba.core.codegen import CPUCodeLibrary
 from numba.core.compiler import CompilerBase
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.errors import NumbaError
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
@@ -98,16 +99,19 @@ class KernelCompiler(CompilerBase):  # type: ignore[misc]
         return [passes]
 
 
-_dispatchers: dict[Any, Any] = {}  # by kernel
+_dispatchers: dict[tuple[Any, bool], Any] = {}  # by kernel, and whether references to arrays are counted
 
 
 def compile_kernel(kernel: Any, arguments: tuple[Any, ...]) -> Compiled:
     """Compile a kernel for the types of its arguments."""
     with global_compiler_lock:
-        dispatcher = _dispatcher(kernel)
         signature = tuple(numba.typeof(value) for value in arguments)
-        dispatcher.compile(signature)
-        found = dispatcher.overloads[signature]
+        try:
+            found = _overload(_dispatcher(kernel, _allocates(kernel)), signature)
+        except NumbaError as error:
+            if "NRT required" not in str(error):
+                raise
+            found = _overload(_dispatcher(kernel, True), signature)
         context, library = found.target_context, found.library
         if library._finalized:  # another kernel, which calls this one, has taken it
             library = KernelLibrary(context.codegen(), ENTRY)
@@ -120,30 +124,35 @@ def compile_kernel(kernel: Any, arguments: tuple[Any, ...]) -> Compiled:
         return Compiled(codes, results, isinstance(found.fndesc.restype, BaseTuple), code)
 
 
-def _dispatcher(kernel: Any) -> Any:
+def _overload(dispatcher: Any, signature: tuple[Any, ...]) -> Any:
+    dispatcher.compile(signature)
+    return dispatcher.overloads[signature]
+
+
+def _dispatcher(kernel: Any, counts: bool) -> Any:
     """Numba's object for a kernel; the kernels that it calls are replaced by theirs."""
-    if kernel not in _dispatchers:
+    if (kernel, counts) not in _dispatchers:
         function, known = kernel.py_func, dict(kernel.py_func.__globals__)
         for name in function.__code__.co_names:
             if isinstance(known.get(name), type(kernel)):
-                known[name] = _dispatcher(known[name])
+                known[name] = _dispatcher(known[name], counts)
             elif isinstance(known.get(name), Intrinsic):
                 known[name] = INTRINSICS[known[name].name]
         copy = FunctionType(function.__code__, known, function.__name__, function.__defaults__, function.__closure__)
         options: dict[str, Any] = {"inline": "always"} if kernel.is_inlined else {"fastmath": kernel.reorders_sums}
-        _dispatchers[kernel] = numba.njit(
-            _nrt=_allocates(kernel),
+        _dispatchers[kernel, counts] = numba.njit(
+            _nrt=counts,
             error_model="numpy",
             no_cfunc_wrapper=True,
             no_cpython_wrapper=True,
             pipeline_class=KernelCompiler,
             **options,
         )(copy)
-    return _dispatchers[kernel]
+    return _dispatchers[kernel, counts]
 
 
-# Names of numpy's functions that make arrays. Where a kernel uses none, numba counts no references to its arrays; one
-# that allocates in another way is refused by numba.
+# Names of numpy's functions that make arrays. Where a kernel uses none, numba counts no references to its arrays,
+# unless it says that it must: for expressions with whole arrays.
 ALLOCATING = {"zeros", "ones", "full", "empty_like", "zeros_like", "full_like", "copy"}
 
 
