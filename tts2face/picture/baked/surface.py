@@ -309,16 +309,11 @@ def build_surface(face: Face) -> LitSurface:
         behind=(page_of[order] != 0) if face.photograph is not None else np.zeros(len(order), bool),
         template=template,
         triangles=np.ascontiguousarray(row_of[keys]),
-        piece_of=_pieces(face, corners),
+        piece_of=connected_pieces(corners, n_vertices)[corners[:, 0]],  # edges of a part's pieces lie over each other
         eye_of=eye_of,
         of_eyes=np.flatnonzero(eye_of >= 0),
         eye_texture=(decode_srgb(picture / 255.0) * light.eye_gain).astype(np.float32),
     )
-
-
-def _pieces(face: Face, corners: NDArray[np.int32]) -> NDArray[np.int32]:
-    """(D,) number of the connected piece of each triangle (D, 3): pieces of one part have edges over each other."""
-    return connected_pieces(corners, len(face.vertices))[corners[:, 0]]
 
 
 def page_places(uv: NDArray[np.float64], page: NDArray[np.int64], least_side: int) -> NDArray[np.float64]:
