@@ -5,14 +5,13 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from cli.corpus import Provenance, check_suffix, corpus
+from cli.corpus import Provenance, check_suffix
 from cli.flags import Cache, Jobs, Model, switch
 from cli.photo import Yes
 from cli.process import stage_bar, write_message
 from tts2face.storage.files import refuse_overwriting
 
 
-@corpus.command
 def gestures(  # noqa: PLR0913 - one parameter a flag
     recordings: Annotated[Path, Parameter(help="Videos, Live Link tables or marker captures: a folder or one file.")],
     /,

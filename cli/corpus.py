@@ -303,3 +303,7 @@ def pool(
     with stage_bar() as stages:
         found = pool_talker(talker, tracks, out, source=source, stages=stages or ignore_stage)
     write_message(f"wrote {out}: networks pooled with {found.n_tracks} tracks, {found.minutes:.1f} minutes of speech")
+
+
+corpus.command("cli.build:gestures")
+corpus.command("cli.evaluate:evaluate")

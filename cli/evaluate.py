@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from cli.corpus import corpus
 from cli.flags import Cache, Jobs, Model, switch, whole_number
 from cli.photo import Yes
 from cli.process import progress_bar, stage_bar, write_message
@@ -133,7 +132,6 @@ class ComparisonFlags:
 NO_SPLIT, NO_COMPARISON = SplitFlags(), ComparisonFlags()
 
 
-@corpus.command
 def evaluate(  # noqa: PLR0913 - one parameter a flag
     *,
     split: SplitFlags = NO_SPLIT,

@@ -8,15 +8,8 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-import cli.build
-import cli.evaluate  # noqa: F401 - both add their command to `corpus`
-from cli.batch import batch
-from cli.corpus import corpus
-from cli.face import face as face_commands
 from cli.flags import Exports, Face, Hair, HairColor, Out, add_option_flags, check_options, options_from_flags, switch
-from cli.jobs import jobs, keys, serve, worker
 from cli.lists import LISTS
-from cli.mimic import mimic
 from cli.photo import (
     Consent,
     Fit,
@@ -44,7 +37,6 @@ from cli.process import (
     signal_exit_code,
     write_message,
 )
-from cli.report import report
 from cli.speak import convert, render
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from lexicon.inputs import LARGEST_TEXT_BYTES, decode_utf8, read_bounded, read_text
@@ -64,17 +56,17 @@ app = App(
     help_format="plaintext",  # Markdown costs a fifth of the time that --help takes
     suppress_keyboard_interrupt=False,
 )
-app.command(mimic)
+app.command("cli.mimic:mimic")
 app.command(convert)
 app.command(render)
-app.command(batch)
-app.command(worker)
-app.command(jobs)
-app.command(serve)
-app.command(keys)
-app.command(corpus)
-app.command(report)
-app.command(face_commands)
+app.command("cli.batch:batch")
+app.command("cli.jobs:worker")
+app.command("cli.jobs:jobs")
+app.command("cli.jobs:serve")
+app.command("cli.jobs:keys")
+app.command("cli.corpus:corpus")
+app.command("cli.report:report")
+app.command("cli.face:face")
 for list_command in LISTS:
     app.command(list_command)
 
@@ -214,6 +206,10 @@ def _read_text(text: str | None, file: Path | None, *, is_needed: bool) -> str:
 
 def _call(arguments: Sequence[str]) -> None:
     check_options(app, arguments)
+    _, called, _ = app.parse_commands(list(arguments))
+    if called[-1].default_command is None or {*app.help_flags} & {*arguments}:
+        for group in called:
+            group.resolved_commands()  # a page of help has only what loaded commands say of themselves
     app(list(arguments), exit_on_error=False, print_error=False, result_action="return_none")
     sys.stdout.flush()
 

@@ -11,7 +11,7 @@ import operator
 import re
 import stat
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from functools import cache, partial
 from io import StringIO
@@ -71,18 +71,24 @@ def check_fields(options: Any) -> None:
     InputError
         A value has another type, is no finite number, or is a path with the character U+0000.
     """
-    for one in fields(options):
-        value = getattr(options, one.name)
-        if type(value) is type(one.default) and value == one.default:
+    for name, kind, default in _fields_of(type(options)):
+        value = getattr(options, name)
+        if type(value) is type(default) and value == default:
             continue
-        found = _convert(one.name, value, one.type)
+        found = _convert(name, value, kind)
         if found is not value:
-            object.__setattr__(options, one.name, found)
+            object.__setattr__(options, name, found)
+
+
+@cache
+def _fields_of(options: type) -> tuple[tuple[str, Any, Any], ...]:
+    """Name, annotation and default of each field of a dataclass."""
+    return tuple((one.name, one.type, one.default) for one in fields(options))
 
 
 def _convert(name: str, value: Any, kind: Any) -> Any:
     """A value of the type of an annotation, itself where nothing is converted; errors as `check_fields`."""
-    if kind is float and type(value) is float and math.isfinite(value):  # of curves, of which there are many
+    if type(value) is kind and kind in _PLAIN and _PLAIN[kind](value):  # of curves and words, of which there are many
         return value
     origin, inner = _parts(kind)
     if origin is UnionType and value is None:
@@ -147,6 +153,9 @@ def format_value(value: Any) -> str:
         return f"a {type(value).__name__}"
 
 
+_PLAIN: Mapping[Any, Callable[[Any], bool]] = MappingProxyType(
+    {str: lambda _: True, float: math.isfinite, int: lambda value: value.bit_length() < sys.float_info.max_exp}
+)
 _NUMBERS: Mapping[Any, Any] = MappingProxyType({int: Integral, float: Real})  # also those of numpy and fractions
 
 
