@@ -42,7 +42,7 @@ INTERRUPTED = "tts2face: interrupted; {}"
 UNCHANGED = "an output that was not complete yet is as it was before"  # also after the first of several outputs
 TRIM_THRESHOLD, MMAP_THRESHOLD, MOST_ARENAS = -1, -3, -8  # parameter numbers of mallopt in glibc's malloc.h
 N_ARENAS = 2  # heaps from which threads allocate; one for each thread takes 14 MB more in a clip
-LARGE_BYTES = 1 << 20  # arrays of at least this size are mapped one by one; pictures of 512 x 512 are smaller
+LARGE_BYTES = 8 << 20  # arrays of at least this size are mapped one by one, which clears their pages each time
 
 
 def exit_code(error: Exception) -> int:
