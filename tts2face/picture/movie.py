@@ -40,10 +40,12 @@ class MovieKind:
 
 
 # Of the presets measured (docs/decisions/031-h264-settings.md) veryfast gives a quarter of ultrafast's size at half its
-# speed. With x264's vector code of the macroblock tree, equal pictures gave other bytes in widths as 64 or 320.
+# speed. With x264's vector code of the macroblock tree, equal pictures gave other bytes in widths as 64 or 320. A face
+# before a still background moves little and has no cuts: neither is searched for.
+_X264 = "cpu-independent=1:me=dia:scenecut=0"
 MP4_MOVIE = MovieKind(
     "mp4", "libx264", "aac", 128_000,
-    MappingProxyType({"crf": "18", "preset": "veryfast", "profile": "high", "x264-params": "cpu-independent=1"}),
+    MappingProxyType({"crf": "18", "preset": "veryfast", "profile": "high", "x264-params": _X264}),
     MappingProxyType({"movflags": "+faststart"}),
 )  # fmt: skip
 _NO_RANDOM_IDS = {"fflags": "+bitexact"}  # of segments and tracks: equal clips are equal bytes
