@@ -17,8 +17,6 @@ from lexicon.errors import InputError
 from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face import Face
 from tts2face.numeric.reuse import map_in_order
-from tts2face.picture import vtk_renderer
-from tts2face.picture.baked.photo_scene import build_photo_scene
 from tts2face.picture.baked.scene import LitScene, build_lit_scene
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.options import PYVISTA, STANDARD, Picture
@@ -176,7 +174,9 @@ class MeshRenderer:
         chosen = range(len(values)) if numbers is None else numbers
         poses = ((values[number], clip.head.values[number]) for number in chosen)
         if self.picture.renderer == PYVISTA and isinstance(self.scene, Scene):
-            yield from vtk_renderer.render_frames(self.scene, poses)
+            from tts2face.picture.vtk_renderer import render_frames
+
+            yield from render_frames(self.scene, poses)
             return
         yield from map_in_order(lambda pose: self._draw(*pose), poses, threads)
 
@@ -197,7 +197,9 @@ class MeshRenderer:
             raise InputError(f"the face has {n_shapes} shapes, not weights of shape {np.shape(weights)}")
         pose = np.asarray(weights, np.float32), np.asarray(head, np.float32)
         if self.picture.renderer == PYVISTA and isinstance(self.scene, Scene):
-            (pixels,) = vtk_renderer.render_frames(self.scene, [pose])
+            from tts2face.picture.vtk_renderer import render_frames
+
+            (pixels,) = render_frames(self.scene, [pose])
             return pixels
         return self._draw(*pose)
 
@@ -243,9 +245,13 @@ def mesh_renderer(face: Face, picture: Picture) -> MeshRenderer:
         The renderer that the picture names is not available on this machine.
     """
     if face.photograph is not None:
+        from tts2face.picture.baked.photo_scene import build_photo_scene
+
         return MeshRenderer(build_photo_scene(face, face.photograph, picture))
     if picture.renderer == PYVISTA:
-        vtk_renderer.require_gl()
+        from tts2face.picture.vtk_renderer import require_gl
+
+        require_gl()
     elif face.light:
         background = draw_background(picture, face.light[0].backdrop)
         optics = camera_matrices(picture.view, face, picture.samples)
