@@ -15,6 +15,7 @@ from types import ModuleType
 from typing import Any
 
 PACKAGE, CODE = "scipy.fft", "_pocketfft/pypocketfft"
+REFUSED = frozenset({"scipy", PACKAGE})
 UNSCALED, BY_LENGTH = 0, 2  # of SciPy's compiled transforms
 
 
@@ -43,14 +44,14 @@ def import_hibari() -> ModuleType:
 
 
 class _Missing:
-    """A finder that tells the thread that made it, and no other, that there is no `scipy.fft`."""
+    """A finder that tells the thread that made it, and no other, that there is no SciPy."""
 
     def __init__(self) -> None:
         self._thread = get_ident()
 
     def find_spec(self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> None:
         del path, target
-        if name == PACKAGE and get_ident() == self._thread:
+        if name in REFUSED and get_ident() == self._thread:
             raise ImportError(f"{name} is not needed")
 
 
