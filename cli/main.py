@@ -30,7 +30,6 @@ from cli.process import (
     discard_output,
     error_message,
     exit_code,
-    pause_collection,
     release_frames,
     repair_streams,
     return_large_blocks,
@@ -42,6 +41,7 @@ from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from lexicon.inputs import LARGEST_TEXT_BYTES, decode_utf8, read_bounded, read_text
 from tts2face import __version__
 from tts2face.picture.options import Picture
+from tts2face.processes.collection import pause_collection
 from tts2face.request import GESTURES, Request
 from tts2face.session.named_models import Models
 from tts2face.storage.temporary import remove_held
@@ -248,7 +248,7 @@ def main() -> None:
     repair_streams()
     INTERRUPTION.install()
     return_large_blocks()
-    if sys.argv[1:2] and sys.argv[1] not in {*app}:  # a text or an option, which `speak` gets
+    if sys.argv[1:2] and (sys.argv[1] == "serve" or sys.argv[1] not in {*app}):  # which resume it, as `speak` does
         pause_collection()
     code = run(sys.argv[1:])
     if INTERRUPTION.number:

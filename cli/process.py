@@ -7,7 +7,6 @@ import codecs
 import contextlib
 import ctypes
 import errno
-import gc
 import os
 import select
 import signal
@@ -254,18 +253,6 @@ def return_large_blocks() -> bool:
         return False
     values = {MMAP_THRESHOLD: LARGE_BYTES, TRIM_THRESHOLD: LARGE_BYTES, MOST_ARENAS: N_ARENAS}
     return all(set_option(option, value) == 1 for option, value in values.items())
-
-
-def pause_collection() -> None:
-    """Stop the search for garbage: a command that imports and loads makes none, and each search looks at all of it."""
-    gc.disable()
-
-
-def resume_collection() -> None:
-    """Search for garbage again where it was paused, but not in what has been imported and loaded."""
-    if not gc.isenabled():
-        gc.freeze()
-        gc.enable()
 
 
 COMPILATION = "tts2face.numeric.kernels"  # name of its logger; the module itself would load numpy

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from cli.flags import Exports, Face, Hair, HairColor, Out, switch
-from cli.process import compilation_messages, progress_bar, resume_collection, write_message
+from cli.process import compilation_messages, progress_bar, write_message
 from lexicon.errors import InputError
 from tts2face.picture.options import Picture
+from tts2face.processes.collection import resume_collection
 from tts2face.request import OWN_FACE, Request
 from tts2face.session.named_models import Models
 from tts2face.storage.files import check_file_name, refuse_overwriting, write_atomically

@@ -71,7 +71,7 @@ def check_fields(options: Any) -> None:
     InputError
         A value has another type, is no finite number, or is a path with the character U+0000.
     """
-    for name, kind, default in _fields_of(type(options)):
+    for name, kind, default in _fields_of(options.__class__):
         value = getattr(options, name)
         if type(value) is type(default) and value == default:
             continue

@@ -24,6 +24,7 @@ from starlette.routing import Match
 
 from lexicon.errors import Tts2faceError
 from tts2face import __version__
+from tts2face.processes.collection import resume_collection
 from tts2face.serving.service.connections import connection_classes
 from tts2face.serving.service.errors import DOCUMENTED, RefusedError, as_refused, error_body
 from tts2face.serving.service.exchange import PAGES
@@ -198,6 +199,7 @@ class DrainingServer(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Listen; then write the address, whose port may have been chosen by the system."""
         await super().startup(sockets)
+        resume_collection()
         if hasattr(signal, "SIGHUP"):
             asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, self._state.reload_keys)
         for server in self.servers:
