@@ -34,6 +34,7 @@ from cli.process import (
     repair_streams,
     return_large_blocks,
     signal_exit_code,
+    use_one_thread_of_blas,
     write_message,
 )
 from cli.speak import convert, render
@@ -46,6 +47,7 @@ from tts2face.request import GESTURES, Request
 from tts2face.session.named_models import Models
 from tts2face.storage.temporary import remove_held
 
+MAKE_CLIPS = (["batch"], ["mimic"], ["render"])  # as a text does
 Shell = Literal["bash", "zsh", "fish", "powershell"]
 
 app = App(
@@ -248,7 +250,10 @@ def main() -> None:
     repair_streams()
     INTERRUPTION.install()
     return_large_blocks()
-    if sys.argv[1:2] and (sys.argv[1] == "serve" or sys.argv[1] not in {*app}):  # which resume it, as `speak` does
+    makes_clip = bool(sys.argv[1:2]) and sys.argv[1] not in {*app}  # a text or an option, which `speak` gets
+    if makes_clip or sys.argv[1:2] in MAKE_CLIPS:
+        use_one_thread_of_blas()
+    if makes_clip or sys.argv[1:2] == ["serve"]:  # both resume it
         pause_collection()
     code = run(sys.argv[1:])
     if INTERRUPTION.number:

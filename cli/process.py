@@ -255,6 +255,14 @@ def return_large_blocks() -> bool:
     return all(set_option(option, value) == 1 for option, value in values.items())
 
 
+def use_one_thread_of_blas() -> None:
+    """Make NumPy's products use one core, unless the environment says otherwise; before NumPy is imported.
+
+    The products of a clip are small: OpenBLAS's other threads turn in circles between them, a 25th of its time.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
 COMPILATION = "tts2face.numeric.kernels"  # name of its logger; the module itself would load numpy
 Progress = Callable[[int, int], None]  # as in `tts2face.types`, which would load numpy for --help
 
