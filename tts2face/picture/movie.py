@@ -166,6 +166,7 @@ class MovieWriter:
             dst_colorspace=Colorspace.ITU709,
             src_color_range=ColorRange.JPEG,
             dst_color_range=ColorRange.MPEG,
+            threads=1,  # as the encoder
         )
         frame.pts, frame.time_base = self.n_frames, 1 / self._fps
         self.n_frames += 1
