@@ -21,7 +21,7 @@ import sys
 import tempfile
 import threading
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache, update_wrapper
 from importlib.util import find_spec
 from pathlib import Path
@@ -98,7 +98,8 @@ class Kernel(Generic[Arguments, Result]):
     ) -> None:
         update_wrapper(self, function)
         self.py_func, self.is_inlined, self.reorders_sums = function, is_inlined, reorders_sums
-        self._calls: dict[tuple[int, ...], tuple[Callable[..., int], str, bool]] = {}
+        self._calls: dict[tuple[Any, ...], tuple[Callable[..., int], str, bool]] = {}  # by what `_flatten` gives
+        self._loaded: dict[tuple[int, ...], tuple[Callable[..., int], str, bool]] = {}  # by `_describe`
         self.n_from_cache = 0  # kinds of arguments whose code was in the cache
 
     def __call__(self, *arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
@@ -110,12 +111,13 @@ class Kernel(Generic[Arguments, Result]):
             The code could not allocate memory.
         """
         flat: list[Any] = []
-        key: list[int] = []
-        _flatten(arguments, flat, key)
+        seen: list[Any] = []
+        _flatten(arguments, flat, seen)
+        key = tuple(seen)
         try:
-            function, results, is_tuple = self._calls[tuple(key)]
+            function, results, is_tuple = self._calls[key]
         except KeyError:
-            function, results, is_tuple = self._load(tuple(key), arguments)
+            function, results, is_tuple = self._calls[key] = self._load(arguments)
         if not results:
             if function(*flat):
                 raise MemoryError(f"{self.py_func.__qualname__} lacks memory")
@@ -137,10 +139,11 @@ class Kernel(Generic[Arguments, Result]):
     def _stem(self) -> str:
         return f"{self.py_func.__name__}-{self.py_func.__code__.co_firstlineno}"  # several may have one name
 
-    def _load(self, key: tuple[int, ...], arguments: Sequence[Any]) -> tuple[Callable[..., int], str, bool]:
+    def _load(self, arguments: Sequence[Any]) -> tuple[Callable[..., int], str, bool]:
+        key = tuple(_describe(arguments))
         with _loading:
-            if key in self._calls:
-                return self._calls[key]
+            if key in self._loaded:
+                return self._loaded[key]
             kind = hashlib.sha256(f"{key} {_machine()}".encode()).hexdigest()[:16]
             path = self._folder() / f"{self._stem()}-{kind}{SUFFIX}"
             try:
@@ -152,34 +155,48 @@ class Kernel(Generic[Arguments, Result]):
             types = [CODES[one] for one in found.arguments]
             prototype = ctypes.CFUNCTYPE(ctypes.c_int, *types, *([ctypes.c_char_p] if found.results else []))
             function = prototype(load_object(found.code, ENTRY))
-            self._calls[key] = function, found.results, found.is_tuple
-            return self._calls[key]
+            self._loaded[key] = function, found.results, found.is_tuple
+            return self._loaded[key]
 
 
-def _flatten(values: Sequence[Any], flat: list[Any], key: list[int]) -> None:
-    """Append the arrays and numbers that arguments hold, and what code depends on: types, and the layout of arrays."""
+def _flatten(values: Sequence[Any], flat: list[Any], seen: list[Any]) -> None:
+    """Append the arrays and numbers that arguments hold, and what tells their types apart; made to be fast."""
     for value in values:
         kind = type(value)
         if kind is np.ndarray:
             flat.append(value)
-            layout, dtype = value.flags.num & LAYOUT, value.dtype
-            layout = layout & ~2 if layout & 1 else layout  # rows of one entry are in both orders
-            key.append(layout | dtype.isnative << 2 | value.ndim << 12 | dtype.num << 20)
+            seen.append(value.flags.num << 8 | value.ndim)
+            seen.append(value.dtype)
         elif kind in SCALARS:
             flat.append(value)
-            key.append(SCALARS[kind])
+            seen.append(kind)
         elif kind is tuple:
-            key.append(-64 - len(value))
-            _flatten(value, flat, key)
+            seen.append(-1 - len(value))
+            _flatten(value, flat, seen)
         elif isinstance(value, np.ndarray):
-            _flatten((np.asarray(value),), flat, key)
+            _flatten((np.asarray(value),), flat, seen)
         elif isinstance(value, np.number | np.bool):
-            number = value.item()
-            flat.append(number)
-            is_same = value.dtype.itemsize == 8 and value.dtype.kind in "if"  # as Python's own
-            key.append(SCALARS[type(number)] if is_same or value.dtype.kind == "b" else -4 - value.dtype.num)
+            flat.append(value.item())
+            seen.append(kind)
         else:
             raise TypeError(f"a kernel takes arrays, numbers and tuples of them, not {kind.__name__}")
+
+
+def _describe(values: Sequence[Any]) -> Iterator[int]:
+    """What code depends on: the types of arguments that `_flatten` takes, and the layout of arrays."""
+    for value in values:
+        if isinstance(value, np.ndarray):
+            layout, dtype = value.flags.num & LAYOUT, value.dtype
+            layout = layout & ~2 if layout & 1 else layout  # rows of one entry are in both orders
+            yield layout | dtype.isnative << 2 | value.ndim << 12 | dtype.num << 20
+        elif isinstance(value, np.number | np.bool) and type(value) not in SCALARS:
+            is_same = value.dtype.itemsize == 8 and value.dtype.kind in "if"  # as Python's own
+            yield SCALARS[type(value.item())] if is_same or value.dtype.kind == "b" else -4 - value.dtype.num
+        elif type(value) is tuple:
+            yield -64 - len(value)
+            yield from _describe(value)
+        else:
+            yield SCALARS[type(value)]
 
 
 def _read(path: Path) -> Compiled:
