@@ -229,10 +229,15 @@ class AsyncChild:
         async with self._starting:
             if self._running is None or self._running.reading.done():
                 errors = error_file(self._program)
-                process = await asyncio.create_subprocess_exec(
-                    *child_command(self._program), stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
-                    stderr=errors, env=self._program.environment(), limit=MAX_LINE_BYTES,
-                )  # fmt: skip
+                try:
+                    process = await asyncio.create_subprocess_exec(
+                        *child_command(self._program), stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
+                        stderr=errors, env=self._program.environment(), limit=MAX_LINE_BYTES,
+                    )  # fmt: skip
+                except BaseException:  # such as a caller that leaves while the process starts
+                    if errors is not None:
+                        errors.close()
+                    raise
                 self._running = _Running(process, errors, self._on_released)
             return self._running
 

@@ -6,8 +6,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from starlette.testclient import TestClient
+from starlette.testclient import TestClient, WebSocketDenialResponse
 
+from tests.running import eventually
 from tests.serving.service.in_process import another_client
 from tts2face.serving.service.exchange import POLICY
 from tts2face.serving.service.guard import COOKIE, cookie_key, set_cookie
@@ -155,6 +156,39 @@ def test_styles_and_scripts_are_in_the_package() -> None:
     folder = Path(tts2face.serving.studio.__file__).parent
     assert (folder / "pages" / "studio.css").is_file()
     assert {"stage.js", "timeline.js", "clock.js", "preview.js"} <= {one.name for one in folder.glob("components/*.js")}
+
+
+CONNECTIONS = ("/_nicegui_ws/socket.io/?EIO=4&transport=websocket", "/api/takes/live")
+
+
+@pytest.mark.parametrize("path", CONNECTIONS)
+def test_a_reload_ends_the_connections_of_a_removed_key(closed: TestClient, keys: dict[str, str], path: str) -> None:
+    """Open pages and live cameras, which cannot connect again."""
+    from tts2face.serving.service.keys import add_key, remove_key
+
+    secret = add_key(Path(keys["file"]), "leaving", ["speak", "build"])
+    headers = {"Cookie": f"{COOKIE}={secret}", "Upgrade": "websocket"}
+    state, portal = closed.app.state.service, closed.portal  # type: ignore[attr-defined]
+    assert portal is not None
+    try:
+        portal.call(state.reload_keys)
+        with closed.websocket_connect(f"ws://localhost/studio{path}", headers=headers) as one:
+            eventually(lambda: any(open.key.name == "leaving" for open in state.exchanges))
+            remove_key(Path(keys["file"]), "leaving")
+            portal.call(state.reload_keys)
+            while (message := one.receive())["type"] != "websocket.close":
+                assert message["type"] == "websocket.send"
+            assert message["code"] == 1008
+        eventually(lambda: not any(open.key.name == "leaving" for open in state.exchanges))
+        with (
+            pytest.raises(WebSocketDenialResponse),
+            closed.websocket_connect(f"ws://localhost/studio{path}", headers=headers),
+        ):
+            pass
+    finally:
+        if "leaving" in Path(keys["file"]).read_text():
+            remove_key(Path(keys["file"]), "leaving")
+        portal.call(state.reload_keys)
 
 
 def test_styles_and_takes_belong_to_a_key(closed: TestClient, keys: dict[str, str]) -> None:

@@ -11,13 +11,16 @@ import uuid
 from collections.abc import Awaitable, Callable, Coroutine, Iterator, MutableMapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from contextvars import ContextVar, copy_context
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from starlette.requests import ClientDisconnect
 
 from tts2face.serving.service.errors import RefusedError, error_body
 from tts2face.serving.service.logs import REQUEST_ID
 from tts2face.serving.service.stages import STAGES, Stage, durations
+
+if TYPE_CHECKING:
+    from tts2face.serving.service.keys import ApiKey
 
 PAGES = "/studio"
 REFERENCE = "/docs"
@@ -59,6 +62,8 @@ HEADERS = ((b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-stor
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
 CLOSE_NORMAL, CLOSE_REFUSED, CLOSE_RESTART = 1000, 1008, 1012  # WebSocket: policy violation; service restart
 HTTP_FORM = "websocket.http.response"  # extension of ASGI: a refused WebSocket gets an HTTP answer
+DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
+CLOSE_S = 1.0  # for which a client that is cut may take to read why
 LEFT = 499  # status, in the log and the metrics only, of a request whose client left before its answer began
 Item = TypeVar("Item")
 
@@ -83,7 +88,8 @@ class Exchange:
         self.first_byte_s: float | None = None
         self.stages: list[Stage] = []
         self.further: list[tuple[bytes, bytes]] = []  # headers of its answer, whatever answers it
-        self.is_cut = False  # ended by the service before it was complete
+        self.key: ApiKey | None = None  # with which it is answered
+        self.cut_by: RefusedError | None = None  # why the service ended it before it was complete
         self.is_answered = False  # all of its answer has been passed on
         self.has_left = False  # its client has, before the answer was complete
         self._watched: set[asyncio.Task[Any]] = set()
@@ -96,6 +102,11 @@ class Exchange:
     def age_s(self) -> float:
         """Seconds since the request arrived."""
         return time.monotonic() - self.began
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether the service ended it before it was complete."""
+        return self.cut_by is not None
 
     @property
     def method(self) -> str:
@@ -152,8 +163,10 @@ class Exchange:
         except asyncio.CancelledError:
             if not self.is_cut:
                 raise
-            assert self._task is not None
-            self._task.uncancel()
+        finally:
+            task, self._task = self._task, None
+            if self.is_cut and task is not None and task.cancelling():  # by `cut`, also where the work has caught it
+                task.uncancel()
 
     def leave(self) -> None:
         """Note that the client has left, and end what is waited for on its behalf."""
@@ -207,11 +220,11 @@ class Exchange:
         await self._send({"type": f"{HTTP_FORM}.start", "status": refused.status, "headers": headers})
         await self._send({"type": f"{HTTP_FORM}.body", "body": body})
 
-    async def announce_end(self, message: str) -> None:
-        """Write to the client of a WebSocket that the service is about to end; pages notice its end by themselves."""
+    async def announce_end(self, refused: RefusedError) -> None:
+        """Write to the client of a WebSocket why the service is about to end it; pages notice it by themselves."""
         if self.scope["type"] == "websocket" and self.status == 101 and not is_page(self.scope["path"]):
             with suppress(OSError, RuntimeError):  # the client has left
-                text = json.dumps({"type": "error", "code": "draining", "message": message})
+                text = json.dumps({"type": "error", "code": refused.code, "message": refused.message})
                 await self.send({"type": "websocket.send", "text": text})
 
     async def close(self, code: int = CLOSE_NORMAL, reason: str = "") -> None:
@@ -221,12 +234,23 @@ class Exchange:
             with suppress(OSError, RuntimeError):  # the client has left
                 await self._send({"type": "websocket.close", "code": code, "reason": reason})
 
-    async def cut(self) -> None:
-        """End the request now: a WebSocket with code 1012, a stream incomplete."""
-        self.is_cut = True
-        await self.close(CLOSE_RESTART, "the service restarts")
+    async def cut(self, refused: RefusedError, code: int = CLOSE_RESTART) -> None:
+        """End the request now: a WebSocket with a close code, a stream incomplete, what has no answer yet with one."""
+        if self.cut_by is not None:
+            return
+        self.cut_by, self.code = refused, refused.code
+        with suppress(TimeoutError):  # a client that reads nothing is not waited for
+            async with asyncio.timeout(CLOSE_S):
+                await self.close(code, refused.message[:120])
         if self._task is not None:
             self._task.cancel()
+
+    async def revoke(self, refused: RefusedError) -> None:
+        """End the request now, since its key is no longer what it was; the client of a WebSocket is told why."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(CLOSE_S):
+                await self.announce_end(refused)
+        await self.cut(refused, CLOSE_REFUSED)
 
     def _count(self, message: MutableMapping[str, Any]) -> None:
         if message["type"] == "http.response.body":
@@ -243,6 +267,12 @@ class Exchange:
         now = time.monotonic()
         stages = durations(self.stages, now) | {"total": now - self.began}
         return ", ".join(f"{name};dur={1000 * seconds:.1f}" for name, seconds in stages.items())
+
+
+def draining() -> RefusedError:
+    """Refusal of a service that shuts down."""
+    headers = {"Retry-After": str(DRAINING_RETRY_S), "Connection": "close"}
+    return RefusedError(503, "draining", "the service is shutting down; repeat the request", headers)
 
 
 CLIENT: ContextVar[Exchange | None] = ContextVar("client", default=None)  # for whose request the present task works

@@ -31,9 +31,10 @@ from tts2face.serving.service.exchange import (
     Receive,
     Scope,
     Send,
+    draining,
     is_page,
 )
-from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, find_key
+from tts2face.serving.service.keys import NOBODY, ApiKey
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.origins import answer_headers, check_origin, preflight_headers
 from tts2face.storage.files import is_disk_full
@@ -100,7 +101,6 @@ VIDEO_PUTS = (f"{RECORDINGS}/", f"{STYLES}/", f"{TAKES}/")
 DRAINING_PATHS = frozenset({"/health", "/healthz", "/readyz", "/metrics"})  # that are answered until the end
 CLOSE = {"Connection": "close"}
 READ_AHEAD_BYTES = 256 << 10  # of a client that wait for the application; then no more is read
-DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
 
 
 class Guard:
@@ -115,35 +115,36 @@ class Guard:
             return await self._app(scope, receive, send)
         request = Exchange(scope, receive, send)
         request.further = answer_headers(request.headers, self._state.settings.origins)
-        key: ApiKey | None = None
         is_counted = scope["path"] not in UNCOUNTED_PATHS and not is_static(scope["path"])
         try:
             self._check_head(request)
             self._check_host(request)
             if allowed := preflight_headers(request.method, request.headers, self._state.settings.origins):
                 await request.answer(204, allowed)
-                return self._state.record(request, key)
+                return self._state.record(request)
             self._check_draining(scope["path"])
-            key = self._identify(request)
+            key = request.key = self._identify(request)
             scope["state"] = {**scope.get("state", {}), "key": key, "exchange": request}
             if is_counted:
                 self._state.limits.begin(key)
         except RefusedError as refused:
             await request.refuse(refused)
-            return self._state.record(request, key)
+            return self._state.record(request)
+        self._state.exchanges.add(request)
         if is_counted:
             self._state.running.add(request)
             CLIENT.set(request)
         try:
             await request.run(self._answer(request, receive))
             await request.close()
-            if request.is_cut:
-                await request.refuse(_draining())
+            if request.cut_by is not None:
+                await request.refuse(request.cut_by)
         finally:
+            self._state.exchanges.discard(request)
             if is_counted:
                 self._state.running.discard(request)
                 self._state.limits.end(key)
-            self._state.record(request, key)
+            self._state.record(request)
         return None
 
     async def _answer(self, request: Exchange, receive: Receive) -> None:
@@ -174,7 +175,7 @@ class Guard:
 
     def _check_draining(self, path: str) -> None:
         if self._state.is_draining and path not in DRAINING_PATHS:
-            raise _draining()
+            raise draining()
 
     def _check_head(self, request: "Exchange") -> None:
         """Refuse heads that are too large, and bodies with two lengths, which proxies may divide differently."""
@@ -199,24 +200,20 @@ class Guard:
 
     def _identify(self, request: "Exchange") -> ApiKey:
         path = request.scope["path"]
-        if path in OPEN_PATHS or path == LOGIN_PATH or not self._state.keys:
-            return LOCAL_KEY
+        if path in OPEN_PATHS or path == LOGIN_PATH:
+            return NOBODY
         given = BEARER.sub("", request.headers.get(b"authorization", b"").decode("latin-1").strip())
         given = given or request.headers.get(b"x-api-key", b"").decode("latin-1")
         if not given and request.scope["type"] == "websocket":  # a browser cannot send headers with it
             given = parse_qs(request.scope["query_string"].decode("latin-1")).get("key", [""])[0]
         if not given and is_page(path):
             given = cookie_key(request.headers)
-        found = find_key(self._state.keys, given)
-        if found is None and wants_login(request):
-            raise RefusedError(303, "unauthorized", "log in with an API key first", {"Location": LOGIN_PATH})
-        if found is None:
-            what = "unknown" if given else "missing"
-            raise RefusedError(
-                401, "unauthorized", f"the API key is {what}; send it as `Authorization: Bearer KEY`",
-                {"WWW-Authenticate": "Bearer"},
-            )  # fmt: skip
-        return found
+        try:
+            return self._state.keys.find(given)
+        except RefusedError as refused:
+            if wants_login(request):
+                raise RefusedError(303, refused.code, refused.message, {"Location": LOGIN_PATH}) from refused
+            raise
 
 
 def _brings_video(scope: Scope) -> bool:
@@ -225,11 +222,6 @@ def _brings_video(scope: Scope) -> bool:
         return False
     is_take = scope["method"] == "PUT" and scope["path"].startswith(VIDEO_PUTS)
     return is_take or (scope["method"], scope["path"]) == ("POST", VIDEO_PATH)
-
-
-def _draining() -> RefusedError:
-    headers = {"Retry-After": str(DRAINING_RETRY_S)} | CLOSE
-    return RefusedError(503, "draining", "the service is shutting down; repeat the request", headers)
 
 
 def _host_name(host: str) -> str:

@@ -11,7 +11,7 @@ import time
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,8 @@ LIMITS = ("requests_per_minute", "concurrent", "speech_s_per_day", "resources", 
 MAY_BE_NONE = ("resources", "resources_mb", "photos_per_day")  # limits of which 0 is one, too
 MAX_LIMIT = 1e9
 NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
+HASH = re.compile(r"[0-9a-f]{64}")
+NO_SECRET = hashlib.sha256(b"").hexdigest()  # what a request without a key would match
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +42,8 @@ class ApiKey:
     ----------
     hash
         SHA-256 of the key, hexadecimal; a key has 256 random bits, so that no slow hash is needed.
+    scopes
+        What it may do; a key of a file that names none may do nothing.
     requests_per_minute, concurrent, speech_s_per_day
         Limits; None: none.
     resources, resources_mb, photos_per_day
@@ -78,7 +82,8 @@ class _Written:
     key: tuple[ApiKey, ...] = ()
 
 
-LOCAL_KEY = ApiKey("local", "", SCOPES)  # of requests to a service without keys
+LOCAL_KEY = ApiKey("local", "", SCOPES)  # of requests to a service without a file of keys
+NOBODY = ApiKey("nobody", "", ())  # of requests that need no key
 
 
 def find_key(keys: Sequence[ApiKey], given: str) -> ApiKey | None:
@@ -96,7 +101,7 @@ def read_keys(path: Path) -> tuple[ApiKey, ...]:
     Raises
     ------
     InputError
-        The file does not exist.
+        The file does not exist, or cannot be read.
     DataError
         It is no file of keys.
     """
@@ -106,9 +111,18 @@ def read_keys(path: Path) -> tuple[ApiKey, ...]:
         raise InputError(
             f"there is no file of keys {path}; create it with `tts2face keys add NAME --file {path}`"
         ) from missing
+    except OSError as refused:
+        raise InputError(
+            f"the file of keys {path} cannot be read: {refused.strerror}; check its place and its rights"
+        ) from refused
     found = checked(_Written, content, str(path)).key
+    found = tuple(key if "scopes" in given else replace(key, scopes=())
+                  for key, given in zip(found, content.get("key", ()), strict=True))  # fmt: skip
     if len({key.name for key in found}) < len(found):
         raise DataError(f"{path} names a key twice; write it with `tts2face keys`")
+    for key in found:
+        if not HASH.fullmatch(key.hash) or key.hash == NO_SECRET:
+            raise DataError(f"{path}: the hash of the key {key.name} is that of no key; write it with `tts2face keys`")
     return found
 
 

@@ -27,7 +27,7 @@ from tts2face import __version__
 from tts2face.processes.collection import resume_collection
 from tts2face.serving.service.connections import connection_classes
 from tts2face.serving.service.errors import DOCUMENTED, RefusedError, as_refused, error_body
-from tts2face.serving.service.exchange import PAGES
+from tts2face.serving.service.exchange import PAGES, draining
 from tts2face.serving.service.guard import Guard
 from tts2face.serving.service.logs import configure_logs, log_event
 from tts2face.serving.service.routes import (
@@ -218,8 +218,7 @@ class DrainingServer(uvicorn.Server):
         while state.running and not self.force_exit and time.monotonic() < began + state.settings.drain_s:
             await asyncio.sleep(0.05)
         telling.cancel()
-        for request in list(state.running):
-            await request.cut()
+        await asyncio.gather(*(request.cut(draining()) for request in state.running))
         log_event("drained", seconds=round(time.monotonic() - began, 3))
 
     def handle_exit(self, sig: int, frame: object) -> None:
@@ -229,12 +228,11 @@ class DrainingServer(uvicorn.Server):
 
     async def _end_sockets(self) -> None:
         sockets = [request for request in self._state.running if request.scope["type"] == "websocket"]
-        for request in sockets:
-            await request.announce_end("the service is shutting down; connect again")
+        telling = [asyncio.create_task(request.announce_end(draining())) for request in sockets]
         await asyncio.sleep(min(SOCKET_GRACE_S, self._state.settings.drain_s))
-        for request in sockets:
-            if request in self._state.running:
-                await request.cut()
+        for task in telling:  # of clients that read nothing
+            task.cancel()
+        await asyncio.gather(*(request.cut(draining()) for request in sockets if request in self._state.running))
 
 
 def _allow_files(connections: int) -> None:

@@ -3,6 +3,7 @@
 Prometheus metrics of the service.
 """
 
+import asyncio
 import logging
 import os
 from collections.abc import AsyncIterator
@@ -15,10 +16,11 @@ from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, gene
 
 from lexicon.errors import Tts2faceError
 from tts2face.processes.message import RESULT, Message
+from tts2face.serving.service.access import KeyRing
 from tts2face.serving.service.errors import RefusedError, as_refused
-from tts2face.serving.service.exchange import while_client_stays
+from tts2face.serving.service.exchange import in_background, while_client_stays
 from tts2face.serving.service.job_service import JobService
-from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits, read_keys
+from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.messages import QUALITY, SYNTHESISE, Work, check_words
@@ -101,7 +103,7 @@ class ServiceState:
 
     def __init__(self, settings: ServiceSettings, tasks: tuple[str, ...] = ()) -> None:
         self.settings = settings
-        self.keys = read_keys(settings.keys) if settings.keys is not None else ()
+        self.keys = KeyRing(settings.keys)
         self.pool = Pool(PoolSettings(
             settings.processes, settings.waiting, self._steps(),
             {"n_sessions": settings.sessions, "log_format": settings.log_format, "log_text": settings.log_text,
@@ -117,17 +119,45 @@ class ServiceState:
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
         self.readiness = Readiness(self.pool, self.jobs, settings)
-        self.running: set[Exchange] = set()
+        self.exchanges: set[Exchange] = set()  # requests that are being answered
+        self._ending: list[asyncio.Task[None]] = []  # those of keys that were removed
+        self.running: set[Exchange] = set()  # those for which a draining service waits
 
     def reload_keys(self) -> None:
-        """Read the file of keys again; the present keys stay valid if it cannot be read."""
-        if self.settings.keys is None:
+        """Read the file of keys again, and end what is open for keys that it no longer has, or that may do less.
+
+        If it cannot be read, nobody is served.
+        """
+        if self.keys.is_open:
             return log_event("keys not reloaded", reason="the service has no file of keys")
+        names: tuple[str, ...] | None = None
         try:
-            self.keys = read_keys(self.settings.keys)
-        except (Tts2faceError, OSError) as error:
-            return log_event("keys not reloaded", level=logging.ERROR, reason=str(error))
-        return log_event("keys reloaded", keys=[key.name for key in self.keys])
+            names = self.keys.reload()
+        except Tts2faceError as error:
+            log_event("keys not reloaded", level=logging.ERROR, reason=str(error))
+        losses = [(one, self.keys.loss_of(one.key)) for one in self.exchanges if one.key is not None]
+        self._ending = [in_background(one.revoke(loss)) for one, loss in losses if loss is not None]
+        if names is not None:
+            log_event("keys reloaded", keys=list(names), ended=len(self._ending))
+        return None
+
+    def speaking_key(self, key: ApiKey) -> ApiKey:
+        """A key as it is now, if it may have something spoken.
+
+        Raises
+        ------
+        RefusedError
+            It has been removed, lacks the scope speak, or has used its seconds of speech.
+        """
+        key = self.keys.current(key)
+        if "speak" not in key.scopes:
+            raise RefusedError(403, "forbidden", f"the key {key.name} lacks the scope speak; use another key")
+        self.limits.check_speech(key)
+        return key
+
+    def count(self, key: ApiKey) -> None:
+        """Count an utterance of an open WebSocket as a request of its key; errors as `speaking_key` and the limits."""
+        self.limits.count(self.speaking_key(key))
 
     def work(self, *, models: dict[str, Any] | None = None, **fields: Any) -> Work:
         """A work with the models of the settings unless it names others."""
@@ -167,9 +197,7 @@ class ServiceState:
             raise RefusedError(
                 413, "too_long", f"the text has more than {self.settings.text_characters} characters; divide it"
             )
-        if "speak" not in key.scopes:
-            raise RefusedError(403, "forbidden", f"the key {key.name} lacks the scope speak; use another key")
-        self.limits.check_speech(key)
+        key = self.speaking_key(key)
         made = 0.0
         if self.settings.log_text and work.request.get("text"):
             log_event("text", text=work.request["text"])
@@ -210,7 +238,7 @@ class ServiceState:
             return made
         return self.cache.messages(work, made)
 
-    def record(self, request: "Exchange", key: ApiKey | None) -> None:
+    def record(self, request: "Exchange") -> None:
         """Log, count and trace a finished request."""
         self.metrics.requests.labels(request.route, str(request.status)).inc()
         self.metrics.sent_bytes.inc(request.n_bytes)
@@ -218,7 +246,7 @@ class ServiceState:
             self.metrics.first_byte.labels(request.route).observe(request.first_byte_s)
         log_event(
             "request", id=request.id, method=request.method, path=request.route, status=request.status,
-            code=request.code, key=key.name if key else None, bytes=request.n_bytes,
+            code=request.code, key=request.key.name if request.key else None, bytes=request.n_bytes,
             first_byte_s=round(request.first_byte_s, 4) if request.first_byte_s is not None else None,
             seconds=round(request.age_s, 4), cut=request.is_cut,
         )  # fmt: skip

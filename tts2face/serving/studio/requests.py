@@ -14,7 +14,7 @@ from lexicon.errors import DataError, InputError
 from tts2face.picture.options import parse_size
 from tts2face.processes.message import Message
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.keys import LOCAL_KEY, ApiKey
+from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.library import check_background, check_voice, resolve_models
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.state import ServiceState
@@ -114,10 +114,10 @@ def _own_palette(state: ServiceState, key: ApiKey) -> Path:
 
 def key_of(state: ServiceState, owner: str) -> ApiKey:
     """The key of an owner; an `InputError` if it is gone."""
-    for key in state.keys or (LOCAL_KEY,):
-        if key.name == owner:
-            return key
-    raise InputError("its key is gone")
+    key = state.keys.named(owner)
+    if key is None:
+        raise InputError("its key is gone")
+    return key
 
 
 def studio_folder(state: ServiceState) -> Path:

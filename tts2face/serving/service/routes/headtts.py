@@ -134,7 +134,7 @@ async def _answer(connection: WebSocket, setup: dict[str, Any], message: dict[st
     """Answer one ``synthesize``, which counts as a request."""
     reference = message.get("id")
     try:
-        service_state(connection).limits.count(connection.state.key)
+        service_state(connection).count(connection.state.key)
         body = HeadTtsRequest(**(setup | (message.get("data") or {})))
         content, sound = await _speak(connection, body, Adjustments())
     except (RefusedError, ValueError, TypeError) as error:

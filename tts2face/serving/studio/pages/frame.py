@@ -27,7 +27,7 @@ from tts2face.request import OWN_FACE
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import PAGES
 from tts2face.serving.service.guard import LOGIN_PATH, set_cookie
-from tts2face.serving.service.keys import ApiKey, find_key
+from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.library import Library, shipped_names
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio.components.stage import StageElement
@@ -297,14 +297,16 @@ def make_router(state: ServiceState) -> APIRouter:
 
     @router.get(LOGIN_PATH)
     async def show_form() -> Response:
-        if not state.keys:
+        if state.keys.is_open:
             return RedirectResponse(f"{PAGES}/", 303)
         return _page("")
 
     @router.post(LOGIN_PATH)
     async def log_in(request: HttpRequest, key: str = Form(default="", max_length=200)) -> Response:
-        if state.keys and find_key(state.keys, key) is None:
-            request.state.exchange.code = "unauthorized"
+        try:
+            state.keys.find(key)
+        except RefusedError as refused:
+            request.state.exchange.code = refused.code
             return _page("This key is unknown. Check it, or ask the operator for another one.", 401)
         answer = RedirectResponse(f"{PAGES}/", 303)
         answer.headers["Set-Cookie"] = set_cookie(key, is_secure=request.url.scheme == "https")

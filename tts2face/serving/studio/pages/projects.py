@@ -46,7 +46,7 @@ class ProjectsPage:
         """Build the page."""
         self._studio.prepare()
         with page_bar(request, "tts2face studio"):
-            if self._studio.state.keys:
+            if not self._studio.state.keys.is_open:
                 ui.html(
                     f'<form method="post" action="{LOGOUT_PATH}"><button type="submit">Log out</button></form>',
                     sanitize=False,
