@@ -269,10 +269,10 @@ class Exchange:
         return ", ".join(f"{name};dur={1000 * seconds:.1f}" for name, seconds in stages.items())
 
 
-def draining() -> RefusedError:
+def draining(advice: str = "repeat the request") -> RefusedError:
     """Refusal of a service that shuts down."""
     headers = {"Retry-After": str(DRAINING_RETRY_S), "Connection": "close"}
-    return RefusedError(503, "draining", "the service is shutting down; repeat the request", headers)
+    return RefusedError(503, "draining", f"the service is shutting down; {advice}", headers)
 
 
 CLIENT: ContextVar[Exchange | None] = ContextVar("client", default=None)  # for whose request the present task works

@@ -228,7 +228,7 @@ class DrainingServer(uvicorn.Server):
 
     async def _end_sockets(self) -> None:
         sockets = [request for request in self._state.running if request.scope["type"] == "websocket"]
-        telling = [asyncio.create_task(request.announce_end(draining())) for request in sockets]
+        telling = [asyncio.create_task(request.announce_end(draining("connect again"))) for request in sockets]
         await asyncio.sleep(min(SOCKET_GRACE_S, self._state.settings.drain_s))
         for task in telling:  # of clients that read nothing
             task.cancel()
