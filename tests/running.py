@@ -105,7 +105,7 @@ class RunningService(Log):
 
     def _is_ready(self) -> bool:
         try:
-            return httpx.get(f"{self.url}/readyz").status_code == 200
+            return all(httpx.get(f"{self.url}/readyz").json()["checks"].values())
         except httpx.TimeoutException:  # the machine is busy
             return False
 

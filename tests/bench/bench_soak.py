@@ -191,10 +191,10 @@ ATTACKS: Mapping[str, Callable[[Soak, int], Awaitable[str]]] = {  # on a soak, w
 
 
 def _missing(soak: Soak) -> set[str]:
-    """What `/readyz` names as missing; it answers 200 where there is nothing."""
+    """What `/readyz` names as missing; it answers 200 where there is nothing that streams need."""
     answer = httpx.get(f"{soak.server.url}/readyz", timeout=60)
     missing = {name for name, is_there in answer.json()["checks"].items() if not is_there}
-    assert (answer.status_code == 200) == (not missing)
+    assert (answer.status_code == 200) == (missing <= {"database", "workers"})
     return missing
 
 

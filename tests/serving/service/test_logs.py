@@ -74,7 +74,8 @@ async def fails(scope: Scope, receive: Receive, send: Send) -> None:
 
 
 def test_a_defect_is_answered_with_its_id_and_logged_with_its_traceback(caplog: pytest.LogCaptureFixture) -> None:
-    guard = Guard(fails, ServiceState(ServiceSettings(processes=1)))
+    state = ServiceState(ServiceSettings(processes=1))
+    guard = Guard(fails, state)
 
     async def ask() -> httpx.Response:
         async with httpx.AsyncClient(transport=httpx.ASGITransport(guard), base_url="http://localhost") as client:
@@ -92,6 +93,7 @@ def test_a_defect_is_answered_with_its_id_and_logged_with_its_traceback(caplog: 
     assert (defect.getMessage(), request.getMessage()) == ("defect", "request")
     assert any("test_logs.py" in frame for frame in json.loads(LineFormatter().format(defect))["traceback"])
     assert request.fields["status"] == 500  # type: ignore[attr-defined]
+    assert b'tts2face_failures_total{kind="internal"} 1.0' in state.metrics.as_text()
 
 
 class FakePool:

@@ -18,7 +18,7 @@ BOARD: dict[str, Any] = json.loads((DOCS / "deploy/grafana.json").read_text())
 ALERTS: dict[str, Any] = yaml.safe_load((DOCS / "deploy/alerts.yaml").read_text())
 RUNBOOK = (DOCS / "runbook.md").read_text(encoding="utf-8")
 SERVING = sorted((ROOT / "tts2face/serving").rglob("*.py"))
-LABELS = {"path", "status", "kind", "state", "samples", "frames", "le"}  # of our metrics
+LABELS = {"path", "status", "kind", "state", "samples", "frames", "check", "le"}  # of our metrics
 OF_PROMETHEUS = {"instance", "job"}
 
 

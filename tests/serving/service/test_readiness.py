@@ -1,6 +1,7 @@
 """What /readyz finds missing, and what a running job says while its disk is full."""
 
 import asyncio
+import logging
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -111,7 +112,67 @@ def test_workers_that_have_ended_are_named(tmp_path: Path, monkeypatch: pytest.M
         jobs = client.app.state.service.jobs  # type: ignore[attr-defined]
         jobs._stopped.set()
         jobs._supervisor.join()
-        assert ready(client) == (503, ["workers"], ["none of 1 job workers is alive; see the log"])
+        assert ready(client) == (200, ["workers"], ["none of 1 job workers is alive; see the log"])  # streams go on
+
+
+class HangingJobs:
+    """Jobs whose database neither answers nor refuses."""
+
+    n_workers = 1
+
+    def __init__(self) -> None:
+        self.n_asked = 0
+
+    async def is_reachable(self) -> bool:
+        self.n_asked += 1
+        await asyncio.Event().wait()
+        return True
+
+
+def test_a_database_that_hangs_neither_stops_streams_nor_delays_a_probe(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Probes of Kubernetes wait for a second; asked again and again, it holds one task and writes one line."""
+    monkeypatch.setattr(readiness, "LOOK_S", 0.0)
+    monkeypatch.setattr(readiness, "DATABASE_S", 0.01)
+    with (
+        service_client(ServiceSettings(workers=0, data=tmp_path), TableProcess()) as client,
+        caplog.at_level(logging.INFO),
+    ):
+        state, jobs = client.app.state.service, HangingJobs()  # type: ignore[attr-defined]
+        monkeypatch.setattr(state.readiness, "_jobs", jobs)
+        for _ in range(3):
+            found = client.get("/readyz")
+            assert (found.status_code, found.json()["status"]) == (200, "ready")
+            assert found.json()["missing"] == ["the database of the jobs does not answer; check it"]
+        assert jobs.n_asked == 1
+        lines = client.get("/metrics").text.splitlines()
+        assert {'tts2face_ready{check="models"} 1.0', 'tts2face_ready{check="database"} 0.0'} <= set(lines)
+        assert client.post("/v1/clips", json={"text": "Hi.", "format": "wav"}).status_code == 200
+        said = [one.fields["missing"] for one in caplog.records if one.getMessage() == "readiness"]  # type: ignore[attr-defined]
+        assert said == [{"database": "the database of the jobs does not answer; check it"}]
+        client.portal and client.portal.call(state.readiness._asking.cancel)
+
+
+def test_probes_do_not_fill_the_log(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Those that are answered as they should be; one that is refused is written, since it cannot work."""
+    with (
+        service_client(ServiceSettings(workers=0, data=tmp_path), TableProcess()) as client,
+        caplog.at_level(logging.INFO),
+    ):
+        service = client.app.state.service  # type: ignore[attr-defined]
+        for _ in range(5):
+            for path in ("/healthz", "/health", "/readyz", "/metrics"):
+                assert client.get(path).status_code == 200
+        service.is_draining = True
+        assert client.get("/readyz").status_code == 503
+        service.is_draining = False
+        assert [one.fields["path"] for one in caplog.records if one.getMessage() == "request"] == []  # type: ignore[attr-defined]
+        client.get("/v1/models")
+        client.get("/readyz", headers={"host": "evil.example"})
+        assert [one.fields["status"] for one in caplog.records if one.getMessage() == "request"] == [200, 421]  # type: ignore[attr-defined]
+        counted = client.get("/metrics").text
+    assert 'tts2face_requests_total{path="/healthz",status="200"} 5.0' in counted
 
 
 def test_a_running_job_says_why_it_waits(tmp_path: Path, free: dict[str, int], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -59,6 +59,8 @@ Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 
 REQUEST_ID_FORM = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 HEADERS = ((b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-store"))
+PROBES = frozenset({"/health", "/healthz", "/readyz", "/metrics"})  # are answered until the end, and not logged
+OTHER = "other"  # route of what no route answers
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
 CLOSE_NORMAL, CLOSE_REFUSED, CLOSE_RESTART = 1000, 1008, 1012  # WebSocket: policy violation; service restart
 HTTP_FORM = "websocket.http.response"  # extension of ASGI: a refused WebSocket gets an HTTP answer
@@ -116,8 +118,13 @@ class Exchange:
 
     @property
     def route(self) -> str:
-        """Path of its route with the names of parameters in place of their values; ``other`` if there is none."""
-        return str(getattr(self.scope.get("route"), "path", "other"))
+        """Path of its route with the names of parameters in place of their values; `OTHER` if there is none."""
+        return str(getattr(self.scope.get("route"), "path", OTHER))
+
+    @property
+    def is_probed(self) -> bool:
+        """Whether it is one of those by which programs look again and again whether the service is well."""
+        return self.scope["path"] in PROBES and self.status in {200, 503}
 
     async def send(self, message: MutableMapping[str, Any]) -> None:
         """Send a message of the answer with the headers of the service."""

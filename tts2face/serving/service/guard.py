@@ -23,6 +23,7 @@ from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import (
     CLIENT,
     PAGES,
+    PROBES,
     RECORDINGS,
     REFERENCE,
     STYLES,
@@ -92,13 +93,12 @@ App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 RETRY_S = 30  # for clients, while a disk is full
 OPEN_PATHS = frozenset({
-    "/health", "/healthz", "/readyz", "/openapi.json", REFERENCE,
+    *(PROBES - {"/metrics"}), "/openapi.json", REFERENCE,
     *(f"{REFERENCE}/{name}" for name in ("swagger-ui-bundle.js", "swagger-ui.css", "start.js")),
 })  # fmt: skip
-UNCOUNTED_PATHS = frozenset({*OPEN_PATHS, "/metrics", "/v1/hello"})
+UNCOUNTED_PATHS = frozenset({*OPEN_PATHS, *PROBES, "/v1/hello"})
 VIDEO_PATH = "/v1/talkers/build"
 VIDEO_PUTS = (f"{RECORDINGS}/", f"{STYLES}/", f"{TAKES}/")
-DRAINING_PATHS = frozenset({"/health", "/healthz", "/readyz", "/metrics"})  # that are answered until the end
 CLOSE = {"Connection": "close"}
 READ_AHEAD_BYTES = 256 << 10  # of a client that wait for the application; then no more is read
 
@@ -168,13 +168,14 @@ class Guard:
                 await request.refuse(RefusedError(503, "unavailable", message, {"Retry-After": str(RETRY_S)}))
                 return
             log_event("defect", level=logging.ERROR, error=defect)
+            self._state.metrics.failures.labels("internal").inc()
             message = f"internal error: {type(defect).__name__}; the log has it under the id {request.id}"
             await request.refuse(RefusedError(500, "internal", message))
         finally:
             incoming.close()
 
     def _check_draining(self, path: str) -> None:
-        if self._state.is_draining and path not in DRAINING_PATHS:
+        if self._state.is_draining and path not in PROBES:
             raise draining()
 
     def _check_head(self, request: "Exchange") -> None:

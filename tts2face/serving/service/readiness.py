@@ -1,16 +1,23 @@
 """What the service needs in order to serve, and what of it is missing now."""
 
 import asyncio
+import logging
 import tempfile
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 from tts2face.serving.batch.engine import lack_of_folder
+from tts2face.serving.service.exchange import in_background
 from tts2face.serving.service.job_service import JobService
+from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.pool import Pool
 from tts2face.serving.service.settings import ServiceSettings
 
 LOOK_S = 1.0  # for which what was found is repeated, however often anybody asks
+DATABASE_S = 0.3  # for which a look waits for it; Kubernetes' probes wait for 1 s
+FOR_STREAMS = ("models", "data", "temporary")
+CHECKS = (*FOR_STREAMS, "database", "workers")
 
 
 class Readiness:
@@ -19,20 +26,30 @@ class Readiness:
     def __init__(self, pool: Pool, jobs: JobService, settings: ServiceSettings) -> None:
         self._pool, self._jobs, self._settings = pool, jobs, settings
         self._looking = asyncio.Lock()
+        self._asking: asyncio.Task[bool] | None = None  # the database
         self._found: dict[str, str] = {}
         self._at = -LOOK_S
 
     async def look(self) -> dict[str, str]:
-        """What the service needs, by name, with the reason where it is missing and an empty text where it is there."""
+        """Each of `CHECKS`, with the reason where it is missing and an empty text where it is there.
+
+        Streams need those of `FOR_STREAMS`, jobs all. A change is written to the log.
+        """
         async with self._looking:
             if time.monotonic() >= self._at + LOOK_S:
-                self._found, self._at = await self._look(), time.monotonic()
+                before, self._found = self._found, await self._look()
+                self._at = time.monotonic()
+                if _missing(before) != _missing(self._found) or not before:
+                    level = logging.WARNING if any(self._found.values()) else logging.INFO
+                    log_event(
+                        "readiness", level=level, missing={name: self._found[name] for name in _missing(self._found)}
+                    )
         return dict(self._found)
 
     async def _look(self) -> dict[str, str]:
-        pool, jobs, settings = self._pool, self._jobs, self._settings
-        is_reachable = await jobs.is_reachable()
-        workers = jobs.n_workers > 0 or not settings.workers
+        pool, settings = self._pool, self._settings
+        is_reachable = await self._is_reachable()
+        workers = self._jobs.n_workers > 0 or not settings.workers
         return {
             "models": "" if pool.n_ready else f"{pool.preparation}; wait, or see the log",
             "data": await asyncio.to_thread(lack_of_folder, settings.data_folder, "data folder"),
@@ -40,3 +57,17 @@ class Readiness:
             "database": "" if is_reachable else "the database of the jobs does not answer; check it",
             "workers": "" if workers else f"none of {settings.workers} job workers is alive; see the log",
         }
+
+    async def _is_reachable(self) -> bool:
+        """Whether the database answers within `DATABASE_S`; one that hangs is asked by one task at a time."""
+        if self._asking is None:
+            self._asking = in_background(self._jobs.is_reachable())
+        await asyncio.wait({self._asking}, timeout=DATABASE_S)
+        if not self._asking.done():
+            return False
+        asked, self._asking = self._asking, None
+        return asked.result()
+
+
+def _missing(found: Mapping[str, str]) -> list[str]:
+    return [name for name, reason in found.items() if reason]

@@ -101,6 +101,7 @@ def create_app(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> FastA
     app.add_exception_handler(HTTPException, _answer_http)
     for mount in mounts:
         mount.add(app, state)
+    state.metrics.begin_paths({one.path for one in _routes(app.routes)})
     app.add_middleware(Guard, state=state)
     return app
 

@@ -1,18 +1,12 @@
-"""What all parts of a running service share.
-
-Prometheus metrics of the service.
-"""
+"""What all parts of a running service share."""
 
 import asyncio
 import logging
 import os
 from collections.abc import AsyncIterator
 from contextlib import aclosing
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
 
 from lexicon.errors import Tts2faceError
 from tts2face.processes.message import RESULT, Message
@@ -24,6 +18,7 @@ from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.messages import QUALITY, SYNTHESISE, Work, check_words
+from tts2face.serving.service.metrics import Metrics, quality_labels
 from tts2face.serving.service.pool import STREAM_PRIORITY, InputQueue, Pool, PoolSettings, work_call
 from tts2face.serving.service.preparation import Step
 from tts2face.serving.service.readiness import Readiness
@@ -34,66 +29,6 @@ from tts2face.serving.service.uploads import Checks
 
 if TYPE_CHECKING:
     from tts2face.serving.service.exchange import Exchange
-    from tts2face.serving.service.pool import Pool
-    from tts2face.serving.service.result_cache import ResultCache
-
-
-LATENCY_BUCKETS_S = (0.025, 0.05, 0.1, 0.15, 0.25, 0.35, 0.5, 0.75, 1, 2, 5, 10, 30, 120)
-
-
-class Metrics:
-    """Counters of requests and results; gauges of the pool are read when they are asked for."""
-
-    def __init__(self, pool: "Pool", jobs: "JobService", cache: "ResultCache | None" = None) -> None:
-        self.registry = CollectorRegistry()
-        self.requests = Counter(
-            "tts2face_requests", "Requests by path and status.", ["path", "status"], registry=self.registry
-        )
-        self.first_byte = Histogram(
-            "tts2face_first_byte_seconds", "Seconds to the first byte of the body.", ["path"],
-            buckets=LATENCY_BUCKETS_S, registry=self.registry,
-        )  # fmt: skip
-        self.sent_bytes = Counter("tts2face_sent_bytes", "Bytes of bodies.", registry=self.registry)
-        self.failures = Counter("tts2face_failures", "Failed works by kind.", ["kind"], registry=self.registry)
-        self.speech = Counter("tts2face_speech_seconds", "Seconds of speech made.", registry=self.registry)
-        self.cpu = Counter("tts2face_synthesis_seconds", "Seconds that processes spent on it.", registry=self.registry)
-        self.quality = Counter(
-            "tts2face_quality_changes", "Changes of the quality of movies in work, by the one that follows.",
-            ["samples", "frames"], registry=self.registry,
-        )  # fmt: skip
-        self.cancel = Histogram(
-            "tts2face_cancel_seconds", "Seconds until a cancelled work had released what it held.",
-            buckets=LATENCY_BUCKETS_S, registry=self.registry,
-        )  # fmt: skip
-        for process in pool.processes:
-            process.on_cancelled = self.cancel.observe
-        gauges = {
-            "tts2face_processes_ready": ("Synthesis processes that are ready.", lambda: pool.n_ready),
-            "tts2face_waiting": ("Requests that wait for a process.", lambda: pool.n_waiting),
-            "tts2face_oldest_waiting_seconds": ("Age of the oldest of them.", lambda: pool.oldest_waiting_s),
-            "tts2face_jobs_oldest_waiting_seconds": ("Age of the oldest waiting job.", lambda: jobs.oldest_waiting_s),
-            "tts2face_load": ("Cost of the running works; 1 is a movie.", lambda: pool.load),
-        }
-        if cache is not None:
-            gauges |= {
-                "tts2face_cache_hits": ("Results that the cache had.", lambda: cache.n_hits),
-                "tts2face_cache_misses": ("Results that it did not have.", lambda: cache.n_misses),
-                "tts2face_cache_bytes": ("Size of the cache.", lambda: cache.n_bytes),
-            }
-        for name, (text, read) in gauges.items():
-            Gauge(name, text, registry=self.registry).set_function(read)
-        by_state = Gauge("tts2face_jobs", "Jobs of the database by state.", ["state"], registry=self.registry)
-        for state in jobs.counts:
-            by_state.labels(state).set_function(partial(_count, jobs, state))
-
-    def as_text(self) -> bytes:
-        """All metrics in Prometheus' text format."""
-        return generate_latest(self.registry)
-
-
-def _count(jobs: "JobService", state: str) -> float:
-    return jobs.counts[state]
-
 
 WARM_TEXT = "Hi."
 
@@ -115,10 +50,10 @@ class ServiceState:
         self.cache: ResultCache | None = None
         if settings.cache_mb:
             self.cache = ResultCache(settings.data_folder / "cache", settings.cache_mb * 1_000_000)
-        self.metrics = Metrics(self.pool, self.jobs, self.cache)
+        self.readiness = Readiness(self.pool, self.jobs, settings)
+        self.metrics = Metrics(self.pool, self.jobs, self.readiness, self.cache)
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
-        self.readiness = Readiness(self.pool, self.jobs, settings)
         self.exchanges: set[Exchange] = set()  # requests that are being answered
         self._ending: list[asyncio.Task[None]] = []  # those of keys that were removed
         self.running: set[Exchange] = set()  # those for which a draining service waits
@@ -227,7 +162,7 @@ class ServiceState:
     def _note_quality(self, message: Message) -> None:
         event = message.content.get("event", {})
         if event.get("type") == QUALITY:
-            samples, frames = "all" if event["has_all_samples"] else "one a pixel", f"1 of {event['frame_step']}"
+            samples, frames = quality_labels(event["has_all_samples"], event["frame_step"])
             self.metrics.quality.labels(samples, frames).inc()
             log_event("quality", samples=samples, frames=frames)
 
@@ -239,19 +174,24 @@ class ServiceState:
         return self.cache.messages(work, made)
 
     def record(self, request: "Exchange") -> None:
-        """Log, count and trace a finished request."""
+        """Log, count and trace a finished request; what a probe asks again and again is not logged."""
         self.metrics.requests.labels(request.route, str(request.status)).inc()
         self.metrics.sent_bytes.inc(request.n_bytes)
         if request.first_byte_s is not None and request.status == 200:
             self.metrics.first_byte.labels(request.route).observe(request.first_byte_s)
+        if not request.is_probed:
+            self._log(request)
+        if self.tracing is not None:
+            self.tracing.record(request)
+
+    @staticmethod
+    def _log(request: "Exchange") -> None:
         log_event(
             "request", id=request.id, method=request.method, path=request.route, status=request.status,
             code=request.code, key=request.key.name if request.key else None, bytes=request.n_bytes,
             first_byte_s=round(request.first_byte_s, 4) if request.first_byte_s is not None else None,
             seconds=round(request.age_s, 4), cut=request.is_cut,
         )  # fmt: skip
-        if self.tracing is not None:
-            self.tracing.record(request)
 
 
 def _folders(work: Work) -> set[Path]:
