@@ -13,7 +13,7 @@ from corpus_tools.dense.build_face import CONTENT, SOURCE_FACE, BuiltFace, fit_p
 from corpus_tools.dense.mesh_fit import align_to_head, face_landmarks
 from corpus_tools.dense.person_look import LookChoices
 from corpus_tools.dense.texels import TrackedPictures
-from tts2face.models.consent import consent_record
+from tts2face.models.consent import PHOTO_TOOL, consent_record
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import N_LANDMARKS, N_MESH_LANDMARKS
@@ -154,6 +154,6 @@ def _metadata(head: Face, record: Mapping[str, str], look: str) -> dict[str, obj
         "content": CONTENT,
         "look": look,
         "consent": dict(record),
-        "made_by": "tts2face face photo",
+        "made_by": PHOTO_TOOL,
         "created": datetime.now(UTC).date().isoformat(),
     }

@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from typing import Any
 
 from lexicon.errors import InputError
 
 MIN_STATEMENT_WORDS = 3  # shorter statements are treated as typing errors
 DRAWN = "drawn"  # the statement for a face that is not that of a real person
+PHOTO_TOOL = "tts2face face photo"  # "made_by" of a head that was made of pictures of a person
 
 
 def consent_record(name: str, statement: str | None, *, date: str | None = None) -> Mapping[str, str]:
@@ -24,3 +26,14 @@ def consent_record(name: str, statement: str | None, *, date: str | None = None)
             '--consent "I, NAME, agree that my face is used for ...", or --consent drawn if it is nobody\'s'
         )
     return {"name": name, "statement": said, "date": date or datetime.now(UTC).date().isoformat()}
+
+
+def states_consent(metadata: Mapping[str, Any]) -> bool:
+    """Whether the metadata of a file hold a statement of the person shown, as `consent_record` demands it."""
+    record = metadata.get("consent")
+    statement = record.get("statement") if isinstance(record, Mapping) else None
+    try:
+        consent_record("the person", statement if isinstance(statement, str) else None)
+    except InputError:
+        return False
+    return True

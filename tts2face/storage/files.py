@@ -104,6 +104,7 @@ MOVIE_SUFFIXES = (".mp4", ".webm", ".mov", ".gif")
 LONGEST_NAME = 255  # bytes; used if the file system does not report a limit
 HIDDEN_EXTRA = 16  # bytes that the name of the temporary file adds: dots and random letters
 _SUFFIX_ALONE = re.compile(r"\.\w{2,7}")
+_FOLDERS = re.compile(r"(?<![\w.:/])/(?:[^/\s'\"]+/)+")  # of a path, not of a URL
 
 
 def check_name(path: Path) -> None:
@@ -246,3 +247,8 @@ def without_folders(message: str, folders: Iterable[Path]) -> str:
     for folder in sorted(folders, reverse=True):  # a folder after those within it
         message = message.replace(f"{folder}/", "")
     return message
+
+
+def without_paths(message: str) -> str:
+    """A message that names all files by their names alone."""
+    return _FOLDERS.sub("", message)

@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
-from lexicon.errors import BackendError
+from lexicon.errors import BackendError, InputError, Tts2faceError
 from tts2face.processes.message import EVENT, Message
+from tts2face.processes.parent import ChildEndedError
 from tts2face.processes.program import Program
 from tts2face.serving.service import pool as service_pool
 from tts2face.serving.service.messages import Work
@@ -122,3 +123,64 @@ def test_what_nobody_waits_for_is_made_aside_once_all_processes_are_ready(asides
 
     assert asyncio.run(run()) == b"ab"
     assert [one.niceness for one in asides] == [NICENESS]
+
+
+@pytest.mark.parametrize(
+    ("error", "times", "lack"),
+    [
+        (InputError("there is no talker 'x' in /srv/models/x"), 1, "its models: there is no talker 'x' in x"),
+        (BackendError("the voice is not installed"), 1, "its models: the voice is not installed"),
+        (ChildEndedError("exit code -9"), 2, ""),  # an accident, as of a process that is killed
+        (ChildEndedError("exit code -9"), 3, "its models: exit code -9"),
+    ],
+)
+def test_what_keeps_every_process_from_being_ready_is_known(error: Tts2faceError, times: int, lack: str) -> None:
+    preparation = Preparation([Step("models", "models", {})], 1)
+
+    async def fail(*_: object) -> None:
+        raise error
+
+    async def work(*_: object) -> None:
+        pass
+
+    async def run() -> str:
+        for _ in range(times):
+            with pytest.raises(type(error)):
+                await preparation.run(fail, 0)
+        found = preparation.lack
+        await preparation.run(work, 0)
+        assert preparation.lack == ""
+        return found
+
+    assert asyncio.run(run()).removeprefix("the service cannot prepare ") == lack
+
+
+def test_works_that_wait_for_a_missing_model_are_refused() -> None:
+    """With the reason, as soon as it is known, and at once from then on; processes are started less and less often."""
+
+    async def run() -> None:
+        pool = Pool(PoolSettings(1, steps=(Step("voice", "voice", {}),)))
+        served: list[float] = []
+
+        async def serve() -> None:
+            served.append(asyncio.get_running_loop().time())
+
+            async def load(*_: object) -> None:
+                raise InputError("there is no talker 'x'")
+
+            await pool.preparation.run(load, 0)
+
+        (process,) = pool.processes
+        process._serve = serve  # type: ignore[method-assign]
+        waiting = asyncio.create_task(anext(pool.stream(Work(request={"text": "x"}))))
+        await asyncio.sleep(0)
+        pool.start()
+        for work in (waiting, anext(pool.stream(Work(request={"text": "x"})))):
+            with pytest.raises(BackendError, match=r"the service cannot prepare its voice: there is no talker 'x'"):
+                await work
+        assert pool.n_waiting == 0
+        assert len(served) == 1
+        await asyncio.wait_for(pool.close(), 10)  # which does not wait for the next start
+        assert len(served) == 1
+
+    asyncio.run(run())

@@ -10,7 +10,7 @@ from starlette.exceptions import HTTPException
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
 from tts2face.serving.service.messages import DefectError
 from tts2face.serving.service.pool import BusyError
-from tts2face.storage.files import without_folders
+from tts2face.storage.files import without_folders, without_paths
 
 
 class RefusedError(HTTPException):
@@ -48,10 +48,14 @@ STATUS: Mapping[type[Tts2faceError], tuple[int, str]] = {
 
 
 def as_refused(error: Tts2faceError, folders: Iterable[Path] = ()) -> RefusedError:
-    """Answer to an error of the synthesis; it does not name the `folders` of the files concerned."""
+    """Answer to an error of the synthesis; it does not name the `folders` of the files concerned.
+
+    Where something is missing on this machine, it names no folder at all.
+    """
     status, code = next(found for kind, found in STATUS.items() if isinstance(error, kind))
     headers = {"Retry-After": str(BusyError.retry_after_s)} if status in {429, 503} else {}
-    return RefusedError(status, code, without_folders(" ".join(str(error).split()), folders), headers)
+    message = without_folders(" ".join(str(error).split()), folders)
+    return RefusedError(status, code, without_paths(message) if status == 503 else message, headers)
 
 
 class ErrorDetail(BaseModel):

@@ -27,6 +27,7 @@ from tts2face.serving.service.stages import stage
 
 PROGRAM = "tts2face.serving.service.synthesis:handlers"
 AT_ONCE = 64  # more calls than the pool gives to one process
+FIRST_PAUSE_S, LAST_PAUSE_S = 0.5, 30.0  # before a process that was not ready is started again
 NICENESS = 10  # of processes for which nobody waits, so that streams go first
 
 InputQueue = asyncio.Queue[tuple[Mapping[str, Any], bytes]]  # contents and payloads
@@ -55,7 +56,7 @@ class WarmProcess:
         self._child = AsyncChild(program, self._note_released)
         self._preparation, self._on_change = preparation, on_change
         self.is_ready = False
-        self.is_closed = False
+        self._closed, self._pause_s = asyncio.Event(), FIRST_PAUSE_S
         self.on_cancelled: Callable[[float], None] = _ignore  # called with the seconds until a task was released
         self.tasks: Counter[float] = Counter()  # their number, by their cost
 
@@ -64,18 +65,31 @@ class WarmProcess:
         """Number of the process."""
         return self._child.pid
 
+    @property
+    def is_closed(self) -> bool:
+        """Whether it is not started again."""
+        return self._closed.is_set()
+
     async def run(self) -> None:
-        """Start the process, and start it again whenever it ends, until `close`."""
+        """Start the process, and again whenever it ends, until `close`: later and later while it is never ready."""
         while not self.is_closed:
+            was_ready = False
             try:
                 await self._serve()
             except Tts2faceError as ended:
                 if not self.is_closed:
                     log_event("synthesis process ended", reason=str(ended))
             finally:
-                self.is_ready = False
+                was_ready, self.is_ready = self.is_ready, False
                 await self._child.close()
                 self._on_change()
+            await self._rest(was_ready=was_ready)
+
+    async def _rest(self, *, was_ready: bool) -> None:
+        pause_s, self._pause_s = self._pause_s, FIRST_PAUSE_S if was_ready else min(2 * self._pause_s, LAST_PAUSE_S)
+        if not was_ready:
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._closed.wait(), pause_s)
 
     async def _serve(self) -> None:
         began = time.monotonic()
@@ -112,7 +126,7 @@ class WarmProcess:
 
     async def close(self) -> None:
         """End the process at once."""
-        self.is_closed = True
+        self._closed.set()
         await self._child.close()
 
 
@@ -211,6 +225,11 @@ class Pool:
         """Cost of all running works."""
         return sum(_load(process) for process in self.processes)
 
+    @property
+    def _lack(self) -> str:
+        """Why no process is ready, nor will be; empty where one is, or may be."""
+        return "" if self.n_ready else self.preparation.lack
+
     def start(self) -> None:
         """Start the processes in the running event loop."""
         self._runs = [asyncio.create_task(process.run()) for process in self.processes]
@@ -250,6 +269,8 @@ class Pool:
             As the work.
         BusyError
             Too many works wait.
+        BackendError
+            No process can become ready.
         """
         cost, tries = work_cost(work), 0
         while True:
@@ -277,6 +298,8 @@ class Pool:
         if found is not None:
             found.tasks[cost] += 1
             return found
+        if self._lack:
+            raise BackendError(self._lack)
         if self.n_waiting >= self.settings.max_waiting:
             self._make_room(key)
         future: asyncio.Future[WarmProcess] = asyncio.get_running_loop().create_future()
@@ -321,6 +344,9 @@ class Pool:
         """Give free processes to waiting works, one key after the other; those of one cost do not wait for others."""
         if self.n_ready == len(self.processes):
             self.is_prepared.set()
+        if self._lack:
+            for future in [one[2] for queue in self._waiting.values() for one in queue if not one[2].done()]:
+                future.set_exception(BackendError(self._lack))
         for key in list(self._waiting):
             for cost, _, future in list(self._waiting[key]):
                 process = None if future.done() else self._free_process(cost)

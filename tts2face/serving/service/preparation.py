@@ -6,8 +6,12 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from lexicon.errors import Tts2faceError
+from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.service.logs import log_event
+from tts2face.storage.files import without_paths
 
+N_ENDED = 3  # processes that end before they are ready, one after another: no accident
 CallProcess = Callable[[str, Mapping[str, Any]], Awaitable[object]]  # with the name and the content of a call
 
 
@@ -45,6 +49,7 @@ class Preparation:
         self._done: set[tuple[str, object]] = set()  # names, with the process for steps of its own
         self._now: Counter[str] = Counter()
         self._n_steps = len(self._shared) + n_processes * len(self._own)
+        self._lack, self._n_ended = "", 0
 
     async def run(self, call: CallProcess, process: object) -> None:
         """Take part in the shared steps until all are done, then make the own ones of a process that has started.
@@ -70,6 +75,12 @@ class Preparation:
             shared.remove(step)
         for step in self._own:
             await self._make(step, call, process)
+        self._lack, self._n_ended = "", 0
+
+    @property
+    def lack(self) -> str:
+        """Why no process can become ready, as a model that is missing or damaged; empty if there is no such reason."""
+        return self._lack
 
     async def _make(self, step: Step, call: CallProcess, process: object) -> None:
         if (step.name, process) in self._done:
@@ -78,6 +89,11 @@ class Preparation:
         self._now[step.name] += 1
         try:
             await call(step.call, step.content)
+        except Tts2faceError as error:
+            self._n_ended += isinstance(error, ChildEndedError)
+            if not isinstance(error, ChildEndedError) or self._n_ended >= N_ENDED:
+                self._lack = f"the service cannot prepare its {step.name}: {without_paths(str(error))}"
+            raise
         finally:
             self._now[step.name] -= 1
         self._done.add((step.name, process))

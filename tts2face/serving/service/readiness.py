@@ -49,9 +49,10 @@ class Readiness:
     async def _look(self) -> dict[str, str]:
         pool, settings = self._pool, self._settings
         is_reachable = await self._is_reachable()
+        preparing = pool.preparation.lack or f"{pool.preparation}; wait, or see the log"
         workers = self._jobs.n_workers > 0 or not settings.workers
         return {
-            "models": "" if pool.n_ready else f"{pool.preparation}; wait, or see the log",
+            "models": "" if pool.n_ready else preparing,
             "data": await asyncio.to_thread(lack_of_folder, settings.data_folder, "data folder"),
             "temporary": await asyncio.to_thread(lack_of_folder, Path(tempfile.gettempdir()), "temporary folder"),
             "database": "" if is_reachable else "the database of the jobs does not answer; check it",

@@ -16,7 +16,7 @@ from typing import Any
 
 from starlette.datastructures import UploadFile
 
-from lexicon.errors import DataError, InputError, Tts2faceError
+from lexicon.errors import DataError, InputError
 from lexicon.inputs import parse_json
 from tts2face.processes.async_parent import call_once
 from tts2face.processes.parent import ChildEndedError
@@ -65,6 +65,7 @@ RESOURCE_TIMEOUT_S = 300.0  # a check takes 3 to 7 s; with other work on the mac
 AVATAR_CPU_S = 240  # the head of a person takes 15 s
 UPLOAD_PREFIX = "tts2face-upload-"  # of names of private folders
 MAX_REASON = 300  # characters
+TOO_MUCH = "it needs too much memory or time"
 MAX_TEXT_BYTES = 1_000_000
 BLOCK_BYTES = 1 << 20
 
@@ -149,9 +150,10 @@ class UploadFolder:
         try:
             async with asyncio.timeout(RESOURCE_TIMEOUT_S):
                 await run_take_tool("avatar", order, lambda **_: None, cpu_s=AVATAR_CPU_S)
-        except (Tts2faceError, TimeoutError) as wrong:
-            reason = "it needs too much memory or time" if isinstance(wrong, TimeoutError) else str(wrong)
-            raise _refused("the photo", reason.replace(photo.name, "the photo")) from wrong
+        except (InputError, DataError) as wrong:
+            raise _refused("the photo", str(wrong).replace(photo.name, "the photo")) from wrong
+        except (ChildEndedError, TimeoutError) as ended:
+            raise _refused("the photo", TOO_MUCH) from ended
         return checked
 
     async def places(self, photo: Path) -> tuple[Path, dict[str, Any]]:
@@ -196,6 +198,8 @@ async def decode_file(arguments: tuple[str, Path, Path, float], name: str, timeo
     ------
     RefusedError
         The file is refused, or takes too much memory or time.
+    BackendError
+        A model or package that its check needs is missing on this machine.
     OSError
         The disk is full.
     """
@@ -210,7 +214,7 @@ async def decode_file(arguments: tuple[str, Path, Path, float], name: str, timeo
     except (InputError, DataError) as refused:
         raise _refused(name, str(refused)) from refused
     except ChildEndedError as ended:
-        raise _refused(name, "it needs too much memory or time") from ended
+        raise _refused(name, TOO_MUCH) from ended
     if answer["is_full"]:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 

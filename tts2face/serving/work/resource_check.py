@@ -6,13 +6,15 @@ The error of a decoding process that refuses its file.
 """
 
 import json
+import re
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lexicon.errors import BackendError, DataError, InputError
+from lexicon.errors import DataError, InputError
+from tts2face.models.consent import PHOTO_TOOL, states_consent
 from tts2face.photo.photograph import HEIC_BRANDS
 
 if TYPE_CHECKING:
@@ -46,7 +48,9 @@ GLTF_MAGIC = b"glTF"
 PICTURE_MAGIC = (b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"BM", b"II*\x00", b"MM\x00*")
 BOXED_PICTURES = ((0, b"RIFF", b"WEBP"), *((4, b"ftyp", brand) for brand in HEIC_BRANDS))  # offset, box, kind
 N_MAGIC = 12  # bytes by which a picture is told
-STATEMENT = "statement.json"  # beside a photo: name of the face, consent of the person shown, pixels, corrections
+# Beside a photo: name of the face, consent of the person shown, pixels, corrections; beside a character: its mapping.
+STATEMENT = "statement.json"
+TOML_SHAPES = re.compile(r"^\s*\[\s*shapes\s*\]", re.MULTILINE)  # the table of a mapping in TOML
 SHOWN, PLACES = "shown.jpg", "places.json"  # files of a photo whose places a person may correct
 SHOWN_PX = 1600  # side of the picture that is shown for it, at most
 
@@ -66,18 +70,20 @@ def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> N
     ------
     RefusedFileError
         The file is of another type, damaged, or does not work.
+    BackendError
+        A model or package that the check needs is missing on this machine.
     """
     with source.open("rb") as file:
         head = file.read(N_MAGIC)
     if kind == FACE:
-        kind = CHARACTER if head.startswith(GLTF_MAGIC) else PHOTO if is_picture(head) else FACE
+        kind = kind_of_face(head)
     try:
         if kind not in {DICTIONARY, CHARACTER, PHOTO}:
             _check_type(kind, source)
         _describe(_CHECKS[kind](source, folder / CONTENT), folder)
         if kind != DICTIONARY:
             draw_resource(FACE if kind in {CHARACTER, PHOTO} else kind, folder / CONTENT, folder / PICTURE)
-    except (DataError, InputError, BackendError) as error:
+    except (DataError, InputError) as error:
         raise RefusedFileError(_sentence(error, source, folder)) from error
     except MemoryError as error:
         raise RefusedFileError("it needs too much memory") from error
@@ -92,6 +98,11 @@ def check_resource(kind: str, source: Path, folder: Path, max_bytes: float) -> N
         raise RefusedFileError(f"it is no {kind} that works ({type(error).__name__})") from error
     if (folder / CONTENT).stat().st_size > max_bytes:
         raise RefusedFileError(f"it has more than {max_bytes / 1e6:g} MB as a {kind}")
+
+
+def kind_of_face(head: bytes) -> str:
+    """`CHARACTER`, `PHOTO` or `FACE`, by the first bytes of a file."""
+    return CHARACTER if head.startswith(GLTF_MAGIC) else PHOTO if is_picture(head) else FACE
 
 
 def is_picture(head: bytes) -> bool:
@@ -122,7 +133,7 @@ def _check_talker(source: Path, out: Path) -> dict[str, Any]:
 
     _rewrite(source, out, TALKER, talker.FORMAT_VERSION)
     found = talker.read_talker(out)
-    if found.appearance is not None and "consent" not in found.metadata:
+    if found.appearance is not None and not states_consent(found.metadata):
         raise DataError("it shows a person's face, but states no consent; build it with --consent")
     _try_speech(out)
     return _without_name(asdict(describe_talker(out)))
@@ -146,21 +157,33 @@ def _check_face(source: Path, out: Path) -> dict[str, Any]:
 
     _rewrite(source, out, FACE, face_file.FORMAT_VERSION)
     face = face_file.read_face(out)
-    if face.photograph is not None and "consent" not in face.metadata:
+    if is_of_photo(face.photograph, face.metadata) and not states_consent(face.metadata):
         raise DataError("it shows a person's photograph, but states no consent; make it with --consent")
     for identity in describe_face(out).identities:
         face_file.read_face(out, identity)
     return _without_name(asdict(describe_face(out))) | {"licence": str(face.metadata.get("licence", "not stated"))}
 
 
+def is_of_photo(photograph: object | None, metadata: Mapping[str, Any]) -> bool:
+    """Whether a face shows a person in a photograph, or as a head that was made of pictures."""
+    return photograph is not None or metadata.get("made_by") == PHOTO_TOOL
+
+
 def _check_character(source: Path, out: Path) -> dict[str, Any]:
-    """Make a face of a character whose file holds everything that it needs."""
+    """Make a face of a character whose file holds everything that it needs, with the mapping that is sent with it."""
+    from lexicon.inputs import read_json
     from tts2face.interchange.characters.importing import import_face
     from tts2face.models.face_file import write_face
 
     named = source.with_name("character.glb")
     named.hardlink_to(source)
-    imported = import_face(named)
+    statement = source.with_name(STATEMENT)
+    text = read_json(statement).get("mapping") if statement.exists() else None
+    mapping = None
+    if text is not None:
+        mapping = source.with_name("mapping.toml" if TOML_SHAPES.search(text) else "mapping.tsv")
+        mapping.write_text(text, encoding="utf-8")
+    imported = import_face(named, mapping=mapping)
     made = out.with_name("imported.face")
     write_face(made, imported.face)
     return _check_face(made, out) | {"notes": list(imported.report.notes)}
@@ -219,7 +242,7 @@ def find_places(source: Path, folder: Path) -> None:
     try:
         read_statement(source)
         picture, fit = places_in_photo(source, notes.append)
-    except (DataError, InputError, BackendError) as error:
+    except (DataError, InputError) as error:
         raise RefusedFileError(_sentence(error, source, folder)) from error
     except MemoryError as error:
         raise RefusedFileError("it needs too much memory") from error
@@ -359,7 +382,9 @@ def _bounded(value: Any) -> Any:
 
 def _sentence(error: Exception, source: Path, folder: Path) -> str:
     """The message of an error without paths of this machine."""
-    text = " ".join(str(error).split())
+    text = " ".join(str(error).split()).replace("--mapping", "the part mapping")
+    for suffix in (".tsv", ".toml"):
+        text = text.replace(str(source.with_name(f"mapping{suffix}")), "the mapping")
     for path in (
         source,
         folder / CONTENT,

@@ -13,11 +13,12 @@ import pytest
 from PIL import Image
 from safetensors.numpy import save
 
-from tests.interchange.characters.made import head_without_mouth, write_character_file
+from tests.interchange.characters.made import Variant, head_without_mouth, write_character_file
 from tests.models.made import write_made_models, write_made_talker
 from tests.photo.pictures import still
 from tests.processes.answered import refusal
 from tts2face.interchange.characters.character import KEY
+from tts2face.models.consent import PHOTO_TOOL
 from tts2face.models.face_file import read_face
 from tts2face.serving.work.resource_check import PLACES, SHOWN, STATEMENT, draw_resource, is_picture
 from tts2face.storage.files import find_file
@@ -110,6 +111,69 @@ def test_a_character_becomes_a_face(tmp_path: Path) -> None:
     about = json.loads((checked / "description.json").read_text())
     assert (about["summary"], about["licence"]) == ("mesh with 51 shapes", "made by a test")  # it has no tongue
     assert "character" not in read_face(checked / "content").metadata
+
+
+@pytest.mark.usefixtures("face_model")
+def test_a_mapping_names_the_shapes_of_a_character(tmp_path: Path) -> None:
+    """Of names that nobody could guess: without it the character is refused, and the message names the part."""
+    numbers: dict[str, str] = {}
+    hidden = Variant(rename=lambda name: numbers.setdefault(name, f"x{len(numbers)}q"))
+    source = write_character_file(tmp_path / "avatar", hidden, head_without_mouth())
+    message, _ = check("face", source, tmp_path)
+    assert "name its shapes in a file and give it as the part mapping" in message
+    again = tmp_path / "again"
+    again.mkdir()
+    rows = "".join(f"{shape}\t{name}\n" for shape, name in numbers.items())
+    (again / STATEMENT).write_text(json.dumps({"mapping": rows}))
+    message, checked = check("face", source.rename(again / "avatar"), again)
+    assert message == ""
+    assert "jawOpen" in read_face(checked / "content").shape_names
+
+
+@pytest.mark.smoke
+@pytest.mark.parametrize(
+    ("mapping", "reason"),
+    [
+        ("jawOpen", "the mapping, line 1: has 1 columns; give shape, source and gain"),
+        ("jawOpen\tnone", "the character has no shape 'none'"),
+        ("[shapes]\njawOpen = 3", "the mapping, jawOpen: give a name or a table of names with gains, not 3"),
+        ("[shapes]\njawOpen =", "the mapping is not TOML"),
+        ("", "the mapping names no shape"),
+    ],
+)
+def test_a_wrong_mapping_is_refused(plain_character: Path, tmp_path: Path, mapping: str, reason: str) -> None:
+    source = tmp_path / "avatar"
+    source.hardlink_to(plain_character)
+    (tmp_path / STATEMENT).write_text(json.dumps({"mapping": mapping}))
+    message, _ = check("face", source, tmp_path)
+    assert reason in message
+    assert str(tmp_path) not in message
+
+
+@pytest.fixture(scope="module")
+def plain_character(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_character_file(tmp_path_factory.mktemp("plain") / "avatar", face=head_without_mouth())
+
+
+@pytest.mark.smoke
+@pytest.mark.parametrize("consent", [None, "", {}, {"statement": ""}, {"statement": "yes"}, {"statement": 3}])
+def test_a_head_of_a_photo_needs_a_statement(files: dict[str, Path], tmp_path: Path, consent: object) -> None:
+    """A consent that says nothing is none."""
+    arrays, header = read_tensors(files["face"], "face", 1)
+    header["metadata"] |= {"made_by": PHOTO_TOOL} | ({} if consent is None else {"consent": consent})
+    write_tensors(tmp_path / "head.face", "face", 1, arrays, header)
+    message, _ = check("face", tmp_path / "head.face", tmp_path)
+    assert message == "it shows a person's photograph, but states no consent; make it with --consent"
+
+
+@pytest.mark.smoke
+def test_a_talker_needs_more_than_an_empty_consent(tmp_path: Path) -> None:
+    write_made_talker(tmp_path / "a.talker", has_face=True)
+    arrays, header = read_tensors(tmp_path / "a.talker", "talker", 1)
+    header["consent"] = {"name": "Ada", "statement": " ", "date": ""}
+    write_tensors(tmp_path / "a.talker", "talker", 1, arrays, header)
+    message, _ = check("talker", tmp_path / "a.talker", tmp_path)
+    assert message == "it shows a person's face, but states no consent; build it with --consent"
 
 
 @pytest.mark.smoke

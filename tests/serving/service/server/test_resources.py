@@ -15,12 +15,16 @@ import pytest
 from PIL import Image
 
 from corpus_tools.dense.person_look import part_colour
-from lexicon.errors import BackendError
+from lexicon.errors import BackendError, DataError
 from tests.models.made import write_made_face
 from tests.photo.pictures import still
 from tests.serving.service.in_process import decoding_here
 from tests.serving.work.conftest import database, postgres  # noqa: F401 - fixtures
+from tts2face.interchange.characters import importing
+from tts2face.models.consent import PHOTO_TOOL, consent_record
 from tts2face.models.face_file import read_face
+from tts2face.photo import face_from_photo
+from tts2face.serving.service import uploads
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import add_key
 from tts2face.serving.service.library import Library
@@ -31,6 +35,8 @@ from tts2face.serving.work.blobs import open_blobs
 from tts2face.serving.work.database import database_url
 from tts2face.serving.work.resources import ResourceTable, StoredResource
 from tts2face.serving.work.run import RESOURCES
+from tts2face.storage.tensors import read_tensors, write_tensors
+from tts2face.video.tracking import MissingModelError
 
 WORDS = b"Siobhan  SH IH0 V AO1 N\n"
 OTHER_WORDS = b"Nguyen  N UW1 Y EH0 N\n"
@@ -167,6 +173,77 @@ def test_a_photo_becomes_a_head_and_is_not_kept(
     iris = part_colour(read_face(next(path for path in stored if path.name == made.json()["sha256"])), "iris")
     assert iris[1] == iris.max()
     assert {path.name for path in stored}.isdisjoint({hashlib.sha256(png(picture)).hexdigest()})
+
+
+def test_heads_of_photos_are_refused_as_photos_are(ask: Ask, ask_with_photos: Ask, tmp_path: Path) -> None:
+    """The file of a head that was made of pictures elsewhere, also one whose photograph is not in it."""
+    write_made_face(tmp_path / "a.face")
+    arrays, header = read_tensors(tmp_path / "a.face", "face", 1)
+    header["metadata"] |= {"made_by": PHOTO_TOOL, "consent": dict(consent_record("Tom", "I agree to this."))}
+    write_tensors(tmp_path / "a.face", "face", 1, arrays, header)
+    content = (tmp_path / "a.face").read_bytes()
+    refused = ask("ann", "POST", "/v1/faces", **form("tom", content))
+    assert refusal(refused) == (403, "forbidden")
+    assert "its operator allows them with the setting photos" in refused.text
+    assert ask_with_photos("ann", "POST", "/v1/faces", **form("tom", content)).status_code == 201
+
+
+GLB = b"glTF" + bytes(20)
+
+
+@pytest.mark.parametrize("makes", ["picture", "avatar"])
+def test_a_model_that_is_missing_here_is_no_fault_of_the_file(
+    ask: Ask, ask_with_photos: Ask, monkeypatch: pytest.MonkeyPatch, makes: str
+) -> None:
+    """A character, a photo and a head need the face tracker: 503, as for all that is missing on the server."""
+
+    async def run(*_: object, **__: object) -> None:
+        raise MissingModelError("the models are not in /root/.cache/x: run `tts2face corpus setup`")
+
+    def find(*_: object, **__: object) -> None:
+        asyncio.run(run())
+
+    monkeypatch.setattr(importing, "import_face", find)
+    monkeypatch.setattr(face_from_photo, "face_from_photo", find)
+    monkeypatch.setattr(uploads, "run_take_tool", run)
+    parts = photo(np.zeros((100, 100, 3), np.uint8), consent="I agree to this.", makes=makes)
+    for answer in (
+        ask("ann", "POST", "/v1/faces", **form("x", GLB)),
+        ask_with_photos("ann", "POST", "/v1/faces", **parts),
+    ):
+        assert refusal(answer) == (503, "unavailable")
+        assert answer.headers["retry-after"]
+        assert answer.json()["error"]["message"] == "the models are not in x: run `tts2face corpus setup`"
+
+
+def test_a_mapping_comes_with_a_character_alone(ask: Ask, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a part of text or as a file, by its rows or its TOML; the check itself is tried in `test_resource_check`."""
+    given: list[tuple[str, str]] = []
+
+    def read(_: Path, *, mapping: Path | None) -> None:
+        assert mapping is not None
+        given.append((mapping.suffix, mapping.read_text()))
+        raise DataError("the character is damaged")
+
+    monkeypatch.setattr(importing, "import_face", read)
+    rows, toml = "jawOpen\tMouthWide\t0.8\n", '[shapes]\njawOpen = "MouthWide"\n'
+    for mapping in (rows, toml):
+        parts = {"data": {"name": "x", "mapping": mapping}, "files": {"file": ("a.glb", GLB)}}
+        assert refusal(ask("ann", "POST", "/v1/faces", **parts)) == (422, "invalid_data")
+        files = {"file": ("a.glb", GLB), "mapping": ("map", b"\xef\xbb\xbf" + mapping.encode())}
+        assert refusal(ask("ann", "POST", "/v1/faces", data={"name": "x"}, files=files)) == (422, "invalid_data")
+    assert given == [(".tsv", rows)] * 2 + [(".toml", toml)] * 2
+    for content, mapping, reason in (
+        (WORDS, rows, "a mapping names shapes of a character; send one, or leave it out"),
+        (GLB, "x" * 100_001, "the part mapping has up to 100000 characters of text"),
+    ):
+        parts = {"data": {"name": "x", "mapping": mapping}, "files": {"file": ("a.glb", content)}}
+        answer = ask("ann", "POST", "/v1/faces", **parts)
+        assert (answer.status_code, answer.json()["error"]["message"]) == (422, reason)
+    broken = {"file": ("a.glb", GLB), "mapping": ("map", b"\xff\xfe")}
+    assert "the part mapping has up to" in ask("ann", "POST", "/v1/faces", data={"name": "x"}, files=broken).text
+    other = {"data": {"name": "x", "mapping": rows}, "files": {"file": ("d", WORDS)}}
+    assert "there is no part 'mapping'" in ask("ann", "POST", "/v1/dictionaries", **other).text
 
 
 def test_the_services_own_are_listed_and_shown(ask: Ask) -> None:

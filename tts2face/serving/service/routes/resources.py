@@ -5,7 +5,7 @@ JSON of the resources of the service.
 
 import asyncio
 import hashlib
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
@@ -31,14 +31,17 @@ from tts2face.serving.service.routes.clips import service_state
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.service.uploads import UploadFolder, save_upload, upload_folder
 from tts2face.serving.work.resource_check import (
+    CHARACTER,
     CONTENT,
     DICTIONARY,
     FACE,
     N_MAGIC,
     PALETTE,
+    PHOTO,
     RESOURCE_KINDS,
     TALKER,
-    is_picture,
+    is_of_photo,
+    kind_of_face,
 )
 from tts2face.serving.work.resources import StoredResource
 from tts2face.storage.tensors import read_metadata
@@ -148,7 +151,7 @@ def uploaded_resource(stored: StoredResource) -> dict[str, object]:
 
 router = APIRouter(prefix="/v1", tags=["resources"])
 
-MAX_NAME, MAX_CONSENT, MAX_FIT = 40, 1000, 100_000
+MAX_NAME, MAX_CONSENT, MAX_FIT, MAX_MAPPING = 40, 1000, 100_000, 100_000
 SPEAKING_PICTURE, AVATAR = "picture", "avatar"  # what is made of a photo
 NO_PHOTOS = "this service has no faces of photos; its operator allows them with the setting photos"
 Name = Annotated[str, InPath(description="Its name.", max_length=MAX_NAME, examples=["head"])]
@@ -227,6 +230,11 @@ def _form(kind: str) -> dict[str, Any]:
         },
     }  # fmt: skip
     if kind == FACE:
+        parts["mapping"] = {
+            "type": "string", "maxLength": MAX_MAPPING, "example": "jawOpen\tMouthWide\t0.8",
+            "description": "With a character: names of its shapes, in place of the guessed ones; a file of "
+                           "`face import --mapping` (docs/characters.md), its rows or its TOML.",
+        }  # fmt: skip
         parts["consent"] = {
             "type": "string",
             "example": "I agree that my face speaks what this service is asked for.",
@@ -299,8 +307,8 @@ async def _store(request: HttpRequest, kind: str) -> StoredResource:
     state = service_state(request)
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         raise RefusedError(422, "invalid_request", "send a form (multipart/form-data) with the parts file and name")
-    async with request.form(max_files=1, max_fields=2 + len(fields(SentPhoto))) as form:
-        return await store_resource(state, key, _read_form(form, kind))
+    async with request.form(max_files=2, max_fields=3 + len(fields(SentPhoto))) as form:
+        return await store_resource(state, key, await _read_form(form, kind))
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,7 +332,7 @@ NO_CHOICES = SentPhoto()
 class Sent:
     """A file that a client sends to be kept under a name: its kind, its size in bytes, and how it is saved to a path.
 
-    With a photo comes what is said of it.
+    With a photo comes what is said of it, with a character the names of its shapes: the text of a mapping's file.
     """
 
     kind: str
@@ -332,6 +340,7 @@ class Sent:
     size: int
     save: Callable[[Path], Awaitable[None]]
     photo: SentPhoto = NO_CHOICES
+    mapping: str | None = None
 
 
 async def store_resource(state: ServiceState, key: ApiKey, sent: Sent) -> StoredResource:
@@ -354,7 +363,10 @@ async def store_resource(state: ServiceState, key: ApiKey, sent: Sent) -> Stored
 async def _checked(state: ServiceState, key: ApiKey, sent: Sent, folder: UploadFolder, given: Path) -> Path:
     """Folder with a checked resource of a saved file."""
     n_bytes = state.library.limits(key).n_bytes
-    if sent.kind == FACE and await asyncio.to_thread(_is_photo, given):
+    kind = await asyncio.to_thread(_kind_of, sent.kind, given)
+    if sent.mapping is not None and kind != CHARACTER:
+        raise RefusedError(422, "invalid_request", "a mapping names shapes of a character; send one, or leave it out")
+    if kind == PHOTO:
         with _photo_turn(state, key):
             folder.state(given, {"name": sent.name, **asdict(sent.photo)})
             if sent.photo.makes == AVATAR:
@@ -362,6 +374,8 @@ async def _checked(state: ServiceState, key: ApiKey, sent: Sent, folder: UploadF
             return await folder.resource(FACE, given, n_bytes)
     if sent.photo.makes == AVATAR:
         raise RefusedError(422, "invalid_request", "a head is made of a picture; send one, or leave out makes")
+    if sent.mapping is not None:
+        folder.state(given, {"mapping": sent.mapping})
     checked = await folder.resource(sent.kind, given, n_bytes)
     if sent.kind == FACE and not state.settings.photos:
         await asyncio.to_thread(_refuse_photograph, checked / CONTENT)
@@ -391,15 +405,26 @@ def _photo_turn(state: ServiceState, key: ApiKey, *, counts: bool = True) -> Abs
     return state.limits.photo(key, state.settings.photos_per_day, counts=counts)
 
 
-def _read_form(form: FormData, kind: str) -> Sent:
-    more = [one.name for one in fields(SentPhoto)] if kind == FACE else []
+async def _read_form(form: FormData, kind: str) -> Sent:
+    more = ["mapping", *(one.name for one in fields(SentPhoto))] if kind == FACE else []
     unknown = set(form) - {"file", "name", *more}
     name, file = form.get("name"), form.get("file")
     if unknown:
         raise RefusedError(422, "invalid_request", f"there is no part {min(unknown)[:40]!r}; send file and name")
     if not isinstance(name, str) or not isinstance(file, UploadFile):
         raise RefusedError(422, "invalid_request", "the form needs a part file, with a file name, and a part name")
-    return Sent(kind, name, file.size or 0, partial(save_upload, file), _read_choices(form))
+    mapping = _text({"mapping": await _content(form.get("mapping"))}, "mapping", MAX_MAPPING)
+    return Sent(kind, name, file.size or 0, partial(save_upload, file), _read_choices(form), mapping)
+
+
+async def _content(part: UploadFile | str | None) -> object:
+    """Text of a part that may be a file; the part itself if it is none."""
+    if not isinstance(part, UploadFile):
+        return part
+    try:
+        return (await part.read(MAX_MAPPING + 1)).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return part
 
 
 def _read_choices(form: FormData) -> SentPhoto:
@@ -420,21 +445,25 @@ def _read_choices(form: FormData) -> SentPhoto:
     return SentPhoto(consent, str(makes), fit, eye_color, age_keep == "true")
 
 
-def _text(form: FormData, part: str, most: int) -> str | None:
+def _text(form: Mapping[str, object], part: str, most: int) -> str | None:
     text = form.get(part)
-    if text is not None and (not isinstance(text, str) or len(text) > most):
+    if text is None:
+        return None
+    if not isinstance(text, str) or len(text) > most:
         raise RefusedError(422, "invalid_request", f"the part {part} has up to {most} characters of text")
     return text
 
 
-def _is_photo(file: Path) -> bool:
+def _kind_of(kind: str, file: Path) -> str:
+    """Kind of a file that is sent as one of a kind: of a face it may be a character or a photo."""
     with file.open("rb") as opened:
-        return is_picture(opened.read(N_MAGIC))
+        return kind_of_face(opened.read(N_MAGIC)) if kind == FACE else kind
 
 
 def _refuse_photograph(face: Path) -> None:
-    """Refuse the file of a face that speaks in a photograph."""
-    if PHOTOGRAPH in read_metadata(face, FACE, FORMAT_VERSION):
+    """Refuse the file of a face that speaks in a photograph, or of a head that was made of one."""
+    header = read_metadata(face, FACE, FORMAT_VERSION)
+    if is_of_photo(header.get(PHOTOGRAPH), header["metadata"]):
         raise RefusedError(403, "forbidden", NO_PHOTOS)
 
 
