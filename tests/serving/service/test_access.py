@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient, WebSocketDenialResponse, WebSocketTestSession
 
+from lexicon.errors import InputError
 from tests.running import eventually
 from tests.serving.service.in_process import LocalProcess, another_client, service_client, with_key
 from tts2face.processes.child import Call
@@ -19,7 +20,7 @@ from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import Exchange
 from tts2face.serving.service.keys import LOCAL_KEY, SCOPES, add_key, read_keys, remove_key
 from tts2face.serving.service.messages import SYNTHESISE, Work
-from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.service.settings import ServiceSettings, read_settings
 from tts2face.serving.service.state import ServiceState
 
 SOCKETS = ("/v1/stream", "/", "/v1/headtts")
@@ -125,6 +126,14 @@ def test_a_service_that_starts_with_a_file_without_keys_is_closed(keys: Keys, tm
         secret = add_key(keys.path, "new", ["speak"])
         reload(client)
         assert status(client, secret) == 200
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+def test_a_variable_without_a_name_of_a_file_opens_nothing(host: str) -> None:
+    """As ``TTS2FACE_SERVE_KEYS=`` of a file whose own variable is missing."""
+    variables = {"TTS2FACE_SERVE_KEYS": "", "TTS2FACE_SERVE_HOST": host}
+    with pytest.raises(InputError, match="the file of keys . cannot be read: Is a directory"):
+        ServiceState(read_settings(environment=variables))
 
 
 def test_a_service_without_a_file_of_keys_is_open_on_this_machine(tmp_path: Path) -> None:

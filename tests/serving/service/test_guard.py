@@ -116,6 +116,25 @@ def test_pages_of_other_origins_are_refused(make_client: Make) -> None:
     assert answer(allowed, headers={"origin": "https://a.example"}).status_code == 200
 
 
+@pytest.mark.parametrize("site", ["cross-site", "same-site"])
+def test_what_another_site_causes_without_an_origin_is_refused(make_client: Make, site: str) -> None:
+    """Pictures, frames and scripts of other pages come without ``Origin``; a link to a page of the service may."""
+    for dest in ("image", "script", "iframe", "empty", ""):
+        asked = {"sec-fetch-site": site, "sec-fetch-dest": dest}
+        assert code(answer(make_client(), "GET", headers=asked)) == (403, "unknown_origin")
+    link = {"sec-fetch-site": site, "sec-fetch-mode": "navigate", "sec-fetch-dest": "document"}
+    assert answer(make_client(), "GET", headers=link).status_code == 200
+    assert answer(make_client(), "GET", headers={"sec-fetch-site": "same-origin"}).status_code == 200
+    assert answer(make_client(), "GET", headers={"sec-fetch-site": "none"}).status_code == 200
+    page = {"sec-fetch-site": site, "origin": "https://a.example"}
+    assert answer(make_client(origins=("https://a.example",)), headers=page).status_code == 200
+
+
+@pytest.mark.parametrize("origin", ["", "localhost:8880", "//localhost:8880", "null"])
+def test_an_origin_that_says_nothing_is_another_one(make_client: Make, origin: str) -> None:
+    assert code(answer(make_client(), headers={"origin": origin})) == (403, "unknown_origin")
+
+
 PAGE = "https://a.example"
 PREFLIGHT = {
     "origin": PAGE, "access-control-request-method": "POST",

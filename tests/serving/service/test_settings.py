@@ -9,6 +9,8 @@ import pytest
 
 from cli.main import run
 from lexicon.errors import DataError, InputError
+from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.job_service import check_webhook
 from tts2face.serving.service.keys import add_key, find_key, read_keys
 from tts2face.serving.service.settings import ServiceSettings, read_settings
 
@@ -46,6 +48,21 @@ def test_shown_settings_are_a_settings_file(tmp_path: Path, capsys: pytest.Captu
         ("port = ", "the settings file .*serve.toml is not TOML"),
         ("host = '0.0.0.0'", "open to everybody who reaches 0.0.0.0; create a key"),
         ("host = 'example.org'", "open to everybody"),
+        ("host = ''", "open to everybody who reaches all addresses; create a key"),
+        ("host = ''\nkeys = 'k.toml'", "host is empty, which would be all addresses"),
+        ("hosts = ['']", "hosts must be names such as face.example.org, without a port, not ''"),
+        ("hosts = ['*']", "hosts must be names such as"),
+        ("hosts = ['a.example:80']", "hosts must be names such as"),
+        (
+            "webhook_hosts = ['']\nwebhook_secret = 'hush'",
+            "webhook_hosts must be such as example.org or a.example:8080",
+        ),
+        ("webhook_hosts = ['*']\nwebhook_secret = 'hush'", "webhook_hosts must be such as"),
+        ("webhook_hosts = ['https://a.example']\nwebhook_secret = 'hush'", "webhook_hosts must be such as"),
+        ("webhook_hosts = ['a.example']", "webhook_hosts needs webhook_secret"),
+        ("webhook_hosts = ['a.example']\nwebhook_secret = ' '", "webhook_hosts needs webhook_secret"),
+        ("webhook_hosts = ['a.example']\nwebhook_secret = 'whsec_'", "webhook_hosts needs webhook_secret"),
+        ("webhook_hosts = ['a.example']\nwebhook_secret = 'whsec_a'", "webhook_hosts needs webhook_secret"),
     ],
 )
 def test_wrong_settings_are_refused(tmp_path: Path, content: str, reason: str) -> None:
@@ -53,6 +70,23 @@ def test_wrong_settings_are_refused(tmp_path: Path, content: str, reason: str) -
     path.write_text(content)
     with pytest.raises(InputError, match=reason):
         read_settings(path, environment={})
+
+
+def test_what_settings_leave_out_is_no_permission() -> None:
+    """As docs/security.md lists it: nobody gets webhooks, no other page and no other name is served, no photo read."""
+    plain = ServiceSettings()
+    assert (plain.origins, plain.webhook_hosts, plain.photos, plain.log_text, plain.cache_mb) == (
+        (),
+        (),
+        False,
+        False,
+        0,
+    )
+    assert plain.allowed_hosts == {"localhost", "127.0.0.1", "::1"}
+    with pytest.raises(RefusedError, match="gets no webhooks"):
+        check_webhook("https://example.org/done", plain)
+    with pytest.raises(RefusedError, match="gets no webhooks"):
+        check_webhook("https://:8080/done", plain)
 
 
 @pytest.mark.parametrize(

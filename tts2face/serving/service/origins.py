@@ -11,6 +11,8 @@ from tts2face.serving.service.exchange import METHODS
 
 HeaderLines = list[tuple[bytes, bytes]]
 
+OTHER_SITES = frozenset({"cross-site", "same-site"})  # Sec-Fetch-Site: W3C Fetch Metadata
+PAGE = "document"  # Sec-Fetch-Dest of what a browser shows in place of the page before, as after a link
 MAX_AGE_S = 600  # for which a browser need not ask again; Chromium keeps at most 7200
 EXPOSED = (  # headers of answers that scripts of other origins may read
     "X-Request-ID", "Server-Timing", "Retry-After", "Location", "ETag", "Accept-Ranges", "Content-Range",
@@ -21,16 +23,26 @@ EXPOSED = (  # headers of answers that scripts of other origins may read
 def check_origin(headers: Mapping[bytes, bytes], origins: Sequence[str]) -> None:
     """Check that the page of a request, if one sends it, is the service's own or of one of some origins.
 
+    A request without ``Origin`` comes from no page, unless a browser says that another site has caused it, as by a
+    picture or a script of that site; only what opens a page of the service in place of the other one may come so.
+
     Raises
     ------
     RefusedError
         It is another page.
     """
     origin = _value(headers, b"origin")
-    if origin and origin not in origins and origin.partition("://")[2] != _value(headers, b"host"):
-        raise RefusedError(
-            403, "unknown_origin", f"pages of {origin[:80]!r} may not use this service; add it to the setting origins"
-        )
+    if b"origin" in headers:
+        if origin not in origins and origin.partition("://")[1:] != ("://", _value(headers, b"host")):
+            raise _refused(repr(origin[:80]))
+    elif _value(headers, b"sec-fetch-site") in OTHER_SITES and _value(headers, b"sec-fetch-dest") != PAGE:
+        raise _refused("other origins")
+
+
+def _refused(pages: str) -> RefusedError:
+    return RefusedError(
+        403, "unknown_origin", f"pages of {pages} may not use this service; add it to the setting origins"
+    )
 
 
 def answer_headers(headers: Mapping[bytes, bytes], origins: Sequence[str]) -> HeaderLines:

@@ -1,5 +1,6 @@
 """Settings of the service: defaults, a TOML file, environment variables, flags; the later ones win."""
 
+import base64
 import ipaddress
 import os
 import re
@@ -14,10 +15,13 @@ from lexicon.records import checked
 from tts2face.storage.files import user_data
 
 PREFIX = "TTS2FACE_SERVE_"  # of environment variables: TTS2FACE_SERVE_PORT
+SECRET_PREFIX = "whsec_"  # of secrets of webhooks in base64 (Standard Webhooks)
 LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
 MAX_SETTINGS_BYTES = 100_000
 Limits = tuple[float, float]
 _ORIGIN = re.compile(r"[a-z][a-z0-9+.-]*://[^/?#A-Z\s]+")  # as browsers send it; another one matches no page
+_HOST = re.compile(r"[a-z0-9._-]+|[0-9a-f.:]*:[0-9a-f.:]*")  # a name or an address, as `Host` headers are compared
+_PLACE = re.compile(r"[a-z0-9._-]+(:\d{1,5})?|[0-9a-f:.]+(:\d{1,5})?")  # of a webhook, as its URL is compared
 _PASSWORD = re.compile(r"(?<=://)([^/:@]*):[^/@]*@")  # in the URL of a database
 
 
@@ -120,17 +124,33 @@ class ServiceSettings:
             if choices is not None and value not in choices:
                 raise InputError(f"{one.name} must be one of {', '.join(choices)}, not {value!r}")
         if self.keys is None and not is_loopback(self.host):
+            where = self.host or "all addresses"
             raise InputError(
-                f"the service would be open to everybody who reaches {self.host}; create a key with `tts2face keys add "
-                f"NAME --file keys.toml` and give --keys keys.toml"
+                f"the service would be open to everybody who reaches {where}; create a key with `tts2face keys add NAME "
+                f"--file keys.toml` and give --keys keys.toml"
             )
+        self._check_names()
+        if self.webhook_hosts and not _is_secret(self.webhook_secret):
+            raise InputError(
+                "webhook_hosts needs webhook_secret, which signs the messages: letters, or whsec_ and base64; give "
+                "both or neither"
+            )
+
+    def _check_names(self) -> None:
+        """Check names that requests are compared with: one of another form would match none, or a missing one."""
+        if not self.host:
+            raise InputError("host is empty, which would be all addresses; give 127.0.0.1, or 0.0.0.0 for all")
+        for host in self.hosts:
+            if not _HOST.fullmatch(host):
+                raise InputError(f"hosts must be names such as face.example.org, without a port, not {host[:80]!r}")
+        for host in self.webhook_hosts:
+            if not _PLACE.fullmatch(host):
+                raise InputError(f"webhook_hosts must be such as example.org or a.example:8080, not {host[:80]!r}")
         for origin in self.origins:
             if not _ORIGIN.fullmatch(origin):
                 raise InputError(
                     f"origins must be such as https://example.org, in small letters and without a path, not {origin!r}"
                 )
-        if self.webhook_hosts and not self.webhook_secret:
-            raise InputError("webhook_hosts needs webhook_secret, which signs the messages; give both or neither")
 
     @property
     def allowed_hosts(self) -> frozenset[str]:
@@ -167,6 +187,16 @@ class ServiceSettings:
 
 
 _Written: Any = make_dataclass("_Written", [(one.name, one.type, one.default) for one in fields(ServiceSettings)])
+
+
+def _is_secret(text: str) -> bool:
+    """Whether a secret signs: it is not empty, nor its base64 after `SECRET_PREFIX`."""
+    if not text.startswith(SECRET_PREFIX):
+        return bool(text.strip())
+    try:
+        return bool(base64.b64decode(text.removeprefix(SECRET_PREFIX), validate=True))
+    except ValueError:
+        return False
 
 
 def is_loopback(host: str) -> bool:
