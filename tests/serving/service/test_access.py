@@ -132,7 +132,7 @@ def test_a_service_that_starts_with_a_file_without_keys_is_closed(keys: Keys, tm
 def test_a_variable_without_a_name_of_a_file_opens_nothing(host: str) -> None:
     """As ``TTS2FACE_SERVE_KEYS=`` of a file whose own variable is missing."""
     variables = {"TTS2FACE_SERVE_KEYS": "", "TTS2FACE_SERVE_HOST": host}
-    with pytest.raises(InputError, match="the file of keys . cannot be read: Is a directory"):
+    with pytest.raises(InputError, match=r"the file of keys \. cannot be read: Is a directory"):
         ServiceState(read_settings(environment=variables))
 
 

@@ -126,8 +126,8 @@ class ServiceSettings:
         if self.keys is None and not is_loopback(self.host):
             where = self.host or "all addresses"
             raise InputError(
-                f"the service would be open to everybody who reaches {where}; create a key with `tts2face keys add NAME "
-                f"--file keys.toml` and give --keys keys.toml"
+                f"the service would be open to everybody who reaches {where}; create a key with `tts2face keys add "
+                f"NAME --file keys.toml` and give --keys keys.toml"
             )
         self._check_names()
         if self.webhook_hosts and not _is_secret(self.webhook_secret):
