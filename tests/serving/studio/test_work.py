@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from lexicon.errors import DataError, InputError
+from tts2face.serving.service.access import KeyRing
 from tts2face.serving.service.keys import LOCAL_KEY
 from tts2face.serving.studio import recording_work, reports, styles, takes
 from tts2face.serving.studio.recording_work import Recordings
@@ -234,7 +235,7 @@ class Host(SimpleNamespace):
 
     def __init__(self, folder: Path) -> None:
         library = SimpleNamespace(resolve=lambda key, kind, name: (f"/models/{name}", {}))
-        state = SimpleNamespace(keys=(), library=library)
+        state = SimpleNamespace(keys=KeyRing(None), library=library)
         super().__init__(folder=folder, work=WorkList(folder), state=state, open_projects=lambda key: [])
 
 

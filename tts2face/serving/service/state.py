@@ -84,10 +84,21 @@ class ServiceState:
         RefusedError
             It has been removed, lacks the scope speak, or has used its seconds of speech.
         """
-        key = self.keys.current(key)
-        if "speak" not in key.scopes:
-            raise RefusedError(403, "forbidden", f"the key {key.name} lacks the scope speak; use another key")
+        key = self.key_with(key, "speak")
         self.limits.check_speech(key)
+        return key
+
+    def key_with(self, key: ApiKey, scope: str) -> ApiKey:
+        """A key as it is now, if it has a scope.
+
+        Raises
+        ------
+        RefusedError
+            It has been removed, or lacks the scope.
+        """
+        key = self.keys.current(key)
+        if scope not in key.scopes:
+            raise RefusedError(403, "forbidden", f"the key {key.name} lacks the scope {scope}; use another key")
         return key
 
     def count(self, key: ApiKey) -> None:

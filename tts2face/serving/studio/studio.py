@@ -188,7 +188,7 @@ class Studio:
 
     def check_scope(self, key: ApiKey) -> None:
         """Refuse keys that may not make speech."""
-        if "speak" not in key.scopes:
+        if "speak" not in self.state.keys.current(key).scopes:
             raise InputError(f"the key {key.name} lacks the scope speak; use another key")
 
     async def _close_idle(self) -> None:

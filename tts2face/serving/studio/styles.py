@@ -172,7 +172,7 @@ class Styles:
 
     def check_scope(self, key: ApiKey) -> None:
         """Refuse keys that may not build models of people."""
-        if "build" not in key.scopes:
+        if "build" not in self._studio.state.keys.current(key).scopes:
             raise InputError(f"the key {key.name} lacks the scope build, which recordings need; use another key")
 
     async def _draw(self, key: ApiKey, request: dict[str, Any]) -> bytes:

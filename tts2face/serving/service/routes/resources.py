@@ -349,8 +349,10 @@ async def store_resource(state: ServiceState, key: ApiKey, sent: Sent) -> Stored
     Raises
     ------
     RefusedError
-        The name is wrong or taken, the quota is used up, too many files are checked, or this one is refused.
+        The key may not build, the name is wrong or taken, the quota is used up, too many files are checked, or this
+        one is refused.
     """
+    key = state.key_with(key, "build")
     check_new_name(sent.kind, sent.name)
     await asyncio.to_thread(state.library.check_room, key, sent.kind, sent.name, sent.size)
     async with upload_folder(state.settings) as folder, state.checks:
@@ -390,8 +392,10 @@ async def find_photo_places(
     Raises
     ------
     RefusedError
-        The operator allows no photos, the key reads one already, too many files are checked, or it shows no face.
+        The operator allows no photos, the key may not build or reads one already, too many files are checked, or it
+        shows no face.
     """
+    key = state.key_with(key, "build")
     async with state.checks:
         with _photo_turn(state, key, counts=False):
             folder.state(photo, {"name": photo.name})
