@@ -26,7 +26,7 @@ from tts2face.serving.service.result_cache import ResultCache
 LATENCY_BUCKETS_S = (0.025, 0.05, 0.1, 0.15, 0.25, 0.35, 0.5, 0.75, 1, 2, 5, 10, 30, 120)
 STATUSES = (200, LEFT, *DOCUMENTED)  # of any path; others, such as 206, begin with their first answer
 
-disable_created_metrics()  # times of creation would be as many series again
+disable_created_metrics()  # type: ignore[no-untyped-call]  # times of creation would be as many series again
 
 
 def quality_labels(has_all_samples: bool, frame_step: int) -> tuple[str, str]:

@@ -1,23 +1,18 @@
-"""Talkers, faces, palettes and dictionaries: list, show, draw, upload and delete; what a key uses.
-
-JSON of the resources of the service.
-"""
+"""Talkers, faces, palettes and dictionaries: list, show, draw, upload and delete; what a key uses."""
 
 import asyncio
 import hashlib
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, fields
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
 from fastapi import Path as InPath
 from fastapi import Request as HttpRequest
 from fastapi.responses import JSONResponse, Response
-from pydantic import BaseModel, Field
 from starlette.datastructures import FormData, UploadFile
 
 from tts2face.models.face_file import FORMAT_VERSION
@@ -27,6 +22,14 @@ from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.guard import require_scope
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.library import check_new_name, describe_shipped, plural, shipped_names, shipped_picture
+from tts2face.serving.service.resource_views import (
+    FACTS,
+    Resource,
+    ResourceList,
+    UsageAnswer,
+    shipped_resource,
+    uploaded_resource,
+)
 from tts2face.serving.service.routes.clips import service_state
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.service.uploads import UploadFolder, save_upload, upload_folder
@@ -36,118 +39,13 @@ from tts2face.serving.work.resource_check import (
     DICTIONARY,
     FACE,
     N_MAGIC,
-    PALETTE,
     PHOTO,
     RESOURCE_KINDS,
-    TALKER,
     is_of_photo,
     kind_of_face,
 )
 from tts2face.serving.work.resources import StoredResource
 from tts2face.storage.tensors import read_metadata
-
-
-class TalkerFacts(BaseModel):
-    """What is known about a talker."""
-
-    language: Annotated[str, Field(description="Language of its recordings.", examples=["en-gb"])]
-    licence: Annotated[str, Field(description="Licence that its file states.", examples=["CC BY 4.0"])]
-    n_utterances: Annotated[int, Field(description="Number of its recorded utterances.", examples=[804])]
-    minutes: Annotated[float, Field(description="Minutes of recorded speech.", examples=[40.2])]
-    has_own_face: Annotated[
-        bool, Field(description="Whether `face: self` shows the talker's own face.", examples=[False])
-    ]
-
-
-class FaceFacts(BaseModel):
-    """What is known about a face."""
-
-    identities: Annotated[list[str], Field(description="Values of `identity`.", examples=[["erik", "amara"]])]
-    summary: Annotated[str, Field(description="What it is.", examples=["mesh with 52 shapes"])]
-    takes_haircuts: Annotated[bool, Field(description="Whether `hair` and `hair_color` apply.", examples=[True])] = True
-    licence: Annotated[str, Field(description="Licence that its file states.", examples=["CC0-1.0"])] = "not stated"
-    notes: Annotated[list[str], Field(description="What the import of a character changed.", examples=[[]])] = []
-
-
-class StyleFacts(BaseModel):
-    """A style of a palette."""
-
-    name: Annotated[str, Field(description="Value of `style`.", examples=["delighted"])]
-    summary: Annotated[str, Field(description="What it looks like.", examples=["a smile, a livelier head"])]
-
-
-class PaletteFacts(BaseModel):
-    """What is known about a palette."""
-
-    styles: Annotated[list[StyleFacts], Field(description="Its styles.")]
-
-
-class DictionaryFacts(BaseModel):
-    """What is known about a dictionary."""
-
-    n_words: Annotated[int, Field(description="Number of its words.", examples=[12])]
-
-
-Facts = TypeVar("Facts", bound=BaseModel)
-FACTS: dict[str, type[BaseModel]] = {
-    TALKER: TalkerFacts, FACE: FaceFacts, PALETTE: PaletteFacts, DICTIONARY: DictionaryFacts,
-}  # fmt: skip
-
-
-class Resource(BaseModel, Generic[Facts]):
-    """A talker, face, palette or dictionary."""
-
-    name: Annotated[str, Field(description="Its name in requests.", examples=["anna"])]
-    kind: Annotated[str, Field(description="talker, face, palette or dictionary.", examples=["face"])]
-    owner: Annotated[
-        str | None, Field(description="Key that uploaded it; null: it is the service's own.", examples=["studio"])
-    ] = None
-    sha256: Annotated[
-        str | None, Field(description="Hash of an upload's content as it is stored.", examples=["ab3f" * 16])
-    ] = None
-    bytes: Annotated[int | None, Field(description="Size of an upload with its picture.", examples=[5272651])] = None
-    created: Annotated[
-        datetime | None, Field(description="When it was uploaded.", examples=["2026-11-22T09:30:00Z"])
-    ] = None
-    about: Annotated[Facts, Field(description="What is known about it.")]
-
-
-class ResourceList(BaseModel, Generic[Facts]):
-    """Resources of a kind: the service's own, then the uploads by name."""
-
-    data: Annotated[list[Resource[Facts]], Field(description="The resources.")]
-
-
-class Share(BaseModel):
-    """How much of something is used."""
-
-    used: Annotated[int, Field(description="Used now.", examples=[3])]
-    limit: Annotated[int, Field(description="Most that may be used.", examples=[100])]
-
-
-class UsageAnswer(BaseModel):
-    """What a key uses and may use."""
-
-    key: Annotated[str, Field(description="Name of the key.", examples=["studio"])]
-    scopes: Annotated[list[str], Field(description="What it may do.", examples=[["speak", "build"]])]
-    resources: Annotated[Share, Field(description="Uploaded talkers, faces, palettes and dictionaries.")]
-    resource_bytes: Annotated[Share, Field(description="Bytes of them and of their pictures.")]
-    requests_per_minute: Annotated[int | None, Field(description="Requests a minute; null: no limit.", examples=[120])]
-    concurrent: Annotated[int | None, Field(description="Requests at the same time; null: no limit.", examples=[4])]
-
-
-def shipped_resource(kind: str, name: str, about: dict[str, object]) -> dict[str, object]:
-    """JSON of a resource of the service itself."""
-    return {"name": name, "kind": kind, "about": about}
-
-
-def uploaded_resource(stored: StoredResource) -> dict[str, object]:
-    """JSON of an upload."""
-    return {
-        "name": stored.name, "kind": stored.kind, "owner": stored.owner, "sha256": stored.content,
-        "bytes": stored.n_bytes, "created": datetime.fromtimestamp(stored.created, UTC), "about": stored.description,
-    }  # fmt: skip
-
 
 router = APIRouter(prefix="/v1", tags=["resources"])
 
