@@ -135,3 +135,22 @@ def test_nobody_waits_for_a_reader_of_the_log(monkeypatch: pytest.MonkeyPatch) -
                 writer.handle(record("after", n=1))
             writer.close()
     assert sum(event["lines"] for event in events if event["event"] == "lines dropped") >= 40
+
+
+def test_a_loop_that_a_defect_ends_is_told_and_counted(caplog: pytest.LogCaptureFixture) -> None:
+    """As that which sends webhooks: nobody asks for it, so that only an alert tells of its end."""
+    state = ServiceState(ServiceSettings(processes=1))
+
+    async def run() -> None:
+        async def loop() -> None:
+            raise KeyError("my words")
+
+        task = asyncio.create_task(loop())
+        task.add_done_callback(state.jobs._note_end)
+        await asyncio.wait({task})
+        await asyncio.sleep(0)
+
+    with caplog.at_level(logging.INFO, LOG.name):
+        asyncio.run(run())
+    assert [one.getMessage() for one in caplog.records] == ["defect"]
+    assert b'tts2face_failures_total{kind="internal"} 1.0' in state.metrics.as_text()

@@ -6,7 +6,6 @@ What a key may do.
 """
 
 import asyncio
-import logging
 import re
 import time
 from collections import deque
@@ -36,7 +35,6 @@ from tts2face.serving.service.exchange import (
     is_page,
 )
 from tts2face.serving.service.keys import NOBODY, ApiKey
-from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.origins import answer_headers, check_origin, preflight_headers
 from tts2face.storage.files import is_disk_full
 
@@ -167,8 +165,7 @@ class Guard:
                 message = "a disk of the service is full, /readyz names its folder; repeat the request later"
                 await request.refuse(RefusedError(503, "unavailable", message, {"Retry-After": str(RETRY_S)}))
                 return
-            log_event("defect", level=logging.ERROR, error=defect)
-            self._state.metrics.failures.labels("internal").inc()
+            self._state.note_defect(defect)
             message = f"internal error: {type(defect).__name__}; the log has it under the id {request.id}"
             await request.refuse(RefusedError(500, "internal", message))
         finally:

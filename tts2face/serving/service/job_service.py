@@ -250,6 +250,7 @@ class JobService:
         self._tasks: list[asyncio.Task[None]] = []
         self._stopped = threading.Event()
         self._supervisor: threading.Thread | None = None
+        self.on_defect: Callable[[BaseException], None] = _ignore  # called with what ends a loop of this object
         self.n_workers = 0  # local ones that are alive
         self.counts, self.oldest_waiting_s = dict.fromkeys(STATES, 0), 0.0
 
@@ -347,7 +348,7 @@ class JobService:
             (self._sweep, SWEEP_S),
         ):  # fmt: skip
             task = asyncio.create_task(self._repeat(action, pause_s))
-            task.add_done_callback(_log_defect)
+            task.add_done_callback(self._note_end)
             self._tasks.append(task)
 
     def _open(self) -> JobClient:
@@ -385,6 +386,10 @@ class JobService:
             *(self.call(partial(deliver, delivery=one, settings=self._settings), self._senders) for one in due)
         )
 
+    def _note_end(self, task: "asyncio.Task[None]") -> None:
+        if not task.cancelled() and (error := task.exception()) is not None:
+            self.on_defect(error)
+
     async def _share_limits(self) -> None:
         if self._settings.keys is not None:
             name = self._name
@@ -415,10 +420,9 @@ class JobService:
         return pruned.n_removed
 
 
+def _ignore(_: BaseException) -> None:
+    pass
+
+
 def _log_worker(message: str) -> None:
     log_event("workers", message=message)
-
-
-def _log_defect(task: "asyncio.Task[None]") -> None:
-    if not task.cancelled() and (error := task.exception()) is not None:
-        log_event("defect", level=logging.ERROR, error=error)

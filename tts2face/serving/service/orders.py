@@ -13,6 +13,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.datastructures import UploadFile
 
+from tts2face.models.consent import states_consent
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.state import ServiceState
@@ -146,7 +147,8 @@ async def prepare_talker(order: JobOrder) -> dict[str, Any]:
     asked: TalkerRequest = order.options
     if order.upload.seconds is None:
         raise RefusedError(422, "invalid_request", "there is no recording; send it as the part `video` of a form")
-    if asked.appearance != bool(asked.consent and asked.consent.strip()):
+    has_words = bool(asked.consent and asked.consent.strip())
+    if asked.appearance != has_words or (has_words and not states_consent({"consent": {"statement": asked.consent}})):
         raise RefusedError(
             422, "consent",
             "a talker with its own face needs the consent of the person shown; give appearance and consent, or neither",

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 from lexicon.errors import Tts2faceError
 from tts2face.processes.message import RESULT, Message
 from tts2face.serving.service.access import KeyRing
-from tts2face.serving.service.errors import RefusedError, as_refused
+from tts2face.serving.service.errors import STATUS, RefusedError, as_refused
 from tts2face.serving.service.exchange import in_background, while_client_stays
 from tts2face.serving.service.job_service import JobService
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
-from tts2face.serving.service.messages import QUALITY, SYNTHESISE, Work, check_words
+from tts2face.serving.service.messages import QUALITY, SYNTHESISE, DefectError, Work, check_words
 from tts2face.serving.service.metrics import Metrics, quality_labels
 from tts2face.serving.service.pool import STREAM_PRIORITY, InputQueue, Pool, PoolSettings, work_call
 from tts2face.serving.service.preparation import Step
@@ -52,6 +52,7 @@ class ServiceState:
             self.cache = ResultCache(settings.data_folder / "cache", settings.cache_mb * 1_000_000)
         self.readiness = Readiness(self.pool, self.jobs, settings)
         self.metrics = Metrics(self.pool, self.jobs, self.readiness, self.cache)
+        self.jobs.on_defect = self.note_defect
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
         self.exchanges: set[Exchange] = set()  # requests that are being answered
@@ -183,6 +184,11 @@ class ServiceState:
         if self.cache is None or work.kind not in CACHED_KINDS:
             return made
         return self.cache.messages(work, made)
+
+    def note_defect(self, error: BaseException) -> None:
+        """Log an error of the program, and count it, so that it alerts."""
+        log_event("defect", level=logging.ERROR, error=error)
+        self.metrics.failures.labels(STATUS[DefectError][1]).inc()
 
     def record(self, request: "Exchange") -> None:
         """Log, count and trace a finished request; what a probe asks again and again is not logged."""

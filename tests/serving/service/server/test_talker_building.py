@@ -168,6 +168,7 @@ def test_a_recording_without_a_face_is_refused_with_the_reason(
         (lambda: movie(side=64)[:3000], {}, 422, "it is no video that can be decoded"),
         (lambda: movie(61.0, 16), {}, 422, "video cannot be used: it is longer than 60 s"),
         (lambda: movie(0.5), {"appearance": True}, 422, "needs the consent of the person shown"),
+        (lambda: movie(0.5), {"appearance": True, "consent": "yes"}, 422, "needs the consent of the person shown"),
         (lambda: movie(0.5), {"consent": "I, Ann, agree."}, 422, "give appearance and consent, or neither"),
         (lambda: movie(0.5), {"name": "../x"}, 422, "name: String should match pattern"),
         (lambda: movie(0.5), {"name": "x" * 10_000}, 422, "name: String should match pattern"),
