@@ -24,8 +24,10 @@ from cli.photo import (
 )
 from cli.process import (
     BROKEN_PIPE_CODE,
+    FIRST_BYTES,
     INTERRUPTED,
     INTERRUPTION,
+    LARGE_BYTES,
     UNCHANGED,
     discard_output,
     error_message,
@@ -249,8 +251,8 @@ def main() -> None:
     """Entry point of the ``tts2face`` command."""
     repair_streams()
     INTERRUPTION.install()
-    return_large_blocks()
     makes_clip = bool(sys.argv[1:2]) and sys.argv[1] not in {*app}  # a text or an option, which `speak` gets
+    return_large_blocks(FIRST_BYTES if makes_clip else LARGE_BYTES)
     if makes_clip or sys.argv[1:2] in MAKE_CLIPS:
         use_one_thread_of_blas()
     if makes_clip or sys.argv[1:2] == ["serve"]:  # both resume it

@@ -41,7 +41,8 @@ INTERRUPTED = "tts2face: interrupted; {}"
 UNCHANGED = "an output that was not complete yet is as it was before"  # also after the first of several outputs
 TRIM_THRESHOLD, MMAP_THRESHOLD, MOST_ARENAS = -1, -3, -8  # parameter numbers of mallopt in glibc's malloc.h
 N_ARENAS = 2  # heaps from which threads allocate; one for each thread takes 14 MB more in a clip
-LARGE_BYTES = 8 << 20  # arrays of at least this size are mapped one by one, which clears their pages each time
+LARGE_BYTES = 1 << 20  # blocks of at least this size are mapped one by one; pictures of 512 x 512 are smaller
+FIRST_BYTES = 8 << 20  # the same until a first result: each mapped block clears its pages, 80,000 by then
 
 
 def exit_code(error: Exception) -> int:
@@ -240,8 +241,8 @@ def _escape_characters(error: UnicodeError) -> tuple[str, int]:
     return "".join(f"\\u{units[at]:02x}{units[at + 1]:02x}" for at in range(0, len(units), 2)), error.end
 
 
-def return_large_blocks() -> bool:
-    """Make the C library return large freed blocks to the system; False where it has no such setting.
+def return_large_blocks(size: int = LARGE_BYTES) -> bool:
+    """Make the C library return freed blocks of a size to the system; False where it has no such setting.
 
     By default glibc raises the size from which blocks are returned, up to 32 MB, whenever one is freed, and then keeps
     the memory of temporary arrays, once for each thread: about 100 MB in a clip (docs/performance.md).
@@ -251,7 +252,7 @@ def return_large_blocks() -> bool:
     set_option = getattr(ctypes.CDLL(None), "mallopt", None)  # glibc
     if set_option is None:
         return False
-    values = {MMAP_THRESHOLD: LARGE_BYTES, TRIM_THRESHOLD: LARGE_BYTES, MOST_ARENAS: N_ARENAS}
+    values = {MMAP_THRESHOLD: size, TRIM_THRESHOLD: size, MOST_ARENAS: N_ARENAS}
     return all(set_option(option, value) == 1 for option, value in values.items())
 
 

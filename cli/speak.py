@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from cli.flags import Exports, Face, Hair, HairColor, Out, switch
-from cli.process import compilation_messages, progress_bar, write_message
+from cli.process import compilation_messages, progress_bar, return_large_blocks, write_message
 from lexicon.errors import InputError
 from tts2face.picture.options import Picture
 from tts2face.processes.collection import resume_collection
@@ -197,7 +197,13 @@ def _report_writing(write: "Callable[[Progress | None], WrittenClip]", options: 
     resume_collection()
     began = time.perf_counter()
     with progress_bar("writing" if options.out is None else "rendering", options.quiet) as on_progress:
-        written = write(on_progress)
+
+        def report(done: int, of: int) -> None:
+            return_large_blocks()
+            if on_progress is not None:
+                on_progress(done, of)
+
+        written = write(report)
     _warn_mismatches(written.mismatches)
     if options.quiet:
         return
