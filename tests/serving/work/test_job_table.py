@@ -215,14 +215,26 @@ def test_a_webhook_is_taken_by_one_server_and_sent_again_until_it_arrives(
     assert client.due_webhooks() == []
     changes.end(record.id, Ending("failed", error="why"))
     for number in range(3):
-        (delivery,) = client.due_webhooks()
-        assert (delivery.job_id, delivery.n_tries) == (record.id, number)
-        assert client.due_webhooks() == []  # leased
+        (delivery,) = due = client.due_webhooks()
+        assert (delivery.job_id, delivery.key_name, delivery.n_tries) == (record.id, "ann", number)
+        assert client.due_webhooks(busy=["bob", "ann"]) == []
+        assert client.take_webhooks(due) == due
+        assert client.take_webhooks(due) == client.due_webhooks() == []  # leased
         client.note_delivery(delivery, is_delivered=False)
     found = client.table.get(record.id)
     assert found is not None
     assert (found.webhook_state, found.webhook_tries) == ("failed", 3)
     assert client.due_webhooks() == []
+
+
+def test_a_webhook_that_a_clock_a_day_ahead_put_off_is_due(client: JobClient, changes: JobChanges) -> None:
+    record, _ = client.submit(new_job(webhook="https://example.org/done"))
+    changes.end(record.id, Ending("failed", error="why"))
+    client.note_delivery(client.due_webhooks()[0], is_delivered=False)
+    assert client.due_webhooks() == []  # in a moment
+    with client._database.transaction(is_change=True) as change:
+        assert change.run("UPDATE tts2face_jobs SET webhook_due = webhook_due + 86400.0")
+    assert [one.job_id for one in client.due_webhooks()] == [record.id]
 
 
 def test_a_job_whose_workflow_has_ended_without_it_fails_with_the_reason(

@@ -1,31 +1,21 @@
 """Jobs of a running server: the database, the worker processes, webhooks and the removal of what is old.
 
-Webhooks: messages about the end of jobs, signed as by the specification Standard Webhooks.
-
 Jobs as the API shows them, and the envelope of a new one.
 """
 
 import asyncio
-import base64
-import hashlib
-import hmac
-import http.client
 import json
 import logging
 import threading
-import time
 import uuid
 from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from functools import partial
 from typing import Annotated, Any, TypeVar
-from urllib.parse import urlsplit
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from lexicon.errors import BackendError, Tts2faceError
-from tts2face import __version__
 from tts2face.serving.batch.engine import lack_of_room
 from tts2face.serving.batch.run import prune_unused
 from tts2face.serving.batch.store import open_store
@@ -35,8 +25,9 @@ from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
 from tts2face.serving.service.pool import NICENESS
 from tts2face.serving.service.settings import ServiceSettings
+from tts2face.serving.service.webhooks import Webhooks
 from tts2face.serving.work.blobs import open_blobs
-from tts2face.serving.work.client import JobClient, WebhookDelivery, prune_jobs, unfinished_segments
+from tts2face.serving.work.client import JobClient, prune_jobs, unfinished_segments
 from tts2face.serving.work.connection import DatabaseAwayError, connection_errors
 from tts2face.serving.work.database import database_url, prepare_database, shown_url
 from tts2face.serving.work.engine import DatabaseEngine, local_workers
@@ -141,77 +132,10 @@ def _file(one: JobFile) -> ResultFile:
     )
 
 
-TIMEOUT_S = 10.0
-SECRET_PREFIX = "whsec_"  # of secrets in base64
-SCHEMES = {"https": http.client.HTTPSConnection, "http": http.client.HTTPConnection}
-
-
-def check_webhook(url: str, settings: ServiceSettings) -> None:
-    """Refuse a webhook whose host is not in the setting `webhook_hosts`.
-
-    Raises
-    ------
-    RefusedError
-        With the reason.
-    """
-    try:
-        parts = urlsplit(url)
-        place = parts.hostname if parts.port is None else f"{parts.hostname}:{parts.port}"
-    except ValueError as wrong:
-        raise RefusedError(400, "invalid_webhook", f"the webhook is no URL: {wrong}") from wrong
-    if parts.scheme not in SCHEMES or "@" in parts.netloc or not url.isascii() or not url.isprintable() or " " in url:
-        raise RefusedError(400, "invalid_webhook", "the webhook must be a URL https://HOST/PATH without a password")
-    if place not in settings.webhook_hosts:
-        raise RefusedError(
-            400,
-            "invalid_webhook",
-            f"the host {str(place)[:80]!r} gets no webhooks; add it to the setting webhook_hosts",
-        )
-
-
-def sign(secret: str, message_id: str, timestamp: int, body: bytes) -> str:
-    """Value of the header ``webhook-signature``: HMAC-SHA256 of id, time and body."""
-    key = base64.b64decode(secret.removeprefix(SECRET_PREFIX)) if secret.startswith(SECRET_PREFIX) else secret.encode()
-    content = f"{message_id}.{timestamp}.".encode() + body
-    return "v1," + base64.b64encode(hmac.digest(key, content, hashlib.sha256)).decode()
-
-
 def message_of(record: JobRecord) -> bytes:
     """Body of the message about a job."""
     content = {"type": f"job.{record.state}", "job": job_detail(record).model_dump(exclude={"webhook"})}
     return json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode()
-
-
-def send_message(url: str, message_id: str, body: bytes, secret: str) -> bool:
-    """Send a message; whether the receiver has accepted it. Redirects are not followed."""
-    parts, now = urlsplit(url), int(time.time())
-    connection = SCHEMES[parts.scheme](parts.hostname or "", parts.port, timeout=TIMEOUT_S)
-    headers = {
-        "Content-Type": "application/json",
-        "User-Agent": f"tts2face/{__version__}",
-        "webhook-id": message_id,
-        "webhook-timestamp": str(now),
-        "webhook-signature": sign(secret, message_id, now, body),
-    }
-    path = (parts.path or "/") + (f"?{parts.query}" if parts.query else "")
-    try:
-        connection.request("POST", path, body, headers)
-        status: int = connection.getresponse().status
-        return 200 <= status < 300
-    except (OSError, http.client.HTTPException):
-        return False
-    finally:
-        connection.close()
-
-
-def deliver(client: JobClient, delivery: WebhookDelivery, settings: ServiceSettings) -> bool:
-    """Send the message about a job once and note the result; the id of the message is that of the job."""
-    record = client.table.get(delivery.job_id)
-    if record is None:
-        return False
-    is_delivered = send_message(delivery.url, record.id, message_of(record), settings.webhook_secret)
-    client.note_delivery(delivery, is_delivered=is_delivered)
-    return is_delivered
 
 
 Value = TypeVar("Value")
@@ -219,11 +143,10 @@ Value = TypeVar("Value")
 RETRY_S = 2.0  # between two tries to open the database
 RETRY_AFTER_S = 5  # for clients, while the database cannot be reached
 SUPERVISE_S, RESTART_S = 0.5, 10.0  # between two looks at the workers, and after they ended again and again
-WEBHOOK_S, SHARE_S, STATISTICS_S, SWEEP_S = 1.0, 0.5, 5.0, 3600.0  # between two looks
+SHARE_S, STATISTICS_S, SWEEP_S = 0.5, 5.0, 3600.0  # between two looks
 PROBE_S = 3.0  # of the database for /readyz
 DAY_S = 86_400.0
 MIN_AGE_S = DAY_S  # of files and segments: a younger one may belong to a job that is being queued or planned
-N_SENDERS = 4  # threads that wait for receivers of webhooks
 N_THREADS = 8  # that wait for the database; the other parts of the server never do
 
 
@@ -246,7 +169,7 @@ class JobService:
         self._client: JobClient | None = None
         self._reason = ""  # why the database cannot be reached
         self._threads = ThreadPoolExecutor(N_THREADS, thread_name_prefix="jobs")
-        self._senders = ThreadPoolExecutor(N_SENDERS, thread_name_prefix="webhooks")
+        self._webhooks = Webhooks(settings, self.call, message_of)
         self._tasks: list[asyncio.Task[None]] = []
         self._stopped = threading.Event()
         self._supervisor: threading.Thread | None = None
@@ -266,8 +189,7 @@ class JobService:
         await asyncio.gather(*self._tasks, return_exceptions=True)
         if self._supervisor is not None:
             await asyncio.to_thread(self._supervisor.join)
-        for threads in (self._threads, self._senders):
-            threads.shutdown(wait=False, cancel_futures=True)
+        self._threads.shutdown(wait=False, cancel_futures=True)
         if self._client is not None:
             self._client.close()
 
@@ -284,8 +206,8 @@ class JobService:
             raise self._unavailable()
         return self._client
 
-    async def call(self, function: Callable[[JobClient], Value], threads: ThreadPoolExecutor | None = None) -> Value:
-        """Value of a function of the client, in a thread of `threads` or of those of the database.
+    async def call(self, function: Callable[[JobClient], Value]) -> Value:
+        """Value of a function of the client, in a thread of those of the database.
 
         Raises
         ------
@@ -295,7 +217,7 @@ class JobService:
         client = self.client
         away_errors: tuple[type[Exception], ...] = (DatabaseAwayError, *connection_errors())
         try:
-            value = await asyncio.get_running_loop().run_in_executor(threads or self._threads, function, client)
+            value = await asyncio.get_running_loop().run_in_executor(self._threads, function, client)
         except away_errors as away:
             self._note_away(str(away))
             raise self._unavailable() from away
@@ -343,11 +265,9 @@ class JobService:
         if self._settings.workers:
             self._supervisor = threading.Thread(target=self._supervise, name="supervisor", daemon=True)
             self._supervisor.start()
-        for action, pause_s in (
-            (self._send_webhooks, WEBHOOK_S), (self._share_limits, SHARE_S), (self._count, STATISTICS_S),
-            (self._sweep, SWEEP_S),
-        ):  # fmt: skip
-            task = asyncio.create_task(self._repeat(action, pause_s))
+        actions = ((self._share_limits, SHARE_S), (self._count, STATISTICS_S), (self._sweep, SWEEP_S))
+        for work in (self._webhooks.run(), *(self._repeat(action, pause_s) for action, pause_s in actions)):
+            task = asyncio.create_task(work)
             task.add_done_callback(self._note_end)
             self._tasks.append(task)
 
@@ -377,14 +297,6 @@ class JobService:
             with suppress(RefusedError):  # the database is away; the next time may succeed
                 await action()
             await asyncio.sleep(pause_s)
-
-    async def _send_webhooks(self) -> None:
-        if not self._settings.webhook_hosts:
-            return
-        due = await self.call(JobClient.due_webhooks)
-        await asyncio.gather(
-            *(self.call(partial(deliver, delivery=one, settings=self._settings), self._senders) for one in due)
-        )
 
     def _note_end(self, task: "asyncio.Task[None]") -> None:
         if not task.cancelled() and (error := task.exception()) is not None:

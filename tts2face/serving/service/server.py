@@ -4,12 +4,14 @@ The ASGI application of the service.
 """
 
 import asyncio
+import os
 import signal
 import socket
 import sys
+import threading
 import time
 from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Sequence
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,6 +46,7 @@ from tts2face.serving.service.routes import (
 )
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
+from tts2face.storage.temporary import remove_held
 
 # FastAPI's own telemetry exports addresses and messages of errors, which may hold keys and texts (decision 099).
 NO_TELEMETRY: TelemetryConfig = {"tracing": False, "metrics": False, "logs": False, "auto_configure": False}
@@ -155,6 +158,7 @@ def _routes(routes: Iterable[Any]) -> Iterator[Any]:
 SOCKET_GRACE_S = 3.0  # between the message to the clients of WebSockets and their end
 FORCED_CODE = 143  # exit code after a second signal; 0 after the first
 CUT_S = 2  # in which requests that were cut release what they hold
+EXIT_S = 10.0  # after the last request, in which the process ends, whatever its threads wait for
 
 
 def serve(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> None:
@@ -170,9 +174,24 @@ def serve(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> None:
     configure_logs(settings.log_format, with_text=settings.log_text)
     _allow_files(settings.connections)
     server = make_server(settings, mounts)
-    server.run()
+    server.exit_s = EXIT_S
+    with _signals_of_process():
+        server.run()
     if server.force_exit:
         sys.exit(FORCED_CODE)
+
+
+@contextmanager
+def _signals_of_process() -> Iterator[None]:
+    """Return the signals to who watched them before: asyncio takes their file descriptor and gives none back.
+
+    A second signal ends a process that still waits for a thread at its exit.
+    """
+    descriptor = signal.set_wakeup_fd(-1)
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(descriptor, warn_on_full_buffer=False)
 
 
 def make_server(settings: ServiceSettings, mounts: Sequence[Mount] = ()) -> "DrainingServer":
@@ -196,6 +215,7 @@ class DrainingServer(uvicorn.Server):
     def __init__(self, config: uvicorn.Config, state: ServiceState) -> None:
         super().__init__(config)
         self._state = state
+        self.exit_s: float | None = None  # of a process that is this server's: `EXIT_S`
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Listen; then write the address, whose port may have been chosen by the system."""
@@ -221,6 +241,8 @@ class DrainingServer(uvicorn.Server):
         telling.cancel()
         await asyncio.gather(*(request.cut(draining()) for request in state.running))
         log_event("drained", seconds=round(time.monotonic() - began, 3))
+        if self.exit_s is not None:
+            threading.Thread(target=_exit_after, args=(self.exit_s, self), name="exit", daemon=True).start()
 
     def handle_exit(self, sig: int, frame: object) -> None:
         """Begin to drain; a second signal ends the server at once."""
@@ -234,6 +256,13 @@ class DrainingServer(uvicorn.Server):
         for task in telling:  # of clients that read nothing
             task.cancel()
         await asyncio.gather(*(request.cut(draining()) for request in sockets if request in self._state.running))
+
+
+def _exit_after(seconds: float, server: DrainingServer) -> None:
+    """End the process: no thread that waits for another machine keeps a drained server."""
+    time.sleep(seconds)
+    remove_held()
+    os._exit(FORCED_CODE if server.force_exit else 0)
 
 
 def _allow_files(connections: int) -> None:

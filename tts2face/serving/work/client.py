@@ -44,8 +44,10 @@ class WebhookDelivery:
     """A webhook that is to be sent now."""
 
     job_id: str
+    key_name: str
     url: str
     n_tries: int
+    due: float
 
 
 class JobClient:
@@ -139,19 +141,34 @@ class JobClient:
             self._changes.remove_unused(set(old[at : at + FILES_PER_LOOK]), remove)
         return n_removed
 
-    def due_webhooks(self, limit: int = 16) -> list[WebhookDelivery]:
-        """Webhooks that are to be sent now; no other server gets them for `LEASE_S`."""
-        query = "SELECT id, webhook, webhook_tries, webhook_due FROM tts2face_jobs WHERE webhook_due <="
-        taken = []
+    def due_webhooks(self, busy: Sequence[str] = (), limit: int = 1000) -> list[WebhookDelivery]:
+        """Webhooks that are to be sent now, those due longest first; none of the keys `busy`.
+
+        One that is due later than a lease or the pause after its last try lasts was put off by a clock that has been
+        set back since.
+        """
+        longest = " ".join(f"WHEN {n_tries} THEN {max(LEASE_S, _pause_s(n_tries))}" for n_tries in range(1, MAX_TRIES))
+        now = self._database.now
+        names = {f"key{number}": name for number, name in enumerate(busy)}
+        others = f"key_name NOT IN ({', '.join(f':{name}' for name in names)}) AND " if names else ""
+        query = (
+            f"SELECT id, key_name, webhook, webhook_tries, webhook_due FROM tts2face_jobs WHERE {others}"
+            f"(webhook_due <= {now} OR webhook_due > {now} + CASE webhook_tries {longest} ELSE {LEASE_S} END) "
+            "ORDER BY webhook_due LIMIT :limit"
+        )
         with self._database.transaction() as look:
-            found = look.rows(f"{query} {self._database.now} ORDER BY webhook_due LIMIT :limit", limit=limit)
-        for job_id, url, n_tries, due in found:
+            return [WebhookDelivery(*row) for row in look.rows(query, limit=limit, **names)]
+
+    def take_webhooks(self, due: Sequence[WebhookDelivery]) -> list[WebhookDelivery]:
+        """Those of some due webhooks that no other server has taken; none gets them for `LEASE_S`."""
+        taken = []
+        for one in due:
             with self._database.transaction(is_change=True) as change:
                 if change.run(
                     f"UPDATE tts2face_jobs SET webhook_due = {self._database.now} + :lease "
-                    "WHERE id = :id AND webhook_due = :due", id=job_id, due=due, lease=LEASE_S,
+                    "WHERE id = :id AND webhook_due = :due", id=one.job_id, due=one.due, lease=LEASE_S,
                 ):  # fmt: skip
-                    taken.append(WebhookDelivery(job_id, url, n_tries))
+                    taken.append(one)
         return taken
 
     def note_delivery(self, delivery: WebhookDelivery, *, is_delivered: bool) -> None:
@@ -160,7 +177,7 @@ class JobClient:
         is_last = is_delivered or n_tries >= MAX_TRIES
         due = "NULL" if is_last else f"{self._database.now} + :pause"
         state = "delivered" if is_delivered else "failed" if is_last else "waiting"
-        pause = {} if is_last else {"pause": FIRST_PAUSE_S * PAUSE_FACTOR**delivery.n_tries}
+        pause = {} if is_last else {"pause": _pause_s(n_tries)}
         with self._database.transaction(is_change=True) as change:
             change.run(
                 f"UPDATE tts2face_jobs SET webhook_due = {due}, webhook_tries = :tries, webhook_state = :state "
@@ -182,6 +199,11 @@ class JobClient:
             load_output=False,
         )
         return [one.workflow_id for one in found]
+
+
+def _pause_s(n_tries: int) -> float:
+    """Seconds between a number of tries to send a webhook and the next one."""
+    return FIRST_PAUSE_S * PAUSE_FACTOR ** (n_tries - 1)
 
 
 STATES: Mapping[str, State] = {

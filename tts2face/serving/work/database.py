@@ -107,14 +107,19 @@ def shown_url(url: str) -> str:
     return f"{scheme}://{user.partition(':')[0]}@{after}"
 
 
+_QUEUES = ", ".join(f"'{name}'" for name in (QUEUE, JOB_QUEUE, TALKER_QUEUE))
+_WAITS = f"status = 'ENQUEUED' AND queue_name IN ({_QUEUES})"  # condition of the engine's rows
+AHEAD_S = 60.0  # by which clocks of machines may differ
+
+
+def _engine_table(kind: str) -> str:
+    return "workflow_status" if kind == "sqlite" else "dbos.workflow_status"
+
+
 def _waiting_query(kind: str) -> str:
     """Query for one job of this version that waits in a queue, in the engine's table."""
-    table = "workflow_status" if kind == "sqlite" else "dbos.workflow_status"
-    queues = ", ".join(f"'{name}'" for name in (QUEUE, JOB_QUEUE, TALKER_QUEUE))
-    return (
-        f"SELECT 1 FROM {table} WHERE status = 'ENQUEUED' AND queue_name IN ({queues}) "
-        f"AND application_version = '{APPLICATION_VERSION}' LIMIT 1"
-    )
+    version = f"application_version = '{APPLICATION_VERSION}'"
+    return f"SELECT 1 FROM {_engine_table(kind)} WHERE {_WAITS} AND {version} LIMIT 1"
 
 
 class Workers:
@@ -126,6 +131,7 @@ class Workers:
         self._sql = sqlalchemy.text
         self._now = NOW[database_kind(url)]
         self._waiting = _waiting_query(database_kind(url))
+        self._table = _engine_table(database_kind(url))
         self._database_error = sqlalchemy.exc.SQLAlchemyError
         self._engine = open_engine(url)
         self._looking: Any = None
@@ -168,6 +174,18 @@ class Workers:
             connection.execute(self._sql(_BEAT.format(now=self._now)), {"id": executor_id, "place": place[:200]})
             connection.execute(self._sql(_FROM_LATER.format(now=self._now)))
             return {str(row[0]) for row in connection.execute(self._sql(query), {"age": DEAD_AFTER_S})}
+
+    def return_later(self) -> int:
+        """Let jobs that a clock queued which has been set back since wait no longer than the others; their number.
+
+        The engine gives those of one priority in the order of their times; these keep theirs among each other.
+        """
+        later = f"{_WAITS} AND created_at > 1000.0 * ({self._now} + {AHEAD_S})"
+        last = f"SELECT max(created_at) FROM {self._table} WHERE {later}"
+        now = f"CAST(1000.0 * {self._now} AS BIGINT)"
+        query = f"UPDATE {self._table} SET created_at = created_at - ({last}) + {now} WHERE {later}"
+        with self._engine.begin() as connection:
+            return int(connection.execute(self._sql(query)).rowcount)
 
     def has_waiting(self) -> bool:
         """Whether a job waits in a queue; for one thread, which asks often: on a connection that stays open.

@@ -13,8 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -37,9 +36,7 @@ from tts2face.serving.work.database import (
 )
 
 WORKER = "tts2face.serving.work.worker:HANDLERS"
-POLL_S = 0.5  # between two looks at the jobs that have ended
-OVERLAP_S = 5.0  # of the times of two looks: a transaction ends some time after the time that it notes
-ALL_JOBS_S = 60.0  # between two looks at all jobs that are awaited
+POLL_S = 0.5  # between two looks at the jobs that are awaited
 JOBS_PER_QUERY = 500
 ACTIVE = frozenset({"PENDING", "ENQUEUED", "DELAYED"})
 RESTART_S = 1.0  # after the death of a local worker
@@ -82,8 +79,7 @@ class DatabaseEngine:
         url = database_url(self.database)
         prepare_database(url)
         with open_client(url) as client, Workers(url) as workers, local_workers(self) as supervise:
-            look = _Look(client, workers.now())
-            look.waiting = enqueue(client, workers, segments, self.priority)
+            look = _Look(client, enqueue(client, workers, segments, self.priority))
             if self.n_workers == 0 and not workers.alive():
                 self.on_message("no worker is alive in this database; start `tts2face worker` with it")
             while look.waiting:
@@ -98,28 +94,29 @@ class DatabaseEngine:
 
 @dataclass(slots=True)
 class _Look:
-    """Looks at jobs: often at those that have ended since the last look, and now and then at all that are awaited.
+    """Looks at the jobs that are awaited, by their names: no clock says which of them have ended since the last look.
 
     Parameters
     ----------
-    since_s
-        Time of the database before the jobs were queued.
     waiting
-        Addresses by the names of their jobs.
+        Addresses by the names of their jobs, in the order in which they were queued.
     """
 
     client: Any
-    since_s: float
-    waiting: dict[str, str] = field(default_factory=dict)
-    _next_all_s: float = 0.0
+    waiting: dict[str, str]
+    _next: int = 0  # place of the further part among those that wait
 
     def ended(self) -> list[tuple[str, str]]:
-        """Addresses of the jobs that have ended, with the reason if there is no segment; each once."""
-        if time.monotonic() < self._next_all_s:
-            found = {name: job for name, job in self._recent().items() if name in self.waiting}
-        else:
-            found = self._all()
-            self._next_all_s = time.monotonic() + ALL_JOBS_S
+        """Addresses of the jobs that have ended, with the reason if there is no segment; each once.
+
+        Of many jobs it looks at those that were queued first, which end first, and at one further part after the other.
+        """
+        names = list(self.waiting)
+        found = self._found(names[:JOBS_PER_QUERY])
+        if len(names) > JOBS_PER_QUERY:
+            at = self._next if JOBS_PER_QUERY <= self._next < len(names) else JOBS_PER_QUERY
+            found |= self._found(names[at : at + JOBS_PER_QUERY])
+            self._next = at + JOBS_PER_QUERY
         reasons = {}
         for name, job in found.items():
             if job is None:
@@ -128,19 +125,10 @@ class _Look:
                 reasons[name] = failure_reason(job)
         return [(self.waiting.pop(name), reason) for name, reason in reasons.items()]
 
-    def _recent(self) -> dict[str, Any]:
-        after = datetime.fromtimestamp(self.since_s - OVERLAP_S, UTC).isoformat()
-        found = self.client.list_workflows(name=WORKFLOW, completed_after=after, load_input=False)
-        self.since_s = max([self.since_s, *((one.completed_at or 0) / 1000.0 for one in found)])
-        return {one.workflow_id: one for one in found}
-
-    def _all(self) -> dict[str, Any]:
-        names = list(self.waiting)
-        found: dict[str, Any] = dict.fromkeys(names)
-        for at in range(0, len(names), JOBS_PER_QUERY):
-            part = names[at : at + JOBS_PER_QUERY]
-            found |= {one.workflow_id: one for one in self.client.list_workflows(workflow_ids=part, load_input=False)}
-        return found
+    def _found(self, names: list[str]) -> dict[str, Any]:
+        """Jobs by their names; None of one that is gone."""
+        jobs = self.client.list_workflows(workflow_ids=names, load_input=False)
+        return dict.fromkeys(names) | {one.workflow_id: one for one in jobs}
 
 
 @contextmanager

@@ -408,6 +408,7 @@ class Worker:
         from dbos import DBOS
 
         alive = set(workers.alive())
+        workers.return_later()
         wanted = self._look_s = poll_interval(len(alive))
         for name in (QUEUE, JOB_QUEUE, TALKER_QUEUE):
             queue = DBOS.retrieve_queue(name)

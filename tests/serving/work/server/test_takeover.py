@@ -4,7 +4,9 @@ import sqlite3
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -22,9 +24,11 @@ from tests.serving.work.stub_worker import Stub
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.work.client import cancel_jobs, list_jobs, prune_jobs
+from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import BEAT_S, DEAD_AFTER_S, Workers, database_url, prepare_database
-from tts2face.serving.work.engine import JOBS_PER_QUERY, DatabaseEngine, enqueue, open_client
-from tts2face.serving.work.worker import MAX_LOOKS_PER_S, POLL_S, Worker, poll_interval
+from tts2face.serving.work.engine import JOBS_PER_QUERY, POLL_S, DatabaseEngine, _Look, enqueue, open_client
+from tts2face.serving.work.worker import MAX_LOOKS_PER_S, Worker, poll_interval
+from tts2face.serving.work.worker import POLL_S as WORKER_POLL_S
 
 Segments = Callable[..., dict[str, Segment]]
 
@@ -103,8 +107,8 @@ def test_a_dead_worker_of_another_version_is_reported_once(
 
 
 def test_looks_at_the_queue_are_bounded() -> None:
-    assert poll_interval(1) == poll_interval(4) == POLL_S
-    assert poll_interval(200) == 200 / MAX_LOOKS_PER_S > POLL_S
+    assert poll_interval(1) == poll_interval(4) == WORKER_POLL_S
+    assert poll_interval(200) == 200 / MAX_LOOKS_PER_S > WORKER_POLL_S
 
 
 def test_a_worker_without_its_database_says_so_in_one_line(tmp_path: Path, segments: Segments) -> None:
@@ -145,11 +149,66 @@ def test_batches_of_the_same_segments_in_another_order_are_queued_at_once(
     assert sorted(job.name for job in list_jobs(url)) == sorted(f"{name}.0" for name in work)
 
 
+def test_a_job_of_a_clock_a_day_ahead_delays_no_later_one(
+    database: str, segments: Segments, start_worker: StartWorker, tmp_path: Path
+) -> None:
+    """Whoever looks at the times of ends finds the one that is a day ahead, and none after it."""
+    early = segments("One.")
+    start_worker(database, 0.0)
+    assert collect(database, early, tmp_path) == dict.fromkeys(early, "")
+    move_by_a_day(database, "completed_at")
+    work = segments("Two.", "Three.")
+    engine = DatabaseEngine(database, str(tmp_path / "store"), n_workers=0)
+    n_looks: list[None] = []
+    watched = replace(engine, on_wait=lambda: n_looks.append(None))
+    found = [one.reason for one in watched.render(work, open_store(tmp_path / "store"))]
+    assert found == ["", ""]
+    assert len(n_looks) * POLL_S < 30.0  # not by a look at all jobs, which came once in a minute
+
+
+def test_jobs_that_a_clock_a_day_ahead_queued_keep_their_turn(database: str, segments: Segments) -> None:
+    early, late = segments("One.", "Two."), segments("Three.")
+    queue(database, early)
+    move_by_a_day(database, "created_at")
+    queue(database, late)
+    with Workers(database_url(database)) as workers:
+        assert workers.return_later() == 2
+        assert workers.return_later() == 0
+        assert [one.text for one in list_jobs(database)][-1] in {"Two.", "Three."}
+        assert max(one.created_s for one in list_jobs(database)) < workers.now() + 1.0
+
+
+def test_all_jobs_of_a_large_batch_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those that were queued first at each look, the further ones part after part."""
+    monkeypatch.setattr("tts2face.serving.work.engine.JOBS_PER_QUERY", 3)
+    ended = {"j9", "j4"}
+
+    class Client:
+        def list_workflows(self, *, workflow_ids: list[str], load_input: bool) -> list[SimpleNamespace]:
+            assert len(workflow_ids) <= 3
+            return [SimpleNamespace(workflow_id=one, status="SUCCESS" if one in ended else "PENDING", error=None)
+                    for one in workflow_ids]  # fmt: skip
+
+    look = _Look(Client(), {f"j{number}": f"a{number}" for number in range(11)})
+    assert [[address for address, _ in look.ended()] for _ in range(3)] == [["a4"], ["a9"], []]
+    ended |= {"j0", "j10"}
+    assert sorted(address for _ in range(3) for address, _ in look.ended()) == ["a0", "a10"]
+
+
+def move_by_a_day(database: str, column: str) -> None:
+    """Move times of the engine's table into the future, as a clock that was ahead has left them."""
+    url = database_url(database)
+    jobs = JobDatabase(url)
+    table = "workflow_status" if jobs.kind == "sqlite" else "dbos.workflow_status"
+    with jobs.transaction() as change:
+        assert change.run(f"UPDATE {table} SET {column} = {column} + 86400000")
+    jobs.close()
+
+
 def test_a_job_that_is_removed_while_a_batch_waits_ends_the_wait(
-    database: str, segments: Segments, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    database: str, segments: Segments, tmp_path: Path
 ) -> None:
     work = segments("One.")
-    monkeypatch.setattr("tts2face.serving.work.engine.ALL_JOBS_S", 0.5)
     engine = DatabaseEngine(database, str(tmp_path / "store"), n_workers=0)
     found = engine.render(work, open_store(tmp_path / "store"))
     reasons: list[str] = []

@@ -26,7 +26,6 @@ from tts2face.serving.service.job_service import (
     JobDetail,
     JobPage,
     NewJobBody,
-    check_webhook,
     job_detail,
     job_view,
 )
@@ -35,6 +34,7 @@ from tts2face.serving.service.options import JOB_KINDS, new_job_schema
 from tts2face.serving.service.orders import JobKind, JobOrder, Upload, expected_speech_s
 from tts2face.serving.service.routes.clips import service_state
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES, upload_folder
+from tts2face.serving.service.webhooks import check_webhook
 from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.serving.work.run import media_type
