@@ -154,7 +154,7 @@ def test_a_job_of_a_clock_a_day_ahead_delays_no_later_one(
 ) -> None:
     """Whoever looks at the times of ends finds the one that is a day ahead, and none after it."""
     early = segments("One.")
-    start_worker(database, 0.0)
+    start_worker(database, 0.8)  # so that some end after the look that finds the one that is ahead
     assert collect(database, early, tmp_path) == dict.fromkeys(early, "")
     move_by_a_day(database, "completed_at")
     work = segments("Two.", "Three.")
