@@ -150,7 +150,7 @@ def _draw_studio(width: int, height: int) -> NDArray[np.uint8]:
 
 def _load_image(path: Path, width: int, height: int) -> NDArray[np.uint8]:
     with open_picture(path, "the background image") as file:
-        return _fitted(file.convert("RGB"), width, height)
+        return _fitted(file if file.mode == "RGB" else file.convert("RGB"), width, height)  # which would copy it
 
 
 def _fitted(image: Any, width: int, height: int) -> NDArray[np.uint8]:

@@ -22,7 +22,7 @@ from tts2face.processes.child import Call, Handler, answer
 from tts2face.processes.message import ERROR, EVENT, MORE, STOP, Message, read_message
 from tts2face.processes.parent import raised
 from tts2face.processes.program import Program
-from tts2face.serving.service import uploads
+from tts2face.serving.service import decoders
 from tts2face.serving.service.messages import SYNTHESISE, Work
 from tts2face.serving.service.pool import InputQueue, WarmProcess, work_call
 from tts2face.serving.service.preparation import Preparation
@@ -169,12 +169,26 @@ def working(settings: ServiceSettings) -> Iterator[None]:
 def decoding_here() -> Iterator[None]:
     """Uploads are decoded in this process, without limits of memory and time (those: `test_uploads.py`)."""
 
-    async def call_here(program: Program, kind: str, content: Mapping[str, Any], **_: Any) -> Mapping[str, Any]:
-        made = (await asyncio.to_thread(answered, program.load()[kind], content))[-1]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(decoders, "started", DecoderHere)
+        yield
+
+
+class DecoderHere:
+    """A decoder of a program that works in a thread of this process."""
+
+    def __init__(self, program: Program) -> None:
+        self._program = program
+
+    async def __aenter__(self) -> "DecoderHere":
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        pass
+
+    async def call(self, kind: str, content: Mapping[str, Any], **_: Any) -> Message:
+        """Result of a call, as from another process."""
+        made = (await asyncio.to_thread(answered, self._program.load()[kind], content))[-1]
         if made.kind == ERROR:
             raise raised(made)
-        return json.loads(json.dumps(made.content))  # type: ignore[no-any-return] # as from another process
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(uploads, "call_once", call_here)
-        yield
+        return Message(made.kind, json.loads(json.dumps(made.content)))

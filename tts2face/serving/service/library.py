@@ -21,10 +21,11 @@ from tts2face.models.hair import parse_hair_colour
 from tts2face.picture.options import BLUR, COLOURS, STUDIO, TRANSPARENT
 from tts2face.request import OWN_FACE
 from tts2face.serving.batch.segment import file_hash
+from tts2face.serving.service.decoders import Decoders
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.settings import ServiceSettings
-from tts2face.serving.service.uploads import RESOURCE_TIMEOUT_S, decode_file
+from tts2face.serving.service.uploads import RESOURCE_TIMEOUT_S
 from tts2face.serving.work.blobs import BlobStore, open_blobs
 from tts2face.serving.work.database import database_url
 from tts2face.serving.work.resource_check import CONTENT, DICTIONARY, FACE, PICTURE, TALKER
@@ -331,7 +332,7 @@ PICTURE_FORMAT = 1  # increased when the same file gives another picture
 _drawing = asyncio.Lock()  # one at a time
 
 
-async def shipped_picture(data: Path, kind: str, name: str) -> Path:
+async def shipped_picture(decoders: Decoders, data: Path, kind: str, name: str) -> Path:
     """Path of the picture of a shipped model; drawn in a child process if it is not there yet."""
     source = find_file(name, kind)
     digest = await asyncio.to_thread(file_hash, source)
@@ -341,6 +342,7 @@ async def shipped_picture(data: Path, kind: str, name: str) -> Path:
             with translate_disk_errors(path):
                 path.parent.mkdir(parents=True, exist_ok=True)
                 with Temporary(path) as temporary:
-                    await decode_file((f"{DRAW}{kind}", source, temporary.path, 0.0), name, RESOURCE_TIMEOUT_S)
+                    arguments = f"{DRAW}{kind}", source, temporary.path, 0.0
+                    await decoders.decode("", arguments, name, RESOURCE_TIMEOUT_S)
                     temporary.replace(path)
     return path

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from lexicon.errors import Tts2faceError
 from tts2face.processes.message import RESULT, Message
 from tts2face.serving.service.access import KeyRing
+from tts2face.serving.service.decoders import Decoders
 from tts2face.serving.service.errors import STATUS, RefusedError, as_refused
 from tts2face.serving.service.exchange import in_background, while_client_stays
 from tts2face.serving.service.job_service import JobService
@@ -25,7 +26,6 @@ from tts2face.serving.service.readiness import Readiness
 from tts2face.serving.service.result_cache import CACHED_KINDS, ResultCache
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.tracing import tracing_from_environment
-from tts2face.serving.service.uploads import Checks
 
 if TYPE_CHECKING:
     from tts2face.serving.service.exchange import Exchange
@@ -44,7 +44,7 @@ class ServiceState:
             {"n_sessions": settings.sessions, "log_format": settings.log_format, "log_text": settings.log_text,
              "memory_mb": settings.memory_mb, "sentences_mb": settings.sentences_mb, "tasks": tasks},
         ))  # fmt: skip
-        self.library, self.checks, self.video_checks = Library(settings), Checks(), Checks()
+        self.library, self.decoders = Library(settings), Decoders()
         self.limits = RateLimits()
         self.jobs = JobService(settings, self.library, self.limits)
         self.cache: ResultCache | None = None

@@ -19,9 +19,8 @@ from tts2face.interchange.subtitles.reader import SUFFIXES, read_subtitles
 from tts2face.request import Request
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
-from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.service.uploads import MAX_TEXT_BYTES, decode_file
+from tts2face.serving.service.uploads import MAX_TEXT_BYTES
 from tts2face.serving.studio.requests import check_project
 from tts2face.serving.studio.store import ProjectEntry, ProjectStore
 from tts2face.serving.studio.work import WorkList
@@ -106,11 +105,11 @@ async def import_file(studio: StudioHost, key: ApiKey, path: Path, name: str, tr
     if suffix in TEXT_SUFFIXES:
         return await import_text(studio, key, _read_text(path, name), title)
     if suffix in SUFFIXES:
-        async with _decoded(studio.state.settings, SUBTITLES, path, suffix) as checked:
+        async with _decoded(studio.state, key, (SUBTITLES, path, suffix)) as checked:
             text = await asyncio.to_thread(_spoken_text, checked)
         return await import_text(studio, key, text, title)
     if suffix in SOUND_SUFFIXES:
-        async with _decoded(studio.state.settings, SOUND, path, ".wav") as checked:
+        async with _decoded(studio.state, key, (SOUND, path, ".wav")) as checked:
             return await add_recording(studio, key, checked, title, transcript)
     kinds = (*TEXT_SUFFIXES, *SUFFIXES, *SOUND_SUFFIXES, ".json")
     raise InputError(f"a file {name[-40:]!r} cannot be imported; give one that ends in {', '.join(kinds)}")
@@ -139,13 +138,14 @@ def _spoken_text(path: Path) -> str:
 
 
 @asynccontextmanager
-async def _decoded(settings: ServiceSettings, kind: str, path: Path, suffix: str) -> AsyncIterator[Path]:
-    """The file after its check in a process with limits."""
+async def _decoded(state: ServiceState, key: ApiKey, given: tuple[str, Path, str]) -> AsyncIterator[Path]:
+    """A file of a kind after its check in a process with limits, with a suffix."""
+    settings, (kind, path, suffix) = state.settings, given
     limit = settings.sound_s if kind == SOUND else settings.job_cues
     with tempfile.TemporaryDirectory(prefix="tts2face-upload-") as folder:
         target = Path(folder, f"checked{suffix}")
         try:
-            await decode_file((kind, path, target, limit), "the file", settings.decode_s)
+            await state.decoders.decode(key.name, (kind, path, target, limit), "the file", settings.decode_s)
         except RefusedError as refused:
             raise InputError(refused.message) from refused
         yield target

@@ -24,6 +24,7 @@ from tts2face.processes.child import Call, Handler
 from tts2face.processes.parent import ChildEndedError
 from tts2face.processes.program import ProcessLimits, Program
 from tts2face.processes.tools import run_tool
+from tts2face.serving.service.decoders import KeyTurns, Shares
 from tts2face.serving.studio.recordings import (
     ACCEPTED_FOLDER,
     CACHE,
@@ -115,6 +116,7 @@ MAX_SENTENCE_CHARACTERS = 300
 BUILD, SAY, CHECK = "build", "say", "check"  # tasks of the work on a recording, and the kind of work on its takes
 WORK, ORDER = "recording", "work.json"  # kind of work, and its order in the folder of a recording
 AT_ONCE = 5  # recordings of an owner
+BUILDS = Shares(1, 1, 1000)  # talkers that are built: each takes a core and 1 GB for up to an hour
 
 
 class Recordings:
@@ -123,7 +125,7 @@ class Recordings:
     def __init__(self, folder: Path, work: WorkList) -> None:
         self.store, self._work = RecordingStore(folder), work
         self._tool, self._turn = AsyncChild(Program(TOOL, TOOL_LIMITS)), asyncio.Lock()
-        self._used_at = 0.0
+        self._used_at, self._builds = 0.0, KeyTurns(BUILDS)
         self._ending: asyncio.Task[None] | None = None
         busy = "the last order still runs; wait for it, or cancel it"
         late = "the work took too long; try it with fewer takes"
@@ -214,7 +216,8 @@ class Recordings:
             return "The clip is ready."
         n_takes, name = len(self.accepted(folder.name)), self.store.name(folder.name)
         consent = content["consent"]
-        return await build_talker(folder, name=name, consent=consent, n_takes=n_takes, on_message=work.show)
+        async with self._builds.turn(work.owner):
+            return await build_talker(folder, name=name, consent=consent, n_takes=n_takes, on_message=work.show)
 
     async def _check(self, work: BackgroundWork) -> str:
         """Give the take its state and, in one line, what to do better."""

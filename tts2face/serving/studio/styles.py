@@ -17,7 +17,6 @@ from tts2face.models.palette_editing import (
     remove_style,
     rename_style,
 )
-from tts2face.processes.tools import run_take_tool
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.studio.importing import StudioHost
 from tts2face.serving.studio.recordings import REFUSED, judge
@@ -193,7 +192,7 @@ class Styles:
         order = {"take": str(take), "cache": str(take.with_name(CACHE))}
         if work.content["task"] == MAKING:
             return await self._make(work, take, order)
-        found = await run_take_tool("check", order, work.show)
+        found = await self._studio.state.decoders.read_take(work.owner, "check", order, work.show)
         state, advice = judge(found["findings"])
         self._found[work.owner] = state, advice or f"a good take of {found['seconds']:.0f} s"
         return advice
@@ -201,7 +200,7 @@ class Styles:
     async def _make(self, work: BackgroundWork, take: Path, order: dict[str, str]) -> str:
         made, name = take.with_name(MADE), work.content["name"]
         order = {**order, "base": self.store.base(work.owner), "name": name, "out": str(made)}
-        built = await run_take_tool("style", order, work.show)
+        built = await self._studio.state.decoders.read_take(work.owner, "style", order, work.show)
         learnt = await asyncio.to_thread(read_palette, made)
         # The palette may have changed meanwhile: only the new style is taken.
         key = key_of(self._studio.state, work.owner)

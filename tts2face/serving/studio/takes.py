@@ -12,7 +12,7 @@ import json
 import os
 import shutil
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,10 +21,8 @@ import numpy as np
 
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import read_json
-from tts2face.processes.tools import run_take_tool
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
-from tts2face.serving.service.uploads import decode_file
 from tts2face.serving.studio.importing import StudioHost, add_recording
 from tts2face.serving.studio.recordings import OwnedFolders
 from tts2face.serving.studio.requests import events_of
@@ -189,9 +187,8 @@ class Takes:
         self._styles.check_scope(key)
         folder, settings = self.store.folder(key.name, number), self._studio.state.settings
         try:
-            await decode_file(
-                (SOUND_KIND, source, folder / f"new-{SOUND}", settings.sound_s), "the sound", settings.decode_s
-            )
+            arguments = SOUND_KIND, source, folder / f"new-{SOUND}", settings.sound_s
+            await self._studio.state.decoders.decode(key.name, arguments, "the sound", settings.decode_s)
         except RefusedError as refused:
             raise InputError(refused.message) from refused
         os.replace(folder / f"new-{SOUND}", folder / SOUND)
@@ -252,20 +249,22 @@ class Takes:
         if work.content["task"] == MAKE_FILM:
             sound = str(folder / SOUND) if entry.has_sound else None
             order = {"take": str(folder / TABLE), "sound": sound, "out": str(folder / FILM)}
-            await run_take_tool("film", order, work.show)
+            await self._studio.state.decoders.read_take(work.owner, "film", order, work.show)
         else:
-            found = await self._read(folder / work.content["file"], work.show)
+            found = await self._read(work, folder / work.content["file"])
             entry = self.store.entry(work.owner, folder.name)  # it may have another name now
             ready = replace(entry, state=READY, seconds=found["seconds"], has_sound=found.get("has_sound", False))
             self.store.write(ready)
         return ""
 
-    async def _read(self, file: Path, show: Callable[[str, int, int], None]) -> Mapping[str, Any]:
+    async def _read(self, work: BackgroundWork, file: Path) -> Mapping[str, Any]:
         """What the tool says of a table, or of a video from which it makes one."""
+        decoders = self._studio.state.decoders
         if file.name != TABLE:
             order = {"take": str(file), "table": str(file.with_name(TABLE)), "sound": str(file.with_name(SOUND))}
-            return await run_take_tool("capture", order, show)
-        found = await run_take_tool("check", {"take": str(file), "cache": str(file.parent)}, show)
+            return await decoders.read_take(work.owner, "capture", order, work.show)
+        order = {"take": str(file), "cache": str(file.parent)}
+        found = await decoders.read_take(work.owner, "check", order, work.show)
         if not found["seconds"]:
             raise InputError(found["findings"][0]["message"])
         return found

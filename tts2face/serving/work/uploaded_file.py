@@ -10,25 +10,31 @@ or size in bytes.
 import json
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from lexicon.errors import Tts2faceError
+from lexicon.errors import DataError, Tts2faceError
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.program import ProcessLimits, Program
 from tts2face.processes.tools import LOW_PRIORITY
 from tts2face.serving.work.resource_check import (
+    N_MAGIC,
     RESOURCE_KINDS,
     RefusedFileError,
     check_resource,
     draw_resource,
     find_places,
+    is_picture,
 )
 from tts2face.storage.files import is_disk_full
+from tts2face.storage.media_files import decoding_bytes
 from tts2face.types import SOUND_RATE
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 SOUND, PICTURE, VIDEO, DRAW, SUBTITLES, PLACES = "sound", "picture", "video", "draw-", "subtitles-", "places"
 LIMITS = ProcessLimits(memory_bytes=2 << 30, cpu_s=60, file_bytes=1 << 30, n_files=64)
@@ -40,7 +46,10 @@ VIDEO_FORMATS = {
 }  # fmt: skip
 MAX_VIDEO_PIXELS, MAX_VIDEO_FPS = 4096 * 2304, 240
 PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TIFF")
-DECODE = "decode"  # name of the call
+DECODE, MEASURE = "decode", "measure"  # names of the calls
+MIB = 1 << 20
+# Memory of a child besides pixels: of Python with a decoder; with the models of a check. Measured, rounded up.
+CHILD_BYTES, RESOURCE_BYTES = 96 * MIB, 512 * MIB
 
 
 @contextmanager
@@ -91,6 +100,27 @@ def decode_sound(source: Path, target: Path, max_seconds: float) -> None:
         raise RefusedFileError("its sound is empty")
 
 
+@contextmanager
+def _opened_picture(source: Path, max_pixels: float) -> "Iterator[Image]":
+    """A picture whose size is checked, before anything is decoded; errors as `decode_picture`."""
+    from PIL import Image
+
+    Image.MAX_IMAGE_PIXELS = None  # the size is checked here
+    with (
+        _decoding("picture", OSError, ValueError, SyntaxError, MemoryError),
+        Image.open(source, formats=PICTURE_FORMATS) as picture,
+    ):
+        if picture.width * picture.height > max_pixels:
+            raise RefusedFileError(f"it has {picture.width} x {picture.height} pixels, more than {max_pixels:g}")
+        n_bytes = decoding_bytes(picture)
+        if n_bytes + CHILD_BYTES > LIMITS.memory_bytes:
+            raise RefusedFileError(
+                f"a {picture.format} of {picture.width} x {picture.height} pixels takes {n_bytes // MIB} MB to decode, "
+                f"more than {(LIMITS.memory_bytes - CHILD_BYTES) // MIB}; reduce its size"
+            )
+        yield picture
+
+
 def decode_picture(source: Path, target: Path, max_pixels: float) -> None:
     """Write a picture as .png.
 
@@ -99,16 +129,9 @@ def decode_picture(source: Path, target: Path, max_pixels: float) -> None:
     RefusedFileError
         It has more than `max_pixels`, or cannot be decoded.
     """
-    from PIL import Image
-
-    Image.MAX_IMAGE_PIXELS = None  # the size is checked here, before anything is decoded
-    with (
-        _decoding("picture", OSError, ValueError, SyntaxError, MemoryError),
-        Image.open(source, formats=PICTURE_FORMATS) as picture,
-    ):
-        if picture.width * picture.height > max_pixels:
-            raise RefusedFileError(f"it has {picture.width} x {picture.height} pixels, more than {max_pixels:g}")
-        picture.convert("RGB").save(target, "PNG", compress_level=1)
+    with _opened_picture(source, max_pixels) as picture:
+        plain = picture if picture.mode == "RGB" else picture.convert("RGB")  # which would copy it
+        plain.save(target, "PNG", compress_level=1)
 
 
 def check_video(source: Path, target: Path, max_seconds: float) -> None:
@@ -194,6 +217,29 @@ def decode(kind: str, source: Path, target: Path, limit: float) -> None:
         {SOUND: decode_sound, PICTURE: decode_picture, VIDEO: check_video}[kind](source, target, limit)
 
 
+def _measure(call: Call) -> dict[str, Any]:
+    """The memory that a file takes when it is decoded, by its head and format."""
+    kind, source, limit = call.content["kind"], Path(call.content["source"]), float(call.content["limit"])
+    if kind == PICTURE:
+        with _opened_picture(source, limit) as picture:
+            return {"memory_bytes": CHILD_BYTES + decoding_bytes(picture)}
+    if not _is_resource(kind):
+        return {"memory_bytes": CHILD_BYTES}
+    return {"memory_bytes": RESOURCE_BYTES + _photo_bytes(source)}
+
+
+def _photo_bytes(source: Path) -> int:
+    """The memory that a photo takes when it is decoded; 0 for another file, which its check refuses or reads."""
+    from tts2face.photo.photograph import open_photograph
+
+    with source.open("rb") as file:
+        if not is_picture(file.read(N_MAGIC)):
+            return 0
+    with suppress(DataError), open_photograph(source) as picture:
+        return decoding_bytes(picture)
+    return 0
+
+
 def _decode(call: Call) -> dict[str, Any]:
     asked = call.content
     try:
@@ -207,9 +253,13 @@ def _decode(call: Call) -> dict[str, Any]:
 
 def program(kind: str) -> Program:
     """The child that decodes a file of a kind."""
-    if kind in {SOUND, PICTURE, VIDEO} or kind.startswith(SUBTITLES):
-        return Program(f"{__name__}:HANDLERS", LIMITS)
-    return Program(f"{__name__}:HANDLERS", replace(LIMITS, cpu_s=RESOURCE_CPU_S), niceness=LOW_PRIORITY)
+    limits = replace(LIMITS, cpu_s=RESOURCE_CPU_S) if _is_resource(kind) else LIMITS
+    return Program(f"{__name__}:HANDLERS", limits, niceness=LOW_PRIORITY)
 
 
-HANDLERS: Mapping[str, Handler] = MappingProxyType({DECODE: _decode})
+def _is_resource(kind: str) -> bool:
+    """Whether a file of a kind is checked with models, which takes longer."""
+    return kind not in {SOUND, PICTURE, VIDEO} and not kind.startswith(SUBTITLES)
+
+
+HANDLERS: Mapping[str, Handler] = MappingProxyType({DECODE: _decode, MEASURE: _measure})

@@ -24,13 +24,11 @@ from tts2face.interchange.characters import importing
 from tts2face.models.consent import PHOTO_TOOL, consent_record
 from tts2face.models.face_file import read_face
 from tts2face.photo import face_from_photo
-from tts2face.serving.service import uploads
-from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service import decoders
 from tts2face.serving.service.keys import add_key
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.server import create_app
 from tts2face.serving.service.settings import ServiceSettings
-from tts2face.serving.service.uploads import MAX_CHECKS, MAX_WAITING, Checks
 from tts2face.serving.work.blobs import open_blobs
 from tts2face.serving.work.database import database_url
 from tts2face.serving.work.resources import ResourceTable, StoredResource
@@ -205,7 +203,7 @@ def test_a_model_that_is_missing_here_is_no_fault_of_the_file(
 
     monkeypatch.setattr(importing, "import_face", find)
     monkeypatch.setattr(face_from_photo, "face_from_photo", find)
-    monkeypatch.setattr(uploads, "run_take_tool", run)
+    monkeypatch.setattr(decoders, "run_take_tool", run)
     parts = photo(np.zeros((100, 100, 3), np.uint8), consent="I agree to this.", makes=makes)
     for answer in (
         ask("ann", "POST", "/v1/faces", **form("x", GLB)),
@@ -462,25 +460,3 @@ def test_a_database_that_is_away_is_said_and_the_services_own_models_do_without(
     assert library.resolve(LOCAL_KEY, "face", "head") == ("head", {})
     with pytest.raises(BackendError, match="the database cannot be reached"):
         library.resolve(LOCAL_KEY, "face", "mine")
-
-
-def test_uploads_take_turns_and_many_are_refused() -> None:
-    async def run() -> tuple[int, list[str]]:
-        checks = Checks()
-        running, most, codes = 0, 0, []
-
-        async def upload() -> None:
-            nonlocal running, most
-            try:
-                async with checks:
-                    running += 1
-                    most = max(most, running)
-                    await asyncio.sleep(0.01)
-                    running -= 1
-            except RefusedError as refused:
-                codes.append(f"{refused.status} {refused.headers['Retry-After']}")
-
-        await asyncio.gather(*(upload() for _ in range(MAX_CHECKS + MAX_WAITING + 3)))
-        return most, codes
-
-    assert asyncio.run(run()) == (MAX_CHECKS, ["429 10"] * 3)

@@ -4,7 +4,7 @@ Streams of results as HTTP answers.
 """
 
 from collections.abc import AsyncIterator, Callable
-from contextlib import AsyncExitStack, aclosing
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, aclosing
 from typing import Any
 
 from fastapi import APIRouter, WebSocket
@@ -129,9 +129,14 @@ async def make_clip(request: HttpRequest) -> StreamingResponse:
         return await _answer(request, _parse(await request.body()), {})
     async with AsyncExitStack() as stack:
         form = await stack.enter_async_context(request.form(max_files=len(FILES), max_fields=4))
-        folder = await stack.enter_async_context(upload_folder(service_state(request).settings))
+        folder = await stack.enter_async_context(_folder(request))
         clip, files = await _read_form(form, folder)
         return await _answer(request, clip, files, stack.pop_all())  # the files are read until the clip is complete
+
+
+def _folder(request: HttpRequest) -> "AbstractAsyncContextManager[UploadFolder]":
+    state = service_state(request)
+    return upload_folder(state.settings, state.decoders, request.state.key.name)
 
 
 def _parse(body: bytes | str) -> ClipRequest:

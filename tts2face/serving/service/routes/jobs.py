@@ -82,7 +82,7 @@ async def build_talker(request: HttpRequest, idempotency_key: IdempotencyKey = N
     require_scope(request, JOB_KINDS[TALKER].scope, "recordings of talkers")
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         raise RefusedError(422, "invalid_request", "send a form (multipart/form-data) with the parts job and video")
-    async with service_state(request).video_checks:
+    with service_state(request).decoders.receiving(request.state.key.name):
         return await _queue(request, idempotency_key, {TALKER: JOB_KINDS[TALKER]})
 
 
@@ -107,7 +107,7 @@ async def _queue(request: HttpRequest, idempotency_key: str | None, kinds: Mappi
             state.limits.check_speech(key)
         if asked.webhook is not None:
             check_webhook(asked.webhook, state.settings)
-        folder = await stack.enter_async_context(upload_folder(state.settings))
+        folder = await stack.enter_async_context(upload_folder(state.settings, state.decoders, key.name))
         order = JobOrder(state, key, _parse(kind.model, json.dumps(asked.request)), Upload(folder))
         await _add_files(kind, order, form)
         content = await kind.prepare(order)

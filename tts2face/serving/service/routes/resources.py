@@ -114,7 +114,9 @@ def _add_picture(kind: str) -> None:
         """The face at rest, of a talker or face; of a palette, each style on the head."""
         state = service_state(request)
         if name in shipped_names(kind):
-            return await _picture(request, await shipped_picture(state.settings.data_folder, kind, name))
+            return await _picture(
+                request, await shipped_picture(state.decoders, state.settings.data_folder, kind, name)
+            )
         stored = await _upload(request, kind, name, owner)
         return await _picture(request, await asyncio.to_thread(state.library.picture, stored))
 
@@ -253,7 +255,7 @@ async def store_resource(state: ServiceState, key: ApiKey, sent: Sent) -> Stored
     key = state.key_with(key, "build")
     check_new_name(sent.kind, sent.name)
     await asyncio.to_thread(state.library.check_room, key, sent.kind, sent.name, sent.size)
-    async with upload_folder(state.settings) as folder, state.checks:
+    async with upload_folder(state.settings, state.decoders, key.name) as folder:
         given = folder.path / f"{sent.kind}.upload"
         await sent.save(given)
         checked = await _checked(state, key, sent, folder, given)
@@ -294,10 +296,9 @@ async def find_photo_places(
         shows no face.
     """
     key = state.key_with(key, "build")
-    async with state.checks:
-        with _photo_turn(state, key, counts=False):
-            folder.state(photo, {"name": photo.name})
-            return await folder.places(photo)
+    with _photo_turn(state, key, counts=False):
+        folder.state(photo, {"name": photo.name})
+        return await folder.places(photo)
 
 
 def _photo_turn(state: ServiceState, key: ApiKey, *, counts: bool = True) -> AbstractContextManager[None]:

@@ -97,11 +97,13 @@ class PhotoDialog:
     async def _uploaded(self, event: events.UploadEventArguments) -> None:
         self._forget()
         self._folder = tempfile.TemporaryDirectory(prefix=UPLOAD_PREFIX)
-        page, folder = self._page, UploadFolder(Path(self._folder.name), self._page.studio.state.settings)
+        page, state = self._page, self._page.studio.state
+        key = page.workspace.key
+        folder = UploadFolder(Path(self._folder.name), state.settings, state.decoders, key.name)
         photo = folder.path / "photo"
         await event.file.save(photo)
         with shown_errors(), self._busy("Looking for lips and lids."):
-            shown, self._found = await find_photo_places(page.studio.state, page.workspace.key, folder, photo)
+            shown, self._found = await find_photo_places(state, key, folder, photo)
             self._fit = self._found["fit"]
             self._places.show(shown.read_bytes(), tuple(self._found["size"]), self._fit)
             self._name.value = self._name.value or face_name(event.file.name)
