@@ -8,19 +8,19 @@ Words with phones given in the text (``<phoneme>``), within the normalised text.
 
 import re
 import string
-import unicodedata
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
 
-from lexicon.dictionary import Dictionary, word_key
+from lexicon.dictionary import Dictionary
 from lexicon.errors import InputError
 from lexicon.ipa import IpaPhone
 from lexicon.marked_text import Mark, MarkedText, NodMark, PauseMark, PhoneMark, StyleRun
 from lexicon.pronounce import Word, pronounce, spoken_form
-from lexicon.sentence_ends import MARKS, middle_place, split_chunks, split_phrase
+from lexicon.sentence_ends import MARKS
+from lexicon.sentence_length import n_letters, overlapping_runs, pieces_of_text
 
 _STEM = "qzx"  # of the placeholders of given words during normalisation; not a word of any language
 
@@ -128,14 +128,6 @@ def _pieces_of_phones(written: str, phones: Sequence[PhoneMark], names: Sequence
     yield written[at:]
 
 
-MAX_SENTENCE_CHARACTERS = 300  # longer sentences are split at a clause mark or a space
-# Letters of the spoken form; a sentence with more (of numbers, symbols, given phones) is divided. 65 s of English.
-MAX_SPOKEN_LETTERS = 1000
-_DIGIT_LETTERS, _SYMBOL_LETTERS = 5, 10  # of the words that espeak-ng speaks for one in other languages than English
-FIRST_PIECE_CHARACTERS = 90  # of a text; its first sound and picture wait for this piece (docs/decisions)
-FIRST_SPOKEN_LETTERS = 270  # of this piece, which cannot be divided beside numbers otherwise; 18 s of English
-
-
 @dataclass(frozen=True, slots=True)
 class Phrase:
     """A part of a sentence with one rate, voice and language, synthesised as a whole.
@@ -217,7 +209,7 @@ class Sentence:
 def split_sentences(
     text: MarkedText, language: str, own: Mapping[str, tuple[IpaPhone, ...]] | None = None
 ) -> Iterator[Sentence]:
-    """Sentences that contain words, lazily and in linear time.
+    """Sentences that contain words, lazily and in linear time, each of bounded length with the silence in it.
 
     `own` has the user's pronunciations by `word_key`, which count for the length of a sentence.
 
@@ -234,9 +226,9 @@ def split_sentences(
     others = [mark for mark in placed.marks if not isinstance(mark, PauseMark | PhoneMark)]
     pending: Sentence | None = None
     leading_pause, end, n_used = sum(mark.seconds for mark in pauses[:1] if mark.at == 0), 0, 0
-    for chunk, is_cut in _pieces(placed, language, own or {}):
+    for chunk, is_cut in pieces_of_text(placed, language, own or {}):
         begin, end = end, end + n_letters(chunk)
-        runs = _overlapping_runs(placed.runs, starts, begin, end)
+        runs = overlapping_runs(placed.runs, starts, begin, end)
         inside = pauses[bisect_right(pause_positions, begin) : bisect_right(pause_positions, end)]
         utterances, silence = _phrases(chunk, begin, runs, inside, language)
         given = phones[bisect_left(phone_positions, begin) : bisect_left(phone_positions, end)]
@@ -261,57 +253,9 @@ def split_sentences(
         yield replace(pending, marks=(*pending.marks, *others[n_used:]))
 
 
-def _pieces(placed: MarkedText, language: str, own: Mapping[str, tuple[IpaPhone, ...]]) -> Iterator[tuple[str, bool]]:
-    """Parts of a text that become sentences, and whether the written sentence continues after a part."""
-    phones = [mark for mark in placed.marks if isinstance(mark, PhoneMark)]
-    starts, begin = [mark.at for mark in phones], 0
-    for number, chunk in enumerate(split_chunks(placed.text, MAX_SENTENCE_CHARACTERS, language)):
-        first, rest = split_phrase(chunk, FIRST_PIECE_CHARACTERS) if number == 0 else (chunk, "")
-        waiting = [rest, first] if rest else [first]
-        while waiting:
-            part = waiting.pop()
-            end = begin + n_letters(part)
-            given = phones[bisect_left(starts, begin) : bisect_left(starts, end)]
-            most = MAX_SPOKEN_LETTERS if begin else FIRST_SPOKEN_LETTERS
-            is_long = _spoken_letters(part, language, given, own) > most
-            at = _dividing_place(part, begin, given) if is_long else 0
-            if at > 0:
-                waiting += [part[at:], part[:at].rstrip()]
-                continue
-            begin = end
-            yield part, bool(waiting)
-
-
-def _spoken_letters(
-    chunk: str, language: str, given: Sequence[PhoneMark], own: Mapping[str, tuple[IpaPhone, ...]]
-) -> int:
-    """About the number of letters of the spoken form of a text, where each given phone is a letter."""
-    text = spoken_form(chunk, language)
-    n = len(text) + sum(len(mark.segments) for mark in given)
-    if not language.startswith("en"):
-        n += (_DIGIT_LETTERS - 1) * sum(map(str.isdigit, text))
-        n += (_SYMBOL_LETTERS - 1) * sum(unicodedata.category(character)[0] == "S" for character in text)
-    if own:
-        n += sum(len(own.get(word_key(word.strip(".,;:!?")), ())) for word in text.split())
-    return n
-
-
-def _dividing_place(chunk: str, begin: int, given: Sequence[PhoneMark]) -> int:
-    """Index near the middle of a chunk that is not within a word with given phones; 0 if there is none."""
-    places = [at for at, character in enumerate(chunk) if not character.isspace()]
-    at = begin + bisect_left(places, middle_place(chunk))
-    at = next((mark.at if mark.at > begin else mark.end for mark in given if mark.at < at < mark.end), at)
-    return places[at - begin] if begin < at < begin + len(places) else 0
-
-
 def _continued_phrase(phrase: Phrase, *, is_cut: bool) -> Phrase:
     """A phrase whose spoken form ends with a comma if its sentence continues, so that the voice does not end it."""
     return replace(phrase, text=f"{phrase.text},") if is_cut and phrase.text[-1:].isalnum() else phrase
-
-
-def n_letters(text: str) -> int:
-    """Number of characters other than white space."""
-    return len("".join(text.split()))
 
 
 def text_prefix(written: str, n: int) -> str:
@@ -352,10 +296,6 @@ def index_by_letters(text: MarkedText) -> MarkedText:
             names.append(replace(mark, at=at))
     marks = sorted([*nods.values(), *names, *pauses.values()], key=lambda mark: mark.at)
     return replace(text, runs=tuple(runs.values()), marks=tuple(marks))
-
-
-def _overlapping_runs(runs: tuple[StyleRun, ...], starts: list[int], begin: int, end: int) -> tuple[StyleRun, ...]:
-    return runs[bisect_right(starts, begin) - 1 : bisect_right(starts, end - 1)]
 
 
 def _phrases(

@@ -16,7 +16,8 @@ from lexicon.marked_text import MarkedText
 from lexicon.normalize import split_tokens
 from lexicon.pronounce import Pronunciation, Word, pronounce
 from lexicon.sentence_ends import split_chunks
-from lexicon.sentences import MAX_SENTENCE_CHARACTERS, Phrase, n_letters, pronounce_words, split_sentences
+from lexicon.sentence_length import MAX_SENTENCE_CHARACTERS, n_letters
+from lexicon.sentences import Phrase, pronounce_words, split_sentences
 
 
 def pronounce_marked(

@@ -3,7 +3,8 @@
 import pytest
 
 from lexicon.sentence_ends import split_phrase
-from lexicon.sentences import FIRST_PIECE_CHARACTERS, split_sentences
+from lexicon.sentence_length import FIRST_PIECE_CHARACTERS
+from lexicon.sentences import split_sentences
 from lexicon.ssml import parse_marks
 
 HOUSE = "the garden behind the old house near the river had been green for years"

@@ -7,10 +7,13 @@ from itertools import islice
 import pytest
 
 from lexicon.dictionary import parse_dictionary
+from lexicon.errors import InputError
 from lexicon.g2p import segments_by_rules
+from lexicon.marked_text import PauseMark
 from lexicon.pronounce import spoken_form
 from lexicon.sentence_ends import split_chunks
-from lexicon.sentences import FIRST_SPOKEN_LETTERS, MAX_SPOKEN_LETTERS, Sentence, split_sentences
+from lexicon.sentence_length import FIRST_SPOKEN_LETTERS, LETTERS_PER_S, MAX_SPOKEN_LETTERS, check_silence
+from lexicon.sentences import Sentence, split_sentences
 from lexicon.ssml import parse_marks, parse_ssml
 
 chance = random.Random(1)
@@ -94,3 +97,47 @@ def test_the_first_piece_is_short_also_where_everything_is_a_number(unit: str) -
     first, second = islice(split_sentences(parse_marks(text), "en-us"), 2)
     assert len(first.utterances[0].text) <= FIRST_SPOKEN_LETTERS + 10
     assert len(second.utterances[0].text) <= MOST_VOICED
+
+
+SLOW = '<prosody rate="50%">{}</prosody>'
+PAUSED = (
+    "a<break time='10s'/>" * 1000, "word <break time='9s'/>" * 1000, "Yes. <break time='10s'/>" * 1000,
+    "a<break time='100ms'/>" * 4000, SLOW.format("word " * 3000), SLOW.format("1" * 900),
+    '<prosody rate="50%">a<break time="10s"/></prosody>' * 500,
+    "<phoneme ph='a'>a</phoneme><break time='10s'/>" * 300, "漢字<break time='10s'/>" * 500,
+)  # fmt: skip
+
+
+def letters_of_silence(sentence: Sentence) -> float:
+    """Silence between the phrases of a sentence, in letters that are spoken in its time."""
+    return LETTERS_PER_S * sum(phrase.pause or 0.0 for phrase in sentence.utterances[:-1])
+
+
+@pytest.mark.parametrize("text", PAUSED, ids=range(len(PAUSED)))
+def test_pauses_and_slow_words_count_and_nothing_is_lost(text: str) -> None:
+    """4,200 times `a<break time='10s'/>` were 14 sentences of 50 minutes each, of 3.3 GB."""
+    document = parse_ssml(f"<speak>{text}</speak>")
+    sentences = list(split_sentences(document, "en-us"))
+    for one in sentences:
+        spoken = sum(len(phrase.text) / phrase.rate for phrase in one.utterances)
+        assert spoken + letters_of_silence(one) <= MOST_VOICED
+    assert sum(phrase.pause or 0.0 for one in sentences for phrase in one.utterances) == pytest.approx(
+        sum(mark.seconds for mark in document.marks if isinstance(mark, PauseMark))
+    )
+    written = "".join("".join(phrase.source.split()) for one in sentences for phrase in one.utterances)
+    assert written == "".join(document.text.split())
+
+
+def test_a_sentence_with_pauses_within_the_bound_stays_whole() -> None:
+    text = "We were <break time='9s'/> away <break time='9s'/> a year <break time='9s'/> ago."
+    (only,) = split_sentences(parse_ssml(f"<speak>{text}</speak>"), "en-us")
+    assert [phrase.pause for phrase in only.utterances] == [9.0, 9.0, 9.0, None]
+
+
+def test_a_text_is_refused_whose_pauses_last_longer_than_an_hour_and_its_words() -> None:
+    hour = parse_ssml("<speak>" + "a<break time='10s'/>" * 360 + "</speak>")
+    check_silence(hour)
+    more = parse_ssml("<speak>" + "a<break time='10s'/>" * 4200 + "</speak>")
+    with pytest.raises(InputError, match=r"pauses of the text last 42000 s together, more than 3873 s .an hour"):
+        check_silence(more)
+    check_silence(parse_marks("word " * 20_000 + "[pause 5]" * 1))

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lexicon.errors import InputError
-from lexicon.marked_text import NodMark
+from lexicon.marked_text import MAX_PAUSE_S, NodMark
 from lexicon.sentences import Sentence, index_by_letters, split_sentences
 from lexicon.sequence import SILENCE
 from lexicon.ssml import parse_marks
@@ -17,7 +17,7 @@ from tests.world import LEAD_S, LEVEL, PHONE_S, RATE_HZ, TRAIL_S, LetterVoice
 from tts2face.gestures.elements import Nod, StyleSpan
 from tts2face.request import Request
 from tts2face.session.joining import join_utterances, silent_speech, trim_silence
-from tts2face.session.prepared import check_marks, marked_styles
+from tts2face.session.prepared import check_marks, marked_styles, prepare
 from tts2face.session.speech import (
     MIN_UTTERANCE_GAP_S,
     MarkTime,
@@ -26,6 +26,7 @@ from tts2face.session.speech import (
     speak_sentence,
     voice_in,
 )
+from tts2face.session.speech_stream import SpeechModels, spoken_pieces
 from tts2face.sound.voice_pool import load_voice
 
 
@@ -339,3 +340,25 @@ def test_a_megabyte_of_marks_is_cut_at_once() -> None:
     assert n == 3000
     assert MIN_UTTERANCE_GAP_S < 0.06
     assert isinstance(next(split_sentences(parse_marks("a"), "en-us")), Sentence)
+
+
+def test_silence_that_adds_up_over_punctuation_comes_in_parts() -> None:
+    """It was one sentence with all of it: `a. . <break/> . <break/>` has as much silence as anybody writes."""
+    text = f"[pause 8] . [pause 8] . [style:delighted]one. {'. [pause 9.5] ' * 20}. two.[/style]"
+    fps = 29.97
+    prepared = prepare(Request(text=text, fps=fps, lead=None))
+    voice = LetterVoice()
+    pieces = list(spoken_pieces(prepared, SpeechModels(lambda name, language: voice)))
+    assert max(piece.speech.waveform.duration for piece in pieces) < 2 * MAX_PAUSE_S + 2.0
+    assert [piece.text for piece in pieces if piece.text] == [". one.", ". two."]
+    silence = sum(piece.speech.waveform.duration for piece in pieces) - 6 * PHONE_S - 2 * (LEAD_S + TRAIL_S)
+    assert silence == pytest.approx(16.0 + 190.0, abs=len(pieces) / fps)
+    begins = np.cumsum([0, *(len(piece.clip.motion) for piece in pieces)]) / float(prepared.fps)
+    assert [piece.begin for piece in pieces] == pytest.approx([*begins[:-1]])
+    for first, piece in zip(begins, pieces, strict=False):  # sound and picture stay together
+        end = first + len(piece.clip.motion) / float(prepared.fps)
+        n_samples = round(end * RATE_HZ) - round(first * RATE_HZ)
+        assert len(piece.speech.waveform.samples) == pytest.approx(n_samples, abs=1)
+    assert sum(piece.n_steps for piece in pieces) == sum(one.n_characters for one in prepared.sentences())
+    styled = [piece for piece in pieces if piece.begin > 16.0]
+    assert all(piece.timeline.spans for piece in styled)  # also in the silence between its sentences

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from lexicon.normalize import canonical_text
 from lexicon.pronounce import spoken_form
-from lexicon.sentences import n_letters, text_prefix
+from lexicon.sentence_length import n_letters
+from lexicon.sentences import text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, enforce_increasing
 from tts2face.sound.pauses import speech_onset
 from tts2face.types import Speech, Waveform, concatenate_speech, first_sample

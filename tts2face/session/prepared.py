@@ -14,6 +14,7 @@ from lexicon.inputs import check_fields, is_file
 from lexicon.ipa import IpaPhone
 from lexicon.languages import check_readable, language_code
 from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS, MarkedText
+from lexicon.sentence_length import check_silence
 from lexicon.sentences import Sentence, split_sentences
 from lexicon.sequence import SILENCE, PhoneSequence
 from lexicon.ssml import parse_marks
@@ -63,6 +64,7 @@ def check_marks(text: MarkedText, request: Request) -> None:
     if text.language is not None and _primary(language_code(text.language)) != _primary(request.language):
         raise InputError(f"the text names the language {text.language}, not {request.language}; choose one of them")
     marked_styles(text)
+    check_silence(text)
     for what, marked, requested, (low, high) in (
         ("speed", {run.rate for run in text.runs}, request.rate, RATE_LIMITS),
         ("loudness", {run.volume for run in text.runs}, request.volume, VOLUME_LIMITS),

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from lexicon.marked_text import Mark, MarkedText, NameMark, NodMark, StyleRun
+from lexicon.marked_text import MAX_PAUSE_S, Mark, MarkedText, NameMark, NodMark, StyleRun
 from lexicon.pronounce import PAUSES_S
-from lexicon.sentences import Phrase, Sentence, index_by_letters, n_letters
+from lexicon.sentence_length import n_letters
+from lexicon.sentences import Phrase, Sentence, index_by_letters
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.gestures.elements import Nod, StyleSpan, span_weights
 from tts2face.gestures.timeline import Timeline, parse_style
@@ -252,6 +253,34 @@ def silent_sentences(
         steps = n_steps * last // n_frames - n_steps * first // n_frames
         silence, begin, end = silent_frames(first, last, rate, fps), float(first / fps), float(last / fps)
         yield SpokenSentence(silence, timeline.restrict(begin, end).shift(-begin), (), silence.waveform), steps, ""
+
+
+def without_long_silence(sentence: Sentence) -> tuple[Sentence, float, float]:
+    """A sentence with at most `MAX_PAUSE_S` of silence at either end, and the seconds beyond it before and after.
+
+    Pauses between words add up only where nothing but punctuation is between them.
+    """
+    *others, last = sentence.utterances
+    before = max(sentence.leading_pause - MAX_PAUSE_S, 0.0)
+    after = max((last.pause or 0.0) - MAX_PAUSE_S, 0.0)
+    if not (before or after):
+        return sentence, 0.0, 0.0
+    kept = replace(last, pause=None if last.pause is None else last.pause - after)
+    shorter = replace(sentence, utterances=(*others, kept), leading_pause=sentence.leading_pause - before)
+    return shorter, before, after
+
+
+def long_silence(
+    seconds: float, fps: Fraction, timeline: Timeline, rate: int
+) -> Iterator[tuple[SpokenSentence, int, str]]:
+    """`silent_sentences` of some seconds within a text, if there are any, without progress of their own.
+
+    The styles without an end in the `timeline` of the sentence before it go on.
+    """
+    timeline = Timeline(spans=tuple(replace(one, start=0.0) for one in timeline.spans if one.end == math.inf))
+    for spoken, n_steps, text in silent_sentences(seconds, fps, 0, timeline, rate) if seconds > 0.0 else ():
+        sound = spoken.sound.part(0, len(spoken.sound.samples) - 1)  # padded: its frames may have one sample less here
+        yield replace(spoken, speech=Speech.without_phones(sound), sound=sound), n_steps, text
 
 
 def resolve_marks(

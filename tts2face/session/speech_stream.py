@@ -22,9 +22,11 @@ from tts2face.session.speech import (
     MarkTime,
     SpokenSentence,
     Voices,
+    long_silence,
     sentence_sound,
     silent_sentences,
     speak_sentence,
+    without_long_silence,
 )
 from tts2face.types import (
     Clip,
@@ -210,11 +212,14 @@ def speak_sentences(
             lambda made: made.sound.samples.nbytes + made.speech.waveform.samples.nbytes,
         )
 
-    for sentence in prepared.sentences():
+    for whole in prepared.sentences():
+        sentence, before_s, after_s = without_long_silence(whole)
         text = " ".join(phrase.source for phrase in sentence.utterances)
+        yield from long_silence(before_s, fps, Timeline(), voice.sample_rate)
         spoken = speak(sentence)
         if has_phones:
             phones = correct_phones(spoken.speech.phones, text, said[text], prepared.edges)
             spoken = replace(spoken, speech=replace(spoken.speech, phones=phones))
         said[text] += 1
         yield spoken, sentence.n_characters, text
+        yield from long_silence(after_s, fps, spoken.timeline, voice.sample_rate)

@@ -11,9 +11,10 @@ from typing import Any
 import pytest
 
 from lexicon.errors import DataError, InputError
+from tts2face.serving.service import decoders
 from tts2face.serving.service.access import KeyRing
 from tts2face.serving.service.keys import LOCAL_KEY
-from tts2face.serving.studio import recording_work, reports, styles, takes
+from tts2face.serving.studio import recording_work, reports, styles
 from tts2face.serving.studio.recording_work import Recordings
 from tts2face.serving.studio.recordings import GOOD, REFUSED, WEAK, RecordingStore
 from tts2face.serving.studio.renders import Renders
@@ -235,7 +236,7 @@ class Host(SimpleNamespace):
 
     def __init__(self, folder: Path) -> None:
         library = SimpleNamespace(resolve=lambda key, kind, name: (f"/models/{name}", {}))
-        state = SimpleNamespace(keys=KeyRing(None), library=library)
+        state = SimpleNamespace(keys=KeyRing(None), library=library, decoders=decoders.Decoders())
         super().__init__(folder=folder, work=WorkList(folder), state=state, open_projects=lambda key: [])
 
 
@@ -300,7 +301,7 @@ def make_take(folder: Path) -> Path:
 
 
 def test_the_check_of_a_take_for_a_style_goes_on(tmp_path, monkeypatch):
-    monkeypatch.setattr(styles, "run_take_tool", Tool({"findings": [], "seconds": 20.0}))
+    monkeypatch.setattr(decoders, "run_take_tool", Tool({"findings": [], "seconds": 20.0}))
 
     async def begin(host: Host) -> None:
         await Styles(host).add_take(LOCAL_KEY, make_take(tmp_path), ".webm")
@@ -314,7 +315,7 @@ def test_the_check_of_a_take_for_a_style_goes_on(tmp_path, monkeypatch):
 
 def test_the_making_of_a_style_goes_on(tmp_path, monkeypatch):
     tool = Tool({"seconds": 20.0})
-    monkeypatch.setattr(styles, "run_take_tool", tool)
+    monkeypatch.setattr(decoders, "run_take_tool", tool)
     learnt = PaletteStore(tmp_path).read(OWNER)
     recorded = next(iter(learnt.styles))
 
@@ -341,7 +342,7 @@ def test_the_making_of_a_style_goes_on(tmp_path, monkeypatch):
 
 
 def test_the_reading_of_a_take_goes_on_and_its_video_is_deleted(tmp_path, monkeypatch):
-    monkeypatch.setattr(takes, "run_take_tool", Tool({"seconds": 3.0, "has_sound": True}))
+    monkeypatch.setattr(decoders, "run_take_tool", Tool({"seconds": 3.0, "has_sound": True}))
     checked = SimpleNamespace(check_scope=lambda key: None)
 
     async def begin(host: Host) -> None:

@@ -152,9 +152,10 @@ class Decoders:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     async def make_avatar(self, key: str, order: Mapping[str, Any]) -> None:
-        """Make the head of a person in a photo, which takes all of the memory; errors as `decode`."""
+        """Make the head of a person in the photo ``take``, which takes all of the memory; errors as `decode`."""
+        shown = Path(order["take"]).name
         async with self._uploads.turn(key):
-            with while_client_stays(), _refusing("the photo", AVATAR_S):
+            with while_client_stays(), _refusing("the photo", AVATAR_S, shown):
                 async with self._memory.reserved(MEMORY_BYTES), asyncio.timeout(AVATAR_S):
                     await run_take_tool("avatar", order, lambda **_: None, cpu_s=AVATAR_CPU_S)
 
@@ -185,8 +186,8 @@ class Decoders:
 
 
 @contextmanager
-def _refusing(name: str, timeout_s: float) -> Iterator[None]:
-    """Refuse a file whose child refuses it, ends, or takes too long."""
+def _refusing(name: str, timeout_s: float, hidden: str = "") -> Iterator[None]:
+    """Refuse a file whose child refuses it, ends, or takes too long; its name `hidden` is not shown."""
     try:
         yield
     except TimeoutError as late:
@@ -196,7 +197,7 @@ def _refusing(name: str, timeout_s: float) -> Iterator[None]:
     except ChildEndedError as ended:
         raise _refused(name, "it needs too much memory or time") from ended
     except (InputError, DataError) as refused:
-        raise _refused(name, str(refused)) from refused
+        raise _refused(name, str(refused).replace(hidden, name) if hidden else str(refused)) from refused
 
 
 def _refused(name: str, reason: str) -> RefusedError:
