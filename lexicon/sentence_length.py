@@ -21,6 +21,11 @@ FIRST_SPOKEN_LETTERS = 270  # of this piece, which cannot be divided beside numb
 MAX_SILENCE_S = 3600.0  # of the marked pauses of a text, besides the time of its words
 
 
+def marked_silence_s(text: MarkedText) -> float:
+    """Seconds of all marked pauses of a text."""
+    return sum(mark.seconds for mark in text.marks if isinstance(mark, PauseMark))
+
+
 def check_silence(text: MarkedText) -> None:
     """Refuse a text whose marked pauses last longer than its words and `MAX_SILENCE_S` besides.
 
@@ -29,7 +34,7 @@ def check_silence(text: MarkedText) -> None:
     InputError
         They do: a few characters would make hours of a clip.
     """
-    silence_s = sum(mark.seconds for mark in text.marks if isinstance(mark, PauseMark))
+    silence_s = marked_silence_s(text)
     most_s = MAX_SILENCE_S + n_letters(text.text) / LETTERS_PER_S
     if silence_s > most_s:
         raise InputError(

@@ -166,6 +166,31 @@ def test_twenty_clips_with_small_files_of_large_pictures_share_the_memory(
     assert 0 < most[1] <= UPLOADS.running
 
 
+def test_videos_of_the_studio_have_places_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their tool may take 6 GB and half an hour: so many at a time as there are keys would take all of a machine."""
+    running: list[str] = []
+    most: list[tuple[int, int]] = []
+
+    async def tool(kind: str, order: Mapping[str, Any], *_: Any, **__: Any) -> Mapping[str, Any]:
+        running.append(order["key"])
+        most.append((len(running), max(Counter(running).values())))
+        await settle()
+        running.remove(order["key"])
+        return {}
+
+    monkeypatch.setattr(decoders, "run_take_tool", tool)
+
+    async def run() -> None:
+        queue = Decoders()
+        keys = [f"key{number % 5}" for number in range(20)]
+        reading = [queue.read_take(key, "check", {"key": key}, lambda **_: None) for key in keys]
+        async with queue._uploads.turn("key0"):
+            await asyncio.gather(*reading)
+
+    asyncio.run(run())
+    assert max(most) == (2, 1)
+
+
 def test_a_picture_is_measured_by_its_head_and_format(tmp_path: Path) -> None:
     def measure(content: bytes) -> Any:
         (tmp_path / "given").write_bytes(content)

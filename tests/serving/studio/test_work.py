@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import os
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from pathlib import Path
@@ -196,6 +197,29 @@ def test_work_in_a_folder_is_forgotten_with_it(tmp_path):
         await work.close()
 
     asyncio.run(check())
+
+
+def test_the_next_server_keeps_the_order_whatever_the_clock_was(tmp_path):
+    async def begin() -> None:
+        work = make_list(tmp_path, forever)
+        for name in "cab":
+            add(work, tmp_path, name)
+        await work.close()
+
+    async def serve() -> list[str]:
+        work = make_list(tmp_path, forever)
+        await work.resume()
+        if not (tmp_path / "d.json").exists():
+            add(work, tmp_path, "d")
+        found = [one.id for one in work.of("thing", OWNER)]
+        await work.close()
+        return found
+
+    asyncio.run(begin())
+    tomorrow = (tmp_path / "c.json").stat().st_mtime + 86_400.0
+    os.utime(tmp_path / "c.json", (tomorrow, tomorrow))  # by a clock that was a day ahead
+    assert asyncio.run(serve()) == ["c", "a", "b", "d"]
+    assert asyncio.run(serve()) == ["c", "a", "b", "d"]
 
 
 def test_the_next_server_goes_on_and_gives_up_after_some_tries(tmp_path):

@@ -6,6 +6,7 @@ Jobs of kind ``talker``: what clients send, and the checks before they are queue
 import asyncio
 import uuid
 from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,6 +14,9 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.datastructures import UploadFile
 
+from lexicon.errors import InputError
+from lexicon.sentence_length import marked_silence_s
+from lexicon.ssml import parse_marks
 from tts2face.models.consent import states_consent
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
@@ -51,6 +55,8 @@ def expected_speech_s(order: JobOrder) -> float:
     options = order.options
     text = getattr(options, "text", "")
     silent_s = sum(getattr(options, name, None) or 0.0 for name in ("idle", "listen"))
+    with suppress(InputError):  # of a text with wrong marks, which makes nothing
+        silent_s += marked_silence_s(parse_marks(text))
     return len(text) / CHARACTERS_PER_S + silent_s + CUE_S * order.upload.n_cues
 
 

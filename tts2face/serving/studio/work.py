@@ -11,6 +11,7 @@ import shutil
 import time
 from collections import defaultdict
 from collections.abc import Awaitable, Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ from tts2face.serving.work.table import CANCELLED, DONE, FAILED, OPEN_STATES, RU
 from tts2face.storage.files import translate_disk_errors, write_atomically
 
 MAX_TRIES = 3  # of a piece of work by servers that ended meanwhile
+NUMBER = "number"  # of an order
 ID = 12 * "[0-9a-f]"  # pattern of the name of an order that has its folder with others
 
 
@@ -44,6 +46,7 @@ class BackgroundWork:
     files: tuple[Path, ...] = ()  # files and folders that it makes; removed with it, and when it does not get done
     created: float = field(default_factory=time.time)  # seconds since 1970; also the time of the order
     tries: int = 0  # how often it was begun
+    number: int = 0  # in which it was queued, by whichever server: no clock tells the order
     task: "asyncio.Task[None] | None" = field(default=None, repr=False)
     on_change: Callable[["BackgroundWork"], None] = field(default=lambda _: None, repr=False)
 
@@ -93,6 +96,7 @@ class WorkList:
         self._kinds: dict[str, WorkKind] = {}
         self._all: dict[Path, BackgroundWork] = {}  # by their orders
         self._turns: dict[tuple[str, str], asyncio.Semaphore] = {}  # of kinds and owners
+        self._last = 0  # number of the work that was queued last
         self.listeners: defaultdict[tuple[str, str], set[Callable[[], None]]] = defaultdict(set)  # as `_turns`
 
     def register(self, kind: WorkKind) -> None:
@@ -114,7 +118,7 @@ class WorkList:
             raise InputError(rules.busy)
         if sum(one.is_open for one in self.of(kind, owner)) >= rules.max_open:
             raise InputError(f"{rules.max_open} {rules.noun} are being made already; wait, or cancel one")
-        work = BackgroundWork(kind, owner, order, content)
+        work = BackgroundWork(kind, owner, order, content, number=self._last + 1)
         self._prepare(work)
         with translate_disk_errors(order):
             order.parent.mkdir(parents=True, exist_ok=True)
@@ -125,7 +129,8 @@ class WorkList:
     async def resume(self) -> None:
         """Queue again what an earlier server did not finish, the oldest first of each kind."""
         for kind in self._kinds.values():
-            for order in await asyncio.to_thread(_oldest_first, self._folder.glob(kind.orders)):
+            for number, order in await asyncio.to_thread(_oldest_first, self._folder.glob(kind.orders)):
+                self._last = max(self._last, number)
                 self._resume(kind, order)
 
     def get(self, order: Path) -> BackgroundWork | None:
@@ -171,8 +176,8 @@ class WorkList:
         try:
             content = dict(parse_json(read_text(order, LARGEST_JSON_BYTES), order.name))
             owner, tries = str(content.pop("owner")), int(content.pop("tries"))
-            created = order.stat().st_mtime
-            work = BackgroundWork(kind.name, owner, order, content, tries=tries, created=created)
+            created, number = order.stat().st_mtime, _number(content)
+            work = BackgroundWork(kind.name, owner, order, content, tries=tries, created=created, number=number)
             self._prepare(work)
             if tries >= MAX_TRIES:
                 raise InputError(f"{MAX_TRIES} servers ended while it was made")
@@ -190,6 +195,7 @@ class WorkList:
         kind.prepare(work)
 
     def _begin(self, work: BackgroundWork) -> None:
+        self._last = max(self._last, work.number)
         self._all.pop(work.order, None)  # the newest is the last
         self._all[work.order] = work
         work.task = in_background(self._run(work))
@@ -231,13 +237,25 @@ class WorkList:
 
 
 def _write_order(work: BackgroundWork) -> None:
-    order = {"owner": work.owner, "tries": work.tries, **work.content}
+    order = {"owner": work.owner, "tries": work.tries, NUMBER: work.number, **work.content}
     write_atomically(work.order, json.dumps(order, ensure_ascii=False).encode())
     os.utime(work.order, (work.created, work.created))
 
 
-def _oldest_first(orders: Iterable[Path]) -> list[Path]:
-    return sorted(orders, key=lambda order: order.stat().st_mtime)
+def _oldest_first(orders: Iterable[Path]) -> list[tuple[int, Path]]:
+    """Orders with their numbers, the smallest first; 0 for one that cannot be read."""
+    found = []
+    for order in orders:
+        number = 0
+        with suppress(OSError, Tts2faceError, LookupError, TypeError, ValueError):
+            number = _number(dict(parse_json(read_text(order, LARGEST_JSON_BYTES), order.name)))
+        found.append((number, order))
+    return sorted(found)
+
+
+def _number(content: dict[str, Any]) -> int:
+    """Number of an order, which is taken out of its content; 0 for those of earlier versions."""
+    return int(content.pop(NUMBER, 0))
 
 
 def _remove(files: Iterable[Path]) -> None:

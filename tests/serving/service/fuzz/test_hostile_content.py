@@ -34,6 +34,8 @@ __all__ = ["alive", "attacked"]  # fixtures
         ("<?xml version='1.0'?><!DOCTYPE s [<!ENTITY x SYSTEM 'file:///etc/passwd'>]><speak>&x;</speak>", {400}),
         ("<speak>" + "<emphasis> " * 4000 + "Hi." + "</emphasis> " * 4000 + "</speak>", {200, 400}),
         ("<speak><break time='1e9s'/>Hi.</speak>", {400}),
+        ("<speak>" + "a<break time='10s'/>" * 4200 + "</speak>", {400}),
+        ("a [pause 10] " * 7000, {400}),
         ("<speak><prosody rate='1e-9'>Hi.</prosody></speak>", {200, 400}),
     ],
     ids=lambda value: repr(value[:24]) if isinstance(value, str) else "",
