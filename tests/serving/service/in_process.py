@@ -177,6 +177,8 @@ def decoding_here() -> Iterator[None]:
 class DecoderHere:
     """A decoder of a program that works in a thread of this process."""
 
+    pid = None
+
     def __init__(self, program: Program) -> None:
         self._program = program
 

@@ -229,6 +229,19 @@ def test_no_format_takes_more_memory_than_is_said(tmp_path: Path, name: str) -> 
     assert taken <= 1.1 * expected + (8 << 20)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="other processes have limits on Linux only")
+def test_a_decoder_takes_no_more_than_is_reserved_for_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever a file makes of its head: here the decoder gets 100 MB too little."""
+    (tmp_path / "given").write_bytes(one_colour("PNG", 6300))
+    asked = PICTURE, tmp_path / "given", tmp_path / "made", 4e7
+    asyncio.run(Decoders().decode("a", asked, "it", 120.0))
+    with Image.open(tmp_path / "made") as made:
+        assert made.size == (6300, 6300)
+    monkeypatch.setattr(decoders, "ADDRESS_BYTES", -(100 << 20))
+    with pytest.raises(RefusedError, match=r"it cannot be used: it (is no picture that can be decoded|needs too much)"):
+        asyncio.run(Decoders().decode("a", asked, "it", 120.0))
+
+
 def test_a_picture_that_takes_too_much_memory_is_refused_before_it_is_decoded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -29,7 +29,8 @@ def idle(data: Path) -> Iterator[Clients]:
     keys = data / "keys.toml"
     scopes = {"ann": ["speak"], "bob": ["speak"], "boss": ["speak", "admin"], "smith": ["build"]}
     secrets = {name: add_key(keys, name, found) for name, found in scopes.items()}
-    secrets["quick"] = add_key(keys, "quick", ["speak"], speech_s_per_day=10)
+    for name in ("quick", "pausing"):
+        secrets[name] = add_key(keys, name, ["speak"], speech_s_per_day=10)
     settings = ServiceSettings(
         data=data, keys=keys, workers=0, job_waiting=3, job_cues=3, job_files=2, job_s=60, text_characters=500,
         webhook_hosts=(HOST,), webhook_secret="x" * 32,
@@ -153,3 +154,5 @@ def test_jobs_use_the_seconds_of_speech_too(idle: Clients) -> None:
     answers = [idle["quick"].post("/v1/jobs", json=job) for _ in range(2)]
     assert [answer.status_code for answer in answers] == [202, 429], answers[0].text
     assert int(answers[1].headers["retry-after"]) > 3600
+    pauses = {"kind": "clip", "request": {"text": "a [pause 9] b [pause 9] c"}}  # 2 s of letters
+    assert [idle["pausing"].post("/v1/jobs", json=pauses).status_code for _ in range(2)] == [202, 429]

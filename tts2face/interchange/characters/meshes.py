@@ -23,6 +23,7 @@ from tts2face.interchange.characters.character import (
 )
 from tts2face.interchange.gltf.container import Fields
 from tts2face.interchange.gltf.reader import DRACO, GltfFile, NodeTree
+from tts2face.storage.media_files import MAX_DECODING_BYTES, decoding_bytes
 
 TRIANGLES, STRIP, FAN = 4, 5, 6
 MAX_VERTICES = 2_000_000  # of all meshes; a film character has 200,000
@@ -285,7 +286,7 @@ def decode_image(content: bytes, place: str) -> NDArray[np.uint8]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             with Image.open(io.BytesIO(content), formats=FORMATS) as image:
-                if image.width * image.height > MAX_IMAGE_PIXELS:
+                if image.width * image.height > MAX_IMAGE_PIXELS or decoding_bytes(image) > MAX_DECODING_BYTES:
                     raise DataError(f"{place}: has {image.width} x {image.height} pixels; use 4096 x 4096 or less")
                 image.draft("RGB", (MAX_IMAGE_SIDE, MAX_IMAGE_SIDE))
                 pixels = image.convert("RGBA")

@@ -9,7 +9,7 @@ import errno
 import os
 from collections import Counter, OrderedDict, deque
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,10 +20,11 @@ from tts2face.processes.parent import ChildEndedError
 from tts2face.processes.tools import run_take_tool
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import while_client_stays
-from tts2face.serving.work.uploaded_file import DECODE, MEASURE, program
+from tts2face.serving.work.uploaded_file import DECODE, MEASURE, PICTURE, program
 
 MAX_REASON = 300  # characters
 MEMORY_BYTES = 1 << 30  # of what is decoded at the same time; the largest picture of the default settings takes .8 GB
+ADDRESS_BYTES = 256 << 20  # of a child with its libraries, most of which take no memory; 149 MB measured
 AVATAR_CPU_S, AVATAR_S = 240, 300.0  # the head of a person takes 15 s
 RETRY_S = 10
 
@@ -145,8 +146,10 @@ class Decoders:
         async with self._uploads.turn(key):
             with while_client_stays(), _refusing(name, timeout_s):
                 async with started(program(kind)) as child:
-                    measured = (await child.call(MEASURE, order, timeout_s=timeout_s)).content
-                    async with self._memory.reserved(measured["memory_bytes"]):  # the time counts from then on
+                    n_bytes = (await child.call(MEASURE, order, timeout_s=timeout_s)).content["memory_bytes"]
+                    async with self._memory.reserved(n_bytes):  # the time counts from then on
+                        if kind == PICTURE:
+                            _limit_memory(child.pid, n_bytes)
                         answer = (await child.call(DECODE, order, timeout_s=timeout_s)).content
         if answer["is_full"]:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -183,6 +186,16 @@ class Decoders:
             yield
         finally:
             self._bodies[key] -= 1
+
+
+def _limit_memory(pid: int | None, n_bytes: int) -> None:
+    """Let a child take no more memory than is reserved for it, where the system has limits of other processes."""
+    with suppress(ImportError, AttributeError, OSError):
+        import resource
+
+        if pid is not None:
+            limit = n_bytes + ADDRESS_BYTES
+            resource.prlimit(pid, resource.RLIMIT_AS, (limit, limit))
 
 
 @contextmanager

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 SOUND, PICTURE, VIDEO, DRAW, SUBTITLES, PLACES = "sound", "picture", "video", "draw-", "subtitles-", "places"
 LIMITS = ProcessLimits(memory_bytes=2 << 30, cpu_s=60, file_bytes=1 << 30, n_files=64)
+MEDIA_BYTES = 1 << 30  # of addresses of a reader of sounds, videos and subtitles; 265 MB measured
 RESOURCE_CPU_S = 180  # a resource with its picture takes 3 to 5 s, at the first time with the compilation of kernels
 SOUND_FORMATS = "wav,mp3,ogg,flac,aac,mov,mp4,m4a,matroska,webm,aiff,caf"
 # Formats of recordings, with the endings under which other readers recognise them.
@@ -253,7 +254,9 @@ def _decode(call: Call) -> dict[str, Any]:
 
 def program(kind: str) -> Program:
     """The child that decodes a file of a kind."""
-    limits = replace(LIMITS, cpu_s=RESOURCE_CPU_S) if _is_resource(kind) else LIMITS
+    limits = LIMITS if kind == PICTURE else replace(LIMITS, memory_bytes=MEDIA_BYTES)
+    if _is_resource(kind):
+        limits = replace(LIMITS, cpu_s=RESOURCE_CPU_S)
     return Program(f"{__name__}:HANDLERS", limits, niceness=LOW_PRIORITY)
 
 
