@@ -150,3 +150,29 @@ def test_websockets_get_a_message_and_the_code_of_a_restart(own: RunningService)
     assert asyncio.run(run()) == [([("draining", "the service is shutting down; connect again")], 1012)] * 2
     assert own.process.wait(60) == 0
     assert not any(event["event"] == "defect" for event in own.events())
+
+
+HELD_PROGRAM = """
+import sys, threading
+from concurrent.futures import ThreadPoolExecutor
+from cli.main import main
+from tts2face.serving.service import pool, server
+
+pool.PROGRAM = "tests.serving.service.table_synthesis:handlers"
+server.EXIT_S = 0.5
+ThreadPoolExecutor(1).submit(threading.Event().wait)  # is joined at the exit of Python
+main()
+"""
+
+
+def test_a_drained_server_ends_whatever_its_threads_wait_for() -> None:
+    own = ServeProcess(environment={"TTS2FACE_SERVE_WORKERS": "0"}, program=("-c", HELD_PROGRAM))
+    try:
+        own.wait_until_ready()
+        processes = children(own.process.pid)
+        own.process.send_signal(signal.SIGTERM)
+        assert own.process.wait(60) == 0
+        wait_until_gone(processes)
+    finally:
+        own.process.kill()
+        own.close()
