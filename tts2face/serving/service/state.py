@@ -56,7 +56,7 @@ class ServiceState:
         self.tracing = tracing_from_environment(os.environ)
         self.is_draining = False
         self.exchanges: set[Exchange] = set()  # requests that are being answered
-        self._ending: list[asyncio.Task[None]] = []  # those of keys that were removed
+        self._ending: set[asyncio.Task[None]] = set()  # those of keys that were removed
         self.running: set[Exchange] = set()  # those for which a draining service waits
 
     def reload_keys(self) -> None:
@@ -72,9 +72,12 @@ class ServiceState:
         except Tts2faceError as error:
             log_event("keys not reloaded", level=logging.ERROR, reason=str(error))
         losses = [(one, self.keys.loss_of(one.key)) for one in self.exchanges if one.key is not None]
-        self._ending = [in_background(one.revoke(loss)) for one, loss in losses if loss is not None]
+        ending = {in_background(one.revoke(loss)) for one, loss in losses if loss is not None}
+        for task in ending:
+            task.add_done_callback(self._ending.discard)
+        self._ending |= ending
         if names is not None:
-            log_event("keys reloaded", keys=list(names), ended=len(self._ending))
+            log_event("keys reloaded", keys=list(names), ended=len(ending))
         return None
 
     def speaking_key(self, key: ApiKey) -> ApiKey:
