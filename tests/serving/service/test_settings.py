@@ -10,9 +10,9 @@ import pytest
 from cli.main import run
 from lexicon.errors import DataError, InputError
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.job_service import check_webhook
 from tts2face.serving.service.keys import add_key, find_key, read_keys
 from tts2face.serving.service.settings import ServiceSettings, read_settings
+from tts2face.serving.service.webhooks import check_webhook
 
 
 def test_flags_win_over_the_environment_and_the_file(tmp_path: Path) -> None:

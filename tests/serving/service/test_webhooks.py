@@ -172,6 +172,26 @@ def test_a_host_that_never_answers_delays_no_other_host(
         assert len(silent.connections) == 3
 
 
+def test_a_host_that_was_taken_out_of_the_settings_is_told_no_more(tmp_path: Path, client: JobClient) -> None:
+    """Also of jobs that were queued before; if it comes back, it is told then."""
+    with Receiver() as removed, Receiver() as kept:
+        first = end_job(tmp_path, client, "ann", f"http://{removed.host}/")
+        second = end_job(tmp_path, client, "ann", f"http://{kept.host}/")
+
+        async def run() -> None:
+            async with sending(client, kept.host):
+                await asyncio.to_thread(eventually, lambda: [one for one, _ in kept.messages] == [second])
+                await asyncio.to_thread(eventually, lambda: tries(first) == 1)
+
+        def tries(name: str) -> int:
+            record = client.table.get(name)
+            assert record is not None
+            return record.webhook_tries
+
+        asyncio.run(run())
+        assert removed.messages == []
+
+
 @pytest.mark.parametrize("drip", [b"H", b""], ids=["drips", "silent"])
 def test_a_server_ends_while_a_receiver_holds_a_call(tmp_path: Path, client: JobClient, drip: bytes) -> None:
     with Silent(drip) as silent:
