@@ -24,7 +24,7 @@ _ACRONYMS = frozenset({"AIDS", "SIM", "RAM", "ROM", "PIN", "GIF", "LED", "ZIP", 
 CAPITALISED_WORDS = word_set(
     "THE AND NOT YOU ARE FOR BUT ALL NO YES SO GO OF TO IN ON IS BE AT AN AS BY DO HE ME MY WE IF UP WAS CAN HIS HER "
     "OUR NEW NOW ONE TWO SIX TEN WHO WHY HOW GET GOT SEE SAY SHE HIM ITS LET MAN MEN DAY WAY OLD BIG BAD RED TOP WIN "
-    "WON RUN HOT OUT OFF TOO ANY END FUN"
+    "WON RUN HOT OUT OFF TOO ANY END FUN HI OH AH HEY WOW BYE MOM DAD SIR"
 )
 _VOICELESS_ENDINGS = frozenset({"p", "t", "k", "f", "θ"})
 _SIBILANTS = frozenset({"s", "z", "ʃ", "ʒ", "tʃ", "dʒ"})
@@ -88,6 +88,12 @@ def add_s(base: tuple[IpaPhone, ...]) -> tuple[IpaPhone, ...]:
     if last in _SIBILANTS:
         return (*base, IpaPhone("ɪ", is_syllabic=True), IpaPhone("z"))
     return (*base, IpaPhone("s" if last in _VOICELESS_ENDINGS else "z"))
+
+
+def is_read_by_letters(word: str) -> bool:
+    """Whether CMUdict reads a word as the names of its letters: FBI, TV."""
+    found, letters = cmudict_lookup(word), _spell_letters(word) if word.isascii() and word.isalpha() else None
+    return found is not None and letters is not None and [s.phone for s in found] == [s.phone for s in letters]
 
 
 def is_initialism(word: str) -> bool:

@@ -373,7 +373,8 @@ def _sentence_segments(
 def _is_letter(forms: Sequence[str], marks: Sequence[str], at: int) -> bool:
     """Whether a single capital is the name of a letter (plan A) rather than the article."""
     following = forms[at + 1] if at + 1 < len(forms) else ""
-    return forms[at].isupper() and not (forms[at] == "A" and not marks[at] and following[:1].islower())
+    is_before_word = following[:1].islower() or (len(following) > 1 and is_initialism(following))  # a UFO
+    return forms[at].isupper() and not (forms[at] == "A" and not marks[at] and is_before_word)
 
 
 def _reduce_function_words(
@@ -396,16 +397,8 @@ def _reduce_function_words(
     return spoken
 
 
-def _are_all_capitals(texts: Sequence[str]) -> bool:
-    """Whether all words are capitals, as in a heading, rather than initialisms."""
-    long = [text for text in texts if len(text) > 1]
-    return len(long) > 1 and all(text.isupper() for text in long) and any(len(text) > 3 for text in long)
-
-
 def _lookup_forms(texts: Sequence[str]) -> list[str]:
     """Lookup forms of words: words in capitals that are not initialisms become lower case."""
-    if _are_all_capitals(texts):
-        return [text.lower() if len(text) > 1 else text for text in texts]
     padded = ["", *texts, ""]
     return [
         text.lower() if len(text) > 1 and CAPITALISED_WORDS & {before, text, after} and text.isupper() else text

@@ -10,17 +10,18 @@ from lexicon.languages import language_scripts, letter_name, letter_script
 from lexicon.sentence_ends import MARKS, is_abbreviated, starts_sentence
 from lexicon.written_forms import cardinal_words, digit_words, number_words, ordinal_words, roman_value, year_words
 
-_NEVER_LETTERS = frozenset({"II", "III", "VII", "VIII"})  # Roman numerals that abbreviate nothing
+NEVER_LETTERS = frozenset({"II", "III", "VII", "VIII"})  # Roman numerals that abbreviate nothing
+TITLES = frozenset({"title", "doctor", "saint"})  # contexts of abbreviations before names
 _BEFORE_YEAR = word_set(
     "in since of by from until till before after during early late mid circa around year copyright to and between "
     "summer winter spring fall autumn class"
 )
-_BEFORE_ROMAN = word_set(
+BEFORE_ROMAN = word_set(
     "chapter part volume act scene section book war phase type level class appendix article figure table episode "
     "season stage grade title rocky unit version schedule group tier bowl fantasy "
     "apollo gemini round"
 )
-_RULERS = word_set(
+RULERS = word_set(
     "henry louis elizabeth george edward charles william james richard mary philip pius benedict paul francis "
     "frederick wilhelm nicholas catherine peter alexander napoleon ramses leo gregory clement innocent urban ivan "
     "ferdinand henri boniface constantine albert margaret"
@@ -138,7 +139,7 @@ def read_plain_number(m: re.Match[str], previous: str) -> str:
 
 def read_initial(m: re.Match[str], previous: str) -> str:
     """The J of J. Smith; a letter that ends a sentence keeps its full stop."""
-    if m.group()[0] in "IVXLCDM" and previous.lower() in _RULERS | _BEFORE_ROMAN:
+    if m.group()[0] in "IVXLCDM" and previous.lower() in RULERS | BEFORE_ROMAN:
         return m.group()
     is_first = not previous or previous in MARKS
     if not is_first and starts_sentence(m.string[m.end() : m.end() + _CONTEXT_AFTER].lstrip()):
@@ -201,9 +202,9 @@ def read_roman_numeral(m: re.Match[str], previous: str) -> str:
     value, before = roman_value(m.group()), previous.lower()
     if value == 1 and not previous[:1].isupper():
         return m.group()
-    if value and before in _RULERS and value < 40:
+    if value and before in RULERS and value < 40:
         return f"the {ordinal_words(value)}"
-    if value and (before in _BEFORE_ROMAN or m.group() in _NEVER_LETTERS):
+    if value and (before in BEFORE_ROMAN or m.group() in NEVER_LETTERS):
         return cardinal_words(value)
     return m.group()
 
@@ -225,7 +226,8 @@ def _keep_full_stop(words: str, m: re.Match[str]) -> str:
 
 def read_abbreviation(m: re.Match[str], previous: str) -> str:
     """Dr. Smith is Doctor Smith, Main St. is Main Street, No. 5 number five."""
-    spoken, context = readings.read_table("abbreviations.tsv")[m["abbr"]]
+    table = readings.read_table("abbreviations.tsv")
+    spoken, context = table.get(m["abbr"]) or table[m["abbr"].capitalize()]
     before_name = bool(_BEFORE_NAME.match(m.string, m.end()))
     after_name = previous[:1].isupper() and previous not in _NO_NAMES
     if context == "number" and not _BEFORE_NUMBER.match(m.string, m.end()):
@@ -240,7 +242,7 @@ def read_abbreviation(m: re.Match[str], previous: str) -> str:
 def read_dotted_letters(m: re.Match[str], _: str) -> str:
     """F.B.I. is FBI; I.I. is I I, as II would be a number."""
     letters = m.group().replace(".", "").upper()
-    return _keep_full_stop(" ".join(letters) if letters in _NEVER_LETTERS else letters, m)
+    return _keep_full_stop(" ".join(letters) if letters in NEVER_LETTERS else letters, m)
 
 
 def read_address(m: re.Match[str], _: str) -> str:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 from lexicon import form_readers as forms
 from lexicon import written_forms as readings
+from lexicon.capitals import sentence_case
 from lexicon.languages import name_letters_in_words
 
 _VULGAR = re.compile(r"(?<=[0-9])\s*([¼-¾⅐-⅞↉])")
@@ -154,9 +155,11 @@ def _letter_unit_pattern() -> str:
 
 
 def _abbreviation_pattern() -> str:
-    written = sorted(readings.read_table("abbreviations.tsv"), key=len, reverse=True)
+    table = readings.read_table("abbreviations.tsv")
+    written = sorted(table, key=len, reverse=True)
+    titles = "|".join(one.upper() for one in written if table[one][1] in forms.TITLES)
     dotless = rf"(?:Mr|Mrs|Ms|Dr|Prof|etc|vs|approx){_STOP}"
-    return rf"(?P<abbr>(?:{'|'.join(map(re.escape, written))})(?=\.)|{dotless})\.?"
+    return rf"(?P<abbr>(?:{'|'.join(map(re.escape, written))})(?=\.)|(?:{titles})(?=\. ?[A-Z])|{dotless})\.?"
 
 
 # Name, pattern and reader, in the order in which they are tried at each position; every repeat over letters is bounded
@@ -289,7 +292,7 @@ def split_tokens(text: str) -> Iterator[WrittenForm]:
     """Written forms of an English text in order, with their words; the text between them is white space."""
     pattern, readers = _scanner()
     previous = ""
-    for match in pattern.finditer(name_letters_in_words(canonical_text(text))):
+    for match in pattern.finditer(name_letters_in_words(sentence_case(canonical_text(text)))):
         spoken = _name_letters(readers[match.lastgroup or ""](match, previous))
         if spoken:
             yield WrittenForm(match.group(), spoken)

@@ -58,6 +58,20 @@ def _rule_table() -> dict[str, dict[str, _StopRule]]:
 
 
 @functools.cache
+def abbreviations(language: str) -> frozenset[str]:
+    """Abbreviations of a language that end with a full stop, without it."""
+    table = _rule_table().get(_primary(language), _rule_table()["*"])
+    return frozenset(written for written in table if written not in ("*", "#"))
+
+
+@functools.cache
+def _titles(language: str) -> dict[str, _StopRule]:
+    """Rules of abbreviations that end no sentence, by their capitals: MR. SMITH in a text of small letters."""
+    table = _rule_table().get(language, _rule_table()["*"])
+    return {written.upper(): stop for written, stop in table.items() if stop.rule == "never" and len(written) > 1}
+
+
+@functools.cache
 def sentence_starts() -> frozenset[str]:
     """English words that begin sentences and are rarely capitalised within one."""
     return _rule_table()["en"]["*"].words
@@ -103,7 +117,8 @@ def _last_word(before: str) -> str:
 
 def _find_rule(word: str, language: str) -> _StopRule | None:
     table = _rule_table().get(_primary(language), _rule_table()["*"])
-    return table.get(word) or (table.get("#") if _ORDINAL.fullmatch(word) else None)
+    found = table.get(word) or (table.get("#") if _ORDINAL.fullmatch(word) else None)
+    return found or (_titles(_primary(language)).get(word) if word.isupper() else None)
 
 
 def _rule_ends_sentence(stop: _StopRule, after: str) -> bool:

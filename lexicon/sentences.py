@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
 
+from lexicon.capitals import sentence_case
 from lexicon.dictionary import Dictionary
 from lexicon.errors import InputError
 from lexicon.ipa import IpaPhone
@@ -217,7 +218,7 @@ def split_sentences(
     sentence begins a new phrase. A first sentence of more than `FIRST_PIECE_CHARACTERS` is divided after its first
     phrase.
     """
-    placed = index_by_letters(text)
+    placed = index_by_letters(replace(text, text=sentence_case(text.text, text.language or language)))
     starts = [run.start for run in placed.runs]
     pauses = [mark for mark in placed.marks if isinstance(mark, PauseMark)]
     pause_positions = [mark.at for mark in pauses]

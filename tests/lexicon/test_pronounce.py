@@ -24,7 +24,7 @@ def _arpabet(text: str) -> list[str]:
         ("NASA said", ["N AE1 S AH0", "S EH1 D"]),
         ("plan A", ["P L AE1 N", "EY1"]),
         ("A dog", ["AH0", "D AO1 G"]),
-        ("STOP THAT NOW", ["S T AA1 P", "DH AE2 T", "N AW1"]),
+        ("STOP THAT NOW", ["S T AA1 P", "DH AE0 T", "N AW1"]),
         ("it's THE END", ["IH0 T S", "DH IY0", "EH1 N D"]),
         ("red-brown", ["R EH2 D B R AW1 N"]),
         ("an X-ray", ["AH0 N", "EH1 K S R EY2"]),
