@@ -243,6 +243,15 @@ def test_noises_lyrics_and_labels_are_not_spoken(shown: str, spoken: str, speake
         ("- JOHN: [sighs]\n- ANN: Hello.", []),
         ("He came\n- late - and left.", []),
         ("JOHN: Hi.\nIt is me.", []),
+        ("- Hi. - Hello.", [("", "Hi."), ("", "Hello.")]),
+        ("-Who? -Me! -No.", [("", "Who?"), ("", "Me!"), ("", "No.")]),
+        ("- JOHN: Hi. - ANN: Hello.", [("JOHN", "Hi."), ("ANN", "Hello.")]),
+        ("Hi. - Hello.", [("", "Hi."), ("", "Hello.")]),
+        ("Hi.\n- Hello.", [("", "Hi."), ("", "Hello.")]),
+        (">> HELLO. >> HI.", [("", "HELLO."), ("", "HI.")]),
+        ("- Go! - he said.", []),
+        ("It fell - to 5. -5, I think.", []),
+        ("He left. — She stayed.", []),
     ],
 )
 @pytest.mark.parametrize("suffix", ["srt", "vtt", "ass"])
@@ -334,7 +343,7 @@ def test_what_pysubs2_writes_is_read_as_pysubs2_reads_it(suffix: str, tmp_path: 
     assert not read.warnings
 
 
-LONG = ["<", "[", "(", "{", "A", "♪", "1\n", " ", "<i ", "# ", "A:", "&", "A ", "- ", "(["]
+LONG = ["<", "[", "(", "{", "A", "♪", "1\n", " ", "<i ", "# ", "A:", "&", "A ", "- ", "([", ". - A ", '." - "']
 
 
 @pytest.mark.parametrize("unit", LONG)

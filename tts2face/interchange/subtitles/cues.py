@@ -5,6 +5,7 @@ The spoken words of a cue, and its speaker's label.
 
 import html
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -126,6 +127,9 @@ _LABEL = re.compile(
     r"^(?P<lead>\s*(?:[-–—‐]\s*|>>\s*|•\s*)?)(?P<label>[^\W\d_][^:：\n?!,;]{0,40}?)\s*(?::(?=\s|$)|：)", re.MULTILINE
 )
 _DASH = re.compile(r"^\s*(?:[-–—‐]\s*(?=\S)|>>\s*|•\s*)", re.MULTILINE)
+_INNER_DASH = re.compile(r"(?<!\s)\s++(?=(?P<dash>[-–—‐]|>>)\s*[\"'“‘«¿¡….(\[]{0,4}(?P<letter>\w))")
+_ENDS_SENTENCE = re.compile(r"[.!?…♪][\"'”’»)\]]*\s*$")
+_END_CHARACTERS = 8  # of a line, within which the end of its last sentence lies
 
 
 _VOICE = re.compile(r"<v(?:\.[^\s.<>]+)*\s([^<>]+)>")
@@ -153,12 +157,13 @@ def spoken_text(written: str) -> SpokenText:
     """Divide the text of a cue into words, tags, noises, lyrics and speakers.
 
     A label is a name in capitals before a colon and a space (``JOHN:``), at the start of a line. A part begins at a
-    label, at a tag of one of several WebVTT voices, and at each of two or more lines that begin with a dash.
+    label, at a tag of one of several WebVTT voices, and at each of two or more dashes that begin a line or follow a
+    sentence in it; a line after a sentence needs only a dash of its own.
     """
     is_dialogue = len({name.strip() for name in _VOICE.findall(written)}) > 1
     plain = _plain(_VOICE.sub("\n\x02\\1\x03", written) if is_dialogue else written)
-    lines = _NOISE.sub(" ", plain).split("\n")
-    has_dashes = sum(_DASH.match(line) is not None for line in lines) > 1
+    lines = [part for line in _NOISE.sub(" ", plain).split("\n") for part in _at_dashes(line)]
+    has_dashes = _is_dialogue(lines)
     parts: list[tuple[str, list[str]]] = [("", [])]
     for line in lines:
         speaker, rest = _speaker_of(line, has_dashes=has_dashes)
@@ -169,6 +174,34 @@ def spoken_text(written: str) -> SpokenText:
     spoken = [part for part in spoken if any(character.isalnum() for character in part.text)]
     shown = " ".join(re.sub(r"\x02[^\x02\x03]*\x03", "", plain).split())
     return SpokenText(" ".join(part.text for part in spoken), shown, tuple(spoken))
+
+
+def _at_dashes(line: str) -> list[str]:
+    """A line divided before the dashes that follow a whole sentence: another person begins one there.
+
+    In a line without a dash at its start a long dash may be a pause, and one after a quotation belongs to its frame.
+    """
+    has_first = _DASH.match(line) is not None
+    begins = [0]
+    for match in _INNER_DASH.finditer(line):
+        is_turn = match["dash"] == ">>" or (
+            _ENDS_SENTENCE.search(line[max(match.start() - _END_CHARACTERS, 0) : match.start()]) is not None
+            and not match["letter"].islower()
+            and not line[match.end("dash") :][:1].isdigit()  # -5 is a number
+            and (has_first or (match["dash"] in "-–" and match["letter"].isalpha()))
+        )
+        begins += [match.end()] if is_turn else []
+    return [line[begin:end] for begin, end in zip(begins, [*begins[1:], None], strict=True)]
+
+
+def _is_dialogue(lines: Sequence[str]) -> bool:
+    """Whether dashes stand for speakers: there are two, or one after a line with a whole sentence of somebody else."""
+    dashed = [_DASH.match(line) is not None for line in lines]
+    follows = (
+        is_next and _ENDS_SENTENCE.search(line[-_END_CHARACTERS:])
+        for line, is_next in zip(lines, dashed[1:], strict=False)
+    )
+    return sum(dashed) > 1 or any(follows)
 
 
 def _speaker_of(line: str, *, has_dashes: bool) -> tuple[str | None, str]:
