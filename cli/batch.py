@@ -2,11 +2,13 @@
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from cli.batch_plan import print_plan, write_table
 from cli.flags import Face, Hair, HairColor, add_option_flags, options_from_flags, switch, whole_number
 from cli.process import progress_bar, write_message
 from lexicon.errors import DataError, InputError
@@ -33,6 +35,14 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     out: Annotated[Path, Parameter(help="Folder of the clips and of manifest.json and manifest.csv.", alias="-o")],
     cast: Annotated[
         Path | None, Parameter(help="TOML file that gives speakers their talker, voice, face, style, ...")
+    ] = None,
+    lines: Annotated[
+        Path | None,
+        Parameter(help="CSV table with rate, voice, offset_s or spoken (yes, no) of single lines; see --write-lines."),
+    ] = None,
+    write_lines: Annotated[
+        Path | None,
+        Parameter(help="Write the table of all lines, with how each is spoken, to this CSV file; --lines reads it."),
     ] = None,
     talker: Annotated[str, Parameter(help="Talker whose articulation is used.")] = "grid_s1",
     face: Face = None,
@@ -67,7 +77,9 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         ),
     ] = None,
     priority: Annotated[int, whole_number("With --database: jobs with smaller numbers are taken first; from 1.")] = 10,
-    dry_run: Annotated[bool, switch("Print the plan with expected time and disk space; render nothing.")] = False,
+    dry_run: Annotated[
+        bool, switch("Print speakers, rates, cuts, expected time and disk space; render nothing.")
+    ] = False,
     progress: Annotated[
         Literal["bar", "json"], Parameter(help="Progress bar, or one line of JSON for each step on standard output.")
     ] = "bar",
@@ -75,12 +87,8 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     **options: Any,
 ) -> None:
     """Make clips of subtitle files, fitted to their cues. Running it again makes only what is missing or changed."""
-    if jobs < (0 if database is not None else 1):
-        raise InputError(f"--jobs must be 1 or more (0 with --database: other workers only), not {jobs}")
-    if "://" in str(out) or str(out).startswith(("s3:", "gs:", "az:")):
-        raise InputError(f"--out must be a folder of this machine, not {out}; give a bucket by --store")
-    if priority < 1:
-        raise InputError(f"--priority must be 1 or more, not {priority}")
+    _check_work(jobs, priority, has_database=database is not None)
+    _check_places(out, write_lines, subtitles)
     from tts2face.serving.batch.cast import Cast, read_cast
     from tts2face.serving.batch.plan import plan_batch
     from tts2face.session.named_models import Models
@@ -92,13 +100,14 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         picture=options_from_flags(Picture, options),
         models=Models(talker, face or "", identity, palette, hair, hair_color),
         cast=read_cast(cast) if cast is not None else Cast(),
+        lines=lines,
     )
     if not quiet:
         _print_warnings(plan)
     if not plan.outputs:
         raise InputError("no cue can be spoken, so there is nothing to make; the warnings say why")
     if dry_run:
-        return _print_plan(plan, out, store)
+        return print_plan(plan, out, (store, write_lines), quiet=quiet)
     from tts2face.serving.batch.run import SEGMENT_FOLDER
     from tts2face.serving.batch.store import open_store
 
@@ -110,8 +119,23 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     except KeyboardInterrupt as interrupt:
         interrupt.add_note(f"what is finished is in {out}; the same command continues")
         raise
+    write_table(plan, opened, write_lines)
     _finish(result, out, quiet=quiet)
     return None
+
+
+def _check_work(jobs: int, priority: int, *, has_database: bool) -> None:
+    if jobs < (0 if has_database else 1):
+        raise InputError(f"--jobs must be 1 or more (0 with --database: other workers only), not {jobs}")
+    if priority < 1:
+        raise InputError(f"--priority must be 1 or more, not {priority}")
+
+
+def _check_places(out: Path, table: Path | None, subtitles: Sequence[Path]) -> None:
+    if "://" in str(out) or str(out).startswith(("s3:", "gs:", "az:")):
+        raise InputError(f"--out must be a folder of this machine, not {out}; give a bucket by --store")
+    if table is not None and table.resolve() in {path.resolve() for path in subtitles}:
+        raise InputError(f"--write-lines would replace the subtitles {table}; choose another name")
 
 
 def _open_engine(database: str | None, place: str, jobs: int, priority: int) -> "Engine":
@@ -178,28 +202,3 @@ def _print_warnings(plan: "Plan") -> None:
         write_message(f"tts2face: warning: {place}: {warning.message}")
     if len(plan.warnings) > MAX_WARNINGS:
         write_message(f"{len(plan.warnings) - MAX_WARNINGS} more warnings will be in the manifest")
-
-
-def _print_plan(plan: "Plan", out: Path, store: str | None) -> None:
-    from tts2face.serving.batch.run import SEGMENT_FOLDER
-    from tts2face.serving.batch.store import open_store
-    from tts2face.serving.batch.windows import estimate_batch
-
-    place = store if store is not None else str(out / SEGMENT_FOLDER)
-    is_there = "://" in place or Path(place).is_dir()
-    estimate = estimate_batch(plan, out, open_store(place) if is_there else None)
-    for output in plan.outputs:
-        length = max((cue.end_s for cue in output.cues), default=output.begin_s) - output.begin_s
-        print(f"{output.name}  {output.begin_s:.2f} s  {length:.2f} s  {len(output.cues)} cues")  # noqa: T201 - the result
-    print(  # noqa: T201 - the result
-        f"{plan.n_cues} cues, {plan.n_silent} of them silent; {estimate.n_outputs} clips, {estimate.n_stale} to make "
-        f"({_duration(estimate.seconds)}); {estimate.n_segments} segments, {estimate.n_missing} to render; about "
-        f"{_duration(estimate.core_s)} of one core and {estimate.n_bytes / 1e6:.0f} MB on disk"
-    )
-
-
-def _duration(seconds: float) -> str:
-    """Seconds in the unit that fits them."""
-    if seconds < 100.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} minutes" if seconds < 6000.0 else f"{seconds / 3600:.1f} hours"

@@ -246,8 +246,8 @@ def read_text(path: Path, largest: int = LARGEST_TEXT_BYTES) -> str:
         return decode_utf8(read_bounded(file, str(path), largest), str(path))
 
 
-def read_table(path: Path, largest: int = LARGEST_TABLE_BYTES) -> list[list[str]]:
-    """Rows of a CSV file, without empty ones.
+def read_table(path: Path, largest: int = LARGEST_TABLE_BYTES, delimiters: str = ",") -> list[list[str]]:
+    """Rows of a CSV file, without empty ones, divided by the delimiter that its first row has most.
 
     Raises
     ------
@@ -256,7 +256,8 @@ def read_table(path: Path, largest: int = LARGEST_TABLE_BYTES) -> list[list[str]
     """
     try:
         text = read_text(path, largest)
-        return [row for row in csv.reader(StringIO(text, newline="")) if row]
+        delimiter = max(delimiters, key=text.partition("\n")[0].count)
+        return [row for row in csv.reader(StringIO(text, newline=""), delimiter=delimiter) if row]
     except OSError as refused:
         raise DataError(f"{path} cannot be read ({refused.strerror}); check the file") from refused
     except csv.Error as broken:

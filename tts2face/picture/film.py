@@ -254,6 +254,12 @@ class ClipWriter:
                 if self._on_progress and pixels is not None:
                     self._on_progress(self._frames.n_frames, self._frames.n_added)
 
+    def add_sound(self, samples: NDArray[np.float32]) -> None:
+        """Append sound (n,) that lasts longer than the pictures of the clips before it; errors as `add`."""
+        if self._encoder is not None:
+            with translate_disk_errors(self.path):
+                self._encoder.put(None, samples)
+
     def _open_encoder(self, clip: Clip) -> EncoderThread:
         self._encoder = EncoderThread(self._open_sink(clip))
         return self._encoder

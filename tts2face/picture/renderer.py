@@ -19,7 +19,7 @@ from tts2face.models.face import Face
 from tts2face.numeric.reuse import map_in_order
 from tts2face.picture.baked.scene import LitScene, build_lit_scene
 from tts2face.picture.camera import camera_matrices
-from tts2face.picture.options import PYVISTA, STANDARD, Picture
+from tts2face.picture.options import PYVISTA, STANDARD, STUDIO, Picture
 from tts2face.picture.scene import Scene, build_scene, draw_background
 from tts2face.types import Clip
 
@@ -257,6 +257,16 @@ def mesh_renderer(face: Face, picture: Picture) -> MeshRenderer:
         optics = camera_matrices(picture.view, face, picture.samples)
         return MeshRenderer(build_lit_scene(face, picture, optics, background))
     return MeshRenderer(build_scene(face, picture))
+
+
+def before_studio(renderer: MeshRenderer, studio: NDArray[np.uint8]) -> MeshRenderer:
+    """Renderer of a face without a studio of its own before that of another one (H, W, 3), if no background is chosen.
+
+    Faces of one film then stand before one wall.
+    """
+    if renderer.scene.face.light or renderer.scene.face.photograph is not None or renderer.picture.background != STUDIO:
+        return renderer
+    return replace(renderer, scene=replace(renderer.scene, background=draw_background(renderer.picture, studio)))
 
 
 def draw(

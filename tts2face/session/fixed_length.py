@@ -129,6 +129,8 @@ def _with_pause(prepared: PreparedRequest, sound_end: float, n_frames: int) -> P
     pause = _pause(sound_end, n_frames, prepared.fps)
     if pause <= 0.0:
         return prepared
+    if prepared.excerpt is not None:
+        return replace(prepared, excerpt=replace(prepared.excerpt, silence=pause))
     text = prepared.text
     return replace(prepared, text=replace(text, marks=(*text.marks, PauseMark(len(text.text), pause))))
 

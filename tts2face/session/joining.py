@@ -19,6 +19,7 @@ from tts2face.types import Speech, Waveform, concatenate_speech, first_sample
 
 CUT_SILENCE_S = 0.05  # after a phrase within a sentence; with the silence before the next one a pause as at a comma
 AUDIBLE_SHARE = 0.01  # of the largest amplitude
+SAME_EDGE_S = 1e-4  # within which two times are the same edge of a phone; phones last 5 ms or more
 FADE_S = 0.005  # linear fade at each cut, which avoids clicks
 
 
@@ -76,11 +77,52 @@ def trim_silence(speech: Speech, *, before: float, behind: float) -> tuple[Speec
 
 def lead_in(speech: Speech, lead: float) -> Speech:
     """Speech whose first sound (`speech_onset`) is at `lead` seconds: its start is cut, or silence precedes it."""
+    return shift_start(speech, round((speech_onset(speech.waveform) - lead) * speech.waveform.rate))
+
+
+def shift_start(speech: Speech, cut: int) -> Speech:
+    """Speech without its first `cut` samples; with as much silence before it if the number is negative."""
     rate = speech.waveform.rate
-    cut = round((speech_onset(speech.waveform) - lead) * rate)
     if cut < 0:
         return concatenate_speech([silent_speech(-cut / rate, rate), speech])
     return _part(speech, cut, len(speech.waveform.samples))
+
+
+@dataclass(frozen=True, slots=True)
+class Excerpt:
+    """Words of a text that are kept of its speech: those of its letters [first, last), and seconds of silence after it.
+
+    The whole text is spoken, so that they sound as in their sentence.
+    """
+
+    first: int
+    last: int
+    silence: float = 0.0
+
+
+def excerpt_of_speech(speech: Speech, begin: float, end: float) -> Speech:
+    """Speech from `begin` to `end` seconds, faded there, with the phones and whole words within; see `word_bounds`."""
+    sound, edges = speech.waveform, speech.phones.edges
+    first, last = round(begin * sound.rate), max(round(end * sound.rate), round(begin * sound.rate) + 1)
+    gains = _fade_gains(last - first, sound.rate, first > 0, last < len(sound.samples))
+    cut = Waveform(sound.samples[first:last] * gains[: len(sound.samples) - first], sound.rate)
+    at = int(np.searchsorted(edges[1:], begin + SAME_EDGE_S))
+    until = max(int(np.searchsorted(edges[:-1], end - SAME_EDGE_S)), at + 1)
+    inner = np.clip(edges[at : until + 1] - begin, 0.0, cut.duration)
+    inner[0], inner[-1] = 0.0, cut.duration
+    words = tuple(word.shift(-at) for word in speech.words if at <= word.first and word.last <= until)
+    return Speech(cut, PhoneSequence(speech.phones.phones[at:until], enforce_increasing(inner)), words)
+
+
+def word_bounds(speech: Speech, begin: float, end: float) -> tuple[float, float]:
+    """Seconds at which the words between two onsets of words are cut out: little silence stays around them."""
+    labels, edges = speech.phones.phones, speech.phones.edges
+    voiced = [at for at, label in enumerate(labels) if label != SILENCE and begin - SAME_EDGE_S <= edges[at] < end]
+    if not voiced:
+        return begin, end
+    before = CUT_SILENCE_S if voiced[0] > 0 and labels[voiced[0] - 1] == SILENCE else 0.0
+    first = float(edges[voiced[0]])
+    return max(first - before, 0.0), min(float(edges[voiced[-1] + 1]) + CUT_SILENCE_S, end)
 
 
 def trim_end(speech: Speech) -> Speech:

@@ -25,6 +25,7 @@ from tts2face.gestures.timeline_file import read_timeline
 from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
 from tts2face.picture.options import Picture
 from tts2face.request import CAMERA, LEAD_S, Request
+from tts2face.session.joining import Excerpt
 from tts2face.storage.files import AnyPath
 from tts2face.types import exact_rate
 
@@ -195,6 +196,8 @@ class PreparedRequest:
         Recorded tokens that are not used.
     listening
         What the face does while it listens, in seconds from the beginning of ``listen``.
+    excerpt
+        What of the speech is kept; None: all.
     """
 
     request: Request
@@ -205,6 +208,7 @@ class PreparedRequest:
     edges: tuple[SentenceEdges, ...] = ()
     excluded: tuple[ExcludedToken, ...] = ()
     listening: Timeline = field(default_factory=Timeline)
+    excerpt: Excerpt | None = None
 
     @property
     def fps(self) -> Fraction:

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lexicon.errors import InputError
-from lexicon.sentences import Sentence
+from lexicon.marked_text import NameMark
+from lexicon.sentences import Sentence, n_letters, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
 from tts2face.numeric.reuse import NO_MEMORY, SentenceMemory
 from tts2face.request import CONVERSATION, TURN_S, Request
+from tts2face.session.joining import Excerpt, excerpt_of_speech, shift_start, silent_speech, word_bounds
 from tts2face.session.prepared import IDLE_STEPS, PreparedRequest, correct_phones
 from tts2face.session.speech import (
     NO_DELIVERIES,
@@ -28,12 +30,14 @@ from tts2face.session.speech import (
     speak_sentence,
     without_long_silence,
 )
+from tts2face.sound.pauses import speech_onset
 from tts2face.types import (
     Clip,
     Speech,
     Trajectory,
     Waveform,
     YieldTurn,
+    concatenate_speech,
     frame_count,
     keep_on,
     pad_to_frame,
@@ -187,7 +191,13 @@ def turn_request(request: Request) -> Request:
 def speak_sentences(
     prepared: PreparedRequest, models: SpeechModels, *, has_phones: bool = True
 ) -> Iterator[tuple[SpokenSentence, int, str]]:
-    """Spoken sentences with numbers of characters and texts, or parts of idle animation with steps and no text."""
+    """Spoken sentences with numbers of characters and texts, or parts of idle animation with steps and no text.
+
+    Of an excerpt there is one sentence.
+    """
+    if prepared.excerpt is not None:
+        yield _speak_excerpt(prepared, prepared.excerpt, models)
+        return
     request, fps = prepared.request, prepared.fps
     if request.silence is not None and not request.is_text:
         yield from silent_sentences(request.silence, fps, IDLE_STEPS, prepared.listening)
@@ -223,3 +233,39 @@ def speak_sentences(
         said[text] += 1
         yield spoken, sentence.n_characters, text
         yield from long_silence(after_s, fps, spoken.timeline, voice.sample_rate)
+
+
+_FIRST, _LAST = "excerpt-begin", "excerpt-end"  # names of the marks at the onsets of an excerpt and of what follows it
+
+
+def _speak_excerpt(
+    prepared: PreparedRequest, excerpt: Excerpt, models: SpeechModels
+) -> tuple[SpokenSentence, int, str]:
+    """The kept words of a text that is spoken as a whole, with the request's silence before them."""
+    text = prepared.text
+    places = [len(text_prefix(text.text, n)) for n in (excerpt.first, excerpt.last)]
+    has_next = excerpt.last < n_letters(text.text)
+    marks = [
+        NameMark(at, name) for at, name, is_set in zip(places, (_FIRST, _LAST), (True, has_next), strict=True) if is_set
+    ]
+    whole = replace(text, marks=tuple(sorted((*text.marks, *marks), key=lambda mark: mark.at)))
+    request = replace(prepared, text=whole, excerpt=None)
+    spoken = [one for one, _, _ in speak_sentences(request, models)]
+    begins = np.cumsum([0.0, *(one.speech.waveform.duration for one in spoken)])
+    times = {mark.name: mark.seconds + begin for one, begin in zip(spoken, begins, strict=False) for mark in one.marks}
+    voice = concatenate_speech([one.speech for one in spoken])
+    bounds = word_bounds(voice, times.get(_FIRST, 0.0), times.get(_LAST, voice.waveform.duration))
+    kept = excerpt_of_speech(voice, *bounds)
+    sound = excerpt_of_speech(concatenate_speech([_with_sound(one) for one in spoken]), *bounds)
+    cut = 0
+    if prepared.request.lead is not None:
+        cut = round((speech_onset(kept.waveform) - prepared.request.lead) * kept.waveform.rate)
+    silence = [silent_speech(excerpt.silence, kept.waveform.rate)] if excerpt.silence > 0.0 else []
+    kept, sound = (concatenate_speech([shift_start(one, cut), *silence]) for one in (kept, sound))
+    written = text.text[places[0] : places[1]].strip()
+    return SpokenSentence(kept, Timeline(), (), sound.waveform), len(written), written
+
+
+def _with_sound(spoken: SpokenSentence) -> Speech:
+    """The speech of a sentence with the sound of its clip."""
+    return replace(spoken.speech, waveform=spoken.sound.part(0, len(spoken.speech.waveform.samples)))

@@ -108,6 +108,16 @@ def speaks(name: str, language: str) -> bool:
     return not languages or language in languages
 
 
+def default_voice(language: str) -> str:
+    """Name of the voice that speaks a language code where none is chosen."""
+    return "heart" if language in ENGLISH_CODES[:2] else "espeak"
+
+
+def is_installed(name: str) -> bool:
+    """Whether the package of a voice of `voice_names` is there; errors as `find_voice`."""
+    return importlib.util.find_spec(find_voice(name).package) is not None
+
+
 def load_voice(
     name: str | None,
     language: str,
@@ -136,7 +146,7 @@ def load_voice(
         A package that the voice needs is not installed.
     """
     setting = VoiceSetting(language_code(language), own_words or {}, align, run)
-    chosen = name or ("heart" if setting.language in ENGLISH_CODES[:2] else "espeak")
+    chosen = name or default_voice(setting.language)
     if chosen.endswith(".onnx"):
         return _piper(Path(chosen), setting)
     if not speaks(chosen, setting.language):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from cli.batch import _duration
+from cli.batch_plan import _duration
 from tests.serving.batch.conftest import Planner
 from tts2face.picture.options import Picture
 from tts2face.serving.batch.options import BatchOptions

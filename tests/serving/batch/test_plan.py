@@ -45,7 +45,8 @@ def test_speakers_of_one_cue_have_their_own_clips_and_divide_its_time(plan_of: P
     assert [one.segments[0].models.face for one in plan.outputs] == ["head", "ada"]
     assert [cue.speaker for one in plan.outputs for cue in one.cues] == ["JOHN", "ANN"]
     assert [(one.line, one.message) for one in plan.warnings] == [
-        (2, "JOHN and ANN speak in cue 1; its time is divided by their letters")
+        (2, "JOHN and ANN speak in cue 1; its time is divided by their letters"),
+        (0, "no role applies to JOHN (1 line); they have the default face and voice"),
     ]
     (file,) = plan_of(text, per="file").outputs
     assert [(cue.begin_s, cue.end_s) for cue in file.cues] == [(1.0, 1.9), (1.9, 4.0)]
@@ -186,7 +187,8 @@ def test_a_role_that_applies_to_no_cue_is_a_warning(plan_of: Planner, tmp_path: 
     (tmp_path / "cast.toml").write_text('[[role]]\nspeaker = "ANN"\n[[role]]\nspeaker = "JOHNN"\nface = "ada"\n')
     plan = plan_of(cast=read_cast(tmp_path / "cast.toml"))
     assert [(one.file, one.line, one.message) for one in plan.warnings] == [
-        ("the cast", 0, "role 2 (speaker 'JOHNN') applies to no cue; check its patterns")
+        ("the cast", 0, "role 2 (speaker 'JOHNN') applies to no cue; check its patterns"),
+        ("the cast", 0, "no role applies to (no name) (2 lines); they have the default face and voice"),
     ]
 
 

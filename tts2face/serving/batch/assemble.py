@@ -80,6 +80,7 @@ class _Joined:
         self._settings: tuple[Any, ...] = ()
         self.notice = ""
         self.n_frames = self._n_samples = 0
+        self._sounding = np.zeros(0, np.int16)  # of the segment before, after its last frame
 
     def _open(self, source: Any) -> None:
         """Streams like those of the first segment."""
@@ -121,9 +122,10 @@ class _Joined:
             origin = first_sample(sound.offset, SOUND_RATE, self._fps)
             self._encode(open_track(Path(sound.path)).read(origin + begin, origin + end))
             return
-        n_samples = end - begin
-        for block in _exactly(_sound(source), n_samples):
-            self._encode(block)
+        samples = np.concatenate([*_sound(source), self._sounding[:0]])
+        self._sounding, own = sound_on(self._sounding, samples, end - begin)
+        for at in range(0, len(own), SAMPLE_BLOCK):
+            self._encode(own[at : at + SAMPLE_BLOCK])
 
     def finish(self) -> None:
         """Flush the encoder of the sound."""
@@ -150,14 +152,13 @@ def _sound(source: Any) -> Iterator[NDArray[np.int16]]:
         yield frame.to_ndarray().reshape(-1)
 
 
-def _exactly(blocks: Iterator[NDArray[np.int16]], n_samples: int) -> Iterator[NDArray[np.int16]]:
-    """Blocks with `n_samples` samples in total, cut or followed by silence."""
-    for block in blocks:
-        part = block[:n_samples]
-        n_samples -= len(part)
-        if len(part):
-            yield part
-    while n_samples > 0:
-        silence = np.zeros(min(n_samples, SAMPLE_BLOCK), np.int16)
-        n_samples -= len(silence)
-        yield silence
+def sound_on(
+    before: NDArray[np.int16], samples: NDArray[np.int16], n_samples: int
+) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
+    """Sound of a segment after its `n_samples` samples, and these with what still sounds of the segment before it."""
+    mixed = np.zeros(max(n_samples, len(samples), len(before)), np.int32)
+    mixed[: len(samples)] += samples
+    mixed[: len(before)] += before
+    limits = np.iinfo(np.int16)
+    joined = np.clip(mixed, limits.min, limits.max).astype(np.int16)
+    return joined[n_samples:], joined[:n_samples]

@@ -6,16 +6,22 @@
     face = "head"
 
     [[role]]
-    speaker = "ANN*"         # a pattern of shells; also `subtitle_style` and `file`
+    speaker = "ANN*"         # a pattern of shells; also `subtitle_style`, `file` and `text`
     identity = "kofi"
     voice = "espeak-female"
     style = "delighted"
+
+    [[role]]
+    subtitle_style = "Sign*"
+    silent = true            # signs and credits are left out
+
+Looks of those who must not be taken for the speaker beside them.
 
 Checks of names that a renderer would refuse segment by segment: voices, identities, haircuts and styles.
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
@@ -24,6 +30,7 @@ from typing import Any
 
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import check_fields, check_type, format_value, is_file, parse_toml, read_text
+from lexicon.languages import language_code
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import BALD
@@ -31,11 +38,20 @@ from tts2face.models.palette import load_palette
 from tts2face.request import NATURAL, OWN_FACE, Request, parse_articulation
 from tts2face.session.catalogue import identities
 from tts2face.session.named_models import Models
-from tts2face.sound.voice_pool import has_voice, voice_names
+from tts2face.sound.voice_pool import (
+    SHIPPED_VOICES,
+    default_voice,
+    find_voice,
+    has_voice,
+    is_installed,
+    speaks,
+    voice_names,
+)
 from tts2face.storage.files import present_name
 
 MODEL_NAMES = tuple(option.name for option in fields(Models))
-PATTERN_NAMES = ("speaker", "subtitle_style", "file")
+PATTERN_NAMES = ("speaker", "subtitle_style", "file", "text")
+SILENT = "silent"  # setting of cues that are left out
 NOT_IN_CAST: Mapping[str, str] = MappingProxyType({  # options, with the reason
     "text": "the cues have it", "audio": "that of the file", "audio_map": "the words are given", "idle": "cues speak",
     "listen": "cues speak", "partner": "cues speak",
@@ -60,7 +76,7 @@ class Role:
 
     def applies(self, cue: Cue, file: str) -> bool:
         """Whether all patterns match a cue, in capitals and small letters alike."""
-        values = {"speaker": cue.speaker, "subtitle_style": cue.style, "file": file}
+        values = {"speaker": cue.speaker, "subtitle_style": cue.style, "file": file, "text": cue.text}
         return all(fnmatchcase(values[name].lower(), pattern.lower()) for name, pattern in self.patterns.items())
 
 
@@ -92,6 +108,10 @@ class Cast:
         """Settings of a cue by name: those of its role over the defaults."""
         role = self.role_of(cue, file)
         return {**self.default, **(role.settings if role else {})}
+
+    def is_silent(self, cue: Cue, file: str) -> bool:
+        """Whether a cue is left out."""
+        return bool(self.settings(cue, file).get(SILENT, False))
 
 
 def read_cast(path: Path) -> Cast:
@@ -146,8 +166,10 @@ def _role(table: Mapping[str, Any], place: str, folder: Path | None) -> Role:
 
 def _settings(table: Mapping[str, Any], place: str, folder: Path | None) -> dict[str, Any]:
     for name, value in table.items():
-        if name not in (*MODEL_NAMES, *REQUEST_NAMES):
-            known = ", ".join((*PATTERN_NAMES, *MODEL_NAMES, *REQUEST_NAMES))
+        if name == SILENT and not isinstance(value, bool):
+            raise DataError(f"{place}: silent must be true or false, not {format_value(value)}")
+        if name not in (SILENT, *MODEL_NAMES, *REQUEST_NAMES):
+            known = ", ".join((*PATTERN_NAMES, SILENT, *MODEL_NAMES, *REQUEST_NAMES))
             raise DataError(f"{place}: there is no setting {name!r}; use {known}")
         if value is None:
             raise DataError(f"{place}: {name} must be a text, a number or true or false, not {format_value(value)}")
@@ -167,6 +189,35 @@ def _resolve(name: str, value: Any, folder: Path | None) -> Any:
     if name in PATH_NAMES and isinstance(value, str) and Path(value).suffix and is_file(folder / value):
         return str(folder / value)
     return value
+
+
+# Shipped faces of other speakers, by the sex of their voices.
+_OTHER_FACES: Mapping[str, tuple[str, ...]] = MappingProxyType({"male": ("ben", "tomas"), "female": ("mara", "noor")})
+
+
+def other_look(
+    models: Models, request: Mapping[str, Any], number: int, *, keeps_face: bool = False
+) -> tuple[Models, dict[str, Any]]:
+    """Models and request of another speaker than the one that is shown with these; `number` counts such, from 1.
+
+    An installed voice that speaks the language, of the other sex first, and a shipped face that goes with it.
+
+    Parameters
+    ----------
+    keeps_face
+        Whether only the voice is another one, for exports, which hold one face.
+    """
+    language = language_code(str(request.get("language", Request().language)))
+    own = str(request.get("voice") or default_voice(language))
+    usable = [name for name in SHIPPED_VOICES if name != own and speaks(name, language) and is_installed(name)]
+    is_male = has_voice(own) and find_voice(own).sex == "male"
+    wanted = "female" if is_male == (number % 2 == 1) else "male"
+    voice = next((name for name in usable if find_voice(name).sex == wanted), usable[0] if usable else own)
+    sex = find_voice(voice).sex if has_voice(voice) else wanted
+    faces = [face for face in _OTHER_FACES[sex] if face != models.face]
+    if not keeps_face:
+        models = replace(models, face=faces[(number - 1) // 2 % len(faces)], identity=None, hair=None, hair_color=None)
+    return models, {**request, "voice": voice}
 
 
 def check_names(models: Models, request: Mapping[str, Any]) -> None:

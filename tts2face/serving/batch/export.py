@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence
@@ -71,7 +72,8 @@ class Exporter:
             gestures = Request(gestures=output.segments[0].request.get("gestures", Request().gestures))
             face = mesh_of(session.animated_face(has_gestures=gestures.has_gestures), files)
         with ExportWriter(files, face=face) as writer:
-            for clip in joined_clips(tracks, output.fps, output.sounds):
+            lengths = [one.slot_frames if one.fills_slot else None for one in output.tracks]
+            for clip in joined_clips(tracks, output.fps, output.sounds, lengths):
                 writer.add(clip)
         return [file.path for file in files]
 
@@ -82,8 +84,18 @@ class Exporter:
         return self._session
 
 
-def joined_clips(tracks: Sequence[Path], fps: float, sounds: Sequence[Sound | None] = ()) -> Iterator[Clip]:
+def joined_clips(
+    tracks: Sequence[Path],
+    fps: float,
+    sounds: Sequence[Sound | None] = (),
+    lengths: Sequence[int | None] = (),
+) -> Iterator[Clip]:
     """Clips of tracks in order, with their sound at `SOUND_RATE` on the samples of their frames.
+
+    Parameters
+    ----------
+    lengths
+        Frames of each track, after which its last words may sound on; empty or None: all of its frames.
 
     Raises
     ------
@@ -92,19 +104,41 @@ def joined_clips(tracks: Sequence[Path], fps: float, sounds: Sequence[Sound | No
     """
     from tts2face.serving.batch.segment import open_track
 
-    rate, at = exact_rate(fps), 0
-    for path, sound in zip(tracks, sounds or [None] * len(tracks), strict=True):
+    rate, at, sounding = exact_rate(fps), 0, np.zeros(0, np.float32)
+    parts = zip(tracks, sounds or [None] * len(tracks), lengths or [None] * len(tracks), strict=True)
+    for path, sound, length in parts:
+        until, later = None if length is None else at + length, [np.zeros(0, np.float32)]
         for piece in read_track(path):
+            own = piece.clip.speech.waveform.resampled(SOUND_RATE)
+            if at == until:
+                later.append(own.samples)
+                continue
             begin = first_sample(at, SOUND_RATE, rate)
             at += len(piece.clip.motion)
             end = first_sample(at, SOUND_RATE, rate)
             if sound is None:
-                made = piece.clip.speech.waveform.resampled(SOUND_RATE).part(0, end - begin).padded(end - begin)
+                made, sounding = _mixed(own, sounding, end - begin)
             else:
                 origin = first_sample(sound.offset, SOUND_RATE, rate)
                 found = open_track(Path(sound.path)).read(origin + begin, origin + end)
                 made = Waveform(found / 32767.0, SOUND_RATE)
             yield _with_sound(piece.clip, made)
+        sounding = _sum(sounding, np.concatenate(later))
+
+
+def _mixed(own: Waveform, sounding: NDArray[np.float32], n_samples: int) -> tuple[Waveform, NDArray[np.float32]]:
+    """Sound of a piece with what still sounds of the track before it, and what sounds on after it."""
+    samples = own.part(0, n_samples).padded(n_samples).samples
+    mixed = np.clip(_sum(samples, sounding[:n_samples]), -1.0, 1.0)
+    return Waveform(mixed, own.rate), sounding[n_samples:]
+
+
+def _sum(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Sum of two sounds from the same instant."""
+    total = np.zeros(max(len(one), len(other)), np.float32)
+    total[: len(one)] += one
+    total[: len(other)] += other
+    return total
 
 
 def _with_sound(clip: Clip, sound: Waveform) -> Clip:

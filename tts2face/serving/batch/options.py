@@ -12,6 +12,7 @@ from tts2face.request import option
 
 MOVIE_FORMATS = ("mp4", "webm", "mov", "none")
 CLIP_UNITS = ("cue", "scene", "file", "film")
+MAX_OVERLAP_S = 2.0  # more is no overlap but two lines at once
 EXTEND, CUT_PAUSES, REPORT = OVERFLOW_POLICIES = ("extend", "cut-pauses", "report")
 
 
@@ -30,10 +31,16 @@ class BatchOptions:
     per: str = option("cue", "One clip for each cue, scene or file, or one film of all files.")
     overflow: str = option(
         "extend",
-        "For speech that is longer than its cue at the largest rate: extend (into the silence after the cue), "
-        "cut-pauses (within the speech, then extend), or report (only say so).",
+        "For speech that is longer than its cue: extend (half a second into the silence after the cue, then faster, "
+        "then further into the silence), cut-pauses (within the speech, then as extend), or report (only say so).",
     )
     max_rate: float = option(1.4, "Largest speaking rate by which speech is fitted to its cue, 1 to 2.")
+    min_rate: float = option(
+        1.0, "Smallest speaking rate to which speech that is shorter than its cue is slowed, 0.5 to 1."
+    )
+    max_overlap: float = option(
+        0.3, "Seconds by which the last words of a cue may sound on after the next one has begun, 0 to 2."
+    )
     scene_gap: float = option(4.0, "Seconds without a cue that divide two scenes.")
     audio: Path | None = option(
         None,
@@ -56,6 +63,10 @@ class BatchOptions:
             raise InputError(f"--overflow must be extend, cut-pauses or report, not {self.overflow!r}")
         if not 1.0 <= self.max_rate <= RATE_LIMITS[1]:
             raise InputError(f"--max-rate must lie between 1 and {RATE_LIMITS[1]:g}, not {self.max_rate:g}")
+        if not RATE_LIMITS[0] <= self.min_rate <= 1.0:
+            raise InputError(f"--min-rate must lie between {RATE_LIMITS[0]:g} and 1, not {self.min_rate:g}")
+        if not 0.0 <= self.max_overlap <= MAX_OVERLAP_S:
+            raise InputError(f"--max-overlap must lie between 0 and {MAX_OVERLAP_S:g} s, not {self.max_overlap:g}")
         if not 0.0 < self.scene_gap <= 3600.0:
             raise InputError(f"--scene-gap must lie between 0 and 3600 s, not {self.scene_gap:g}")
         if self.audio is not None and not self.audio.is_dir():

@@ -17,7 +17,9 @@ from typing import Any
 from lexicon.errors import DataError, InputError
 from lexicon.inputs import parse_json
 from tts2face import __version__
+from tts2face.serving.batch.lines import LineSettings
 from tts2face.serving.batch.segment import Segment, SegmentResult, content_address, file_hash
+from tts2face.serving.batch.speakers import Look
 from tts2face.storage.files import write_atomically
 
 
@@ -115,6 +117,38 @@ class PlanWarning:
 
 
 @dataclass(frozen=True, slots=True)
+class PlannedLine:
+    """A cue with words, or one speaker's part of it, in the order of the subtitles.
+
+    Parameters
+    ----------
+    file
+        Name of its subtitle file, without the ending.
+    number, part
+        Its cue, and which of several speakers of it, from 1; 0 for a whole cue.
+    begin_s, end_s
+        Instants in its file.
+    settings
+        Its row of the table of lines.
+    look
+        Who speaks.
+    segment
+        What is rendered; None for a line that is not spoken.
+    """
+
+    file: str
+    number: int
+    part: int
+    begin_s: float
+    end_s: float
+    speaker: str
+    text: str
+    settings: LineSettings
+    look: Look
+    segment: Segment | None
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """Outputs of a batch, and warnings; equal segments occur once in `segments`."""
 
@@ -122,6 +156,7 @@ class Plan:
     warnings: tuple[PlanWarning, ...]
     n_cues: int
     n_silent: int
+    lines: tuple[PlannedLine, ...] = ()
 
     @property
     def segments(self) -> dict[str, Segment]:
@@ -166,7 +201,7 @@ JSON_NAME, CSV_NAME = "manifest.json", "manifest.csv"
 FORMAT = 1
 COLUMNS = (
     "file", "status", "source", "cues", "begin_s", "duration_s", "n_frames", "fps", "rate", "overflow_s", "cut_s",
-    "warnings", "sha256", "bytes", "took_s",
+    "overlap_s", "warnings", "sha256", "bytes", "took_s",
 )  # fmt: skip
 
 
@@ -227,6 +262,7 @@ def done_entry(
         "rate": max((result.rate for _, result in spoken), default=1.0),
         "overflow_s": max((result.overflow_s for _, result in spoken), default=0.0),
         "cut_s": max((result.cut_s for _, result in spoken), default=0.0),
+        "overlap_s": max((result.overlap_s for _, result in spoken), default=0.0),
         "warnings": warnings,
         "sha256": file_hash(path),
         "bytes": path.stat().st_size,
@@ -234,7 +270,7 @@ def done_entry(
         **({"exports": [_file_entry(path) for path in exports]} if exports else {}),
         "cues": [
             _cue_entry(cue)
-            | {"rate": result.rate, "speech_s": result.speech_s, "overflow_s": result.overflow_s, "cut_s": result.cut_s}
+            | {name: getattr(result, name) for name in ("rate", "speech_s", "overflow_s", "cut_s", "overlap_s")}
             for cue, result in spoken
         ],
     }

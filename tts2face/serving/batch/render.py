@@ -4,7 +4,7 @@ Requests for the recordings of segments: the words where the recording contains 
 """
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
@@ -16,30 +16,45 @@ from typing import Any
 import numpy as np
 
 from lexicon.errors import DataError
+from lexicon.sentences import n_letters, text_prefix
 from tts2face.interchange.exports.writer import ExportWriter, plan_exports
+from tts2face.models.face_loading import load_face
 from tts2face.picture.film import MKV, ClipWriter
 from tts2face.picture.options import Picture
 from tts2face.picture.own_face import OwnFaceRenderer
-from tts2face.picture.renderer import FrameRenderer
+from tts2face.picture.renderer import FrameRenderer, MeshRenderer, before_studio
 from tts2face.processes.child import Call, Handler
-from tts2face.request import IDLE_LIMITS_S, Request
+from tts2face.request import DRAWN_FACE, IDLE_LIMITS_S, Request
+from tts2face.serving.batch.fit import EASY_S, RELEASE_S, Fit, Limits, Room, fit_speech, without_overlap
+from tts2face.serving.batch.options import REPORT
 from tts2face.serving.batch.render_process import RENDER
 from tts2face.serving.batch.segment import (
     ALPHA_MOVIE,
     FILE_PREFIX,
     TRACK,
+    Part,
     Segment,
     SegmentResult,
     open_track,
     segment_from_json,
 )
-from tts2face.serving.batch.windows import Fit, Limits, fit_speech
 from tts2face.session.functions import SessionCache
+from tts2face.session.joining import Excerpt
+from tts2face.session.prepared import PreparedRequest, prepare
 from tts2face.session.session import Session
 from tts2face.sound.pauses import speech_onset
 from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.temporary import Temporary
-from tts2face.types import SOUND_RATE, Waveform, exact_rate, first_sample, frame_count
+from tts2face.types import (
+    SOUND_RATE,
+    Clip,
+    Speech,
+    Waveform,
+    concatenate_clips,
+    exact_rate,
+    first_sample,
+    frame_count,
+)
 
 ONSET_S = 60  # of a recording of a cue, within which its first sound lies
 
@@ -129,11 +144,36 @@ class SegmentRenderer:
         if segment.medium.startswith(FILE_PREFIX):
             return replace(_write_file(session, segment, out), took_s=round(time.perf_counter() - began, 3))
         with excerpt_of(segment, Request(**segment.request)) as request:
-            fitted, result = _fit(session, request, segment)
-            with _writer(session, segment, fitted, (out, result.n_frames)) as writer:
+            fitted, result = fit_segment(session, request, segment)
+            with _writer(session, segment, fitted.request, (out, result.n_frames)) as writer:
                 for clip in session.stream_to_length(fitted, result.n_frames):
                     writer.add(clip)
+                if result.overlap_s > 0.0 and segment.fills_slot and request.audio is None:
+                    _add_overlap(session, fitted, writer, clip, result)
         return replace(result, took_s=round(time.perf_counter() - began, 3))
+
+    def measure(self, segment: Segment) -> SegmentResult:
+        """The result of `render` without a picture or motion: the fit of the speech; errors as there."""
+        session = self._sessions.get(segment.models)
+        with excerpt_of(segment, Request(**segment.request)) as request:
+            return fit_segment(session, request, segment)[1]
+
+
+def _add_overlap(
+    session: Session, fitted: PreparedRequest, writer: ClipWriter | ExportWriter, last: Clip, result: SegmentResult
+) -> None:
+    """Append the sound of the words after the last frame of a segment, whose last clip is given; a track shows rest."""
+    spoken = concatenate_clips([piece.clip for piece in session.stream_speech(fitted)]).speech.waveform
+    end = result.n_frames / result.fps + result.overlap_s + RELEASE_S
+    sound = spoken.part(round(result.n_frames / result.fps * spoken.rate), round(end * spoken.rate))
+    if isinstance(writer, ClipWriter):
+        writer.add_sound(sound.samples)
+        return
+    n_frames = frame_count(sound.duration, last.fps)
+    motion, head = (
+        replace(one, values=np.repeat(one.values[-1:], n_frames, axis=0)) for one in (last.motion, last.head)
+    )
+    writer.add(Clip(motion, head, Speech.without_phones(sound)))
 
 
 def _write_file(session: Session, segment: Segment, out: Path) -> SegmentResult:
@@ -160,53 +200,135 @@ def _writer(
     renderer: FrameRenderer = session.renderer(Picture(**segment.picture), has_gestures=request.has_gestures)
     if isinstance(renderer, OwnFaceRenderer):
         renderer = replace(renderer, n_returning=n_frames)
+    if isinstance(renderer, MeshRenderer):
+        renderer = before_studio(renderer, load_face(DRAWN_FACE).light[0].backdrop)
     return ClipWriter(out, renderer, kind=MKV if segment.medium == ALPHA_MOVIE else None)
 
 
-def _fit(session: Session, request: Request, segment: Segment) -> tuple[Request, SegmentResult]:
-    """The request with its fitted text and rate, and the length of the segment."""
-    fps = exact_rate(request.fps)
-    window_s = float(segment.window_frames / fps)
+def fit_segment(session: Session, request: Request, segment: Segment) -> tuple[PreparedRequest, SegmentResult]:
+    """The request with its fitted text and rate, and the length of the segment; errors as `SegmentRenderer.render`."""
     if request.idle is not None:
-        return request, SegmentResult(segment.slot_frames or segment.window_frames, float(fps))
-    heard: list[str] = []
+        n_frames = segment.slot_frames or segment.window_frames
+        return prepare(request), SegmentResult(n_frames, float(exact_rate(request.fps)))
     if request.audio is not None:
-        request, spoken, heard = fit_recording(session, request, segment)
-        spoken = min(spoken, window_s) if segment.audio_begin is not None else spoken
-        fit = Fit(request.text, 1.0, spoken, max(0.0, spoken - window_s), 1)
-    else:
-        slot_s = None if segment.slot_frames is None else float(segment.slot_frames / fps)
-        limits = Limits(window_s, slot_s, request.rate, segment.max_rate, segment.overflow)
-        fit = fit_speech(
-            request.text, limits, lambda text, rate: session.measure_speech(replace(request, text=text, rate=rate))
-        )
-        request = replace(request, text=fit.text, rate=fit.rate)
-    n_frames, warnings = _length(segment, fit, float(fps))
-    cut = max(0.0, fit.speech_s - n_frames / float(fps))
+        return _fit_recorded(session, request, segment)
+    speech = SegmentSpeech(session, request, segment)
+    fit = fit_speech(request.text, speech.limits, speech.ends)
+    prepared, kept, lost = speech.kept(fit)
+    n_frames, warnings = _length(segment, kept, speech.fps)
+    if lost:
+        warnings.append(f"{lost!r} is not spoken, as the next cue begins")
+    elif kept.overlap_s > 0.0:
+        warnings.append(f"the last {kept.overlap_s:.2f} s of the speech sound on after the next cue has begun")
+    cut = max(0.0, fit.speech_s - kept.speech_s)
+    return prepared, _result(segment, kept, (n_frames, speech.fps), cut, warnings)
+
+
+def _fit_recorded(session: Session, request: Request, segment: Segment) -> tuple[PreparedRequest, SegmentResult]:
+    """A recording keeps its rate; what does not fit is cut off."""
+    fps = float(exact_rate(request.fps))
+    window_s = segment.window_frames / fps
+    request, spoken, heard = fit_recording(session, request, segment)
+    spoken = min(spoken, window_s) if segment.audio_begin is not None else spoken
+    fit = Fit(request.text, 1.0, spoken, max(0.0, spoken - window_s))
+    n_frames, warnings = _length(segment, fit, fps)
+    cut = max(0.0, spoken - n_frames / fps)
     if cut > 0:
         warnings.append(f"the last {cut:.2f} s of the speech are cut off by the next cue")
-    result = SegmentResult(
-        n_frames,
-        float(fps),
+    return prepare(request), _result(segment, fit, (n_frames, fps), cut, [*heard, *warnings])
+
+
+def _result(
+    segment: Segment, fit: Fit, length: tuple[int, float], cut: float, warnings: Sequence[str]
+) -> SegmentResult:
+    speech_s = max(fit.speech_s - (segment.lead_frames or 0) / length[1], 0.0)
+    return SegmentResult(
+        *length,
         fit.rate,
-        round(max(fit.speech_s - (segment.lead_frames or 0) / float(fps), 0.0), 4),
+        round(speech_s, 4),
         round(fit.overflow_s, 4),
         round(cut, 4),
-        (*heard, *warnings),
+        tuple(warnings),
+        overlap_s=round(fit.overlap_s, 4),
     )
-    return request, result
 
 
 def _length(segment: Segment, fit: Fit, fps: float) -> tuple[int, list[str]]:
     """Frames of a segment, and warnings of its fit."""
     warnings = []
-    if fit.overflow_s > 1.0 / fps:
+    if fit.overflow_s > (1.0 / fps if segment.overflow == REPORT else EASY_S):
         warnings.append(f"the speech is {fit.overflow_s:.2f} s longer than its cue at rate {fit.rate:.2f}")
-    if fit.rate > segment.max_rate + 1e-6:
+    if fit.rate > max(segment.max_rate, float(segment.request.get("rate", 1.0))) + 1e-6:
         warnings.append(f"the rate {fit.rate:.2f} exceeds {segment.max_rate:g}, as the next cue begins")
     if segment.fills_slot and segment.slot_frames is not None:
         return segment.slot_frames, warnings
     return max(segment.window_frames, frame_count(max(fit.speech_s, 1e-3), fps)), warnings
+
+
+class SegmentSpeech:
+    """The words of a segment as a voice speaks them, with those of the whole sentence if it runs over several cues."""
+
+    def __init__(self, session: Session, request: Request, segment: Segment) -> None:
+        self.fps = float(exact_rate(request.fps))
+        self._session, self._request, self._segment = session, request, segment
+        own = Part(n_letters(request.text), segment.window_frames, segment.slot_frames, segment.lead_frames or 0)
+        self._parts = segment.parts or (own,)
+
+    @property
+    def limits(self) -> Limits:
+        """Limits of the fit."""
+        segment = self._segment
+        last = len(self._parts) - 1
+        rooms = tuple(
+            Room(
+                part.window_frames / self.fps,
+                None if part.slot_frames is None else part.slot_frames / self.fps,
+                segment.max_overlap,
+                segment.is_shared or at < last,
+            )
+            for at, part in enumerate(self._parts)
+        )
+        rates = self._request.rate, segment.min_rate, segment.max_rate
+        return Limits(rooms, *rates, segment.overflow, segment.part)
+
+    def ends(self, text: str, rate: float) -> list[float]:
+        """Ends of the parts of a text at a rate, in seconds of their segments."""
+        request = replace(self._request, text=text, rate=rate)
+        return [self._session.measure_speech(self._prepared(request, at)).end for at in range(len(self._parts))]
+
+    def kept(self, fit: Fit) -> tuple[PreparedRequest, Fit, str]:
+        """The fitted request, without the last words that would sound on too long; its fit, and these words."""
+        request = replace(self._request, text=fit.text, rate=fit.rate)
+        room, words = self.limits.rooms[self._segment.part], self._own_words()
+
+        def end_of(n_words: int) -> float:
+            return self._session.measure_speech(self._prepared(request, self._segment.part, words[:n_words])).end
+
+        if not self._segment.fills_slot or len(words) < 2:
+            return self._prepared(request, self._segment.part), fit, ""
+        n_kept = without_overlap(fit, len(words), end_of, room)
+        if n_kept == len(words):
+            return self._prepared(request, self._segment.part), fit, ""
+        end = end_of(n_kept)
+        overlap = 0.0 if room.slot_s is None else max(0.0, end - room.slot_s)
+        shorter = replace(fit, speech_s=end, overflow_s=max(0.0, end - room.window_s), overlap_s=overlap)
+        return self._prepared(request, self._segment.part, words[:n_kept]), shorter, " ".join(words[n_kept:])
+
+    def _own_words(self) -> list[str]:
+        first = sum(part.n_letters for part in self._parts[: self._segment.part])
+        text, own = self._request.text, self._parts[self._segment.part]
+        begin, end = (len(text_prefix(text, n)) for n in (first, first + own.n_letters))
+        return text[begin:end].split()
+
+    def _prepared(self, request: Request, at: int, words: Sequence[str] | None = None) -> PreparedRequest:
+        """The request of a part, of which only the first words may be kept."""
+        if words is None and not self._segment.parts:
+            return prepare(request)
+        part, first = self._parts[at], sum(one.n_letters for one in self._parts[:at])
+        if self._segment.parts:
+            request = replace(request, lead=part.lead_frames / self.fps)
+        last = first + (part.n_letters if words is None else sum(map(n_letters, words)))
+        return replace(prepare(request), excerpt=Excerpt(first, last))
 
 
 @lru_cache(maxsize=1)

@@ -49,11 +49,13 @@ class SegmentResult:
     overflow_s
         Seconds by which the speech ends after its cue.
     cut_s
-        Seconds of speech that the next cue cuts off.
+        Seconds of speech that is left out or cut off, as the next cue begins.
     warnings
         What does not match the subtitles.
     took_s
         Seconds of work.
+    overlap_s
+        Seconds of speech that sound on after the next cue has begun.
     """
 
     n_frames: int
@@ -64,6 +66,7 @@ class SegmentResult:
     cut_s: float = 0.0
     warnings: tuple[str, ...] = ()
     took_s: float = 0.0
+    overlap_s: float = 0.0
 
     def as_json(self) -> dict[str, Any]:
         """JSON object from which `result_from_json` makes the result again."""
@@ -77,7 +80,7 @@ def result_from_json(content: Mapping[str, Any]) -> SegmentResult:
     return SegmentResult(**{**found, "warnings": tuple(found.get("warnings", ()))})
 
 
-SEGMENT_FORMAT = 3  # raised when equal requests give other segments
+SEGMENT_FORMAT = 4  # raised when equal requests give other segments
 VOICE_PACKAGES = ("hibari-tts", "onnxruntime", "espeakng-loader", "piper-tts", "hama", "pyopenjtalk-plus", "av")
 
 
@@ -127,6 +130,16 @@ REQUEST_FILES = ("audio", "partner", "dictionary", "voice", "timeline")
 HAIR = ("hair", "hair_color")  # of models; not part of the addresses of segments without them
 
 
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One cue of a sentence that runs over several: letters of its words, and frames as those of `Segment`."""
+
+    n_letters: int
+    window_frames: int
+    slot_frames: int | None
+    lead_frames: int
+
+
 @dataclass(frozen=True)
 class Segment:
     """What is rendered: the words of a cue, a recording, or silence between cues.
@@ -143,8 +156,13 @@ class Segment:
         Frames up to the next cue: longest length of the segment; None: as long as its speech.
     fills_slot
         Whether the segment is `slot_frames` long (a part of a longer clip), or as short as its speech and cue allow.
-    overflow, max_rate
+    overflow, max_rate, min_rate, max_overlap
         As `BatchOptions`.
+    is_shared
+        Whether the next cue is of the same speaker.
+    parts, part
+        The cues of a sentence that is spoken as one, whose words are those of the request, and which of them this is;
+        empty: the words are those of this cue.
     audio_begin
         Sample, at `SOUND_RATE`, at which the segment begins in the recording of a whole file; None: the recording is
         one of this segment.
@@ -168,6 +186,11 @@ class Segment:
     audio_begin: int | None = None
     lead_frames: int | None = None
     medium: str = MOVIE
+    min_rate: float = 1.0
+    max_overlap: float = 0.0
+    is_shared: bool = False
+    parts: tuple[Part, ...] = ()
+    part: int = 0
 
     @cached_property
     def address(self) -> str:
@@ -196,6 +219,11 @@ class Segment:
             "audio_begin": self.audio_begin,
             "lead_frames": self.lead_frames,
             "medium": self.medium,
+            "min_rate": self.min_rate,
+            "max_overlap": self.max_overlap,
+            "is_shared": self.is_shared,
+            "parts": [asdict(part) for part in self.parts],
+            "part": self.part,
         }
 
     def as_track(self) -> "Segment":
@@ -227,7 +255,8 @@ class Segment:
 
 def segment_from_json(content: Mapping[str, Any]) -> Segment:
     """The segment of `Segment.as_json`."""
-    return Segment(**{**content, "models": Models(**content["models"])})
+    parts = tuple(Part(**part) for part in content.get("parts", ()))
+    return Segment(**{**content, "models": Models(**content["models"]), "parts": parts})
 
 
 def input_hashes(models: Models, request: Mapping[str, Any], picture: Mapping[str, Any]) -> dict[str, str]:

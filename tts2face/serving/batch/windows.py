@@ -1,28 +1,23 @@
 """Frames of cues: windows that do not overlap, and the slots up to the next cue.
 
-Fit of speech to the time of its cue: the speaking rate, the pauses, and what remains too long.
-
 What a batch will take: seconds of work and bytes on disk, before anything is rendered.
 """
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import groupby
 from pathlib import Path
 
-from lexicon.errors import InputError
-from lexicon.marked_text import RATE_LIMITS
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.picture.options import Picture
-from tts2face.serving.batch.options import CUT_PAUSES, REPORT
 from tts2face.serving.batch.output import Output, Plan, is_current, read_manifest
 from tts2face.serving.batch.segment import TRACK, Segment
 from tts2face.serving.batch.store import Store
-from tts2face.session.speech_stream import SpeechSpan
 
 EXTENSION_S = 1.0  # after a cue that no other cue follows soon; speech may use it
+MAX_EXTENSION_S = 10.0  # after a cue with more words than time, which has a long silence after it
+SLOW_CHARACTERS_PER_S = 12.0  # of slow speech, by which its time is estimated
 MAX_TAIL_S = 2.0  # longer silences are segments of their own, shared by equal silences
 
 
@@ -50,15 +45,24 @@ class Window:
         return self.end - self.margin_end
 
 
-def cue_windows(cues: Sequence[Cue], fps: Fraction, margins: tuple[int, int] = (0, 0)) -> tuple[Window, ...]:
-    """Windows of spoken cues in order of time; overlapping ones end where the next one begins.
+def cue_windows(
+    cues: Sequence[Cue],
+    fps: Fraction,
+    margins: tuple[int, int] = (0, 0),
+    *,
+    is_spoken: Callable[[Cue, int], bool] = lambda _cue, _part: True,
+) -> tuple[Window, ...]:
+    """Windows of cues in order of time; overlapping ones end where the next one begins.
 
     Cues that begin at the same frame, and speakers of one cue, divide their time by their letters. Windows are longer
     than their cues by `margins` frames before and after them, or by half of a gap that is shorter than two margins.
+    Lines, by their cue and part, that are not spoken have no window and take no time.
     """
     windows: list[Window] = []
     for begin, group in groupby(cues, key=lambda cue: round(Fraction(cue.begin_s) * fps)):
-        together = [part for cue in group for part in _parts(cue)]
+        together = [line for cue in group for line in cue_lines(cue) if is_spoken(*line)]
+        if not together:
+            continue
         end = max(round(Fraction(cue.end_s) * fps) for cue, _ in together)
         end = max(end, begin + len(together))
         letters = [max(len(cue.text), 1) for cue, _ in together]
@@ -72,7 +76,7 @@ def cue_windows(cues: Sequence[Cue], fps: Fraction, margins: tuple[int, int] = (
     return tuple(_with_slots(_with_margins(windows, *margins), fps))
 
 
-def _parts(cue: Cue) -> list[tuple[Cue, int]]:
+def cue_lines(cue: Cue) -> list[tuple[Cue, int]]:
     """A cue for each of its speakers, with its number from 1; a cue of one speaker with 0."""
     if not cue.parts:
         return [(cue, 0)]
@@ -107,6 +111,10 @@ def _with_slots(windows: Sequence[Window], fps: Fraction) -> list[Window]:
         end = max(window.end if following is None else min(window.end, following), begin + 1)
         is_last = following is None or following - end > tail
         slot_end = end + extension if is_last or following is None else max(following, end)
+        if is_last:
+            longest = end + round(MAX_EXTENSION_S * fps) if following is None else following - extension
+            needed = begin + round(len(window.cue.text) / SLOW_CHARACTERS_PER_S * fps)
+            slot_end = max(slot_end, min(needed, longest))
         slots.append(replace(window, begin=begin, end=end, slot_end=slot_end, next_begin=following))
         at = end
     return slots
@@ -193,85 +201,3 @@ def _output_bytes(output: Output) -> float:
     movies = output.segments if output.suffix else ()
     n_bytes = sum(_n_bytes(segment, output.fps, OUTPUT_SOUND_BYTES_PER_S) for segment in movies)
     return n_bytes + len(output.exports) * seconds * TRACK_BYTES_PER_S / 2
-
-
-MAX_STEPS = 4  # of the search for a rate; two are usual
-AIM = 0.985  # of the cue's time, so that rounding of durations by the voice does not need another step
-PAUSE_PLACES = re.compile(r"(?<=\w)([,;:.!?…]+)\s+(?=\S)")
-SHORT_PAUSE = "[pause 0]"  # the shortest pause between two utterances, 20 ms
-
-
-Measure = Callable[[str, float], SpeechSpan]  # span of a text at a rate
-
-
-@dataclass(frozen=True, slots=True)
-class Fit:
-    """Text and rate by which speech fits its cue.
-
-    Parameters
-    ----------
-    text
-        Words, with marks that shorten the pauses if that was needed.
-    rate
-        Speaking rate.
-    speech_s
-        Seconds from the start of the cue to the end of the last word.
-    overflow_s
-        Seconds by which the last word ends after the cue; 0 if it fits.
-    n_steps
-        Number of times the speech was measured.
-    """
-
-    text: str
-    rate: float
-    speech_s: float
-    overflow_s: float
-    n_steps: int
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """Time of a cue, time up to the next one (None: unlimited), and how speech may be changed."""
-
-    window_s: float
-    slot_s: float | None
-    rate: float
-    max_rate: float
-    policy: str
-
-
-def fit_speech(text: str, limits: Limits, measure: Measure) -> Fit:
-    """Choose the rate and pauses by which a text fits its cue.
-
-    The natural duration is measured first; a text that is shorter than its cue keeps its rate. Else the rate is raised
-    up to `Limits.max_rate`, measured again at each step, as durations of voices do not follow the rate exactly. Then
-    the policy applies: ``extend`` lets the speech end after its cue, up to the next one; ``cut-pauses`` shortens the
-    pauses at punctuation first; ``report`` changes nothing.
-    """
-    fastest = max(limits.rate, limits.max_rate)
-    fit = _search(text, limits.rate, fastest, limits.window_s, measure)
-    if fit.overflow_s > 0.0 and limits.policy == CUT_PAUSES and PAUSE_PLACES.search(text):
-        short = PAUSE_PLACES.sub(rf"\1 {SHORT_PAUSE} ", text)
-        n_before = fit.n_steps
-        fit = _search(short, limits.rate, fastest, limits.window_s, measure)
-        fit = Fit(fit.text, fit.rate, fit.speech_s, fit.overflow_s, fit.n_steps + n_before)
-    if limits.slot_s is not None and fit.speech_s > limits.slot_s and limits.policy != REPORT:
-        last = _search(fit.text, fit.rate, RATE_LIMITS[1], limits.slot_s, measure)  # the next cue begins: faster
-        overflow = max(0.0, last.speech_s - limits.window_s)
-        fit = Fit(last.text, last.rate, last.speech_s, overflow, fit.n_steps + last.n_steps)
-    return fit
-
-
-def _search(text: str, rate: float, fastest: float, window_s: float, measure: Measure) -> Fit:
-    """The lowest rate from `rate` to `fastest` at which a text fits, or the fastest one."""
-    if not rate <= fastest:
-        raise InputError(f"the rate {rate:g} exceeds the largest rate {fastest:g}; lower it")
-    spoken = measure(text, rate).end
-    steps = 1
-    while spoken > window_s and rate < fastest and steps < MAX_STEPS:
-        rate = min(fastest, rate * max(spoken / (window_s * AIM), 1.01))
-        if steps == MAX_STEPS - 1:
-            rate = fastest
-        spoken = measure(text, rate).end
-        steps += 1
-    return Fit(text, round(rate, 6), spoken, max(0.0, spoken - window_s), steps)

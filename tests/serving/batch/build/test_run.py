@@ -66,7 +66,7 @@ def test_a_silence_of_one_or_two_frames_is_joined(
 
 
 def test_a_file_is_in_sync_at_every_cue(plan_of: Planner, voices: list[LetterVoice], tmp_path: Path) -> None:
-    result = run_batch(plan_of(per="file"), tmp_path / "out")
+    result = run_batch(plan_of(SRT.replace("Good", "A very good"), per="file"), tmp_path / "out")
     assert (result.n_made, result.failed) == (1, ())
     pictures, samples, rate = decoded(tmp_path / "out" / "one.mp4")
     assert len(pictures) == 125
@@ -74,7 +74,7 @@ def test_a_file_is_in_sync_at_every_cue(plan_of: Planner, voices: list[LetterVoi
     entry = manifest(tmp_path / "out")["outputs"][0]
     heard = spans(samples, rate)
     assert len(heard) == 3
-    for (begin, end), cue, letters in zip(heard, entry["cues"], (10, 19, 10), strict=True):
+    for (begin, end), cue, letters in zip(heard, entry["cues"], (10, 24, 10), strict=True):
         assert abs(begin - cue["begin_s"]) < AAC_SMEAR_S
         assert abs(end - cue["begin_s"] - letters * PHONE_S / cue["rate"]) < AAC_SMEAR_S
         assert abs(end - cue["begin_s"] - cue["speech_s"]) < HALF_FRAME_S

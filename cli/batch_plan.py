@@ -1,0 +1,85 @@
+"""The plan of ``tts2face batch --dry-run``: outputs, speakers, rates and what is cut."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cli.process import progress_bar
+
+if TYPE_CHECKING:
+    from tts2face.serving.batch.output import Plan
+    from tts2face.serving.batch.segment import SegmentResult
+    from tts2face.serving.batch.store import Store
+
+
+def write_table(plan: "Plan", store: "Store", path: Path | None) -> None:
+    """Write the table of lines, with the fits of a store, if a path is given."""
+    if path is None:
+        return
+    from tts2face.serving.batch.lines import write_lines
+    from tts2face.serving.batch.report import line_rows, measure_plan
+
+    write_lines(path, line_rows(plan, measure_plan(plan, store)))
+
+
+def print_plan(plan: "Plan", out: Path, files: tuple[str | None, Path | None], *, quiet: bool) -> None:
+    """Print what a batch will make; `files` are the store and the table of lines to write."""
+    from tts2face.serving.batch.lines import write_lines
+    from tts2face.serving.batch.report import line_rows, measure_plan
+    from tts2face.serving.batch.run import SEGMENT_FOLDER
+    from tts2face.serving.batch.store import open_store
+    from tts2face.serving.batch.windows import estimate_batch
+
+    store, table = files
+    place = store if store is not None else str(out / SEGMENT_FOLDER)
+    opened = open_store(place) if "://" in place or Path(place).is_dir() else None
+    estimate = estimate_batch(plan, out, opened)
+    with progress_bar("lines", quiet) as on_progress:
+        results = measure_plan(plan, opened, on_progress)
+    for output in plan.outputs:
+        length = max((cue.end_s for cue in output.cues), default=output.begin_s) - output.begin_s
+        print(f"{output.name}  {output.begin_s:.2f} s  {length:.2f} s  {len(output.cues)} cues")  # noqa: T201 - the result
+    _print_speakers(plan)
+    _print_rates(plan, results)
+    print(  # noqa: T201 - the result
+        f"{plan.n_cues} cues, {plan.n_silent} of them silent; {estimate.n_outputs} clips, {estimate.n_stale} to make "
+        f"({_duration(estimate.seconds)}); {estimate.n_segments} segments, {estimate.n_missing} to render; about "
+        f"{_duration(estimate.core_s)} of one core and {estimate.n_bytes / 1e6:.0f} MB on disk"
+    )
+    if table is not None:
+        write_lines(table, line_rows(plan, results))
+
+
+def _print_speakers(plan: "Plan") -> None:
+    """Print who speaks, with which face and voice."""
+    from tts2face.serving.batch.report import planned_speakers
+
+    for one in planned_speakers(plan):
+        role = "no role" if one.role is None else f"role {one.role}"
+        lines = f"{one.n_lines} line{'s' * (one.n_lines != 1)}"
+        print(f"speaker {one.name}: {lines}, {role}, face {one.face}, voice {one.voice}")  # noqa: T201 - the result
+
+
+def _print_rates(plan: "Plan", results: "Mapping[str, SegmentResult]") -> None:
+    """Print the lines that are not spoken as usual, and how many there are."""
+    from tts2face.serving.batch.report import CHANGED, fitted_lines, summarise
+
+    for line, result in fitted_lines(plan, results):
+        usual = float(line.segment.request.get("rate", 1.0)) if line.segment is not None else 1.0
+        if abs(result.rate - usual) < CHANGED and not result.warnings:
+            continue
+        where = f"{line.file}, cue {line.number}" + (f", part {line.part}" if line.part else "")
+        told = "; ".join((f"rate {result.rate:.2f}", *result.warnings))
+        print(f"{where}: {told}")  # noqa: T201 - the result
+    found = summarise(plan, results)
+    print(  # noqa: T201 - the result
+        f"{found.n_lines} lines: {found.n_faster} faster than usual ({found.n_over_limit} than --max-rate), "
+        f"{found.n_slower} slower, {found.n_overlapping} sound on into the next cue, {found.n_cut} lose words"
+    )
+
+
+def _duration(seconds: float) -> str:
+    """Seconds in the unit that fits them."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} minutes" if seconds < 6000.0 else f"{seconds / 3600:.1f} hours"

@@ -1,0 +1,82 @@
+"""Sentences that run over several cues, which are spoken as one and cut back at their words."""
+
+import re
+from collections.abc import Sequence
+
+from lexicon.dictionary import word_set
+from lexicon.sentences import MAX_SENTENCE_CHARACTERS
+from tts2face.serving.batch.windows import Window
+
+MAX_GAP_S = 1.0  # between the cues of a sentence
+_CLOSING = "\"'”’»)]"
+_ENDS = re.compile(r"[.!?…。！？｡।:;]$")
+_DOTS = re.compile(r"(?:\.{2,}|…)$")
+_LEADING_DOTS = re.compile(r"^(?:\.{2,}|…)\s*")
+# Words that end no sentence, after which one goes on with a name (to / London).
+_OPEN_WORDS = word_set(
+    "a an the and or but nor of to from with for at as by if than because into onto my your our their its every"
+)
+_LAST_WORD = re.compile(r"[^\W\d_]+(?:['’][^\W\d_]+)*$")
+
+
+def continues(text: str, following: str, *, is_in_capitals: bool = False) -> bool:
+    """Whether a sentence goes on in the next cue.
+
+    It has no end mark, and a comma at its end, a small letter after it, or a last word that ends no sentence
+    (*of*, *the*); or dots at its end and a small letter after it.
+
+    Parameters
+    ----------
+    is_in_capitals
+        Whether the file has no small letters; then a missing end mark decides.
+    """
+    end, begin = text.rstrip().rstrip(_CLOSING), following.lstrip("\"'“‘«([")
+    if _DOTS.search(end):
+        return _LEADING_DOTS.sub("", begin)[:1].islower()
+    if not end or ends_sentence(end) or _LEADING_DOTS.match(begin):
+        return False
+    if is_in_capitals or end[-1] in ",、，" or begin[:1].islower():
+        return True
+    word = _LAST_WORD.search(end)
+    return word is not None and word.group().lower() in _OPEN_WORDS
+
+
+def ends_sentence(text: str) -> bool:
+    """Whether a cue ends with the mark of a sentence's end."""
+    return _ENDS.search(text.rstrip().rstrip(_CLOSING)) is not None
+
+
+def spoken_part(text: str, *, is_first: bool, is_last: bool) -> str:
+    """Words of a cue within a sentence, without the dots by which it goes on."""
+    begin = text if is_first else _LEADING_DOTS.sub("", text)
+    return begin if is_last else _DOTS.sub("", begin.rstrip()).rstrip()
+
+
+def sentence_groups(
+    windows: Sequence[Window], keys: Sequence[object], max_gap: int, *, is_in_capitals: bool = False
+) -> list[list[int]]:
+    """Indices of the windows of each sentence, in order.
+
+    Parameters
+    ----------
+    keys
+        For each window what must be equal for its words to be spoken as one with the next ones; None: nothing is.
+    max_gap
+        Frames between two cues of a sentence.
+    """
+    groups: list[list[int]] = []
+    for at, window in enumerate(windows):
+        if groups:
+            before = groups[-1][-1]
+            n_characters = sum(len(windows[one].cue.text) + 1 for one in groups[-1])
+            is_one = keys[at] is not None and keys[at] == keys[before] and window.begin - windows[before].end <= max_gap
+            is_short = n_characters + len(window.cue.text) <= MAX_SENTENCE_CHARACTERS
+            if (
+                is_one
+                and is_short
+                and continues(windows[before].cue.text, window.cue.text, is_in_capitals=is_in_capitals)
+            ):
+                groups[-1].append(at)
+                continue
+        groups.append([at])
+    return groups

@@ -1,0 +1,121 @@
+"""Who speaks a line: its models and request by cast and table, and how speakers without a role are told apart."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from lexicon.errors import InputError
+from lexicon.languages import language_code
+from tts2face.interchange.subtitles.cues import Cue
+from tts2face.request import DRAWN_FACE
+from tts2face.serving.batch.cast import MODEL_NAMES, REQUEST_NAMES, Cast, Role, other_look
+from tts2face.serving.batch.lines import NO_SETTINGS, Lines, LineSettings
+from tts2face.session.named_models import Models
+
+UNNAMED = "(no name)"
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """Models and fields of the request of a line, and the number of its role, from 1; None without a role."""
+
+    models: Models
+    request: Mapping[str, Any]
+    role: int | None
+    other: int = 0  # counts the speakers of one cue who have no role, from the second one
+
+
+@dataclass(slots=True)
+class Speakers:
+    """Looks of the lines of one subtitle file.
+
+    Parameters
+    ----------
+    request
+        Fields of the command's request that differ from their defaults.
+    names
+        Name of the file with its ending, for the patterns of roles, and without, for the table.
+    keeps_face
+        Whether all have one face, as exports need it.
+    on_unknown
+        Called with a cue whose language is not known.
+    """
+
+    cast: Cast
+    lines: Lines
+    request: Mapping[str, Any]
+    models: Models
+    names: tuple[str, str]
+    keeps_face: bool
+    on_unknown: Callable[[Cue], None]
+    used: set[int] = field(default_factory=set)
+    _others: dict[tuple[int, int], int] = field(default_factory=dict)
+    _looks: dict[tuple[int, int], Look] = field(default_factory=dict)
+
+    def tell_apart(self, group: Sequence[tuple[Cue, int]]) -> None:
+        """Note the lines of one instant, with their parts: several speakers without a role do not look alike."""
+        strangers: list[str] = []
+        for number, (cue, part) in enumerate(group):
+            if self.cast.role_of(cue, self.names[0]) is not None:
+                continue
+            who = cue.speaker or f"{number}"  # nobody without a name speaks twice at once
+            if who not in strangers:
+                strangers.append(who)
+            self._others[(cue.number, part)] = strangers.index(who)
+
+    def settings(self, cue: Cue, part: int) -> LineSettings:
+        """Settings of a line in the table."""
+        return self.lines.of(self.names[1], cue.number, part) if self.lines.settings else NO_SETTINGS
+
+    def is_spoken(self, cue: Cue, part: int) -> bool:
+        """Whether a line is spoken, by the table or its role."""
+        chosen = self.settings(cue, part).is_spoken
+        return not self.cast.is_silent(cue, self.names[0]) if chosen is None else chosen
+
+    def look(self, cue: Cue, part: int) -> Look:
+        """Models and request of a line, without its words."""
+        key = (cue.number, part)
+        if key not in self._looks:
+            self._looks[key] = self._made(cue, part)
+        return self._looks[key]
+
+    def _made(self, cue: Cue, part: int) -> Look:
+        role = self.cast.role_of(cue, self.names[0])
+        self.used.add(id(role))
+        request = dict(self.request)
+        if cue.language and "language" not in request:
+            request["language"] = self._language(cue)
+        chosen = self.cast.settings(cue, self.names[0])
+        request |= {name: value for name, value in chosen.items() if name in REQUEST_NAMES}
+        request = {name: value for name, value in request.items() if value is not None}
+        models, other = self._models(role), self._others.get((cue.number, part), 0)
+        if other:
+            models, request = other_look(models, request, other, keeps_face=self.keeps_face)
+        line = self.settings(cue, part)
+        request |= {name: value for name, value in (("rate", line.rate), ("voice", line.voice)) if value is not None}
+        return Look(models, request, None if role is None else self.cast.roles.index(role) + 1, other)
+
+    def _language(self, cue: Cue) -> str | None:
+        try:
+            return language_code(str(cue.language))
+        except InputError:
+            self.on_unknown(cue)
+            return None
+
+    def _models(self, role: Role | None) -> Models:
+        models = self.models
+        for settings in (self.cast.default, role.settings if role else {}):
+            chosen = {name: settings[name] for name in MODEL_NAMES if name in settings}
+            if chosen.get("face", models.face) != models.face:
+                chosen = dict.fromkeys(("identity", "hair", "hair_color")) | chosen  # they belong to a face
+            elif models.face == DRAWN_FACE:
+                chosen = {"face": ""} | chosen  # the one that the other settings belong to
+            models = replace(models, **chosen)
+        return models
+
+
+def shown_name(speaker: str, look: Look | None) -> str:
+    """Name of a speaker in a plan; of people without a name in one cue, with their number."""
+    if speaker:
+        return speaker
+    return f"{UNNAMED} {look.other + 1}" if look is not None and look.other else UNNAMED
