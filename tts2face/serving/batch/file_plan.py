@@ -22,7 +22,7 @@ from tts2face.serving.batch.output import Output, PlannedCue, PlannedLine, PlanW
 from tts2face.serving.batch.recordings import Recordings, find_recordings
 from tts2face.serving.batch.segment import ALPHA_MOVIE, MOVIE, Part, Segment, file_hash
 from tts2face.serving.batch.speakers import Speakers
-from tts2face.serving.batch.windows import Window, cue_lines, cue_windows, scenes
+from tts2face.serving.batch.windows import MAX_TAIL_S, Window, cue_lines, cue_windows, scenes
 from tts2face.session.named_models import Models
 from tts2face.session.prepared import prepare
 from tts2face.types import SOUND_RATE, exact_rate, first_sample
@@ -195,6 +195,16 @@ class FilePlan:
         look = self.speakers.look(window.cue, window.part)
         return window.cue.speaker, look.other, look.models, repr(sorted(look.request.items()))
 
+    def _speaks_on(self, window: Window, following: Window) -> bool:
+        """Whether one speaker has both lines, with no long silence between them."""
+        before, after = (self.speakers.look(one.cue, one.part) for one in (window, following))
+        is_near = following.begin - window.end <= MAX_TAIL_S * float(exact_rate(self.base.request.fps))
+        same = [
+            (one.cue.speaker, look.other, look.models, look.request.get("voice"))
+            for one, look in ((window, before), (following, after))
+        ]
+        return is_near and same[0] == same[1]
+
     def _is_spoken_as_one(self, sentence: _Sentence) -> bool:
         """Whether a voice can speak the words of all cues together, of which each begins with a letter."""
         request = Request(**self.speakers.look(sentence.windows[0].cue, 0).request, text=self._joined(sentence))
@@ -289,7 +299,7 @@ class FilePlan:
             segment,
             min_rate=options.min_rate,
             max_overlap=0.0 if is_last else options.max_overlap,
-            is_shared=following is not None and self._who(following) == self._who(window),
+            is_shared=following is not None and self._speaks_on(window, following),
         )
         if rate is not None:
             segment = replace(segment, overflow=REPORT, min_rate=rate, max_rate=rate)

@@ -1,0 +1,110 @@
+"""Who speaks: several speakers without names, speakers without a role, lines that are left out, and their list."""
+
+from pathlib import Path
+
+import pytest
+
+from lexicon.errors import DataError
+from tests.serving.batch.conftest import SRT, Planner
+from tts2face.serving.batch.cast import other_look, read_cast
+from tts2face.serving.batch.report import planned_speakers
+from tts2face.session.named_models import Models
+from tts2face.sound.voice_pool import find_voice
+
+TWO = "1\n00:00:01,000 --> 00:00:04,000\n- Good morning. - Hello there.\n"
+
+
+def cast_of(tmp_path: Path, text: str) -> object:
+    (tmp_path / "cast.toml").write_text(text)
+    return read_cast(tmp_path / "cast.toml")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        TWO,
+        TWO.replace(" - ", "\n- "),
+        TWO.replace("- Good", "Good").replace(" - ", "\n- "),
+        TWO.replace("- Good", "JOHN: Good").replace(" - ", "\nANN: "),
+        "1\n00:00:01,000 --> 00:00:04,000\nGood morning.\n\n2\n00:00:01,000 --> 00:00:04,000\nHello there.\n",
+    ],
+)
+def test_two_who_speak_at_once_share_neither_face_nor_voice(text: str, plan_of: Planner) -> None:
+    first, second = (line.look for line in plan_of(text).lines)
+    assert first.models.face != second.models.face
+    assert first.request.get("voice") != second.request.get("voice")
+    assert first.models == Models()
+
+
+def test_a_role_decides_for_both(plan_of: Planner, tmp_path: Path) -> None:
+    cast = cast_of(tmp_path, '[[role]]\nspeaker = "*"\nface = "noor"\n')
+    assert [line.look.models.face for line in plan_of(TWO, cast=cast).lines] == ["noor", "noor"]
+
+
+def test_exports_of_several_cues_keep_one_face(plan_of: Planner) -> None:
+    plan = plan_of(TWO, per="file", exports=("csv",))
+    first, second = (line.look for line in plan.lines)
+    assert first.models == second.models
+    assert first.request.get("voice") != second.request.get("voice")
+
+
+def test_another_speaker_has_a_voice_of_the_language_and_the_other_sex() -> None:
+    models, request = other_look(Models(), {"language": "de"}, 1)
+    assert (request["voice"], models.face) == ("espeak-female", "mara")
+    _, request = other_look(Models(face="head", identity="ravi"), {"voice": "espeak-female"}, 1)
+    assert find_voice(request["voice"]).sex == "male"
+    looks = [other_look(Models(), {}, number) for number in (1, 2, 3)]
+    assert len({models.face for models, _ in looks}) == 3
+
+
+def test_speakers_without_a_role_are_named(plan_of: Planner, tmp_path: Path) -> None:
+    cast = cast_of(tmp_path, '[[role]]\nspeaker = "ANN"\nface = "mara"\n')
+    text = (
+        SRT.replace("Bob may", "JOHN: You may").replace("Good", "EVE: Good")
+        + "\n4\n00:00:13,000 --> 00:00:14,000\n- No. - Yes.\n"
+    )
+    messages = [one.message for one in plan_of(text, cast=cast).warnings if one.file == "the cast"]
+    assert messages == [
+        "no role applies to EVE (1 line), JOHN (1 line), (no name) (1 line); they have the default face and voice"
+    ]
+    assert not [one for one in plan_of(text).warnings if "no role" in one.message]  # there are no roles at all
+
+
+def test_all_speakers_are_listed_with_face_and_voice(plan_of: Planner, tmp_path: Path) -> None:
+    cast = cast_of(tmp_path, '[[role]]\nspeaker = "ANN"\nface = "head"\nidentity = "kofi"\nvoice = "espeak"\n')
+    found = planned_speakers(plan_of(SRT, cast=cast))
+    assert [(one.name, one.n_lines, one.role, one.face, one.voice) for one in found] == [
+        ("(no name)", 2, None, "ada", "heart"),
+        ("ANN", 1, 1, "head kofi", "espeak"),
+    ]
+
+
+SIGNS = """[Events]
+Format: Start, End, Style, Name, Text
+Dialogue: 0:00:01.00,0:00:03.00,Default,,Hello there.
+Dialogue: 0:00:01.50,0:00:03.50,Sign - Door,,Keep out.
+Dialogue: 0:00:04.00,0:00:06.00,Default,,Subtitles by Somebody
+Dialogue: 0:00:07.00,0:00:08.00,Default,,Good morning.
+"""
+
+
+def test_signs_and_credits_are_left_out_and_take_no_time(plan_of: Planner, tmp_path: Path) -> None:
+    cast = cast_of(
+        tmp_path,
+        '[[role]]\nsubtitle_style = "sign*"\nsilent = true\n[[role]]\ntext = "subtitles by *"\nsilent = true\n',
+    )
+    plan = plan_of(SIGNS, name="one.ass", cast=cast)
+    assert [output.name for output in plan.outputs] == ["one-0001.mp4", "one-0004.mp4"]
+    assert plan.outputs[0].cues[0].end_s == 3.0
+    assert (plan.n_cues, plan.n_silent) == (4, 2)
+    assert [line.segment is None for line in plan.lines] == [False, True, True, False]
+    assert [one.message for one in plan.warnings if one.file == "the cast"] == [
+        "no role applies to (no name) (2 lines); they have the default face and voice"
+    ]
+
+
+def test_all_but_some_roles_can_be_left_out(plan_of: Planner, tmp_path: Path) -> None:
+    cast = cast_of(tmp_path, '[default]\nsilent = true\n[[role]]\nspeaker = "ANN"\nsilent = false\n')
+    assert [output.name for output in plan_of(SRT, cast=cast).outputs] == ["one-0001.mp4"]
+    with pytest.raises(DataError, match='silent must be true or false, not "yes"'):
+        cast_of(tmp_path, '[default]\nsilent = "yes"\n')
