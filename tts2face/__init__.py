@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from tts2face.serving.batch.options import BatchOptions as BatchOptions
     from tts2face.serving.batch.output import Plan as Plan
     from tts2face.serving.batch.plan import plan_batch as plan_batch
+    from tts2face.serving.batch.report import measure_plan as measure_plan
     from tts2face.serving.batch.run import BatchResult as BatchResult
     from tts2face.serving.batch.run import run_batch as run_batch
     from tts2face.session.animated_face import AnimatedFace as AnimatedFace
@@ -119,6 +120,7 @@ __all__ = [
     "load_palette",
     "load_project",
     "load_talker",
+    "measure_plan",
     "plan_batch",
     "read_cast",
     "read_subtitles",
@@ -140,6 +142,7 @@ _MODULES = {
     "tts2face.serving.batch.options": ("BatchOptions",),
     "tts2face.serving.batch.output": ("Plan",),
     "tts2face.serving.batch.plan": ("plan_batch",),
+    "tts2face.serving.batch.report": ("measure_plan",),
     "tts2face.serving.batch.run": ("BatchResult", "run_batch"),
     "tts2face.session.catalogue": (
         "faces",

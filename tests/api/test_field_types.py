@@ -44,6 +44,7 @@ from tts2face.models.palette_editing import StyleMix
 from tts2face.picture.options import Picture
 from tts2face.request import Request
 from tts2face.serving.batch.cast import Cast, Role
+from tts2face.serving.batch.lines import LineSettings
 from tts2face.serving.batch.options import BatchOptions
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.studio.comparison import KEPT, Reference
@@ -56,7 +57,7 @@ from tts2face.types import Clip, Speech, Trajectory, Waveform, resting_head
 
 SPEECH = Speech(Waveform(np.zeros(800), 8000), PhoneSequence(["a"], [0.0, 0.1]), (WordSpan("a", 0, 1),))
 MADE: tuple[Any, ...] = (
-    Request(), Models(), Picture(), Project(), Timeline(), BatchOptions(), Cast(), Role({}, {}),
+    Request(), Models(), Picture(), Project(), Timeline(), BatchOptions(), Cast(), Role({}, {}), LineSettings(),
     ServiceSettings(), Performance(take=Path("a.mp4")), StreamFormat("mp3", Picture()),
     SynthesisOptions(), FieldOptions(), ExcludedToken("a", 0.0), SentenceEdges("a", 0, ("a",), (0.0, 0.1)),
     StyleMix("neutral"), Reference(KEPT, project=Project()),

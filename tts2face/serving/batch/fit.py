@@ -1,6 +1,6 @@
 """Fit of speech to the time of its cue: the speaking rate, the pauses, and what remains too long.
 
-A sentence that runs over several cues has one rate, at which each of its parts fits its own cue.
+A sentence that runs over several cues has one rate, at which each of its parts fits its own cue, if possible.
 """
 
 import re
@@ -13,7 +13,7 @@ from tts2face.serving.batch.options import CUT_PAUSES, REPORT
 MAX_STEPS = 4  # of the search for a rate; two are usual
 AIM = 0.985  # of a time, so that rounding of durations by the voice does not need another step
 EASY_S = 0.5  # after a cue that speech may use before its rate is raised: a viewer reads on as long
-RELEASE_S = 0.05  # of silence between the last word and the next cue: the sound of a word ends after its last phone
+RELEASE_S = 0.05  # after the last word, whose sound ends after its last phone
 PAUSE_PLACES = re.compile(r"(?<=\w)([,;:.!?…]+)\s+(?=\S)")
 SHORT_PAUSE = "[pause 0]"  # the shortest pause between two utterances, 20 ms
 
@@ -34,29 +34,32 @@ class Room:
         By how much speech may sound on after the next cue has begun.
     is_shared
         Whether the next cue is of the same speaker, who speaks faster rather than twice at once.
+    release_s
+        Silence before the next cue; none within a sentence.
     """
 
     window_s: float
     slot_s: float | None = None
     overlap_s: float = 0.0
     is_shared: bool = False
+    release_s: float = RELEASE_S
 
     @property
     def easy_s(self) -> float:
         """End of speech for which no rate is raised."""
         if self.slot_s is None:
             return self.window_s + EASY_S
-        return max(self.window_s, min(self.window_s + EASY_S, self.slot_s - RELEASE_S))
+        return max(self.window_s, min(self.window_s + EASY_S, self.slot_s - self.release_s))
 
     @property
-    def free_s(self) -> float:
-        """End of speech that reaches no next cue."""
-        return float("inf") if self.slot_s is None else max(self.slot_s - RELEASE_S, self.window_s)
+    def next_s(self) -> float:
+        """Begin of the next cue."""
+        return float("inf") if self.slot_s is None else max(self.slot_s, self.window_s)
 
     @property
     def last_s(self) -> float:
         """End of speech that sounds on as long as is allowed."""
-        return float("inf") if self.slot_s is None else max(self.slot_s, self.window_s) + self.overlap_s
+        return self.next_s + self.overlap_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,8 +119,11 @@ def fit_speech(text: str, limits: Limits, measure: Measure) -> Fit:
     )
     if limits.policy == CUT_PAUSES and search.exceeds([one.easy_s for one in limits.rooms]) and search.shorten_pauses():
         search.faster(max(limits.rate, limits.max_rate), [one.easy_s for one in limits.rooms])
-    if not keeps_to_cue:
-        search.faster(RATE_LIMITS[1], [one.free_s if one.is_shared else one.last_s for one in limits.rooms])
+    if not keeps_to_cue:  # beyond the limit each part has a rate of its own: one that is too long does not hurry all
+        own = limits.rooms[limits.part]
+        ends = [float("inf")] * len(limits.rooms)
+        ends[limits.part] = own.next_s if own.is_shared else own.last_s
+        search.faster(RATE_LIMITS[1], ends)
     if search.rate == limits.rate and limits.min_rate < limits.rate:
         search.slower(limits.min_rate, [one.window_s for one in limits.rooms])
     return search.result()
@@ -170,8 +176,8 @@ class _Search:
     def result(self) -> Fit:
         """The fit that was found, of the part in question."""
         end, room = self._ends[self._limits.part], self._limits.rooms[self._limits.part]
-        overlap = 0.0 if room.slot_s is None else max(0.0, end - max(room.slot_s, room.window_s))
-        return Fit(self._text, round(self.rate, 6), end, max(0.0, end - room.window_s), overlap, self._n_steps)
+        late, overlap = max(0.0, end - room.window_s), max(0.0, end - room.next_s)
+        return Fit(self._text, round(self.rate, 6), end, late, overlap, self._n_steps)
 
     def _speak(self, rate: float) -> None:
         self.rate, self._ends = rate, self._measure(self._text, rate)

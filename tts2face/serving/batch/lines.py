@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_limits, parse_cell, read_table
+from lexicon.inputs import check_fields, check_limits, parse_cell, read_table
 from lexicon.marked_text import RATE_LIMITS
 from tts2face.storage.files import write_atomically
 
@@ -46,6 +46,10 @@ class LineSettings:
     rate: float | None = None
     voice: str | None = None
     offset_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse values of other types (`InputError`)."""
+        check_fields(self)
 
 
 NO_SETTINGS = LineSettings()

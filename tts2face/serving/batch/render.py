@@ -148,8 +148,9 @@ class SegmentRenderer:
             with _writer(session, segment, fitted.request, (out, result.n_frames)) as writer:
                 for clip in session.stream_to_length(fitted, result.n_frames):
                     writer.add(clip)
-                if result.overlap_s > 0.0 and segment.fills_slot and request.audio is None:
-                    _add_overlap(session, fitted, writer, clip, result)
+                if segment.fills_slot and fitted.request.is_text:
+                    end = result.speech_s + ((segment.lead_frames or 0) / result.fps) + RELEASE_S
+                    _add_overlap(session, fitted, writer, clip, (result.n_frames / result.fps, end))
         return replace(result, took_s=round(time.perf_counter() - began, 3))
 
     def measure(self, segment: Segment) -> SegmentResult:
@@ -160,20 +161,22 @@ class SegmentRenderer:
 
 
 def _add_overlap(
-    session: Session, fitted: PreparedRequest, writer: ClipWriter | ExportWriter, last: Clip, result: SegmentResult
+    session: Session, fitted: PreparedRequest, writer: ClipWriter | ExportWriter, last: Clip, span: tuple[float, float]
 ) -> None:
-    """Append the sound of the words after the last frame of a segment, whose last clip is given; a track shows rest."""
+    """Append the sound of the last words from the end of a segment's frames on, whose last clip is given.
+
+    A track shows the face at rest with it. `span` is in seconds of the segment.
+    """
+    if span[0] >= span[1]:
+        return
     spoken = concatenate_clips([piece.clip for piece in session.stream_speech(fitted)]).speech.waveform
-    end = result.n_frames / result.fps + result.overlap_s + RELEASE_S
-    sound = spoken.part(round(result.n_frames / result.fps * spoken.rate), round(end * spoken.rate))
+    sound = spoken.part(*(round(seconds * spoken.rate) for seconds in span))
     if isinstance(writer, ClipWriter):
         writer.add_sound(sound.samples)
-        return
-    n_frames = frame_count(sound.duration, last.fps)
-    motion, head = (
-        replace(one, values=np.repeat(one.values[-1:], n_frames, axis=0)) for one in (last.motion, last.head)
-    )
-    writer.add(Clip(motion, head, Speech.without_phones(sound)))
+    elif len(sound.samples):
+        n_frames, shown = frame_count(sound.duration, last.fps), (last.motion, last.head)
+        motion, head = (replace(one, values=np.repeat(one.values[-1:], n_frames, axis=0)) for one in shown)
+        writer.add(Clip(motion, head, Speech.without_phones(sound)))
 
 
 def _write_file(session: Session, segment: Segment, out: Path) -> SegmentResult:
@@ -285,6 +288,7 @@ class SegmentSpeech:
                 None if part.slot_frames is None else part.slot_frames / self.fps,
                 segment.max_overlap,
                 segment.is_shared or at < last,
+                RELEASE_S if at == last else 0.0,
             )
             for at, part in enumerate(self._parts)
         )
@@ -310,8 +314,8 @@ class SegmentSpeech:
         if n_kept == len(words):
             return self._prepared(request, self._segment.part), fit, ""
         end = end_of(n_kept)
-        overlap = 0.0 if room.slot_s is None else max(0.0, end - room.slot_s)
-        shorter = replace(fit, speech_s=end, overflow_s=max(0.0, end - room.window_s), overlap_s=overlap)
+        late, overlap = max(0.0, end - room.window_s), max(0.0, end - room.next_s)
+        shorter = replace(fit, speech_s=end, overflow_s=late, overlap_s=overlap)
         return self._prepared(request, self._segment.part, words[:n_kept]), shorter, " ".join(words[n_kept:])
 
     def _own_words(self) -> list[str]:

@@ -14,6 +14,7 @@ from tests.world import PHONE_S, LetterVoice, World
 from tts2face.models.face_loading import load_face
 from tts2face.picture.scene import draw_background
 from tts2face.request import DRAWN_FACE, Request
+from tts2face.serving.batch.cast import Cast
 from tts2face.serving.batch.export import joined_clips
 from tts2face.serving.batch.render import SegmentRenderer, _writer
 from tts2face.serving.batch.report import measure_plan
@@ -67,7 +68,7 @@ def sound_of(path: Path) -> np.ndarray:
 def test_last_words_sound_on_while_the_next_cue_begins(
     plan_of: Planner, voices: list[LetterVoice], tmp_path: Path
 ) -> None:
-    plan = plan_of(OVERLAP, per="file", format="mov", exports=("wav",))
+    plan = plan_of(OVERLAP, per="file", format="mov", exports=("wav",), cast=Cast({"volume": 0.4}))
     run_batch(plan, tmp_path / "out")
     (output,) = manifest(tmp_path / "out")["outputs"]
     first, second = output["cues"]
