@@ -72,6 +72,9 @@ def _print_rates(plan: "Plan", results: "Mapping[str, SegmentResult]") -> None:
         told = "; ".join((f"rate {result.rate:.2f}", *result.warnings))
         print(f"{where}: {told}")  # noqa: T201 - the result
     found = summarise(plan, results)
+    missing = sum(line.segment is not None for line in plan.lines) - found.n_lines
+    if missing:
+        print(f"{missing} lines cannot be spoken as planned, and will fail: see the errors of the run")  # noqa: T201
     print(  # noqa: T201 - the result
         f"{found.n_lines} lines: {found.n_faster} faster than usual ({found.n_over_limit} than --max-rate), "
         f"{found.n_slower} slower, {found.n_overlapping} sound on into the next cue, {found.n_cut} lose words"

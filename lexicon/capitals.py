@@ -19,6 +19,7 @@ _WORD = re.compile(r"[^\W\d_]+(?:['’][^\W\d_]+)*")
 _TWO_CAPITALS = re.compile(r"[^\W\d_a-z]{2}")  # without them no word is in capitals
 _PREFIX = re.compile(r"(?:Mc|Mac)(?=[A-Z])")
 _SENTENCE_END = re.compile(r"[.!?…。！？]|\n\s*\n|:\s|\A\Z")
+_OF_INITIALISM = re.compile(r"([A-Z]{2,5})(?:['’]?S)\Z")  # the FBI's, DVDs
 _STOP = re.compile(r"\s*[.!?…]")
 _VOWELS = frozenset("AEIOUY")
 _SYLLABLE = re.compile("[^AEIOU][AEIOU][^AEIOUHWY]")  # a short name (JAX) rather than an initialism (ICU, ETA)
@@ -206,8 +207,11 @@ def _spelling(text: str, word: re.Match[str], before: str, after: str) -> str:
         return letters.capitalize()
     if letters == "A" and _is_content(after):
         return "a"
+    stem = _OF_INITIALISM.match(letters)
+    if stem is not None and _is_spelled(stem[1], before, after) and not _is_word(letters):
+        return stem[1] + letters[stem.end(1) :].lower()
     is_kept = len(letters) == 1 or not _is_capital(letters) or _is_spelled(letters, before, after)
-    return letters if is_kept else letters.lower()
+    return letters if is_kept else letters.lower().replace("i'", "I'", letters.startswith("I'"))
 
 
 def _beside_number(text: str, word: re.Match[str]) -> str:
@@ -239,10 +243,14 @@ def _is_spelled(word: str, before: str, after: str) -> bool:
     return _has_letters_alone(word)
 
 
+def _is_word(word: str) -> bool:
+    return cmudict_lookup(word) is not None or own_pronunciation(word) is not None
+
+
 @functools.lru_cache(maxsize=10_000)
 def _has_letters_alone(word: str) -> bool:
     """Whether dictionaries read a word by its letters, or do not have it and it does not look like a word."""
-    if cmudict_lookup(word) is not None or own_pronunciation(word) is not None or not word.isalpha():
+    if _is_word(word) or not word.isalpha():
         return is_read_by_letters(word)
     is_short = len(word) <= _MAX_SPELLED_LETTERS and not _SYLLABLE.fullmatch(word)
     return is_short or not set(word) & _VOWELS
