@@ -134,6 +134,8 @@ def _check_work(jobs: int, priority: int, *, has_database: bool) -> None:
 def _check_places(out: Path, table: Path | None, subtitles: Sequence[Path]) -> None:
     if "://" in str(out) or str(out).startswith(("s3:", "gs:", "az:")):
         raise InputError(f"--out must be a folder of this machine, not {out}; give a bucket by --store")
+    if table is not None and not table.resolve().parent.is_dir():
+        raise InputError(f"--write-lines: there is no folder {table.parent}; create it, or choose another")
     if table is not None and table.resolve() in {path.resolve() for path in subtitles}:
         raise InputError(f"--write-lines would replace the subtitles {table}; choose another name")
 

@@ -135,3 +135,5 @@ def test_the_command_lists_speakers_rates_and_cuts_and_writes_the_table(
     assert "4 lines: 0 faster than usual" in capsys.readouterr().out
     assert run([*words, "--dry-run", "--write-lines", "one.srt"]) == 2
     assert "would replace the subtitles one.srt" in capsys.readouterr().err
+    assert run([*words, "--dry-run", "--write-lines", "none/lines.csv"]) == 2
+    assert "there is no folder none; create it, or choose another" in capsys.readouterr().err
