@@ -173,6 +173,11 @@ def _silence_at_ends(speech: Speech) -> tuple[float, float]:
     return lead, float(edges[-1] - edges[-2]) if labels[-1] == SILENCE else 0.0
 
 
+def fade_out(n_samples: int, rate: int) -> NDArray[np.float32]:
+    """(n_samples,) gains with a fade at their end."""
+    return _fade_gains(n_samples, rate, begins=False, ends=True)
+
+
 def _fade_gains(n_samples: int, rate: int, begins: bool, ends: bool) -> NDArray[np.float32]:
     ramp = np.linspace(0.0, 1.0, min(round(FADE_S * rate), n_samples // 2), endpoint=False, dtype=np.float32)
     gain = np.ones(n_samples, np.float32)

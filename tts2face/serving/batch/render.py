@@ -39,7 +39,7 @@ from tts2face.serving.batch.segment import (
     segment_from_json,
 )
 from tts2face.session.functions import SessionCache
-from tts2face.session.joining import Excerpt
+from tts2face.session.joining import Excerpt, fade_out
 from tts2face.session.prepared import PreparedRequest, prepare
 from tts2face.session.session import Session
 from tts2face.sound.pauses import speech_onset
@@ -55,6 +55,7 @@ from tts2face.types import (
     first_sample,
     frame_count,
 )
+from tts2face.video.media import read_sound
 
 ONSET_S = 60  # of a recording of a cue, within which its first sound lies
 
@@ -148,9 +149,8 @@ class SegmentRenderer:
             with _writer(session, segment, fitted.request, (out, result.n_frames)) as writer:
                 for clip in session.stream_to_length(fitted, result.n_frames):
                     writer.add(clip)
-                if segment.fills_slot and fitted.request.is_text:
-                    end = result.speech_s + ((segment.lead_frames or 0) / result.fps) + RELEASE_S
-                    _add_overlap(session, fitted, writer, clip, (result.n_frames / result.fps, end))
+                if segment.fills_slot and segment.audio_begin is None and result.speech_s > 0.0:
+                    _add_overlap(session, fitted, writer, clip, _span_after(segment, result))
         return replace(result, took_s=round(time.perf_counter() - began, 3))
 
     def measure(self, segment: Segment) -> SegmentResult:
@@ -160,23 +160,33 @@ class SegmentRenderer:
             return fit_segment(session, request, segment)[1]
 
 
+def _span_after(segment: Segment, result: SegmentResult) -> tuple[float, float]:
+    """Seconds of a segment from the end of its frames to that of its sound."""
+    end = result.speech_s + (segment.lead_frames or 0) / result.fps + RELEASE_S
+    frames_s = result.n_frames / result.fps
+    return frames_s, min(end, frames_s + result.overlap_s + RELEASE_S)
+
+
 def _add_overlap(
     session: Session, fitted: PreparedRequest, writer: ClipWriter | ExportWriter, last: Clip, span: tuple[float, float]
 ) -> None:
-    """Append the sound of the last words from the end of a segment's frames on, whose last clip is given.
-
-    A track shows the face at rest with it. `span` is in seconds of the segment.
-    """
+    """Append the sound of a span after a segment's frames, whose last clip is given; a track shows rest with it."""
     if span[0] >= span[1]:
         return
-    spoken = concatenate_clips([piece.clip for piece in session.stream_speech(fitted)]).speech.waveform
-    sound = spoken.part(*(round(seconds * spoken.rate) for seconds in span))
+    if fitted.request.audio is None:
+        whole = concatenate_clips([piece.clip for piece in session.stream_speech(fitted)]).speech.waveform
+    else:
+        whole = read_sound(fitted.request.audio, last.speech.waveform.rate)
+    sound = whole.part(*(round(seconds * whole.rate) for seconds in span))
+    if not len(sound.samples):
+        return
+    sound = Waveform(sound.samples * fade_out(len(sound.samples), sound.rate), sound.rate)
     if isinstance(writer, ClipWriter):
         writer.add_sound(sound.samples)
-    elif len(sound.samples):
-        n_frames, shown = frame_count(sound.duration, last.fps), (last.motion, last.head)
-        motion, head = (replace(one, values=np.repeat(one.values[-1:], n_frames, axis=0)) for one in shown)
-        writer.add(Clip(motion, head, Speech.without_phones(sound)))
+        return
+    n_frames, shown = frame_count(sound.duration, last.fps), (last.motion, last.head)
+    motion, head = (replace(one, values=np.repeat(one.values[-1:], n_frames, axis=0)) for one in shown)
+    writer.add(Clip(motion, head, Speech.without_phones(sound)))
 
 
 def _write_file(session: Session, segment: Segment, out: Path) -> SegmentResult:
@@ -228,17 +238,21 @@ def fit_segment(session: Session, request: Request, segment: Segment) -> tuple[P
 
 
 def _fit_recorded(session: Session, request: Request, segment: Segment) -> tuple[PreparedRequest, SegmentResult]:
-    """A recording keeps its rate; what does not fit is cut off."""
+    """A recording keeps its rate; what does not fit sounds on, and beyond the limit is cut off."""
     fps = float(exact_rate(request.fps))
     window_s = segment.window_frames / fps
     request, spoken, heard = fit_recording(session, request, segment)
     spoken = min(spoken, window_s) if segment.audio_begin is not None else spoken
     fit = Fit(request.text, 1.0, spoken, max(0.0, spoken - window_s))
     n_frames, warnings = _length(segment, fit, fps)
-    cut = max(0.0, spoken - n_frames / fps)
-    if cut > 0:
-        warnings.append(f"the last {cut:.2f} s of the speech are cut off by the next cue")
-    return prepare(request), _result(segment, fit, (n_frames, fps), cut, [*heard, *warnings])
+    late = max(0.0, spoken - n_frames / fps)
+    overlap = min(late, segment.max_overlap)
+    if late > overlap:
+        warnings.append(f"the last {late - overlap:.2f} s of the speech are cut off by the next cue")
+    if overlap > 0.0:
+        warnings.append(f"{overlap:.2f} s of the speech sound on after the next cue has begun")
+    fit = replace(fit, overlap_s=overlap)
+    return prepare(request), _result(segment, fit, (n_frames, fps), late - overlap, [*heard, *warnings])
 
 
 def _result(

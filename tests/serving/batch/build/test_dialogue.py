@@ -1,6 +1,7 @@
 """Lines close together: sentences over several cues, last words that sound on, one background for all faces."""
 
 import wave
+from dataclasses import replace
 from pathlib import Path
 
 import av
@@ -9,13 +10,16 @@ import pytest
 
 from lexicon.sentences import n_letters
 from tests.serving.batch.build.test_run import AAC_SMEAR_S, decoded, manifest, spans
+from tests.serving.batch.build.test_tracks import write_wav
 from tests.serving.batch.conftest import FPS, SMALL, Planner
 from tests.world import PHONE_S, LetterVoice, World
 from tts2face.models.face_loading import load_face
 from tts2face.picture.scene import draw_background
 from tts2face.request import DRAWN_FACE, Request
+from tts2face.serving.batch import render
 from tts2face.serving.batch.cast import Cast
 from tts2face.serving.batch.export import joined_clips
+from tts2face.serving.batch.fit import RELEASE_S
 from tts2face.serving.batch.render import SegmentRenderer, _writer
 from tts2face.serving.batch.report import measure_plan
 from tts2face.serving.batch.run import SEGMENT_FOLDER, run_batch
@@ -136,8 +140,29 @@ def test_faces_without_a_studio_stand_before_that_of_the_drawn_faces(
     studio = load_face(DRAWN_FACE).light[0].backdrop
     assert np.array_equal(shown._renderer.scene.background, draw_background(SMALL, studio))
     assert not np.array_equal(shown._renderer.scene.background, draw_background(SMALL))
-    green = type(segment)(
-        **{**segment.as_json(), "models": segment.models, "parts": (), "picture": {"background": "green"}}
-    )
+    green = replace(segment, picture={"background": "green"})
     shown = _writer(world.session(), green, Request(text="Hello."), (tmp_path / "b.mov", 10))
     assert len(np.unique(shown._renderer.scene.background.reshape(-1, 3), axis=0)) == 1
+
+
+RECORDED = ((0.9, 0.0, 0.0), (1.2, 0.2, 0.0), (1.6, 0.3, 0.3))  # seconds spoken in a slot of 1 s, sounding on, cut
+
+
+@pytest.mark.parametrize("case", RECORDED)
+def test_a_recording_sounds_on_up_to_the_limit(
+    case: tuple[float, float, float],
+    plan_of: Planner,
+    world: World,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    sound, (spoken, overlap_s, cut_s) = tmp_path / "a.wav", case
+    write_wav(sound, np.full(round(spoken * 48_000), 0.5))
+    monkeypatch.setattr(render, "fit_recording", lambda _session, request, _segment: (request, spoken, []))
+    segment = replace(plan_of(OVERLAP, per="file").lines[0].segment, slot_frames=10, lead_frames=0)
+    _, result = render.fit_segment(world.session(), Request(text="abc", audio=sound, fps=FPS), segment)
+    assert (result.n_frames, result.overlap_s, result.cut_s) == (10, pytest.approx(overlap_s), pytest.approx(cut_s))
+    assert any("sound on" in one for one in result.warnings) == (overlap_s > 0.0)
+    assert any("cut off" in one for one in result.warnings) == (cut_s > 0.0)
+    begin, end = render._span_after(segment, result)
+    assert end - begin == pytest.approx(min(overlap_s + RELEASE_S, spoken + RELEASE_S - 1.0), abs=1e-6)
