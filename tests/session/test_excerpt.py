@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lexicon.sentences import n_letters
+from lexicon.sentence_length import n_letters
 from lexicon.sequence import SILENCE
 from tests.world import PHONE_S, World
 from tts2face.request import LEAD_S, Request

@@ -11,7 +11,8 @@ import numpy as np
 
 from lexicon.errors import InputError
 from lexicon.marked_text import NameMark
-from lexicon.sentences import Sentence, n_letters, text_prefix
+from lexicon.sentence_length import n_letters
+from lexicon.sentences import Sentence, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
 from tts2face.numeric.reuse import NO_MEMORY, SentenceMemory

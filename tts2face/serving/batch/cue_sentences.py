@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 
 from lexicon.dictionary import word_set
-from lexicon.sentences import MAX_SENTENCE_CHARACTERS
+from lexicon.sentence_length import MAX_SENTENCE_CHARACTERS
 from tts2face.serving.batch.windows import Window
 
 MAX_GAP_S = 1.0  # between the cues of a sentence

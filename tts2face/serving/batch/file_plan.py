@@ -8,7 +8,7 @@ from typing import Any
 
 from lexicon.capitals import is_in_capitals, sentence_case
 from lexicon.errors import DataError, InputError
-from lexicon.sentences import n_letters
+from lexicon.sentence_length import n_letters
 from tts2face.interchange.exports.table import batch_format
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.interchange.subtitles.reader import read_subtitles

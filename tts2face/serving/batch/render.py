@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from lexicon.errors import DataError
-from lexicon.sentences import n_letters, text_prefix
+from lexicon.sentence_length import n_letters
+from lexicon.sentences import text_prefix
 from tts2face.interchange.exports.writer import ExportWriter, plan_exports
 from tts2face.models.face_loading import load_face
 from tts2face.picture.film import MKV, ClipWriter

@@ -8,7 +8,7 @@ import av
 import numpy as np
 import pytest
 
-from lexicon.sentences import n_letters
+from lexicon.sentence_length import n_letters
 from tests.serving.batch.build.test_run import AAC_SMEAR_S, decoded, manifest, spans
 from tests.serving.batch.build.test_tracks import write_wav
 from tests.serving.batch.conftest import FPS, SMALL, Planner
