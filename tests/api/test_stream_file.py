@@ -1,8 +1,12 @@
 """Files that are sent while they are made."""
 
 import io
+import json
+import tempfile
 import threading
+import wave
 from collections.abc import Iterator
+from pathlib import Path
 
 import av
 import numpy as np
@@ -11,6 +15,7 @@ import pytest
 import tts2face
 from lexicon.errors import InputError
 from tests.world import World
+from tts2face.session import steps
 from tts2face.session.encoded_stream import media_types
 from tts2face.sound.voice_pool import VoicePool
 
@@ -132,3 +137,70 @@ def test_all_formats_have_media_types() -> None:
         "mp3": "audio/mpeg",
         "curves": "application/jsonl",
     }
+
+
+@pytest.mark.parametrize("format", ["mp4", "webm", "wav", "mp3", "opus", "weba", "flac"])
+def test_a_complete_file_has_its_length_in_its_header(
+    format: str, session: tts2face.Session, clip: tts2face.Clip
+) -> None:
+    chunks = list(session.stream_file(TEXT, format, picture=SMALL, fps=25, is_complete=True))
+    assert sum(chunk.seconds for chunk in chunks) == pytest.approx(clip.speech.waveform.duration, abs=0.04)
+    with av.open(io.BytesIO(content(iter(chunks)))) as file:
+        assert file.duration is not None
+        assert file.duration / av.time_base == pytest.approx(clip.speech.waveform.duration, abs=0.08)
+    if format == "wav":
+        with wave.open(io.BytesIO(content(iter(chunks)))) as sound:
+            assert sound.getnframes() == len(clip.speech.waveform.samples)
+
+
+@pytest.mark.parametrize("format", ["mp4", "webm"])
+def test_a_complete_movie_is_that_of_the_command(format: str, session: tts2face.Session, tmp_path: Path) -> None:
+    session.write("We may.", tmp_path / f"clip.{format}", picture=SMALL)
+    made = content(session.stream_file("We may.", format, picture=SMALL, is_complete=True))
+    assert made == (tmp_path / f"clip.{format}").read_bytes()
+
+
+def test_a_complete_file_is_not_left_behind(
+    session: tts2face.Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    chunks = session.stream_file(TEXT, "flac", is_complete=True)
+    assert next(chunks).content == b""
+    chunks.close()  # type: ignore[attr-defined]
+    assert list(tmp_path.iterdir()) == []
+
+
+BEYOND = [
+    {"nods": [{"time": 50}]}, {"brow_raises": [{"time": 50}]}, {"listens": [{"start": 50}]},
+    {"gaze": [{"down_deg": 1, "left_deg": 1, "start": 50}]},
+    {"expressions": [{"expression": "happy", "weight": 0.5, "start": 0.5, "end": 50}]},
+    {"spans": [{"feature": "head", "style": "neutral", "start": 50}]},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("elements", BEYOND, ids=lambda one: next(iter(one)))
+@pytest.mark.parametrize("format", ["mp4", "curves"])
+def test_times_beyond_the_clip_are_refused_before_its_first_byte(
+    elements: dict[str, object], format: str, session: tts2face.Session, tmp_path: Path
+) -> None:
+    (tmp_path / "t.json").write_text(json.dumps(elements))
+    chunks = session.stream_file("Bob may move. We were away.", format, picture=SMALL, timeline=tmp_path / "t.json")
+    with pytest.raises(InputError, match="lies beyond the clip"):
+        next(chunks)
+
+
+def test_times_within_the_clip_do_not_wait_for_its_end(session: tts2face.Session, tmp_path: Path) -> None:
+    (tmp_path / "t.json").write_text(json.dumps({"nods": [{"time": 0.5}]}))
+    text = "Bob may move. We were away. " * 40
+    assert next(session.stream_file(text, "curves", timeline=tmp_path / "t.json")).content
+
+
+def test_times_beyond_a_long_clip_are_refused_at_its_end(
+    session: tts2face.Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(steps, "AHEAD_S", 1.0)
+    (tmp_path / "t.json").write_text(json.dumps({"nods": [{"time": 500}]}))
+    chunks = session.stream_file("Bob may move. We were away. " * 3, "curves", timeline=tmp_path / "t.json")
+    assert next(chunks).content
+    with pytest.raises(InputError, match="the nod at 500 s lies beyond the clip"):
+        list(chunks)

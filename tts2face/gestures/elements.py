@@ -374,18 +374,25 @@ class ElementKind:
             One lies there.
         """
         for one in elements:
+            if self.latest_s(one) < duration:
+                continue
             if self.shape == "span":
-                last = one.start if math.isinf(one.end) else one.end - MAX_OVERRUN_S
-                if max(last, one.start) >= duration:
-                    raise InputError(
-                        f"the span of {self.lane(one)} from {one.start:g} to {one.end:g} s lies beyond the clip, which "
-                        f"lasts {duration:.2f} s; shorten it"
-                    )
-            elif self.shape == "instant" and one.time >= duration:
-                what = self.name.removesuffix("s").replace("_", " ")
                 raise InputError(
-                    f"the {what} at {one.time:g} s lies beyond the clip, which lasts {duration:.2f} s; move it"
+                    f"the span of {self.lane(one)} from {one.start:g} to {one.end:g} s lies beyond the clip, which "
+                    f"lasts {duration:.2f} s; shorten it"
                 )
+            what = self.name.removesuffix("s").replace("_", " ")
+            raise InputError(
+                f"the {what} at {one.time:g} s lies beyond the clip, which lasts {duration:.2f} s; move it"
+            )
+
+    def latest_s(self, element: Any) -> float:
+        """Second that a clip must go beyond to hold an element; below 0 for a curve, which any clip holds."""
+        if self.shape == "curve":
+            return -1.0
+        if self.shape == "instant":
+            return float(element.time)
+        return float(element.start if math.isinf(element.end) else max(element.start, element.end - MAX_OVERRUN_S))
 
 
 KINDS: Mapping[str, ElementKind] = MappingProxyType({

@@ -236,6 +236,12 @@ class Timeline:
         for name in self.style_names:
             palette.require(name)
 
+    @property
+    def latest_s(self) -> float:
+        """Second that a clip must go beyond to hold all elements; below 0 where any clip does."""
+        seconds = [kind.latest_s(one) for name, kind in KINDS.items() for one in getattr(self, name)]
+        return max(seconds, default=-1.0)
+
     def check_duration(self, duration: float) -> None:
         """Refuse times beyond the end of a clip.
 

@@ -294,22 +294,23 @@ class ClipFrames:
 
 @dataclass(frozen=True, slots=True)
 class StreamedMovie:
-    """Encoding of a movie format, and its media type."""
+    """Encodings of a movie format, sent while it is made and as a complete file, and its media type."""
 
     kind: MovieKind
+    complete: MovieKind
     media_type: str
     has_alpha: bool
 
 
 MOVIE_KINDS = {
-    "mp4": StreamedMovie(STREAMED_MP4, "video/mp4", False),
-    "webm": StreamedMovie(STREAMED_WEBM, "video/webm", True),
+    "mp4": StreamedMovie(STREAMED_MP4, MP4_MOVIE, "video/mp4", False),
+    "webm": StreamedMovie(STREAMED_WEBM, WEBM_MOVIE, "video/webm", True),
 }
 
 
 def encode_movie(
     clips: Iterable[Clip], renderer: FrameRenderer, format: str, *, threads: int | None = None,
-    pace: Pace | None = None,
+    pace: Pace | None = None, path: Path | None = None,
 ) -> Iterator[Chunk]:  # fmt: skip
     """Draw and encode consecutive clips; yields a chunk of the movie after each frame.
 
@@ -321,17 +322,20 @@ def encode_movie(
         One of `MOVIE_KINDS`.
     threads, pace
         As for `ClipFrames`.
+    path
+        Where a complete file is written, with its duration and an index; chunks are empty then.
 
     Raises
     ------
     InputError
         The format is unknown or cannot be transparent, or the clips differ in fps, sound rate or channels.
     """
-    kind, frames = find_movie_kind(format, renderer.picture), ClipFrames(renderer, threads, pace)
+    movie, frames = find_movie_kind(format, renderer.picture), ClipFrames(renderer, threads, pace)
     buffer, writer, n_frames = WriteBuffer(), None, 0
+    target, kind = (buffer, movie.kind) if path is None else (path, movie.complete)
     try:
         for clip in clips:
-            writer = writer or _open_movie(buffer, kind, clip, renderer)
+            writer = writer or _open_movie(target, kind, clip, renderer)
             for pixels, samples in frames.add(clip):
                 seconds = (frames.n_frames - n_frames) / clip.fps
                 n_frames = frames.n_frames
@@ -350,16 +354,16 @@ def encode_movie(
             writer.abandon()
 
 
-def find_movie_kind(format: str, picture: Picture) -> MovieKind:
-    """Encoding of a streamed movie; raises as `encode_movie`."""
+def find_movie_kind(format: str, picture: Picture) -> StreamedMovie:
+    """Encodings of a movie format; raises as `encode_movie`."""
     if format not in MOVIE_KINDS:
         raise InputError(f"there is no streamed movie format {format!r}; the formats are {', '.join(MOVIE_KINDS)}")
     movie = MOVIE_KINDS[format]
     if picture.is_transparent and not movie.has_alpha:
         raise InputError(f"{format} cannot be transparent; choose webm, or another background")
-    return movie.kind
+    return movie
 
 
-def _open_movie(buffer: WriteBuffer, kind: MovieKind, clip: Clip, renderer: FrameRenderer) -> MovieWriter:
+def _open_movie(target: Path | WriteBuffer, kind: MovieKind, clip: Clip, renderer: FrameRenderer) -> MovieWriter:
     picture, clock = renderer.picture, (exact_rate(clip.fps), clip.speech.waveform.rate)
-    return MovieWriter(buffer, kind, (picture.height, picture.width, picture.channels), clock, renderer.notice)
+    return MovieWriter(target, kind, (picture.height, picture.width, picture.channels), clock, renderer.notice)

@@ -1,9 +1,10 @@
-"""Encoded sound that is sent while it is made."""
+"""Encoded sound, sent while it is made or written as a complete file."""
 
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from tts2face.storage.media_files import pcm_bytes
 from tts2face.types import Chunk, Waveform
 
 UNKNOWN_BYTES = 0xFFFFFFFF  # size of a WAV file that is not yet known; players read to the end of the stream
+HEAD_BYTES = 44  # of a WAV file, before its samples
 OPUS_RATE = 48_000  # Hz
 BLOCK_S = 0.5  # of sound that a codec encodes at a time; a sentence takes up to 0.2 s
 
@@ -39,23 +41,24 @@ SOUND_KINDS = {
     "flac": SoundKind("audio/flac", "flac", "flac"),
 }
 _NO_RANDOM_IDS = {"fflags": "+bitexact"}
-_CONTAINER_OPTIONS = {
-    "ogg": _NO_RANDOM_IDS, "webm": {**_NO_RANDOM_IDS, "live": "1", "cluster_time_limit": "200"},
-}  # fmt: skip
+_CONTAINER_OPTIONS = {"ogg": _NO_RANDOM_IDS, "webm": _NO_RANDOM_IDS}
+_STREAM_OPTIONS = {"webm": {"live": "1", "cluster_time_limit": "200"}}
 
 
-def encode_sound(sounds: Iterator[Waveform], format: str) -> Iterator[Chunk]:
+def encode_sound(sounds: Iterator[Waveform], format: str, path: Path | None = None) -> Iterator[Chunk]:
     """Encode consecutive mono sounds of one sample rate as a file; yields its chunks in order.
 
     Parameters
     ----------
     format
         One of `SOUND_KINDS`; ``wav`` and ``pcm`` have 16 bits, ``pcm`` has no header.
+    path
+        Where a complete file is written, whose header has its length; chunks are empty then.
 
     Raises
     ------
     InputError
-        The format is unknown, or the sounds differ in sample rate.
+        The format is unknown, the sounds differ in sample rate, or a complete WAV file would have more than 4 GB.
     """
     if format not in SOUND_KINDS:
         raise InputError(f"there is no sound format {format!r}; the formats are {', '.join(SOUND_KINDS)}")
@@ -66,7 +69,7 @@ def encode_sound(sounds: Iterator[Waveform], format: str) -> Iterator[Chunk]:
         for sound in sounds:
             if encoder is None:
                 rate = sound.rate
-                encoder = _CodecEncoder(kind, rate) if kind.codec else _PcmEncoder(rate, has_header=format == "wav")
+                encoder = _open_encoder(kind, rate, path, has_header=format == "wav")
             if sound.rate != rate:
                 raise InputError(f"sounds of one file must share the sample rate {rate} Hz; one has {sound.rate} Hz")
             for block in _blocks(sound) if kind.codec else [sound]:
@@ -77,6 +80,10 @@ def encode_sound(sounds: Iterator[Waveform], format: str) -> Iterator[Chunk]:
     finally:
         if encoder is not None:
             encoder.finish()
+
+
+def _open_encoder(kind: SoundKind, rate: int, path: Path | None, *, has_header: bool) -> "_PcmEncoder | _CodecEncoder":
+    return _CodecEncoder(kind, rate, path) if kind.codec else _PcmEncoder(rate, path, has_header=has_header)
 
 
 def _blocks(sound: Waveform) -> Iterator[Waveform]:
@@ -99,26 +106,42 @@ def wav_header(rate: int, n_bytes: int | None) -> bytes:
 class _PcmEncoder:
     """Encoder without compression."""
 
-    def __init__(self, rate: int, *, has_header: bool) -> None:
+    def __init__(self, rate: int, path: Path | None, *, has_header: bool) -> None:
+        self._rate, self._has_header, self._n_bytes = rate, has_header, 0
+        self._file = None if path is None else path.open("wb")
         self._header = wav_header(rate, None) if has_header else b""
 
     def add(self, sound: Waveform) -> bytes:
         header, self._header = self._header, b""
-        return header + pcm_bytes(sound.samples)
+        samples = pcm_bytes(sound.samples)
+        if self._file is None:
+            return header + samples
+        self._n_bytes += len(samples)
+        if self._has_header and self._n_bytes > UNKNOWN_BYTES - HEAD_BYTES:
+            raise InputError("a .wav file has at most 4 GB of sound; choose flac, or divide the text")
+        self._file.write(header + samples)
+        return b""
 
     def finish(self) -> bytes:
+        if self._file is not None:
+            if self._has_header:
+                self._file.seek(0)
+                self._file.write(wav_header(self._rate, self._n_bytes))
+            self._file.close()
         return b""
 
 
 class _CodecEncoder:
     """Encoder with a codec of FFmpeg."""
 
-    def __init__(self, kind: SoundKind, rate: int) -> None:
+    def __init__(self, kind: SoundKind, rate: int, path: Path | None) -> None:
         import av
 
         self._buffer, self._rate, self._n_samples = WriteBuffer(), rate, 0
-        options = {"flush_packets": "1"} | _CONTAINER_OPTIONS.get(kind.container, {})
-        self._container: Any = av.open(self._buffer, "w", format=kind.container, options=options)
+        options, target = _CONTAINER_OPTIONS.get(kind.container, {}), self._buffer if path is None else str(path)
+        if path is None:
+            options = {"flush_packets": "1"} | options | _STREAM_OPTIONS.get(kind.container, {})
+        self._container: Any = av.open(target, "w", format=kind.container, options=options)
         self._stream: Any = self._container.add_stream(kind.codec, rate=kind.rate or rate, layout="mono")
         if kind.bits:
             self._stream.codec_context.bit_rate = kind.bits

@@ -1,4 +1,4 @@
-"""A clip as bytes that are sent while they are made: a movie, sound or lines of text."""
+"""A clip as bytes: a movie, sound or lines of text that are sent while they are made, or a complete file."""
 
 import io
 import tempfile
@@ -24,6 +24,7 @@ from tts2face.session.prepared import PreparedRequest
 from tts2face.session.speech_stream import Piece, spoken_pieces
 from tts2face.types import Chunk
 
+LINES = "application/jsonl"  # media type of lines of JSON
 BLOCK_BYTES = 1 << 18  # of a file that is read when it is complete
 
 
@@ -39,7 +40,7 @@ def media_types() -> Mapping[str, str]:
     return MappingProxyType({
         **{name: kind.media_type for name, kind in MOVIE_KINDS.items()},
         **{name: kind.media_type for name, kind in SOUND_KINDS.items()},
-        **dict.fromkeys(line_formats(), "application/jsonl"),
+        **dict.fromkeys(line_formats(), LINES),
         "livelink": "text/csv",
         "glb": "model/gltf-binary",
     })  # fmt: skip
@@ -53,6 +54,8 @@ class StreamFormat:
     ----------
     threads, pace
         As for `tts2face.picture.movie.ClipFrames`.
+    is_complete
+        Bytes come when all is made: a file whose header has its length, in place of one that plays while it is sent.
 
     Raises
     ------
@@ -64,6 +67,7 @@ class StreamFormat:
     picture: Picture
     threads: int | None = None
     pace: Pace | None = None
+    is_complete: bool = False
 
     def __post_init__(self) -> None:
         """Check the types and the format."""
@@ -77,21 +81,45 @@ class StreamFormat:
 def encode_stream(prepared: PreparedRequest, models: SessionModels, format: StreamFormat) -> Iterator[Chunk]:
     """Synthesise and encode a request; yields consecutive chunks of a file."""
     request, name = prepared.request, format.name
-    if name in MOVIE_KINDS:
-        renderer = models.renderer(format.picture, has_gestures=request.has_gestures)
-        clips = (piece.clip for piece in models.pieces(prepared))
-        return encode_movie(clips, renderer, name, threads=format.threads, pace=format.pace)
-    if name in SOUND_KINDS:
-        if request.audio is None:
-            pieces = spoken_pieces(prepared, models.for_request(prepared).speech, has_phones=False)
-        else:
-            pieces = models.pieces(prepared)
-        return encode_sound((piece.speech.waveform for piece in pieces), name)
+    if name in MOVIE_KINDS or name in SOUND_KINDS:
+        if not format.is_complete:
+            return _encode_media(prepared, models, format, None)
+        return encode_complete(lambda path: _encode_media(prepared, models, format, path), name)
     if name not in line_formats():
         file, face = f"clip.{name}", models.face(has_gestures=request.has_gestures)
         return encode_whole(models.pieces(prepared), file, face, lambda folder: folder / file)
     mesh = models.face(has_gestures=request.has_gestures).mesh if line_formats()[name].uses_face else None
     return encode_lines(models.pieces(prepared), name, mesh)
+
+
+def _encode_media(
+    prepared: PreparedRequest, models: SessionModels, format: StreamFormat, path: Path | None
+) -> Iterator[Chunk]:
+    """Movie or sound of a request; `path` as for `encode_movie` and `encode_sound`."""
+    request = prepared.request
+    if format.name in MOVIE_KINDS:
+        renderer = models.renderer(format.picture, has_gestures=request.has_gestures)
+        clips = (piece.clip for piece in models.pieces(prepared))
+        return encode_movie(clips, renderer, format.name, threads=format.threads, pace=format.pace, path=path)
+    if request.audio is None:
+        pieces = spoken_pieces(prepared, models.for_request(prepared).speech, has_phones=False)
+    else:
+        pieces = models.pieces(prepared)
+    return encode_sound((piece.speech.waveform for piece in pieces), format.name, path)
+
+
+def encode_complete(write: Callable[[Path], Iterator[Chunk]], format: str) -> Iterator[Chunk]:
+    """Chunks without content while a file is written to the path that `write` gets, then its bytes."""
+    with tempfile.TemporaryDirectory(prefix="tts2face-") as folder:
+        path = Path(folder, f"clip.{format}")
+        yield from write(path)
+        yield from _file_chunks(path)
+
+
+def _file_chunks(path: Path) -> Iterator[Chunk]:
+    with path.open("rb") as file:
+        while block := file.read(BLOCK_BYTES):
+            yield Chunk(block)
 
 
 def encode_whole(
@@ -115,9 +143,7 @@ def encode_whole(
             for piece in pieces:
                 writer.add(piece.clip, piece.text)
                 yield Chunk(b"", piece.clip.speech.waveform.duration)
-        with choose(Path(folder)).open("rb") as file:
-            while block := file.read(BLOCK_BYTES):
-                yield Chunk(block)
+        yield from _file_chunks(choose(Path(folder)))
 
 
 class LineBuffer(io.StringIO):

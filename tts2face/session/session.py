@@ -193,6 +193,7 @@ class Session:
         picture: Picture | None = None,
         threads: int | None = None,
         pace: Pace | None = None,
+        is_complete: bool = False,
         **options: Any,
     ) -> Iterator[Chunk]:
         """Synthesise and encode the clip of a text or request; yields the file in chunks while it is made.
@@ -210,6 +211,8 @@ class Session:
         pace
             Lowers the quality of a movie that is made more slowly than it is seen; None: the quality is that of
             `picture`.
+        is_complete
+            The bytes come when all is made, as a file whose header has its length; a movie is that of `write`.
 
         Raises
         ------
@@ -218,7 +221,7 @@ class Session:
         """
         picture, options = split_picture(picture, options)
         prepared = prepare_request(text, options)
-        return encode_stream(prepared, self._models, StreamFormat(format, picture, threads, pace))
+        return encode_stream(prepared, self._models, StreamFormat(format, picture, threads, pace, is_complete))
 
     def write(
         self,

@@ -8,20 +8,25 @@ from collections import defaultdict
 from collections.abc import Mapping
 from typing import Any
 
+from lexicon.errors import InputError
 from tts2face.processes.child import Call, Handler, StoppedError
 from tts2face.serving.service.messages import SERVE, SYNTHESISE
 
 PART = bytes(range(256)) * 16
 N_PARTS, PAUSE_S = 60, 0.05  # of a film, which takes some seconds
 FILM = PART * N_PARTS
+FAILS, N_BEFORE_FAILURE = "fails late", 2  # words of a text whose film fails after some parts
+FAILURE = "the nod at 60 s lies beyond the clip, which lasts 1.20 s; move it"
 
 
 def synthesise(call: Call) -> Mapping[str, float]:
-    """A film in parts; of a live stream an event, and no end."""
-    is_live = call.content["work"]["kind"] == "live"
+    """A film in parts, which fails where the text says so; of a live stream an event, and no end."""
+    is_live, text = call.content["work"]["kind"] == "live", call.content["work"]["request"].get("text", "")
     if is_live:
         call.event({"seconds": 0.0, "event": {"type": "curves"}})
-    for _ in range(10**9 if is_live else N_PARTS):
+    for number in range(10**9 if is_live else N_PARTS):
+        if number == N_BEFORE_FAILURE and FAILS in text:
+            raise InputError(FAILURE)
         with call.changed:
             if call.changed.wait_for(lambda: call.is_stopped, PAUSE_S):
                 raise StoppedError

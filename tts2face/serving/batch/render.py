@@ -196,7 +196,7 @@ def _write_file(session: Session, segment: Segment, out: Path) -> SegmentResult:
     format = segment.medium.removeprefix(FILE_PREFIX)
     with translate_disk_errors(out), Temporary(out) as temporary:
         with temporary.path.open("wb") as file:
-            for chunk in session.stream_file(request, format, picture=Picture(**segment.picture)):
+            for chunk in session.stream_file(request, format, picture=Picture(**segment.picture), is_complete=True):
                 file.write(chunk.content)
                 seconds += chunk.seconds
         temporary.replace(out)

@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+from collections.abc import Sequence
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +12,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 from tts2face.serving.service.errors import error_body
+from tts2face.serving.service.exchange import FAIL
 from tts2face.serving.service.settings import ServiceSettings
 
 if TYPE_CHECKING:
@@ -61,6 +64,7 @@ class HttpConnection(H11Protocol):
         self._settings = settings
         self._head, self._stall = _Timer(self._end_slow_head), _Timer(self._abort)
         self._linger, self._n_lingering = _Timer(self._abort), 0
+        self.app_state = {**self.app_state, FAIL: self.fail}
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Count the connection, and wait for a head."""
@@ -102,6 +106,20 @@ class HttpConnection(H11Protocol):
         self._n_lingering = 0
         if self.conn.their_state is h11.SEND_BODY and not self.transport.is_closing():
             self._linger.start(LINGER_S)
+
+    def fail(self, fields: Sequence[tuple[bytes, bytes]], *, is_read: bool) -> None:
+        """End the present answer, which is incomplete, with trailer fields, and close.
+
+        Only a client that reads trailers (``TE: trailers``) gets the end of the message; for all others it is missing,
+        so that they do not take the answer for complete.
+        """
+        if self.transport.is_closing():
+            return
+        with suppress(h11.LocalProtocolError):  # of a stated length, or for a client of HTTP/1.0: without trailers
+            end = self.conn.send(h11.EndOfMessage(headers=list(fields)))
+            self.transport.write(end if is_read else end.removesuffix(b"\r\n"))
+        self.cycle.response_complete = True
+        self.transport.close()
 
     def pause_writing(self) -> None:
         """Begin to wait for a client that does not read."""

@@ -65,7 +65,9 @@ METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"}
 CLOSE_NORMAL, CLOSE_REFUSED, CLOSE_RESTART = 1000, 1008, 1012  # WebSocket: policy violation; service restart
 HTTP_FORM = "websocket.http.response"  # extension of ASGI: a refused WebSocket gets an HTTP answer
 DRAINING_RETRY_S = 5  # until another server, or this one again, may be asked
-CLOSE_S = 1.0  # for which a client that is cut may take to read why
+CLOSE_S = 1.0  # for which a client may take to read why its answer ends early
+ERROR_FIELD = "X-Tts2face-Error"  # trailer of an answer that ends before it is complete, with the JSON of the error
+FAIL = "end_incomplete"  # name in the state of a scope: ends an answer with trailers, `HttpConnection.fail`
 LEFT = 499  # status, in the log and the metrics only, of a request whose client left before its answer began
 Item = TypeVar("Item")
 
@@ -90,6 +92,7 @@ class Exchange:
         self.first_byte_s: float | None = None
         self.stages: list[Stage] = []
         self.further: list[tuple[bytes, bytes]] = []  # headers of its answer, whatever answers it
+        self.ending: Callable[[dict[str, Any]], bytes] | None = None  # how an answer that fails ends
         self.key: ApiKey | None = None  # with which it is answered
         self.cut_by: RefusedError | None = None  # why the service ended it before it was complete
         self.is_answered = False  # all of its answer has been passed on
@@ -209,23 +212,33 @@ class Exchange:
             self._watched.discard(task)
 
     async def refuse(self, refused: RefusedError) -> None:
-        """Answer with an error, unless an answer has begun."""
-        self.code = refused.code
+        """Answer with an error, or end with it an answer that has begun."""
+        self.code, content = refused.code, error_body(refused.code, refused.message)
         if self.status:
-            return
-        body = json.dumps(error_body(refused.code, refused.message)).encode()
+            return await self._end_incomplete(content)
+        body = json.dumps(content).encode()
         headers = [(name.lower().encode(), value.encode("latin-1")) for name, value in refused.headers.items()]
         headers.append((b"content-type", b"application/json"))
         if self.scope["type"] == "http":
-            await self.answer(refused.status, headers, body)
-            return
+            return await self.answer(refused.status, headers, body)
         self.status = refused.status
         if HTTP_FORM not in self.scope.get("extensions", {}):
-            await self._send({"type": "websocket.close", "code": CLOSE_REFUSED, "reason": refused.message[:120]})
-            return
+            return await self._send({"type": "websocket.close", "code": CLOSE_REFUSED, "reason": refused.message[:120]})
         headers += [(b"content-length", str(len(body)).encode()), (b"x-request-id", self.id.encode()), *self.further]
         await self._send({"type": f"{HTTP_FORM}.start", "status": refused.status, "headers": headers})
-        await self._send({"type": f"{HTTP_FORM}.body", "body": body})
+        return await self._send({"type": f"{HTTP_FORM}.body", "body": body})
+
+    async def _end_incomplete(self, content: dict[str, Any]) -> None:
+        """End an answer that has begun: by a last line or event where its form has them, else by a trailer."""
+        if self.scope["type"] != "http" or self.is_answered or self._is_closed or self.has_left:
+            return
+        if self.ending is not None and (last := self.ending(content)):
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self.send({"type": "http.response.body", "body": last}), CLOSE_S)
+            return
+        if (fail := self.scope.get("state", {}).get(FAIL)) is not None:
+            accepted = self.headers.get(b"te", b"").lower().replace(b" ", b"").split(b",")
+            fail([(ERROR_FIELD.encode(), json.dumps(content).encode())], is_read=b"trailers" in accepted)
 
     async def announce_end(self, refused: RefusedError) -> None:
         """Write to the client of a WebSocket why the service is about to end it; pages notice it by themselves."""

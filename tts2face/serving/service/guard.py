@@ -159,7 +159,7 @@ class Guard:
             pass  # the client has left
         except Exception as defect:  # noqa: BLE001 - the one place where a defect becomes an answer
             if isinstance(defect.__cause__, RefusedError) and request.status:  # Starlette's, of one that comes too late
-                request.code = defect.__cause__.code
+                await request.refuse(defect.__cause__)
                 return
             if is_disk_full(defect):
                 message = "a disk of the service is full, /readyz names its folder; repeat the request later"

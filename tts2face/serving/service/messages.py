@@ -51,6 +51,8 @@ class Work:
         A movie has pictures of less quality rather than falling behind who sees it (`tts2face.picture.pace.Pace`).
     affinity
         Works of equal affinity run in the same process if it is free, which keeps their sentences; empty: any.
+    is_complete
+        The bytes come when all is made, as a file whose header has its length.
     """
 
     kind: str = "file"
@@ -61,6 +63,7 @@ class Work:
     owner: str = ""
     keeps_pace: bool = False
     affinity: str = ""
+    is_complete: bool = False
 
     def as_json(self) -> dict[str, Any]:
         """JSON object of the fields."""

@@ -6,6 +6,7 @@ Tasks of the service: each makes a result step by step with a session.
 import logging
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -46,7 +47,9 @@ def stream_file(session: "Session", work: Work, _: Inputs) -> Iterator[Event | C
     request, picture = Request(**work.request), Picture(**work.picture)
     pace = Pace(lead) if work.keeps_pace else None
     quality = pace.quality if pace is not None else None
-    for chunk in session.stream_file(request, work.format, picture=picture, threads=DRAWING_THREADS, pace=pace):
+    for chunk in session.stream_file(
+        request, work.format, picture=picture, threads=DRAWING_THREADS, pace=pace, is_complete=work.is_complete
+    ):
         yield chunk
         if pace is not None and pace.quality != quality:
             quality = pace.quality
@@ -56,10 +59,12 @@ def stream_file(session: "Session", work: Work, _: Inputs) -> Iterator[Event | C
 def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk]:
     """For each sentence an event with its words, phones and visemes in seconds of the whole, then its sound.
 
-    The format of a work without one is PCM.
+    The format of a work without one is PCM. The sound of a complete file comes after all events.
     """
     from tts2face.picture.sound_stream import encode_sound
+    from tts2face.session.encoded_stream import encode_complete
 
+    format = work.format or "pcm"
     events: list[Event] = []
 
     def sounds() -> Iterator[Waveform]:
@@ -67,7 +72,10 @@ def timed_speech(session: "Session", work: Work, _: Inputs) -> Iterator[Event | 
             events.append(_timed_event(timed))
             yield timed.speech.waveform
 
-    for chunk in encode_sound(sounds(), work.format or "pcm"):
+    def write(path: Path | None = None) -> Iterator[Chunk]:
+        return encode_sound(sounds(), format, path)
+
+    for chunk in encode_complete(write, format) if work.is_complete else write():
         yield from events
         events.clear()
         yield chunk

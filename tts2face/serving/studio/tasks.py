@@ -136,9 +136,11 @@ def picture(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
 
 
 def project_file(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:
-    """Bytes of a project's clip in a format of `Session.stream_file`."""
+    """Bytes of a project's clip as a complete file in a format of `Session.stream_file`."""
     project = read_project(work)
-    return session.stream_file(project.prepare(), work.format, picture=project.picture, threads=DRAWING_THREADS)
+    return session.stream_file(
+        project.prepare(), work.format, picture=project.picture, threads=DRAWING_THREADS, is_complete=True
+    )
 
 
 def project_export(session: "Session", work: Work, _: Inputs) -> Iterator[Chunk]:

@@ -1,4 +1,4 @@
-"""Jobs of kind ``clip``: one clip in a format of `Session.stream_file`, with the bytes that a stream would have.
+"""Jobs of kind ``clip``: one clip in a format of `Session.stream_file`, as a complete file.
 
 Jobs of kind ``subtitles``: a batch of subtitle files, whose clips and manifest are the results.
 

@@ -3,9 +3,11 @@
 Streams of results as HTTP answers.
 """
 
-from collections.abc import AsyncIterator, Callable
+import json
+from collections.abc import AsyncIterator
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, aclosing
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 from fastapi import APIRouter, WebSocket
 from fastapi import Request as HttpRequest
@@ -17,11 +19,12 @@ from starlette.datastructures import FormData
 from tts2face.picture.movie import MOVIE_KINDS
 from tts2face.processes.message import Message
 from tts2face.serving.service.errors import RefusedError
+from tts2face.serving.service.exchange import ERROR_FIELD
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.options import ClipRequest, divide_options
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES, UploadFolder, upload_folder
-from tts2face.session.encoded_stream import media_types
+from tts2face.session.encoded_stream import LINES, media_types
 
 
 def service_state(request: HttpRequest | WebSocket) -> ServiceState:
@@ -35,7 +38,7 @@ async def stream_work(
     work: Work,
     media_type: str,
     *,
-    convert: "Callable[[AsyncIterator[Message]], AsyncIterator[bytes]] | None" = None,
+    convert: "Converter | None" = None,
     resources: AsyncExitStack | None = None,
 ) -> StreamingResponse:
     """Answer that sends a result while it is made.
@@ -45,13 +48,14 @@ async def stream_work(
     Parameters
     ----------
     convert
-        Converts messages to bytes; None: the bytes of all data.
+        Converts messages to bytes, and an error to what ends them; None: the bytes of all data.
     resources
         Closed when the answer is complete or has failed.
     """
     state, stack = service_state(request), resources or AsyncExitStack()
     messages = state.messages(work, request.state.key)
-    chunks = (convert or data_bytes)(messages)
+    convert = convert or DataBytes(media_type)
+    chunks = convert(messages)
     try:
         first = await anext(chunks)
     except StopAsyncIteration:
@@ -67,14 +71,48 @@ async def stream_work(
             async for chunk in chunks:
                 yield chunk
 
-    return StreamingResponse(body(), media_type=media_type)
+    request.state.exchange.ending = convert.failed
+    headers = {} if convert.failed({}) else {"Trailer": ERROR_FIELD}
+    return StreamingResponse(body(), media_type=media_type, headers=headers)
 
 
-async def data_bytes(messages: AsyncIterator[Message]) -> AsyncIterator[bytes]:
-    """Bytes of the data of a result."""
-    async for message in messages:
-        if message.payload:
-            yield message.payload
+class Converter(Protocol):
+    """Converts the messages of a result to the bytes of an answer."""
+
+    def __call__(self, messages: AsyncIterator[Message]) -> AsyncIterator[bytes]:
+        """The bytes, as they come."""
+        ...
+
+    def failed(self, content: dict[str, Any]) -> bytes:
+        """What follows the bytes so far when the result ends with an error; empty: their form has no place for it."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class DataBytes:
+    """The bytes of the data of a result, as they are."""
+
+    media_type: str
+
+    async def __call__(self, messages: AsyncIterator[Message]) -> AsyncIterator[bytes]:
+        """The bytes."""
+        async for message in messages:
+            if message.payload:
+                yield message.payload
+
+    def failed(self, content: dict[str, Any]) -> bytes:
+        """A line, after lines of JSON."""
+        return json_line(content) if self.media_type == LINES else b""
+
+
+def error_event(content: dict[str, Any]) -> bytes:
+    """Server-sent event with an error, the last one of a stream."""
+    return b"event: error\ndata: " + json_line({"type": "error", **content}) + b"\n"
+
+
+def json_line(content: Any) -> bytes:
+    """Compact JSON on a line."""
+    return json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode() + b"\n"
 
 
 async def timed_speech(request: HttpRequest | WebSocket, work: Work) -> tuple[list[dict[str, Any]], bytes]:

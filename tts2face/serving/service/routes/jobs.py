@@ -32,7 +32,7 @@ from tts2face.serving.service.job_service import (
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.options import JOB_KINDS, new_job_schema
 from tts2face.serving.service.orders import JobKind, JobOrder, Upload, expected_speech_s
-from tts2face.serving.service.routes.clips import service_state
+from tts2face.serving.service.routes.clips import error_event, service_state
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES, upload_folder
 from tts2face.serving.service.webhooks import check_webhook
 from tts2face.serving.work.client import JobClient
@@ -156,6 +156,7 @@ async def follow_job(
     """Server-sent events of a job, from its begin or after `Last-Event-ID`, up to its end."""
     record = await _find(request, job_id)
     after = int(last_event_id) if last_event_id and re.fullmatch(r"[0-9]{1,9}", last_event_id) else 0
+    request.state.exchange.ending = error_event
     return StreamingResponse(_events(request, record.id, after), media_type="text/event-stream")
 
 

@@ -1,7 +1,6 @@
 """What Kokoro-FastAPI has beyond OpenAI's interface: captioned speech, and phones of a text."""
 
 import base64
-import json
 from collections.abc import AsyncIterator
 from typing import Annotated, Any
 
@@ -14,7 +13,7 @@ from lexicon.languages import language_code
 from tts2face.processes.message import Message
 from tts2face.serving.service.client_names import KOKORO_LANGUAGES, Adjustments
 from tts2face.serving.service.request_fields import described
-from tts2face.serving.service.routes.clips import service_state, stream_work, timed_speech
+from tts2face.serving.service.routes.clips import json_line, service_state, stream_work, timed_speech
 from tts2face.serving.service.routes.openai import SoundFormat, SpokenText, TimedJson, speech_work, timed
 from tts2face.session.encoded_stream import media_types
 
@@ -59,8 +58,12 @@ class _CaptionedLines:
                     "audio": base64.b64encode(message.payload).decode(), "audio_format": media_types()[self._format],
                     "timestamps": _timestamps(due),
                 }  # fmt: skip
-                yield json.dumps(part, ensure_ascii=False).encode() + b"\n"
+                yield json_line(part)
                 due = []
+
+    def failed(self, content: dict[str, Any]) -> bytes:
+        """A last line."""
+        return json_line(content)
 
 
 @router.post("/captioned_speech", response_class=StreamingResponse, summary="Speak a text with the times of its words")
@@ -68,7 +71,9 @@ async def captioned_speech(request: HttpRequest, speech: CaptionedSpeech) -> Res
     """Sound in base64 with the times of its words in seconds."""
     adjustments, format = Adjustments(), speech.response_format
     names = ("word",) if speech.return_timestamps else ()
-    work = await speech_work(request, speech, {}, adjustments, kind="speech", format=format)
+    work = await speech_work(
+        request, speech, {}, adjustments, kind="speech", format=format, is_complete=not speech.stream
+    )
     convert = _CaptionedLines(format, names) if speech.stream else _Captioned(format, names)
     return adjustments.on(await stream_work(request, work, "application/json", convert=convert))
 

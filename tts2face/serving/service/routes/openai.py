@@ -1,7 +1,6 @@
 """OpenAI's speech endpoint, with movies and curves as further formats, and times of words and phones."""
 
 import base64
-import json
 from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
@@ -27,7 +26,7 @@ from tts2face.serving.service.library import CLIENT_MODELS, shipped_names
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.options import divide_options
 from tts2face.serving.service.request_fields import described
-from tts2face.serving.service.routes.clips import service_state, stream_work
+from tts2face.serving.service.routes.clips import error_event, json_line, service_state, stream_work
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.session import catalogue
 from tts2face.session.encoded_stream import media_types
@@ -83,6 +82,9 @@ class Speech(SpokenText):
     stream_format: Annotated[
         Literal["audio", "sse"], Field(description="Bytes, or server-sent events with base64 (sound only).")
     ] = "audio"
+    stream: Annotated[
+        bool, Field(description="Sent while it is made; else a complete file, whose header has its length.")
+    ] = True
     timestamps: Annotated[
         list[TimeName] | None,
         Field(
@@ -108,12 +110,14 @@ async def speak(request: HttpRequest, speech: Speech) -> Response:
         raise RefusedError(
             400, "invalid_request", f"{format} has no timestamps; choose {', '.join(SOUND_KINDS)}, or leave them out"
         )
-    adjustments = Adjustments()
+    adjustments, has_events = Adjustments(), speech.stream_format == "sse" and format in SOUND_KINDS
+    is_complete = not has_events and (bool(names) or not speech.stream)
     work = await speech_work(
         request, speech, speech.model_dump(include=SAME_NAMES, exclude_none=True), adjustments,
-        kind="speech" if names else "file", format=format, keeps_pace=format in MOVIE_KINDS,
+        kind="speech" if names else "file", format=format, is_complete=is_complete,
+        keeps_pace=format in MOVIE_KINDS and not is_complete,
     )  # fmt: skip
-    if speech.stream_format == "sse" and format in SOUND_KINDS:
+    if has_events:
         answer = await stream_work(request, work, "text/event-stream", convert=_Events(names))
     elif names:
         answer = await stream_work(request, work, "application/json", convert=TimedJson(format, names))
@@ -145,25 +149,30 @@ def timed(event: Mapping[str, Any], names: Sequence[str]) -> dict[str, list[dict
 
 
 class TimedJson:
-    """Converts messages to one JSON object: ``audio`` in base64, and then the times of the names."""
+    """Converts the messages of a complete file to one JSON object: ``audio`` in base64, then the times of the names."""
 
     def __init__(self, format: str, names: Sequence[str]) -> None:
         self._format, self._names = format, names
 
     async def __call__(self, messages: AsyncIterator[Message]) -> AsyncIterator[bytes]:
-        """Parts of the object, as the sound comes."""
+        """Parts of the object, from the first bytes of the file on."""
         rest, lists = b"", {LISTS[name]: list[Any]() for name in self._names}
-        yield b'{"audio":"'
+        opening = b'{"audio":"'
         async for message in messages:
             if "event" in message.content:
                 for name, found in timed(message.content["event"], self._names).items():
                     lists[name] += found
-            rest += message.payload
-            n_whole = len(rest) - len(rest) % 3  # three bytes are four letters
-            yield base64.b64encode(rest[:n_whole])
-            rest = rest[n_whole:]
+            if message.payload:
+                rest += message.payload
+                n_whole = len(rest) - len(rest) % 3  # three bytes are four letters
+                yield opening + base64.b64encode(rest[:n_whole])
+                opening, rest = b"", rest[n_whole:]
         end = {"audio_format": media_types()[self._format], **self.listed(lists)}
-        yield base64.b64encode(rest) + b'",' + _json(end)[1:]
+        yield opening + base64.b64encode(rest) + b'",' + json_line(end)[1:-1]
+
+    def failed(self, content: dict[str, Any]) -> bytes:
+        """The end of the object, whose sound is incomplete."""
+        return b'",' + json_line(content)[1:-1]
 
     def listed(self, lists: dict[str, list[Any]]) -> dict[str, list[Any]]:
         """The lists of times as they stand in the object."""
@@ -184,6 +193,10 @@ class _Events:
         usage = {"input_tokens": 0, "output_tokens": 0, "total_tokens": 0}
         yield _event({"type": "speech.audio.done", "usage": usage})
 
+    def failed(self, content: dict[str, Any]) -> bytes:
+        """An event ``error``."""
+        return error_event(content)
+
     def _contents(self, message: Message) -> Iterator[dict[str, Any]]:
         if "event" in message.content:
             yield {"type": "speech.timestamps", **timed(message.content["event"], self._names)}
@@ -191,12 +204,8 @@ class _Events:
             yield {"type": "speech.audio.delta", "audio": base64.b64encode(message.payload).decode()}
 
 
-def _json(content: Any) -> bytes:
-    return json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode()
-
-
 def _event(content: dict[str, Any]) -> bytes:
-    return b"data: " + _json(content) + b"\n\n"
+    return b"data: " + json_line(content) + b"\n"
 
 
 def _model(name: str) -> dict[str, Any]:
