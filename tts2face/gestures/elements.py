@@ -31,6 +31,14 @@ FloatArray = NDArray[np.float64]
 Keys = tuple[Annotated[tuple[float, float], "[seconds, value]"], ...]
 
 
+class BeyondClipError(InputError):
+    """An element lies beyond the end of a clip of `duration` seconds."""
+
+    def __init__(self, what: str, duration: float, advice: str) -> None:
+        self.duration = duration
+        super().__init__(f"{what} lies beyond the clip, which lasts {duration:.2f} s; {advice}")
+
+
 def span_weights(times: ArrayLike, start: float, end: float, ease_s: float) -> FloatArray:
     """(T,) weights of a span at T times in seconds: 0 outside, 1 inside, 0.5 at its edges.
 
@@ -370,21 +378,17 @@ class ElementKind:
 
         Raises
         ------
-        InputError
+        BeyondClipError
             One lies there.
         """
         for one in elements:
             if self.latest_s(one) < duration:
                 continue
             if self.shape == "span":
-                raise InputError(
-                    f"the span of {self.lane(one)} from {one.start:g} to {one.end:g} s lies beyond the clip, which "
-                    f"lasts {duration:.2f} s; shorten it"
-                )
+                what = f"the span of {self.lane(one)} from {one.start:g} to {one.end:g} s"
+                raise BeyondClipError(what, duration, "shorten it")
             what = self.name.removesuffix("s").replace("_", " ")
-            raise InputError(
-                f"the {what} at {one.time:g} s lies beyond the clip, which lasts {duration:.2f} s; move it"
-            )
+            raise BeyondClipError(f"the {what} at {one.time:g} s", duration, "move it")
 
     def latest_s(self, element: Any) -> float:
         """Second that a clip must go beyond to hold an element; below 0 for a curve, which any clip holds."""

@@ -124,15 +124,6 @@ def without_edges(project: Project, sentences: Collection[tuple[str, int]]) -> P
     )
 
 
-def is_too_long(project: Project, duration: float) -> bool:
-    """Whether the timeline of a project names times beyond its clip of `duration` seconds."""
-    try:
-        project.timeline.check_duration(duration)
-    except InputError:
-        return True
-    return False
-
-
 def cut_timeline(project: Project, duration: float) -> Project:
     """The project with its timeline cut to `duration` seconds."""
     return replace(project, timeline=project.timeline.restrict(0.0, duration))

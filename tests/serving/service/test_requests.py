@@ -1,7 +1,9 @@
 """What requests ask the pool for, and why they are refused: forms, names, limits, ranges and routes, in one process."""
 
+import io
 import json
 import tempfile
+import wave
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,7 @@ from tests.serving.service.in_process import (
 )
 from tests.serving.service.job_requests import CLIP, finished, submit
 from tests.serving.service.test_uploads import png, png_bomb, wav
+from tts2face.picture.sound_stream import HEAD_BYTES
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.session.functions import SessionCache
@@ -274,8 +277,11 @@ def result(stored: dict[str, Any]) -> str:
     return str(stored["url"])
 
 
-def test_a_job_has_the_bytes_of_its_stream(client: TestClient, result: str) -> None:
-    assert client.get(result).content == client.post("/v1/clips", json={**CLIP, "format": "wav"}).content
+def test_a_job_is_a_complete_file_with_the_sound_of_its_stream(client: TestClient, result: str) -> None:
+    made, streamed = client.get(result).content, client.post("/v1/clips", json={**CLIP, "format": "wav"}).content
+    assert made[HEAD_BYTES:] == streamed[HEAD_BYTES:]
+    with wave.open(io.BytesIO(made)) as sound:
+        assert 2 * sound.getnframes() == len(made) - HEAD_BYTES
 
 
 @pytest.mark.parametrize("given", ["bytes=abc", "bytes=5-2", "bytes=", "bytes=-", "lines=0-1", "0-1", "bytes=0-1,x"])

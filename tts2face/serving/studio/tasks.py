@@ -18,12 +18,13 @@ import numpy as np
 
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence
+from tts2face.gestures.elements import BeyondClipError
 from tts2face.lips.explanation import N_INSTANTS, LipOutline, PhoneExplanation, lip_outlines, token_outlines
 from tts2face.models.talker import Talker
 from tts2face.serving.service.messages import DRAWING_THREADS, Event, Inputs, Task, Work
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.prepared import StaleEdgesError
-from tts2face.session.project import Project, cut_timeline, is_too_long, without_edges
+from tts2face.session.project import Project, cut_timeline, without_edges
 from tts2face.session.project_file import parse_project
 from tts2face.storage.media_files import pcm_bytes
 from tts2face.types import Chunk
@@ -54,10 +55,8 @@ def preview(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk
     have = frozenset(work.request.get("have", ()))
     while True:
         yield Event({"type": "begin", "fps": float(project.request.fps)})
-        seconds = 0.0
         try:
             for event, content in _pieces(session, project, have):
-                seconds = event["begin"] + event["seconds"]
                 yield Event(event)
                 if content:
                     yield Chunk(content)
@@ -65,11 +64,11 @@ def preview(session: "Session", work: Work, _: Inputs) -> Iterator[Event | Chunk
         except StaleEdgesError as stale:
             dropped.append([stale.text, stale.occurrence])
             project = without_edges(project, [(stale.text, stale.occurrence)])
-        except InputError:
-            if cut_to is not None or not is_too_long(project, seconds):
+        except BeyondClipError as beyond:
+            if cut_to is not None:
                 raise
-            cut_to = seconds
-            project = cut_timeline(project, seconds)
+            cut_to = beyond.duration
+            project = cut_timeline(project, cut_to)
     yield Event({"type": "end", "dropped": dropped, "cut_to": cut_to})
 
 
