@@ -81,6 +81,8 @@ def run_prepared(prepared: "PreparedRequest", picture: Picture, options: SpeakOp
 def _make(prepared: "PreparedRequest", picture: Picture, options: SpeakOptions) -> None:
     from tts2face.sound.voice_pool import VoicePool
 
+    for note in () if options.quiet else prepared.notes:
+        write_message(f"tts2face: note: {note}")
     voices = VoicePool()
     prepared.preload_voice(voices)  # beside the imports of the session, and loading of talker and face
     if not _write_speech(prepared, picture, options, voices):

@@ -183,6 +183,11 @@ def letter_script(letter: str) -> str:
     return unicodedata.name(letter, "").partition(" ")[0]
 
 
+def script_name(script: str) -> str:
+    """Name of a writing system, by the first word of the Unicode names of its letters."""
+    return _NAMES.get(script, script.capitalize() or "unnamed")
+
+
 def language_scripts(language: str) -> frozenset[str]:
     """Writing systems of a language, including Latin."""
     own = SCRIPTS.get(language, SCRIPTS.get(language.partition("-")[0], frozenset()))
@@ -240,7 +245,7 @@ def check_script(text: str, language: str) -> None:
     if words:
         shown = ", ".join(word[:MAX_QUOTED_CHARACTERS] for word in list(words)[:MAX_QUOTED_WORDS])
         scripts = {letter_script(unicodedata.normalize("NFKC", c)[0]) for word in words for c in word if c.isalpha()}
-        names = ", ".join(sorted(_NAMES.get(script, script.capitalize() or "unnamed") for script in scripts))
+        names = ", ".join(sorted(script_name(script) for script in scripts))
         more = ", ..." if len(words) > MAX_QUOTED_WORDS else ""
         raise InputError(
             f"language {language!r} cannot read {shown}{more} ({names} letters); "
@@ -258,7 +263,7 @@ def check_readable(text: MarkedText, language: str) -> None:
     BackendError
         The text is Japanese with Chinese characters, and the library that reads them is not installed.
     """
-    unread = _blank_given_words(text)
+    unread = blank_given_words(text)
     ends = [*(run.start for run in text.runs[1:]), len(unread)]
     if all(run.language is None for run in text.runs):
         check_script(unread, language)
@@ -269,7 +274,8 @@ def check_readable(text: MarkedText, language: str) -> None:
         check_script(unread[run.start : end], span_language)
 
 
-def _blank_given_words(text: MarkedText) -> str:
+def blank_given_words(text: MarkedText) -> str:
+    """The spoken text with spaces in place of words with given phones."""
     pieces, at = [], 0
     for mark in text.marks:
         if isinstance(mark, PhoneMark):

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from lexicon.dictionary import Dictionary
 from lexicon.errors import InputError
+from lexicon.foreign_words import make_readable
 from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.inputs import LARGEST_TEXT_BYTES
 from lexicon.languages import language_code
@@ -18,6 +19,7 @@ from lexicon.pronounce import Pronunciation, Word, pronounce
 from lexicon.sentence_ends import split_chunks
 from lexicon.sentence_length import MAX_SENTENCE_CHARACTERS, n_letters
 from lexicon.sentences import Phrase, pronounce_words, split_sentences
+from lexicon.ssml import parse_marks
 
 
 def pronounce_marked(
@@ -32,12 +34,18 @@ def pronounce_marked(
     """
     language = language_code(language)
     words: list[Word] = []
+    text, _ = make_readable(text, language)
     for sentence in split_sentences(text, language, dictionary.entries if dictionary else None):
         for phrase in sentence.utterances:
             words += pronounce_phrase(phrase, phrase.language or language, dictionary)
     if not words:
         raise InputError("there is nothing to say in the text; add at least one word or number")
     return Pronunciation(text.text, language, tuple(words))
+
+
+def reading_notes(text: str, language: str) -> tuple[str, ...]:
+    """What is done with words that the language of a text does not read; raises as `parse_marks`."""
+    return () if text.isascii() else make_readable(parse_marks(text, language), language)[1]
 
 
 def pronounce_phrase(phrase: Phrase, language: str, dictionary: Dictionary | None = None) -> tuple[Word, ...]:

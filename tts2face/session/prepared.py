@@ -10,6 +10,7 @@ import numpy as np
 
 from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
+from lexicon.foreign_words import make_readable
 from lexicon.inputs import check_fields, is_file
 from lexicon.ipa import IpaPhone
 from lexicon.languages import check_readable, language_code
@@ -198,6 +199,8 @@ class PreparedRequest:
         What the face does while it listens, in seconds from the beginning of ``listen``.
     excerpt
         What of the speech is kept; None: all.
+    notes
+        What is spoken in another way than a reader may expect, each a sentence without its stop.
     """
 
     request: Request
@@ -209,6 +212,7 @@ class PreparedRequest:
     excluded: tuple[ExcludedToken, ...] = ()
     listening: Timeline = field(default_factory=Timeline)
     excerpt: Excerpt | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def fps(self) -> Fraction:
@@ -247,18 +251,21 @@ def prepare(request: Request) -> PreparedRequest:
     for path in (request.audio, request.partner):
         if path is not None and not is_file(path):
             raise InputError(f"there is no recording {path}; check the path")
+    written = parse_marks(request.text, request.language)
+    text, notes = make_readable(written, request.language)
     prepared = PreparedRequest(
         request,
-        parse_marks(request.text, request.language),
+        text,
         build_request_timeline(request),
         synthesis_options(request),
         read_dictionary(request.dictionary).entries if request.dictionary else {},
         listening=_listening(request),
+        notes=notes,
     )
     if not request.text.strip() and (request.audio is not None or request.silence is not None):
         return prepared
-    check_readable(prepared.text, request.language)
-    check_marks(prepared.text, request)
+    check_readable(text, request.language)
+    check_marks(written, request)
     if next(prepared.sentences(), None) is None:
         raise InputError(f"there is nothing to say in {request.text[:40]!r}; give at least one word")
     return prepared

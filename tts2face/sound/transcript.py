@@ -6,7 +6,7 @@ Recognised phones and phones of the text are matched by least edit distance (Wag
 that an hour of speech takes seconds and little memory.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import count
 
 import numpy as np
@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from lexicon.dictionary import Dictionary, cmudict_lookup
 from lexicon.english_text import weak_forms
 from lexicon.errors import DataError, InputError
+from lexicon.foreign_words import make_readable
+from lexicon.marked_text import MarkedText
 from lexicon.pronounce import Word, pronounce
 from lexicon.sequence import PhoneSequence, WordSpan
 from tts2face.numeric.kernels import kernel
@@ -141,8 +143,21 @@ def pronounce_transcript(text: str, language: str, own: Dictionary | None = None
     BackendError
         A word needs espeak-ng, which is not installed.
     """
-    words = pronounce(text, language, own).words
-    return tuple((word.text, _pronunciations(word, language, own)) for word in words)
+    return tuple(
+        (word.text, _pronunciations(word, spoken, own))
+        for part, spoken in _parts(text, language)
+        for word in pronounce(part, spoken, own).words
+    )
+
+
+def _parts(text: str, language: str) -> Iterator[tuple[str, str]]:
+    """Parts of a text with their languages: the whole, or what has words where some are of other languages."""
+    readable, _ = make_readable(MarkedText(text), language)
+    ends = [*(run.start for run in readable.runs[1:]), len(readable.text)]
+    for run, end in zip(readable.runs, ends, strict=True):
+        part = readable.text[run.start : end]
+        if len(ends) == 1 or any(letter.isalnum() for letter in part):
+            yield part, run.language or language
 
 
 def _pronunciations(word: Word, language: str, own: Dictionary | None) -> Pronunciations:

@@ -15,6 +15,7 @@ from fastapi.responses import Response
 from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.languages import language_code
 from lexicon.marked_text import RATE_LIMITS
+from lexicon.spoken_words import reading_notes
 from lexicon.text_language import guess_language
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
@@ -56,6 +57,11 @@ class Adjustments:
         """Note the language that a text is taken for, unless it is the default one."""
         if language != DEFAULT_LANGUAGE:
             self.made.append(f"the language is {language}")
+
+    async def note_words(self, state: ServiceState, text: str, language: str) -> None:
+        """Note what is done with words of other writing systems; texts that are too long are refused elsewhere."""
+        if len(text) <= state.settings.text_characters:
+            self.made += await asyncio.to_thread(reading_notes, text, language_code(language))
 
     def on(self, response: Answer) -> Answer:
         """An answer with the header that names them, if there are any."""
@@ -165,6 +171,7 @@ async def spoken_fields(state: ServiceState, key: ApiKey, asked: Any, adjustment
     voice = asked.voice if isinstance(asked.voice, str) else str(asked.voice.get("id", ""))
     language = asked.language or asked.lang_code
     name, code = await asyncio.to_thread(choose_voice, voice, language, asked.input, adjustments)
+    await adjustments.note_words(state, asked.input, code)
     talker = await choose_talker(state, key, asked.model, adjustments)
     given = {"text": asked.input, "rate": limited_rate(asked.speed, adjustments), "voice": name, "language": code}
     return given | ({} if talker is None else {"talker": talker})

@@ -16,8 +16,10 @@ from fastapi.responses import StreamingResponse
 from pydantic import ValidationError
 from starlette.datastructures import FormData
 
+from lexicon.g2p import DEFAULT_LANGUAGE
 from tts2face.picture.movie import MOVIE_KINDS
 from tts2face.processes.message import Message
+from tts2face.serving.service.client_names import Adjustments
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import ERROR_FIELD
 from tts2face.serving.service.messages import Work
@@ -211,10 +213,11 @@ async def _answer(
 ) -> StreamingResponse:
     given: dict[str, Any] = clip.model_dump(exclude_none=True, exclude_defaults=True)
     format = given.pop("format", "mp4")
-    state = service_state(request)
+    state, adjustments = service_state(request), Adjustments()
+    await adjustments.note_words(state, given.get("text", ""), given.get("language", DEFAULT_LANGUAGE))
     fields = await divide_options(state, request.state.key, given)
     picture = fields.picture | {name: files[name] for name in ("background",) if name in files}
     spoken = fields.request | {name: files[name] for name in (*SOUNDS, "timeline") if name in files}
     keeps_pace = format in MOVIE_KINDS and not clip.model_fields_set & {"quality", "supersampling"}
     work = state.work(models=fields.models, request=spoken, picture=picture, format=format, keeps_pace=keeps_pace)
-    return await stream_work(request, work, media_types()[format], resources=resources)
+    return adjustments.on(await stream_work(request, work, media_types()[format], resources=resources))

@@ -157,6 +157,7 @@ async def _speak(
     }  # fmt: skip
     fields["voice"], _ = await asyncio.to_thread(choose_voice, body.voice, body.language, text, adjustments)
     state = service_state(request)
+    await adjustments.note_words(state, text, body.language)
     fields = await resolve_dictionary(state.library, request.state.key, fields)
     events, pcm = await timed_speech(request, state.work(kind="speech", request=fields))
     rate = events[0]["rate"] if events else 24_000

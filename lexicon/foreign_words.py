@@ -1,0 +1,166 @@
+"""Words within a text that its language does not read: each is spoken in a language of its writing system, or spelled.
+
+A text in one language names words of another one ("The word 你好 means hello."). Such words become runs of the language
+that most people write in these letters; letters that no language of espeak-ng reads are spoken by their names.
+"""
+
+import re
+import unicodedata
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from lexicon.errors import BackendError
+from lexicon.g2p import has_kanji, languages, load_reader
+from lexicon.languages import blank_given_words, foreign_runs, letter_name, letter_script, run_name, script_name
+from lexicon.marked_text import Mark, MarkedText, PhoneMark, StyleRun
+from lexicon.text_language import guess_language
+from lexicon.written_forms import read_table
+
+_KANJI = re.compile(r"[^\W\d_\u3040-\u30ff]+|[\u3040-\u30ff]+")  # Chinese characters, or kana
+
+
+@dataclass(frozen=True, slots=True)
+class ForeignWords:
+    """Words of a text that are not spoken in its language.
+
+    Parameters
+    ----------
+    begin, end
+        Half-open range of characters.
+    language
+        In which they are spoken; empty: their letters are spelled by name.
+    script
+        Name of their writing system.
+    """
+
+    begin: int
+    end: int
+    language: str
+    script: str
+
+    @property
+    def note(self) -> str:
+        """What is done with them."""
+        return f"{self.script} words are " + (f"spoken in {self.language}" if self.language else "spelled")
+
+
+def make_readable(text: MarkedText, language: str) -> tuple[MarkedText, tuple[str, ...]]:
+    """A text of which each run can be read in its language, and what is done with words of other writing systems.
+
+    Single letters with a name (π, Ж), units, and words with given phones stay as they are. Linear in the length of the
+    text.
+    """
+    if text.text.isascii():
+        return text, ()
+    unread, found, runs = blank_given_words(text), list[ForeignWords](), list[StyleRun]()
+    ends = [*(run.start for run in text.runs[1:]), len(unread)]
+    for run, end in zip(text.runs, ends, strict=True):
+        runs.append(run)
+        for words in _foreign_words(unread, (run.start, end), run.language or language):
+            found.append(words)
+            if words.language:
+                runs.append(replace(run, start=words.begin, language=words.language))
+                runs.append(replace(run, start=words.end))
+    kept = [run for run, after in zip(runs, [*runs[1:], None], strict=True) if after is None or run.start < after.start]
+    readable = _spelled(replace(text, runs=tuple(kept)), [one for one in found if not one.language])
+    return readable, tuple(dict.fromkeys(one.note for one in found))
+
+
+def _foreign_words(text: str, span: tuple[int, int], language: str) -> Iterator[ForeignWords]:
+    """Words of a span that a language does not read; those with only signs and digits between them are one."""
+    first, last = span
+    begin = end = -1
+    n_runs = 0
+    for from_, to in [*((first + a, first + b) for a, b in foreign_runs(text[first:last], language)), (last, last)]:
+        if n_runs and from_ < last and not any(letter.isalpha() for letter in text[end:from_]):
+            end, n_runs = to, n_runs + 1
+            continue
+        if n_runs and not (n_runs == 1 and _is_read(text[begin:end])):
+            yield from _divided(text, begin, end)
+        begin, end, n_runs = from_, to, 1
+
+
+def _is_read(run: str) -> bool:
+    """Whether every language reads a run: a letter with a name, or a unit."""
+    return bool(run_name(run)) or unicodedata.normalize("NFKC", run) in read_table("units.tsv")
+
+
+def _divided(text: str, begin: int, end: int) -> Iterator[ForeignWords]:
+    """Foreign words with their language, by parts where no language reads all of them."""
+    words = text[begin:end]
+    script = script_name(letter_script(next(letter for letter in words if letter.isalpha())))
+    spoken = guess_language(words, "")
+    if spoken == "ja" and has_kanji(words) and not _has_reader():
+        parts = [part.span() for part in _KANJI.finditer(words)]
+    elif spoken in languages() and not any(True for _ in foreign_runs(words, spoken)):
+        yield ForeignWords(begin, end, spoken, script)
+        return
+    else:
+        parts = list(_scripts(words))
+    if len(parts) == 1:
+        yield ForeignWords(begin, end, "", script)
+        return
+    for first, last in parts:
+        yield from _divided(text, begin + first, begin + last)
+
+
+def _scripts(words: str) -> Iterator[tuple[int, int]]:
+    """Longest parts of letters of one writing system, with what follows each."""
+    begin, before = 0, ""
+    for at, letter in enumerate(words):
+        script = letter_script(letter) if letter.isalpha() else before
+        if before and script != before:
+            yield begin, at
+            begin = at
+        before = script
+    yield begin, len(words)
+
+
+def _has_reader() -> bool:
+    try:
+        load_reader()
+    except BackendError:
+        return False
+    return True
+
+
+def _spelled(text: MarkedText, words: Sequence[ForeignWords]) -> MarkedText:
+    """A text with the names of the letters of some words in their place, and its marks where they belong then."""
+    if not words:
+        return text
+    pieces, at, ends, shifts = list[str](), 0, [0], [0]
+    for one in words:
+        names = letter_names(text.text[one.begin : one.end])
+        before, after = text.text[one.begin - 1 : one.begin], text.text[one.end : one.end + 1]
+        names = " " * before.isalnum() + names + " " * after.isalnum()
+        pieces += [text.text[at : one.begin], names]
+        at = one.end
+        ends.append(one.end)
+        shifts.append(shifts[-1] + len(names) - (one.end - one.begin))
+
+    def moved(position: int) -> int:
+        return position + shifts[bisect_right(ends, position) - 1]
+
+    def moved_mark(mark: Mark) -> Mark:
+        if isinstance(mark, PhoneMark):
+            return replace(mark, at=moved(mark.at), end=moved(mark.end))
+        return replace(mark, at=moved(mark.at))
+
+    runs = tuple(replace(run, start=moved(run.start)) for run in text.runs)
+    marks = tuple(moved_mark(mark) for mark in text.marks)
+    return replace(text, text="".join([*pieces, text.text[at:]]), runs=runs, marks=marks)
+
+
+def letter_names(word: str) -> str:
+    """Names of the letters of a word; of letters without a name the one of their writing system, once."""
+    names: list[str] = []
+    for letter in word:
+        name = letter_name(letter) if letter.isalpha() else ""
+        if letter.isalpha() and not name:
+            name = f"{script_name(letter_script(letter))} sign".lower()
+            if names and names[-1] == name:
+                continue
+        if name:
+            names.append(name)
+    return " ".join(names)
