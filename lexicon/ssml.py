@@ -17,7 +17,8 @@ The parser is expat; a document type declaration is refused, and without one the
 Attributes have at most `lexicon.ssml_values.MAX_ATTRIBUTE_CHARACTERS` characters, so that parsing is linear in the
 length of the document.
 
-Parse the marks in a text: ``[pause 0.4]``, ``[nod]``, ``[style:delighted] ... [/style]``, or SSML.
+Parse the marks in a text: ``[pause 0.4]``, ``[nod]``, ``[style:delighted] ... [/style]``,
+``[phoneme:təˈmɑtoʊ]tomato[/phoneme]``, or SSML.
 
 Any other bracket is text.
 """
@@ -221,12 +222,7 @@ class _SsmlReader:
                 say_as(attributes["interpret-as"].strip(), text, attributes.get("format", ""), self._current_language)
             )
             return
-        for number, (word, segments) in enumerate(
-            phoneme_words(text, attributes["ph"], attributes.get("alphabet", "ipa"))
-        ):
-            begin = self._builder.at + (number > 0)
-            self._builder.add_mark(PhoneMark(begin, begin + len(word), segments))
-            self._builder.add_text(f" {word}" if number else word)
+        _add_phonemes(self._builder, text, attributes["ph"], attributes.get("alphabet", "ipa"))
 
     def _break(self, attributes: Attributes) -> None:
         known = check_attributes("break", attributes, "time", "strength")
@@ -275,9 +271,20 @@ class _SsmlReader:
         self._builder.open("express-as", f'<express-as style="{style}">', style=style.strip())
 
 
-# A bracket, one of the three words, and the rest up to the closing bracket, which a mark must have. Each part ends
-# where the next begins, so that the scan is linear.
-MARK_PATTERN = re.compile(r"\[(?P<name>/?(?:style|nod|pause)\b)(?P<rest>[^\[\]]*)(?P<end>\]?)")
+def _add_phonemes(builder: MarkedTextBuilder, text: str, phones: str, alphabet: str) -> None:
+    """Add words with given phones."""
+    for number, (word, segments) in enumerate(phoneme_words(text, phones, alphabet)):
+        begin = builder.at + (number > 0)
+        builder.add_mark(PhoneMark(begin, begin + len(word), segments))
+        builder.add_text(f" {word}" if number else word)
+
+
+# A bracket, one of the words, and the rest up to the closing bracket, which a mark must have; words with phones up to
+# their end. Each part ends where the next begins, so that the scan is linear.
+MARK_PATTERN = re.compile(
+    r"\[phoneme:(?P<phones>[^\[\]]*)\](?P<words>[^\[\]]*)\[/phoneme\]"
+    r"|\[(?P<name>/?(?:style|nod|pause)\b|phoneme(?=:)|/phoneme(?=\]))(?P<rest>[^\[\]]*)(?P<end>\]?)"
+)
 MAX_QUOTED_CHARACTERS = 40
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)")
 
@@ -310,6 +317,8 @@ def parse_marks(text: str, language: str = DEFAULT_LANGUAGE) -> MarkedText:
 
 def _read_mark(builder: MarkedTextBuilder, match: "re.Match[str]") -> None:
     shown = " ".join(match.group()[:MAX_QUOTED_CHARACTERS].split())
+    if match["name"] is None:
+        return _add_phonemes(builder, match["words"], match["phones"], "ipa")
     name, rest = match["name"], match["rest"].strip()
     if not match["end"]:
         raise InputError(f"the mark {shown!r} has no closing bracket; write {_mark_syntax(name)}")
@@ -323,6 +332,7 @@ def _read_mark(builder: MarkedTextBuilder, match: "re.Match[str]") -> None:
         builder.close("style", shown)
     else:
         raise InputError(f"cannot read the mark {shown}; write {_mark_syntax(name)}")
+    return None
 
 
 def _parse_number(written: str, shown: str, name: str) -> float:
@@ -333,5 +343,6 @@ def _parse_number(written: str, shown: str, name: str) -> float:
 
 def _mark_syntax(name: str) -> str:
     forms = {"pause": "[pause 0.4], in seconds", "nod": "[nod], or [nod 0.5] for a small one"}
+    forms |= dict.fromkeys(("phoneme", "/phoneme"), "[phoneme:IPA]word[/phoneme]")
     syntax = forms.get(name, "[style:NAME] ... [/style]")
     return f"{syntax}, or use round brackets around words to be spoken"

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from fastapi.responses import Response
 
+from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.languages import language_code
 from lexicon.marked_text import RATE_LIMITS
@@ -19,6 +20,7 @@ from lexicon.spoken_words import reading_notes
 from lexicon.text_language import guess_language
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
+from tts2face.serving.service.kokoro_text import with_marks
 from tts2face.serving.service.library import CLIENT_MODELS, check_voice, resolve_models
 from tts2face.serving.service.state import ServiceState
 from tts2face.session import catalogue
@@ -39,6 +41,7 @@ _WEIGHTED = re.compile(r"(?P<name>[a-z0-9_]{1,40})(?:[(:](?P<weight>\d{0,6}(?:\.
 _UNSAFE = re.compile(r"[^A-Za-z0-9._+()/-]")
 _MODEL = re.compile(rf"({'|'.join(CLIENT_MODELS)})(-\d{{4}}(-\d\d-\d\d)?)?")  # dated ones too: tts-1-hd-1106
 Answer = TypeVar("Answer", bound=Response)
+MAX_COMBINED = 20  # voices of a combination; further ones are left out
 MAX_SHOWN = 60  # characters of a client's name in the header
 
 
@@ -98,19 +101,40 @@ def voice_kind(name: str) -> _Kind | None:
     >>> voice_kind("bf_emma"), voice_kind("af_bella(1)+am_adam(2)").sex, voice_kind("heart")
     (_Kind(language='en-gb', sex='female'), 'male', None)
     """
-    if name in OPENAI_VOICES:
-        return _Kind("en-gb" if name == "fable" else DEFAULT_LANGUAGE, OPENAI_VOICES[name])
-    parts = [_WEIGHTED.fullmatch(one.strip()) for one in re.split(r"[+-]", name[:400])]
-    kinds = [None if one is None else _KOKORO.fullmatch(one["name"]) for one in parts]
     heaviest: tuple[float, _Kind] | None = None
-    for part, kind in zip(parts, kinds, strict=True):
+    for part in (_WEIGHTED.fullmatch(one.strip()) for one in re.split(r"[+-]", name[:400])):
+        kind = None if part is None else _single_kind(part["name"])
         if part is None or kind is None:
             return None
         weight = float(part["weight"] or 1)
         if heaviest is None or weight > heaviest[0]:
-            sex = FEMALE if kind["sex"] == "f" else MALE
-            heaviest = weight, _Kind(KOKORO_LANGUAGES[kind["language"]], sex)
+            heaviest = weight, kind
     return heaviest[1] if heaviest else None
+
+
+def _single_kind(name: str) -> _Kind | None:
+    if name in OPENAI_VOICES:
+        return _Kind("en-gb" if name == "fable" else DEFAULT_LANGUAGE, OPENAI_VOICES[name])
+    found = _KOKORO.fullmatch(name)
+    return found and _Kind(KOKORO_LANGUAGES[found["language"]], FEMALE if found["sex"] == "f" else MALE)
+
+
+def combined_name(voices: str | list[str]) -> str:
+    """Name of a combination of voices of OpenAI and Kokoro, which stands for the one of most weight.
+
+    Raises
+    ------
+    InputError
+        There is no voice, or it is one of the service, which is not combined.
+    """
+    parts = voices.split("+") if isinstance(voices, str) else voices
+    names = [name for part in parts[:MAX_COMBINED] if (name := "".join(part.split()))]
+    if not names:
+        raise InputError("there is no voice to combine; give names as af_bella+af_sky, or a list of them")
+    for name in names:
+        if voice_kind(name) is None:
+            raise InputError(f"voice {name[:40]!r} cannot be combined; give voices as af_bella and bm_george")
+    return "+".join(names)
 
 
 def nearest_voice(kind: _Kind, language: str) -> str:
@@ -170,8 +194,9 @@ async def spoken_fields(state: ServiceState, key: ApiKey, asked: Any, adjustment
     """Options of a clip for a request with OpenAI's fields: input, model, voice, speed, language, volume."""
     voice = asked.voice if isinstance(asked.voice, str) else str(asked.voice.get("id", ""))
     language = asked.language or asked.lang_code
-    name, code = await asyncio.to_thread(choose_voice, voice, language, asked.input, adjustments)
-    await adjustments.note_words(state, asked.input, code)
+    text = with_marks(asked.input)
+    name, code = await asyncio.to_thread(choose_voice, voice, language, text, adjustments)
+    await adjustments.note_words(state, text, code)
     talker = await choose_talker(state, key, asked.model, adjustments)
-    given = {"text": asked.input, "rate": limited_rate(asked.speed, adjustments), "voice": name, "language": code}
+    given = {"text": text, "rate": limited_rate(asked.speed, adjustments), "voice": name, "language": code}
     return given | ({} if talker is None else {"talker": talker})

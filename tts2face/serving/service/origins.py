@@ -16,7 +16,7 @@ PAGE = "document"  # Sec-Fetch-Dest of what a browser shows in place of the page
 MAX_AGE_S = 600  # for which a browser need not ask again; Chromium keeps at most 7200
 EXPOSED = (  # headers of answers that scripts of other origins may read
     "X-Request-ID", "Server-Timing", "Retry-After", "Location", "ETag", "Accept-Ranges", "Content-Range",
-    "Content-Disposition", "X-Tts2face-Adjusted",
+    "Content-Disposition", "X-Tts2face-Adjusted", "X-Download-Path",
 )  # fmt: skip
 
 

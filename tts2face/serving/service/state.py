@@ -12,6 +12,7 @@ from lexicon.errors import Tts2faceError
 from tts2face.processes.message import RESULT, Message
 from tts2face.serving.service.access import KeyRing
 from tts2face.serving.service.decoders import Decoders
+from tts2face.serving.service.downloads import Downloads
 from tts2face.serving.service.errors import STATUS, RefusedError, as_refused
 from tts2face.serving.service.exchange import in_background, while_client_stays
 from tts2face.serving.service.job_service import JobService
@@ -44,6 +45,7 @@ class ServiceState:
             {"n_sessions": settings.sessions, "log_format": settings.log_format, "log_text": settings.log_text,
              "memory_mb": settings.memory_mb, "sentences_mb": settings.sentences_mb, "tasks": tasks},
         ))  # fmt: skip
+        self.downloads = Downloads()
         self.library, self.decoders = Library(settings), Decoders()
         self.limits = RateLimits()
         self.jobs = JobService(settings, self.library, self.limits)

@@ -18,6 +18,7 @@ from tts2face.serving.service.client_names import (
     KOKORO_EXAMPLES,
     OPENAI_VOICES,
     Adjustments,
+    Answer,
     is_client_model,
     spoken_fields,
 )
@@ -33,6 +34,7 @@ from tts2face.session.encoded_stream import media_types
 
 router = APIRouter(prefix="/v1", tags=["speech"])
 
+DOWNLOAD = "X-Download-Path"  # relative to /v1, as Kokoro-FastAPI has it
 SAME_NAMES = {"face", "palette", "dictionary"}  # of fields and of options of clips
 FORMATS = {"jsonl": "curves"}  # further names of formats
 SoundFormat = Literal["mp3", "opus", "aac", "flac", "wav", "pcm", "weba"]
@@ -67,6 +69,12 @@ class SpokenText(BaseModel):
     volume_multiplier: Annotated[
         float | None,
         Field(ge=VOLUME_LIMITS[0], le=VOLUME_LIMITS[1], description="Factor of the loudness.", examples=[1.0]),
+    ] = None
+    return_download_link: Annotated[
+        bool, Field(description="`X-Download-Path` of the answer names a complete file, below /v1.")
+    ] = False
+    download_format: Annotated[
+        SoundFormat | None, Field(description="Format of this file; by default that of the answer.", examples=["flac"])
     ] = None
 
 
@@ -123,7 +131,17 @@ async def speak(request: HttpRequest, speech: Speech) -> Response:
         answer = await stream_work(request, work, "application/json", convert=TimedJson(format, names))
     else:
         answer = await stream_work(request, work, media_types()[format])
-    return adjustments.on(answer)
+    return adjustments.on(with_download(request, speech, work, answer))
+
+
+def with_download(request: HttpRequest, asked: SpokenText, work: Work, answer: Answer) -> Answer:
+    """An answer with the path of a complete file of its work, if one is asked for."""
+    if asked.return_download_link:
+        name = service_state(request).downloads.add(
+            request.state.key.name, work, asked.download_format or work.format
+        )  # fmt: skip
+        answer.headers[DOWNLOAD] = f"/download/{name}"
+    return answer
 
 
 async def speech_work(

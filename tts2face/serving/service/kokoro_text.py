@@ -1,0 +1,73 @@
+"""Marks and phones as clients of Kokoro-FastAPI write them, as marks of this service.
+
+``[pause:1.0s]`` is a pause, and ``[word](/ipa/)`` a word with its phones; elsewhere that is a link.
+"""
+
+import re
+
+from lexicon.errors import InputError
+from lexicon.ipa import parse_ipa
+from lexicon.ssml import is_ssml
+
+_PAUSE = re.compile(r"\[pause:[ ]?([0-9]{1,4}(?:\.[0-9]{1,3})?)[ ]?s?\]", re.IGNORECASE)
+_GIVEN = re.compile(r"\[([^\[\]\n]{1,200})\]\(/([^()\[\]/\n]{1,200})/\)")
+_PUNCTUATION = '.,;:!?…—"“”()'
+# Letters of Kokoro's alphabet (misaki) that are not IPA.
+_IPA = str.maketrans({
+    "A": "eɪ", "I": "aɪ", "O": "oʊ", "Q": "əʊ", "W": "aʊ", "Y": "ɔɪ", "T": "ɾ", "ʤ": "dʒ", "ʧ": "tʃ",
+    "ᵊ": "ə", "ᵻ": "ɪ",
+})  # fmt: skip
+
+
+def kokoro_ipa(written: str) -> str:
+    """Phones in Kokoro's alphabet, or in IPA, as IPA."""
+    return written.translate(_IPA)
+
+
+def with_marks(text: str) -> str:
+    """A text with the marks of this service in place of Kokoro-FastAPI's; SSML as it is.
+
+    Examples
+    --------
+    >>> with_marks("A [pause:1.0s] [tomato](/təmˈɑːtO/), see [this](/a page).")
+    'A [pause 1.0] [phoneme:təmˈɑːtoʊ]tomato[/phoneme], see [this](/a page).'
+    """
+    if is_ssml(text):
+        return text
+    return _GIVEN.sub(_given, _PAUSE.sub(r"[pause \1]", text))
+
+
+def _given(match: "re.Match[str]") -> str:
+    """A word with its phones; what has none is a link."""
+    ipa = kokoro_ipa(match[2].strip())
+    try:
+        is_spoken = bool(parse_ipa(ipa))
+    except InputError:
+        is_spoken = False
+    return f"[phoneme:{ipa}]{match[1]}[/phoneme]" if is_spoken else match[0]
+
+
+def phones_text(phones: str) -> str:
+    """A text of words with given phones, divided by spaces, with the punctuation around them.
+
+    Raises
+    ------
+    InputError
+        There is none, or a letter is no phone.
+
+    Examples
+    --------
+    >>> phones_text("həlˈO, wˈɜɹld!")
+    '[phoneme:həlˈoʊ][/phoneme], [phoneme:wˈɜɹld][/phoneme]!'
+    """
+    words: list[str] = []
+    for written in kokoro_ipa(phones).split():
+        bare = written.lstrip(_PUNCTUATION)
+        ipa = bare.rstrip(_PUNCTUATION)
+        if not ipa:
+            words.append(written)
+        elif parse_ipa(ipa):
+            words.append(f"{written[: len(written) - len(bare)]}[phoneme:{ipa}][/phoneme]{bare[len(ipa) :]}")
+    if not any("phoneme" in word for word in words):
+        raise InputError(f"there is no phone in {phones[:40]!r}; give words in IPA or in Kokoro's alphabet")
+    return " ".join(words)
