@@ -12,7 +12,15 @@ from dataclasses import dataclass, replace
 
 from lexicon.errors import BackendError
 from lexicon.g2p import has_kanji, languages, load_reader
-from lexicon.languages import blank_given_words, foreign_runs, letter_name, letter_script, run_name, script_name
+from lexicon.languages import (
+    SCRIPTS,
+    blank_given_words,
+    foreign_runs,
+    letter_name,
+    letter_script,
+    run_name,
+    script_name,
+)
 from lexicon.marked_text import Mark, MarkedText, PhoneMark, StyleRun
 from lexicon.text_language import guess_language
 from lexicon.written_forms import read_table
@@ -68,17 +76,36 @@ def make_readable(text: MarkedText, language: str) -> tuple[MarkedText, tuple[st
 
 
 def _foreign_words(text: str, span: tuple[int, int], language: str) -> Iterator[ForeignWords]:
-    """Words of a span that a language does not read; those with only signs and digits between them are one."""
+    """Words of a span that a language does not read.
+
+    Those of one writing system with only signs and digits between them are one, in which single letters are words too.
+    """
     first, last = span
-    begin = end = -1
-    n_runs = 0
-    for from_, to in [*((first + a, first + b) for a, b in foreign_runs(text[first:last], language)), (last, last)]:
-        if n_runs and from_ < last and not any(letter.isalpha() for letter in text[end:from_]):
-            end, n_runs = to, n_runs + 1
-            continue
-        if n_runs and not (n_runs == 1 and _is_read(text[begin:end])):
-            yield from _divided(text, begin, end)
-        begin, end, n_runs = from_, to, 1
+    group: list[tuple[int, int]] = []
+    for begin, end in ((first + a, first + b) for a, b in foreign_runs(text[first:last], language)):
+        if group and not _is_joined(text, group[-1], (begin, end)):
+            yield from _of_group(text, group)
+            group = []
+        group.append((begin, end))
+    yield from _of_group(text, group)
+
+
+def _is_joined(text: str, before: tuple[int, int], after: tuple[int, int]) -> bool:
+    """Whether two runs are of one writing system, without a letter between them."""
+    scripts = [_script_of(text[slice(*run)]) for run in (before, after)]
+    is_one = scripts[0] == scripts[1] or set(scripts) <= SCRIPTS["ja"]
+    return is_one and not any(letter.isalpha() for letter in text[before[1] : after[0]])
+
+
+def _script_of(run: str) -> str:
+    """Writing system of the first letter of a run, which may be written as a sign (㌔ is キロ)."""
+    letters = unicodedata.normalize("NFKC", run)
+    return letter_script(next((letter for letter in letters if letter.isalpha()), letters[0]))
+
+
+def _of_group(text: str, group: Sequence[tuple[int, int]]) -> Iterator[ForeignWords]:
+    if not all(_is_read(text[begin:end]) for begin, end in group):
+        yield from _divided(text, group[0][0], group[-1][1])
 
 
 def _is_read(run: str) -> bool:
@@ -89,8 +116,7 @@ def _is_read(run: str) -> bool:
 def _divided(text: str, begin: int, end: int) -> Iterator[ForeignWords]:
     """Foreign words with their language, by parts where no language reads all of them."""
     words = text[begin:end]
-    script = script_name(letter_script(next(letter for letter in words if letter.isalpha())))
-    spoken = guess_language(words, "")
+    script, spoken = script_name(_script_of(words)), guess_language(unicodedata.normalize("NFKC", words), "")
     if spoken == "ja" and has_kanji(words) and not _has_reader():
         parts = [part.span() for part in _KANJI.finditer(words)]
     elif spoken in languages() and not any(True for _ in foreign_runs(words, spoken)):
@@ -155,7 +181,7 @@ def _spelled(text: MarkedText, words: Sequence[ForeignWords]) -> MarkedText:
 def letter_names(word: str) -> str:
     """Names of the letters of a word; of letters without a name the one of their writing system, once."""
     names: list[str] = []
-    for letter in word:
+    for letter in unicodedata.normalize("NFKC", word):
         name = letter_name(letter) if letter.isalpha() else ""
         if letter.isalpha() and not name:
             name = f"{script_name(letter_script(letter))} sign".lower()

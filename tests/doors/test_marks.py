@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from lexicon.errors import InputError
 from lexicon.sequence import SILENCE
 from tests.world import RATE_HZ, World
 from tts2face.gestures.elements import StyleSpan
@@ -78,11 +77,13 @@ def test_a_document_with_voices_languages_and_phones_is_one_sound(ready: Session
         assert speech.phones.phones[first:last] == ("k", "æ", "t")
 
 
-def test_one_foreign_letter_is_read_and_a_word_is_refused(ready: Session) -> None:
+def test_one_foreign_letter_is_named_and_a_word_is_spoken(ready: Session) -> None:
     (piece,) = pieces("The value of π is 3.", ready)
     assert "pi" in [word.text for word in piece.clip.speech.words]
-    with pytest.raises(InputError, match="language 'en-us' cannot read Привет"):
-        pieces("Hello Привет.", ready)
+    (piece,) = pieces("Hello Привет.", ready)
+    words, phones = piece.clip.speech.words, piece.clip.speech.phones.phones
+    assert words[1].text.startswith("Привет")
+    assert phones[words[1].first : words[1].last] == ("p", "r", "i", "v", "e", "t")
 
 
 def test_a_file_with_marks_counts_characters_and_tells_the_times_of_names(ready: Session, tmp_path: Path) -> None:

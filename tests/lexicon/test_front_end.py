@@ -8,6 +8,7 @@ from xml.sax.saxutils import escape
 import pytest
 
 from lexicon.errors import InputError
+from lexicon.foreign_words import make_readable
 from lexicon.pronounce import pronounce
 from lexicon.sentences import split_sentences
 from lexicon.spoken_words import pronounce_marked
@@ -83,9 +84,9 @@ def spoken_words(text: str) -> list[tuple[str, tuple[str, ...], tuple[int, ...]]
     """Words that a voice is given for a text, phrase by phrase, with phones and stress."""
     return [
         (word.text, word.phones, word.stress)
-        for sentence in split_sentences(parse_marks(text, "en-us"), "en-us")
+        for sentence in split_sentences(make_readable(parse_marks(text, "en-us"), "en-us")[0], "en-us")
         for phrase in sentence.utterances
-        for word in pronounce_content(phrase_content(phrase), "en-us", {})
+        for word in pronounce_content(phrase_content(phrase), phrase.language or "en-us", {})
     ]
 
 
