@@ -61,3 +61,10 @@ def test_a_sound_without_the_words_is_refused() -> None:
         align_recording(
             noise, pronounce_transcript("a long sentence that nobody could say in a tenth of a second", "en-us")
         )
+
+
+def test_a_transcript_has_the_phones_of_words_of_other_writing_systems() -> None:
+    words = dict(pronounce_transcript("The word 你好 means ខម.", "en-us"))
+    assert list(words) == ["The", "word", "你好", "means", "kha", "mo"]
+    assert words["你好"] == (("n", "i", "χ", "ɑu"),)
+    assert ("m", "i", "n", "z") in words["means"]

@@ -188,10 +188,7 @@ async def prepare_clip(order: JobOrder) -> dict[str, Any]:
     given: dict[str, Any] = order.options.model_dump(exclude_none=True, exclude_defaults=True)
     format = given.pop("format", ClipRequest.model_fields["format"].default)
     fields = await divide_options(order.state, order.key, given)
-    if len(given.get("text", "")) > order.state.settings.text_characters:
-        raise RefusedError(
-            413, "too_long", f"the text has more than {order.state.settings.text_characters} characters; divide it"
-        )
+    order.state.check_length(given.get("text", ""))
     has_audio = FILES["audio"] in order.upload.files
     if not (given.get("text", "").strip() or has_audio or "idle" in given or "listen" in given):
         raise RefusedError(400, "invalid_request", "there is nothing to say; give text, audio, idle or listen")

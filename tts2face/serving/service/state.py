@@ -131,6 +131,12 @@ class ServiceState:
         """For whom processes keep finished sentences, whoever asks: the one user of a service without keys."""
         return LOCAL_KEY.name if self.settings.studio and self.settings.keys is None else ""
 
+    def check_length(self, text: str) -> None:
+        """Refuse a text of more than `text_characters`."""
+        most = self.settings.text_characters
+        if len(text) > most:
+            raise RefusedError(413, "too_long", f"the text has more than {most} characters; divide it")
+
     async def messages(
         self, work: Work, key: ApiKey, inputs: InputQueue | None = None, priority: int = STREAM_PRIORITY
     ) -> AsyncIterator[Message]:
@@ -145,10 +151,7 @@ class ServiceState:
         ClientDisconnect
             The client of the present request has left; the work no longer waits, or has been stopped.
         """
-        if len(str(work.request.get("text", ""))) > self.settings.text_characters:
-            raise RefusedError(
-                413, "too_long", f"the text has more than {self.settings.text_characters} characters; divide it"
-            )
+        self.check_length(str(work.request.get("text", "")))
         key = self.speaking_key(key)
         made = 0.0
         if self.settings.log_text and work.request.get("text"):

@@ -1,5 +1,7 @@
 """HEAD on the wire: as GET, without a body."""
 
+import json
+
 import httpx
 import pytest
 
@@ -24,3 +26,11 @@ def test_head_of_events(service: RunningService, client: httpx.Client) -> None:
     client.post(f"/v1/jobs/{job['id']}/cancel")
     request = service.wait_for_event("request", method="HEAD", path="/v1/jobs/{job_id}/events")
     assert (request["status"], request["bytes"]) == (200, 0)
+
+
+@pytest.mark.parametrize("format", ["mp4", "webm", "curves", "livelink"])
+def test_a_nod_beyond_the_clip_is_refused_before_the_first_byte(client: httpx.Client, format: str) -> None:
+    form = {"request": json.dumps({"text": "Hello there. Good bye.", "size": "64x64", "format": format})}
+    answer = client.post("/v1/clips", data=form, files={"timeline": json.dumps({"nods": [{"time": 60}]}).encode()})
+    assert answer.status_code == 400
+    assert "the nod at 60 s lies beyond the clip" in answer.json()["error"]["message"]

@@ -171,3 +171,15 @@ def test_elsewhere_brackets_stay_a_link(client: httpx.Client) -> None:
     clip = {"text": "[Misaki](/mɪsˈɑki/) is here.", "format": "words"}
     words = [json.loads(line) for line in client.post("/v1/clips", json=clip).text.splitlines()]
     assert len(words) > 4
+
+
+@pytest.mark.parametrize("path", ["/v1/audio/speech", "/dev/phonemize", "/dev/generate_from_phonemes"])
+def test_a_text_that_is_too_long_is_refused_before_its_marks_are_read(client: httpx.Client, path: str) -> None:
+    long = "[a](/a/) " * 50_000
+    answer = client.post(path, json={**SPEECH, "input": long, "text": long, "phonemes": long})
+    assert (answer.status_code, answer.json()["error"]["code"]) == (413, "too_long")
+
+
+def test_a_voice_of_the_service_speaks_another_writing_system(client: httpx.Client) -> None:
+    answer = spoken(client, "Привет, мир", voice="heart")
+    assert "Cyrillic words are spoken in ru" in answer.headers[ADJUSTED]

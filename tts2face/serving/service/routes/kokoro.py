@@ -105,7 +105,9 @@ class Phones(BaseModel):
 async def phonemize(request: HttpRequest, asked: PhonesRequest) -> dict[str, Any]:
     """The phones that a voice of the language speaks."""
     language = language_code(KOKORO_LANGUAGES.get(asked.language, asked.language))
-    work = service_state(request).work(kind="phones", request={"text": with_marks(asked.text), "language": language})
+    state = service_state(request)
+    state.check_length(asked.text)
+    work = state.work(kind="phones", request={"text": with_marks(asked.text), "language": language})
     (event,), _ = await timed_speech(request, work)
     return {"phonemes": " ".join(event["words"]), "tokens": []}
 
@@ -128,6 +130,7 @@ class PhonesToSpeak(BaseModel):
 async def generate_from_phonemes(request: HttpRequest, asked: PhonesToSpeak) -> Response:
     """Sound of phones as a .wav file, sent while it is made."""
     adjustments, state = Adjustments(), service_state(request)
+    state.check_length(asked.phonemes)
     voice, language = await asyncio.to_thread(choose_voice, asked.voice, None, "", adjustments)
     spoken = {"text": phones_text(asked.phonemes), "voice": voice, "language": language}
     work = state.work(request=spoken, format="wav")
@@ -150,7 +153,9 @@ async def download(request: HttpRequest, name: FileName) -> Response:
 class CombinedVoice(BaseModel):
     """A combination of voices, which has no file of its own."""
 
-    voice: Annotated[str, Field(description="Name of the combination, a `voice` of all requests.")]
+    voice: Annotated[
+        str, Field(description="Name of the combination, a `voice` of all requests.", examples=["af_bella+af_sky"])
+    ]
     speaks: Annotated[str, Field(description="The installed voice that stands for it.", examples=["heart"])]
     language: Annotated[str, Field(description="Its language.", examples=["en-us"])]
 
