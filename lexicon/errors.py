@@ -20,6 +20,10 @@ class InputError(Tts2faceError, ValueError):
     """An invalid request: change the request."""
 
 
+class SilentTextError(InputError):
+    """There is nothing to say in a text, or in a part of one: no word, or none that the voice has sounds for."""
+
+
 class DataError(Tts2faceError, ValueError):
     """An invalid or damaged file: correct or rebuild the file."""
 

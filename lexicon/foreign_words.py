@@ -71,8 +71,7 @@ def make_readable(text: MarkedText, language: str) -> tuple[MarkedText, tuple[st
                 runs.append(replace(run, start=words.begin, language=words.language))
                 runs.append(replace(run, start=words.end))
     kept = [run for run, after in zip(runs, [*runs[1:], None], strict=True) if after is None or run.start < after.start]
-    readable = _spelled(replace(text, runs=tuple(kept)), [one for one in found if not one.language])
-    return readable, tuple(dict.fromkeys(one.note for one in found))
+    return _rewritten(replace(text, runs=tuple(kept)), found), tuple(dict.fromkeys(one.note for one in found))
 
 
 def _foreign_words(text: str, span: tuple[int, int], language: str) -> Iterator[ForeignWords]:
@@ -83,6 +82,9 @@ def _foreign_words(text: str, span: tuple[int, int], language: str) -> Iterator[
     first, last = span
     group: list[tuple[int, int]] = []
     for begin, end in ((first + a, first + b) for a, b in foreign_runs(text[first:last], language)):
+        if group and all(unicodedata.category(mark)[0] == "M" for mark in text[group[-1][1] : begin]):
+            group[-1] = (group[-1][0], end)  # marks that distinguish no words are dropped when the text is read
+            continue
         if group and not _is_joined(text, group[-1], (begin, end)):
             yield from _of_group(text, group)
             group = []
@@ -151,19 +153,25 @@ def _has_reader() -> bool:
     return True
 
 
-def _spelled(text: MarkedText, words: Sequence[ForeignWords]) -> MarkedText:
-    """A text with the names of the letters of some words in their place, and its marks where they belong then."""
-    if not words:
-        return text
+def _rewritten(text: MarkedText, words: Sequence[ForeignWords]) -> MarkedText:
+    """A text with some words as they are spoken, and its marks where they belong then.
+
+    Words that no language reads are the names of their letters; signs that stand for letters (㌔) are these letters.
+    """
     pieces, at, ends, shifts = list[str](), 0, [0], [0]
     for one in words:
-        names = letter_names(text.text[one.begin : one.end])
+        written = text.text[one.begin : one.end]
+        if one.language and not any(map(_is_sign, written)):
+            continue
+        spoken = unicodedata.normalize("NFKC", written) if one.language else letter_names(written)
         before, after = text.text[one.begin - 1 : one.begin], text.text[one.end : one.end + 1]
-        names = " " * before.isalnum() + names + " " * after.isalnum()
-        pieces += [text.text[at : one.begin], names]
+        spoken = " " * before.isalnum() + spoken + " " * after.isalnum()
+        pieces += [text.text[at : one.begin], spoken]
         at = one.end
         ends.append(one.end)
-        shifts.append(shifts[-1] + len(names) - (one.end - one.begin))
+        shifts.append(shifts[-1] + len(spoken) - (one.end - one.begin))
+    if at == 0:
+        return text
 
     def moved(position: int) -> int:
         return position + shifts[bisect_right(ends, position) - 1]
@@ -176,6 +184,12 @@ def _spelled(text: MarkedText, words: Sequence[ForeignWords]) -> MarkedText:
     runs = tuple(replace(run, start=moved(run.start)) for run in text.runs)
     marks = tuple(moved_mark(mark) for mark in text.marks)
     return replace(text, text="".join([*pieces, text.text[at:]]), runs=runs, marks=marks)
+
+
+def _is_sign(character: str) -> bool:
+    """Whether a character is no letter and stands for some."""
+    is_letter = unicodedata.category(character)[0] in "LM"
+    return not is_letter and any(map(str.isalpha, unicodedata.normalize("NFKC", character)))
 
 
 def letter_names(word: str) -> str:

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from lexicon.dictionary import Dictionary
 from lexicon.english import fold_to_arpabet
 from lexicon.english_text import english_segments
-from lexicon.errors import InputError
+from lexicon.errors import InputError, SilentTextError
 from lexicon.g2p import DEFAULT_LANGUAGE, has_kanji, parse_espeak_word, phonemize, segments_by_rules, to_kana
 from lexicon.ipa import IpaPhone
 from lexicon.languages import check_script, language_code, name_foreign_letters
@@ -49,6 +49,7 @@ def spoken_form(text: str, language: str) -> str:
     return _LONG_WORD.sub(r"\g<0> ", text)
 
 
+NOTHING = "there is nothing to say in the text; add at least one word or number"
 PAUSES_S = MappingProxyType({"": 0.0, ",": 0.2, ";": 0.3, ":": 0.3, ".": 0.5, "!": 0.5, "?": 0.5})  # s, nominal
 _MARKS_BY_STRENGTH = tuple(PAUSES_S)  # of two adjacent marks the later one of this order is kept
 _PIECE = re.compile(r"[^\s.,;:!?]+|[.,;:!?]")
@@ -247,7 +248,7 @@ def pronounce(text: str, language: str = DEFAULT_LANGUAGE, dictionary: Dictionar
         words = _split_words((piece, piece) for piece in canonical_text(spoken, keep_marks=True).split())
         words = [word for word in words if any(letter.isalnum() for letter in word.text)]
     if not words:
-        raise InputError("there is nothing to say in the text; add at least one word or number")
+        raise SilentTextError(NOTHING)
     if language == DEFAULT_LANGUAGE:
         spoken_segments = english_segments([word.text for word in words], [word.mark for word in words], own)
         for word, segments in zip(words, spoken_segments, strict=True):
@@ -256,4 +257,7 @@ def pronounce(text: str, language: str = DEFAULT_LANGUAGE, dictionary: Dictionar
         _pronounce_in_context(words, language)
         for word in words:
             word.segments = own.lookup(word.text) or word.segments
+    words = [word for word in words if word.segments or any(map(str.isalpha, word.text))]  # no signs without words
+    if not words:
+        raise SilentTextError(NOTHING)
     return Pronunciation(text, language, tuple(_build_word(word, language) for word in words))

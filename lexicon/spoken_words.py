@@ -8,14 +8,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from lexicon.dictionary import Dictionary
-from lexicon.errors import InputError
+from lexicon.errors import InputError, SilentTextError
 from lexicon.foreign_words import make_readable
 from lexicon.g2p import DEFAULT_LANGUAGE
 from lexicon.inputs import LARGEST_TEXT_BYTES
 from lexicon.languages import language_code
 from lexicon.marked_text import MarkedText
 from lexicon.normalize import split_tokens
-from lexicon.pronounce import Pronunciation, Word, pronounce
+from lexicon.pronounce import NOTHING, Pronunciation, Word, pronounce
 from lexicon.sentence_ends import split_chunks
 from lexicon.sentence_length import MAX_SENTENCE_CHARACTERS, n_letters
 from lexicon.sentences import Phrase, pronounce_words, split_sentences
@@ -39,7 +39,7 @@ def pronounce_marked(
         for phrase in sentence.utterances:
             words += pronounce_phrase(phrase, phrase.language or language, dictionary)
     if not words:
-        raise InputError("there is nothing to say in the text; add at least one word or number")
+        raise SilentTextError(NOTHING)
     return Pronunciation(text.text, language, tuple(words))
 
 

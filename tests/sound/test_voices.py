@@ -1,14 +1,20 @@
 """Requirements that every voice meets."""
 
+import random
+import unicodedata
+
 import numpy as np
 import pytest
 
 from lexicon.dictionary import MAX_PHONES, parse_dictionary
-from lexicon.errors import BackendError, DataError, InputError
+from lexicon.errors import BackendError, DataError, InputError, SilentTextError
 from lexicon.ipa import IpaPhone, parse_ipa
 from lexicon.phones import PHONES
 from lexicon.sequence import SILENCE, PhoneSequence
+from tts2face.request import Request
 from tts2face.session.joining import resampled_speech
+from tts2face.session.prepared import prepare
+from tts2face.session.speech_stream import SpeechModels, speak_sentences
 from tts2face.sound.voice import SpokenWord, Voice, apply_volume
 from tts2face.sound.voice_pool import load_voice
 from tts2face.types import Speech, Waveform
@@ -232,3 +238,27 @@ def test_loud_sound_is_turned_down_as_a_whole() -> None:
     loud = apply_volume(np.array([0.5, -1.0, 0.25]), 2.0)
     assert loud == pytest.approx([0.5, -1.0, 0.25])
     assert apply_volume(np.array([0.25, -0.5]), 2.0) == pytest.approx([0.5, -1.0])
+
+
+def spoken_of(text: str, language: str) -> list[list[str]]:
+    """Words of each sentence of a text that espeak-ng speaks."""
+    models = SpeechModels(lambda _, code: load_voice("espeak", code))
+    found = speak_sentences(prepare(Request(text=text, language=language, voice="espeak")), models)
+    return [[word.text for word in spoken.speech.words] for spoken, _, _ in found]
+
+
+def test_a_part_without_words_for_the_voice_is_left_out() -> None:
+    assert spoken_of("Hello. ⳽⮟. ⅙👗 [pause 0.5] there", "th") == [["Hello"], ["there"]]
+    with pytest.raises(SilentTextError, match="nothing to say"):
+        spoken_of("⅙👗.", "th")
+
+
+@pytest.mark.parametrize("language", ["en-us", "de", "th", "cmn", "ja"])
+def test_random_texts_fail_before_their_second_sentence_or_not_at_all(language: str) -> None:
+    rng = random.Random(5)
+    pools = [range(0x20, 0x250), range(0x250, 0x2000), range(0x2000, 0x3400), range(0x4E00, 0x4F00)]
+    letters = [[chr(code) for code in pool if unicodedata.category(chr(code)) != "Cn"] for pool in pools]
+    for _ in range(6):
+        words = ["".join(rng.choice(rng.choice(letters)) for _ in range(rng.randint(1, 6))) for _ in range(4)]
+        text = " ".join(words).replace("[", "(").replace("<", "(")
+        assert spoken_of(f"A b. {text}", language)

@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import InputError
+from lexicon.errors import InputError, SilentTextError
 from lexicon.marked_text import MAX_PAUSE_S, Mark, MarkedText, NameMark, NodMark, StyleRun
 from lexicon.pronounce import PAUSES_S
 from lexicon.sentence_length import n_letters
@@ -142,8 +142,9 @@ def speak_sentence(
     Raises
     ------
     InputError
-        A voice cannot speak the text, or `voices` is None and the sentence needs other voices.
+        A voice cannot speak any part of the text, or `voices` is None and the sentence needs other voices.
     """
+    parts: list[Phrase] = []
     spoken: list[Speech] = []
     word_times: list[WordTimes] = []
     gains: list[Floats] = []
@@ -152,7 +153,13 @@ def speak_sentence(
         speaker = speaker_of(part, voice, request, voices)
         delivery = delivery_of(part, sentence.runs, request, deliveries)
         rate = request.rate * part.rate * delivery.rate
-        speech = speaker.speak(phrase_content(part), rate=rate, seed=request.seed)
+        try:
+            speech = speaker.speak(phrase_content(part), rate=rate, seed=request.seed)
+        except SilentTextError:  # signs, such as pictures, for which a voice has no words
+            if part is sentence.utterances[-1] and not spoken:
+                raise
+            continue
+        parts.append(part)
         speech = _trimmed(resampled_speech(speech, voice.sample_rate), sentence, part, request)
         language = part.language or request.language
         times_of_part = WordTimes(part.source, speech.phones, speech.words, language=language, first=part.first)
@@ -160,6 +167,7 @@ def speak_sentence(
         word_times.append(times_of_part)
         gains.append(_gain(speech.waveform, sentence.runs, part, times_of_part))
         volumes.append(request.volume * delivery.volume)
+    sentence = replace(sentence, utterances=tuple(parts))
     scaled = [_scale_speech(speech, request.volume, gain) for speech, gain in zip(spoken, gains, strict=True)]
     speech, begins = _join_sentence(scaled, sentence, voice.sample_rate)
     yield_turn()

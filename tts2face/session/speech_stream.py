@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lexicon.errors import InputError
+from lexicon.errors import InputError, SilentTextError
 from lexicon.marked_text import NameMark
 from lexicon.sentence_length import n_letters
 from lexicon.sentences import Sentence, text_prefix
@@ -223,11 +223,11 @@ def speak_sentences(
             lambda made: made.sound.samples.nbytes + made.speech.waveform.samples.nbytes,
         )
 
-    for whole in prepared.sentences():
+    for whole, found in _spoken(prepared.sentences(), lambda whole: speak(without_long_silence(whole)[0])):
         sentence, before_s, after_s = without_long_silence(whole)
         text = " ".join(phrase.source for phrase in sentence.utterances)
         yield from long_silence(before_s, fps, Timeline(), voice.sample_rate)
-        spoken = speak(sentence)
+        spoken = found
         if has_phones:
             phones = correct_phones(spoken.speech.phones, text, said[text], prepared.edges)
             spoken = replace(spoken, speech=replace(spoken.speech, phones=phones))
@@ -270,3 +270,20 @@ def _speak_excerpt(
 def _with_sound(spoken: SpokenSentence) -> Speech:
     """The speech of a sentence with the sound of its clip."""
     return replace(spoken.speech, waveform=spoken.sound.part(0, len(spoken.speech.waveform.samples)))
+
+
+def _spoken(
+    sentences: Iterator[Sentence], speak: Callable[[Sentence], SpokenSentence]
+) -> Iterator[tuple[Sentence, SpokenSentence]]:
+    """Sentences with their speech, but those in which the voice has nothing to say, unless these are all."""
+    silent, n_spoken = None, 0
+    for sentence in sentences:
+        try:
+            spoken = speak(sentence)
+        except SilentTextError as error:
+            silent = error
+            continue
+        n_spoken += 1
+        yield sentence, spoken
+    if silent is not None and not n_spoken:
+        raise silent

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, InputError
+from lexicon.errors import BackendError, SilentTextError
 from lexicon.g2p import DEFAULT_LANGUAGE, has_kanji, parse_espeak_word, to_kana
 from lexicon.ipa import IpaPhone
 from lexicon.languages import check_script, language_code
@@ -151,7 +151,7 @@ class EspeakVoice:
         if words:
             events = _assign_written_words(events, header, text)
         if not any(phone != SILENCE for event in events for phone in event.phones):
-            raise InputError(f"there is nothing to say in {text[:40]!r}; give at least one word")
+            raise SilentTextError(f"there is nothing to say in {text[:40]!r}; give at least one word")
         given = [tuple(segment.phone for segment in word.segments) for word in spoken]
         events = _relabel_events(events, given, len(sound) / self._rate)
         phones, spans = _phone_sequence(events, words or names, len(sound) / self._rate)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, DataError, InputError
+from lexicon.errors import BackendError, DataError, InputError, SilentTextError
 from lexicon.g2p import DEFAULT_LANGUAGE, parse_espeak_word, phonemize
 from lexicon.inputs import read_json
 from lexicon.ipa import IpaPhone
@@ -269,7 +269,7 @@ class PiperVoice:
             return [(word.text, [tuple(word.phones)]) for word in words], sentences
         spoken = self._words(content)
         if not spoken:
-            raise InputError("there is nothing to say in the text; give at least one word")
+            raise SilentTextError("there is nothing to say in the text; give at least one word")
         if isinstance(content, str):
             text = self._insert_own_words(content)
         else:
