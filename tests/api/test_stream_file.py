@@ -15,7 +15,7 @@ import pytest
 import tts2face
 from lexicon.errors import InputError
 from tests.world import World
-from tts2face.session import steps
+from tts2face.session import speech_stream
 from tts2face.session.encoded_stream import media_types
 from tts2face.sound.voice_pool import VoicePool
 
@@ -198,7 +198,7 @@ def test_times_within_the_clip_do_not_wait_for_its_end(session: tts2face.Session
 def test_times_beyond_a_long_clip_are_refused_at_its_end(
     session: tts2face.Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(steps, "AHEAD_S", 1.0)
+    monkeypatch.setattr(speech_stream, "AHEAD_S", 1.0)
     (tmp_path / "t.json").write_text(json.dumps({"nods": [{"time": 500}]}))
     chunks = session.stream_file("Bob may move. We were away. " * 3, "curves", timeline=tmp_path / "t.json")
     assert next(chunks).content

@@ -2,6 +2,7 @@
 
 import random
 import unicodedata
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from tts2face.request import Request
 from tts2face.session.joining import resampled_speech
 from tts2face.session.prepared import prepare
 from tts2face.session.speech_stream import SpeechModels, speak_sentences
+from tts2face.sound import voice_pool
 from tts2face.sound.voice import SpokenWord, Voice, apply_volume
 from tts2face.sound.voice_pool import load_voice
 from tts2face.types import Speech, Waveform
@@ -262,3 +264,12 @@ def test_random_texts_fail_before_their_second_sentence_or_not_at_all(language: 
         words = ["".join(rng.choice(rng.choice(letters)) for _ in range(rng.randint(1, 6))) for _ in range(4)]
         text = " ".join(words).replace("[", "(").replace("<", "(")
         assert spoken_of(f"A b. {text}", language)
+
+
+def test_a_missing_voice_of_a_later_sentence_is_refused_before_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    joe = replace(voice_pool.SHIPPED_VOICES["joe"], package="no_such_package")
+    monkeypatch.setattr(voice_pool, "SHIPPED_VOICES", {**voice_pool.SHIPPED_VOICES, "joe": joe})
+    text = "<speak>Hello. Good bye. <voice name='joe'>Now.</voice></speak>"
+    models = SpeechModels(lambda _, code: load_voice("espeak", code))
+    with pytest.raises(BackendError, match="the voice joe is not installed"):
+        next(speak_sentences(prepare(Request(text=text, voice="espeak")), models))

@@ -1,6 +1,6 @@
 """Pieces of a clip, and the first step of a text and of idle animation: speech in whole frames, the face at rest."""
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -32,6 +32,7 @@ from tts2face.session.speech import (
     without_long_silence,
 )
 from tts2face.sound.pauses import speech_onset
+from tts2face.sound.voice_pool import require_installed
 from tts2face.types import (
     Clip,
     Speech,
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     from tts2face.lips.explanation import PhoneExplanation
     from tts2face.sound.alignment import TextMismatch
 
+AHEAD_S = 60.0  # of speech in memory, 12 MB, while the latest time of a timeline is not reached
 # Options of a request that do not affect the speech of its sentences.
 NOT_SPOKEN: Mapping[str, Any] = MappingProxyType(
     {"expression": None, "gain": None, "timeline": None, "pitch": False, "context": None, "exemplars": None}
@@ -171,6 +173,24 @@ def spoken_pieces(
         first_frame += n_frames
 
 
+def spoken_ahead(pieces: Iterator[Piece], timeline: Timeline, yield_turn: YieldTurn) -> Iterator[Piece]:
+    """Pieces of a text, spoken up to the latest time of a timeline before the first one is passed on.
+
+    So times beyond the end of the clip are refused before anything of it is sent; beyond `AHEAD_S` that is found later.
+    """
+    waiting, seconds = deque[Piece](), 0.0
+    while seconds <= min(timeline.latest_s, AHEAD_S):
+        if (piece := next(pieces, None)) is None:
+            timeline.check_duration(seconds)
+            break
+        waiting.append(piece)
+        seconds += piece.speech.waveform.duration
+        yield_turn()
+    while waiting:
+        yield waiting.popleft()
+    yield from pieces
+
+
 def timed_speech(prepared: PreparedRequest, models: SpeechModels) -> Iterator[Piece]:
     """Pieces of a text or of idle animation without motion.
 
@@ -203,6 +223,8 @@ def speak_sentences(
     if request.silence is not None and not request.is_text:
         yield from silent_sentences(request.silence, fps, IDLE_STEPS, prepared.listening)
         return
+    for name in {run.voice for run in prepared.text.runs if run.voice is not None}:
+        require_installed(name)  # else a later sentence would fail
     voices, said = cache(models.voice), Counter[str]()
     voice = voices(request.voice, request.language)
     if request.listen is not None:

@@ -4,7 +4,6 @@ The first step makes the pieces: `spoken_pieces` those of a text and of idle ani
 recording. What a step keeps for the next request, and by which key, is its method ``key``.
 """
 
-from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
@@ -48,7 +47,7 @@ from tts2face.session.recording import (
     select_audio_map,
 )
 from tts2face.session.speech import resolve_recording_marks
-from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces
+from tts2face.session.speech_stream import Piece, SpeechModels, spoken_ahead, spoken_pieces
 from tts2face.types import HEAD_CHANNELS, Clip, Progress, Trajectory, Waveform, YieldTurn, frame_count, keep_on
 
 Step = Callable[[Piece], Piece]
@@ -58,7 +57,6 @@ TRANSCRIPT_BYTES = 10_000  # of a transcript besides its phones
 DEFAULT_STYLE = "neutral"
 REACH_S = 2.0  # s around a piece within which elements of the timeline affect it: nods last .6 s, fades .6 s
 TURN_REACH_S = 0.6  # before a phrase within which the face listened, where a turn begins
-AHEAD_S = 60.0  # of speech in memory, 12 MB, while the latest time of a timeline is not reached
 STATE_BYTES = 200_000  # of a stream between two pieces
 POLL_S = 0.005  # between turns of other requests, while gestures are drawn
 Drawn = tuple[GestureValues, GestureStream | NoiseStream]  # gestures of a piece, and the stream for the piece after it
@@ -112,7 +110,7 @@ def pieces_from(
     else:
         started, steps = spoken_pieces(prepared, models.speech, first_frame), (lips, *steps)
         if gestures is not None:
-            started = _spoken_ahead(started, prepared.timeline, models.speech.yield_turn)
+            started = spoken_ahead(started, prepared.timeline, models.speech.yield_turn)
     for piece in started:
         if gestures is not None:
             gestures.begin(piece)
@@ -120,24 +118,6 @@ def pieces_from(
             models.speech.yield_turn()
             piece = step(piece)  # noqa: PLW2901 - it gains from step to step
         yield piece
-
-
-def _spoken_ahead(pieces: Iterator[Piece], timeline: Timeline, yield_turn: YieldTurn) -> Iterator[Piece]:
-    """Pieces of a text, spoken up to the latest time of a timeline before the first one is passed on.
-
-    So times beyond the end of the clip are refused before anything of it is sent; beyond `AHEAD_S` that is found later.
-    """
-    waiting, seconds = deque[Piece](), 0.0
-    while seconds <= min(timeline.latest_s, AHEAD_S):
-        if (piece := next(pieces, None)) is None:
-            timeline.check_duration(seconds)
-            break
-        waiting.append(piece)
-        seconds += piece.speech.waveform.duration
-        yield_turn()
-    while waiting:
-        yield waiting.popleft()
-    yield from pieces
 
 
 @dataclass(frozen=True, slots=True, eq=False)

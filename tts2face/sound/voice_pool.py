@@ -102,6 +102,15 @@ def find_voice(name: str) -> VoiceInfo:
     )
 
 
+def require_installed(name: str) -> None:
+    """Refuse a voice of `voice_names` whose package is missing, without loading it; errors as `find_voice`."""
+    package = find_voice(name).package
+    if importlib.util.find_spec(package) is None:
+        raise BackendError(
+            f"the voice {name} is not installed: {package} is missing; `tts2face voices` lists all voices"
+        )
+
+
 def speaks(name: str, language: str) -> bool:
     """Whether a voice of `voice_names` speaks a language; errors as `find_voice`."""
     languages = find_voice(name).languages
