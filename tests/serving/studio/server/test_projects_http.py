@@ -8,6 +8,7 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+import av
 import httpx
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from tts2face.session.project_file import load_project
 from tts2face.session.session import Session
 
 TEXT = "Bob may move. Five maps were there."
+FORMS = ("webm", "srt", "glb", "wav", "flac")
 Bundle = tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -149,18 +151,21 @@ def test_files_are_queued_made_downloaded_and_deleted(studio: httpx.Client, numb
     edit(studio, number, {"kind": "picture", "options": {"size": "64x64", "quality": "draft"}})
     preview(studio, number)
     address = f"/api/projects/{number}/renders"
-    started = {form: studio.post(address, json={"format": form}).json()["id"] for form in ("webm", "srt", "glb", "wav")}
+    started = {form: studio.post(address, json={"format": form}).json()["id"] for form in FORMS}
     eventually(lambda: not {one["state"] for one in studio.get(address).json()} & {"waiting", "running"}, 120.0)
     assert {one["state"] for one in studio.get(address).json()} == {"done"}
     files = {form: studio.get(f"{address}/{one}/file") for form, one in started.items()}
     assert files["webm"].content[:4] == b"\x1a\x45\xdf\xa3"
+    for form in ("webm", "flac"):  # complete files, with their length
+        with av.open(io.BytesIO(files[form].content), "r") as file:
+            assert 1.0 < (file.duration or 0) / av.time_base < 6.0
     assert "Bob may move." in files["srt"].text
     assert set(zipfile.ZipFile(io.BytesIO(files["glb"].content)).namelist()) == {"One.glb", "One.wav"}
     with wave.open(io.BytesIO(files["wav"].content)) as sound:
         assert sound.getnframes() == preview(studio, number)[0]["n_samples"]
     assert 'filename="One.webm"' in files["webm"].headers["content-disposition"]
     assert studio.delete(f"{address}/{started['webm']}").status_code == 204
-    assert len(studio.get(address).json()) == 3
+    assert len(studio.get(address).json()) == len(FORMS) - 1
 
 
 def test_a_render_is_cancelled(studio: httpx.Client) -> None:
