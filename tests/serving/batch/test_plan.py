@@ -10,6 +10,7 @@ from lexicon.errors import DataError, InputError
 from tests.serving.batch.conftest import SRT, Planner
 from tts2face.picture.options import Picture
 from tts2face.request import Request
+from tts2face.serving.batch import plan as plan_module
 from tts2face.serving.batch.cast import read_cast
 from tts2face.serving.batch.options import BatchOptions
 from tts2face.serving.batch.plan import plan_batch
@@ -157,10 +158,20 @@ def test_wrong_casts_are_refused(content: str, reason: str, tmp_path: Path) -> N
         read_cast(tmp_path / "cast.toml")
 
 
-def test_words_that_no_voice_speaks_are_a_warning_with_their_line(plan_of: Planner) -> None:
+def test_words_of_another_writing_system_are_spoken(plan_of: Planner) -> None:
     plan = plan_of(SRT.replace("Bob may move.", "☃ … 你好"))
+    assert (len(plan.outputs), plan.n_silent, plan.warnings) == (3, 0, ())
+
+
+def test_a_cue_that_is_refused_is_a_warning_with_its_line(plan_of: Planner, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(request: Request) -> None:
+        if "Bob" in request.text:
+            raise InputError("no")
+
+    monkeypatch.setattr(plan_module, "prepare", refuse)
+    plan = plan_of(SRT)
     assert [(one.line, one.message[:15]) for one in plan.warnings] == [(10, "cue 3 is silent")]
-    assert len(plan.outputs) == 2
+    assert (len(plan.outputs), plan.n_silent) == (2, 1)
 
 
 @pytest.mark.parametrize(
@@ -193,7 +204,7 @@ def test_a_role_that_applies_to_no_cue_is_a_warning(plan_of: Planner, tmp_path: 
 
 
 def test_cues_that_cannot_be_spoken_count_as_silent(plan_of: Planner) -> None:
-    assert plan_of(SRT.replace("Bob may move.", "你好")).n_silent == 1
+    assert plan_of(SRT.replace("Bob may move.", "☃ …")).n_silent == 1
 
 
 def test_a_language_of_the_file_is_used_and_an_unknown_one_is_not(plan_of: Planner) -> None:
