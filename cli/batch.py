@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from cli.batch_plan import print_plan, write_table
 from cli.flags import Face, Hair, HairColor, add_option_flags, options_from_flags, switch, whole_number
-from cli.process import progress_bar, write_message
+from cli.process import WhatRemains, progress_bar, write_message
 from lexicon.errors import DataError, InputError
 from tts2face.picture.options import Picture
 from tts2face.request import Request
@@ -117,7 +117,7 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     try:
         result = _run(plan, out, (opened, engine), is_json=progress == "json", quiet=quiet)
     except KeyboardInterrupt as interrupt:
-        interrupt.add_note(f"what is finished is in {out}; the same command continues")
+        interrupt.add_note(WhatRemains(f"what is finished is in {out}; the same command continues"))
         raise
     write_table(plan, opened, write_lines)
     _finish(result, out, quiet=quiet)

@@ -17,7 +17,7 @@ from cyclopts import App, Parameter
 from cli.flags import add_option_flags, switch, whole_number
 from cli.lists import AsJson
 from cli.photo import YES, Yes, sets_up_model
-from cli.process import write_message
+from cli.process import WhatRemains, write_message
 from lexicon.errors import InputError
 from tts2face.serving.service.settings import ServiceSettings, read_settings
 
@@ -61,7 +61,7 @@ def worker(
                 supervise()
                 time.sleep(WAIT_S)
     except KeyboardInterrupt as interrupt:
-        interrupt.add_note("the workers have ended; others take over their segments")
+        interrupt.add_note(WhatRemains("the workers have ended; others take over their segments"))
         raise
 
 

@@ -29,6 +29,7 @@ from cli.process import (
     INTERRUPTION,
     LARGE_BYTES,
     UNCHANGED,
+    WhatRemains,
     discard_output,
     error_message,
     exit_code,
@@ -231,7 +232,8 @@ def run(arguments: Sequence[str]) -> int:
         INTERRUPTION.end()
         release_frames(ended)
         if INTERRUPTION.number or isinstance(ended, KeyboardInterrupt):  # whatever the interruption has led to
-            what_remains = "; ".join(getattr(ended, "__notes__", ())) or UNCHANGED
+            notes = [note for note in getattr(ended, "__notes__", ()) if isinstance(note, WhatRemains)]
+            what_remains = "; ".join(notes) or UNCHANGED
             write_message(f"\n{INTERRUPTED.format(what_remains)}")
             return signal_exit_code(ended)
         if isinstance(ended, BrokenPipeError):

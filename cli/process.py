@@ -188,8 +188,8 @@ def repair_streams() -> None:
     """
     for number in range(3):
         _open_if_closed(number)
-    sys.stdin = sys.stdin or open(0, encoding="utf-8", closefd=False)  # noqa: SIM115 - for the whole process
-    sys.stdout = sys.stdout or open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - as above
+    sys.stdin = sys.stdin or open(os.devnull, encoding="utf-8")  # noqa: SIM115 - a library may have opened number 0
+    sys.stdout = sys.stdout or open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - for the whole process
     sys.stderr = sys.stderr or open(2, "w", encoding="utf-8", closefd=False)  # noqa: SIM115 - as above
     codecs.register_error(ESCAPE_HANDLER, _escape_characters)
     if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors in REFUSING_HANDLERS:
@@ -239,6 +239,10 @@ def _escape_characters(error: UnicodeError) -> tuple[str, int]:
         raise error
     units = error.object[error.start : error.end].encode("utf-16-be", "surrogatepass")
     return "".join(f"\\u{units[at]:02x}{units[at + 1]:02x}" for at in range(0, len(units), 2)), error.end
+
+
+class WhatRemains(str):
+    """A note of an interruption: what remains of the work; Python adds others."""
 
 
 def return_large_blocks(size: int = LARGE_BYTES) -> bool:

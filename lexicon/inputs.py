@@ -204,6 +204,17 @@ def is_file(path: Path) -> bool:
         return False
 
 
+def is_there(path: Path, is_kind: Callable[[int], bool] = lambda _: True) -> bool:
+    """Whether there is a file of a kind, as `stat.S_ISDIR`; an OSError where that cannot be told.
+
+    pathlib says no to a name that is longer than any file's from Python 3.14 on.
+    """
+    try:
+        return is_kind(path.stat().st_mode)
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+
+
 def read_bounded(file: BinaryIO, name: str, largest: int) -> bytes:
     """All bytes of an open file or stream, including pipes.
 

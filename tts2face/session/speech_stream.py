@@ -223,8 +223,7 @@ def speak_sentences(
     if request.silence is not None and not request.is_text:
         yield from silent_sentences(request.silence, fps, IDLE_STEPS, prepared.listening)
         return
-    for name in {run.voice for run in prepared.text.runs if run.voice is not None}:
-        require_installed(name)  # else a later sentence would fail
+    _require_voices(prepared)
     voices, said = cache(models.voice), Counter[str]()
     voice = voices(request.voice, request.language)
     if request.listen is not None:
@@ -256,6 +255,12 @@ def speak_sentences(
         said[text] += 1
         yield spoken, sentence.n_characters, text
         yield from long_silence(after_s, fps, spoken.timeline, voice.sample_rate)
+
+
+def _require_voices(prepared: PreparedRequest) -> None:
+    """Refuse a text with a voice that is missing, which would fail in a later sentence."""
+    for name in {run.voice for run in prepared.text.runs if run.voice is not None}:
+        require_installed(name)
 
 
 _FIRST, _LAST = "excerpt-begin", "excerpt-end"  # names of the marks at the onsets of an excerpt and of what follows it

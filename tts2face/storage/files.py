@@ -12,12 +12,14 @@ import errno
 import logging
 import os
 import re
+import stat
 import sys
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
+from lexicon.inputs import is_there
 from tts2face.storage.temporary import Temporary
 
 SHIPPED_FOLDER = Path(__file__).parents[1] / "data"
@@ -55,7 +57,7 @@ def find_file(name: str, kind: str) -> Path:
     shipped = SHIPPED_FOLDER / f"{name}.{kind}"
     if shipped.parent == SHIPPED_FOLDER and shipped.is_file():
         return shipped
-    if Path(name).suffix or Path(name).exists():
+    if Path(name).suffix or is_there(Path(name)):
         return Path(name)
     if name in FORMER.get(kind, {}):
         _say_new_name(name, kind)
@@ -119,7 +121,7 @@ def check_name(path: Path) -> None:
     """
     _check_stem(path)
     try:
-        is_folder = path.parent.is_dir()
+        is_folder = is_there(path.parent, stat.S_ISDIR)
     except OSError as error:
         raise InputError(f"cannot write {short_name(path)}: {error.strerror}; choose another folder") from error
     if not is_folder:
