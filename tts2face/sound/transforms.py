@@ -14,7 +14,8 @@ from threading import get_ident
 from types import ModuleType
 from typing import Any
 
-PACKAGE, CODE = "scipy.fft", "_pocketfft/pypocketfft"
+PACKAGE = "scipy.fft"
+CODES = ("_pocketfft/pypocketfft", "_duccfft/pyduccfft")  # until SciPy 1.17, and later
 REFUSED = frozenset({"scipy", PACKAGE})
 UNSCALED, BY_LENGTH = 0, 2  # of SciPy's compiled transforms
 
@@ -59,9 +60,10 @@ def _compiled_transforms() -> Any | None:
     """SciPy's compiled transforms; None if they lie elsewhere in another version."""
     found = find_spec("scipy")
     folders = [] if found is None else list(found.submodule_search_locations or ())
-    files = [Path(folder, "fft", f"{CODE}{suffix}") for folder in folders for suffix in EXTENSION_SUFFIXES]
-    file = next((one for one in files if one.is_file()), None)
-    spec = None if file is None else spec_from_file_location(f"{PACKAGE}.{CODE.replace('/', '.')}", file)
+    names = [(folder, name, suffix) for folder in folders for name in CODES for suffix in EXTENSION_SUFFIXES]
+    files = ((name, Path(folder, "fft", f"{name}{suffix}")) for folder, name, suffix in names)
+    name, file = next((one for one in files if one[1].is_file()), ("", None))
+    spec = None if file is None else spec_from_file_location(f"{PACKAGE}.{name.replace('/', '.')}", file)
     if spec is None or spec.loader is None:
         return None
     code = module_from_spec(spec)

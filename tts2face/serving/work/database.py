@@ -3,6 +3,7 @@
 import logging
 import sqlite3
 from collections.abc import Iterable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +78,7 @@ def prepare_database(url: str) -> None:
     quiet_dbos()
     try:
         if url.startswith("sqlite"):
-            with sqlite3.connect(url.removeprefix("sqlite:///"), timeout=30.0) as connection:
+            with closing(sqlite3.connect(url.removeprefix("sqlite:///"), timeout=30.0)) as connection:
                 connection.execute("PRAGMA journal_mode=WAL")
         DBOS.migrate(url)
         with Workers(url) as workers:

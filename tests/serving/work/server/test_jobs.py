@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -181,7 +182,10 @@ def test_a_segment_that_kills_its_worker_ends_as_failed(
     url = database_url(database)
     queue(database, work)
     name = f"{next(iter(work))}.0"
-    with sqlite3.connect(tmp_path / "jobs.sqlite") as connection:  # as if it had killed many workers before
+    with (
+        closing(sqlite3.connect(tmp_path / "jobs.sqlite")) as connection,
+        connection,
+    ):  # as if it had killed many workers before
         connection.execute("UPDATE workflow_status SET recovery_attempts = 12 WHERE workflow_uuid = ?", (name,))
     start_worker(database)
     reasons = collect(database, work, tmp_path)
@@ -237,7 +241,7 @@ def test_jobs_are_listed_shown_cancelled_and_pruned(
 
 def test_the_log_of_sqlite_is_written_ahead(tmp_path: Path) -> None:
     prepare_database(database_url(tmp_path / "jobs.sqlite"))
-    with sqlite3.connect(tmp_path / "jobs.sqlite") as connection:
+    with closing(sqlite3.connect(tmp_path / "jobs.sqlite")) as connection, connection:
         assert connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
 
 

@@ -4,6 +4,7 @@ import sqlite3
 import threading
 import time
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -93,7 +94,7 @@ def test_a_dead_worker_of_another_version_is_reported_once(
     """Its work waits for a worker of its version."""
     path = tmp_path / "jobs.sqlite"
     queue(str(path), segments("Words."))
-    with sqlite3.connect(path) as connection:
+    with closing(sqlite3.connect(path)) as connection, connection:
         connection.execute(
             "UPDATE workflow_status SET status = 'PENDING', executor_id = 'old', application_version = 'segments-0'"
         )
@@ -264,7 +265,7 @@ def test_nothing_of_a_pruned_job_remains_in_the_database(
         work = segments(f"Words {number}.", f"These are wrong, {number}.")
         collect(str(path), work, tmp_path)
         assert prune_jobs(str(path)) == 2
-        with sqlite3.connect(path) as connection:
+        with closing(sqlite3.connect(path)) as connection, connection:
             tables = [row[0] for row in connection.execute("SELECT name FROM sqlite_master WHERE type = 'table'")]
             rows.append({one: connection.execute(f"SELECT count(*) FROM {one}").fetchone()[0] for one in tables})
     assert rows[0] == rows[1] == rows[2]
