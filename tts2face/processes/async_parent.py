@@ -11,8 +11,8 @@ from tts2face.processes.message import EVENT, GO, MAX_LINE_BYTES, MORE, PAUSE, S
 from tts2face.processes.parent import END_S, OnEvent, answer_of, child_command, ended_error, error_file, last_words
 from tts2face.processes.program import Program
 
-PAUSE_BYTES = 8 << 20  # of a call that its caller has not read yet, beyond which it is paused
-GO_BYTES = 2 << 20
+PAUSE_BYTES = 1 << 20  # of a call that its caller has not read yet, beyond which it is paused; some seconds of a movie
+GO_BYTES = 256 << 10
 
 Inputs = AsyncIterator[tuple[Mapping[str, Any], bytes]]  # of a call that goes on: contents and payloads
 
@@ -31,6 +31,7 @@ class _Answers:
     """What came of a call and its caller has not read yet; None at the end of the child."""
 
     id: int
+    on_paused: Callable[[bool], None]
     messages: asyncio.Queue[Message | None] = field(default_factory=asyncio.Queue)
     n_bytes: int = 0
     is_paused: bool = False
@@ -48,9 +49,9 @@ class _Running:
         self._calls: dict[int, _Answers] = {}
         self.reading = asyncio.create_task(self._read())
 
-    def begin(self, id: int) -> _Answers:
+    def begin(self, id: int, on_paused: Callable[[bool], None]) -> _Answers:
         """Answers of a new call."""
-        self._calls[id] = _Answers(id)
+        self._calls[id] = _Answers(id, on_paused)
         return self._calls[id]
 
     def write(self, message: Message) -> None:
@@ -74,9 +75,13 @@ class _Running:
         message = await call.messages.get()
         call.n_bytes -= 0 if message is None else len(message.payload)
         if call.is_paused and call.n_bytes < GO_BYTES:
-            call.is_paused = False
-            self.write(Message(GO, id=call.id))
+            self._pause(call, is_paused=False)
         return message
+
+    def _pause(self, call: _Answers, *, is_paused: bool) -> None:
+        call.is_paused = is_paused
+        self.write(Message(PAUSE if is_paused else GO, id=call.id))
+        call.on_paused(is_paused)
 
     def stop(self, call: _Answers) -> None:
         """Stop a call that nobody reads any more."""
@@ -126,8 +131,7 @@ class _Running:
             call.messages.put_nowait(message)
             call.n_bytes += len(message.payload)
             if call.n_bytes > PAUSE_BYTES and not call.is_paused:
-                call.is_paused = True
-                self.write(Message(PAUSE, id=call.id))
+                self._pause(call, is_paused=True)
         elif message.kind != EVENT:
             self._on_released(time.monotonic() - call.stopped_at)
 
@@ -179,19 +183,22 @@ class AsyncChild:
         raise AssertionError("a stream ends with its result")
 
     async def stream(
-        self, kind: str, content: Mapping[str, Any], payload: bytes = b"", *, inputs: Inputs | None = None
-    ) -> AsyncGenerator[Message]:
+        self, kind: str, content: Mapping[str, Any], payload: bytes = b"", *, inputs: Inputs | None = None,
+        on_paused: Callable[[bool], None] = lambda _: None,
+    ) -> AsyncGenerator[Message]:  # fmt: skip
         """Messages of a call up to its result; errors, and leaving it, as `call`.
 
         Parameters
         ----------
         inputs
             What the handler gets by `tts2face.processes.child.Call.more`.
+        on_paused
+            Called when the call is paused, since much of its answer has not been read, and when it goes on.
         """
         async with self._places:
             running = await self._start()
             self._n_calls += 1
-            call = running.begin(self._n_calls)
+            call = running.begin(self._n_calls, on_paused)
             forwarding, is_answered = None, False
             try:
                 await running.send(Message(kind, content, payload, call.id))

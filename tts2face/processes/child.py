@@ -31,8 +31,8 @@ class Call:
     Parameters
     ----------
     changed
-        Notified when an input arrives, and when the call is paused, continued or stopped; shared by all calls of a
-        process.
+        Notified when an input arrives, and when the call is paused, continued or stopped; all calls of a process share
+        its lock.
 
     Attributes
     ----------
@@ -127,12 +127,12 @@ def serve(handlers: Mapping[str, Handler], out: BinaryIO, at_once: int = 1) -> N
     """
     waiting: queue.SimpleQueue[Call] = queue.SimpleQueue()
     live: dict[int, Call] = {}
-    changed = threading.Condition()
+    lock = threading.RLock()
 
     def receive() -> None:
         while (message := read_message(sys.stdin.buffer)) is not None:
             if message.kind not in CONTROLS:
-                live[message.id] = Call(message, out, changed)
+                live[message.id] = Call(message, out, threading.Condition(lock))
                 waiting.put(live[message.id])
             elif (call := live.get(message.id)) is not None:
                 call.control(message)

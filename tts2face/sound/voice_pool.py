@@ -19,7 +19,7 @@ from lexicon.errors import BackendError, InputError
 from lexicon.languages import language_code
 from tts2face.plugins import VOICES, declared, load_plugin
 from tts2face.sound.voice import NativeRun, PronunciationMap, SpeechInput, Voice, VoiceInfo, VoiceSetting
-from tts2face.types import Speech, Waveform
+from tts2face.types import Speech, Waveform, YieldTurn, keep_on
 
 if TYPE_CHECKING:
     from tts2face.sound.alignment import Align, Aligner
@@ -194,10 +194,12 @@ class VoicePool:
     run
         Runs the models of voices and their aligner, during which other requests have their turns and may use the same
         voice.
+    yield_turn
+        Lets other requests take their turn, between two steps of a synthesis.
     """
 
-    def __init__(self, run: NativeRun | None = None) -> None:
-        self._native_run = run
+    def __init__(self, run: NativeRun | None = None, yield_turn: YieldTurn = keep_on) -> None:
+        self._native_run, self.yield_turn = run, yield_turn
         self._lock = threading.Lock()
         self._unused: list[tuple[Hashable, Voice]] = []  # the newest at the end
         self._kept: OrderedDict[Hashable, Speech] = OrderedDict()
@@ -248,11 +250,6 @@ class VoicePool:
         """Aligner of all voices of the pool, which take turns."""
         run = self._native_run
         return run and (lambda sound, words: run(lambda: self._aligner.align(sound, words), _nothing))
-
-    def yield_turn(self) -> None:
-        """Let other requests take their turn, between two steps of a synthesis."""
-        if self._native_run is not None:
-            self._native_run(_nothing, _nothing)
 
     @contextmanager
     def borrow(self, key: Hashable, load: Callable[[], Voice]) -> Iterator[Voice]:

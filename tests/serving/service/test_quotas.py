@@ -3,7 +3,7 @@
 import asyncio
 import hmac
 from collections import Counter
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,11 +16,13 @@ from tts2face.processes.message import EVENT, Message
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits, add_key, find_key, read_keys, remove_key
 from tts2face.serving.service.messages import Work
-from tts2face.serving.service.pool import MOVIE_COST, PLACES, SOUND_COST, BusyError, Pool, PoolSettings
+from tts2face.serving.service.places import LIVE_COST, MOST_BEGUN_BY_SHARE, MOVIE_COST, PLACES, SOUND_COST, Place, Places
+from tts2face.serving.service.pool import BusyError, Pool, PoolSettings
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 
 HOUR_S = 3600.0
+N_MOST = round(MOST_BEGUN_BY_SHARE * PLACES[MOVIE_COST])  # movies that may have begun
 
 
 class Clock:
@@ -133,10 +135,16 @@ def test_long_words_are_refused_before_any_work() -> None:
 
 
 class FakeProcess:
-    """A process that is ready and works on some movies."""
+    """A process that is ready and works on some movies, by the letters of their keys."""
 
-    def __init__(self, n_movies: int = 0) -> None:
-        self.is_ready, self.tasks = True, Counter({MOVIE_COST: n_movies})
+    def __init__(self, movies: str = "") -> None:
+        self.is_ready, self.places = True, Places()
+        for key in movies:
+            self.places.take(MOVIE_COST, key, self)
+
+    def n_movies(self) -> Counter[str]:
+        """Number of movies of each key."""
+        return Counter(place.key for place in self.places.of(MOVIE_COST))
 
 
 def test_keys_take_turns() -> None:
@@ -144,20 +152,20 @@ def test_keys_take_turns() -> None:
 
     async def order() -> list[str]:
         pool = Pool(PoolSettings(n_processes=1))
-        pool.processes = [FakeProcess(PLACES[MOVIE_COST] - 1)]  # type: ignore[list-item]
+        pool.processes = [FakeProcess("x" * (N_MOST - 1))]  # type: ignore[list-item]
         served: list[str] = []
 
         async def work(key: str) -> None:
-            process = await pool._take(MOVIE_COST, key, "")
+            place = await pool._take(MOVIE_COST, key, "")
             served.append(key)
             await asyncio.sleep(0)
-            pool._release(process, MOVIE_COST)
+            pool._release(place)
 
         greedy = [asyncio.create_task(work("greedy")) for _ in range(6)]
         await asyncio.sleep(0)
         modest = [asyncio.create_task(work(key)) for key in ("modest", "modest", "rare")]
         await asyncio.gather(*greedy, *modest)
-        assert pool.processes[0].tasks[MOVIE_COST] == PLACES[MOVIE_COST] - 1
+        assert len(pool.processes[0].places.begun) == N_MOST - 1
         return served
 
     served = asyncio.run(order())
@@ -176,7 +184,7 @@ def waiting_keys(asked: str, n_places: int) -> tuple[list[str], list[str]]:
 
     async def run() -> tuple[list[str], list[str]]:
         pool = Pool(PoolSettings(n_processes=1, max_waiting=n_places))
-        pool.processes = [FakeProcess(PLACES[MOVIE_COST])]  # type: ignore[list-item]
+        pool.processes = [FakeProcess("x" * N_MOST)]  # type: ignore[list-item]
         refused: list[str] = []
 
         async def work(key: str) -> None:
@@ -221,7 +229,7 @@ def test_keys_share_the_places_to_wait(asked: str, waiting: str, refused: str) -
 def test_short_works_do_not_wait_for_movies() -> None:
     async def run() -> list[str]:
         pool = Pool(PoolSettings(n_processes=1))
-        pool.processes = [FakeProcess(PLACES[MOVIE_COST])]  # type: ignore[list-item]
+        pool.processes = [FakeProcess("a" * PLACES[MOVIE_COST])]  # type: ignore[list-item]
         served: list[str] = []
 
         async def work(name: str, cost: float) -> None:
@@ -231,12 +239,88 @@ def test_short_works_do_not_wait_for_movies() -> None:
         tasks = [asyncio.create_task(work(*one)) for one in (("movie", MOVIE_COST), ("sound", SOUND_COST))]
         await asyncio.sleep(0.01)
         assert served == ["sound"]
-        pool._release(pool.processes[0], MOVIE_COST)
+        pool._release(pool.processes[0].places.begun[0])
         await asyncio.gather(*tasks)
         assert pool.n_waiting == 0
         return served
 
     assert asyncio.run(run()) == ["sound", "movie"]
+
+
+def begun_movies(asked: str, at_first: str, act: Callable[[Pool, list[Place]], None] = lambda *_: None) -> str:
+    """Keys, by their letters, of the movies that have begun of those that are asked for one after another.
+
+    Parameters
+    ----------
+    at_first
+        Keys of those that one process has begun before.
+    act
+        Gets these places when all have asked.
+    """
+
+    async def run() -> str:
+        pool = Pool(PoolSettings(n_processes=1))
+        process = FakeProcess(at_first)
+        pool.processes, places = [process], process.places.begun[:]  # type: ignore[list-item]
+        tasks = []
+        for key in asked:
+            tasks.append(asyncio.create_task(pool._take(MOVIE_COST, key, "")))
+            await asyncio.sleep(0)
+        act(pool, places)
+        for _ in range(4):
+            await asyncio.sleep(0)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        return "".join(sorted(process.n_movies().elements()))
+
+    return asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ("asked", "begun"),
+    [
+        ("a" * 20, "a" * 8),  # one key may have all places
+        ("a" * 20 + "b" * 10, "a" * 8 + "b" * 4),  # another one has its share at once, and no more
+        ("a" * 20 + "bcd", "a" * 8 + "bcd"),
+        ("a" * 20 + "bcdef", "a" * 8 + "bcde"),  # up to a bound
+    ],
+)
+def test_a_key_gets_its_share_of_the_running_places_at_once(asked: str, begun: str) -> None:
+    assert begun_movies(asked, "") == begun
+
+
+def test_a_place_that_is_free_goes_to_the_key_that_has_less() -> None:
+    """The key with most has none again until it has less than its share."""
+
+    def release(pool: Pool, places: list[Place]) -> None:
+        for place in places[:3]:
+            pool._release(place)
+
+    assert begun_movies("a" * 9 + "b" * 9, "a" * 8, release) == "a" * 5 + "b" * 4
+
+
+def test_a_work_that_waits_for_its_reader_holds_no_place() -> None:
+    """So many clients that read slowly do not keep others of their key waiting."""
+
+    def pause(pool: Pool, places: list[Place]) -> None:
+        for place in places[:5]:
+            pool._pause(place, True)
+
+    assert begun_movies("a" * 5, "a" * 8, pause) == "a" * 10  # up to a bound of memory
+
+
+def test_live_streams_hold_no_places_of_others() -> None:
+    """Of streams that wait for a sentence, any number may be open."""
+
+    async def run() -> int:
+        pool = Pool(PoolSettings(n_processes=1))
+        pool.processes = [FakeProcess()]  # type: ignore[list-item]
+        taken = [await pool._take(LIVE_COST, "a", "") for _ in range(200)]
+        taken += [await pool._take(cost, "a", "") for cost in PLACES]
+        return len(taken)
+
+    assert asyncio.run(run()) == 200 + len(PLACES)
 
 
 def test_all_hashes_are_compared_in_constant_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -45,13 +45,13 @@ class Calls:
     def flush(self) -> None:
         pass
 
-    def start(self, id: int, steps: Callable[[], Iterator[Step]], priority: int = 0) -> None:
+    def start(self, id: int, steps: Callable[[], Iterator[Step]], priority: int = 0, key: str = "") -> None:
         """Begin a call; returns when it has had a turn or waits for one."""
         call = self._calls[id] = Call(Message("make", id=id), self, self.changed)  # type: ignore[arg-type]
 
         def run() -> None:
             try:
-                self.results[id] = self.turns.run(call, steps, priority)
+                self.results[id] = self.turns.run(call, steps, priority, key)
             except (Exception, StoppedError) as error:  # noqa: BLE001
                 self.results[id] = error
 
@@ -126,6 +126,81 @@ def test_a_new_call_begins_before_one_that_is_ahead_continues(calls: Calls) -> N
     calls.end(2)
     assert calls.order[:10] == [1] * 5 + [2] * 5  # until both are equally far ahead of their listeners
     assert set(calls.order[10:14]) == {1, 2}
+
+
+def test_keys_share_the_turns(calls: Calls, held: threading.Event) -> None:
+    """Ten calls of a key have together as many turns as one of another key."""
+    for id in range(1, 11):
+        calls.start(id, lambda: calls.speech(20, seconds=0.01), key="a")
+    calls.start(11, lambda: calls.speech(20, seconds=0.01), key="b")
+    held.set()
+    calls.end(11)
+    order = calls.order[: 1 + max(at for at, id in enumerate(calls.order) if id == 11)]
+    assert abs(order.count(11) - sum(id != 11 for id in order)) <= 2
+    for id in range(1, 11):
+        calls.end(id)
+
+
+def test_a_key_that_was_idle_has_a_short_credit_and_no_more(calls: Calls) -> None:
+    """However long it was idle: its first turns follow one another, then the keys alternate."""
+
+    def first() -> Iterator[Step]:
+        yield from calls.speech(100, seconds=0.001)
+        threading.Thread(target=calls.start, args=(2, lambda: calls.speech(40, seconds=0.001), 0, "b")).start()
+        eventually(lambda: calls.n_waiting(2), WAIT_S)
+        yield from calls.speech(40, seconds=0.001)
+
+    calls.start(1, first, key="a")
+    calls.end(1)
+    eventually(lambda: 2 in calls.results, WAIT_S)
+    later = calls.order[101:]
+    n_first = later.index(1)  # turns of a tenth of a second
+    assert 9 <= n_first <= 12
+    assert abs(later[n_first : n_first + 20].count(1) - 10) <= 1
+
+
+def test_a_call_that_is_ahead_of_its_listener_gives_way_to_another_key(calls: Calls, held: threading.Event) -> None:
+    """Also one of the key for which less has been computed."""
+    calls.start(1, lambda: calls.speech(5, seconds=100.0), key="a")
+    calls.start(2, lambda: calls.speech(5, seconds=0.01), key="b")
+    held.set()
+    calls.end(1)
+    calls.end(2)
+    assert calls.order == [1, 2, 2, 2, 2, 2, 1, 1, 1, 1]
+
+
+def test_cancelling_again_and_again_takes_no_turns_of_another_key(calls: Calls, held: threading.Event) -> None:
+    def interrupted() -> Iterator[Step]:
+        for _ in range(20):
+            calls.now += 0.1
+            calls.control(1, MORE, type="cancel")
+            yield Chunk(b"sound", 0.01)
+
+    calls.start(1, interrupted, key="a")
+    calls.start(2, lambda: calls.speech(20, seconds=0.01), key="b")
+    held.set()
+    calls.end(1)
+    calls.end(2)
+    assert abs(calls.order[:20].count(1) - 10) <= 1
+
+
+def test_computations_of_keys_take_turns() -> None:
+    """Of twenty of one key and one of another, the last one is not the last that is done."""
+    calls, native, begin = Calls(), OneAtATime(), threading.Event()
+    done: list[int] = []
+
+    def computing(id: int) -> Iterator[Step]:
+        yield Event({})
+        native(lambda: (begin.wait(WAIT_S), done.append(id)), lambda: None)
+        yield Chunk(b"sound", 0.01)
+
+    for id in range(21):
+        calls.start(id, partial(computing, id), key="b" if id == 20 else "a")
+        eventually(lambda n=id: len(native._waiting) == n, WAIT_S)  # type: ignore[misc]
+    begin.set()
+    for id in range(21):
+        calls.end(id)
+    assert done.index(20) <= 1
 
 
 def test_calls_of_lower_priority_run_when_no_other_can(calls: Calls, held: threading.Event) -> None:
@@ -216,7 +291,7 @@ def test_an_error_ends_its_call_only(
 
     monkeypatch.setattr(SessionCache, "get", lambda *_: None)
     synthesis = Synthesis(SessionCache(), {"fails": fails, "works": lambda *_: iter([Chunk(b"a")])})
-    order = {"priority": 0, "id": "id-1"}
+    order = {"priority": 0, "key": "", "id": "id-1"}
     failed, works = (
         answered(synthesis.synthesise, order | {"work": Work(kind).as_json()})[-1] for kind in ("fails", "works")
     )

@@ -11,7 +11,8 @@ from tests.processes.answered import answered
 from tts2face.processes.message import ERROR, RESULT
 from tts2face.serving.service import pool, synthesis
 from tts2face.serving.service.messages import SYNTHESISE, Work
-from tts2face.serving.service.pool import LINES_COST, MOVIE_COST, SOUND_COST, WarmProcess, work_cost
+from tts2face.serving.service.places import LINES_COST, MOVIE_COST, SOUND_COST, work_cost
+from tts2face.serving.service.pool import WarmProcess
 from tts2face.serving.service.preparation import Preparation
 from tts2face.serving.service.server import Mount, create_app
 from tts2face.serving.service.settings import ServiceSettings
@@ -51,7 +52,8 @@ def test_the_end_of_a_process_is_not_taken_from_asyncio(
 def test_processes_have_the_tasks_of_what_is_mounted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(SessionCache, "get", lambda *_: None)
     monkeypatch.setattr(synthesis, "configure_logs", lambda *_, **__: None)
-    mount, order = Mount(lambda *_: None, (f"{__name__}:GIVEN",)), {"work": Work("given").as_json(), "priority": 0}
+    mount = Mount(lambda *_: None, (f"{__name__}:GIVEN",))
+    order = {"work": Work("given").as_json(), "priority": 0, "key": ""}
     last = []
     for mounts in ([], [mount]):
         settings = create_app(ServiceSettings(processes=1, data=tmp_path), mounts).state.service.pool.settings

@@ -6,7 +6,7 @@ The server's side of one synthesis process.
 import asyncio
 import time
 import zlib
-from collections import Counter, OrderedDict, deque
+from collections import OrderedDict, deque
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import aclosing, suppress
 from dataclasses import dataclass, field
@@ -14,28 +14,27 @@ from typing import Any
 
 from lexicon.errors import BackendError, Tts2faceError
 from tts2face.numeric.reuse import available_cores
-from tts2face.picture.movie import MOVIE_KINDS
-from tts2face.picture.sound_stream import SOUND_KINDS
 from tts2face.processes.async_parent import AsyncChild, started
 from tts2face.processes.message import Message
 from tts2face.processes.parent import ChildEndedError
 from tts2face.processes.program import Program
 from tts2face.serving.service.logs import REQUEST_ID, log_event
 from tts2face.serving.service.messages import SERVE, SYNTHESISE, Work
+from tts2face.serving.service.places import Place, Places, has_less_than_share, work_cost
 from tts2face.serving.service.preparation import Preparation, Step
 from tts2face.serving.service.stages import stage
 
 PROGRAM = "tts2face.serving.service.synthesis:handlers"
-AT_ONCE = 64  # more calls than the pool gives to one process
+AT_ONCE = 4096  # more calls than the pool gives to one process
 FIRST_PAUSE_S, LAST_PAUSE_S = 0.5, 30.0  # before a process that was not ready is started again
 NICENESS = 10  # of processes for which nobody waits, so that streams go first
 
 InputQueue = asyncio.Queue[tuple[Mapping[str, Any], bytes]]  # contents and payloads
 
 
-def work_call(work: Work, priority: int = 0) -> dict[str, Any]:
-    """Content of the call `SYNTHESISE` for a work of the present request."""
-    return {"work": work.as_json(), "priority": priority, "id": REQUEST_ID.get()}
+def work_call(work: Work, priority: int = 0, key: str = "") -> dict[str, Any]:
+    """Content of the call `SYNTHESISE` for a work of the present request; keys share the turns of a process."""
+    return {"work": work.as_json(), "priority": priority, "key": key, "id": REQUEST_ID.get()}
 
 
 class WarmProcess:
@@ -58,7 +57,7 @@ class WarmProcess:
         self.is_ready = False
         self._closed, self._pause_s = asyncio.Event(), FIRST_PAUSE_S
         self.on_cancelled: Callable[[float], None] = _ignore  # called with the seconds until a task was released
-        self.tasks: Counter[float] = Counter()  # their number, by their cost
+        self.places = Places()
 
     @property
     def pid(self) -> int | None:
@@ -100,13 +99,19 @@ class WarmProcess:
                 log_event("synthesis process ready", process=self.pid, seconds=round(time.monotonic() - began, 3))
                 self._on_change()
 
-    async def stream(self, work: Work, priority: int, inputs: InputQueue | None = None) -> AsyncIterator[Message]:
+    async def stream(
+        self, call: Mapping[str, Any], inputs: InputQueue | None, on_paused: Callable[[bool], None]
+    ) -> AsyncIterator[Message]:
         """Messages of a task up to its result, which is included; leaving the iteration cancels the task.
 
         Parameters
         ----------
+        call
+            As of `work_call`.
         inputs
             What is passed on to the task.
+        on_paused
+            As for `AsyncChild.stream`.
 
         Raises
         ------
@@ -115,9 +120,8 @@ class WarmProcess:
         ChildEndedError
             The process ended before the task did.
         """
-        content = work_call(work, priority)
         given = None if inputs is None else _items(inputs)
-        async with aclosing(self._child.stream(SYNTHESISE, content, inputs=given)) as messages:
+        async with aclosing(self._child.stream(SYNTHESISE, call, inputs=given, on_paused=on_paused)) as messages:
             async for message in messages:
                 yield message
 
@@ -139,13 +143,17 @@ def _ignore(_: float) -> None:
     pass
 
 
-MOVIE_COST, LINES_COST, SOUND_COST = 1.0, 0.2, 0.1  # shares of a core of a stream in real time, rounded up
-PLACES = {MOVIE_COST: 8, LINES_COST: 10, SOUND_COST: 20}  # tasks of each cost that one process takes at a time
 MAX_TRIES = 2  # of a request whose process ended before anything was sent
 STREAM_PRIORITY = 0
 
 
-_Waiting = tuple[float, float, "asyncio.Future[WarmProcess]"]  # cost, begin, the process when there is one
+@dataclass(frozen=True, slots=True, eq=False)
+class _Waiting:
+    """A work that waits for a place."""
+
+    cost: float
+    begin: float
+    place: "asyncio.Future[Place]"
 
 
 class BusyError(BackendError):
@@ -176,22 +184,12 @@ class PoolSettings:
     handlers: Mapping[str, Any] = field(default_factory=dict)
 
 
-def _load(process: WarmProcess) -> float:
-    return sum(cost * number for cost, number in process.tasks.items())
-
-
-def work_cost(work: Work) -> float:
-    """Share of a core that a work takes."""
-    if work.format in SOUND_KINDS:
-        return SOUND_COST
-    return MOVIE_COST if work.format in MOVIE_KINDS else LINES_COST
-
-
 class Pool:
     """Distributes works over synthesis processes.
 
-    While all processes are occupied, works wait in one queue for each key, and the keys take turns. The places to wait
-    are shared likewise: when all are taken, a key that has fewer of them gets one of the key that has most
+    While all places of the processes are taken, works wait in one queue for each key, and the keys take turns. A key
+    that has less than its share of the places gets one nevertheless, up to `MOST_BEGUN_BY_SHARE` (decision 203). The
+    places to wait are shared, too: when all are taken, a key that has fewer of them gets one of the key that has most
     (decision 180).
     """
 
@@ -217,13 +215,13 @@ class Pool:
     @property
     def oldest_waiting_s(self) -> float:
         """Age of the work that waits longest."""
-        begins = [begin for queue in self._waiting.values() for _, begin, _ in queue]
+        begins = [one.begin for queue in self._waiting.values() for one in queue]
         return time.monotonic() - min(begins) if begins else 0.0
 
     @property
     def load(self) -> float:
         """Cost of all running works."""
-        return sum(_load(process) for process in self.processes)
+        return sum(process.places.load for process in self.processes)
 
     @property
     def _lack(self) -> str:
@@ -272,12 +270,13 @@ class Pool:
         BackendError
             No process can become ready.
         """
-        cost, tries = work_cost(work), 0
+        cost, tries = work_cost(work, is_live=inputs is not None), 0
         while True:
             with stage("queue"):
-                process = await self._take(cost, key, work.affinity)
+                place = await self._take(cost, key, work.affinity)
             is_begun = False
-            messages = process.stream(work, priority, inputs)
+            call = work_call(work, priority, key)
+            messages = place.process.stream(call, inputs, lambda is_paused, of=place: self._pause(of, is_paused))  # type: ignore[misc]
             try:
                 with stage("synthesis"):
                     async for message in messages:
@@ -290,25 +289,25 @@ class Pool:
                     raise
             finally:
                 await messages.aclose()  # type: ignore[attr-defined]
-                self._release(process, cost)
+                self._release(place)
 
-    async def _take(self, cost: float, key: str, affinity: str) -> WarmProcess:
-        is_first = all(one[0] != cost for queue in self._waiting.values() for one in queue)
-        found = self._free_process(cost, affinity) if is_first else None
+    async def _take(self, cost: float, key: str, affinity: str) -> Place:
+        waiting = self._keys_that_wait(cost)
+        is_first = key not in waiting and (not waiting or self._has_less(cost, key))
+        found = self._place(cost, key, affinity) if is_first else None
         if found is not None:
-            found.tasks[cost] += 1
             return found
         if self._lack:
             raise BackendError(self._lack)
         if self.n_waiting >= self.settings.max_waiting:
             self._make_room(key)
-        future: asyncio.Future[WarmProcess] = asyncio.get_running_loop().create_future()
-        self._waiting.setdefault(key, deque()).append((cost, time.monotonic(), future))
+        future: asyncio.Future[Place] = asyncio.get_running_loop().create_future()
+        self._waiting.setdefault(key, deque()).append(_Waiting(cost, time.monotonic(), future))
         try:
             return await future
         except asyncio.CancelledError:
             if future.done() and not future.cancelled() and future.exception() is None:
-                self._release(future.result(), cost)
+                self._release(future.result())
             raise
         finally:
             self._forget(key, future)
@@ -321,46 +320,59 @@ class Pool:
         BusyError
             This key has its share of the places.
         """
-        waits = {name: sum(not one[2].done() for one in queue) for name, queue in self._waiting.items()}
+        waits = {name: sum(not one.place.done() for one in queue) for name, queue in self._waiting.items()}
         largest = max(waits, key=lambda name: waits[name], default=key)
         if waits.get(largest, 0) <= waits.get(key, 0) + 1:
             raise BusyError(f"{self.n_waiting} requests are waiting already; repeat the request later")
-        newest = next(one[2] for one in reversed(self._waiting[largest]) if not one[2].done())
+        newest = next(one.place for one in reversed(self._waiting[largest]) if not one.place.done())
         newest.set_exception(BusyError("other keys need the places to wait; repeat the request later"))
         self._forget(largest, newest)
 
-    def _release(self, process: WarmProcess, cost: float) -> None:
-        process.tasks[cost] -= 1
+    def _release(self, place: Place) -> None:
+        place.process.places.begun.remove(place)
         self._wake()
 
-    def _free_process(self, cost: float, affinity: str = "") -> WarmProcess | None:
-        free = [one for one in self.processes if one.is_ready and one.tasks[cost] < PLACES[cost]]
+    def _pause(self, place: Place, is_paused: bool) -> None:
+        place.is_paused = is_paused
+        self._wake()
+
+    def _place(self, cost: float, key: str, affinity: str = "") -> Place | None:
+        """A place in a process for a work that begins; None if there is none."""
+        has_less = self._has_less(cost, key)
+        free = [one for one in self.processes if one.is_ready and one.places.has_room(cost, has_less=has_less)]
         usual = self.processes[zlib.crc32(affinity.encode()) % len(self.processes)] if affinity else None
-        if usual in free:
-            return usual
-        return min(free, key=_load, default=None)
+        process = usual if usual in free else min(free, key=lambda one: one.places.load, default=None)
+        return None if process is None else process.places.take(cost, key, process)
+
+    def _has_less(self, cost: float, key: str) -> bool:
+        """Whether a key has begun fewer works of a cost than its share of the places."""
+        ready = [one.places for one in self.processes if one.is_ready]
+        return has_less_than_share(ready, cost, key, self._keys_that_wait(cost))
+
+    def _keys_that_wait(self, cost: float) -> set[str]:
+        waits = self._waiting.items()
+        return {key for key, queue in waits if any(one.cost == cost and not one.place.done() for one in queue)}
 
     def _wake(self) -> None:
-        """Give free processes to waiting works, one key after the other; those of one cost do not wait for others."""
+        """Give free places to waiting works, one key after the other; those of one cost do not wait for others."""
         if self.n_ready == len(self.processes):
             self.is_prepared.set()
         if self._lack:
-            for future in [one[2] for queue in self._waiting.values() for one in queue if not one[2].done()]:
+            for future in [one.place for queue in self._waiting.values() for one in queue if not one.place.done()]:
                 future.set_exception(BackendError(self._lack))
         for key in list(self._waiting):
-            for cost, _, future in list(self._waiting[key]):
-                process = None if future.done() else self._free_process(cost)
-                if process is not None:
-                    process.tasks[cost] += 1
-                    future.set_result(process)
+            firsts = {one.cost: one for one in reversed(self._waiting[key]) if not one.place.done()}
+            for cost, one in firsts.items():
+                if (place := self._place(cost, key)) is not None:
+                    one.place.set_result(place)
                     self._waiting.move_to_end(key)
-                    self._forget(key, future)
+                    self._forget(key, one.place)
                     break
 
-    def _forget(self, key: str, future: "asyncio.Future[WarmProcess]") -> None:
+    def _forget(self, key: str, future: "asyncio.Future[Place]") -> None:
         queue = self._waiting.get(key)
         if queue is not None:
             with suppress(StopIteration):
-                queue.remove(next(one for one in queue if one[2] is future))
+                queue.remove(next(one for one in queue if one.place is future))
             if not queue:
                 del self._waiting[key]

@@ -30,7 +30,7 @@ from tts2face.serving.service.messages import (
     Task,
     Work,
 )
-from tts2face.serving.service.scheduler import OneAtATime, Turns, lead
+from tts2face.serving.service.scheduler import OneAtATime, Turns, give_turn, lead
 from tts2face.session import warm_up
 from tts2face.session.functions import SessionCache
 from tts2face.session.named_models import Models
@@ -131,7 +131,7 @@ class Synthesis:
             The task raised another error.
         """
         try:
-            return self._turns.run(call, lambda: self._steps(call), call.content["priority"])
+            return self._turns.run(call, lambda: self._steps(call), call.content["priority"], call.content["key"])
         except Tts2faceError:
             raise
         except Exception as error:
@@ -161,7 +161,7 @@ def handlers(
     """
     configure_logs(log_format, with_text=log_text)
     sessions = SessionCache(
-        n_sessions, voices=VoicePool(OneAtATime()), max_bytes=memory_mb * 1_000_000 or None,
+        n_sessions, voices=VoicePool(OneAtATime(), give_turn), max_bytes=memory_mb * 1_000_000 or None,
         memory_mb=sentences_mb,
     )  # fmt: skip
     known = dict(TASKS)

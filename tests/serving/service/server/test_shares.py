@@ -14,7 +14,7 @@ import websockets
 from tests.running import HostService, RunningService, eventually
 from tests.serving.service.raw import connect, request
 from tts2face.serving.service.keys import add_key
-from tts2face.serving.service.pool import MOVIE_COST, PLACES
+from tts2face.serving.service.places import MOVIE_COST, PLACES
 
 N_PLACES = 64  # as by default: the services of a run of the tests share one pool
 N_ASKED, N_RUNNING = 80, PLACES[MOVIE_COST]  # movies
