@@ -89,7 +89,7 @@ class Keys:
     async def load(self, seconds: float) -> Load:
         """The load of the three keys for some seconds."""
         load, end = Load(), time.monotonic() + seconds
-        async with httpx.AsyncClient(base_url=self.server.url, timeout=60) as client:
+        async with httpx.AsyncClient(base_url=self.server.url, timeout=30) as client:
 
             async def repeat(kind: str, ask: Callable[[], Awaitable[float]]) -> None:
                 while time.monotonic() < end:
