@@ -265,7 +265,16 @@ class LiveSpeech:
     @property
     def seconds(self) -> float:
         """Duration of all pieces so far."""
-        return float(self._n_frames / exact_rate(self._request.fps))
+        return self.seconds_of(self._n_frames)
+
+    @property
+    def fps(self) -> float:
+        """Frames per second."""
+        return self._request.fps
+
+    def seconds_of(self, n_frames: int) -> float:
+        """Duration of a number of frames."""
+        return float(n_frames / exact_rate(self._request.fps))
 
     def say(self, text: str) -> Iterator[Piece]:
         """Append the sentences of a text; errors as `Session.stream`."""

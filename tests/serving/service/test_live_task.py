@@ -1,8 +1,8 @@
 """The task of a live stream, without a service."""
 
 import itertools
+import json
 from collections import deque
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,10 +11,24 @@ import pytest
 import tts2face
 from tts2face.processes.message import MORE, Message
 from tts2face.request import TURN_S
+from tts2face.serving.service import live_motion
 from tts2face.serving.service.live import LiveTask
-from tts2face.serving.service.messages import Event, Inputs, Work
+from tts2face.serving.service.live_motion import IDLE_PART_S, Projection, idle_motion
+from tts2face.serving.service.messages import Event, Inputs, Line, Step, Wait, Work
 from tts2face.serving.service.scheduler import InterruptedTaskError
+from tts2face.session.live import LiveSpeech
 from tts2face.sound.voice_pool import VoicePool
+from tts2face.types import Chunk
+
+
+def content_of(step: Step) -> Any:
+    """JSON of an event."""
+    assert isinstance(step, Event | Line)
+    return step.content if isinstance(step, Event) else json.loads(step.content)
+
+
+def type_of(step: Step) -> str:
+    return str(content_of(step)["type"])
 
 
 def test_a_face_listens_until_it_has_something_to_say() -> None:
@@ -36,7 +50,7 @@ def test_a_face_listens_until_it_has_something_to_say() -> None:
     pulses = np.sign(np.sin(2 * np.pi * 200 * np.arange(32_000) / 16_000))
     inputs.append(Message(MORE, {"type": "heard"}, (8_000 * pulses).astype("<i2").tobytes()))
     for _ in range(3):
-        assert next(steps).content["type"] == "curves"
+        assert type_of(next(steps)) == "curves"
         now[0] += 0.2
     inputs.append(Message(MORE, {"type": "heard"}, bytes(32_000)))  # a pause
     next(steps)
@@ -45,7 +59,7 @@ def test_a_face_listens_until_it_has_something_to_say() -> None:
     speech = next(steps).content
     assert speech["type"] == "speech"
     assert speech["phones"][0][2] - speech["begin"] == pytest.approx(TURN_S, abs=0.1)
-    assert [one.content["type"] for one in itertools.islice(steps, 3) if isinstance(one, Event)][:1] == ["curves"]
+    assert [type_of(one) for one in itertools.islice(steps, 3) if not isinstance(one, Chunk)][:1] == ["curves"]
     assert len(listened) == 4
 
 
@@ -54,13 +68,83 @@ def test_idle_motion_is_interrupted_by_cancel() -> None:
     inputs: Inputs = deque()
     arriving = [Message(MORE, {"type": "cancel", "arrived": 0.0})]  # between the steps of idle motion
 
-    def run(compute: Callable[[], Any], _: Callable[[], None]) -> Any:
+    def interrupt() -> None:
         if arriving:
             inputs.append(arriving.pop())
             raise InterruptedTaskError
-        return compute()
 
-    session = tts2face.Session(voices=VoicePool(run=run))
+    session = tts2face.Session(voices=VoicePool(yield_turn=interrupt))
     steps = LiveTask(session, Work(kind="live"), inputs, clock=lambda: 0.0).steps()
     found = [next(steps) for _ in range(2)]
-    assert [one.content["type"] for one in found if isinstance(one, Event)] == ["cancelled", "curves"]
+    assert [type_of(one) for one in found] == ["cancelled", "curves"]
+
+
+def idle_events(session: tts2face.Session, seconds: float, inputs: Inputs, **options: Any) -> list[Any]:
+    """Events and sounds of a stream for some seconds of its clock, on which the making takes no time."""
+    now = [0.0]
+    found: list[Any] = []
+    for step in LiveTask(session, Work(kind="live", request=options), inputs, clock=lambda: now[0]).steps():
+        if isinstance(step, Wait):
+            now[0] += step.seconds or 1.0
+        elif not isinstance(step, Chunk):
+            found.append(content_of(step))
+        if now[0] > seconds:
+            break
+    return found
+
+
+def frames_of(events: list[Any]) -> Any:
+    """Weights and head poses of all frames, which follow one another without a gap."""
+    curves = [one for one in events if one["type"] == "curves"]
+    n_frames = 0
+    for one in curves:
+        assert one["begin"] == pytest.approx(n_frames / one["fps"], abs=2e-4)
+        n_frames += len(one["weights"])
+    return np.array(
+        [[*weights, *head] for one in curves for weights, head in zip(one["weights"], one["head"], strict=True)]
+    )
+
+
+def test_streams_of_equal_options_share_their_idle_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is made once, in long parts; other options have another one."""
+    session, made = tts2face.Session(), list[float]()
+    idle = LiveSpeech.idle
+    monkeypatch.setattr(LiveSpeech, "idle", lambda speech, seconds: made.append(seconds) or idle(speech, seconds))
+    first, second = (frames_of(idle_events(session, 4.0, deque())) for _ in range(2))
+    assert np.array_equal(first, second)
+    assert made == [IDLE_PART_S]
+    assert np.ptp(first[:, -6:], axis=0).max() > 0.01  # the head moves
+    assert not np.array_equal(first, frames_of(idle_events(session, 4.0, deque(), seed=5)))
+    assert made == [IDLE_PART_S] * 2
+
+
+def test_idle_motion_is_that_of_a_clip() -> None:
+    session = tts2face.Session()
+    frames = frames_of(idle_events(session, 2.0, deque()))
+    clip = next(iter(session.live().idle(IDLE_PART_S))).clip
+    assert np.abs(frames - Projection(session).frames(clip.motion, clip.head)[: len(frames)]).max() <= 5e-5
+
+
+def test_speech_and_idle_motion_join_without_a_jump(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From idle motion to speech, back, and where idle motion repeats: no step is larger than those within."""
+    monkeypatch.setattr(live_motion, "IDLE_LOOP_S", IDLE_PART_S)
+    session, inputs = tts2face.Session(), Inputs()
+    inputs.append(Message(MORE, {"type": "say", "text": "Yes."}))
+    spoken = frames_of(idle_events(session, 8.0, inputs, seed=3))
+    idle = frames_of(idle_events(session, 12.0, deque(), seed=3))
+    usual = np.abs(np.diff(idle[:140, -6:], axis=0)).max(axis=0)  # within the first part
+    for frames in (spoken, idle):
+        assert (np.abs(np.diff(frames[:, -6:], axis=0)) <= 3.0 * usual + 2e-3).all()
+        assert frames[:, :52].min() >= 0.0
+        assert frames[:, :52].max() <= 1.0
+
+
+def test_another_stream_waits_while_idle_motion_is_made() -> None:
+    """A turn in the middle of the making shows another stream nothing half made."""
+    session = tts2face.Session()
+    idle = idle_motion(session, {})
+    idle._is_growing = True
+    steps = LiveTask(session, Work(kind="live"), deque(), clock=lambda: 0.0).steps()
+    assert isinstance(next(steps), Wait)
+    idle._is_growing = False
+    assert type_of(next(steps)) == "curves"

@@ -16,7 +16,15 @@ from tts2face.processes.message import EVENT, Message
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import LOCAL_KEY, ApiKey, RateLimits, add_key, find_key, read_keys, remove_key
 from tts2face.serving.service.messages import Work
-from tts2face.serving.service.places import LIVE_COST, MOST_BEGUN_BY_SHARE, MOVIE_COST, PLACES, SOUND_COST, Place, Places
+from tts2face.serving.service.places import (
+    LIVE_COST,
+    MOST_BEGUN_BY_SHARE,
+    MOVIE_COST,
+    PLACES,
+    SOUND_COST,
+    Place,
+    Places,
+)
 from tts2face.serving.service.pool import BusyError, Pool, PoolSettings
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState

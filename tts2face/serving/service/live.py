@@ -5,18 +5,17 @@ import time
 from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lexicon.errors import Tts2faceError
 from tts2face.gestures.listening import PartnerSound
 from tts2face.processes.message import Message
-from tts2face.serving.service.messages import Event, Inputs, Step, Wait, Work, check_words
+from tts2face.serving.service.live_motion import Curves, idle_motion
+from tts2face.serving.service.messages import Event, Inputs, Line, Step, Wait, Work, check_words
 from tts2face.serving.service.scheduler import InterruptedTaskError
-from tts2face.types import Chunk, Clip, Trajectory
+from tts2face.types import Chunk, Clip
 
 if TYPE_CHECKING:
     from tts2face.session.live import LiveSpeech
@@ -24,9 +23,11 @@ if TYPE_CHECKING:
     from tts2face.session.speech_stream import Piece
 
 
-IDLE_S = 0.2  # of idle motion at a time, so that speech can begin soon
-MAX_FRAMES = 200  # of an event, whose writing is one step of the server's event loop, of some 5 ms
-AHEAD_S = 0.3  # by which idle motion is ahead of the clock
+IDLE_S = 0.3  # of idle motion at a time, so that speech can begin soon
+LISTEN_S = 0.2  # likewise of a listener's
+AHEAD_S = 0.2  # by which idle motion is ahead of the clock at least
+LEAST_WAIT_S = 1e-3  # a shorter wait is none: of a clock that counts otherwise than the frames
+GROWING_S = 0.02  # after which is looked again whether another stream has made more of the idle motion
 
 
 class LiveTask:
@@ -45,7 +46,9 @@ class LiveTask:
         options = dict(work.request)
         self._has_idle = bool(options.pop("with_idle", True))
         self._speech: LiveSpeech = session.live(**options)
-        self._curves = _Curves(session)
+        self._curves = Curves(session)
+        self._idle = idle_motion(session, options) if self._has_idle else None
+        self._idle_at = self._n_idle = 0  # next frame of the idle motion; frames of it that the stream has
         self._inputs, self._clock = inputs, clock
         self._sentences: deque[str] = deque()
         self._is_ended = False
@@ -53,6 +56,17 @@ class LiveTask:
         self._n_cancels = 0
         self._listens = False
         self._partner: PartnerSound | None = None
+        self._source = ""  # of the last curves
+
+    @property
+    def _seconds(self) -> float:
+        """Duration of the stream so far."""
+        return self._speech.seconds + self._idle_s
+
+    @property
+    def _idle_s(self) -> float:
+        """Seconds by which a piece of speech begins later than in a stream without idle motion."""
+        return self._speech.seconds_of(self._n_idle)
 
     def steps(self) -> Iterator[Step]:
         """Yield results until ``end`` and all its text are done."""
@@ -60,7 +74,7 @@ class LiveTask:
             yield from self._read_inputs()
             is_alive = self._has_idle or self._listens
             if self._began is None and (self._sentences or is_alive):
-                self._began = self._clock() - self._speech.seconds
+                self._began = self._clock() - self._seconds
             if self._sentences:
                 self._listens = False
                 yield from self._say(self._sentences.popleft())
@@ -71,30 +85,53 @@ class LiveTask:
             if not is_alive or self._began is None:
                 yield Wait()
                 continue
-            ahead = self._speech.seconds - (self._clock() - self._began)
-            if ahead > AHEAD_S:
+            ahead = self._seconds - (self._clock() - self._began)
+            if ahead > AHEAD_S + LEAST_WAIT_S:
                 yield Wait(ahead - AHEAD_S)
                 continue
             with suppress(InterruptedTaskError):  # by a message that is read next
-                for piece in self._silence():
-                    yield from self._curves.events(piece.clip, piece.begin)
+                yield from self._listen() if self._listens else self._be_idle()
 
-    def _silence(self) -> "Iterator[Piece]":
-        """Idle motion, or that of a listener."""
-        if not self._listens:
-            return self._speech.idle(IDLE_S)
-        return self._speech.listen(IDLE_S, None if self._partner is None else self._partner.new_cues())
+    def _listen(self) -> Iterator[Line]:
+        cues = None if self._partner is None else self._partner.new_cues()
+        self._begin_source("listening")
+        for piece in self._speech.listen(LISTEN_S, cues):
+            yield from self._curves.of_clip(piece.clip, piece.begin + self._idle_s)
 
-    def _say(self, sentence: str) -> Iterator[Event | Chunk]:
+    def _be_idle(self) -> Iterator[Step]:
+        idle, at = self._idle, self._idle_at
+        assert idle is not None
+        n = max(1, round(IDLE_S * self._speech.fps))
+        if not idle.is_whole and at + n > len(idle.frames) and not idle.grow():
+            yield Wait(GROWING_S)
+            return
+        self._speech.rest()
+        if at == 0:
+            self._source = ""  # it begins again
+        self._begin_source("idle")
+        part = slice(at, min(at + n, len(idle.frames)))
+        begin = self._seconds
+        self._n_idle += part.stop - at
+        self._idle_at = 0 if idle.is_whole and part.stop == len(idle.frames) else part.stop
+        yield self._curves.of_idle(idle, part, begin)
+
+    def _begin_source(self, name: str) -> None:
+        if name != self._source:
+            self._source = name
+            self._curves.begin_source()
+
+    def _say(self, sentence: str) -> Iterator[Step]:
         n_cancels = self._n_cancels
-        if self._clock() - (self._began or 0.0) > self._speech.seconds:
+        if self._clock() - (self._began or 0.0) > self._seconds:
             self._speech.rest()  # the sentence before it has been heard
+        self._begin_source("speech")
         try:
             check_words(sentence)
             for piece in self._speech.say(sentence):
-                yield _speech_event(piece)
+                begin = piece.begin + self._idle_s
+                yield _speech_event(piece, begin)
                 yield _sound(piece.clip)
-                yield from self._curves.events(piece.clip, piece.begin)
+                yield from self._curves.of_clip(piece.clip, begin)
                 yield from self._read_inputs()
                 if self._n_cancels != n_cancels:
                     return
@@ -119,10 +156,10 @@ class LiveTask:
                         yield _said(len(self._sentences))
                         self._sentences.clear()
                     self._n_cancels += 1
-                    self._began = self._clock() - self._speech.seconds  # what follows is due now
+                    self._began = self._clock() - self._seconds  # what follows is due now
                     self._speech.rest()
                     after_ms = 1000 * (self._clock() - content["arrived"])
-                    cancelled = {"at": round(self._speech.seconds, 4), "after_ms": round(after_ms, 1)}
+                    cancelled = {"at": round(self._seconds, 4), "after_ms": round(after_ms, 1)}
                     yield Event({"type": "cancelled", **cancelled})
 
     def _hear(self, given: Message) -> None:
@@ -134,8 +171,8 @@ class LiveTask:
         self._listens = True
         rate = given.content["rate"]
         self._partner = None if rate is None else PartnerSound(rate)
-        if self._began is None or self._clock() - self._began > self._speech.seconds:
-            self._began = self._clock() - self._speech.seconds  # it listens from now on
+        if self._began is None or self._clock() - self._began > self._seconds:
+            self._began = self._clock() - self._seconds  # it listens from now on
 
 
 def _said(n_sentences: int) -> Event:
@@ -147,10 +184,10 @@ def live(session: "Session", work: Work, inputs: Inputs) -> Iterator[Step]:
     return LiveTask(session, work, inputs).steps()
 
 
-def listen(session: "Session", work: Work, inputs: Inputs) -> Iterator[Event | Wait]:
+def listen(session: "Session", work: Work, inputs: Inputs) -> Iterator[Event | Line | Wait]:
     """Curves of sound: inputs are ``audio``, whose payload is 16-bit samples, and ``end``."""
     lips = session.listen(int(work.request.get("rate", 16_000)))
-    curves, n_frames = _Curves(session), 0
+    curves, n_frames = Curves(session), 0
     yield Event({"type": "listening", "fps": lips.fps, "look_ahead_s": round(lips.look_ahead_s, 4)})
     is_ended = False
     while not is_ended:
@@ -166,43 +203,8 @@ def listen(session: "Session", work: Work, inputs: Inputs) -> Iterator[Event | W
             n_frames += len(motion)
 
 
-class _Curves:
-    """ARKit weights of clips of a session."""
-
-    def __init__(self, session: "Session") -> None:
-        self._session = session
-        self._projection: Any = None
-
-    def events(self, clip: Clip, begin: float) -> Iterator[Event]:
-        """Weights and head pose of all frames of a clip, at most `MAX_FRAMES` in an event."""
-        motion, head = clip.motion, clip.head
-        for at in range(0, len(motion), MAX_FRAMES):
-            part = slice(at, at + MAX_FRAMES)
-            some, turned = replace(motion, values=motion.values[part]), replace(head, values=head.values[part])
-            yield self.of_motion(some, begin + at / motion.fps, turned)
-
-    def of_motion(self, motion: Trajectory, begin: float, head: Trajectory | None = None) -> Event:
-        """Weights of all frames of a motion, and the head pose if there is one."""
-        from tts2face.interchange.exports.curves import ARKIT_SHAPES, arkit_projection
-
-        content: dict[str, Any] = {"type": "curves", "begin": round(begin, 4), "fps": motion.fps}
-        if self._projection is None:
-            self._projection = arkit_projection(motion.channels, self._session.mesh, "the stream")
-            content["names"] = list(ARKIT_SHAPES)
-            if head is not None:
-                content["head_names"] = list(head.channels)
-        content["weights"] = _rounded(self._projection.weights(motion.values))
-        if head is not None:
-            content["head"] = _rounded(head.values)
-        return Event(content, 0.0 if head is not None else motion.duration)
-
-
-def _rounded(values: NDArray[np.floating]) -> list[list[float]]:
-    return [[round(value, 4) for value in row] for row in values.tolist()]
-
-
-def _speech_event(piece: "Piece") -> Event:
-    speech, begin = piece.clip.speech, piece.begin
+def _speech_event(piece: "Piece", begin: float) -> Event:
+    speech = piece.clip.speech
     edges = [round(float(edge) + begin, 6) for edge in speech.phones.edges]
     return Event({
         "type": "speech", "text": piece.text, "begin": round(begin, 6),

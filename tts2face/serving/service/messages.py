@@ -85,9 +85,17 @@ class Event:
     seconds: float = 0.0
 
 
-# A part of a result, or a wait. The messages of a part have its ``seconds`` of speech and either bytes as their
-# payload or an ``event``; the last message has ``seconds`` and ``cpu_s`` of the whole.
-Step = Chunk | Event | Wait
+@dataclass(frozen=True, slots=True)
+class Line:
+    """The same as JSON that is written already, which the server passes on as it is."""
+
+    content: bytes
+    seconds: float = 0.0
+
+
+# A part of a result, or a wait. The messages of a part have its ``seconds`` of speech and an ``event`` or bytes as
+# their payload, which are JSON if ``is_json``; the last message has ``seconds`` and ``cpu_s`` of the whole.
+Step = Chunk | Event | Line | Wait
 Task = Callable[["Session", Work, Inputs], Iterator[Step]]  # makes a result step by step
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from tts2face.processes.child import Call, StoppedError
-from tts2face.serving.service.messages import CANCEL, Event, Step, Wait
+from tts2face.serving.service.messages import CANCEL, Event, Line, Step, Wait
 from tts2face.types import Chunk
 
 Result = TypeVar("Result")
@@ -213,9 +213,11 @@ def _notify(call: Call) -> None:
         call.changed.notify_all()
 
 
-def _send(task: _Task, step: Chunk | Event) -> None:
+def _send(task: _Task, step: Chunk | Event | Line) -> None:
     if isinstance(step, Event):
         task.call.event({"seconds": step.seconds, "event": step.content})
+    elif isinstance(step, Line):
+        task.call.event({"seconds": step.seconds, "is_json": True}, step.content)
     elif step.content:
         task.call.event({"seconds": step.seconds}, step.content)
 

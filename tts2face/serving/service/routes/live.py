@@ -190,7 +190,9 @@ async def _send(connection: WebSocket, results: AsyncIterator[Message], receiver
         async with aclosing(results) as messages:  # type: ignore[type-var]
             async for message in messages:
                 event = message.content.get("event")
-                if event is None:
+                if message.content.get("is_json"):
+                    await connection.send_text(message.payload.decode())
+                elif event is None:
                     await connection.send_bytes(message.payload)
                 elif not receiver.is_note(event):
                     await connection.send_json(event)
