@@ -260,6 +260,7 @@ class LiveSpeech:
         self._request, self._models = request, models
         self._layer = models.gesture_layer(prepare(idle_request(request, UNUSED_IDLE_S)))
         self._n_frames, self._is_speaking, self._has_listened = 0, False, False
+        self._rate = exact_rate(request.fps)
         self._cues: list[float] = []  # seconds of the clip at which the face responds
 
     @property
@@ -274,7 +275,7 @@ class LiveSpeech:
 
     def seconds_of(self, n_frames: int) -> float:
         """Duration of a number of frames."""
-        return float(n_frames / exact_rate(self._request.fps))
+        return float(n_frames / self._rate)
 
     def say(self, text: str) -> Iterator[Piece]:
         """Append the sentences of a text; errors as `Session.stream`."""

@@ -9,7 +9,7 @@ import asyncio
 import io
 import json
 import threading
-from collections.abc import AsyncIterator, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -24,7 +24,7 @@ from tts2face.processes.parent import raised
 from tts2face.processes.program import Program
 from tts2face.serving.service import decoders
 from tts2face.serving.service.messages import SYNTHESISE, Work
-from tts2face.serving.service.pool import InputQueue, WarmProcess, work_call
+from tts2face.serving.service.pool import InputQueue, WarmProcess
 from tts2face.serving.service.preparation import Preparation
 from tts2face.serving.service.server import Mount, create_app
 from tts2face.serving.service.settings import ServiceSettings
@@ -53,12 +53,14 @@ class LocalProcess(WarmProcess):
     async def run(self) -> None:
         """Nothing is to be started."""
 
-    async def stream(self, work: Work, priority: int, inputs: InputQueue | None = None) -> AsyncIterator[Message]:
-        """Messages of a work as they are made."""
+    async def stream(
+        self, call: Mapping[str, Any], inputs: InputQueue | None, on_paused: Callable[[bool], None]
+    ) -> AsyncIterator[Message]:
+        """Messages of a work as they are made; it is never paused."""
         answers = Answers(asyncio.get_running_loop())
-        call = Call(Message(SYNTHESISE, work_call(work, priority)), answers, self._changed)
-        asked = asyncio.create_task(asyncio.to_thread(answer, call, self._handlers))
-        given = asyncio.create_task(_pass_on(call, inputs)) if inputs is not None else None
+        order = Call(Message(SYNTHESISE, call), answers, self._changed)
+        asked = asyncio.create_task(asyncio.to_thread(answer, order, self._handlers))
+        given = asyncio.create_task(_pass_on(order, inputs)) if inputs is not None else None
         try:
             while (message := await answers.queue.get()).kind == EVENT:
                 yield message
@@ -68,7 +70,7 @@ class LocalProcess(WarmProcess):
         finally:
             if given is not None:
                 given.cancel()
-            call.control(Message(STOP, {}))
+            order.control(Message(STOP, {}))
             await asyncio.shield(asked)
 
 

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from tts2face.session.speech_stream import Piece
 
 
-IDLE_S = 0.3  # of idle motion at a time, so that speech can begin soon
+IDLE_S = 0.4  # of idle motion at a time, so that speech can begin soon
 LISTEN_S = 0.2  # likewise of a listener's
-AHEAD_S = 0.2  # by which idle motion is ahead of the clock at least
+AHEAD_S = 0.1  # by which idle motion is ahead of the clock at least
 LEAST_WAIT_S = 1e-3  # a shorter wait is none: of a clock that counts otherwise than the frames
 GROWING_S = 0.02  # after which is looked again whether another stream has made more of the idle motion
 

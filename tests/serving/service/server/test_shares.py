@@ -3,7 +3,7 @@
 import asyncio
 import json
 from collections.abc import Iterator
-from contextlib import ExitStack, closing, suppress
+from contextlib import AsyncExitStack, ExitStack, closing, suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,10 @@ import websockets
 from tests.running import HostService, RunningService, eventually
 from tests.serving.service.raw import connect, request
 from tts2face.serving.service.keys import add_key
-from tts2face.serving.service.places import MOVIE_COST, PLACES
+from tts2face.serving.service.places import LINES_COST, LIVE_COST, PLACES
 
 N_PLACES = 64  # as by default: the services of a run of the tests share one pool
-N_ASKED, N_RUNNING = 80, PLACES[MOVIE_COST]  # movies
+N_ASKED = 80  # movies
 LONG = "We were away a year ago, but Bob may move five big maps. " * 100
 PERSON = {"text": "Yes.", "size": "64x64", "format": "mp4"}
 Keys = dict[str, str]
@@ -91,31 +91,48 @@ def test_every_sentence_of_a_live_stream_is_a_request(running: RunningService, k
     assert "'Yes.' and what follows it in the message is not spoken: the key six has used its 6 requests" in refused[0]
 
 
-def test_a_key_cannot_take_all_places_to_wait(running: RunningService, keys: tuple[Path, Keys]) -> None:
+def test_a_key_cannot_take_all_places(running: RunningService, keys: tuple[Path, Keys]) -> None:
+    """While its movies have all places to run and to wait, another key has movies and speech at once."""
     greedy, modest = keys[1]["greedy"], keys[1]["modest"]
     body = json.dumps({"text": LONG}).encode()
     asked = request("POST", "/v1/clips", body, f"Authorization: Bearer {greedy}")
     headers = {"authorization": f"Bearer {modest}"}
 
-    async def ask(connections: ExitStack) -> list[int]:
-        async with httpx.AsyncClient(timeout=120, headers=headers) as client:
+    async def ask() -> list[int]:
+        async with httpx.AsyncClient(timeout=120, headers=headers) as client, asyncio.timeout(120):
             sent = [client.post(f"{running.url}/v1/clips", json=PERSON) for _ in range(2)]
-            asking = [asyncio.create_task(one) for one in sent]
-            n_refused = N_ASKED - N_RUNNING - N_PLACES
-            await asyncio.to_thread(eventually, lambda: refused_of(running, "greedy") == n_refused + 2)
-            connections.close()
-            return [(await one).status_code for one in asking]
+            answers = await asyncio.gather(*sent, client.post(f"{running.url}/v1/synthesize", json={"input": "Yes."}))
+        return [answer.status_code for answer in answers]
 
     with ExitStack() as connections:
         for _ in range(N_ASKED):
             connections.enter_context(closing(connect(running.url))).sendall(asked)
         eventually(lambda: measure(running, "tts2face_waiting", modest) == N_PLACES)
-        assert asyncio.run(ask(connections)) == [200, 200]
+        assert asyncio.run(ask()) == [200, 200, 200]
+        assert measure(running, "tts2face_waiting", modest) > 0  # of the other key
 
 
-def refused_of(service: RunningService, key: str) -> int:
-    lines = [one for one in service.events() if one["event"] == "request" and one["key"] == key]
-    return sum(one["status"] == 429 for one in lines)
+def test_silent_streams_hold_no_places(running: RunningService, keys: tuple[Path, Keys]) -> None:
+    """More than a process has places for lines: another one of them, and curves of another key, begin at once."""
+    greedy, modest = keys[1]["greedy"], keys[1]["modest"]
+    n_silent = 2 * PLACES[LINES_COST] + 1
+
+    async def ask() -> tuple[str, int]:
+        async with AsyncExitStack() as stack:
+            for _ in range(n_silent):
+                silent = await stack.enter_async_context(socket(running, "/v1/stream", greedy))
+                await silent.send(json.dumps({"type": "start", "with_idle": False}))
+            await asyncio.to_thread(
+                eventually, lambda: measure(running, "tts2face_load", modest) == pytest.approx(n_silent * LIVE_COST)
+            )
+            await silent.send(json.dumps({"type": "text", "text": "Yes."}))
+            await silent.send(json.dumps({"type": "flush"}))
+            spoken = json.loads(await asyncio.wait_for(silent.recv(), 60))
+            async with httpx.AsyncClient(timeout=60, headers={"authorization": f"Bearer {modest}"}) as client:
+                curves = await client.post(f"{running.url}/v1/clips", json={"text": "Yes.", "format": "curves"})
+        return spoken["type"], curves.status_code
+
+    assert asyncio.run(ask()) == ("speech", 200)
 
 
 def test_large_texts_of_live_streams_are_refused(running: RunningService, keys: tuple[Path, Keys]) -> None:
