@@ -276,7 +276,7 @@ class Pool:
                 place = await self._take(cost, key, work.affinity)
             is_begun = False
             call = work_call(work, priority, key)
-            messages = place.process.stream(call, inputs, lambda is_paused, of=place: self._pause(of, is_paused))  # type: ignore[misc]
+            messages = place.process.stream(call, inputs, lambda is_paused, of=place: self._pause(of, is_paused))
             try:
                 with stage("synthesis"):
                     async for message in messages:
@@ -288,7 +288,7 @@ class Pool:
                 if is_begun or tries >= MAX_TRIES:
                     raise
             finally:
-                await messages.aclose()  # type: ignore[attr-defined]
+                await messages.aclose()
                 self._release(place)
 
     async def _take(self, cost: float, key: str, affinity: str) -> Place:

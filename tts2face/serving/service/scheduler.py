@@ -68,8 +68,9 @@ class _Task:
 
     def charge(self, seconds: float) -> None:
         """Note what has been computed for it."""
-        self.cpu_s += seconds
-        self.share.used += seconds
+        with self.call.changed:  # tasks of one share are charged by several threads
+            self.cpu_s += seconds
+            self.share.used += seconds
 
     def add(self, seconds: float, now: float) -> None:
         """Note that the result has become longer."""
@@ -201,8 +202,8 @@ class Turns:
     def _release(self, task: _Task) -> None:
         """End the turn of a task, if it has one."""
         if self._holder is task:
+            task.charge(self._clock() - self._taken_at)
             with task.call.changed:
-                task.charge(self._clock() - self._taken_at)
                 self._holder = None
                 if (first := self._first()) is not None:
                     _notify(first.call)
