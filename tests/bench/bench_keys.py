@@ -13,6 +13,7 @@ import asyncio
 import json
 import os
 import random
+import socket
 import tempfile
 import time
 from collections import Counter, defaultdict
@@ -57,7 +58,7 @@ class Load:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """An attack: the load without and with it, processor time a second, and the most memory in MB."""
+    """An attack: the load without and with it, processor time a second, the most memory, what the attacker got."""
 
     attack: str
     without: Load
@@ -65,6 +66,7 @@ class Finding:
     cpu: float
     server_mb: float
     processes_mb: float
+    statuses: Counter[str]
 
     def ratio(self, kind: str) -> float:
         """How many times longer the 95th percentile of a kind is with the attack."""
@@ -79,11 +81,12 @@ class Keys:
         self.keys = {kind: add_key(path, kind, ["speak"], concurrent=100) for kind in ("mp3", "curves", "mp4")}
         self.keys["live"] = self.keys["mp3"]
         attacker = add_key(path, "attacker", ["speak", "build"], concurrent=1000)
-        environment = {"TTS2FACE_SERVE_WEBHOOK_HOSTS": "127.0.0.1", "TTS2FACE_SERVE_WEBHOOK_SECRET": "a secret word",
-                       "TTS2FACE_SERVE_STUDIO": "false"}  # fmt: skip
+        port = free_port()
+        given = {"WEBHOOK_HOSTS": f"127.0.0.1:{port}", "WEBHOOK_SECRET": "a-secret-of-a-bench", "STUDIO": "false"}
+        environment = {f"TTS2FACE_SERVE_{name}": value for name, value in given.items()}
         self.server = ServeProcess("--keys", str(path), processes=processes, environment=environment)
         self.server.wait_until_ready()
-        self.target = Target(self.server.url, attacker)
+        self.target = Target(self.server.url, attacker, port)
         self._most = [0.0, 0.0]
 
     async def load(self, seconds: float) -> Load:
@@ -149,6 +152,7 @@ class Keys:
         """Measure the load without an attack, and then with it."""
         without = await self.load(seconds / 3)
         self._most = [0.0, 0.0]
+        self.target.statuses.clear()
         watching = asyncio.create_task(self.watch())
         attacking = asyncio.create_task(ATTACKS[attack](self.target))
         try:
@@ -160,11 +164,17 @@ class Keys:
             for task in (attacking, watching):
                 task.cancel()
             await asyncio.gather(attacking, watching, return_exceptions=True)
-        return Finding(attack, without, under, cpu, *self._most)
+        return Finding(attack, without, under, cpu, *self._most, self.target.statuses.copy())
 
 
 class _RefusedError(Exception):
     """The service has refused a request."""
+
+
+def free_port() -> int:
+    """A port that nobody listens on."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])
 
 
 def family(pid: int) -> list[int]:
@@ -219,7 +229,8 @@ def show(found: Finding) -> None:
         print(f"| {found.attack} | {kind} | {' | '.join(cells)} | {found.ratio(kind):.2f} | {n_refused} |")
     print(
         f"{found.attack}: {found.cpu:.2f} cores, server {found.server_mb:.0f} MB, processes {found.processes_mb:.0f} "
-        f"MB, load of the machine {os.getloadavg()[0]:.1f} {dict(found.under.refused) or ''}",
+        f"MB, load of the machine {os.getloadavg()[0]:.1f}; attacker: {dict(found.statuses)}; "
+        f"refused: {dict(found.under.refused)}",
         flush=True,
     )
 

@@ -6,9 +6,10 @@ Each goes on until it is cancelled; what ends or is refused is begun again.
 import asyncio
 import io
 import json
-from collections.abc import Awaitable, Callable, Mapping
+from collections import Counter
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
@@ -18,17 +19,32 @@ import websockets
 LONG = "We were away a year ago, but Bob may move five big maps. " * 1600  # 90,000 characters
 PAUSES = "a<break time='10s'/>" * 4200  # 84 KB
 AGAIN_S = 0.2
-DRIP_S = 1.0
+DRIP_S, UNREAD_S = 1.0, 100.0  # less than `stall_s`
 SIDE_PX = 6300
 Client = httpx.AsyncClient
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Address of a service, and the attacker's key."""
+    """Address of a service, the attacker's key and port for webhooks, and how often it got which status or error."""
 
     url: str
     key: str
+    port: int
+    statuses: Counter[str] = field(default_factory=Counter)
+
+    async def repeat(self, number: int, one: Callable[[], Awaitable[object]]) -> None:
+        """So many at the same time, each again when it has ended with a status or an error."""
+
+        async def again() -> None:
+            while True:
+                try:
+                    self.statuses[str(await one())] += 1
+                except (httpx.HTTPError, OSError, websockets.WebSocketException) as error:
+                    self.statuses[type(error).__name__] += 1
+                await asyncio.sleep(AGAIN_S)
+
+        await asyncio.gather(*(again() for _ in range(number)))
 
     def client(self) -> Client:
         """A client with the key and any number of connections."""
@@ -43,27 +59,16 @@ def socket_of(url: str, key: str) -> Any:
     return websockets.connect(address, max_size=None, additional_headers={"authorization": f"Bearer {key}"})
 
 
-async def _repeat(number: int, one: Callable[[], Awaitable[object]]) -> None:
-    """So many at the same time, each again when it has ended."""
-
-    async def again() -> None:
-        while True:
-            with suppress(httpx.HTTPError, OSError, websockets.WebSocketException):
-                await one()
-            await asyncio.sleep(AGAIN_S)
-
-    await asyncio.gather(*(again() for _ in range(number)))
-
-
 async def _clips(target: Target, number: int, **options: Any) -> None:
     async with target.client() as client:
 
-        async def one() -> None:
+        async def one() -> int:
             async with client.stream("POST", "/v1/clips", json=options) as answer:
                 async for _ in answer.aiter_raw():
                     pass
+            return answer.status_code
 
-        await _repeat(number, one)
+        await target.repeat(number, one)
 
 
 async def _streams(target: Target, number: int, *, with_idle: bool) -> None:
@@ -73,7 +78,7 @@ async def _streams(target: Target, number: int, *, with_idle: bool) -> None:
             async for _ in connection:
                 pass
 
-    await _repeat(number, one)
+    await target.repeat(number, one)
 
 
 async def silent(target: Target) -> None:
@@ -100,11 +105,12 @@ async def unread(target: Target) -> None:
     """Long texts whose answers nobody reads."""
     async with target.client() as client:
 
-        async def one() -> None:
-            async with client.stream("POST", "/v1/clips", json={"text": LONG, "format": "wav"}):
-                await asyncio.sleep(3600)
+        async def one() -> int:
+            async with client.stream("POST", "/v1/clips", json={"text": LONG, "format": "wav"}) as answer:
+                await asyncio.sleep(UNREAD_S)
+            return answer.status_code
 
-        await _repeat(40, one)
+        await target.repeat(40, one)
 
 
 @cache
@@ -121,11 +127,11 @@ async def pictures(target: Target) -> None:
     content = _large_picture()
     async with target.client() as client:
 
-        async def one() -> None:
+        async def one() -> int:
             files = {"request": (None, json.dumps({"text": "Yes.", "size": "64x64"})), "background": ("a.png", content)}
-            await client.post("/v1/clips", files=files)
+            return (await client.post("/v1/clips", files=files)).status_code
 
-        await _repeat(20, one)
+        await target.repeat(20, one)
 
 
 async def pauses(target: Target) -> None:
@@ -135,35 +141,46 @@ async def pauses(target: Target) -> None:
 
 async def uploads(target: Target) -> None:
     """Recordings of a talker that arrive slowly."""
-    head = b'--x\r\nContent-Disposition: form-data; name="name"\r\n\r\nabc\r\n'
 
-    async def drip() -> Any:
+    async def drip() -> AsyncIterator[bytes]:
+        yield b'--x\r\nContent-Disposition: form-data; name="recordings"; filename="a.mp4"\r\n\r\n'
         while True:
-            yield head
             await asyncio.sleep(DRIP_S)
+            yield b"a"
 
     async with target.client() as client:
         kind = {"content-type": "multipart/form-data; boundary=x", "content-length": str(10**8)}
-        await _repeat(4, lambda: client.post("/v1/talkers/build", content=drip(), headers=kind))
+
+        async def one() -> int:
+            return (await client.post("/v1/talkers/build", content=drip(), headers=kind)).status_code
+
+        await target.repeat(4, one)
 
 
 async def webhooks(target: Target) -> None:
     """Jobs whose webhook is answered a byte at a time."""
 
     async def answer(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        with suppress(OSError):
+        with suppress(OSError, asyncio.CancelledError):  # the second when the attack ends
             writer.write(b"HTTP/1.1 200 OK\r\n")
             while True:
                 writer.write(b"a")
                 await writer.drain()
                 await asyncio.sleep(DRIP_S)
 
-    server = await asyncio.start_server(answer, "127.0.0.1", 0)
-    address = f"http://127.0.0.1:{server.sockets[0].getsockname()[1]}/"
-    order = {"kind": "clip", "request": {"text": "Yes.", "format": "mp3"}, "webhook": address}
+    server = await asyncio.start_server(answer, "127.0.0.1", target.port)
+    order = {
+        "kind": "clip",
+        "request": {"text": "Yes.", "format": "mp3"},
+        "webhook": f"http://127.0.0.1:{target.port}/",
+    }
     try:
         async with target.client() as client:
-            await _repeat(4, lambda: client.post("/v1/jobs", json=order))
+
+            async def one() -> int:
+                return (await client.post("/v1/jobs", json=order)).status_code
+
+            await target.repeat(4, one)
     finally:
         server.close()
 
