@@ -10,7 +10,7 @@ from lexicon.errors import DataError, InputError
 from tests.serving.batch.conftest import SRT, Planner
 from tts2face.picture.options import Picture
 from tts2face.request import Request
-from tts2face.serving.batch import plan as plan_module
+from tts2face.serving.batch import file_plan
 from tts2face.serving.batch.cast import read_cast
 from tts2face.serving.batch.options import BatchOptions
 from tts2face.serving.batch.plan import plan_batch
@@ -168,7 +168,7 @@ def test_a_cue_that_is_refused_is_a_warning_with_its_line(plan_of: Planner, monk
         if "Bob" in request.text:
             raise InputError("no")
 
-    monkeypatch.setattr(plan_module, "prepare", refuse)
+    monkeypatch.setattr(file_plan, "prepare", refuse)
     plan = plan_of(SRT)
     assert [(one.line, one.message[:15]) for one in plan.warnings] == [(10, "cue 3 is silent")]
     assert (len(plan.outputs), plan.n_silent) == (2, 1)

@@ -383,10 +383,10 @@ def test_the_command_plans_makes_and_reports(
     assert run([*words, "--jobs", "0"]) == 2
     assert run(["batch", "--out", "clips"]) == 2
     assert "there are no subtitles" in capsys.readouterr().err
-    Path("two.srt").write_text("1\n00:00:00,500 --> 00:00:02,000\n你好\n", encoding="utf-8")
+    Path("two.srt").write_text("1\n00:00:00,500 --> 00:00:02,000\n♪\n", encoding="utf-8")
     assert run(["batch", "two.srt", "--out", "two"]) == 2
     printed = capsys.readouterr().err
-    assert "two.srt, line 2: cue 1 is silent" in printed
+    assert "two.srt, line 1: no cue has words that are spoken" in printed
     assert "no cue can be spoken, so there is nothing to make" in printed
     assert run(["batch", "one.srt", "--out", "s3://bucket/clips"]) == 2
     assert "--out must be a folder of this machine" in capsys.readouterr().err
