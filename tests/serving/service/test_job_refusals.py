@@ -124,6 +124,11 @@ def cues(number: int, at: int = 0) -> bytes:
         (role(dictionary="/etc/passwd"), [("subtitles", cues(1))], 400, "no dictionary"),
         (role(shell="rm"), [("subtitles", cues(1))], 422, "no setting 'shell'"),
         ({"background": "transparent"}, [("subtitles", cues(1))], 400, "no transparency"),
+        ({}, [("subtitles", cues(1)), ("lines", b"rate\n1.2\n")], 422, "lines: there is no column cue"),
+        ({}, [("subtitles", cues(1)), ("lines", b"cue,rate\n1,fast\n")], 422, "lines, line 2: 'fast' is not a number"),
+        ({}, [("subtitles", cues(1)), ("lines", b"\xff\xfe\xfd")], 422, "lines"),
+        ({}, [("subtitles", cues(1)), ("lines", b"cue,voice\n1,/etc/x.onnx\n")], 400, "no voice"),
+        ({"min_rate": 0.2}, [("subtitles", cues(1))], 422, "min_rate"),
     ],
 )  # fmt: skip
 def test_wrong_subtitle_jobs_are_refused(

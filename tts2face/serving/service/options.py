@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field
 from starlette.datastructures import UploadFile
 
-from lexicon.errors import InputError
+from lexicon.errors import DataError, InputError
 from lexicon.inputs import check_limits, parse_toml
 from tts2face.interchange.subtitles.reader import SUFFIXES
 from tts2face.picture.options import AUTO_SIZE, Picture, parse_size
 from tts2face.request import Request
 from tts2face.serving.batch.cast import MODEL_NAMES, cast_from_tables
+from tts2face.serving.batch.lines import read_lines
 from tts2face.serving.batch.options import BatchOptions
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
@@ -30,7 +31,7 @@ from tts2face.serving.service.library import check_background, check_voice, reso
 from tts2face.serving.service.orders import TALKER_KIND, JobKind, JobOrder
 from tts2face.serving.service.request_fields import MODEL_FIELDS, PICTURE_FIELDS, options_model
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.work.kinds import BACKGROUND, FILES
+from tts2face.serving.work.kinds import BACKGROUND, FILES, LINES
 from tts2face.serving.work.resource_check import TALKER
 from tts2face.session.encoded_stream import media_types
 
@@ -116,6 +117,10 @@ class SubtitlesRequest(SubtitleFields):
         Literal["extend", "cut-pauses", "report"], Field(description="For speech that is longer than its cue.")
     ] = "extend"
     max_rate: Annotated[float, Field(ge=1, le=2, description="Largest rate by which speech is fitted.")] = 1.4
+    min_rate: Annotated[float, Field(ge=0.5, le=1, description="Smallest rate to which short speech is slowed.")] = 1.0
+    max_overlap: Annotated[
+        float, Field(ge=0, le=2, description="Seconds by which last words may sound on into the next cue.")
+    ] = 0.3
     scene_gap: Annotated[float, Field(gt=0, le=3600, description="Seconds without a cue that divide scenes.")] = 4.0
     format: Annotated[Literal["mp4", "webm", "mov", "none"], Field(description="Videos; none: only exports.")] = "mp4"
     exports: Annotated[
@@ -151,6 +156,12 @@ async def add_clip_file(order: JobOrder, part: str, file: UploadFile, number: in
     folder = order.upload.folder
     made = await folder.sound(part, file) if FILES[part].endswith(".wav") else await folder.text(part, file, ".json")
     order.upload.files[FILES[part]] = made
+
+
+async def add_lines(order: JobOrder, part: str, file: UploadFile, number: int) -> None:
+    """Note the table of lines, which is checked when the subtitles are known."""
+    _refuse_second(part, number)
+    order.upload.files[LINES] = await order.upload.folder.text(part, file, ".csv")
 
 
 async def add_subtitles(order: JobOrder, part: str, file: UploadFile, number: int) -> None:
@@ -215,6 +226,8 @@ async def prepare_subtitles(order: JobOrder) -> dict[str, Any]:
             f"there are {n_tracks} recordings of {len(subtitles)} subtitle files; send one of each",
         )
     BatchOptions(**options)
+    if LINES in order.upload.files:
+        _check_lines(order.upload.files[LINES], [Path(name).stem for name in subtitles])
     fields = await divide_options(order.state, order.key, given)
     Request(**fields.request)
     picture = Picture(**fields.picture)
@@ -230,6 +243,16 @@ async def prepare_subtitles(order: JobOrder) -> dict[str, Any]:
         "has_audio": n_tracks > 0,
         "cast": {"default": resolved[0], "role": resolved[1:]},
     }
+
+
+def _check_lines(table: Path, names: Sequence[str]) -> None:
+    """Refuse a table of lines that cannot be used, and voices that are not known by name."""
+    try:
+        lines = read_lines(table, names)
+    except DataError as wrong:
+        raise RefusedError(422, "invalid_request", str(wrong).replace(str(table), "lines")) from wrong
+    for one in lines.settings.values():
+        check_voice(one.voice)
 
 
 def _cast_tables(cast: dict[str, Any] | str) -> dict[str, Any]:
@@ -273,6 +296,7 @@ JOB_KINDS: dict[str, JobKind] = {
             "subtitles": ("Subtitle files: SubRip, WebVTT, ASS, TTML; one or several.", add_subtitles),
             "audio": ("A recording of each subtitle file in place of a voice, in the same order.", add_track),
             "background": ("Picture behind the face.", add_background),
+            "lines": ("Table of rate, voice and offset of single lines, CSV.", add_lines),
         },
         prepare_subtitles,
     ),

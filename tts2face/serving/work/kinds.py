@@ -24,9 +24,11 @@ from tts2face.processes.parent import Child, ChildEndedError
 from tts2face.processes.program import ProcessLimits, Program
 from tts2face.request import Request
 from tts2face.serving.batch.cast import cast_from_tables
+from tts2face.serving.batch.lines import write_lines
 from tts2face.serving.batch.options import BatchOptions
 from tts2face.serving.batch.output import CSV_NAME, JSON_NAME, Plan
 from tts2face.serving.batch.plan import plan_batch
+from tts2face.serving.batch.report import line_rows, measure_plan
 from tts2face.serving.batch.run import run_batch
 from tts2face.serving.batch.segment import FILE_PREFIX, Segment, input_hashes
 from tts2face.serving.work.connection import DatabaseAwayError
@@ -39,6 +41,7 @@ from tts2face.session.named_models import Models
 # Fields of a request: names of the job's files.
 FILES = {"audio": "audio.wav", "partner": "partner.wav", "timeline": "timeline.json"}
 BACKGROUND = "background.png"
+LINES = "lines.csv"
 
 
 def run_clip(task: JobTask) -> Products:
@@ -94,6 +97,8 @@ def run_subtitles(task: JobTask) -> Products:
     )
     for name in (JSON_NAME, CSV_NAME):
         _remove_folders(out / name, task)
+    if LINES in task.inputs:
+        write_lines(out / LINES, line_rows(plan, measure_plan(plan, task.store)))
     failed = [f"{name}: {reason}" for name, reason in result.failed]
     if result.n_made == 0:
         raise DataError("; ".join(failed[:N_SHOWN]))
@@ -117,6 +122,7 @@ def plan_of(task: JobTask) -> Plan:
         picture=Picture(**picture),
         models=Models(**content["models"]),
         cast=cast_from_tables(content.get("cast", {}), "the cast"),
+        lines=task.inputs.get(LINES),
     )
 
 

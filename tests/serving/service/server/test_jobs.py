@@ -1,5 +1,6 @@
 """Jobs, their events and their results over HTTP, with a real server and its workers."""
 
+import csv
 import io
 import json
 import wave
@@ -107,6 +108,24 @@ def test_subtitles_become_clips_and_a_manifest(api: httpx.Client) -> None:
     movie = api.get(by_name["subtitles-001-0001.mp4"]["url"])
     assert movie.headers["content-type"] == "video/mp4"
     assert job["progress"]["done"] == job["progress"]["of"] == 6
+
+
+def test_a_table_of_lines_counts_and_comes_back(api: httpx.Client) -> None:
+    form = {"job": json.dumps({"kind": "subtitles", "request": {**SMALL, "min_rate": 0.9, "max_overlap": 0.1}})}
+    table = "cue;rate;spoken\n1;1,25;\n2;;no\n"
+    job = finished(api, api.post("/v1/jobs", data=form, files=[("subtitles", SRT), ("lines", table.encode())]).json())
+    assert job["state"] == "done", job["error"]
+    by_name = {one["name"]: one["url"] for one in job["results"]}
+    rows = list(csv.DictReader(io.StringIO(api.get(by_name["lines.csv"]).content.decode("utf-8-sig"))))
+    assert [(one["file"], one["cue"], one["rate"], one["spoken"]) for one in rows] == [
+        ("subtitles-001", "1", "1.25", ""), ("subtitles-001", "2", "", "no"),
+    ]  # fmt: skip
+    assert float(rows[0]["used_rate"]) == 1.25
+    unknown = {"subtitles": SRT, "lines": b"cue,rate\n9,1.1\n"}
+    failed = finished(api, api.post("/v1/jobs", data=form, files=unknown).json())
+    assert failed["state"] == "failed"
+    assert "has no cue 9 with words" in failed["error"]
+    assert "/" not in failed["error"]
 
 
 def test_a_dubbing_track_replaces_the_voice(api: httpx.Client) -> None:
