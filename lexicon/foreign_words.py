@@ -120,7 +120,8 @@ def _divided(text: str, begin: int, end: int) -> Iterator[ForeignWords]:
     words = text[begin:end]
     script, spoken = script_name(_script_of(words)), guess_language(unicodedata.normalize("NFKC", words), "")
     if spoken == "ja" and has_kanji(words) and not _has_reader():
-        parts = [part.span() for part in _KANJI.finditer(words)]
+        begins = [part.start() for part in _KANJI.finditer(words)]
+        parts = list(zip(begins, [*begins[1:], len(words)], strict=True))
     elif spoken in languages() and not any(True for _ in foreign_runs(words, spoken)):
         yield ForeignWords(begin, end, spoken, script)
         return

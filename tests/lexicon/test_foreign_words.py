@@ -82,6 +82,7 @@ def test_japanese_without_its_reader_is_spoken_by_parts(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(foreign_words, "load_reader", missing)
     assert runs_of("Say 日本の.") == [("Say ", None), ("日本", "cmn"), ("の", "ja"), (".", None)]
+    assert runs_of("A 곢\u1accノ b") == [("A ", None), ("곢\u1acc", "ko"), ("ノ", "ja"), (" b", None)]
 
 
 def test_signs_that_stand_for_letters_are_these_letters() -> None:

@@ -41,6 +41,10 @@ class Turns:
             raise InterruptedSpeechError
         return found
 
+    def give(self) -> None:
+        """The end of a step."""
+        self.run(lambda: None, lambda: None)
+
     def restart(self, interrupt_at: int | None = None) -> None:
         self.seconds, self.interrupt_at = [], interrupt_at
 
@@ -52,7 +56,7 @@ def turns() -> Turns:
 
 @pytest.fixture(scope="module")
 def session(world: World, turns: Turns) -> tts2face.Session:
-    return world.session(voices=WorldVoices(run=turns.run))
+    return world.session(voices=WorldVoices(run=turns.run, yield_turn=turns.give))
 
 
 def continue_idly(live: LiveSpeech) -> Piece:
@@ -92,7 +96,7 @@ def test_an_interrupted_sentence_does_not_change_what_follows(
 
 def test_the_steps_of_a_long_sentence_are_short(turns: Turns) -> None:
     """A service reads `cancel` between them. The alignment, which it runs elsewhere, is not counted."""
-    live = tts2face.Session(face="head", voices=VoicePool(run=turns.run)).live()
+    live = tts2face.Session(face="head", voices=VoicePool(run=turns.run, yield_turn=turns.give)).live()
     list(live.say(LONG))  # compiles and loads
     shares = []
     for _ in range(3):  # other processes make single steps longer

@@ -255,7 +255,9 @@ def test_a_part_without_words_for_the_voice_is_left_out() -> None:
         spoken_of("⅙👗.", "th")
 
 
-@pytest.mark.parametrize("language", ["en-us", "de", "th", "cmn", "ja"])
+@pytest.mark.parametrize(
+    "language", ["en-us", "de", "th", "cmn", pytest.param("ja", marks=pytest.mark.needs("pyopenjtalk"))]
+)
 def test_random_texts_fail_before_their_second_sentence_or_not_at_all(language: str) -> None:
     rng = random.Random(5)
     pools = [range(0x20, 0x250), range(0x250, 0x2000), range(0x2000, 0x3400), range(0x4E00, 0x4F00)]
