@@ -26,9 +26,10 @@ _LOCK = threading.RLock()
 _LANGUAGE_SWITCH = re.compile(r"\([a-z0-9-]+\)")  # espeak-ng marks foreign words: (en)...(fr); their phones are kept
 
 # The output of espeak-ng in tone languages is partly not IPA: tones as digits and as ɜ (a "3"), retroflexes with a dot.
+# The vowel of English words among them is long: ɜː.
 _TONE_LANGUAGES = frozenset({"cmn", "hak", "yue", "vi", "th", "my", "shn"})
 _TONE_SPELLINGS = (
-    (re.compile(r"ɜ|[0-9]|-"), ""),
+    (re.compile(r"ɜ(?!ː)|[0-9]|-"), ""),
     (re.compile(r"ts\.?h"), "tsh"),
     (re.compile(r"ts\."), "ʈʂ"),
     (re.compile(r"s\."), "ʂ"),

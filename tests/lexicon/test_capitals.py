@@ -36,6 +36,7 @@ def phones(text: str) -> list[tuple[str, ...]]:
         ("JAN. 5 WAS COLD", "Jan. 5 was cold"),
         ("THE 10TH OF THE 1980S", "The 10th of the 1980s"),
         ("A BIG CAT SAT", "A big cat sat"),
+        ("PSST! HMM, TSK. BRR, MMM. GRR!", "Psst! Hmm, tsk. Brr, mmm. Grr!"),
         ("THE UN'S DVDS AND THE FBI'S MEN", "The UN's DVDs and the FBI's men"),
         ("BUT I'M HERE AND IT'S US", "But I'm here and it's us"),
         ("HIS BUS IS HERS", "His bus is hers"),

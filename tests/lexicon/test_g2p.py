@@ -143,3 +143,9 @@ def test_threads_get_their_own_answers() -> None:
     for thread in threads:
         thread.join()
     assert wrong == []
+
+
+@pytest.mark.parametrize(("text", "language"), [("你好 world", "cmn"), ("สวัสดี bird", "th"), ("xin girl", "vi")])
+def test_english_words_within_tone_languages_keep_their_vowel(text: str, language: str) -> None:
+    (words,) = phonemize([text], language)
+    assert "ɜ" in {segment.phone for segment in parse_espeak_word(words[-1], language)}
