@@ -67,6 +67,12 @@ def test_the_last_words_sound_on_before_the_rate_exceeds_its_limit() -> None:
     assert fit.overlap_s == pytest.approx(1.0 / 1.4 - 0.6)
 
 
+def test_speech_overlaps_only_where_the_next_cue_has_begun() -> None:
+    room = {"slot": 0.6, "overlap_s": 0.2}
+    assert fit_speech(TEN, limits(0.5, silence_s=0.2, **room), measure).overlap_s == 0.0
+    assert fit_speech(TEN, limits(0.5, silence_s=0.1, **room), measure).overlap_s == pytest.approx(1.0 / 1.4 - 0.7)
+
+
 def test_the_next_cue_raises_the_rate_beyond_the_limit() -> None:
     fit = fit_speech(TEN, limits(0.5, slot=0.6), measure)
     assert 1.4 < fit.rate <= 2.0

@@ -74,6 +74,18 @@ def test_scenes_files_and_films_fill_all_frames(plan_of: Planner) -> None:
     assert [one.address for one in film.segments] == [one.address for one in file.segments]
 
 
+def test_a_line_before_a_long_silence_may_use_all_of_it(plan_of: Planner) -> None:
+    text = "1\n00:00:20,000 --> 00:00:20,300\nThe word hello means hello to everybody in this large house.\n\n2\n"
+    slots = []
+    for begin in ("22,300", "22,400", "22,600", "23,100", "26,000", "40,000"):
+        plan = plan_of(f"{text}00:00:{begin} --> 00:00:41,000\nHe came home.\n", per="file")
+        segment = plan.lines[0].segment
+        slots.append(segment.slot_frames)
+        assert segment.silence_s == (0.3 if segment.slot_frames < 61 and begin > "26" else 0.0)
+    assert slots == sorted(slots)
+    assert slots[2] == 26  # up to the frame at which the lips of the next line open
+
+
 def test_a_film_continues_with_the_next_file(tmp_path: Path) -> None:
     for name in ("a.srt", "b.srt"):
         (tmp_path / name).write_text(SRT, encoding="utf-8")

@@ -2,6 +2,7 @@
 
 from fractions import Fraction
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,8 +18,23 @@ def frames(*cues: Cue) -> list[tuple[int, int, int]]:
     return [(one.begin, one.end, one.slot_end) for one in cue_windows(cues, Fraction(10))]
 
 
-def test_slots_reach_the_next_cue_or_one_second_beyond_the_last() -> None:
-    assert frames(cue(1, 2), cue(3, 4), cue(9, 10)) == [(10, 20, 30), (30, 40, 50), (90, 100, 110)]
+def test_slots_reach_the_next_cue_or_two_seconds_beyond_it_or_one_beyond_the_last() -> None:
+    assert frames(cue(1, 2), cue(3, 4), cue(9, 10)) == [(10, 20, 30), (30, 40, 60), (90, 100, 110)]
+
+
+@pytest.mark.parametrize("text", ["abc", "x" * 62, "2024 1999 1848", "你好" * 20])
+@pytest.mark.parametrize("rate", [1.0, 0.5])
+def test_a_longer_silence_gives_no_less_time(text: str, rate: float) -> None:
+    def slot(gap: float) -> int:
+        cues = [cue(20, 20.3, text), *([cue(20.3 + gap, 30 + gap)] if gap < 60 else [])]
+        return cue_windows(cues, Fraction(30), rate_of=lambda _cue, _part: rate)[0].slot_end
+
+    slots = [slot(n / 10) for n in range(1, 200)]
+    assert slots == sorted(slots)
+    needed = {"abc": 8, "x" * 62: 155}.get(text, 0) / rate  # frames at 12 characters a second
+    assert slot(3.0) >= min(609 + 90, 600 + needed)
+    if text != "abc":
+        assert slot(60.0) >= slot(2.0)
 
 
 def test_overlapping_cues_end_where_the_next_begins() -> None:

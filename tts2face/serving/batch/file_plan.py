@@ -22,7 +22,7 @@ from tts2face.serving.batch.output import Output, PlannedCue, PlannedLine, PlanW
 from tts2face.serving.batch.recordings import Recordings, find_recordings
 from tts2face.serving.batch.segment import ALPHA_MOVIE, MOVIE, Part, Segment, file_hash
 from tts2face.serving.batch.speakers import Speakers
-from tts2face.serving.batch.windows import MAX_TAIL_S, Window, cue_lines, cue_windows, scenes
+from tts2face.serving.batch.windows import Window, cue_lines, cue_windows, scenes
 from tts2face.session.named_models import Models
 from tts2face.session.prepared import prepare
 from tts2face.types import SOUND_RATE, exact_rate, first_sample
@@ -150,13 +150,17 @@ class FilePlan:
             self.speakers.tell_apart(list(group))
         margins = (MARGIN_S, MARGIN_S) if self.recordings.track else (self.base.request.lead or 0.0, 0.0)
         before, after = (round(margin * fps) for margin in margins)
-        windows = cue_windows(cues, fps, (before, after), is_spoken=self.speakers.is_spoken)
+        windows = cue_windows(cues, fps, (before, after), is_spoken=self.speakers.is_spoken, rate_of=self._rate_of)
         self._windows = {(window.cue.number, window.part): window for window in windows}
         self.n_silent = len(read.cues) - len({window.cue.number for window in windows})
         self._following = {(one.cue.number, one.part): later for one, later in pairwise(windows)}
         if self.base.options.audio is None:
             self._find_sentences(windows)
         return windows
+
+    def _rate_of(self, cue: Cue, part: int) -> float:
+        """Speaking rate of a line before it is fitted."""
+        return float(self.speakers.look(cue, part).request.get("rate", Request().rate))
 
     def _moved(self, cue: Cue) -> Cue:
         """A cue at its time of the table; several speakers of one move with the first of them."""
@@ -196,14 +200,13 @@ class FilePlan:
         return window.cue.speaker, look.other, look.models, repr(sorted(look.request.items()))
 
     def _speaks_on(self, window: Window, following: Window) -> bool:
-        """Whether one speaker has both lines, with no long silence between them."""
+        """Whether one speaker has both lines, the first of which may use the time up to the second."""
         before, after = (self.speakers.look(one.cue, one.part) for one in (window, following))
-        is_near = following.begin - window.end <= MAX_TAIL_S * float(exact_rate(self.base.request.fps))
         same = [
             (one.cue.speaker, look.other, look.models, look.request.get("voice"))
             for one, look in ((window, before), (following, after))
         ]
-        return is_near and same[0] == same[1]
+        return following.begin <= window.slot_end and same[0] == same[1]
 
     def _is_spoken_as_one(self, sentence: _Sentence) -> bool:
         """Whether a voice can speak the words of all cues together, of which each begins with a letter."""
@@ -295,11 +298,15 @@ class FilePlan:
         options, rate = self.base.options, self.speakers.settings(window.cue, window.part).rate
         windows = (window,) if sentence is None else sentence.windows
         following = self._following.get((windows[-1].cue.number, windows[-1].part))
+        overlap = 0.0 if is_last else options.max_overlap
+        n_silent = max((window.next_begin or window.slot_end) - window.slot_end, 0)
+        silence = float(n_silent / exact_rate(self.base.request.fps))
         segment = replace(
             segment,
             min_rate=options.min_rate,
-            max_overlap=0.0 if is_last else options.max_overlap,
-            is_shared=following is not None and self._speaks_on(window, following),
+            max_overlap=overlap,
+            silence_s=min(silence, overlap) if segment.fills_slot else 0.0,
+            is_shared=following is not None and self._speaks_on(windows[-1], following),
         )
         if rate is not None:
             segment = replace(segment, overflow=REPORT, min_rate=rate, max_rate=rate)

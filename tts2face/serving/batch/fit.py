@@ -29,13 +29,15 @@ class Room:
     window_s
         End of the cue.
     slot_s
-        Begin of the next one; None: no other follows.
+        End of its slot, `silence_s` before the next one; None: no other follows.
     overlap_s
-        By how much speech may sound on after the next cue has begun.
+        By how much speech may sound on after its slot.
     is_shared
         Whether the next cue is of the same speaker, who speaks faster rather than twice at once.
     release_s
         Silence before the next cue; none within a sentence.
+    silence_s
+        Silence between the slot and the next cue.
     """
 
     window_s: float
@@ -43,6 +45,7 @@ class Room:
     overlap_s: float = 0.0
     is_shared: bool = False
     release_s: float = RELEASE_S
+    silence_s: float = 0.0
 
     @property
     def easy_s(self) -> float:
@@ -53,13 +56,17 @@ class Room:
 
     @property
     def next_s(self) -> float:
-        """Begin of the next cue."""
+        """End of the slot."""
         return float("inf") if self.slot_s is None else max(self.slot_s, self.window_s)
 
     @property
     def last_s(self) -> float:
         """End of speech that sounds on as long as is allowed."""
         return self.next_s + self.overlap_s
+
+    def excess(self, end_s: float) -> tuple[float, float]:
+        """Seconds by which speech that ends at `end_s` ends after its cue, and after the next one has begun."""
+        return max(0.0, end_s - self.window_s), max(0.0, end_s - self.next_s - self.silence_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,8 +183,7 @@ class _Search:
     def result(self) -> Fit:
         """The fit that was found, of the part in question."""
         end, room = self._ends[self._limits.part], self._limits.rooms[self._limits.part]
-        late, overlap = max(0.0, end - room.window_s), max(0.0, end - room.next_s)
-        return Fit(self._text, round(self.rate, 6), end, late, overlap, self._n_steps)
+        return Fit(self._text, round(self.rate, 6), end, *room.excess(end), self._n_steps)
 
     def _speak(self, rate: float) -> None:
         self.rate, self._ends = rate, self._measure(self._text, rate)

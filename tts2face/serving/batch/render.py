@@ -166,7 +166,7 @@ def _span_after(segment: Segment, result: SegmentResult) -> tuple[float, float]:
     """Seconds of a segment from the end of its frames to that of its sound."""
     end = result.speech_s + (segment.lead_frames or 0) / result.fps + RELEASE_S
     frames_s = result.n_frames / result.fps
-    return frames_s, min(end, frames_s + result.overlap_s + RELEASE_S)
+    return frames_s, min(end, frames_s + segment.silence_s + result.overlap_s + RELEASE_S)
 
 
 def _add_overlap(
@@ -232,7 +232,7 @@ def fit_segment(session: Session, request: Request, segment: Segment) -> tuple[P
     prepared, kept, lost = speech.kept(fit)
     n_frames, warnings = _length(segment, kept, speech.fps)
     if lost:
-        warnings.append(f"{lost!r} is not spoken, as the next cue begins")
+        warnings.append(f"{lost!r} is not spoken, {_why(segment)}")
     elif kept.overlap_s > 0.0:
         warnings.append(f"the last {kept.overlap_s:.2f} s of the speech sound on after the next cue has begun")
     cut = max(0.0, fit.speech_s - kept.speech_s)
@@ -249,14 +249,15 @@ def _fit_recorded(session: Session, request: Request, segment: Segment) -> tuple
     fit = Fit(request.text, 1.0, spoken, max(0.0, spoken - window_s))
     n_frames, warnings = _length(segment, fit, fps)
     late = max(0.0, spoken - n_frames / fps)
-    overlap = min(late, segment.max_overlap)
-    if late > overlap:
-        warnings.append(f"the last {late - overlap:.2f} s of the speech are cut off by the next cue")
+    cut = max(0.0, late - segment.max_overlap)
+    overlap = max(0.0, late - cut - segment.silence_s)
+    if cut > 0.0:
+        warnings.append(f"the last {cut:.2f} s of the speech are cut off, {_why(segment)}")
     if overlap > 0.0:
         warnings.append(f"{overlap:.2f} s of the speech sound on after the next cue has begun")
     fit = replace(fit, overlap_s=overlap)
     warnings = [*heard, *reading_notes(request.text, request.language), *warnings]
-    return prepare(request), _result(segment, fit, (n_frames, fps), late - overlap, warnings)
+    return prepare(request), _result(segment, fit, (n_frames, fps), cut, warnings)
 
 
 def _result(
@@ -280,10 +281,15 @@ def _length(segment: Segment, fit: Fit, fps: float) -> tuple[int, list[str]]:
     if fit.overflow_s > (1.0 / fps if segment.overflow == REPORT else EASY_S):
         warnings.append(f"the speech is {fit.overflow_s:.2f} s longer than its cue at rate {fit.rate:.2f}")
     if fit.rate > max(segment.max_rate, float(segment.request.get("rate", 1.0))) + 1e-6:
-        warnings.append(f"the rate {fit.rate:.2f} exceeds {segment.max_rate:g}, as the next cue begins")
+        warnings.append(f"the rate {fit.rate:.2f} exceeds {segment.max_rate:g}, {_why(segment)}")
     if segment.fills_slot and segment.slot_frames is not None:
         return segment.slot_frames, warnings
     return max(segment.window_frames, frame_count(max(fit.speech_s, 1e-3), fps)), warnings
+
+
+def _why(segment: Segment) -> str:
+    """Why speech is cut or hurried."""
+    return "as its time ends" if segment.silence_s else "as the next cue begins"
 
 
 class SegmentSpeech:
@@ -307,6 +313,7 @@ class SegmentSpeech:
                 segment.max_overlap,
                 segment.is_shared or at < last,
                 RELEASE_S if at == last else 0.0,
+                segment.silence_s if at == segment.part else 0.0,
             )
             for at, part in enumerate(self._parts)
         )
@@ -332,7 +339,7 @@ class SegmentSpeech:
         if n_kept == len(words):
             return self._prepared(request, self._segment.part), fit, ""
         end = end_of(n_kept)
-        late, overlap = max(0.0, end - room.window_s), max(0.0, end - room.next_s)
+        late, overlap = room.excess(end)
         shorter = replace(fit, speech_s=end, overflow_s=late, overlap_s=overlap)
         return self._prepared(request, self._segment.part, words[:n_kept]), shorter, " ".join(words[n_kept:])
 

@@ -160,6 +160,8 @@ class Segment:
         As `BatchOptions`.
     is_shared
         Whether the next cue is of the same speaker.
+    silence_s
+        Seconds, up to `max_overlap`, between the end of its slot and the next cue.
     parts, part
         The cues of a sentence that is spoken as one, whose words are those of the request, and which of them this is;
         empty: the words are those of this cue.
@@ -191,6 +193,7 @@ class Segment:
     is_shared: bool = False
     parts: tuple[Part, ...] = ()
     part: int = 0
+    silence_s: float = 0.0
 
     @cached_property
     def address(self) -> str:
@@ -198,6 +201,8 @@ class Segment:
         content = {name: value for name, value in self.as_json().items() if name not in ("models", "audio_begin")}
         if self.medium == MOVIE:
             del content["medium"]
+        if not self.silence_s:
+            del content["silence_s"]
         content["request"] = {name: self.file_hashes.get(name, value) for name, value in self.request.items()}
         content["picture"] = {name: self.file_hashes.get(name, value) for name, value in self.picture.items()}
         content["identity"] = self.models.identity
@@ -224,6 +229,7 @@ class Segment:
             "is_shared": self.is_shared,
             "parts": [asdict(part) for part in self.parts],
             "part": self.part,
+            "silence_s": self.silence_s,
         }
 
     def as_track(self) -> "Segment":

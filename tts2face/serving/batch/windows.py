@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import groupby
 from pathlib import Path
+from unicodedata import east_asian_width
 
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.picture.options import Picture
@@ -15,10 +16,11 @@ from tts2face.serving.batch.output import Output, Plan, is_current, read_manifes
 from tts2face.serving.batch.segment import TRACK, Segment
 from tts2face.serving.batch.store import Store
 
-EXTENSION_S = 1.0  # after a cue that no other cue follows soon; speech may use it
-MAX_EXTENSION_S = 10.0  # after a cue with more words than time, which has a long silence after it
+EXTENSION_S = 1.0  # after the last cue, whose words are estimated to fit
+MAX_EXTENSION_S = 10.0  # after the last cue, if it has more words than time
 SLOW_CHARACTERS_PER_S = 12.0  # of slow speech, by which its time is estimated
-MAX_TAIL_S = 2.0  # longer silences are segments of their own, shared by equal silences
+FIGURE_CHARACTERS, WIDE_CHARACTERS = 6, 4  # that a figure (seven) and a syllable of Chinese are estimated as
+MAX_TAIL_S = 2.0  # of longer silences the rest is a segment of its own, shared by equal ones
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +53,14 @@ def cue_windows(
     margins: tuple[int, int] = (0, 0),
     *,
     is_spoken: Callable[[Cue, int], bool] = lambda _cue, _part: True,
+    rate_of: Callable[[Cue, int], float] = lambda _cue, _part: 1.0,
 ) -> tuple[Window, ...]:
     """Windows of cues in order of time; overlapping ones end where the next one begins.
 
     Cues that begin at the same frame, and speakers of one cue, divide their time by their letters. Windows are longer
     than their cues by `margins` frames before and after them, or by half of a gap that is shorter than two margins.
-    Lines, by their cue and part, that are not spoken have no window and take no time.
+    Lines, by their cue and part, that are not spoken have no window and take no time. Slots reach up to the next cue,
+    or as far into a long silence as the words may need at their speaking rate; a longer silence gives no less.
     """
     windows: list[Window] = []
     for begin, group in groupby(cues, key=lambda cue: round(Fraction(cue.begin_s) * fps)):
@@ -73,7 +77,7 @@ def cue_windows(
             until = max(until, at + 1)
             windows.append(Window(cue, at, until, until, part=part))
             at = until
-    return tuple(_with_slots(_with_margins(windows, *margins), fps))
+    return tuple(_with_slots(_with_margins(windows, *margins), fps, rate_of))
 
 
 def cue_lines(cue: Cue) -> list[tuple[Cue, int]]:
@@ -100,24 +104,31 @@ def _with_margins(windows: Sequence[Window], longest_before: int, longest_after:
     return longer
 
 
-def _with_slots(windows: Sequence[Window], fps: Fraction) -> list[Window]:
+def _with_slots(windows: Sequence[Window], fps: Fraction, rate_of: Callable[[Cue, int], float]) -> list[Window]:
     """Windows cut at the start of the next one, with their slots."""
     slots: list[Window] = []
-    extension, tail = round(EXTENSION_S * fps), round(MAX_TAIL_S * fps)
+    extension, tail, longest = (round(seconds * fps) for seconds in (EXTENSION_S, MAX_TAIL_S, MAX_EXTENSION_S))
     at = 0
     for number, window in enumerate(windows):
         begin = max(window.begin, at)
         following = windows[number + 1].begin if number + 1 < len(windows) else None
         end = max(window.end if following is None else min(window.end, following), begin + 1)
-        is_last = following is None or following - end > tail
-        slot_end = end + extension if is_last or following is None else max(following, end)
-        if is_last:
-            longest = end + round(MAX_EXTENSION_S * fps) if following is None else following - extension
-            needed = begin + round(len(window.cue.text) / SLOW_CHARACTERS_PER_S * fps)
-            slot_end = max(slot_end, min(needed, longest))
+        rate = rate_of(window.cue, window.part)
+        needed = begin + round(_n_spoken(window.cue.text) / SLOW_CHARACTERS_PER_S / rate * fps)
+        if following is None:
+            slot_end = min(max(end + (tail if needed > end else extension), needed), end + longest)
+        else:
+            slot_end = max(min(max(end + tail, needed), following), end)
         slots.append(replace(window, begin=begin, end=end, slot_end=slot_end, next_begin=following))
         at = end
     return slots
+
+
+def _n_spoken(text: str) -> int:
+    """Characters of English by which the time of a text is estimated: figures and East Asian ones take that of many."""
+    return sum(
+        FIGURE_CHARACTERS if one.isdigit() else WIDE_CHARACTERS if east_asian_width(one) in "WF" else 1 for one in text
+    )
 
 
 def scenes(windows: Sequence[Window], gap_frames: int) -> list[list[Window]]:
