@@ -16,6 +16,15 @@ from tts2face.serving.batch.cue_sentences import continues, spoken_part
         ("I was going...", "...to the market."),
         ("I was going…", "to the market."),
         ('"And then', 'we left."'),
+        ("I saw Mr.", "Smith in the office."),
+        ("I SAW MR.", "SMITH IN THE OFFICE."),
+        ("He is in the U.S.", "Army now."),
+        ("We leave at 5 p.m.", "Monday."),
+        ("It is in vol.", "3 of them."),
+        ("They had e.g.", "apples and pears."),
+        ("We saw the men", "...came to see me."),
+        ("We saw the men", "… came to see me."),
+        ("We went to the", "...Grand Hotel."),
     ],
 )
 def test_a_sentence_goes_on(text: str, following: str) -> None:
@@ -32,6 +41,13 @@ def test_a_sentence_goes_on(text: str, following: str) -> None:
         ('"We left."', "he said."),
         ("Wait -", "No!"),
         ("", "we left."),
+        ("It was the U.S.", "He left."),
+        ("IT WAS THE U.S.", "HE LEFT."),
+        ("We left at 5 p.m.", "Then we ate."),
+        ("Was it Mr.?", "Smith."),
+        ("We saw the men", "...Then they left."),
+        ("We saw the", "..."),
+        ("We left.", "...and that was all."),
     ],
 )
 def test_a_sentence_ends(text: str, following: str) -> None:
@@ -81,6 +97,18 @@ def test_other_speakers_and_other_writing_systems_divide_a_sentence(texts: tuple
     parts = [None if line.segment is None else line.segment.parts for line in plan.lines]
     assert parts == [()] * len(plan.lines)
     assert len(parts) >= len(texts)
+
+
+def test_an_abbreviation_of_the_language_of_the_file_ends_no_sentence(plan_of: Planner) -> None:
+    (first, second) = plan_of(srt("I saw Mr.", "Smith in the office.")).lines
+    assert first.segment.request["text"] == second.segment.request["text"] == "I saw Mr. Smith in the office."
+    assert continues("Er kommt am 3.", "Mai.", "de")
+    assert not continues("We had 3.", "May I go?", "en-us")
+
+
+def test_dots_in_front_of_a_cue_alone_join_it(plan_of: Planner) -> None:
+    (first, second) = plan_of(srt("We saw the men", "...came to see me.")).lines
+    assert first.segment.request["text"] == second.segment.request["text"] == "We saw the men came to see me."
 
 
 def test_a_silence_divides_a_sentence(plan_of: Planner) -> None:

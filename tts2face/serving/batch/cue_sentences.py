@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 
 from lexicon.dictionary import word_set
+from lexicon.sentence_ends import ends_sentence
 from lexicon.sentence_length import MAX_SENTENCE_CHARACTERS
 from tts2face.serving.batch.windows import Window
 
@@ -19,31 +20,39 @@ _OPEN_WORDS = word_set(
 _LAST_WORD = re.compile(r"[^\W\d_]+(?:['’][^\W\d_]+)*$")
 
 
-def continues(text: str, following: str, *, is_in_capitals: bool = False) -> bool:
+def continues(text: str, following: str, language: str = "en-us", *, is_in_capitals: bool = False) -> bool:
     """Whether a sentence goes on in the next cue.
 
     It has no end mark, and a comma at its end, a small letter after it, or a last word that ends no sentence
-    (*of*, *the*); or dots at its end and a small letter after it.
+    (*of*, *the*); or dots at its end and a small letter after it; or the full stop of an abbreviation (*Mr.*), which
+    the rules of the language do not take for an end. Dots in front of the next cue do not count.
 
     Parameters
     ----------
     is_in_capitals
         Whether the file has no small letters; then a missing end mark decides.
     """
-    end, begin = text.rstrip().rstrip(_CLOSING), following.lstrip("\"'“‘«([")
-    if _DOTS.search(end):
-        return _LEADING_DOTS.sub("", begin)[:1].islower()
-    if not end or ends_sentence(end) or _LEADING_DOTS.match(begin):
+    end, begin = _end(text), _LEADING_DOTS.sub("", following.lstrip("\"'“‘«(["))
+    if not end or not begin:
         return False
+    if _DOTS.search(end):
+        return begin[:1].islower()
+    if has_end_mark(end):
+        after = begin.capitalize() if begin.isupper() else begin
+        return end[-1] == "." and not ends_sentence(end[:-1], after, language)
     if is_in_capitals or end[-1] in ",、，" or begin[:1].islower():
         return True
     word = _LAST_WORD.search(end)
     return word is not None and word.group().lower() in _OPEN_WORDS
 
 
-def ends_sentence(text: str) -> bool:
-    """Whether a cue ends with the mark of a sentence's end."""
-    return _ENDS.search(text.rstrip().rstrip(_CLOSING)) is not None
+def has_end_mark(text: str) -> bool:
+    """Whether a cue ends with a mark of sentences' ends, if only with the full stop of an abbreviation."""
+    return _ENDS.search(_end(text)) is not None
+
+
+def _end(text: str) -> str:
+    return text.rstrip().rstrip(_CLOSING)
 
 
 def spoken_part(text: str, *, is_first: bool, is_last: bool) -> str:
@@ -53,7 +62,12 @@ def spoken_part(text: str, *, is_first: bool, is_last: bool) -> str:
 
 
 def sentence_groups(
-    windows: Sequence[Window], keys: Sequence[object], max_gap: int, *, is_in_capitals: bool = False
+    windows: Sequence[Window],
+    keys: Sequence[object],
+    max_gap: int,
+    languages: Sequence[str],
+    *,
+    is_in_capitals: bool = False,
 ) -> list[list[int]]:
     """Indices of the windows of each sentence, in order.
 
@@ -63,6 +77,8 @@ def sentence_groups(
         For each window what must be equal for its words to be spoken as one with the next ones; None: nothing is.
     max_gap
         Frames between two cues of a sentence.
+    languages
+        Language of each window, whose abbreviations count.
     """
     groups: list[list[int]] = []
     for at, window in enumerate(windows):
@@ -71,11 +87,8 @@ def sentence_groups(
             n_characters = sum(len(windows[one].cue.text) + 1 for one in groups[-1])
             is_one = keys[at] is not None and keys[at] == keys[before] and window.begin - windows[before].end <= max_gap
             is_short = n_characters + len(window.cue.text) <= MAX_SENTENCE_CHARACTERS
-            if (
-                is_one
-                and is_short
-                and continues(windows[before].cue.text, window.cue.text, is_in_capitals=is_in_capitals)
-            ):
+            texts = windows[before].cue.text, window.cue.text
+            if is_one and is_short and continues(*texts, languages[at], is_in_capitals=is_in_capitals):
                 groups[-1].append(at)
                 continue
         groups.append([at])

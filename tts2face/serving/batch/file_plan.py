@@ -14,7 +14,7 @@ from tts2face.interchange.subtitles.cues import Cue
 from tts2face.interchange.subtitles.reader import read_subtitles
 from tts2face.request import IDLE_LIMITS_S, Request
 from tts2face.serving.batch.cast import Cast, check_names
-from tts2face.serving.batch.cue_sentences import MAX_GAP_S, ends_sentence, sentence_groups, spoken_part
+from tts2face.serving.batch.cue_sentences import MAX_GAP_S, has_end_mark, sentence_groups, spoken_part
 from tts2face.serving.batch.export import check_faces
 from tts2face.serving.batch.lines import Lines
 from tts2face.serving.batch.options import REPORT, BatchOptions, non_defaults
@@ -182,10 +182,11 @@ class FilePlan:
     def _find_sentences(self, windows: Sequence[Window]) -> None:
         """Note the sentences that run over several cues."""
         gap = round(MAX_GAP_S * float(exact_rate(self.base.request.fps)))
-        ends = sum(ends_sentence(window.cue.text) for window in windows)
+        ends = sum(has_end_mark(window.cue.text) for window in windows)
         is_open = self._is_in_capitals and ends >= PUNCTUATED_SHARE * len(windows)
         keys = [None if window.part else self._who(window) for window in windows]
-        for group in sentence_groups(windows, keys, gap, is_in_capitals=is_open):
+        languages = [self._language(window) for window in windows]
+        for group in sentence_groups(windows, keys, gap, languages, is_in_capitals=is_open):
             inside, last = tuple(windows[at] for at in group), len(group) - 1
             texts = [
                 spoken_part(window.cue.text, is_first=at == 0, is_last=at == last) for at, window in enumerate(inside)
@@ -224,8 +225,10 @@ class FilePlan:
 
     def _written(self, text: str, window: Window) -> str:
         """Words of a line, in small letters where the file has only capitals."""
-        language = self.speakers.look(window.cue, window.part).request.get("language", Request().language)
-        return sentence_case(text, str(language), is_shouted=True) if self._is_in_capitals else text
+        return sentence_case(text, self._language(window), is_shouted=True) if self._is_in_capitals else text
+
+    def _language(self, window: Window) -> str:
+        return str(self.speakers.look(window.cue, window.part).request.get("language", Request().language))
 
     def _joined_output(self, name: str, windows: Sequence[Window], begin: int) -> Output:
         """Clip of consecutive windows with the silences between them."""
