@@ -61,7 +61,7 @@ def test_webm_keeps_transparency(tmp_path: Path, voices: list[LetterVoice]) -> N
         assert {name.lower(): value for name, value in stream.metadata.items()}["alpha_mode"] == "1"
         decoder = av.CodecContext.create("libvpx-vp9", "r")  # FFmpeg's own decoder ignores the coverage
         frames = [frame for packet in movie.demux(stream) for frame in decoder.decode(packet)]
-    assert len(frames) == 46  # one of them before the cue
+    assert len(frames) == 56  # one of them before the first cue, and two seconds after the last one
     for frame in (frames[0], frames[-1]):
         coverage = frame.to_ndarray(format="rgba")[:, :, 3]
         assert coverage[0, 0] < 5  # of 255; the coding is lossy
