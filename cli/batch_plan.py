@@ -56,21 +56,27 @@ def _print_speakers(plan: "Plan") -> None:
 
     for one in planned_speakers(plan):
         role = "no role" if one.role is None else f"role {one.role}"
-        lines = f"{one.n_lines} line{'s' * (one.n_lines != 1)}"
+        if not one.n_lines:
+            print(f"speaker {one.name}: silent, {_lines(one.n_silent)}, {role}")  # noqa: T201 - the result
+            continue
+        lines = _lines(one.n_lines) + (f" and {one.n_silent} silent" if one.n_silent else "")
         print(f"speaker {one.name}: {lines}, {role}, face {one.face}, voice {one.voice}")  # noqa: T201 - the result
+
+
+def _lines(number: int) -> str:
+    return f"{number} line{'s' * (number != 1)}"
 
 
 def _print_rates(plan: "Plan", results: "Mapping[str, SegmentResult]") -> None:
     """Print the lines that are not spoken as usual, and how many there are."""
-    from tts2face.serving.batch.report import CHANGED, fitted_lines, summarise
+    from tts2face.serving.batch.report import fitted_lines, line_notes, summarise
 
     for line, result in fitted_lines(plan, results):
-        usual = float(line.segment.request.get("rate", 1.0)) if line.segment is not None else 1.0
-        if abs(result.rate - usual) < CHANGED and not result.warnings:
+        notes = line_notes(line, result)
+        if not notes:
             continue
         where = f"{line.file}, cue {line.number}" + (f", part {line.part}" if line.part else "")
-        told = "; ".join((f"rate {result.rate:.2f}", *result.warnings))
-        print(f"{where}: {told}")  # noqa: T201 - the result
+        print(f"{where}: {'; '.join(notes)}")  # noqa: T201 - the result
     found = summarise(plan, results)
     missing = sum(line.segment is not None for line in plan.lines) - found.n_lines
     if missing:

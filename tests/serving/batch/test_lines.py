@@ -14,7 +14,7 @@ from tts2face.serving.batch.lines import COLUMNS, read_lines, write_lines
 from tts2face.serving.batch.options import BatchOptions
 from tts2face.serving.batch.output import Plan
 from tts2face.serving.batch.plan import plan_batch
-from tts2face.serving.batch.report import line_rows
+from tts2face.serving.batch.report import fitted_lines, line_notes, line_rows, summarise
 from tts2face.serving.batch.segment import SegmentResult
 
 DIALOGUE = SRT + "\n4\n00:00:13,000 --> 00:00:15,000\n- No. - Yes.\n"
@@ -54,6 +54,8 @@ def test_lines_are_left_out_and_taken_in(tmp_path: Path) -> None:
         ("\ufefffile;cue;rate\r\none;1;1,25\r\n", 1.25),
         ("file\tcue\trate\none.srt\t1\t1.25\n", 1.25),
         ('"cue","text","Rate"\n1,"a, ""b""\nc",1.25\n', 1.25),
+        ("cue,rate,,\n1,1.25,,\n", 1.25),
+        (f"{','.join(COLUMNS)}\n,1,,,,,,,1.25\n", 1.25),
     ],
 )
 def test_tables_of_spreadsheets_are_read(table: str, rate: float, tmp_path: Path) -> None:
@@ -65,6 +67,9 @@ def test_tables_of_spreadsheets_are_read(table: str, rate: float, tmp_path: Path
     [
         ("", "there is no column cue"),
         ("number,rate\n1,1\n", "there is no column cue; the first row names the columns: file, cue, part"),
+        ("cue,ratte\n1,1.5\n", "there is no column ratte; a column is one of file, cue, part"),
+        ("cue,rate,rate\n1,1.5,1\n", "the column rate is there twice; remove one of them"),
+        ("cue,rate\n1,1,5\n", "line 2: there are more cells than columns"),
         ("cue,rate\n1,fast\n", "line 2: 'fast' is not a number"),
         ("cue,rate\n1,9\n", "line 2: rate must lie between 0.5 and 2, not 9"),
         ("cue,rate\n1,nan\n", "line 2: 'nan' is not a number"),
@@ -81,6 +86,31 @@ def test_tables_of_spreadsheets_are_read(table: str, rate: float, tmp_path: Path
 def test_rows_that_cannot_be_used_are_refused(table: str, reason: str, tmp_path: Path) -> None:
     with pytest.raises(DataError, match=reason):
         plan(tmp_path, table)
+
+
+def test_offsets_that_cannot_be_kept_are_warnings(tmp_path: Path) -> None:
+    found = plan(tmp_path, "cue,part,offset_s\n1,,-5\n3,,-5\n4,2,0.5\n")
+    assert [(one.line, one.message) for one in found.warnings if "offset" in one.message] == [
+        (2, "cue 1 begins at 0 s: an offset of -5 s is before the start"),
+        (14, "the offset of part 2 of cue 4 has no effect: it moves with part 1"),
+    ]
+
+
+def test_what_the_table_sets_is_in_the_notes_and_counts(tmp_path: Path) -> None:
+    found = plan(tmp_path, "cue,part,rate,offset_s\n1,,1.3,\n2,,0.8,0.25\n3,,,-0.5\n")
+    rates = (1.3, 0.8, 1.0, 1.0, 1.0)
+    results = {
+        line.segment.address: SegmentResult(10, 10.0, rate) for line, rate in zip(found.lines, rates, strict=True)
+    }
+    assert [line_notes(line, result) for line, result in fitted_lines(found, results)] == [
+        ["rate 1.30 from the table of lines"],
+        ["rate 0.80 from the table of lines", "offset +0.25 s"],
+        ["rate 1.00", "offset -0.5 s"],
+        [],
+        [],
+    ]
+    summary = summarise(found, results)
+    assert (summary.n_faster, summary.n_slower, summary.n_over_limit) == (1, 1, 0)
 
 
 def test_a_table_that_does_not_exist_is_named(tmp_path: Path) -> None:
@@ -132,7 +162,9 @@ def test_the_command_lists_speakers_rates_and_cuts_and_writes_the_table(
     assert (row["speaker"], row["used_rate"], row["rate"]) == ("BOB", "2.000", "")
     Path("lines.csv").write_text(text.replace("qrstuvw.,,", "qrstuvw.,no,"), encoding="utf-8")
     assert run([*words, "--dry-run", "--lines", "lines.csv"]) == 0
-    assert "4 lines: 0 faster than usual" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "4 lines: 0 faster than usual" in printed
+    assert "speaker BOB: silent, 1 line, no role\n" in printed
     assert run([*words, "--dry-run", "--write-lines", "one.srt"]) == 2
     assert "would replace the subtitles one.srt" in capsys.readouterr().err
     assert run([*words, "--dry-run", "--write-lines", "none/lines.csv"]) == 2

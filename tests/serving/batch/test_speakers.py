@@ -103,6 +103,15 @@ def test_signs_and_credits_are_left_out_and_take_no_time(plan_of: Planner, tmp_p
     ]
 
 
+def test_silent_speakers_are_listed(plan_of: Planner, tmp_path: Path) -> None:
+    cast = cast_of(tmp_path, '[[role]]\nspeaker = "ANN"\nsilent = true\n')
+    found = planned_speakers(plan_of(SRT, cast=cast))
+    assert [(one.name, one.n_lines, one.n_silent, one.role) for one in found] == [
+        ("(no name)", 2, 0, None),
+        ("ANN", 0, 1, 1),
+    ]
+
+
 def test_all_but_some_roles_can_be_left_out(plan_of: Planner, tmp_path: Path) -> None:
     cast = cast_of(tmp_path, '[default]\nsilent = true\n[[role]]\nspeaker = "ANN"\nsilent = false\n')
     assert [output.name for output in plan_of(SRT, cast=cast).outputs] == ["one-0001.mp4"]

@@ -165,6 +165,13 @@ class FilePlan:
     def _moved(self, cue: Cue) -> Cue:
         """A cue at its time of the table; several speakers of one move with the first of them."""
         offset = self.speakers.settings(cue, 1 if cue.parts else 0).offset_s
+        for part in range(2, len(cue.parts) + 1):
+            if self.speakers.settings(cue, part).offset_s not in (0.0, offset):
+                self._warn(
+                    cue.line, f"the offset of part {part} of cue {cue.number} has no effect: it moves with part 1"
+                )
+        if cue.begin_s + offset < 0.0:
+            self._warn(cue.line, f"cue {cue.number} begins at 0 s: an offset of {offset:g} s is before the start")
         begin = max(cue.begin_s + offset, 0.0)
         return replace(cue, begin_s=begin, end_s=max(cue.end_s + offset, begin + 0.001)) if offset else cue
 

@@ -90,21 +90,36 @@ def read_lines(path: Path, names: Sequence[str]) -> Lines:
     Raises
     ------
     DataError
-        It cannot be read, has no column ``cue``, two rows of one line, or a value that cannot be used; the message
-        names the row.
+        It cannot be read, has no column ``cue``, a column that is not known or is there twice, more cells than columns,
+        two rows of one line, or a value that cannot be used; the message names the row.
     """
     rows = read_table(path, MAX_TABLE_BYTES, delimiters=",;\t")
     columns = [name.strip().lower() for name in rows[0]] if rows else []
-    if "cue" not in columns:
-        raise DataError(f"{path}: there is no column cue; the first row names the columns: {', '.join(COLUMNS)}")
+    _check_columns(path, columns)
     found: dict[LineKey, LineSettings] = {}
     for number, cells in enumerate(rows[1:], start=2):
+        if any(map(str.strip, cells[len(columns) :])):
+            raise DataError(
+                f"{path}, line {number}: there are more cells than columns; put values with separators into quotes"
+            )
         row = dict(zip(columns, (cell.strip() for cell in cells), strict=False))
         key = _key(row, names, (path, number))
         if key in found:
             raise DataError(f"{path}, line {number}: cue {key[1]} has a row already; remove one of them")
         found[key] = _settings(row, (path, number))
     return Lines(str(path), {key: one for key, one in found.items() if one != NO_SETTINGS})
+
+
+def _check_columns(path: Path, columns: Sequence[str]) -> None:
+    named = [name for name in columns if name]
+    if "cue" not in columns:
+        raise DataError(f"{path}: there is no column cue; the first row names the columns: {', '.join(COLUMNS)}")
+    unknown = next((name for name in named if name not in COLUMNS), None)
+    if unknown is not None:
+        raise DataError(f"{path}: there is no column {unknown[:40]}; a column is one of {', '.join(COLUMNS)}")
+    twice = next((name for name in named if named.count(name) > 1), None)
+    if twice is not None:
+        raise DataError(f"{path}: the column {twice} is there twice; remove one of them")
 
 
 def _key(row: Mapping[str, str], names: Sequence[str], place: Place) -> LineKey:

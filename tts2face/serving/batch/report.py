@@ -21,24 +21,30 @@ CHANGED = 0.005  # of the rate, from which it is another one
 
 @dataclass(frozen=True, slots=True)
 class PlannedSpeaker:
-    """Lines of one speaker that are spoken, and how; `role` is the number in the cast, None without one."""
+    """Lines of one speaker that are spoken, and how; `role` is the number in the cast, None without one.
+
+    `n_silent` counts lines that are not spoken, besides.
+    """
 
     name: str
     n_lines: int
     role: int | None
     face: str
     voice: str
+    n_silent: int = 0
 
 
 def planned_speakers(plan: Plan) -> tuple[PlannedSpeaker, ...]:
-    """Speakers of a plan, those with most lines first."""
-    counts: dict[tuple[str, int | None, str, str], int] = {}
+    """Speakers of a plan, those with most lines first, also those who are silent."""
+    found: dict[tuple[str, int | None, str, str], list[bool]] = {}
     for line in plan.lines:
-        if line.segment is not None:
-            key = shown_name(line.speaker, line.look), line.look.role, shown_face(line.look.models), _voice(line.look)
-            counts[key] = counts.get(key, 0) + 1
-    ordered = sorted(counts.items(), key=lambda one: -one[1])
-    return tuple(PlannedSpeaker(name, n, *rest) for (name, *rest), n in ordered)  # type: ignore[arg-type]
+        key = shown_name(line.speaker, line.look), line.look.role, shown_face(line.look.models), _voice(line.look)
+        found.setdefault(key, []).append(line.segment is not None)
+    speakers = [
+        PlannedSpeaker(name, sum(spoken), role, face, voice, len(spoken) - sum(spoken))
+        for (name, role, face, voice), spoken in found.items()
+    ]
+    return tuple(sorted(speakers, key=lambda one: -one.n_lines))
 
 
 def shown_face(models: Models) -> str:
@@ -98,7 +104,7 @@ class RateSummary:
 def summarise(plan: Plan, results: Mapping[str, SegmentResult]) -> RateSummary:
     """Numbers of the lines of a plan whose fits are known."""
     rated = [
-        (result, float(line.segment.request.get("rate", 1.0)), line.segment.max_rate)
+        (result, line.look.usual_rate, max(line.segment.max_rate, line.settings.rate or 0.0))
         for line, result in fitted_lines(plan, results)
         if line.segment is not None
     ]
@@ -117,6 +123,15 @@ def fitted_lines(plan: Plan, results: Mapping[str, SegmentResult]) -> Iterator[t
     for line in plan.lines:
         if line.segment is not None and line.segment.address in results:
             yield line, results[line.segment.address]
+
+
+def line_notes(line: PlannedLine, result: SegmentResult) -> list[str]:
+    """What is not as usual with a line: its rate, what a table sets, and warnings of its fit."""
+    is_set, offset = line.settings.rate is not None, line.settings.offset_s
+    notes = [f"offset {offset:+g} s", *result.warnings] if offset else list(result.warnings)
+    if notes or is_set or abs(result.rate - line.look.usual_rate) >= CHANGED:
+        notes.insert(0, f"rate {result.rate:.2f}" + " from the table of lines" * is_set)
+    return notes
 
 
 def line_rows(plan: Plan, results: Mapping[str, SegmentResult]) -> Iterator[dict[str, Any]]:

@@ -7,7 +7,7 @@ from typing import Any
 from lexicon.errors import InputError
 from lexicon.languages import language_code
 from tts2face.interchange.subtitles.cues import Cue
-from tts2face.request import DRAWN_FACE
+from tts2face.request import DRAWN_FACE, Request
 from tts2face.serving.batch.cast import MODEL_NAMES, REQUEST_NAMES, Cast, Role, other_look
 from tts2face.serving.batch.lines import NO_SETTINGS, Lines, LineSettings
 from tts2face.session.named_models import Models
@@ -17,12 +17,16 @@ UNNAMED = "(no name)"
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """Models and fields of the request of a line, and the number of its role, from 1; None without a role."""
+    """Models and fields of the request of a line, and the number of its role, from 1; None without a role.
+
+    `usual_rate` is the speaking rate of its role, or of the command, without that of the table of lines.
+    """
 
     models: Models
     request: Mapping[str, Any]
     role: int | None
     other: int = 0  # counts the speakers of one cue who have no role, from the second one
+    usual_rate: float = 1.0
 
 
 @dataclass(slots=True)
@@ -91,9 +95,9 @@ class Speakers:
         models, other = self._models(role), self._others.get((cue.number, part), 0)
         if other:
             models, request = other_look(models, request, other, keeps_face=self.keeps_face)
-        line = self.settings(cue, part)
+        line, usual = self.settings(cue, part), float(request.get("rate", Request().rate))
         request |= {name: value for name, value in (("rate", line.rate), ("voice", line.voice)) if value is not None}
-        return Look(models, request, None if role is None else self.cast.roles.index(role) + 1, other)
+        return Look(models, request, None if role is None else self.cast.roles.index(role) + 1, other, usual)
 
     def _language(self, cue: Cue) -> str | None:
         try:
