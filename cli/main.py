@@ -198,7 +198,7 @@ def _read_text(text: str | None, file: Path | None, *, is_needed: bool) -> str:
         return text
     try:
         if file is not None:
-            return read_text(file)
+            return read_text(file, may_be_pipe=True)
         if text is None and sys.stdin.isatty():
             raise InputError('there is no text to speak; add one: tts2face "Hello there." --out hello.mp4')
         source = "standard input"

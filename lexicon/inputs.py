@@ -8,6 +8,7 @@ import errno
 import json
 import math
 import operator
+import os
 import re
 import stat
 import sys
@@ -171,6 +172,7 @@ _FILE_KINDS = (
     (stat.S_ISCHR, "a device"),
     (stat.S_ISBLK, "a device"),
 )
+_OPEN_DESCRIPTORS = re.compile(r"/dev/(stdin|fd/\d+)|/proc/self/fd/\d+")
 _TOKENS = re.compile(r'"(?:[^"\\]|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)  # a whole string, or one bracket
 _QUOTED = re.compile(r'"(?:[^"\\]|\\.)*+"?|\'[^\']*+\'?')  # a text on one line of TOML, closed or not
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
@@ -189,6 +191,10 @@ def check_regular_file(path: Path) -> None:
         mode = path.stat().st_mode
     except OSError as refused:
         raise DataError(f"{path} cannot be read ({refused.strerror}); check the path") from refused
+    _check_kind(path, mode)
+
+
+def _check_kind(path: Path, mode: int) -> None:
     kind = next((name for is_kind, name in _FILE_KINDS if is_kind(mode)), None)
     if kind is not None:
         raise DataError(f"{path} is {kind}, not a file; remove it or use a file")
@@ -243,18 +249,31 @@ def decode_utf8(content: bytes, name: str) -> str:
         raise DataError(f"{name} is not UTF-8 text (byte {broken.start}); save it as UTF-8") from broken
 
 
-def read_text(path: Path, largest: int = LARGEST_TEXT_BYTES) -> str:
-    """Text of a UTF-8 file or pipe.
+def read_text(path: Path, largest: int = LARGEST_TEXT_BYTES, *, may_be_pipe: bool = False) -> str:
+    """Text of a UTF-8 file, or of a pipe that is open already, as ``/dev/stdin``.
+
+    Parameters
+    ----------
+    may_be_pipe
+        Whether any pipe or device is read, too, as long as it lasts, and its writer is waited for.
 
     Raises
     ------
     OSError
         It cannot be opened or read.
     DataError
-        It contains more than `largest` bytes, or is not UTF-8.
+        It is another pipe or a device, contains more than `largest` bytes, or is not UTF-8.
     """
-    with path.open("rb") as file:
+    is_pipe = may_be_pipe or _OPEN_DESCRIPTORS.fullmatch(str(path))
+    with open(path, "rb", opener=None if is_pipe else _open_at_once) as file:
+        if not is_pipe:
+            _check_kind(path, os.fstat(file.fileno()).st_mode)
         return decode_utf8(read_bounded(file, str(path), largest), str(path))
+
+
+def _open_at_once(name: str, flags: int) -> int:
+    """Open a file without waiting for the writer of a pipe."""
+    return os.open(name, flags | getattr(os, "O_NONBLOCK", 0))  # which Windows lacks
 
 
 def read_table(path: Path, largest: int = LARGEST_TABLE_BYTES, delimiters: str = ",") -> list[list[str]]:

@@ -161,6 +161,27 @@ def test_files_are_read_to_a_size_and_no_further(tmp_path: Path) -> None:
         read_json(file)
 
 
+def test_a_text_is_read_of_a_file_or_of_a_pipe_given_on_purpose(tmp_path: Path) -> None:
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    with pytest.raises(DataError, match="zero is a device, not a file"):
+        read_text(tmp_path / "zero", 7)
+    os.mkfifo(tmp_path / "pipe")
+    end = os.open(tmp_path / "pipe", os.O_RDWR)
+    try:
+        os.write(end, b"Hello there.")
+        with pytest.raises(DataError, match="pipe is a pipe, not a file; remove it or use a file"):
+            read_text(tmp_path / "pipe", 7)
+        with pytest.raises(DataError, match="pipe contains more than"):  # it is read
+            read_text(tmp_path / "pipe", 7, may_be_pipe=True)
+    finally:
+        os.close(end)
+    given, end = os.pipe()
+    os.write(end, b"Hello there.")
+    os.close(end)
+    assert read_text(Path(f"/dev/fd/{given}")) == "Hello there."
+    os.close(given)
+
+
 def test_a_table_is_its_rows_without_empty_ones(tmp_path: Path) -> None:
     table = tmp_path / "a.csv"
     table.write_bytes(b'\xef\xbb\xbfname,value\r\n\r\n"a,\r\nb",1\r\n')

@@ -3,6 +3,8 @@
 import asyncio
 import json
 import logging
+import os
+import threading
 from collections.abc import Callable, Iterator, MutableMapping
 from pathlib import Path
 from typing import Any
@@ -14,11 +16,11 @@ from lexicon.errors import InputError
 from tests.running import eventually
 from tests.serving.service.in_process import LocalProcess, another_client, service_client, with_key
 from tts2face.processes.child import Call
-from tts2face.serving.service import exchange
+from tts2face.serving.service import access, exchange
 from tts2face.serving.service.access import KeyRing
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import Exchange
-from tts2face.serving.service.keys import LOCAL_KEY, SCOPES, add_key, read_keys, remove_key
+from tts2face.serving.service.keys import LOCAL_KEY, SCOPES, ApiKey, add_key, read_keys, remove_key
 from tts2face.serving.service.messages import SYNTHESISE, Work
 from tts2face.serving.service.settings import ServiceSettings, read_settings
 from tts2face.serving.service.state import ServiceState
@@ -116,6 +118,44 @@ def test_a_file_that_loses_its_keys_closes_the_door_and_says_so(
     assert client.get("/healthz").status_code == 200
 
 
+def test_a_pipe_in_place_of_the_keys_closes_the_door_and_is_not_waited_for(
+    client: TestClient, keys: Keys, caplog: pytest.LogCaptureFixture
+) -> None:
+    keys.path.unlink()
+    os.mkfifo(keys.path)
+    silent = os.open(keys.path, os.O_RDWR)
+    end = threading.Timer(10.0, os.close, [silent])  # of a pipe that is read nevertheless
+    end.start()
+    with caplog.at_level(logging.INFO):
+        reload(client)
+    assert end.is_alive()
+    end.cancel()
+    os.close(silent)
+    (said,) = [one for one in caplog.records if one.getMessage() == "keys not reloaded"]
+    assert "keys.toml is a pipe, not a file; remove it or use a file" in said.fields["reason"]  # type: ignore[attr-defined]
+    assert status(client, keys.secrets["ann"]) == 401
+
+
+def test_keys_are_read_beside_the_loop_and_stay_until_then(
+    client: TestClient, keys: Keys, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A slow disk keeps no request waiting."""
+    portal = client.portal
+    assert portal is not None
+    threads: list[int] = []
+    met: list[bool] = []
+
+    def read(path: Path) -> tuple[ApiKey, ...]:
+        threads.append(threading.get_ident())
+        met.append(bool(state_of(client).keys.named("ann")))
+        return read_keys(path)
+
+    monkeypatch.setattr(access, "read_keys", read)
+    reload(client)
+    assert threads != [portal.call(threading.get_ident)]
+    assert met == [True]
+
+
 @pytest.mark.parametrize("way", [LAST, "an empty file", "a file of remarks", "an empty list"])
 def test_a_service_that_starts_with_a_file_without_keys_is_closed(keys: Keys, tmp_path: Path, way: str) -> None:
     WAYS[way](keys)
@@ -198,7 +238,8 @@ def test_keys_are_asked_again_at_each_utterance(client: TestClient, keys: Keys, 
         if not is_live:
             socket.receive()  # its sound
         remove_key(keys.path, "ann")
-        state_of(client).keys.reload()
+        assert client.portal is not None
+        client.portal.call(state_of(client).keys.reload)
         refused = say(socket)
         assert refused["type"] == "error"
         assert "the API key ann has been removed" in json.dumps(refused)

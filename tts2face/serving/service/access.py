@@ -1,5 +1,6 @@
 """Who may use a service, asked at each request and at each utterance of an open connection."""
 
+import asyncio
 import logging
 from pathlib import Path
 
@@ -21,6 +22,7 @@ class KeyRing:
 
     def __init__(self, path: Path | None) -> None:
         self._path, self._keys = path, () if path is None else read_keys(path)
+        self._reading = asyncio.Lock()
         self._note_if_empty()
 
     @property
@@ -67,20 +69,24 @@ class KeyRing:
         """The key of a name."""
         return next((one for one in ((LOCAL_KEY,) if self.is_open else self._keys) if one.name == name), None)
 
-    def reload(self) -> tuple[str, ...]:
-        """Read the file again; names of its keys, none if it cannot be read.
+    async def reload(self) -> tuple[str, ...]:
+        """Read the file again, in a thread, as its disk may be slow; names of its keys.
+
+        The keys stay as they are until it has been read.
 
         Raises
         ------
         InputError, DataError
             As `read_keys`; then nobody is served.
         """
-        self._keys = ()
-        try:
-            self._keys = () if self._path is None else read_keys(self._path)
-        finally:
-            self._note_if_empty()
-        return tuple(key.name for key in self._keys)
+        async with self._reading:
+            found: tuple[ApiKey, ...] = ()
+            try:
+                found = () if self._path is None else await asyncio.to_thread(read_keys, self._path)
+            finally:
+                self._keys = found
+                self._note_if_empty()
+        return tuple(key.name for key in found)
 
     def _note_if_empty(self) -> None:
         if not self.is_open and not self._keys:

@@ -215,6 +215,7 @@ class DrainingServer(uvicorn.Server):
     def __init__(self, config: uvicorn.Config, state: ServiceState) -> None:
         super().__init__(config)
         self._state = state
+        self._reloading: set[asyncio.Task[None]] = set()
         self.exit_s: float | None = None  # of a process that is this server's: `EXIT_S`
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -222,12 +223,17 @@ class DrainingServer(uvicorn.Server):
         await super().startup(sockets)
         resume_collection()
         if hasattr(signal, "SIGHUP"):
-            asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, self._state.reload_keys)
+            asyncio.get_running_loop().add_signal_handler(signal.SIGHUP, self._reload_keys)
         for server in self.servers:
             for one in server.sockets:
                 host, port = one.getsockname()[:2]
                 url = f"http://{host}:{port}"
                 log_event("listening", url=url, studio=f"{url}{PAGES}" if self._state.settings.studio else None)
+
+    def _reload_keys(self) -> None:
+        task = asyncio.get_running_loop().create_task(self._state.reload_keys())
+        self._reloading.add(task)
+        task.add_done_callback(self._reloading.discard)
 
     async def main_loop(self) -> None:
         """Serve until a signal comes, then until the running requests are complete, or `drain_s` seconds."""

@@ -61,7 +61,7 @@ class ServiceState:
         self._ending: set[asyncio.Task[None]] = set()  # those of keys that were removed
         self.running: set[Exchange] = set()  # those for which a draining service waits
 
-    def reload_keys(self) -> None:
+    async def reload_keys(self) -> None:
         """Read the file of keys again, and end what is open for keys that it no longer has, or that may do less.
 
         If it cannot be read, nobody is served.
@@ -70,17 +70,22 @@ class ServiceState:
             return log_event("keys not reloaded", reason="the service has no file of keys")
         names: tuple[str, ...] | None = None
         try:
-            names = self.keys.reload()
+            names = await self.keys.reload()
         except Tts2faceError as error:
             log_event("keys not reloaded", level=logging.ERROR, reason=str(error))
+        ended = self._end_lost()
+        if names is not None:
+            log_event("keys reloaded", keys=list(names), ended=ended)
+        return None
+
+    def _end_lost(self) -> int:
+        """End what is open for keys that are gone or may do less; how many."""
         losses = [(one, self.keys.loss_of(one.key)) for one in self.exchanges if one.key is not None]
         ending = {in_background(one.revoke(loss)) for one, loss in losses if loss is not None}
         for task in ending:
             task.add_done_callback(self._ending.discard)
         self._ending |= ending
-        if names is not None:
-            log_event("keys reloaded", keys=list(names), ended=len(ending))
-        return None
+        return len(ending)
 
     def speaking_key(self, key: ApiKey) -> ApiKey:
         """A key as it is now, if it may have something spoken.
