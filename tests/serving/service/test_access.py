@@ -131,7 +131,7 @@ def test_a_pipe_in_place_of_the_keys_closes_the_door_and_is_not_waited_for(
     assert end.is_alive()
     end.cancel()
     os.close(silent)
-    (said,) = [one for one in caplog.records if one.getMessage() == "keys not reloaded"]
+    (said,) = [one for one in caplog.records if one.getMessage() == "keys dropped"]
     assert "keys.toml is a pipe, not a file; remove it or use a file" in said.fields["reason"]  # type: ignore[attr-defined]
     assert status(client, keys.secrets["ann"]) == 401
 
@@ -243,6 +243,24 @@ def test_keys_are_asked_again_at_each_utterance(client: TestClient, keys: Keys, 
         refused = say(socket)
         assert refused["type"] == "error"
         assert "the API key ann has been removed" in json.dumps(refused)
+
+
+@pytest.mark.parametrize("path", SOCKETS)
+def test_a_damaged_file_is_said_as_it_is(
+    client: TestClient, keys: Keys, caplog: pytest.LogCaptureFixture, path: str
+) -> None:
+    """No key has been removed from it."""
+    with open_socket(client, path, keys.secrets["ann"]) as socket, caplog.at_level(logging.INFO):
+        eventually(lambda: len(state_of(client).exchanges) == 1)
+        keys.path.write_text("[[key")
+        reload(client)
+        said = json.loads(socket.receive()["text"])["message"]
+        assert said == "the service has no API keys now, so that nobody is served; ask its operator"
+        assert socket.receive()["code"] == 1008
+    logged = {one.getMessage(): one.fields for one in caplog.records}  # type: ignore[attr-defined]
+    assert "keys.toml is not TOML" in logged["keys dropped"]["reason"]
+    assert logged["keys dropped"]["ended"] == 1
+    assert "keys not reloaded" not in logged
 
 
 def test_a_key_that_may_do_less_is_asked_to_connect_again(client: TestClient, keys: Keys) -> None:

@@ -49,6 +49,8 @@ class KeyRing:
         if self.is_open:
             return key
         found = next((one for one in self._keys if one.hash == key.hash), None)
+        if found is None and not self._keys:
+            raise _unauthorized("the service has no API keys now, so that nobody is served; ask its operator")
         if found is None:
             raise _unauthorized(f"the API key {key.name} has been removed; connect with another one")
         return found

@@ -68,14 +68,12 @@ class ServiceState:
         """
         if self.keys.is_open:
             return log_event("keys not reloaded", reason="the service has no file of keys")
-        names: tuple[str, ...] | None = None
         try:
             names = await self.keys.reload()
         except Tts2faceError as error:
-            log_event("keys not reloaded", level=logging.ERROR, reason=str(error))
-        ended = self._end_lost()
-        if names is not None:
-            log_event("keys reloaded", keys=list(names), ended=ended)
+            log_event("keys dropped", level=logging.ERROR, reason=str(error), ended=self._end_lost())
+        else:
+            log_event("keys reloaded", keys=list(names), ended=self._end_lost())
         return None
 
     def _end_lost(self) -> int:
