@@ -179,7 +179,7 @@ BEYOND = [
 
 
 @pytest.mark.parametrize("elements", BEYOND, ids=lambda one: next(iter(one)))
-@pytest.mark.parametrize("format", ["mp4", "curves"])
+@pytest.mark.parametrize("format", ["mp4", "curves", "wav", "mp3"])
 def test_times_beyond_the_clip_are_refused_before_its_first_byte(
     elements: dict[str, object], format: str, session: tts2face.Session, tmp_path: Path
 ) -> None:
@@ -189,18 +189,25 @@ def test_times_beyond_the_clip_are_refused_before_its_first_byte(
         next(chunks)
 
 
+def test_times_beyond_the_speech_alone_are_refused(session: tts2face.Session, tmp_path: Path) -> None:
+    (tmp_path / "t.json").write_text(json.dumps({"nods": [{"time": 60}]}))
+    with pytest.raises(InputError, match="the nod at 60 s lies beyond the clip"):
+        next(session.stream_speech("Bob may move.", timeline=tmp_path / "t.json"))
+
+
 def test_times_within_the_clip_do_not_wait_for_its_end(session: tts2face.Session, tmp_path: Path) -> None:
     (tmp_path / "t.json").write_text(json.dumps({"nods": [{"time": 0.5}]}))
     text = "Bob may move. We were away. " * 40
     assert next(session.stream_file(text, "curves", timeline=tmp_path / "t.json")).content
 
 
+@pytest.mark.parametrize("format", ["curves", "wav"])
 def test_times_beyond_a_long_clip_are_refused_at_its_end(
-    session: tts2face.Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    format: str, session: tts2face.Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(speech_stream, "AHEAD_S", 1.0)
     (tmp_path / "t.json").write_text(json.dumps({"nods": [{"time": 500}]}))
-    chunks = session.stream_file("Bob may move. We were away. " * 3, "curves", timeline=tmp_path / "t.json")
+    chunks = session.stream_file("Bob may move. We were away. " * 3, format, timeline=tmp_path / "t.json")
     assert next(chunks).content
     with pytest.raises(InputError, match="the nod at 500 s lies beyond the clip"):
         list(chunks)

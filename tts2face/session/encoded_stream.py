@@ -21,7 +21,7 @@ from tts2face.picture.sound_stream import SOUND_KINDS, encode_sound
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.models import SessionModels
 from tts2face.session.prepared import PreparedRequest
-from tts2face.session.speech_stream import Piece, spoken_pieces
+from tts2face.session.speech_stream import Piece, timed_speech
 from tts2face.types import Chunk
 
 LINES = "application/jsonl"  # media type of lines of JSON
@@ -102,7 +102,7 @@ def _encode_media(
         clips = (piece.clip for piece in models.pieces(prepared))
         return encode_movie(clips, renderer, format.name, threads=format.threads, pace=format.pace, path=path)
     if request.audio is None:
-        pieces = spoken_pieces(prepared, models.for_request(prepared).speech, has_phones=False)
+        pieces = timed_speech(prepared, models.for_request(prepared).speech, has_phones=False)
     else:
         pieces = models.pieces(prepared)
     return encode_sound((piece.speech.waveform for piece in pieces), format.name, path)

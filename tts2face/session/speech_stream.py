@@ -191,17 +191,26 @@ def spoken_ahead(pieces: Iterator[Piece], timeline: Timeline, yield_turn: YieldT
     yield from pieces
 
 
-def timed_speech(prepared: PreparedRequest, models: SpeechModels) -> Iterator[Piece]:
-    """Pieces of a text or of idle animation without motion.
+def timed_speech(prepared: PreparedRequest, models: SpeechModels, *, has_phones: bool = True) -> Iterator[Piece]:
+    """Pieces of a text or of idle animation without motion; `has_phones` as for `spoken_pieces`.
 
     Raises
     ------
     InputError
-        The request has a recording.
+        The request has a recording, or a time beyond the end of the clip, which its motion would refuse.
     """
     if prepared.request.audio is not None:
         raise InputError("a recording is not spoken; remove it, or stream its clip")
-    return spoken_pieces(prepared, models)
+    pieces = spoken_pieces(prepared, models, has_phones=has_phones)
+    return _within_clip(pieces, prepared.timeline, models.yield_turn) if prepared.request.has_gestures else pieces
+
+
+def _within_clip(pieces: Iterator[Piece], timeline: Timeline, yield_turn: YieldTurn) -> Iterator[Piece]:
+    seconds = 0.0
+    for piece in spoken_ahead(pieces, timeline, yield_turn):
+        seconds += piece.speech.waveform.duration
+        yield piece
+    timeline.check_duration(seconds)
 
 
 def turn_request(request: Request) -> Request:

@@ -28,7 +28,7 @@ def test_head_of_events(service: RunningService, client: httpx.Client) -> None:
     assert (request["status"], request["bytes"]) == (200, 0)
 
 
-@pytest.mark.parametrize("format", ["mp4", "webm", "curves", "livelink"])
+@pytest.mark.parametrize("format", ["mp4", "webm", "mp3", "wav", "curves", "livelink"])
 def test_a_nod_beyond_the_clip_is_refused_before_the_first_byte(client: httpx.Client, format: str) -> None:
     form = {"request": json.dumps({"text": "Hello there. Good bye.", "size": "64x64", "format": format})}
     answer = client.post("/v1/clips", data=form, files={"timeline": json.dumps({"nods": [{"time": 60}]}).encode()})
