@@ -11,7 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lexicon.errors import DataError, InputError
-from tts2face.gestures.elements import GAIN_NAMES, ExpressionSpan, Gains, Nod, StyleSpan
+from tts2face.gestures.elements import (
+    GAIN_NAMES,
+    BrowRaise,
+    ExpressionSpan,
+    Gains,
+    GazeTarget,
+    Listening,
+    Nod,
+    StyleSpan,
+)
 from tts2face.gestures.timeline import BLEND_S, ONSET_S, Timeline, parse_expressions, parse_gains, parse_style
 from tts2face.gestures.timeline_file import parse_timeline, read_timeline
 from tts2face.models.palette import EXPRESSIONS, FEATURES, Palette, Style
@@ -149,8 +158,15 @@ def test_a_timeline_can_be_moved() -> None:
         ),
         (
             lambda: Timeline(expressions=(ExpressionSpan("sad", 1, 9.0, math.inf),)).check_duration(9),
-            "span of sad from 9 to inf s lies beyond",
+            "the span of sad from 9 s to the end lies beyond the clip, which lasts 9.00 s; let it begin earlier",
         ),
+        (lambda: Timeline(gaze=(GazeTarget(0, 0, 1, 9),)).check_duration(8), "the span of the gaze from 1 to 9 s lies"),
+        (lambda: Timeline(listens=(Listening(3, 9),)).check_duration(8), "span of listening from 3 to 9 s .*; shorten"),
+        (
+            lambda: Timeline(listens=(Listening(3, math.inf), Listening(5, 9))),
+            "two spans of listening overlap: 3 s to the end and 5-9 s; let one",
+        ),
+        (lambda: Timeline(brow_raises=(BrowRaise(9),)).check_duration(8), "the brow raise at 9 s lies beyond"),
         (lambda: Timeline(nods=(Nod(9.5),)).check_duration(9), r"the nod at 9\.5 s lies beyond"),
     ],
 )
@@ -271,7 +287,7 @@ def test_a_file_holds_a_timeline(tmp_path: Path) -> None:
         ('{"spans": [{"feature": "head", "style": "a", "start": 1e999}]}', r"a\.json: the number 1e999 is too large"),
         (
             '{"spans": [{"feature": "head", "style": "a", "start": 1}, {"feature": "all", "style": "a", "start": 2}]}',
-            r"a\.json: two spans of head overlap: 1-inf s and 2-inf s",
+            r"a\.json: two spans of head overlap: 1 s to the end and 2 s to the end",
         ),
         ('{"expressions": [{"expression": "sad", "weight": 9}]}', r"expressions\[0\]: the weight of sad must lie"),
         ('{"nods": [{"time": 1}, {"time": -1}]}', r"nods\[1\]: a nod needs a time of 0 s or more, not -1"),

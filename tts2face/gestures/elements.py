@@ -307,16 +307,19 @@ class ElementKind:
     owner
         Field that tells lanes apart: spans of one lane may not overlap, and each lane has one curve. Empty where all
         elements are in one lane.
+    noun
+        What messages call an element, or all of them, where lanes have no names.
     """
 
     name: str
     record: type[Any]
     shape: Literal["span", "curve", "instant"]
     owner: str
+    noun: str = ""
 
     def lane(self, element: Any) -> str:
         """Lane of an element as messages name it."""
-        return str(getattr(element, self.owner)) if self.owner else f"the {self.name}"
+        return str(getattr(element, self.owner)) if self.owner else self.noun
 
     def ordered(self, elements: Iterable[Any]) -> tuple[Any, ...]:
         """Elements in order of time; curves as they are.
@@ -339,8 +342,8 @@ class ElementKind:
             for before, after in pairwise(members):
                 if after.start < before.end:
                     raise InputError(
-                        f"two spans of {lane} overlap: {before.start:g}-{before.end:g} s and {after.start:g}-"
-                        f"{after.end:g} s; let one end before the other begins"
+                        f"two spans of {lane} overlap: {_span_text(before, '-')} and {_span_text(after, '-')}; "
+                        "let one end before the other begins"
                     )
         return found
 
@@ -385,10 +388,9 @@ class ElementKind:
             if self.latest_s(one) < duration:
                 continue
             if self.shape == "span":
-                what = f"the span of {self.lane(one)} from {one.start:g} to {one.end:g} s"
-                raise BeyondClipError(what, duration, "shorten it")
-            what = self.name.removesuffix("s").replace("_", " ")
-            raise BeyondClipError(f"the {what} at {one.time:g} s", duration, "move it")
+                what = f"the span of {self.lane(one)} from {_span_text(one, ' to ')}"
+                raise BeyondClipError(what, duration, "shorten it" if one.start < duration else "let it begin earlier")
+            raise BeyondClipError(f"the {self.noun} at {one.time:g} s", duration, "move it")
 
     def latest_s(self, element: Any) -> float:
         """Second that a clip must go beyond to hold an element; below 0 for a curve, which any clip holds."""
@@ -399,15 +401,20 @@ class ElementKind:
         return float(element.start if math.isinf(element.end) else max(element.start, element.end - MAX_OVERRUN_S))
 
 
+def _span_text(span: Any, between: str) -> str:
+    """Seconds of a span in a message."""
+    return f"{span.start:g} s to the end" if math.isinf(span.end) else f"{span.start:g}{between}{span.end:g} s"
+
+
 KINDS: Mapping[str, ElementKind] = MappingProxyType({
     kind.name: kind
     for kind in (
         ElementKind("spans", StyleSpan, "span", "feature"),
         ElementKind("expressions", ExpressionSpan, "span", "expression"),
-        ElementKind("gaze", GazeTarget, "span", ""),
-        ElementKind("listens", Listening, "span", ""),
-        ElementKind("nods", Nod, "instant", ""),
-        ElementKind("brow_raises", BrowRaise, "instant", ""),
+        ElementKind("gaze", GazeTarget, "span", "", "the gaze"),
+        ElementKind("listens", Listening, "span", "", "listening"),
+        ElementKind("nods", Nod, "instant", "", "nod"),
+        ElementKind("brow_raises", BrowRaise, "instant", "", "brow raise"),
         ElementKind("strengths", StrengthCurve, "curve", "feature"),
         ElementKind("curves", ExpressionCurve, "curve", "expression"),
         ElementKind("edits", ChannelEdit, "curve", "channel"),
