@@ -1,6 +1,7 @@
 """Marks and phones as clients of Kokoro-FastAPI write them, as marks of this service.
 
-``[pause:1.0s]`` is a pause, and ``[word](/ipa/)`` a word with its phones; elsewhere that is a link.
+``[pause:1.0s]`` is a pause, and ``[word](/ipa/)`` a word with its phones; elsewhere that is a link. What has another
+form, as ``[word](/path)``, is one here, too.
 """
 
 import re
@@ -9,8 +10,11 @@ from lexicon.errors import InputError
 from lexicon.ipa import parse_ipa
 from lexicon.ssml import is_ssml
 
-_PAUSE = re.compile(r"\[pause:[ ]?([0-9]{1,4}(?:\.[0-9]{1,3})?)[ ]?s?\]", re.IGNORECASE)
-_GIVEN = re.compile(r"\[([^\[\]\n]{1,200})\]\(/([^()\[\]/\n]{1,200})/\)")
+_PAUSE = re.compile(r"\[pause:([^\[\]\n]*+)(\]?)", re.IGNORECASE)
+_SECONDS = re.compile(r"([0-9]{1,4}(?:\.[0-9]{1,9})?) ?s?", re.IGNORECASE)
+_GIVEN = re.compile(r"\[([^\[\]\n]*+)\]\(/([^()\[\]/\n]*+)/\)")
+FORM = "[word](/wˈɜɹd/)"
+MAX_SHOWN = 60  # characters of a mark in a message
 _PUNCTUATION = '.,;:!?…—"“”()'
 # Letters of Kokoro's alphabet (misaki) that are not IPA.
 _IPA = str.maketrans({
@@ -27,6 +31,11 @@ def kokoro_ipa(written: str) -> str:
 def with_marks(text: str) -> str:
     """A text with the marks of this service in place of Kokoro-FastAPI's; SSML as it is.
 
+    Raises
+    ------
+    InputError
+        A pause is no number of seconds, a word has no phones or a wrong one, or phones have no word.
+
     Examples
     --------
     >>> with_marks("A [pause:1.0s] [tomato](/təmˈɑːtO/), see [this](/a page).")
@@ -34,17 +43,28 @@ def with_marks(text: str) -> str:
     """
     if is_ssml(text):
         return text
-    return _GIVEN.sub(_given, _PAUSE.sub(r"[pause \1]", text))
+    return _GIVEN.sub(_given, _PAUSE.sub(_paused, text))
+
+
+def _paused(match: "re.Match[str]") -> str:
+    seconds = _SECONDS.fullmatch(match[1].strip())
+    if seconds is None or not match[2]:
+        raise InputError(f"cannot read the mark {match[0][:MAX_SHOWN]}; write a pause in seconds, as [pause:0.5s]")
+    return f"[pause {seconds[1]}]"
 
 
 def _given(match: "re.Match[str]") -> str:
-    """A word with its phones; what has none is a link."""
-    ipa = kokoro_ipa(match[2].strip())
+    """A word with its phones."""
+    shown, word, ipa = match[0][:MAX_SHOWN], match[1].strip(), kokoro_ipa(match[2].strip())
+    if not word:
+        raise InputError(f"{shown} has phones and no word; write the word in the square brackets, as {FORM}")
     try:
-        is_spoken = bool(parse_ipa(ipa))
-    except InputError:
-        is_spoken = False
-    return f"[phoneme:{ipa}]{match[1]}[/phoneme]" if is_spoken else match[0]
+        has_phones = bool(parse_ipa(ipa))
+    except InputError as wrong:
+        raise InputError(f"{shown}: {wrong}") from wrong
+    if not has_phones:
+        raise InputError(f"{shown} has no phones; write them in IPA or in Kokoro's alphabet, as {FORM}")
+    return f"[phoneme:{ipa}]{match[1]}[/phoneme]"
 
 
 def phones_text(phones: str) -> str:
