@@ -61,3 +61,11 @@ def test_wrong_marks_are_refused_and_named(
 )
 def test_links_stay_and_marks_become_those_of_the_service(text: str, marked: str) -> None:
     assert with_marks(text) == marked
+
+
+def test_phones_are_answered_as_a_complete_file(client: TestClient, process: TableProcess) -> None:
+    """Nothing asks for a stream."""
+    asked = {"phonemes": "həlˈO wˈɜɹld.", "voice": "af_heart"}
+    assert client.post("/dev/generate_from_phonemes", json=asked).status_code == 200
+    (work,) = process.works
+    assert (work.format, work.is_complete) == ("wav", True)

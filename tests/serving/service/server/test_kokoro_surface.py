@@ -134,6 +134,7 @@ def test_phones_are_spoken(client: httpx.Client) -> None:
     answer = client.post("/dev/generate_from_phonemes", json={"phonemes": "həlˈO wˈɜɹld.", "voice": "af_bella"})
     assert (answer.status_code, answer.headers["content-type"]) == (200, "audio/wav")
     samples = np.frombuffer(answer.content[44:], "<i2")
+    assert frames_of(answer.content) == len(samples)  # as its header has it
     assert 0.5 < len(samples) / 24_000 < 3.0
     assert np.abs(samples).max() > 3000
 

@@ -128,12 +128,12 @@ class PhonesToSpeak(BaseModel):
 
 @router.post("/dev/generate_from_phonemes", response_class=StreamingResponse, summary="Speak phones")
 async def generate_from_phonemes(request: HttpRequest, asked: PhonesToSpeak) -> Response:
-    """Sound of phones as a .wav file, sent while it is made."""
+    """Sound of phones as a complete .wav file."""
     adjustments, state = Adjustments(), service_state(request)
     state.check_length(asked.phonemes)
     voice, language = await asyncio.to_thread(choose_voice, asked.voice, None, "", adjustments)
     spoken = {"text": phones_text(asked.phonemes), "voice": voice, "language": language}
-    work = state.work(request=spoken, format="wav")
+    work = state.work(request=spoken, format="wav", is_complete=True)
     return adjustments.on(await stream_work(request, work, media_types()["wav"]))
 
 
