@@ -13,7 +13,7 @@ from PIL import Image
 
 from tests.processes.answered import refusal
 from tts2face.serving.service.decoders import Decoders
-from tts2face.serving.work.uploaded_file import PICTURE, SOUND, SUBTITLES
+from tts2face.serving.work.uploaded_file import PICTURE, SOUND, SUBTITLES, VIDEO
 
 RATE = 16_000
 
@@ -72,6 +72,32 @@ def test_a_picture_becomes_a_plain_picture(tmp_path: Path) -> None:
         assert picture.getpixel((3, 3)) == (10, 200, 30)
 
 
+def saved(format: str) -> bytes:
+    buffer = io.BytesIO()
+    Image.new("RGB", (8, 8)).save(buffer, format)
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (saved("GIF"), "GIF is not read; give a PNG, JPEG or WebP"),
+        (b"\0\0\0 ftypavif\0\0\0\0avifmif1", "AVIF is not read; give a PNG, JPEG or WebP"),
+        (b"\0\0\0\x18ftypheic\0\0\0\0mif1heic", "HEIC is not read; give a PNG, JPEG or WebP"),
+        (b"", "it is empty"),
+        (png_bomb(7000), "it has 7000 x 7000 pixels, more than 40000000"),
+        (b"no picture", "it is no picture that can be decoded"),
+    ],
+)
+def test_a_picture_is_refused_for_what_it_is(tmp_path: Path, content: bytes, reason: str) -> None:
+    assert decode(PICTURE, content, tmp_path, 4e7)[0] == reason
+
+
+@pytest.mark.parametrize("kind", [SOUND, VIDEO])
+def test_an_empty_file_is_refused_as_such(tmp_path: Path, kind: str) -> None:
+    assert decode(kind, b"", tmp_path, 10.0)[0] == "it is empty"
+
+
 PLAYLIST = b"#EXTM3U\n#EXT-X-TARGETDURATION:10\n#EXTINF:10,\nfile:///etc/passwd\n#EXT-X-ENDLIST\n"
 
 
@@ -79,15 +105,15 @@ PLAYLIST = b"#EXTM3U\n#EXT-X-TARGETDURATION:10\n#EXTINF:10,\nfile:///etc/passwd\
     ("kind", "content", "limit", "reason"),
     [
         ("sound", wav(3.0), 2.0, "longer than 2 s"),
-        ("sound", b"", 2.0, "no sound that can be decoded"),
+        ("sound", b"", 2.0, "it is empty"),
         ("sound", b"RIFF" + bytes(100), 2.0, "no sound that can be decoded"),
         ("sound", PLAYLIST, 2.0, "no sound that can be decoded"),
         ("sound", b"ffconcat version 1.0\nfile /etc/passwd\n", 2.0, "no sound that can be decoded"),
         ("sound", png(16, 16), 2.0, "no sound that can be decoded"),
         ("picture", png(200, 200), 10_000, "200 x 200 pixels, more than 10000"),
         ("picture", png_bomb(60_000), 4e7, "60000 x 60000 pixels"),
-        ("picture", b"GIF89a" + bytes(100), 1e6, "no picture that can be decoded"),
-        ("picture", b"<svg xmlns='http://www.w3.org/2000/svg'/>", 1e6, "no picture that can be decoded"),
+        ("picture", b"GIF89a" + bytes(100), 1e6, "GIF is not read"),
+        ("picture", b"<svg xmlns='http://www.w3.org/2000/svg'/>", 1e6, "SVG is not read"),
         ("picture", png(64, 64)[:60], 1e6, "no picture that can be decoded"),
     ],
 )

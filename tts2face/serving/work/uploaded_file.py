@@ -47,6 +47,11 @@ VIDEO_FORMATS = {
 }  # fmt: skip
 MAX_VIDEO_PIXELS, MAX_VIDEO_FPS = 4096 * 2304, 240
 PICTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TIFF")
+# Other pictures, by their first bytes after some.
+OTHER_PICTURES = (
+    (0, b"GIF8", "GIF"), (4, b"ftypavi", "AVIF"), (4, b"ftyphei", "HEIC"), (4, b"ftypmif1", "HEIF"),
+    (4, b"jP  ", "JPEG 2000"), (0, b"<svg", "SVG"), (0, b"%PDF", "PDF"),
+)  # fmt: skip
 DECODE, MEASURE = "decode", "measure"  # names of the calls
 MIB = 1 << 20
 # Memory of a child besides pixels: of Python with a decoder; with the models of a check. Measured, rounded up.
@@ -54,8 +59,10 @@ CHILD_BYTES, RESOURCE_BYTES = 96 * MIB, 512 * MIB
 
 
 @contextmanager
-def _decoding(kind: str, *errors: type[Exception]) -> Iterator[None]:
-    """Refuse a file whose decoding ends in one of these errors."""
+def _decoding(kind: str, source: Path, *errors: type[Exception]) -> Iterator[None]:
+    """Refuse a file that is empty, or whose decoding ends in one of these errors."""
+    if not source.stat().st_size:
+        raise RefusedFileError("it is empty")
     try:
         yield
     except RefusedFileError:
@@ -81,7 +88,7 @@ def decode_sound(source: Path, target: Path, max_seconds: float) -> None:
     # A playlist could name other files: only formats without references, and no protocol to open them.
     options = {"format_whitelist": SOUND_FORMATS, "protocol_whitelist": "none"}
     with (
-        _decoding("sound", av.FFmpegError, ValueError, EOFError),
+        _decoding("sound", source, av.FFmpegError, ValueError, EOFError),
         source.open("rb") as file,
         av.open(file, "r", options=options) as container,
     ):
@@ -107,12 +114,17 @@ def _opened_picture(source: Path, max_pixels: float) -> "Iterator[Image]":
     from PIL import Image
 
     Image.MAX_IMAGE_PIXELS = None  # the size is checked here
+    with source.open("rb") as file:
+        head = file.read(N_MAGIC)
+    for at, magic, name in OTHER_PICTURES:
+        if head.startswith(magic, at):
+            raise RefusedFileError(f"{name} is not read; give a PNG, JPEG or WebP")
     with (
-        _decoding("picture", OSError, ValueError, SyntaxError, MemoryError),
+        _decoding("picture", source, OSError, ValueError, SyntaxError, MemoryError),
         Image.open(source, formats=PICTURE_FORMATS) as picture,
     ):
         if picture.width * picture.height > max_pixels:
-            raise RefusedFileError(f"it has {picture.width} x {picture.height} pixels, more than {max_pixels:g}")
+            raise RefusedFileError(f"it has {picture.width} x {picture.height} pixels, more than {max_pixels:.0f}")
         n_bytes = decoding_bytes(picture)
         if n_bytes + CHILD_BYTES > LIMITS.memory_bytes:
             raise RefusedFileError(
@@ -147,7 +159,7 @@ def check_video(source: Path, target: Path, max_seconds: float) -> None:
 
     options = {"format_whitelist": ",".join(VIDEO_FORMATS), "protocol_whitelist": "none"}
     with (
-        _decoding("video", av.FFmpegError, ValueError, EOFError, StopIteration),
+        _decoding("video", source, av.FFmpegError, ValueError, EOFError, StopIteration),
         source.open("rb") as file,
         av.open(file, "r", options=options) as container,
     ):
@@ -193,7 +205,7 @@ def check_subtitles(source: Path, target: Path, max_cues: float, encoding: str |
     except Tts2faceError as wrong:
         raise RefusedFileError(str(wrong).replace(f"{target.parent}/", "")) from wrong
     if len(cues) > max_cues:
-        raise RefusedFileError(f"it has {len(cues)} cues, more than {max_cues:g}")
+        raise RefusedFileError(f"it has {len(cues)} cues, more than {max_cues:.0f}")
     numbers = {"cues": len(cues), "seconds": max(cue.end_s for cue in cues)}
     Path(f"{target}.json").write_text(json.dumps(numbers))
 
