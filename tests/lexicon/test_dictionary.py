@@ -72,9 +72,13 @@ def test_wrong_lines_are_named(line: str, reason: str) -> None:
         parse_dictionary(f"good G UH1 D\n{line}\n")
 
 
-def test_a_dictionary_without_end_is_not_read() -> None:
-    with pytest.raises(DataError, match="/dev/zero contains more than 17 MB"):
+def test_a_dictionary_without_end_is_not_read(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="/dev/zero is a device, not a file"):
         read_dictionary(Path("/dev/zero"))
+    with open(tmp_path / "long.txt", "wb") as file:
+        file.truncate(1 << 40)
+    with pytest.raises(DataError, match="long.txt contains more than 17 MB"):
+        read_dictionary(tmp_path / "long.txt")
 
 
 def test_files(tmp_path: Path) -> None:
