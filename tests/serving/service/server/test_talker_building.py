@@ -161,7 +161,7 @@ def test_a_recording_without_a_face_is_refused_with_the_reason(
 @pytest.mark.parametrize(
     ("make", "request_", "status", "reason"),
     [
-        (lambda: b"", {}, 422, "video cannot be used: it is no video that can be decoded"),
+        (lambda: b"", {}, 422, "video cannot be used: it is empty; send another file"),
         (lambda: b"#EXTM3U\n#EXTINF:10,\nfile:///etc/passwd\n", {}, 422, "it is no video that can be decoded"),
         (lambda: b"ffconcat version 1.0\nfile /etc/passwd\n", {}, 422, "it is no video that can be decoded"),
         (sound, {}, 422, "it is no video that can be decoded"),
