@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from cli.batch_plan import print_plan, write_table
+from cli.batch_plan import print_plan
 from cli.flags import Face, Hair, HairColor, add_option_flags, options_from_flags, switch, whole_number
 from cli.process import WhatRemains, progress_bar, write_message
 from lexicon.errors import DataError, InputError
@@ -108,6 +108,7 @@ def batch(  # noqa: PLR0913 - one parameter a flag
         raise InputError("no cue can be spoken, so there is nothing to make; the warnings say why")
     if dry_run:
         return print_plan(plan, out, (store, write_lines), quiet=quiet)
+    from tts2face.serving.batch.report import measure_plan, write_table
     from tts2face.serving.batch.run import SEGMENT_FOLDER
     from tts2face.serving.batch.store import open_store
 
@@ -119,7 +120,8 @@ def batch(  # noqa: PLR0913 - one parameter a flag
     except KeyboardInterrupt as interrupt:
         interrupt.add_note(WhatRemains(f"what is finished is in {out}; the same command continues"))
         raise
-    write_table(plan, opened, write_lines)
+    if write_lines is not None:
+        write_table(write_lines, plan, measure_plan(plan, opened))
     _finish(result, out, quiet=quiet)
     return None
 

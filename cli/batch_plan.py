@@ -9,23 +9,11 @@ from cli.process import progress_bar
 if TYPE_CHECKING:
     from tts2face.serving.batch.output import Plan
     from tts2face.serving.batch.segment import SegmentResult
-    from tts2face.serving.batch.store import Store
-
-
-def write_table(plan: "Plan", store: "Store", path: Path | None) -> None:
-    """Write the table of lines, with the fits of a store, if a path is given."""
-    if path is None:
-        return
-    from tts2face.serving.batch.lines import write_lines
-    from tts2face.serving.batch.report import line_rows, measure_plan
-
-    write_lines(path, line_rows(plan, measure_plan(plan, store)))
 
 
 def print_plan(plan: "Plan", out: Path, files: tuple[str | None, Path | None], *, quiet: bool) -> None:
     """Print what a batch will make; `files` are the store and the table of lines to write."""
-    from tts2face.serving.batch.lines import write_lines
-    from tts2face.serving.batch.report import line_rows, measure_plan
+    from tts2face.serving.batch.report import measure_plan, write_table
     from tts2face.serving.batch.run import SEGMENT_FOLDER
     from tts2face.serving.batch.store import open_store
     from tts2face.serving.batch.windows import estimate_batch
@@ -47,7 +35,7 @@ def print_plan(plan: "Plan", out: Path, files: tuple[str | None, Path | None], *
         f"{_duration(estimate.core_s)} of one core and {estimate.n_bytes / 1e6:.0f} MB on disk"
     )
     if table is not None:
-        write_lines(table, line_rows(plan, results))
+        write_table(table, plan, results)
 
 
 def _print_speakers(plan: "Plan") -> None:

@@ -199,9 +199,13 @@ def _report_writing(write: "Callable[[Progress | None], WrittenClip]", options: 
     resume_collection()
     began = time.perf_counter()
     with progress_bar("writing" if options.out is None else "rendering", options.quiet) as on_progress:
+        has_begun = False
 
         def report(done: int, of: int) -> None:
-            return_large_blocks()
+            nonlocal has_begun
+            if not has_begun:
+                return_large_blocks()
+                has_begun = True
             if on_progress is not None:
                 on_progress(done, of)
 

@@ -18,7 +18,6 @@ import numpy as np
 from lexicon.errors import DataError
 from lexicon.sentence_length import n_letters
 from lexicon.sentences import text_prefix
-from lexicon.spoken_words import reading_notes
 from tts2face.interchange.exports.writer import ExportWriter, plan_exports
 from tts2face.models.face_loading import load_face
 from tts2face.picture.film import MKV, ClipWriter
@@ -236,8 +235,7 @@ def fit_segment(session: Session, request: Request, segment: Segment) -> tuple[P
     elif kept.overlap_s > 0.0:
         warnings.append(f"the last {kept.overlap_s:.2f} s of the speech sound on after the next cue has begun")
     cut = max(0.0, fit.speech_s - kept.speech_s)
-    notes = reading_notes(request.text, request.language)
-    return prepared, _result(segment, kept, (n_frames, speech.fps), cut, [*notes, *warnings])
+    return prepared, _result(segment, kept, (n_frames, speech.fps), cut, [*prepared.notes, *warnings])
 
 
 def _fit_recorded(session: Session, request: Request, segment: Segment) -> tuple[PreparedRequest, SegmentResult]:
@@ -256,8 +254,8 @@ def _fit_recorded(session: Session, request: Request, segment: Segment) -> tuple
     if overlap > 0.0:
         warnings.append(f"{overlap:.2f} s of the speech sound on after the next cue has begun")
     fit = replace(fit, overlap_s=overlap)
-    warnings = [*heard, *reading_notes(request.text, request.language), *warnings]
-    return prepare(request), _result(segment, fit, (n_frames, fps), cut, warnings)
+    prepared = prepare(request)
+    return prepared, _result(segment, fit, (n_frames, fps), cut, [*heard, *prepared.notes, *warnings])
 
 
 def _result(

@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from lexicon.errors import Tts2faceError
 from lexicon.languages import language_code
 from tts2face.request import Request
-from tts2face.serving.batch.lines import LineSettings
+from tts2face.serving.batch.lines import LineSettings, write_lines
 from tts2face.serving.batch.output import Plan, PlannedLine
 from tts2face.serving.batch.segment import Segment, SegmentResult
 from tts2face.serving.batch.speakers import Look, shown_name
@@ -132,6 +133,11 @@ def line_notes(line: PlannedLine, result: SegmentResult) -> list[str]:
     if notes or is_set or abs(result.rate - line.look.usual_rate) >= CHANGED:
         notes.insert(0, f"rate {result.rate:.2f}" + " from the table of lines" * is_set)
     return notes
+
+
+def write_table(path: Path, plan: Plan, results: Mapping[str, SegmentResult]) -> None:
+    """Write the table of the lines of a plan with their fits; errors as `write_lines`."""
+    write_lines(path, line_rows(plan, results))
 
 
 def line_rows(plan: Plan, results: Mapping[str, SegmentResult]) -> Iterator[dict[str, Any]]:

@@ -24,11 +24,10 @@ from tts2face.processes.parent import Child, ChildEndedError
 from tts2face.processes.program import ProcessLimits, Program
 from tts2face.request import Request
 from tts2face.serving.batch.cast import cast_from_tables
-from tts2face.serving.batch.lines import write_lines
 from tts2face.serving.batch.options import BatchOptions
 from tts2face.serving.batch.output import CSV_NAME, JSON_NAME, Plan
 from tts2face.serving.batch.plan import plan_batch
-from tts2face.serving.batch.report import line_rows, measure_plan
+from tts2face.serving.batch.report import measure_plan, write_table
 from tts2face.serving.batch.run import run_batch
 from tts2face.serving.batch.segment import FILE_PREFIX, Segment, input_hashes
 from tts2face.serving.work.connection import DatabaseAwayError
@@ -98,7 +97,7 @@ def run_subtitles(task: JobTask) -> Products:
     for name in (JSON_NAME, CSV_NAME):
         _remove_folders(out / name, task)
     if LINES in task.inputs:
-        write_lines(out / LINES, line_rows(plan, measure_plan(plan, task.store)))
+        write_table(out / LINES, plan, measure_plan(plan, task.store))
     failed = [f"{name}: {reason}" for name, reason in result.failed]
     if result.n_made == 0:
         raise DataError("; ".join(failed[:N_SHOWN]))
