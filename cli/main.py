@@ -42,7 +42,7 @@ from cli.process import (
 )
 from cli.speak import convert, render
 from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
-from lexicon.inputs import LARGEST_TEXT_BYTES, decode_utf8, read_bounded, read_text
+from lexicon.values.files import LARGEST_TEXT_BYTES, decode_utf8, read_bounded, read_text
 from tts2face import __version__
 from tts2face.picture.options import Picture
 from tts2face.processes.collection import pause_collection

@@ -40,7 +40,7 @@ from corpus_tools.recordings.observe import Refusal
 from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.train_talker import fit_pose_correction
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_fields
+from lexicon.values.fields import check_fields
 from tts2face.face.deformation import rest_landmarks
 from tts2face.face.expressions import expression_landmarks
 from tts2face.face.mouth import MIDDLE_PAIR

@@ -37,8 +37,8 @@ from corpus_tools.training.pooling.speech import base_speech
 from corpus_tools.training.score_map import add_score_map
 from corpus_tools.training.train_talker import correct_pose, learn_talker
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import read_json
 from lexicon.sequence import SILENCE
+from lexicon.values.json_text import read_json
 from tts2face.models.talker import NOT_STATED, Talker, load_talker, write_talker
 from tts2face.storage.files import write_atomically
 from tts2face.types import Progress

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from lexicon.errors import BackendError, InputError
-from lexicon.inputs import check_fields
+from lexicon.values.fields import check_fields
 from tts2face.processes.child import exit_after
 from tts2face.storage.files import user_cache
 from tts2face.types import Progress

@@ -17,9 +17,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import read_text
 from lexicon.ipa import IpaPhone, parse_ipa
 from lexicon.phones import PHONES, arpabet_to_ipa
+from lexicon.values.files import read_text
 
 MAX_EQUAL_LETTERS = 20_000  # characters of CMUdict in which lines of equal letters lie (o'brien, o'neill: 6,000)
 _UNSTRESSED_TY = re.compile(r"(?<=0 )T IY2$")  # in 50 of its words, as in ability; the other 1,000 have none

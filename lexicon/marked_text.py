@@ -6,8 +6,8 @@ Positions are character indices of the spoken text, which does not contain the m
 from dataclasses import dataclass, replace
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_limits
 from lexicon.ipa import IpaPhone
+from lexicon.values.checks import check_limits
 
 RATE_LIMITS = (0.5, 2.0)  # speaking rate of marked words, as of a whole request
 VOLUME_LIMITS = (0.0, 2.0)

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_fields
 from lexicon.phones import PHONES
 from lexicon.pronounce import Pronunciation
+from lexicon.values.fields import check_fields
 
 SILENCE = "sil"  # label of segments without speech
 DOUBTFUL = 0.5  # words below this confidence

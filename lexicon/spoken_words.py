@@ -11,7 +11,6 @@ from lexicon.dictionary import Dictionary
 from lexicon.errors import InputError, SilentTextError
 from lexicon.foreign_words import make_readable
 from lexicon.g2p import DEFAULT_LANGUAGE
-from lexicon.inputs import LARGEST_TEXT_BYTES
 from lexicon.languages import language_code
 from lexicon.marked_text import MarkedText
 from lexicon.normalize import split_tokens
@@ -20,6 +19,7 @@ from lexicon.sentence_ends import split_chunks
 from lexicon.sentence_length import MAX_SENTENCE_CHARACTERS, n_letters
 from lexicon.sentences import Phrase, pronounce_words, split_sentences
 from lexicon.ssml import parse_marks
+from lexicon.values.files import LARGEST_TEXT_BYTES
 
 
 def pronounce_marked(

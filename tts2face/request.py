@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_fields, check_limits, is_number
 from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS
+from lexicon.values.checks import check_limits, is_number
+from lexicon.values.fields import check_fields
 
 FPS_LIMITS = (1.0, 120.0)
 RECOGNISED = "phones"

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_fields, check_limits, check_type
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan, concatenate_phones
+from lexicon.values.checks import check_limits, check_type
+from lexicon.values.fields import check_fields
 from tts2face.numeric.arrays import interpolate_columns
 from tts2face.request import FPS_LIMITS
 

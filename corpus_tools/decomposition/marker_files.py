@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from corpus_tools.decomposition.c3d_file import C3dFile, read_c3d_file
 from corpus_tools.recordings.sound import SOUND_RATE
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import read_table
+from lexicon.values.tables import read_table
 from tts2face.models.palette import GESTURE_FPS
 from tts2face.types import Waveform
 

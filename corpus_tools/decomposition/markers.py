@@ -21,7 +21,7 @@ from corpus_tools.decomposition.marker_face import (
 )
 from corpus_tools.decomposition.marker_files import MarkerTake, read_markers
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import read_text
+from lexicon.values.files import read_text
 from tts2face.face.deformation import rest_landmarks
 from tts2face.models.face import Face
 from tts2face.models.landmarks import N_LANDMARKS

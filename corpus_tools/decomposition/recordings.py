@@ -33,7 +33,8 @@ from corpus_tools.recordings.sound import SOUND_RATE
 from corpus_tools.recordings.video import CachedTracker
 from corpus_tools.run_options import RunOptions, map_unordered
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_fields, check_regular_file
+from lexicon.values.fields import check_fields
+from lexicon.values.files import check_regular_file
 from tts2face.face.deformation import moved_landmarks, rest_landmarks
 from tts2face.lips.performer import match_shapes
 from tts2face.models.face import Face

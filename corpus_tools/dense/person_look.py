@@ -30,7 +30,7 @@ from corpus_tools.dense.skin_colour import (
     srgb_colour,
 )
 from corpus_tools.dense.texels import find_texels
-from lexicon.inputs import check_fields
+from lexicon.values.fields import check_fields
 from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import tint_parts
 from tts2face.models.hair import EYE_COLOURS, HAIR_COLOURS, parse_eye_colour, parse_hair_colour

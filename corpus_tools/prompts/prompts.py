@@ -24,8 +24,8 @@ from corpus_tools.prompts.coverage import Coverage, RunningText, Units, count_un
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import InputError
 from lexicon.g2p import DEFAULT_LANGUAGE, check_language
-from lexicon.inputs import read_text
 from lexicon.sentence_ends import split_chunks
+from lexicon.values.files import read_text
 from tts2face.storage.files import write_atomically
 
 MIN_WORDS, MAX_WORDS = 5, 12

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import read_table
 from lexicon.normalize import normalize
+from lexicon.values.tables import read_table
 from tts2face.interchange.subtitles.reader import read_subtitles, read_text
 from tts2face.sound.word_lattice import PronouncedWords, Pronunciations
 

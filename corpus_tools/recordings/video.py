@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from lexicon.inputs import check_regular_file
+from lexicon.values.files import check_regular_file
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, FACE_OVAL
 from tts2face.storage.content_store import content_hash
 from tts2face.storage.tensors import read_kept, write_tensors

@@ -20,7 +20,7 @@ from corpus_tools.training.linear_audio_map import (
     standardised_windows,
 )
 from lexicon.errors import InputError
-from lexicon.inputs import check_fields
+from lexicon.values.fields import check_fields
 from tts2face.models.audio_map import AudioMap
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.sound.features import FEATURE_RATE, speech_features, speech_level

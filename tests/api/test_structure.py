@@ -20,11 +20,11 @@ Find = Callable[[str, str], Iterator[str]]  # of the text and the name of a modu
 # Places that start Python, outside the room of child processes, which is to start all of them.
 PROCESS_ROOM = "tts2face.processes"
 STARTS_PYTHON = ("tts2face.sound.espeak",)
-# Modules that read JSON or TOML themselves; `lexicon.inputs` does it for others.
+# Modules that read JSON or TOML themselves; `lexicon.values` does it for others.
 PARSES = (
-    "corpus_tools.head.source", "lexicon.inputs", "lexicon.part_of_speech", "tts2face.processes.message",
-    "tts2face.serving.studio.previews", "tts2face.serving.work.resources", "tts2face.serving.work.table",
-    "tts2face.sound.espeak", "tts2face.sound.espeak_child", "tts2face.storage.tensors",
+    "corpus_tools.head.source", "lexicon.part_of_speech", "lexicon.values.json_text", "lexicon.values.toml_text",
+    "tts2face.processes.message", "tts2face.serving.studio.previews", "tts2face.serving.work.resources",
+    "tts2face.serving.work.table", "tts2face.sound.espeak", "tts2face.sound.espeak_child", "tts2face.storage.tensors",
 )  # fmt: skip
 # Strings that name a module of a package above their own, or of a room of tts2face above theirs.
 NAMES_HIGHER = ()
@@ -116,7 +116,7 @@ def is_module(name: str) -> bool:
 
 COUNTS: dict[str, tuple[Find, tuple[str, ...], str]] = {
     "starts of Python": (starts_of_python, STARTS_PYTHON, f"start it in {PROCESS_ROOM}"),
-    "readers of JSON or TOML": (parsers, PARSES, "use lexicon.inputs.parse_json or a reader that exists"),
+    "readers of JSON or TOML": (parsers, PARSES, "use lexicon.values.json_text.parse_json or a reader that exists"),
     "names of higher modules": (higher_names, NAMES_HIGHER, "let the higher package or room pass what is needed"),
 }
 

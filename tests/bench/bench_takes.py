@@ -13,7 +13,7 @@ import numpy as np
 
 from corpus_tools.recordings.observe import RecordingChecker, recordings_to_check
 from corpus_tools.run_options import RunOptions
-from lexicon.inputs import read_table
+from lexicon.values.tables import read_table
 from tests.corpus_tools.build.test_browser_recordings import RATE, write_browser_file
 from tts2face.video.media import read_frames, read_sound
 

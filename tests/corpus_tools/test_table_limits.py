@@ -10,7 +10,7 @@ from corpus_tools.decomposition.markers import read_marker_set
 from corpus_tools.recordings.folder import find_recordings
 from corpus_tools.studies.evaluation.tracks import read_tracks
 from lexicon.errors import DataError
-from lexicon.inputs import LARGEST_TABLE_BYTES
+from lexicon.values.tables import LARGEST_TABLE_BYTES
 from tts2face.video.take import read_livelink
 
 

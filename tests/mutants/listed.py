@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from lexicon.inputs import parse_toml
-from lexicon.records import checked
+from lexicon.values.records import checked
+from lexicon.values.toml_text import parse_toml
 
 ROOT = Path(__file__).resolve().parents[2]
 LIST = Path(__file__).with_name("mutants.toml")

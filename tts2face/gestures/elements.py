@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_fields, check_limits
 from lexicon.marked_text import NOD_SIZE_LIMITS
+from lexicon.values.checks import check_limits
+from lexicon.values.fields import check_fields
 from tts2face.models.palette import EXPRESSIONS, FEATURES
 from tts2face.numeric.arrays import smoothstep
 

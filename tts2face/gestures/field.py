@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_fields
+from lexicon.values.fields import check_fields
 from tts2face.gestures.field_kernels import (
     MIN_MOMENT_GAP,
     SEARCH_SLACK,

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_fields
+from lexicon.values.fields import check_fields
 from tts2face.gestures.elements import (
     GAIN_NAMES,
     KINDS,

@@ -9,8 +9,10 @@ from types import GenericAlias
 from typing import Any
 
 from lexicon.errors import InputError
-from lexicon.inputs import LARGEST_JSON_BYTES, format_value, parse_json, read_text
-from lexicon.records import checked, errors_at
+from lexicon.values.checks import format_value
+from lexicon.values.files import read_text
+from lexicon.values.json_text import LARGEST_JSON_BYTES, parse_json
+from lexicon.values.records import checked, errors_at
 from tts2face.gestures.elements import KINDS, Gains, StyleSpan, check_feature
 from tts2face.gestures.timeline import ALL_FEATURES, Timeline, expand_feature, parse_style
 from tts2face.models.palette import FEATURES

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_fields
+from lexicon.values.fields import check_fields
 
 
 @dataclass(frozen=True, slots=True)

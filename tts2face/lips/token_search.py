@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from lexicon.inputs import format_value
+from lexicon.values.checks import format_value
 from tts2face.lips.tokens import MAX_CONTEXT, Tokens
 from tts2face.numeric.kernels import kernel
 

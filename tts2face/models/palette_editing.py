@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_fields
+from lexicon.values.fields import check_fields
 from tts2face.models.palette import (
     EXPRESSIONS,
     FEATURES,

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import read_json
-from lexicon.records import checked, errors_at
+from lexicon.values.json_text import read_json
+from lexicon.values.records import checked, errors_at
 from tts2face.models.landmarks import INNER_LIP_LOWER, INNER_LIP_UPPER, N_LANDMARKS
 from tts2face.photo.eyes import IRISES, EyePatch
 from tts2face.photo.lines import LID_MARGINS, N_LID, N_POINTS, InnerLips, LidLines

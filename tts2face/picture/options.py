@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_fields, is_file
+from lexicon.values.fields import check_fields
+from lexicon.values.files import is_file
 from tts2face.request import option
 
 

@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import Any
 
 from lexicon.errors import BackendError
-from lexicon.inputs import parse_json
+from lexicon.values.json_text import parse_json
 from tts2face.plugins import TOOLS, declared, load_plugin
 
 NEW_USERS, NEW_NETWORK = 0x10000000, 0x40000000  # flags of unshare in Linux's sched.h

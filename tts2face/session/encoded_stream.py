@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_fields
+from lexicon.values.fields import check_fields
 from tts2face.interchange.exports.parts import FormatWriter, FrameGrid
 from tts2face.interchange.exports.table import FormatInfo, all_formats
 from tts2face.interchange.exports.writer import ExportFile, ExportWriter, make_target, mesh_of, plan_exports

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from lexicon.inputs import check_fields
+from lexicon.values.fields import check_fields
 from tts2face.models.face_names import default_face
 
 if TYPE_CHECKING:

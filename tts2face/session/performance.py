@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_fields, check_limits
+from lexicon.values.checks import check_limits
+from lexicon.values.fields import check_fields
 from tts2face.face.body import Body
 from tts2face.numeric.arrays import interpolate_rows
 from tts2face.picture.options import Picture

@@ -11,7 +11,6 @@ import numpy as np
 from lexicon.dictionary import read_dictionary
 from lexicon.errors import InputError
 from lexicon.foreign_words import make_readable
-from lexicon.inputs import check_fields, is_file
 from lexicon.ipa import IpaPhone
 from lexicon.languages import check_readable, language_code
 from lexicon.marked_text import RATE_LIMITS, VOLUME_LIMITS, MarkedText
@@ -19,6 +18,8 @@ from lexicon.sentence_length import check_silence
 from lexicon.sentences import Sentence, split_sentences
 from lexicon.sequence import SILENCE, PhoneSequence
 from lexicon.ssml import parse_marks
+from lexicon.values.fields import check_fields
+from lexicon.values.files import is_file
 from tts2face.gestures.elements import ExpressionSpan, Gains, Listening
 from tts2face.gestures.listening import CUE_RATE, cue_times, responses
 from tts2face.gestures.timeline import Timeline, parse_expressions, parse_gains, parse_style

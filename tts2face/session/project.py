@@ -11,8 +11,8 @@ from types import MappingProxyType
 
 from lexicon.dictionary import Dictionary, parse_dictionary
 from lexicon.errors import InputError
-from lexicon.inputs import check_fields
 from lexicon.ipa import IpaPhone
+from lexicon.values.fields import check_fields
 from tts2face.gestures.elements import Gains, StyleSpan, check_feature
 from tts2face.gestures.timeline import Timeline, parse_style
 from tts2face.lips.options import ExcludedToken

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import LARGEST_JSON_BYTES, is_file, parse_json, read_text
-from lexicon.records import checked, errors_at
+from lexicon.values.files import is_file, read_text
+from lexicon.values.json_text import LARGEST_JSON_BYTES, parse_json
+from lexicon.values.records import checked, errors_at
 from tts2face.gestures.timeline_file import parse_timeline_object, timeline_json
 from tts2face.lips.options import ExcludedToken
 from tts2face.picture.options import Picture

@@ -19,7 +19,7 @@ from functools import cache
 from pathlib import Path
 
 from lexicon.errors import BackendError, InputError
-from lexicon.inputs import is_there
+from lexicon.values.files import is_there
 from tts2face.storage.temporary import Temporary
 
 SHIPPED_FOLDER = Path(__file__).parents[1] / "data"

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError, InputError
-from lexicon.inputs import parse_json
+from lexicon.values.json_text import parse_json
 from tts2face.storage.content_store import FolderStore
 from tts2face.storage.files import user_cache, write_atomically
 from tts2face.storage.schema import choice, list_of, refuse, row, text, whole

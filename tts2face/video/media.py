@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_regular_file
+from lexicon.values.files import check_regular_file
 from tts2face.types import Waveform
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import read_table
+from lexicon.values.tables import read_table
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.numeric.arrays import interpolate_columns, interpolate_linear
 from tts2face.types import HEAD_CHANNELS, Progress, Trajectory

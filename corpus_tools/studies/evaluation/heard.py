@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from corpus_tools.recordings.observation import Observation
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import parse_cell
 from lexicon.sequence import PhoneSequence
+from lexicon.values.tables import parse_cell
 from tts2face.models.talker import Talker
 from tts2face.session.recording import map_audio_to_motion
 from tts2face.sound.segments import RATE

@@ -20,8 +20,8 @@ from corpus_tools.run_options import RunOptions
 from corpus_tools.studies.evaluation.reference import ReferenceUtterance
 from corpus_tools.training.linear_audio_map import fit_ridge
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import parse_cell, read_table
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
+from lexicon.values.tables import parse_cell, read_table
 from tts2face.face.deformation import moved_landmarks
 from tts2face.lips.performer import match_shapes
 from tts2face.models.face_loading import load_face

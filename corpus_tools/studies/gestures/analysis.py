@@ -34,7 +34,7 @@ from corpus_tools.studies.gestures.measures import (
     wasserstein,
 )
 from lexicon.errors import InputError
-from lexicon.inputs import check_fields
+from lexicon.values.fields import check_fields
 from tts2face.gestures.stream import GestureFields
 from tts2face.lips.explanation import pearson
 from tts2face.models.palette import GESTURE_FPS, Palette, Style

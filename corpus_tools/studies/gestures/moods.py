@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from corpus_tools.studies.gestures.measures import find_blinks
 from corpus_tools.studies.pages import report_writer
 from lexicon.errors import BackendError, InputError
-from lexicon.inputs import check_fields
+from lexicon.values.fields import check_fields
 from tts2face.models.palette import Palette
 from tts2face.picture.options import Picture
 from tts2face.session.session import Session

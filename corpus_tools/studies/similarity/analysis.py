@@ -34,8 +34,8 @@ from corpus_tools.studies.similarity.tables import (
     viseme_classes,
 )
 from lexicon.errors import InputError
-from lexicon.inputs import check_fields
 from lexicon.phones import look_up_phone
+from lexicon.values.fields import check_fields
 from tts2face.lips.similarity import PhoneSimilarity
 from tts2face.models.talker import Talker
 from tts2face.types import Progress

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from corpus_tools.training.linear_audio_map import fit_ridge
 from lexicon.dictionary import cmudict_lookup
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import parse_cell
 from lexicon.phones import arpabet_to_ipa
 from lexicon.sequence import SILENCE
+from lexicon.values.tables import parse_cell
 from tts2face.models.landmarks import CHIN, EYE_OUTER_LEFT, EYE_OUTER_RIGHT
 from tts2face.models.talker import ShapeModel
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import read_text
+from lexicon.values.files import read_text
 from tts2face.face.deformation import build_rig, scatter_landmarks
 from tts2face.face.expressions import BLINK_SHAPES
 from tts2face.interchange.characters.shapes import VISEME_PREFIX

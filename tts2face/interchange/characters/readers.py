@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from lexicon.inputs import read_text
+from lexicon.values.files import read_text
 from tts2face.interchange.characters.character import BLEND, Character, Material, MaterialPiece, MorphTarget
 from tts2face.interchange.characters.landmarks import MAX_COORDINATE
 from tts2face.interchange.characters.meshes import MaterialReader, decode_image, read_pieces, target_names

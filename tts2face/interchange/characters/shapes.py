@@ -13,7 +13,10 @@ from importlib.resources import files
 from pathlib import Path
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_type, format_value, parse_cell, parse_toml, read_text
+from lexicon.values.checks import check_type, format_value
+from lexicon.values.files import read_text
+from lexicon.values.tables import parse_cell
+from lexicon.values.toml_text import parse_toml
 
 MAX_GAIN = 10.0
 MAX_MAPPING_BYTES = 1_000_000

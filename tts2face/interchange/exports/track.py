@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_list, check_regular_file, check_type, parse_json
 from lexicon.sequence import PhoneSequence, WordSpan
+from lexicon.values.checks import check_list, check_type
+from lexicon.values.files import check_regular_file
+from lexicon.values.json_text import parse_json
 from tts2face.interchange.exports.parts import Part, Target, frame_rows
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 

@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError
-from lexicon.inputs import check_regular_file, decode_utf8, parse_json
+from lexicon.values.files import check_regular_file, decode_utf8
+from lexicon.values.json_text import parse_json
 from tts2face.interchange.gltf.container import ALIGNMENT, BINARY_CHUNK, JSON_CHUNK, MAGIC, Fields
 from tts2face.interchange.gltf.meshopt import EXPONENTIAL, NO_FILTER, apply_exponential_filter, decode_buffer
 from tts2face.numeric.arrays import quaternion_matrix

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_regular_file
+from lexicon.values.files import check_regular_file
 from tts2face.interchange.subtitles.blocks import HAS_ARROW, read_subrip, read_substation, read_webvtt
 from tts2face.interchange.subtitles.cues import Cue, Subtitles, SubtitleWarning, WrittenCue, spoken_text
 from tts2face.interchange.subtitles.ttml import read_ttml

@@ -29,8 +29,11 @@ from types import MappingProxyType
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_fields, check_type, format_value, is_file, parse_toml, read_text
 from lexicon.languages import language_code
+from lexicon.values.checks import check_type, format_value
+from lexicon.values.fields import check_fields
+from lexicon.values.files import is_file, read_text
+from lexicon.values.toml_text import parse_toml
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import BALD

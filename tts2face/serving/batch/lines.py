@@ -12,8 +12,10 @@ from types import MappingProxyType
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_fields, check_limits, parse_cell, read_table
 from lexicon.marked_text import RATE_LIMITS
+from lexicon.values.checks import check_limits
+from lexicon.values.fields import check_fields
+from lexicon.values.tables import parse_cell, read_table
 from tts2face.storage.files import write_atomically
 
 MAX_TABLE_BYTES = 16 << 20  # 100,000 lines have 10 MB

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
-from lexicon.inputs import check_fields
 from lexicon.marked_text import RATE_LIMITS
+from lexicon.values.fields import check_fields
 from tts2face.interchange.exports.table import batch_format
 from tts2face.request import option
 

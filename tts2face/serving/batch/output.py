@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import parse_json
+from lexicon.values.json_text import parse_json
 from tts2face import __version__
 from tts2face.serving.batch.lines import LineSettings
 from tts2face.serving.batch.segment import Segment, SegmentResult, content_address, file_hash

@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import parse_toml, read_text
-from lexicon.records import checked
+from lexicon.values.files import read_text
+from lexicon.values.records import checked
+from lexicon.values.toml_text import parse_toml
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.work.usage import Name, SharedUsage, Spent
 from tts2face.storage.files import write_atomically

@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from lexicon.errors import DataError
-from lexicon.inputs import format_value, parse_json
 from lexicon.spoken_words import GrowingText
+from lexicon.values.checks import format_value
+from lexicon.values.json_text import parse_json
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import MINUTE_S, Bucket
 from tts2face.serving.service.pool import InputQueue

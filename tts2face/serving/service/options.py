@@ -18,7 +18,8 @@ from pydantic import Field
 from starlette.datastructures import UploadFile
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import check_limits, parse_toml
+from lexicon.values.checks import check_limits
+from lexicon.values.toml_text import parse_toml
 from tts2face.interchange.subtitles.reader import SUFFIXES
 from tts2face.picture.options import AUTO_SIZE, Picture, parse_size
 from tts2face.request import Request

@@ -10,8 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import EXPECTED, check_fields, check_limits, format_value, parse_toml, read_text
-from lexicon.records import checked
+from lexicon.values.checks import EXPECTED, check_limits, format_value
+from lexicon.values.fields import check_fields
+from lexicon.values.files import read_text
+from lexicon.values.records import checked
+from lexicon.values.toml_text import parse_toml
 from tts2face.storage.files import user_data
 
 PREFIX = "TTS2FACE_SERVE_"  # of environment variables: TTS2FACE_SERVE_PORT

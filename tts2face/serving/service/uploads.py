@@ -10,7 +10,7 @@ from typing import Any
 
 from starlette.datastructures import UploadFile
 
-from lexicon.inputs import parse_json
+from lexicon.values.json_text import parse_json
 from tts2face.serving.service.decoders import Decoders
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.settings import ServiceSettings

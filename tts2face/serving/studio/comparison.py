@@ -16,8 +16,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from lexicon.errors import DataError, InputError, Tts2faceError
-from lexicon.inputs import LARGEST_JSON_BYTES, check_fields, parse_json, read_text
-from lexicon.records import checked
+from lexicon.values.fields import check_fields
+from lexicon.values.files import read_text
+from lexicon.values.json_text import LARGEST_JSON_BYTES, parse_json
+from lexicon.values.records import checked
 from tts2face.request import Request
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.messages import Work

@@ -12,8 +12,8 @@ from functools import partial
 from typing import Any
 
 from lexicon.errors import InputError
-from lexicon.inputs import check_type, is_number
 from lexicon.sequence import PhoneSequence
+from lexicon.values.checks import check_type, is_number
 from tts2face.gestures.elements import KINDS, ElementKind, Nod, StyleSpan, check_feature
 from tts2face.gestures.timeline import Timeline, expand_feature
 from tts2face.lips.options import ExcludedToken

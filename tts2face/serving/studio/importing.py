@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Protocol
 
 from lexicon.errors import InputError
-from lexicon.inputs import parse_json
+from lexicon.values.json_text import parse_json
 from tts2face.gestures.elements import StyleSpan
 from tts2face.gestures.timeline import Timeline
 from tts2face.interchange.subtitles.reader import SUFFIXES, read_subtitles

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import read_json
+from lexicon.values.json_text import read_json
 from tts2face.storage.files import translate_disk_errors, write_atomically
 
 ID = re.compile(r"[0-9a-f]{16}")

@@ -12,7 +12,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
+from lexicon.values.files import read_text
+from lexicon.values.json_text import LARGEST_JSON_BYTES, parse_json
 from tts2face.processes.program import ProcessLimits, Program
 from tts2face.processes.tools import run_tool
 from tts2face.serving.service.errors import RefusedError

@@ -28,7 +28,8 @@ from typing import Any
 
 from lexicon.dictionary import parse_dictionary
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
+from lexicon.values.files import read_text
+from lexicon.values.json_text import LARGEST_JSON_BYTES, parse_json
 from tts2face import __version__
 from tts2face.models.palette import Palette, load_palette, write_palette
 from tts2face.serving.studio.editing import History, Step

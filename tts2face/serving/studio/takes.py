@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from lexicon.errors import DataError, InputError
-from lexicon.inputs import read_json
+from lexicon.values.json_text import read_json
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.studio.importing import StudioHost, add_recording

@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from lexicon.errors import InputError, Tts2faceError
-from lexicon.inputs import LARGEST_JSON_BYTES, parse_json, read_text
+from lexicon.values.files import read_text
+from lexicon.values.json_text import LARGEST_JSON_BYTES, parse_json
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import in_background
 from tts2face.serving.service.logs import log_event

@@ -171,7 +171,7 @@ def is_of_photo(photograph: object | None, metadata: Mapping[str, Any]) -> bool:
 
 def _check_character(source: Path, out: Path) -> dict[str, Any]:
     """Make a face of a character whose file holds everything that it needs, with the mapping that is sent with it."""
-    from lexicon.inputs import read_json
+    from lexicon.values.json_text import read_json
     from tts2face.interchange.characters.importing import import_face
     from tts2face.models.face_file import write_face
 
@@ -191,7 +191,7 @@ def _check_character(source: Path, out: Path) -> dict[str, Any]:
 
 def _check_photo(source: Path, out: Path) -> dict[str, Any]:
     """Make a face that speaks in a photo."""
-    from lexicon.inputs import parse_json
+    from lexicon.values.json_text import parse_json
     from tts2face.models.face_file import write_face
     from tts2face.photo.face_from_photo import face_from_photo
     from tts2face.photo.fit import parse_fit
@@ -214,7 +214,7 @@ def read_statement(photo: Path) -> dict[str, Any]:
     DataError
         It has too many pixels.
     """
-    from lexicon.inputs import read_json
+    from lexicon.values.json_text import read_json
     from tts2face.photo.photograph import open_photograph
 
     stated: dict[str, Any] = read_json(photo.with_name(STATEMENT))
@@ -267,7 +267,7 @@ def _check_palette(source: Path, out: Path) -> dict[str, Any]:
 
 def _check_dictionary(source: Path, out: Path) -> dict[str, Any]:
     from lexicon.dictionary import parse_dictionary
-    from lexicon.inputs import read_text
+    from lexicon.values.files import read_text
 
     text = read_text(source)
     entries = parse_dictionary(text, "the dictionary").entries

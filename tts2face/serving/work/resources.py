@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from lexicon.inputs import parse_json
+from lexicon.values.json_text import parse_json
 from tts2face.serving.work.blobs import BlobStore
 from tts2face.serving.work.connection import JobDatabase, Transaction, create_tables
 from tts2face.serving.work.resource_check import CONTENT, DESCRIPTION, PICTURE

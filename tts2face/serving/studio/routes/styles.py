@@ -8,8 +8,8 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import FileResponse, Response
 
 from lexicon.errors import InputError
-from lexicon.inputs import parse_json
-from lexicon.records import checked
+from lexicon.values.json_text import parse_json
+from lexicon.values.records import checked
 from tts2face.models.palette_editing import StyleMix
 from tts2face.serving.service.exchange import STYLES
 from tts2face.serving.studio.recordings import SUFFIXES

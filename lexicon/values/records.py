@@ -13,7 +13,7 @@ from types import GenericAlias, MappingProxyType, NoneType
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from lexicon.errors import DataError, InputError, Tts2faceError
-from lexicon.inputs import EXPECTED, format_value
+from lexicon.values.checks import EXPECTED, format_value
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import pytest
 
 from lexicon.errors import DataError, InputError
-from lexicon.records import checked, errors_at
+from lexicon.values.records import checked, errors_at
 
 
 @dataclass(frozen=True, slots=True)
