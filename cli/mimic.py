@@ -98,7 +98,8 @@ def _divide_outputs(out: Path | None, export: list[str] | None) -> tuple[Path | 
 def _run_live_window(source: str, models: "Models", picture: "Picture", model: Path | None) -> None:
     """Show a head that follows the person in front of a camera, until the window is closed."""
     from tts2face.models.face_loading import load_face
-    from tts2face.picture.window import LiveWindow, require_display
+    from tts2face.picture.display import require_display
+    from tts2face.picture.window import LiveWindow
     from tts2face.session.live import CALIBRATION_S, LiveCapture
     from tts2face.video.streaming import CaptureDevice
 

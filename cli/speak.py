@@ -128,7 +128,7 @@ def _check_options(request: Request, picture: Picture, options: SpeakOptions) ->
     if options.view:
         if options.models.face == OWN_FACE:
             raise InputError("--view cannot show the talker's own face; remove it, or use --face head")
-        from tts2face.picture.window import require_display
+        from tts2face.picture.display import require_display
 
         require_display("--view")
 

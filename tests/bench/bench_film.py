@@ -1,5 +1,5 @@
-"""Processor time of a frame of a face with baked light, by stage, beside the renderer with lamps and VTK's software
-renderer on the same face, view and poses: python tests/bench/bench_film.py [face] [frames].
+"""Processor time of a frame of a face with baked light, by stage, beside the renderer with lamps on the same face,
+view and poses: python tests/bench/bench_film.py [face] [frames].
 """
 
 import sys
@@ -10,14 +10,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from bench_renderers import clip_of
+from bench_render import clip_of
 
-from lexicon.errors import BackendError
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.numeric.reuse import available_cores
 from tts2face.picture.baked import scene as film
-from tts2face.picture.options import PYVISTA, Picture
+from tts2face.picture.options import Picture
 from tts2face.picture.renderer import MeshRenderer, mesh_renderer
 
 STAGES = {  # of a frame, and the functions of `tts2face.picture.baked.scene` that it calls
@@ -30,7 +29,7 @@ STAGES = {  # of a frame, and the functions of `tts2face.picture.baked.scene` th
     "eyes": ("colour_eyes",),
     "composing": ("compose",),
 }
-ROUNDS, VTK_FRAMES = 5, 12
+ROUNDS = 5
 
 
 def timed(function: Callable[..., Any], spent: Counter[str], name: str) -> Callable[..., Any]:
@@ -96,11 +95,6 @@ def main() -> None:
         print(f"| {stage} | {spent:.1f} |")
     own, other = milliseconds(lit, clip), milliseconds(lamps, clip)
     print(f"| baked light, all | {own:.1f} |\n| lamps | {other:.1f}, {other / own:.1f} times as much |")
-    try:
-        theirs = milliseconds(mesh_renderer(plain, Picture(renderer=PYVISTA)), clip_of(plain, VTK_FRAMES))
-        print(f"| VTK's software renderer (pyvista), light at vertices | {theirs:.1f}, {theirs / own:.1f} times |")
-    except BackendError as missing:
-        print(f"| VTK | {missing} |")
     for size in ("512x512", "1920x1080"):
         print(f"| frames a second on {available_cores()} cores, {size} | {rate(face, clip, Picture(size=size)):.0f} |")
 

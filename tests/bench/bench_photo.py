@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from bench_film import milliseconds, rate
-from bench_renderers import clip_of
+from bench_render import clip_of
 from numpy.typing import NDArray
 from PIL import Image
 

@@ -9,15 +9,28 @@ import time
 from pathlib import Path
 
 import numpy as np
-from bench_renderers import clip_of
 
+from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.face_loading import load_face
 from tts2face.numeric.reuse import available_cores
 from tts2face.picture.film import write_clips
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
+from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 SIZES = ("256x256", "512x512", "1280x720", "1920x1080")
+FPS, RATE = 30, 24_000
+
+
+def clip_of(face, n_frames):
+    """A jaw that opens and closes and a head that turns."""
+    motion = np.zeros((n_frames, len(face.shape_names)))
+    motion[:, face.shape_names.index("jawOpen")] = 0.3 + 0.3 * np.sin(np.arange(n_frames) / 3)
+    head = np.zeros((n_frames, len(HEAD_CHANNELS)))
+    head[:, 1] = 0.1 * np.sin(np.arange(n_frames) / 9)
+    n_samples = n_frames * RATE // FPS
+    speech = Speech(Waveform(np.zeros(n_samples), RATE), PhoneSequence((SILENCE,), np.array([0, n_samples / RATE])), ())
+    return Clip(Trajectory(face.shape_names, motion, FPS), Trajectory(HEAD_CHANNELS, head, FPS), speech)
 
 
 def reference_s() -> float:

@@ -47,7 +47,7 @@ def test_every_option_changes_the_picture(option):
 
 
 def test_every_option_is_tested():
-    assert {option.name for option in fields(Picture)} == set(OTHERS) | {"renderer"}  # both renderers: test_vtk.py
+    assert {option.name for option in fields(Picture)} == set(OTHERS) | {"renderer"}  # of which there is one
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

@@ -68,9 +68,10 @@ def test_supersampling_out_of_range_is_refused(supersampling):
         Picture(supersampling=supersampling)
 
 
-def test_an_unknown_renderer_is_refused():
-    with pytest.raises(InputError, match="choose numba or pyvista"):
-        Picture(renderer="gl")
+@pytest.mark.parametrize("name", ["gl", "pyvista"])
+def test_another_renderer_is_refused(name):
+    with pytest.raises(InputError, match=f"no renderer '{name}'; numba draws every picture: remove --renderer"):
+        Picture(renderer=name)
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,12 @@ class CameraMatrices:
     view: NDArray[np.float64]
     lens: NDArray[np.float64]
 
+    @property
+    def yaw_deg(self) -> float:
+        """Where the camera stands round the head, positive towards the face's own left."""
+        ahead = self.view[2]
+        return math.degrees(math.atan2(-ahead[0], -ahead[2]))
+
     def scaled(self, share: float) -> "CameraMatrices":
         """The same camera for a picture of `share` times as many samples on each side."""
         return CameraMatrices(self.view, self.lens * [share, share, share, 1.0])

@@ -70,7 +70,7 @@ AUTO_SIZE, DEFAULT_SIZE = "auto", (512, 512)
 SUPERSAMPLING_FACTORS = (1, 2, 3)
 DRAFT, STANDARD, HIGH = QUALITIES = ("draft", "standard", "high")
 HIGH_SUPERSAMPLING = 3
-NUMBA, PYVISTA = RENDERERS = ("numba", "pyvista")
+NUMBA = "numba"
 STUDIO, TRANSPARENT, BLUR = "studio", "transparent", "blur"
 COLOURS = {
     "black": "000000", "white": "ffffff", "grey": "808080", "gray": "808080", "red": "c8282d", "green": "00b140",
@@ -104,9 +104,7 @@ class Picture:
         "draft (one sample a pixel, no light under the skin), standard, or high (3 x 3 samples in every pixel).",
         choices=QUALITIES,
     )
-    renderer: str = option(
-        "numba", "numba (any machine) or pyvista (VTK, with a GPU or software GL).", choices=RENDERERS
-    )
+    renderer: str = option(NUMBA, "numba, which draws every picture on any machine.", choices=(NUMBA,))
     visible_mark: bool = option(False, "Write the word synthetic into the lower right corner of clips.")
 
     def __post_init__(self) -> None:
@@ -119,8 +117,8 @@ class Picture:
             raise InputError(f"supersampling must be 1, 2 or 3, not {self.supersampling}")
         if self.quality not in QUALITIES:
             raise InputError(f"there is no quality {self.quality!r}; choose {', '.join(QUALITIES)}")
-        if self.renderer not in RENDERERS:
-            raise InputError(f"there is no renderer {self.renderer!r}; choose numba or pyvista")
+        if self.renderer != NUMBA:
+            raise InputError(f"there is no renderer {self.renderer!r}; numba draws every picture: remove --renderer")
 
     @property
     def width(self) -> int:

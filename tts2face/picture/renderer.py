@@ -18,8 +18,8 @@ from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face import Face
 from tts2face.numeric.reuse import map_in_order
 from tts2face.picture.baked.scene import LitScene, build_lit_scene
-from tts2face.picture.camera import camera_matrices
-from tts2face.picture.options import PYVISTA, STANDARD, STUDIO, Picture
+from tts2face.picture.camera import CameraMatrices, camera_matrices
+from tts2face.picture.options import STANDARD, STUDIO, Picture
 from tts2face.picture.scene import Scene, build_scene, draw_background
 from tts2face.types import Clip
 
@@ -173,11 +173,6 @@ class MeshRenderer:
         values = self._weights(clip)
         chosen = range(len(values)) if numbers is None else numbers
         poses = ((values[number], clip.head.values[number]) for number in chosen)
-        if self.picture.renderer == PYVISTA and isinstance(self.scene, Scene):
-            from tts2face.picture.vtk_renderer import render_frames
-
-            yield from render_frames(self.scene, poses)
-            return
         yield from map_in_order(lambda pose: self._draw(*pose), poses, threads)
 
     def frame(self, clip: Clip, number: int) -> NDArray[np.uint8]:
@@ -195,18 +190,16 @@ class MeshRenderer:
         n_shapes = len(self.scene.face.shape_names)
         if np.shape(weights) != (n_shapes,):
             raise InputError(f"the face has {n_shapes} shapes, not weights of shape {np.shape(weights)}")
-        pose = np.asarray(weights, np.float32), np.asarray(head, np.float32)
-        if self.picture.renderer == PYVISTA and isinstance(self.scene, Scene):
-            from tts2face.picture.vtk_renderer import render_frames
+        return self._draw(np.asarray(weights, np.float32), np.asarray(head, np.float32))
 
-            (pixels,) = render_frames(self.scene, [pose])
-            return pixels
-        return self._draw(*pose)
+    def seen_by(self, optics: CameraMatrices) -> "MeshRenderer":
+        """Renderer of the same face in pictures of another camera; a photograph has only its own."""
+        return MeshRenderer(self.scene.seen_by(optics), self.buffers)
 
     def with_fewest_samples(self) -> "MeshRenderer":
         """Renderer with one sample a pixel."""
         fewest = replace(self.picture, supersampling=1, quality=STANDARD)
-        if self.picture.renderer == PYVISTA or fewest.samples == self.picture.samples:
+        if fewest.samples == self.picture.samples:
             return self
         return MeshRenderer(self.scene.with_picture(fewest))
 
@@ -241,18 +234,12 @@ def mesh_renderer(face: Face, picture: Picture) -> MeshRenderer:
     ------
     InputError
         The picture asks for what a photograph does not show.
-    BackendError
-        The renderer that the picture names is not available on this machine.
     """
     if face.photograph is not None:
         from tts2face.picture.baked.photo_scene import build_photo_scene
 
         return MeshRenderer(build_photo_scene(face, face.photograph, picture))
-    if picture.renderer == PYVISTA:
-        from tts2face.picture.vtk_renderer import require_gl
-
-        require_gl()
-    elif face.light:
+    if face.light:
         background = draw_background(picture, face.light[0].backdrop)
         optics = camera_matrices(picture.view, face, picture.samples)
         return MeshRenderer(build_lit_scene(face, picture, optics, background))

@@ -50,6 +50,12 @@ class Scene:
         share = picture.samples_per_side / self.picture.samples_per_side
         return replace(self, picture=picture, optics=self.optics.scaled(share))
 
+    def seen_by(self, optics: CameraMatrices) -> "Scene":
+        """The same scene from another camera, before lamps that stay where they are."""
+        lights = light_table(lamp_directions(self.picture.view), optics)
+        surface = build_surface(self.face, scatters=self.picture.quality != DRAFT)  # another camera may see its backs
+        return replace(self, surface=surface, optics=optics, lights=lights)
+
     def pose(self, weights: NDArray[np.float32], head: NDArray[np.float32]) -> Pose:
         """The face with shape weights (K,) and a head pose (6,), lit."""
         surface, view = self.surface, self.optics.view

@@ -1,34 +1,26 @@
-"""Window that plays a clip in real time: the mouse turns the camera, space restarts, q closes."""
+"""Window that plays a clip in real time: the mouse turns the camera, space restarts, q closes.
 
-import os
-import sys
+It shows the pictures of `tts2face.picture.renderer` for its camera, so that a face has the light that it has in files.
+"""
+
+import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import BackendError, InputError
+from lexicon.errors import InputError
 from tts2face.models.face import Face
-from tts2face.numeric.reuse import available_cores
-from tts2face.picture.camera import CameraMatrices, camera_matrices
-from tts2face.picture.kernels.tables import lamp_directions, light_table
-from tts2face.picture.light import compute_exposure
-from tts2face.picture.options import Picture, parse_background
-from tts2face.picture.surface import build_surface
-from tts2face.picture.vtk_renderer import (
-    ON_SCREEN,
-    PlottedFace,
-    aim_camera,
-    can_draw_with,
-    require_pyvista,
-    use_window_class,
-)
+from tts2face.picture.camera import CameraMatrices
+from tts2face.picture.display import require_display, use_window_class
+from tts2face.picture.options import SIDE_LIMITS_PX, STUDIO, Picture
+from tts2face.picture.renderer import MeshRenderer, mesh_renderer
 from tts2face.types import HEAD_CHANNELS, Clip
 
-WALL, WALL_TOP = "#3a4049", "#7d8793"  # gradient of the background unless the picture has a colour
 TICK_MS = 10  # interval of the timer
 
 
@@ -52,25 +44,14 @@ def show_clip(clip: Clip, face: Face, picture: Picture) -> None:
         player.close()
 
 
-def require_display(purpose: str) -> None:
-    """Check that a window can be opened on this machine.
-
-    Raises
-    ------
-    BackendError
-        There is no display, or VTK cannot open a window on it; the message begins with `purpose`.
-    """
-    require_pyvista(purpose)
-    is_linux = sys.platform.startswith("linux")
-    if is_linux and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise BackendError(
-            f"{purpose} opens a window, and this machine has no display; write a file with --out clip.mp4"
-        )
-    if not can_draw_with(ON_SCREEN):
-        raise BackendError(
-            "VTK cannot open a window on this display (it needs X11 or XWayland, and OpenGL 3.2); "
-            "write a file with --out clip.mp4"
-        )
+def aim_camera(camera: Any, optics: CameraMatrices, height: int) -> None:
+    """Set a camera of pyvista from camera matrices for pictures of `height` samples."""
+    view = optics.view
+    place = -view[:, :3].T @ view[:, 3]
+    camera.position = tuple(place)
+    camera.focal_point = tuple(place + max(float(view[2, 3]), 1.0) * view[2, :3])  # at the depth of the origin
+    camera.up = tuple(-view[1, :3])
+    camera.view_angle = math.degrees(2 * math.atan(height / 2 / float(optics.lens[0])))
 
 
 def camera_matrix(camera: Any) -> NDArray[np.float64]:
@@ -85,17 +66,23 @@ class HeadWindow(ABC):
 
     def __init__(self, face: Face, picture: Picture) -> None:
         import pyvista
+        from vtkmodules.vtkRenderingCore import vtkActor2D, vtkImageMapper
 
-        self._surface, self._lamps = build_surface(face), lamp_directions(picture.view)
-        self._exposure = compute_exposure(face, self._surface, self._lamps, available_cores())
-        self._optics = camera_matrices(picture.view, face, (picture.width, picture.height))
-        with use_window_class(ON_SCREEN):
+        self._face = face
+        self._picture = replace(picture, background=STUDIO) if picture.is_transparent else picture
+        self._renderer = mesh_renderer(face, self._picture)
+        with use_window_class():
             self.plotter: Any = pyvista.Plotter(
                 window_size=[picture.width, picture.height], lighting="none", title="tts2face"
             )
-        self._paint_wall(picture)
-        self._head = PlottedFace(self._surface, self.plotter)
-        aim_camera(self.plotter, self._optics, picture.height)
+        self._mapper: Any = vtkImageMapper()
+        self._mapper.SetColorWindow(255.0)  # 8-bit levels as they are
+        self._mapper.SetColorLevel(127.5)
+        wall = vtkActor2D()
+        wall.SetMapper(self._mapper)
+        self.plotter.add_actor(wall, reset_camera=False)
+        optics = self._renderer.scene.optics
+        aim_camera(self.plotter.camera, optics, self._renderer.picture.samples[1])
 
     def run(self) -> None:
         """Call `tick` at every timer interval until the window is closed."""
@@ -107,26 +94,32 @@ class HeadWindow(ABC):
         """Pose the head for the present instant; returns whether the picture changed."""
 
     def pose(self, weights: NDArray[np.floating], head: NDArray[np.floating]) -> None:
-        """Pose the head by shape weights (K,) and head pose (6,), lit for the present camera."""
-        view = camera_matrix(self.plotter.camera)
-        lights = light_table(self._lamps, CameraMatrices(view, self._optics.lens))
-        self._head.show(self._surface.rig.pose(weights, head), view, (lights, self._exposure.at(weights)))
+        """Show the head with shape weights (K,) and head pose (6,), as the present camera sees it."""
+        import pyvista
+
+        pixels = self._seen().draw(weights, head)
+        height, width, channels = pixels.shape
+        image = pyvista.ImageData(dimensions=(width, height, 1))
+        image.point_data["picture"] = pixels[::-1].reshape(-1, channels)  # VTK's first row is the lowest
+        self._mapper.SetInputData(image)
 
     def close(self) -> None:
         """Close the window."""
         self.plotter.close()
 
+    def _seen(self) -> MeshRenderer:
+        """Renderer of pictures in the window's present size from its present camera."""
+        least, most = SIDE_LIMITS_PX
+        width, height = (min(max(side - side % 2, least), most) for side in self.plotter.window_size)
+        if (width, height) != (self._picture.width, self._picture.height):
+            self._picture = replace(self._picture, size=f"{width}x{height}")
+            self._renderer = mesh_renderer(self._face, self._picture)
+        lens = self._renderer.scene.optics.lens
+        return self._renderer.seen_by(CameraMatrices(camera_matrix(self.plotter.camera), lens))
+
     def _tick(self, _step: int) -> None:
         if self.tick():
             self.plotter.render()
-
-    def _paint_wall(self, picture: Picture) -> None:
-        self.plotter.enable_anti_aliasing("msaa", multi_samples=4)
-        kind = parse_background(picture.background)
-        if isinstance(kind, tuple):
-            self.plotter.set_background(tuple(value / 255 for value in kind))
-        else:
-            self.plotter.set_background(WALL, top=WALL_TOP)
 
 
 class ClipPlayer(HeadWindow):
@@ -134,9 +127,11 @@ class ClipPlayer(HeadWindow):
 
     def __init__(self, clip: Clip, face: Face, picture: Picture) -> None:
         super().__init__(face, picture)
+        n_missing = len(face.shape_names) - len(clip.motion.channels)
+        self._weights = np.pad(clip.motion.values, ((0, 0), (0, n_missing)))
         self._clip = clip
         self.plotter.add_key_event("space", self.restart)
-        self._last_state: tuple[int, int] | None = None
+        self._last_state: tuple[int, ...] | None = None
         self.restart()
 
     def run(self) -> None:
@@ -156,11 +151,11 @@ class ClipPlayer(HeadWindow):
     def show_at(self, seconds: float) -> bool:
         """Show the frame at an instant of the clip in seconds; returns whether the picture changed."""
         frame = min(int(seconds * self._clip.fps), len(self._clip.motion) - 1)
-        state = frame, int(self.plotter.camera.GetMTime())
+        state = frame, int(self.plotter.camera.GetMTime()), *self.plotter.window_size
         if state == self._last_state:
             return False
         self._last_state = state
-        self.pose(self._clip.motion.values[frame], self._clip.head.values[frame])
+        self.pose(self._weights[frame], self._clip.head.values[frame])
         return True
 
 

@@ -10,7 +10,7 @@ from tts2face.models.face import Face, PhotoView
 from tts2face.picture.baked.cut_out import moving_pixels, page_covers, without_background
 from tts2face.picture.baked.scene import LitScene, build_lit_scene
 from tts2face.picture.camera import photo_crop, photo_matrices
-from tts2face.picture.options import AUTO_SIZE, BLUR, PYVISTA, SIDE_LIMITS_PX, STUDIO, Picture
+from tts2face.picture.options import AUTO_SIZE, BLUR, SIDE_LIMITS_PX, STUDIO, Picture
 from tts2face.picture.scene import draw_background
 
 BLUR_MM = 12.0  # standard deviation, where the person is
@@ -52,8 +52,6 @@ def build_photo_scene(face: Face, view: PhotoView, picture: Picture) -> LitScene
 
 def _check(face: Face, view: PhotoView, picture: Picture) -> None:
     """Refuse what a photograph does not show; errors as `build_photo_scene`."""
-    if picture.renderer == PYVISTA:
-        raise InputError("a photograph is drawn by the renderer numba; remove --renderer pyvista")
     if view.alpha is None and picture.background != STUDIO:
         raise InputError(
             "the person in the photograph was not told from its background, which stays; remove --background, or give "

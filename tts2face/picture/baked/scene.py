@@ -176,6 +176,11 @@ class LitScene:
         optics = self.optics.scaled(picture.samples_per_side / self.picture.samples_per_side)
         return replace(self, picture=picture, optics=optics, camera=_camera(optics))
 
+    def seen_by(self, optics: CameraMatrices) -> "LitScene":
+        """The same scene from another camera."""
+        from_camera = _from_camera(self.surface.light, optics.yaw_deg)
+        return replace(self, optics=optics, camera=_camera(optics), from_camera=from_camera)
+
     def allocate_buffers(self) -> LitBuffers:
         """Buffers for pictures of this scene."""
         light, surface, picture = self.surface.light, self.surface, self.picture
