@@ -22,7 +22,8 @@ PROCESS_ROOM = "tts2face.processes"
 STARTS_PYTHON = ("tts2face.sound.espeak",)
 # Modules that read JSON or TOML themselves; `lexicon.values` does it for others.
 PARSES = (
-    "corpus_tools.head.source", "lexicon.part_of_speech", "lexicon.values.json_text", "lexicon.values.toml_text",
+    "corpus_tools.shipped.head.source", "lexicon.part_of_speech", "lexicon.values.json_text",
+    "lexicon.values.toml_text",
     "tts2face.processes.message", "tts2face.serving.studio.previews", "tts2face.serving.work.resources",
     "tts2face.serving.work.table", "tts2face.sound.espeak", "tts2face.sound.espeak_child", "tts2face.storage.tensors",
 )  # fmt: skip

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from sentences import sentences
 
 from corpus_tools.recordings.folder import read_word_times
-from corpus_tools.training.damage import babble, coded, speech_power, stationary_noise, with_echo
-from corpus_tools.training.spoken_material import resampled
+from corpus_tools.shipped.training.damage import babble, coded, speech_power, stationary_noise, with_echo
+from corpus_tools.shipped.training.spoken_material import resampled
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan
 from tts2face.sound.alignment import LEAST_FIT, Aligner
 from tts2face.sound.segments import RATE

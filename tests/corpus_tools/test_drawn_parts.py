@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from corpus_tools.drawn.build_drawn import CAST
-from corpus_tools.drawn.character import CharacterColours, DrawnCharacter, Hairstyle
-from corpus_tools.drawn.fields import (
+from corpus_tools.shipped.drawn.build_drawn import CAST
+from corpus_tools.shipped.drawn.character import CharacterColours, DrawnCharacter, Hairstyle
+from corpus_tools.shipped.drawn.fields import (
     COLLAR,
     MARGIN,
     SHIRT,
@@ -19,7 +19,7 @@ from corpus_tools.drawn.fields import (
     smooth_line,
     wind_outward,
 )
-from corpus_tools.drawn.hair import (
+from corpus_tools.shipped.drawn.hair import (
     LOWEST_DEG,
     MIDDLE,
     N_DOWN,
@@ -31,11 +31,11 @@ from corpus_tools.drawn.hair import (
     on_volume,
     other_palettes,
 )
-from corpus_tools.drawn.paint import _brow_hairs, paint_eye
-from corpus_tools.drawn.sculpt import apply_proportions
-from corpus_tools.drawn.worn import HAIRCUTS, _roll, comb, cut, grow, lay_closer
-from corpus_tools.head.mesh import grid_triangles
-from corpus_tools.head.skin import HeadSkin
+from corpus_tools.shipped.drawn.paint import _brow_hairs, paint_eye
+from corpus_tools.shipped.drawn.sculpt import apply_proportions
+from corpus_tools.shipped.drawn.worn import HAIRCUTS, _roll, comb, cut, grow, lay_closer
+from corpus_tools.shipped.head.mesh import grid_triangles
+from corpus_tools.shipped.head.skin import HeadSkin
 from lexicon.errors import DataError
 from tests.face.people import DRAWN
 from tts2face.models.face_loading import load_face

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.head.cards import LINE_Y, MIDDLE, Cards, StrandStyle, flat_relief, hair_share
-from corpus_tools.head.haircut import (
+from corpus_tools.shipped.head.cards import LINE_Y, MIDDLE, Cards, StrandStyle, flat_relief, hair_share
+from corpus_tools.shipped.head.haircut import (
     ROOT_MM,
     SUNK_MM,
     border_points,

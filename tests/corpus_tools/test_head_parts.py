@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from corpus_tools.dense.texels import find_texels
-from corpus_tools.head import source
-from corpus_tools.head.build_head import PRESETS
-from corpus_tools.head.head import TABLE, Sheet, add_targets, clip_sheet, modelling_targets
-from corpus_tools.head.mesh import fit_rotation, fit_sphere, layout_coordinates
-from corpus_tools.head.mouth import LOWER, UPPER, arch_piece
+from corpus_tools.shipped.head import source
+from corpus_tools.shipped.head.build_head import PRESETS
+from corpus_tools.shipped.head.head import TABLE, Sheet, add_targets, clip_sheet, modelling_targets
+from corpus_tools.shipped.head.mesh import fit_rotation, fit_sphere, layout_coordinates
+from corpus_tools.shipped.head.mouth import LOWER, UPPER, arch_piece
 from lexicon.errors import DataError
 
 OBJ = """v 0 0 0

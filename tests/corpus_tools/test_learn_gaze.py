@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from corpus_tools.shipped.training.gaze import estimate, fit_lognormal, learn_gaze
 from corpus_tools.studies.gestures.gaze import compare, made_person, study_gaze, survival
-from corpus_tools.training.gaze import estimate, fit_lognormal, learn_gaze
 from corpus_tools.training.gaze_recordings import Fixations, Lengths, find_looks, jump_sizes, read_people
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.gesture_study.made_gaze import write_people

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from corpus_tools.drawn.build_drawn import CAST
-from corpus_tools.drawn.worn import HAIRCUTS
-from corpus_tools.make_models import __main__ as make_models
+from corpus_tools.shipped import make_models
+from corpus_tools.shipped.drawn.build_drawn import CAST
+from corpus_tools.shipped.drawn.worn import HAIRCUTS
 from tts2face.models.face_names import OF_FACE
 from tts2face.models.palette import load_palette
 from tts2face.models.talker import load_talker
@@ -18,7 +18,7 @@ from tts2face.storage.files import SHIPPED_FOLDER
 
 def test_derived_styles_are_made_as_they_are_shipped(tmp_path: Path) -> None:
     path = Path(shutil.copy(SHIPPED_FOLDER / "starter.palette", tmp_path))
-    command = [sys.executable, "-m", "corpus_tools.make_models", "styles", "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "corpus_tools.shipped.make_models", "styles", "--out", str(tmp_path)]
     subprocess.run(command, check=True, capture_output=True)
     assert path.read_bytes() == (SHIPPED_FOLDER / "starter.palette").read_bytes()
 

@@ -2,7 +2,7 @@
 
 A person in a state (speaking, listening) is a `GazeHabit`: log-normal distributions of the lengths of looks and
 fixations and of how far they go, and shares of directions. People differ several times over, so that the file holds a
-normal distribution of the parameters over people. `corpus_tools.training.gaze` learns it.
+normal distribution of the parameters over people. `corpus_tools.shipped.training.gaze` learns it.
 """
 
 import math

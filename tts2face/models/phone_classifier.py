@@ -2,7 +2,7 @@
 
 One hidden layer of rectified linear units over features of a window around each frame: of the spectrum for a voice
 (``heart``), also of what a recogniser hears for recordings of anybody (``recordings``).
-`corpus_tools.training.phone_classifier` trains both.
+`corpus_tools.shipped.training.phone_classifier` trains both.
 """
 
 from dataclasses import dataclass

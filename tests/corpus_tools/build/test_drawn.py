@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.drawn.build_drawn import BODY_SHAPES, CAST, drawn_face
+from corpus_tools.shipped.drawn.build_drawn import BODY_SHAPES, CAST, drawn_face
 from tests.interchange.characters.makehuman import makehuman
 from tts2face.face.body import BREATH_SHAPE
 from tts2face.face.deformation import landmark_motion, landmark_positions

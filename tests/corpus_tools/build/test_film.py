@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from corpus_tools.drawn.build_drawn import CAST, drawn_face, face_masks
-from corpus_tools.drawn.hair import OtherHair
-from corpus_tools.film.compare import View, differences, draw_view
-from corpus_tools.film.fit_light import fit_light
-from corpus_tools.film.look import LAMPS, Look
-from corpus_tools.film.poses import EXPRESSIONS, LitPose, PoseLight, expression_pose, farthest
+from corpus_tools.shipped.drawn.build_drawn import CAST, drawn_face, face_masks
+from corpus_tools.shipped.drawn.hair import OtherHair
+from corpus_tools.shipped.film.compare import View, differences, draw_view
+from corpus_tools.shipped.film.fit_light import fit_light
+from corpus_tools.shipped.film.look import LAMPS, Look
+from corpus_tools.shipped.film.poses import EXPRESSIONS, LitPose, PoseLight, expression_pose, farthest
 from tests.interchange.characters.makehuman import makehuman
 from tts2face.models.baked_light import table_levels
 from tts2face.models.face_file import read_face, write_face
@@ -38,7 +38,7 @@ def scene() -> Any:
     """The drawn woman before the camera."""
     if find_spec("bpy") is None:
         pytest.skip("Blender's package bpy is not installed")
-    from corpus_tools.film.scene import FilmScene
+    from corpus_tools.shipped.film.scene import FilmScene
 
     source, character = makehuman(), CAST["ada"]
     face = drawn_face(source, character)
@@ -66,7 +66,7 @@ def test_a_character_is_traced_in_its_light(scene: Any, tmp_path: Path) -> None:
 
 
 def test_light_is_baked_into_texels_and_vertices(scene: Any) -> None:
-    from corpus_tools.film.bake import TexelBake, bake_vertices, displayed, view_table
+    from corpus_tools.shipped.film.bake import TexelBake, bake_vertices, displayed, view_table
 
     scene.pose(np.zeros(len(scene.face.shape_names)), np.zeros(6))
     skin = TexelBake(scene, ["skin"], SIDE).light(SAMPLES)
@@ -85,7 +85,7 @@ def test_light_is_baked_into_texels_and_vertices(scene: Any) -> None:
 
 
 def test_a_character_is_drawn_in_its_baked_light(scene: Any, tmp_path: Path) -> None:
-    from corpus_tools.film.bake import Effort, bake_poses
+    from corpus_tools.shipped.film.bake import Effort, bake_poses
 
     face, still = scene.face, np.zeros(6, np.float32)
     shown = {"rest": {}, **{name: EXPRESSIONS[name] for name in ("a", "smile", "blink")}}

@@ -209,7 +209,9 @@ def test_the_paper_s_six_moods_are_derived() -> None:
 def test_the_shipped_palette_has_the_derived_styles_of_the_table() -> None:
     shipped = load_palette("starter")
     (recorded,) = shipped.styles
-    assert shipped.derivations == read_derived_styles(recorded), "run: python -m corpus_tools.make_models styles"
+    assert shipped.derivations == read_derived_styles(recorded), (
+        "run: python -m corpus_tools.shipped.make_models styles"
+    )
 
 
 @pytest.mark.parametrize(

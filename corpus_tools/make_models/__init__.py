@@ -1,1 +1,0 @@
-"""The script that makes every shipped model; in the repository only."""

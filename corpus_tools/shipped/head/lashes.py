@@ -1,0 +1,172 @@
+"""Lashes: MakeHuman's cards, which follow the edges of the lids and turn with them.
+
+Brows: MakeHuman's cards, laid on the skin and moving with it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from corpus_tools.shipped.head.cards import (
+    BROWS,
+    CARDS_TEXTURE,
+    HIDDEN,
+    LASHES,
+    brow_coordinates,
+    lash_coordinates,
+    number_islands,
+)
+from corpus_tools.shipped.head.correspondence import nearest_surface_points
+from corpus_tools.shipped.head.haircut import split_seams
+from corpus_tools.shipped.head.mesh import Cage, HeadPart, MaterialSpan, triangulate
+from corpus_tools.shipped.head.shapes import LidEdge
+from corpus_tools.shipped.head.skin import HeadSkin, vertex_normals
+from corpus_tools.shipped.head.source import Asset, read_asset
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+COLOUR = np.array([0.07, 0.05, 0.04])
+MATERIAL = {"specular": 0.05, "shininess": 20.0, "cutout": True, "kind": "strands", "texture": CARDS_TEXTURE}
+N_ROOTS = 3  # vertices of the lid's edge that a lash follows
+SHUT_DOWN, SHUT_AHEAD = 0.55, 0.83  # offset of upper lashes from their roots when the lids are shut, in their lengths
+LOOK_DOWN_SHARE = 0.4  # of that turn when the eye looks down
+LENGTH = 0.7  # of MakeHuman's lashes, which reach the crease of the lid and look like wrinkles there
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LashCards:
+    """A set of lashes: its asset, triangles, coordinates, roots (N, 3) on the skin and their weights."""
+
+    asset: Asset
+    order: Ints
+    triangles: Ints
+    uv: Floats
+    roots: Ints
+    weights: Floats
+    is_upper: NDArray[np.bool_]
+
+
+def bind_lashes(folder: Path, cage: Cage, skin: HeadSkin, edges: tuple[LidEdge, LidEdge]) -> dict[str, LashCards]:
+    """Each set of lashes, bound to the lids of the reference head."""
+    lines = [(edge.upper, edge.lower) for edge in edges]
+    bound = {}
+    for name in LASHES:
+        asset = read_asset(folder, f"lashes/{name}", cage.source.vertices)
+        cards = split_seams(asset, asset.fit(cage.vertices, cage.source.vertices))
+        roots, weights = np.zeros((len(cards.vertices), N_ROOTS), np.int64), np.zeros((len(cards.vertices), N_ROOTS))
+        is_upper = np.zeros(len(cards.vertices), bool)
+        islands = number_islands(len(cards.vertices), cards.triangles)
+        for island in np.unique(islands):
+            rows = np.flatnonzero(islands == island)
+            middle = cards.vertices[rows].mean(axis=0)
+            side = lines[0] if middle[0] > 0 else lines[1]
+            upper = middle[1] > 0
+            line = side[0] if upper else side[1]
+            distance, nearest = cKDTree(skin.vertices[line]).query(cards.vertices[rows], N_ROOTS)
+            share = 1 / np.maximum(distance, 0.05) ** 2
+            roots[rows], weights[rows], is_upper[rows] = line[nearest], share / share.sum(1, keepdims=True), upper
+        uv = lash_coordinates(name, cards.uv)
+        bound[name] = LashCards(asset, cards.weld, cards.triangles, uv, roots, weights, is_upper)
+    return bound
+
+
+def lash_piece(cage: Cage, skin: HeadSkin, bound: Mapping[str, LashCards], shown: str) -> HeadPart:
+    """All sets of lashes of a head; those that are not shown lie inside the skull."""
+    points, faces, coordinates, tangents, count = [], [], [], [], 0
+    shapes: dict[str, list[Floats]] = {name: [] for name in skin.shapes}
+    for name, own in bound.items():
+        places = own.asset.fit(cage.vertices, cage.source.vertices)[own.order]
+        root = np.einsum("nk,nkd->nd", own.weights, skin.vertices[own.roots])
+        off = LENGTH * (places - root)
+        for shape, moved in skin.shapes.items():
+            follow = np.einsum("nk,nkd->nd", own.weights, moved[own.roots])
+            shapes[shape].append(follow + _turn(off, shape, own.is_upper & _is_beside(shape, root)))
+        points.append(root + off if name == shown else np.tile(HIDDEN, (len(root), 1)))
+        faces.append(own.triangles + count)
+        coordinates.append(own.uv)
+        tangents.append(off / np.maximum(np.linalg.norm(off, axis=1, keepdims=True), 1e-6))
+        count += len(root)
+    vertices = np.concatenate(points)
+    joined = {name: np.concatenate(blocks) for name, blocks in shapes.items()}
+    return HeadPart(
+        vertices,
+        (MaterialSpan("lashes", np.concatenate(faces), MATERIAL),),
+        np.tile(COLOUR, (len(vertices), 1)),
+        {name: moved for name, moved in joined.items() if np.abs(moved).max() > 1e-3},
+        np.concatenate(coordinates),
+        np.concatenate(tangents),
+    )
+
+
+def _is_beside(shape: str, root: Floats) -> NDArray[np.bool_]:
+    """(N,) whether lashes belong to the eye that a shape moves."""
+    beside: NDArray[np.bool_] = root[:, 0] > 0 if shape.endswith("Left") else root[:, 0] < 0
+    return beside
+
+
+def _turn(off: Floats, shape: str, turns: NDArray[np.bool_]) -> Floats:
+    """(N, 3) displacement of lashes relative to their roots: those of a shut or lowered lid turn forwards and down."""
+    share = {"eyeBlink": 1.0, "eyeLookDown": LOOK_DOWN_SHARE}.get(shape.removesuffix("Left").removesuffix("Right"), 0.0)
+    length = np.linalg.norm(off[:, 1:], axis=1)
+    turned = np.column_stack([off[:, 0], -SHUT_DOWN * length, SHUT_AHEAD * length])
+    moved: Floats = np.where(turns[:, None], share * (turned - off), 0.0)
+    return moved
+
+
+OFF_MM = 0.45  # above the skin
+AHEAD_Z = -5.0
+BROW_MATERIAL = {"specular": 0.05, "shininess": 12.0, "cutout": True, "kind": "strands", "texture": CARDS_TEXTURE}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BrowCards:
+    """The cards of a set of brows on the reference skin: corners (N, 3), weights (N, 3), triangles and coordinates."""
+
+    corners: Ints
+    weights: Floats
+    triangles: Ints
+    uv: Floats
+
+
+def bind_brows(folder: Path, cage: Cage, skin: HeadSkin) -> dict[str, BrowCards]:
+    """Each set of brows, bound to the skin of the reference head."""
+    triangles = triangulate(skin.quads)
+    places = skin.vertices[triangles].mean(axis=1)
+    triangles = triangles[(np.abs(places[:, 1] - 15) < 30) & (places[:, 2] > AHEAD_Z)]
+    bound = {}
+    for name in BROWS:
+        asset = read_asset(folder, f"brows/{name}", cage.source.vertices)
+        cards = split_seams(asset, asset.fit(cage.vertices, cage.source.vertices))
+        number, weights, _ = nearest_surface_points(cards.vertices, skin.vertices, triangles)
+        bound[name] = BrowCards(triangles[number], weights, cards.triangles, brow_coordinates(name, cards.uv))
+    return bound
+
+
+def brow_piece(skin: HeadSkin, bound: dict[str, BrowCards], shown: str) -> HeadPart:
+    """All sets of brows on a skin; those that are not shown lie inside the skull."""
+    normals = vertex_normals(skin.vertices, skin.quads, skin.base)
+    points, faces, coordinates, count = [], [], [], 0
+    for name, cards in bound.items():
+        on_skin = np.einsum("nk,nkd->nd", cards.weights, (skin.vertices + OFF_MM * normals)[cards.corners])
+        points.append(on_skin if name == shown else np.tile(HIDDEN, (len(on_skin), 1)))
+        faces.append(cards.triangles + count)
+        coordinates.append(cards.uv)
+        count += len(on_skin)
+    corners = np.concatenate([cards.corners for cards in bound.values()])
+    weights = np.concatenate([cards.weights for cards in bound.values()])
+    vertices = np.concatenate(points)
+    moved = {name: np.einsum("nk,nkd->nd", weights, shape[corners]) for name, shape in skin.shapes.items()}
+    along = np.einsum("nk,nkd->nd", weights, skin.vertices[corners])[:, :1]
+    return HeadPart(
+        vertices,
+        (MaterialSpan("brows", np.concatenate(faces), BROW_MATERIAL),),
+        np.tile([0.27, 0.20, 0.15], (len(vertices), 1)),
+        {name: shape for name, shape in moved.items() if np.abs(shape).max() > 1e-3},
+        np.concatenate(coordinates),
+        np.sign(along) * np.array([0.95, 0.2, -0.25]),
+    )

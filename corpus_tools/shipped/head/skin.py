@@ -1,0 +1,200 @@
+"""The skin: MakeHuman's head after one step of subdivision.
+
+Rings of edges around the mouth and the eyes: where lips and lids meet.
+"""
+
+from collections import defaultdict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from corpus_tools.shipped.head.mesh import Cage, catmull_clark
+from lexicon.errors import DataError
+
+Floats = NDArray[np.float64]
+
+LOWEST, WIDEST = 4.1, 3.2  # of the bust, in units of the source
+NECK_Y, NECK_SLOPE = 5.80, -0.272  # the head ends below this plane, under the shirt's collar
+HEAD_WIDEST = 1.2  # half the width of head and neck; arms are further out
+SHOULDER_Y = 6.35  # the bust ends above this
+SOCKET_U, SOCKET_Z = 0.2, 1.30  # MakeHuman's islands of the sockets; parts further back are behind the eyeballs
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeadSkin:
+    """The subdivided head.
+
+    Parameters
+    ----------
+    vertices : (N, 3)
+        mm; split along texture seams.
+    shapes
+        Displacement (N, 3) by name.
+    quads : (F, 4)
+    source_uv : (N, 2)
+        Texture coordinates in MakeHuman's own layout, v up.
+    base : (N, 3)
+        Position of each vertex on the source's base mesh, the same for every identity.
+    corrections
+        Displacements (N, 3) added to shapes, by name; lashes follow them.
+    """
+
+    vertices: Floats
+    shapes: Mapping[str, Floats]
+    quads: NDArray[np.int64]
+    source_uv: Floats
+    base: Floats
+    corrections: Mapping[str, Floats] = field(default_factory=dict)
+
+
+def build_skin(cage: Cage) -> HeadSkin:
+    """Head and neck of a cage after one Catmull-Clark step."""
+    body = cage.source.groups["body"]
+    places, where = cage.source.vertices[body.corners], cage.source.uv[body.uv_corners]
+    kept: NDArray[np.bool_] = np.any(places[:, :, 1] - NECK_SLOPE * places[:, :, 2] > NECK_Y, axis=1)
+    kept &= np.all((np.abs(places[:, :, 0]) < HEAD_WIDEST) & (places[:, :, 1] > LOWEST), axis=1)
+    kept &= ~np.all((where[:, :, 0] < SOCKET_U) & (places[:, :, 2] < SOCKET_Z), axis=1)
+    return _subdivide(cage, kept)
+
+
+def build_shoulders(cage: Cage) -> HeadSkin:
+    """Neck and shoulders of a cage, under the shirt."""
+    places = cage.source.vertices[cage.source.groups["body"].corners]
+    inside = (places[:, :, 1] > LOWEST) & (places[:, :, 1] < SHOULDER_Y) & (np.abs(places[:, :, 0]) < WIDEST)
+    kept: NDArray[np.bool_] = np.all(inside, axis=1)
+    return _subdivide(cage, kept)
+
+
+def _subdivide(cage: Cage, kept: NDArray[np.bool_]) -> HeadSkin:
+    body = cage.source.groups["body"]
+    used, quads = np.unique(body.corners[kept], return_inverse=True)
+    matrix, fine = catmull_clark(len(used), quads.reshape(-1, 4))
+    fine_uv = _subdivide_coordinates(cage.source.uv[body.uv_corners[kept]])
+    keys = np.column_stack([fine.ravel(), np.rint(fine_uv.reshape(-1, 2) * 1e6).astype(np.int64)])
+    _, first, corner = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    rows = fine.ravel()[first]
+    split = matrix[rows]
+    return HeadSkin(
+        vertices=split @ cage.vertices[used],
+        shapes={name: split @ moved[used] for name, moved in cage.units.items()},
+        quads=corner.reshape(-1, 4).astype(np.int64),
+        source_uv=fine_uv.reshape(-1, 2)[first],
+        base=split @ cage.source.vertices[used],
+    )
+
+
+def _subdivide_coordinates(corners: Floats) -> Floats:
+    """(4 F, 4, 2) texture coordinates of quads split in four as in `catmull_clark`."""
+    after = (corners + np.roll(corners, -1, axis=1)) / 2
+    centre = corners.mean(axis=1)
+    new = [np.stack([corners[:, k], after[:, k], centre, after[:, k - 1]], axis=1) for k in range(4)]
+    return np.stack(new, axis=1).reshape(-1, 4, 2)
+
+
+def vertex_normals(vertices: Floats, quads: NDArray[np.int64], base: Floats) -> Floats:
+    """(N, 3) unit normals; vertices on a seam share one."""
+    diagonals = vertices[quads[:, 2]] - vertices[quads[:, 0]], vertices[quads[:, 3]] - vertices[quads[:, 1]]
+    faces = np.cross(*diagonals)
+    _, weld = np.unique(np.rint(base * 1e6).astype(np.int64), axis=0, return_inverse=True)
+    weld = weld.ravel()
+    total = np.zeros((int(weld.max()) + 1, 3))
+    for corner in quads.T:
+        np.add.at(total, weld[corner], faces)
+    unit: Floats = (total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12))[weld]
+    return unit
+
+
+Ints = NDArray[np.int64]
+
+LONGEST = 400  # vertices; the head's own rings around mouth and eyes have under 100
+
+
+class EdgeRings:
+    """Edge rings of a quad mesh: at each vertex of four edges a ring continues with the opposite edge.
+
+    Parameters
+    ----------
+    quads : (F, 4)
+    places : (N, 3)
+        Vertices at one position count as one, because texture seams split the mesh.
+    """
+
+    def __init__(self, quads: Ints, places: Floats) -> None:
+        rounded = np.rint(places * 1e6).astype(np.int64)
+        _, first, where = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        self._beside: defaultdict[int, set[int]] = defaultdict(set)
+        self._around: defaultdict[int, list[set[int]]] = defaultdict(list)
+        for quad in first[where.ravel()][quads].tolist():
+            for k, corner in enumerate(quad):
+                self._beside[corner] |= {quad[k - 1], quad[(k + 1) % 4]}
+                self._around[corner].append(set(quad))
+        self.vertices = sorted(self._beside)
+
+    def ring(self, start: int, towards: int) -> list[int] | None:
+        """The closed ring of vertices beginning with the edge from `start` to `towards`; None if it is open."""
+        path = [start, towards]
+        while len(path) < LONGEST:
+            onward = self._onward(path[-2], path[-1])
+            if onward is None or onward == start:
+                return path if onward is not None else None
+            path.append(onward)
+        return None
+
+    def rings_from(self, start: int) -> list[list[int]]:
+        """Closed rings through `start`."""
+        found = [self.ring(start, towards) for towards in sorted(self._beside[start])]
+        return [ring for ring in found if ring is not None]
+
+    def _onward(self, before: int, here: int) -> int | None:
+        passed = [quad for quad in self._around[here] if before in quad]
+        ahead = [n for n in self._beside[here] if n != before and not any(n in quad for quad in passed)]
+        return ahead[0] if len(ahead) == 1 and len(self._beside[here]) == 4 else None
+
+
+def find_narrowest_ring(strips: EdgeRings, vertices: Floats, inside: Floats, reach: float, clear: float = 0.0) -> Ints:
+    """The ring around an opening with the smallest area in the frontal view: the edge of lips or lids.
+
+    Parameters
+    ----------
+    vertices : (N, 3)
+    inside : (3,)
+        A point in the opening, or behind it.
+    reach
+        Maximum distance of a ring from the point in the frontal view, mm.
+    clear
+        Minimum mean distance of a ring from the point, mm: an eyeball's radius.
+
+    Raises
+    ------
+    DataError
+        No ring encloses the point.
+    """
+    near = np.hypot(*(vertices[strips.vertices] - inside).T[:2]) < reach
+    best, least = None, np.inf
+    seen: set[int] = set()
+    for start in np.array(strips.vertices)[near].tolist():
+        for ring in strips.rings_from(start) if start not in seen else ():
+            seen.update(ring)
+            flat = vertices[ring, :2] - inside[:2]
+            is_clear = np.linalg.norm(vertices[ring] - inside, axis=1).mean() > clear
+            if np.hypot(*flat.T).max() > reach or not _encloses_origin(flat) or not is_clear:
+                continue
+            area = abs(_area(flat))
+            if area < least:
+                best, least = ring, area
+    if best is None:
+        raise DataError(f"no edge ring encloses {inside}; use the pinned source mesh")
+    return np.array(best, np.int64)
+
+
+def _encloses_origin(flat: Floats) -> bool:
+    """Whether a closed line winds once around the origin."""
+    angles = np.unwrap(np.arctan2(*np.concatenate([flat, flat[:1]]).T[::-1]))
+    return bool(abs(abs(angles[-1] - angles[0]) - 2 * np.pi) < 0.1)
+
+
+def _area(flat: Floats) -> float:
+    after = np.roll(flat, -1, axis=0)
+    return float((flat[:, 0] * after[:, 1] - flat[:, 1] * after[:, 0]).sum() / 2)
