@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("lexicon", "tts2face", "corpus_tools", "cli")
+from tests.api.rooms import PACKAGES, ROOT
 
 
 def modules() -> dict[str, Path]:

@@ -5,7 +5,6 @@ Circles among files are counted by `test_import_graph.py`; there are none.
 
 import ast
 import re
-import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -13,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.api.test_import_graph import PACKAGES, ROOT
+from tests.api.rooms import PACKAGES, ROOT, rooms
 
 Find = Callable[[str, str], Iterator[str]]  # of the text and the name of a module
 
@@ -70,15 +69,6 @@ def parsers(text: str, name: str) -> Iterator[str]:
     """The module, if it reads JSON or TOML."""
     if any(uses(text, PARSERS)):
         yield name
-
-
-@cache
-def rooms() -> list[list[str]]:
-    """Rooms of tts2face, from top to bottom, as the import contracts have them."""
-    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    contracts = settings["tool"]["importlinter"]["contracts"]
-    layers = next(one["layers"] for one in contracts if one["name"] == "rooms of tts2face")
-    return [re.findall(r"[\w.]+", layer) for layer in layers]
 
 
 def names_above(name: str) -> list[str]:
