@@ -14,6 +14,7 @@ from bench_render import clip_of
 
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
+from tts2face.models.light import Lamps
 from tts2face.numeric.reuse import available_cores
 from tts2face.picture.baked import scene as film
 from tts2face.picture.options import Picture
@@ -86,7 +87,7 @@ def main() -> None:
     """Print the table."""
     face = load_face(sys.argv[1] if len(sys.argv) > 1 else "ada")
     n_frames = int(sys.argv[2]) if len(sys.argv) > 2 else 60
-    clip, plain = clip_of(face, n_frames), replace(face, light=())
+    clip, plain = clip_of(face, n_frames), replace(face, light=Lamps())
     lit, lamps = mesh_renderer(face, Picture()), mesh_renderer(plain, Picture())
     for renderer in (lit, lamps):  # kernels
         renderer.draw(clip.motion.values[0], clip.head.values[0])

@@ -13,6 +13,7 @@ from tests.picture.film.lit_face import lit_tiny_face
 from tts2face.models.baked_light import LIMIT_STEP, quantised
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
+from tts2face.models.light import Baked
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
 
@@ -114,7 +115,7 @@ def test_what_pictures_show_corrects_the_light() -> None:
     wanted = {pose.name: np.array(one) for pose, one in zip(poses, before, strict=True)}
     for one in wanted.values():
         one[..., 0] -= np.where(one[..., 3] > 0, 20, 0).astype(np.uint8)
-    fitted = replace(face, light=(fit_to_pictures(face, poses, wanted),))
+    fitted = replace(face, light=Baked(fit_to_pictures(face, poses, wanted)))
     for pose, old in zip(poses, before, strict=True):
         new = mesh_renderer(fitted, picture).draw(pose.weights, pose.head).astype(np.float64)
         off, apart = (np.abs(one - wanted[pose.name])[old[..., 3] == 255] for one in (new, old.astype(np.float64)))

@@ -87,7 +87,7 @@ def test_a_photo_becomes_the_head_of_its_person(tmp_path: Path) -> None:
     _, made = ordered(TAKES, "avatar", order)
     assert str(made["look"]).startswith("hair: ")
     face = read_face(out / CONTENT)
-    assert face.photograph is None
+    assert not face.light.is_flat
     assert face.metadata["consent"]["statement"] == "drawn"
     assert face.hairdo is not None
     assert "green" in str(made["look"])

@@ -10,12 +10,13 @@ from lexicon.errors import DataError, InputError
 from tests.face.test_hair import cap
 from tests.picture.film.lit_face import lit_tiny_face
 from tests.picture.tiny_face import tiny_face
-from tts2face.models.baked_light import HairLight, HairTint, table_levels
-from tts2face.models.face import Face, Hairdo, Late
+from tts2face.models.baked_light import BakedLight, HairLight, HairTint, table_levels
+from tts2face.models.face import Face, Hairdo
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.hair import parse_hair_colour
 from tts2face.models.hair_file import LitHair, read_hair, swing_shapes, tint_hair, wear_hair, write_hair, write_lit_hair
+from tts2face.models.light import Baked
 from tts2face.numeric.arrays import decode_srgb, encode_srgb
 from tts2face.storage.tensors import deflate, read_tensors, unpack_arrays, write_tensors
 
@@ -38,7 +39,7 @@ def tint(n_vertices: int, side: int) -> HairTint:
 def haired_face() -> Face:
     """The tiny lit face with a triangle of hair, its last part, in brown."""
     bare = lit_tiny_face()
-    light, n = bare.light[0], len(bare.vertices)
+    light, n = bare.light.baked, len(bare.vertices)
     crown = np.array([[-20, 90, 0], [20, 90, 0], [0, 90, 30]], np.float32)
     corners = np.array([[n, n + 1, n + 2]], np.int32)
     part = replace(bare.parts[0], name="hair", first=len(bare.triangles), count=1, texture=-1)
@@ -53,7 +54,7 @@ def haired_face() -> Face:
         colours=np.concatenate([bare.colours, np.tile(np.rint(np.array(OWN) * 255).astype(np.uint8), (N_OWN, 1))]),
         uv=np.concatenate([bare.uv, np.zeros((N_OWN, 2), np.float32)]),
         hairdo=Hairdo("fringe", "#4c3319"),
-        light=(
+        light=Baked(
             replace(
                 light,
                 page_of={**light.page_of, "hair": 1},
@@ -61,7 +62,7 @@ def haired_face() -> Face:
                 is_inside=np.append(light.is_inside, False),
                 pages=pages,
                 tint=tint(N_OWN, pages.shape[1]),
-            ),
+            )
         ),
         metadata={"name": "tiny"},
     )
@@ -69,7 +70,7 @@ def haired_face() -> Face:
 
 def wig_of(face: Face) -> LitHair:
     """Two triangles higher up, loose at one corner, whose skin is lit in red."""
-    light, own = face.light[0], face.parts[-1]
+    light, own = face.light.baked, face.parts[-1]
     vertices = np.array([[-30, 110, 0], [30, 110, 0], [0, 110, 40], [0, 150, 0]], np.float32)
     first = len(face.triangles) - own.count
     drawn = np.append(light.triangles, np.int32(first + 1))
@@ -125,10 +126,10 @@ def test_a_haircut_takes_the_place_of_the_own_hair(face: Face, wig: LitHair) -> 
     assert not worn.shapes[1:, n:].any()  # the face has no shape by which hair swings
     assert (worn.textures[0].pixels == 77).all()
     assert worn.textures[1:] == face.textures[1:]
-    light = worn.light[0]
+    light = worn.light.baked
     assert (light.pages[0] == (90, 20, 10)).all()
-    assert (light.base == face.light[0].base + 3).all()
-    assert light.responses is face.light[0].responses
+    assert (light.base == face.light.baked.base + 3).all()
+    assert light.responses is face.light.baked.responses
 
 
 def test_loose_hair_lags_about_the_middle_of_the_head(wig: LitHair) -> None:
@@ -140,7 +141,7 @@ def test_loose_hair_lags_about_the_middle_of_the_head(wig: LitHair) -> None:
 
 
 def test_skin_adds_its_own_gloss_from_cameras_to_what_a_haircut_changes_of_it(face: Face, wig: LitHair) -> None:
-    light = face.light[0]
+    light = face.light.baked
     n = light.camera_modes.shape[2]
     both = np.concatenate([np.full_like(light.camera_modes, 40), light.camera_modes], axis=2)
     lit = replace(light, camera_modes=both, camera_sizes=np.array([0.5], np.float32))
@@ -161,12 +162,12 @@ def test_a_haircut_of_another_face_is_refused(face: Face, wig: LitHair) -> None:
         wear_hair(tiny_face(textured=True), wig)
     other = replace(wig, lights=(replace(wig.lights[0], base=wig.lights[0].base[1:]),))
     with pytest.raises(DataError, match="the haircut wig is of another build of tiny"):
-        tuple(wear_hair(face, other).light)
+        _ = wear_hair(face, other).light.baked
 
 
 def shown(face: Face) -> np.ndarray:
     """(3,) colour, 0..1, of the hair on the second page."""
-    return face.light[0].pages[1, 3, 3] / 255
+    return face.light.baked.pages[1, 3, 3] / 255
 
 
 @pytest.mark.parametrize("colour", [BLACK, LIGHT])
@@ -177,9 +178,9 @@ def test_hair_in_a_known_colour_is_as_it_was_baked(colour, face: Face) -> None:
     assert tinted.colours[-1] / 255 == pytest.approx(np.array(colour), abs=0.003)
     assert np.array_equal(tinted.colours[:-N_OWN], face.colours[:-N_OWN])
     assert tinted.hairdo == Hairdo("fringe", name)
-    rest = face.light[0].pages.shape[1] // 2
-    assert np.array_equal(tinted.light[0].pages[1, rest:], face.light[0].pages[1, rest:])
-    assert np.array_equal(tinted.light[0].pages[0], face.light[0].pages[0])
+    rest = face.light.baked.pages.shape[1] // 2
+    assert np.array_equal(tinted.light.baked.pages[1, rest:], face.light.baked.pages[1, rest:])
+    assert np.array_equal(tinted.light.baked.pages[0], face.light.baked.pages[0])
 
 
 def test_hair_between_known_colours_lies_between_them_in_each_channel(face: Face) -> None:
@@ -193,12 +194,12 @@ def test_hair_between_known_colours_lies_between_them_in_each_channel(face: Face
 
 
 def test_what_the_camera_changes_shows_less_on_lighter_hair(face: Face) -> None:
-    light = face.light[0]
+    light = face.light.baked
     strong = light.camera_modes.copy()
     strong[:, 0] = 60
-    face = replace(face, light=(replace(light, camera_modes=strong),))
+    face = replace(face, light=Baked(replace(light, camera_modes=strong)))
     side = light.turn_side
-    means = {name: tint_hair(face, name).light[0].camera_modes.reshape(3, side, side) for name in ("black", "white")}
+    means = {name: tint_hair(face, name).light.baked.camera_modes.reshape(3, side, side) for name in ("black", "white")}
     top = [means[name][0, : side // 4].mean() for name in ("black", "white")]
     assert 0 < top[1] < 0.4 * top[0]
     for changed in means.values():
@@ -206,7 +207,7 @@ def test_what_the_camera_changes_shows_less_on_lighter_hair(face: Face) -> None:
 
 
 def test_hair_in_one_colour_is_not_tinted(face: Face) -> None:
-    plain = replace(face, light=(replace(face.light[0], tint=None),))
+    plain = replace(face, light=Baked(replace(face.light.baked, tint=None)))
     with pytest.raises(DataError, match="has one colour only; remove the colour of the hair"):
         tint_hair(plain, "red")
     with pytest.raises(InputError, match="there is no hair colour 'plaid'"):
@@ -216,11 +217,11 @@ def test_hair_in_one_colour_is_not_tinted(face: Face) -> None:
 def test_faces_and_haircuts_round_trip(face: Face, wig: LitHair, tmp_path: Path) -> None:
     write_face(tmp_path / "tiny.face", face)
     read = read_face(tmp_path / "tiny.face")
-    before, after = face.light[0].tint, read.light[0].tint
+    before, after = face.light.baked.tint, read.light.baked.tint
     assert np.array_equal(after.colours, before.colours)
     assert np.array_equal(after.vertices, before.vertices)
     assert np.abs(after.pages.astype(int) - before.pages).max() <= 3
-    assert np.array_equal(read.light[0].triangles, face.light[0].triangles)
+    assert np.array_equal(read.light.baked.triangles, face.light.baked.triangles)
     write_lit_hair(tmp_path / "wig.hair", wig)
     hair = read_hair(tmp_path / "wig.hair")
     for name in ("vertices", "triangles", "colours", "loose", "middle"):
@@ -232,7 +233,7 @@ def test_faces_and_haircuts_round_trip(face: Face, wig: LitHair, tmp_path: Path)
     loaded = load_face(str(tmp_path / "tiny.face"), hair=str(tmp_path / "wig.hair"), hair_color="blond")
     assert loaded.hairdo == Hairdo("wig", "blond")
     assert len(loaded.vertices) == wig.n_face_vertices + 4
-    assert isinstance(read_face(tmp_path / "tiny.face", checks_pictures=False).light, Late)
+    assert not isinstance(read_face(tmp_path / "tiny.face", checks_pictures=False).light._light, BakedLight)
 
 
 def test_earlier_light_whose_arrays_have_no_steps_is_the_same(face: Face, wig: LitHair, tmp_path: Path) -> None:
@@ -249,7 +250,7 @@ def test_earlier_light_whose_arrays_have_no_steps_is_the_same(face: Face, wig: L
         write_tensors(tmp_path / f"before.{kind}", kind, 1, arrays, header)
         for one in (path, tmp_path / f"before.{kind}"):
             found = read(one)
-            lights.append((found.light if isinstance(found, Face) else found.lights)[0])
+            lights.append(found.light.baked if isinstance(found, Face) else found.lights[0])
     for packed, before in (lights[:2], lights[2:]):
         for field in fields(packed):
             if isinstance(array := getattr(packed, field.name), np.ndarray):
@@ -298,10 +299,10 @@ def test_gloss_stays_when_the_colour_changes(face: Face) -> None:
     def displayed(colour) -> np.ndarray:
         return encode_srgb(SHINE + 0.7 * decode_srgb(np.array(colour))) / 255
 
-    side = face.light[0].pages.shape[1]
-    pages = face.light[0].pages.copy()
+    side = face.light.baked.pages.shape[1]
+    pages = face.light.baked.pages.copy()
     pages[1, : side // 2] = page_of(displayed(OWN), side)
     known = replace(tint(N_OWN, side), pages=np.stack([page_of(displayed(one), side // 2) for one in (BLACK, LIGHT)]))
-    glossy = replace(face, light=(replace(face.light[0], view=view, pages=pages, tint=known),))
+    glossy = replace(face, light=Baked(replace(face.light.baked, view=view, pages=pages, tint=known)))
     for name in ("black", "red", "dark-blond", "white"):
         assert shown(tint_hair(glossy, name)) == pytest.approx(displayed(parse_hair_colour(name)), abs=0.02), name

@@ -180,7 +180,7 @@ def kinds(folder: Path) -> dict[str, tuple[Kind, ...]]:
             model(made["face"], lambda path: read_face(path, "older")),
             model(made["palette"], read_palette),
             model(made["hair"], lambda path: attach_hair(bare, read_hair(path), "#ff0000")),
-            model(folder / "lit.hair", lambda path: tuple(wear_hair(lit, read_hair(path)).light)),
+            model(folder / "lit.hair", lambda path: wear_hair(lit, read_hair(path)).light.baked),
         ),
         "project": (document(".json", project, json_bytes, use_request),),
         "timeline": (document(".json", timeline_json(WHOLE), json_bytes, use_timeline),),

@@ -46,7 +46,7 @@ def test_a_darker_picture_has_a_darker_mouth(faces: dict[str, Face]) -> None:
 def test_the_dark_of_a_mouth_is_warm_and_lower_teeth_lie_in_the_shade(faces: dict[str, Face]) -> None:
     """What lips hardly part before is redder than in open light; in grey pictures it is grey."""
     for name in ("coloured", "grey"):
-        (light,) = faces[name].light
+        light = faces[name].light.baked
         teeth = np.isin(light.mouth_rows, _rows(faces[name], "teeth_upper"))
         base, opened = light.mouth_base[teeth].astype(float), inside(faces[name], "teeth_upper")
         dark = base.mean(axis=0) / opened.mean(axis=0)

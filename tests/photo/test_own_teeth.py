@@ -110,7 +110,7 @@ def test_they_are_shown_between_the_lips_of_another_picture(teeth: OwnTeeth, hea
     assert wide.sum() > 1.4 * marked_pixels(jawOpen=0.1).sum() > 0
     down, across = np.nonzero(wide)
     assert np.ptp(across) > 3 * np.ptp(down)
-    assert face.light[0].page_of[PICTURED] == 1
+    assert face.light.baked.page_of[PICTURED] == 1
 
 
 def test_teeth_of_the_picture_itself_are_used(smiling: np.ndarray, teeth: OwnTeeth, head: Face) -> None:

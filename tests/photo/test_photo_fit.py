@@ -13,6 +13,7 @@ from tts2face.face.deformation import landmark_positions
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import INNER_LIP_UPPER, LEFT_LIDS, LOWER_LIP_INNER_MID, RIGHT_LIDS, UPPER_LIP_INNER_MID
+from tts2face.models.light import Photographed
 from tts2face.photo.fit import NOTHING_GIVEN, PhotoFit, parse_fit, read_fit, write_fit
 from tts2face.photo.photograph import Photograph
 from tts2face.photo.speaking_photo import speaking_photo
@@ -44,8 +45,8 @@ def found(face: Face) -> dict[str, Any]:
 
 def in_picture(face: Face, points: np.ndarray) -> np.ndarray:
     """Places (N, 2) in the file of points (N, 3), mm."""
-    assert face.photograph is not None
-    view, lens = face.photograph.view, face.photograph.lens
+    assert isinstance(face.light, Photographed)
+    view, lens = face.light.view.view, face.light.view.lens
     seen = points @ view[:, :3].T + view[:, 3]
     return (seen[:, :2] / seen[:, 2:] * lens[0] + lens[1:] + 0.5) * REDUCED_BY
 

@@ -17,6 +17,7 @@ from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.landmarks import inner_lip_gaps, lip_opening
+from tts2face.models.light import Photographed
 from tts2face.photo.found_face import FoundFace
 from tts2face.photo.photograph import Photograph, split_number
 from tts2face.photo.shapes import EYES, LIDS, SKIN
@@ -93,12 +94,12 @@ def test_what_does_not_move_is_the_picture_in_every_frame(renderer: MeshRenderer
 
 
 def test_shapes_move_the_skin_without_folds(face: Face) -> None:
-    view = face.photograph.view
+    view = face.light.view.view
     triangles = face.triangles[: next(part for part in face.parts if part.name == SKIN).count]
 
     def areas(points: np.ndarray) -> np.ndarray:
         seen = points @ view[:, :3].T + view[:, 3]
-        places = seen[:, :2] / seen[:, 2:] * face.photograph.lens[0]
+        places = seen[:, :2] / seen[:, 2:] * face.light.view.lens[0]
         a, b, c = (places[triangles[:, k]] for k in range(3))
         first, second = b - a, c - a
         return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
@@ -262,17 +263,17 @@ def test_a_file_keeps_both_layers(parted: Face, before_wall: MeshRenderer, tmp_p
     write_face(tmp_path / "me.face", parted)
     kept = mesh_renderer(read_face(tmp_path / "me.face"), Picture())
     assert (tmp_path / "me.face").stat().st_size < 2_500_000
-    np.testing.assert_array_equal(kept.scene.face.photograph.alpha, parted.photograph.alpha)
+    np.testing.assert_array_equal(kept.scene.face.light.view.alpha, parted.light.view.alpha)
     assert np.abs(drawn(kept).astype(int) - drawn(before_wall)).mean() < 2  # layers are JPEG in files
 
 
 def test_what_lies_behind_a_photograph_needs_its_coverage(parted: Face, tmp_path: Path) -> None:
-    view = replace(parted.photograph, alpha=None)
-    write_face(tmp_path / "me.face", replace(parted, photograph=view))
+    view = replace(parted.light.view, alpha=None)
+    write_face(tmp_path / "me.face", replace(parted, light=Photographed(parted.light.baked, view)))
     with pytest.raises(DataError, match="has what lies behind a photograph, but not its alpha"):
         read_face(tmp_path / "me.face")
-    view = replace(parted.photograph, behind=parted.photograph.behind[:-2])
-    write_face(tmp_path / "me.face", replace(parted, photograph=view))
+    view = replace(parted.light.view, behind=parted.light.view.behind[:-2])
+    write_face(tmp_path / "me.face", replace(parted, light=Photographed(parted.light.baked, view)))
     with pytest.raises(DataError, match="the photograph and its layers differ in size"):
         read_face(tmp_path / "me.face")
 
@@ -307,7 +308,7 @@ def test_large_eyes_do_not_show_beside_the_cheeks() -> None:
 
 
 def test_the_head_moves_within_what_the_picture_bears(face: Face) -> None:
-    view = face.photograph
+    view = face.light.view
     small, large = (view.bearable(np.array([0, yaw, 0, 4, 4, 9], float)) for yaw in (0.05, 1.0))
     assert 0.5 * 0.05 < small[1] < 0.05
     assert large[1] <= np.radians(9)
@@ -382,12 +383,13 @@ def test_one_of_several_faces_is_named_after_the_file(tmp_path: Path) -> None:
 
 
 def test_the_stage_shows_it_as_the_picture_does(face: Face) -> None:
-    view = face.photograph
+    view = face.light.view
     angle = np.radians(12)
     roll = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
-    leaning = replace(face, photograph=replace(view, view=np.column_stack([roll @ view.view[:, :3], view.view[:, 3]])))
+    turned = replace(view, view=np.column_stack([roll @ view.view[:, :3], view.view[:, 3]]))
+    leaning = replace(face, light=Photographed(face.light.baked, turned))
     made = Read(stage_glb(leaning, leaning.shape_names))
-    seen = leaning.vertices @ leaning.photograph.view[:, :3].T + leaning.photograph.view[:, 3]
+    seen = leaning.vertices @ leaning.light.view.view[:, :3].T + leaning.light.view.view[:, 3]
     expected = seen[:, :2] / seen[:, 2:]
     primitives, materials = made.json["meshes"][0]["primitives"], made.json["materials"]
     for primitive, material in zip(primitives, materials, strict=True):
@@ -399,7 +401,7 @@ def test_the_stage_shows_it_as_the_picture_does(face: Face) -> None:
         assert material["extras"]["behind"] == (material["name"] not in (SKIN, LIDS))
     stage = made.json["asset"]["extras"]
     assert list(stage["views"]) == ["front", "close"]
-    assert stage["photo"]["gain"] == pytest.approx(leaning.photograph.head_gain)
+    assert stage["photo"]["gain"] == pytest.approx(leaning.light.view.head_gain)
     low, high = np.array(stage["frame"])
     assert ((high - low)[:2] > 0.2).all()  # metres: a head with some of what is around it
     assert ((high - low)[:2] < 0.5).all()

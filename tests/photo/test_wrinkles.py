@@ -8,6 +8,7 @@ import pytest
 from tests.photo.pictures import found_in, photographed, projected, still
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
+from tts2face.models.light import Photographed
 from tts2face.photo.photograph import Photograph
 from tts2face.photo.speaking_photo import speaking_photo
 from tts2face.picture.options import Picture
@@ -36,13 +37,13 @@ def face(pixels: np.ndarray) -> Face:
 
 def shaded(face: Face, landmark: int, reach: float, **weights: float) -> np.ndarray:
     """Change (H, W) of the light around a landmark, of 255: the picture of a pose with that light and without it."""
-    light = face.light[0]
+    light = face.light.baked
     moving = light.responses.copy()
     moving[4:7] = 0
     posed = np.array([weights.get(name, 0.0) for name in face.shape_names], np.float32)
+    lights = (Photographed(baked, face.light.view) for baked in (light, replace(light, responses=moving)))
     lit, plain = (
-        mesh_renderer(replace(face, light=(one,)), Picture()).draw(posed).astype(float).mean(axis=2)
-        for one in (light, replace(light, responses=moving))
+        mesh_renderer(replace(face, light=shown), Picture()).draw(posed).astype(float).mean(axis=2) for shown in lights
     )
     across, down = projected(NAME, SIDE, **weights)[landmark, :2].round().astype(int)
     reach = round(reach * SIDE)

@@ -25,6 +25,7 @@ from tts2face.face import deformation, eyeballs
 from tts2face.gestures import field_kernels
 from tts2face.lips import blending, contacts, token_search, tokens
 from tts2face.models import networks
+from tts2face.models.light import Lamps
 from tts2face.numeric import compiler, least_squares, object_code
 from tts2face.numeric import kernels as compilation
 from tts2face.numeric.kernels import CACHE_VARIABLE, Kernel, cache_folder, inlined_kernel, kernel
@@ -102,7 +103,7 @@ def test_kernels_count_as_compiled_once_they_lie_on_disk(indexes):
     assert not kernels_are_compiled(None)
     indexes["motion"].write_bytes(b"")
     assert kernels_are_compiled(None)
-    for kind, face in (("lamps", replace(lit, light=())), ("baked", lit)):
+    for kind, face in (("lamps", replace(lit, light=Lamps())), ("baked", lit)):
         assert not kernels_are_compiled(face)
         indexes[kind].write_bytes(b"")
         assert kernels_are_compiled(face)

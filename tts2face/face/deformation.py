@@ -15,6 +15,7 @@ from lexicon.errors import DataError
 from tts2face.face.eyeballs import EyeballClearance, build_clearance
 from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN, N_LANDMARKS
+from tts2face.models.light import Photographed
 from tts2face.numeric.arrays import nearest_rotation, smoothstep
 from tts2face.numeric.kernels import kernel
 from tts2face.numeric.reuse import shared
@@ -105,8 +106,8 @@ def build_rig(face: Face) -> FaceRig:
 
 def head_share(face: Face) -> NDArray[np.float32]:
     """Share (V,) of the head motion that each vertex follows: 1 on the head, falling to 0 at the end of the neck."""
-    if face.photograph is not None:
-        return face.photograph.follow
+    if isinstance(face.light, Photographed):
+        return face.light.view.follow
     height = face.vertices[:, 1]
     chin = np.flatnonzero(face.landmarks == CHIN)
     if not len(chin):

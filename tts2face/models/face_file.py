@@ -1,6 +1,6 @@
 """Reading and writing of ``.face`` files: a face in compact form, with identity presets."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from itertools import takewhile
 from pathlib import Path
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from tts2face.models.baked_light import BakedLight
-from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Hairdo, Late, PhotoView, Texture
+from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Hairdo, Late, Texture
 from tts2face.models.face_schema import (
     FOLLOW,
     LIGHT,
@@ -30,8 +30,10 @@ from tts2face.models.face_schema import (
     encode_uv,
     texture_number,
 )
+from tts2face.models.light import Baked, Lamps, Light, Photographed
 from tts2face.models.light_coding import decode_light, encode_light, pack_shapes, quantise, unpack_shapes
 from tts2face.models.networks import score_map_arrays, score_map_from_arrays
+from tts2face.models.photo_view import PhotoView
 from tts2face.storage.files import present_name
 from tts2face.storage.media_files import (
     decode_colours,
@@ -111,10 +113,10 @@ def write_face(path: Path, face: Face, identities: Mapping[str, Identity] | None
     if face.scores is not None:
         arrays |= score_map_arrays(face.scores)
         header[SCORE_INPUTS] = list(face.scores.inputs)
-    for light in face.light:
-        arrays[LIGHT], header[LIGHT] = encode_light(light)
-    if face.photograph is not None:
-        view = face.photograph
+    if not isinstance(face.light, Lamps):
+        arrays[LIGHT], header[LIGHT] = encode_light(face.light.baked)
+    if isinstance(face.light, Photographed):
+        view = face.light.view
         arrays[FOLLOW] = np.rint(255 * view.follow).astype(np.uint8)
         if view.alpha is not None:
             arrays[PHOTO_ALPHA] = encode_coverage(view.alpha)
@@ -147,14 +149,15 @@ def read_face(path: Path, identity: str | None = None, *, checks_pictures: bool 
     face = _face_from_arrays(arrays, header, path)
     if checks_pictures:
         tuple(face.textures)
-        tuple(face.light)
+        if not isinstance(face.light, Lamps):
+            _ = face.light.baked
     return face if identity is None else _apply_identity(face, arrays, header, names.index(identity))
 
 
 def _picture_arrays(face: Face) -> dict[str, NDArray[Any]]:
     """Textures of a face, and the places of its vertices in them or in a photograph."""
     arrays: dict[str, NDArray[Any]] = {}
-    if face.uv is not None and (face.textures or face.photograph is not None):
+    if face.uv is not None and (face.textures or face.light.is_flat):
         arrays["uv"] = encode_uv(face.uv)
     for number, texture in enumerate(face.textures):
         pixels, alpha = texture_tensors(number)
@@ -217,17 +220,19 @@ def _read_textures(arrays: Mapping[str, NDArray[Any]], path: Path) -> Late[Textu
     return Late(len(pictures), decode)
 
 
-def _read_light(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Sequence[BakedLight]:
+def _read_light(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> Light:
     if LIGHT not in arrays:
-        return ()
+        return Lamps()
     names = {"vertices": "vertices", "triangles": "triangles", "shapes": "shape_steps"}
     sizes = {what: len(arrays[name]) for what, name in names.items()}
-    return Late(1, lambda: [decode_light(arrays[LIGHT], header[LIGHT], sizes, path)])
+
+    def decode() -> BakedLight:
+        return decode_light(arrays[LIGHT], header[LIGHT], sizes, path)
+
+    return Photographed(decode, _read_view(arrays, header, path)) if PHOTOGRAPH in header else Baked(decode)
 
 
-def _read_photograph(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> PhotoView | None:
-    if PHOTOGRAPH not in header:
-        return None
+def _read_view(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any], path: Path) -> PhotoView:
     stored = header[PHOTOGRAPH]
     wide, high = stored["size"]
     follow = arrays[FOLLOW].astype(np.float32) / np.float32(255)
@@ -272,7 +277,6 @@ def _face_from_arrays(arrays: Mapping[str, NDArray[Any]], header: Mapping[str, A
         metadata=header["metadata"],
         scores=score_map_from_arrays(arrays, tuple(header.get(SCORE_INPUTS, ()))),
         light=_read_light(arrays, header, path),
-        photograph=_read_photograph(arrays, header, path),
     )
 
 

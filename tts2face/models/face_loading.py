@@ -8,6 +8,7 @@ from tts2face.models.face_file import KIND, read_face
 from tts2face.models.face_names import BALD
 from tts2face.models.hair import attach_hair, parse_hair_colour
 from tts2face.models.hair_file import LitHair, load_hair, tint_hair, wear_hair
+from tts2face.models.light import Lamps
 from tts2face.numeric.reuse import Shared, file_state
 from tts2face.storage.files import FORMER, SHIPPED_FOLDER, find_file
 
@@ -54,7 +55,7 @@ def _read_face(name: str, path: Path, identity: str | None, hair: str | None, ha
             raise InputError(f"no haircut fits the face {name}; remove --hair and --hair-color, or choose another face")
         return face
     chosen = Hairdo(hair or face.hairdo.haircut, hair_color or face.hairdo.colour)
-    if len(face.light):
+    if not isinstance(face.light, Lamps):
         return _lit_face(face, chosen)
     if chosen.haircut == BALD:
         parse_hair_colour(chosen.colour)
@@ -66,7 +67,7 @@ def _read_face(name: str, path: Path, identity: str | None, hair: str | None, ha
 
 
 def _lit_face(face: Face, chosen: Hairdo) -> Face:
-    """A face with baked light, which has a haircut and a colour in its file, with chosen ones."""
+    """A face with light of its own, which has a haircut and a colour in its file, with chosen ones."""
     own, name = face.hairdo or chosen, str(face.metadata.get("name", ""))
     if chosen.haircut != own.haircut:
         hair = load_hair(chosen.haircut, name, own.haircut)

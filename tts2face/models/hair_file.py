@@ -26,6 +26,7 @@ from tts2face.models.face_schema import (
     round_places,
 )
 from tts2face.models.hair import HAIR_PART, Hair, parse_hair_colour
+from tts2face.models.light import Lamps
 from tts2face.models.light_coding import (
     HAIR_QUALITY,
     SHAPE_TENSORS,
@@ -113,7 +114,8 @@ def wear_hair(face: Face, hair: LitHair) -> Face:
     n, name = hair.n_face_vertices, str(hair.metadata.get("name", ""))
     own = face.parts[-1]
     fits = own.name == HAIR_PART and own.first == hair.n_face_triangles and face.triangles[: own.first].max() < n
-    if not (fits and len(face.light) and face.triangles[own.first :].min() == n and face.uv is not None):
+    light = face.light
+    if isinstance(light, Lamps) or not (fits and face.triangles[own.first :].min() == n and face.uv is not None):
         raise DataError(f"the haircut {name} is one of the face {hair.face}; choose that face, or another haircut")
     moves = {**hair.shapes, **swing_shapes(hair.vertices, hair.loose / np.float32(255), hair.middle)}
     shapes = np.zeros((len(face.shapes), len(hair.vertices), 3), np.float32)
@@ -121,7 +123,7 @@ def wear_hair(face: Face, hair: LitHair) -> Face:
         if shape in moves:
             shapes[number] = moves[shape]
     tangents = np.zeros((n, 3), np.float32) if face.tangents is None else face.tangents[:n]
-    lights, textures = face.light, face.textures
+    textures = face.textures
     return replace(
         face,
         vertices=np.concatenate([face.vertices[:n], hair.vertices]),
@@ -134,7 +136,7 @@ def wear_hair(face: Face, hair: LitHair) -> Face:
         textures=Late(len(textures), lambda: (Texture(hair.skins[0]), *textures[1:])),
         hairdo=Hairdo(name, "" if face.hairdo is None else face.hairdo.colour),
         occlusion=None,
-        light=Late(1, lambda: [_lit(lights[0], hair)]),
+        light=light.changed(lambda baked: _lit(baked, hair)),
     )
 
 
@@ -146,7 +148,7 @@ def _lit(light: BakedLight, hair: LitHair) -> BakedLight:
 
 
 def tint_hair(face: Face, colour: str) -> Face:
-    """A face with baked light whose hair has a colour.
+    """A face with light of its own whose hair has a colour.
 
     Raises
     ------
@@ -155,9 +157,9 @@ def tint_hair(face: Face, colour: str) -> Face:
     DataError
         The hair of the face has one colour only.
     """
-    srgb, lights = parse_hair_colour(colour), face.light
-    tint = lights[0].tint
-    if tint is None:
+    srgb, light = parse_hair_colour(colour), face.light
+    tint = None if isinstance(light, Lamps) else light.baked.tint
+    if isinstance(light, Lamps) or tint is None:
         raise DataError("the hair of this face has one colour only; remove the colour of the hair")
     n = len(face.vertices) - tint.vertices.shape[1]
     known = np.concatenate([face.colours[None, n:], tint.vertices]).astype(np.float64)
@@ -169,7 +171,7 @@ def tint_hair(face: Face, colour: str) -> Face:
         face,
         colours=colours,
         hairdo=Hairdo("" if face.hairdo is None else face.hairdo.haircut, colour),
-        light=Late(1, lambda: [_tinted(lights[0], tint, srgb)]),
+        light=light.changed(lambda baked: _tinted(baked, tint, srgb)),
     )
 
 

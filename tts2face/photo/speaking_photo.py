@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from tts2face.face.deformation import landmark_motion, landmark_positions, scatter_landmarks
-from tts2face.models.face import Face, FacePart, PhotoView
+from tts2face.models.face import Face, FacePart
 from tts2face.models.landmarks import N_LANDMARKS
+from tts2face.models.light import Photographed
+from tts2face.models.photo_view import PhotoView
 from tts2face.photo.camera import PhotoCamera, find_camera
 from tts2face.photo.eyes import EYE_BEHIND_MM, SIDES, EyePatch, eye_patches, gaze_shapes
 from tts2face.photo.fit import NOTHING_GIVEN, PhotoFit, PhotoPlaces, place_landmarks
@@ -158,8 +160,10 @@ def speaking_photo(
         pivot=camera.to_head(pivot[None])[0].astype(np.float32),
         metadata={**metadata, "fit": given.used(lips, lids, {"teeth": edge, "pivot": pivot}).as_json()},
         scores=head.scores,
-        light=(picture_light(pixels, pages.pages, (mesh, skin.places, creases), drawn, mouth),),
-        photograph=_view(picture, camera, every.follow, pages),
+        light=Photographed(
+            picture_light(pixels, pages.pages, (mesh, skin.places, creases), drawn, mouth),
+            _view(picture, camera, every.follow, pages),
+        ),
     )
 
 

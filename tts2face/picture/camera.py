@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.face.deformation import landmark_positions
-from tts2face.models.face import Face, PhotoView
+from tts2face.models.face import Face
 from tts2face.models.landmarks import CHIN
+from tts2face.models.light import Photographed
+from tts2face.models.photo_view import PhotoView
 from tts2face.picture.options import CameraView
 
 FIELD_OF_VIEW_RAD = math.radians(
@@ -52,8 +54,9 @@ def camera_matrices(camera: CameraView, face: Face, size: tuple[int, int]) -> Ca
     InputError
         The face is that of a photograph, and the camera does not see it from where it was taken.
     """
-    if face.photograph is not None:
-        return photo_matrices(face.photograph, photo_crop(camera, face, size), size)
+    if isinstance(face.light, Photographed):
+        crop = photo_crop(camera, face, face.light.view, size)
+        return photo_matrices(face.light.view, crop, size)
     low, high = framing_box(face)
     yaw, pitch = math.radians(camera.yaw_deg), math.radians(camera.pitch_deg)
     ahead = -np.array([math.sin(yaw) * math.cos(pitch), math.sin(pitch), math.cos(yaw) * math.cos(pitch)])
@@ -70,7 +73,9 @@ def camera_matrices(camera: CameraView, face: Face, size: tuple[int, int]) -> Ca
     return CameraMatrices(view, np.array([focal, size[0] / 2, size[1] / 2, near]))
 
 
-def photo_crop(camera: CameraView, face: Face, size: tuple[int, int]) -> tuple[float, float, float, float]:
+def photo_crop(
+    camera: CameraView, face: Face, view: PhotoView, size: tuple[int, int]
+) -> tuple[float, float, float, float]:
     """Left, top, right and bottom, in pixels of its photograph, of what a camera shows in a picture of `size`.
 
     The picture is filled, with the face as near its middle as it can be.
@@ -80,9 +85,6 @@ def photo_crop(camera: CameraView, face: Face, size: tuple[int, int]) -> tuple[f
     InputError
         The camera does not see the face from where the photograph was taken.
     """
-    view = face.photograph
-    if view is None:
-        raise InputError("the face is not that of a photograph")
     if max(abs(camera.yaw_deg), abs(camera.pitch_deg)) > MAX_PHOTO_TURN_DEG:
         raise InputError(
             "a photograph is seen from where it was taken; choose the camera front or close, or a distance such as "

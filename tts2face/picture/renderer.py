@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face import Face
+from tts2face.models.light import Baked, Lamps, Light, Photographed
 from tts2face.numeric.reuse import map_in_order
 from tts2face.picture.baked.scene import LitScene, build_lit_scene
 from tts2face.picture.camera import CameraMatrices, camera_matrices
@@ -235,25 +236,27 @@ def mesh_renderer(face: Face, picture: Picture) -> MeshRenderer:
     InputError
         The picture asks for what a photograph does not show.
     """
-    if face.photograph is not None:
+    if isinstance(face.light, Photographed):
         from tts2face.picture.baked.photo_scene import build_photo_scene
 
-        return MeshRenderer(build_photo_scene(face, face.photograph, picture))
-    if face.light:
-        background = draw_background(picture, face.light[0].backdrop)
+        return MeshRenderer(build_photo_scene(face, face.light, picture))
+    if isinstance(face.light, Baked):
+        background = draw_background(picture, face.light.baked.backdrop)
         optics = camera_matrices(picture.view, face, picture.samples)
-        return MeshRenderer(build_lit_scene(face, picture, optics, background))
+        return MeshRenderer(build_lit_scene(face, face.light, picture, optics, background))
     return MeshRenderer(build_scene(face, picture))
 
 
-def before_studio(renderer: MeshRenderer, studio: NDArray[np.uint8]) -> MeshRenderer:
-    """Renderer of a face without a studio of its own before that of another one (H, W, 3), if no background is chosen.
+def before_studio(renderer: MeshRenderer, studio: Light) -> MeshRenderer:
+    """Renderer of a face without a studio of its own before that of another light, if no background is chosen.
 
     Faces of one film then stand before one wall.
     """
-    if renderer.scene.face.light or renderer.scene.face.photograph is not None or renderer.picture.background != STUDIO:
+    own = renderer.scene.face.light
+    if isinstance(studio, Lamps) or not isinstance(own, Lamps) or renderer.picture.background != STUDIO:
         return renderer
-    return replace(renderer, scene=replace(renderer.scene, background=draw_background(renderer.picture, studio)))
+    background = draw_background(renderer.picture, studio.baked.backdrop)
+    return replace(renderer, scene=replace(renderer.scene, background=background))
 
 
 def draw(

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import InputError
 from tts2face.models.face import Face
+from tts2face.models.light import Photographed
 from tts2face.picture.camera import CameraMatrices
 from tts2face.picture.display import require_display, use_window_class
 from tts2face.picture.options import SIDE_LIMITS_PX, STUDIO, Picture
@@ -34,7 +35,7 @@ def show_clip(clip: Clip, face: Face, picture: Picture) -> None:
     BackendError
         pyvista is not installed, or there is no display or no GL for it.
     """
-    if face.photograph is not None:
+    if isinstance(face.light, Photographed):
         raise InputError("--view shows heads; write a file of a photograph with --out clip.mp4")
     require_display("--view")
     player = ClipPlayer(clip, face, picture)

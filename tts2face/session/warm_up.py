@@ -20,6 +20,7 @@ from tts2face.gestures import field_kernels
 from tts2face.lips import contacts
 from tts2face.models.face import Face, keep_parts
 from tts2face.models.face_loading import load_face
+from tts2face.models.light import Lamps
 from tts2face.models.talker import load_talker
 from tts2face.numeric.reuse import available_cores
 from tts2face.picture.options import Picture
@@ -48,7 +49,7 @@ def _drawing_kernel(drawn: Face) -> "Kernel":
     from tts2face.picture.baked import surface
     from tts2face.picture.kernels import raster
 
-    return (surface, "find_nearest") if drawn.light else (raster, "draw_band")
+    return (raster, "draw_band") if isinstance(drawn.light, Lamps) else (surface, "find_nearest")
 
 
 def _is_compiled(module: ModuleType, name: str) -> bool:
@@ -63,7 +64,7 @@ def compile_kernels(drawn: Face | None) -> None:
     """
     from tts2face.picture.surface import STRANDS
 
-    has_strands = drawn is not None and not drawn.light
+    has_strands = drawn is not None and isinstance(drawn.light, Lamps)
     works = deque(name for name, work in WORKS.items() if has_strands or work is not compile_strands)
     children = [Child(Program(f"{__name__}:HANDLERS")) for _ in range(min(available_cores() - 1, len(works)))]
     threads = [threading.Thread(target=_compile, args=(child, works), daemon=True) for child in children]

@@ -18,6 +18,7 @@ from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_names import OF_FACE
 from tts2face.models.hair_file import write_lit_hair
+from tts2face.models.light import Baked
 
 
 def bake_face(
@@ -57,7 +58,7 @@ def light_character(
     own = baked(face, character, Effort())
     report(f"{name}: fit")
     light = fit_light(face, own, look_of(name), character.eyes)
-    write_face(path, replace(face, light=(light,), hairdo=own_hairdo(character)))
+    write_face(path, replace(face, light=Baked(light), hairdo=own_hairdo(character)))
     report(f"{name}: calibration")  # again: the tracker sees other pictures of it now
     calibrate_face_file(str(path), path)
     for style in HAIRCUTS.get(name, ()):

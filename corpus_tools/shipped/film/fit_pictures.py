@@ -56,7 +56,7 @@ class Missing:
 def fit_to_pictures(face: Face, poses: Sequence[LitPose], pictures: Mapping[str, Pixels]) -> BakedLight:
     """Light of a face whose pictures (S, S, 4) of poses, by their names, are nearer to these; S is `SIDE_PX`."""
     scene, skin, mouth = _missing(face, poses, pictures)
-    (light,), drawn = face.light, scene.surface.light
+    light, drawn = scene.lit.baked, scene.surface.light
     rows, mouth_rows = (
         np.flatnonzero(np.isin(every, own))
         for every, own in ((light.rows, drawn.rows), (light.mouth_rows, drawn.mouth_rows))

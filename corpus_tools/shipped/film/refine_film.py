@@ -22,6 +22,7 @@ from corpus_tools.training.calibrate_face import calibrate_face_file
 from tts2face.face.deformation import build_rig
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
+from tts2face.models.light import Baked
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.options import parse_camera
 
@@ -72,6 +73,6 @@ def refine_mouth(source: SourceMesh, name: str, path: Path, traced: Path, report
     poses = [pose for pose in lit_poses(face) if not pose.head.any()]
     pictures = trace_mouths(partial(build_scene, source, face, name), face, poses, traced / name, report)
     report(f"{name}: fit")
-    write_face(path, replace(face, light=(fit_to_pictures(face, poses, pictures),)))
+    write_face(path, replace(face, light=Baked(fit_to_pictures(face, poses, pictures))))
     report(f"{name}: calibration")  # again: the tracker sees other pictures of it now
     calibrate_face_file(str(path), path)

@@ -20,6 +20,7 @@ from tts2face.models.baked_light import table_levels
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.face_loading import load_face
 from tts2face.models.hair_file import tint_hair
+from tts2face.models.light import Baked
 from tts2face.picture.options import CameraView, parse_camera
 
 SIDE, SAMPLES = 96, 2
@@ -101,7 +102,7 @@ def test_a_character_is_drawn_in_its_baked_light(scene: Any, tmp_path: Path) -> 
     baked = bake_poses(scene, poses, other, effort, steps.append)
     assert steps[1] == "rest"
     baked.save(tmp_path / "baked.npz")
-    lit = replace(face, light=(fit_light(face, PoseLight.load(tmp_path / "baked.npz"), Look(), CAST["ada"].eyes),))
+    lit = replace(face, light=Baked(fit_light(face, PoseLight.load(tmp_path / "baked.npz"), Look(), CAST["ada"].eyes)))
     write_face(tmp_path / "lit.face", lit)
     lit = read_face(tmp_path / "lit.face")
     for pose in (poses[0], poses[1]):
@@ -114,7 +115,7 @@ def test_a_character_is_drawn_in_its_baked_light(scene: Any, tmp_path: Path) -> 
         assert apart["hair"] < 20
         assert apart["mouth"] < 25
     blond = tint_hair(lit, "#ababab")
-    assert np.abs(blond.light[0].pages[1].mean() - lit.light[0].pages[1].mean()) > 20
+    assert np.abs(blond.light.baked.pages[1].mean() - lit.light.baked.pages[1].mean()) > 20
     scene.paint_hair(other.vertices[0])
     scene.pose(poses[0].weights, poses[0].head)
     scene.render(tmp_path / "blond.png", 8, has_wall=False)

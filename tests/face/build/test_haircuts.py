@@ -113,9 +113,9 @@ def test_haircuts_of_drawn_characters(name: str, haircut: str) -> None:
         hides = (np.abs(off[:, 0]) < EYE_MM) & (np.abs(off[:, 1]) < EYE_MM / 2) & (off[:, 2] > 0)
         assert not hides.any()
     assert all(face.shapes[face.shape_names.index(shape), n:].any() for shape in SWING_SHAPES) == (haircut not in STILL)
-    light = face.light[0]
+    light = face.light.baked
     assert light.triangle_numbers.max() < len(face.triangles)
     assert np.isin(np.arange(face.parts[-1].first, len(face.triangles)), light.triangle_numbers).mean() > 0.3
-    assert np.abs(light.pages[1].astype(int) - own.light[0].pages[1]).mean() > 3  # another haircut, in red
+    assert np.abs(light.pages[1].astype(int) - own.light.baked.pages[1]).mean() > 3  # another haircut, in red
     red, green, blue = light.pages[1][: len(light.pages[1]) // 2].mean(axis=(0, 1))
     assert red > 1.3 * green > 1.3 * blue

@@ -9,9 +9,11 @@ import pytest
 
 from tests.picture.film.lit_face import SKIN_LIGHT, lit_tiny_face
 from tests.picture.tiny_face import tiny_face
+from tts2face.face.rest_light import in_rest_light
 from tts2face.interchange.exports import stage_surfaces
-from tts2face.interchange.exports.stage_glb import LEAST_MOVE_MM, in_rest_light, quantised_moves, stage_glb
+from tts2face.interchange.exports.stage_glb import LEAST_MOVE_MM, quantised_moves, stage_glb
 from tts2face.interchange.exports.surfaces import divide_surface
+from tts2face.models.light import Baked
 
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
@@ -104,11 +106,11 @@ def test_other_viewers_can_read_it(made):
 
 def test_a_face_with_baked_light_is_shown_in_it_at_rest() -> None:
     face = lit_tiny_face()
-    (light,) = face.light
+    light = face.light.baked
     lashes = face.triangles[face.parts[-1].first :]
     brown = replace(light, page_of={"skin": 0}, rows=np.unique(lashes).astype(np.int32))
     brown = replace(brown, base=np.full((len(brown.rows), 3), (90, 60, 30), np.uint8))
-    shown, unlit = in_rest_light(replace(face, light=(brown,)))
+    shown, unlit = in_rest_light(replace(face, light=Baked(brown)))
     assert unlit == {"skin", "lashes"}
     assert [one.pixels[0, 0].tolist() for one in shown.textures] == [list(SKIN_LIGHT), [30, 30, 30]]
     assert (shown.colours[brown.rows] == (90, 60, 30)).all()

@@ -53,7 +53,7 @@ def test_a_person_is_told_from_a_room(photo: Path, person: np.ndarray, segmenter
     said: list[str] = []
     face = face_from_photo(photo, consent="drawn", model=face_model, on_warning=said.append)
     assert not said
-    view, true = face.photograph, person[..., 3] / 255.0
+    view, true = face.light.view, person[..., 3] / 255.0
     apart = np.abs(view.alpha / 255.0 - true)
     near = (distance_transform_edt(true < 0.5) < RIM_PX) & (distance_transform_edt(true > 0.5) < RIM_PX)
     assert apart[near].mean() < 0.06
@@ -85,7 +85,7 @@ def test_a_person_whose_surroundings_look_like_him_is_not_cut_out(
     Image.fromarray((share * shown[..., :3] + (1 - share) * wall).astype(np.uint8)).save(tmp_path / "me.png")
     said: list[str] = []
     face = face_from_photo(tmp_path / "me.png", consent="drawn", model=face_model, on_warning=said.append)
-    assert face.photograph.alpha is None
+    assert face.light.view.alpha is None
     assert any("is not told from the background" in sentence for sentence in said)
 
 
@@ -95,5 +95,5 @@ def test_without_the_segmentation_model_it_is_said(
     monkeypatch.setattr("tts2face.video.tracking.is_segmenter", lambda _: False)
     said: list[str] = []
     face = face_from_photo(photo, consent="drawn", model=face_model, on_warning=said.append)
-    assert face.photograph.alpha is None
+    assert face.light.view.alpha is None
     assert any("`tts2face corpus setup` adds the model" in sentence for sentence in said)

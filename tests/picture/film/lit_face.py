@@ -6,6 +6,7 @@ import numpy as np
 
 from tests.picture.tiny_face import tiny_face
 from tts2face.models.baked_light import BLACK_SHARE, LIP_RING, N_BALL_TERMS, N_MOUTH_TERMS, N_TERMS, BakedLight
+from tts2face.models.light import Baked
 
 SKIN_LIGHT, TONGUE_LIGHT, WALL = (200, 120, 90), (150, 40, 50), (20, 60, 100)
 SIDE, TURN_SIDE = 128, 128
@@ -69,7 +70,7 @@ def lit_tiny_face():
     )
     return replace(
         face,
-        light=(light,),
+        light=Baked(light),
         landmarks=np.array(LIP_RING, np.int32),
         landmark_vertices=np.repeat(np.array(nearest, np.int32)[:, None], 3, axis=1),
         landmark_weights=np.tile(np.array([1, 0, 0], np.float32), (len(LIP_RING), 1)),

@@ -28,9 +28,9 @@ def terms_of(made: LightTerms, points: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def test_terms_are_those_of_rest_and_movement() -> None:
-    made = light_terms(FACE, RIG, FACE.light[0])
+    made = light_terms(FACE, RIG, FACE.light.baked)
     rest, _ = terms_of(made, FACE.vertices)
-    assert rest.shape == (N_TERMS, len(FACE.light[0].rows) + len(FACE.light[0].ball_rows))
+    assert rest.shape == (N_TERMS, len(FACE.light.baked.rows) + len(FACE.light.baked.ball_rows))
     assert (rest[0] == 1).all()
     assert np.abs(rest[1:]).max() < 1e-5
     moved, _ = terms_of(made, FACE.vertices + np.float32([0, 4, 0]))
@@ -39,10 +39,10 @@ def test_terms_are_those_of_rest_and_movement() -> None:
 
 
 def test_normals_turn_across_a_seam_of_the_texture_alike() -> None:
-    made = light_terms(FACE, RIG, FACE.light[0])
+    made = light_terms(FACE, RIG, FACE.light.baked)
     turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]], np.float32)  # by 90 degrees about z
     centre = np.array([0, -20, -60], np.float32)
-    skin = slice(0, len(FACE.light[0].rows))
+    skin = slice(0, len(FACE.light.baked.rows))
     turned = FACE.vertices.copy()
     turned[made.source[skin]] = (turned[made.source[skin]] - centre) @ turn.T + centre
     found, _ = terms_of(made, turned)
@@ -97,7 +97,7 @@ def polygon_holds(corners: np.ndarray, across: np.ndarray, up: np.ndarray) -> np
 
 
 def test_the_mouth_is_lit_from_in_front_and_more_when_it_opens() -> None:
-    made = light_terms(FACE, RIG, FACE.light[0])
+    made = light_terms(FACE, RIG, FACE.light.baked)
     _, shut = terms_of(made, FACE.vertices)
     points = FACE.vertices.copy()
     ring = FACE.landmark_vertices[:, 0]

@@ -20,6 +20,7 @@ from tts2face.face.body import DILATION, PUPIL_SHAPE
 from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face import Texture, keep_parts
 from tts2face.models.face_file import read_face, write_face
+from tts2face.models.light import Baked, Lamps
 from tts2face.picture.baked.eyes import EDGE_RAD
 from tts2face.picture.baked.scene import LitScene
 from tts2face.picture.options import Picture
@@ -68,9 +69,9 @@ def test_light_changes_with_expression_head_and_camera() -> None:
     dark = [picture[picture.max(axis=1) < 90] for picture in lashes]
     assert np.median(dark[0], axis=0) == pytest.approx([30, 30, 30], abs=2)
     assert np.median(dark[1], axis=0) == pytest.approx([30, 30, 30 + CAMERA_CHANGE], abs=2)
-    light = FACE.light[0]
+    light = FACE.light.baked
     both = replace(light, camera_modes=np.concatenate([light.camera_modes, 0 * light.camera_modes], axis=2))
-    seen = drawn(replace(FACE, light=(both,)), camera="30,0").reshape(-1, 3)
+    seen = drawn(replace(FACE, light=Baked(both)), camera="30,0").reshape(-1, 3)
     off = np.abs(seen - SKIN_LIGHT - [0, 0, CAMERA_CHANGE]).max(axis=1)
     assert (off <= 1).sum() > 1000  # the skin, when the first page has the change
 
@@ -109,7 +110,7 @@ def test_eyes_are_looked_up_in_the_view_transform() -> None:
 
 
 def test_a_pupil_widens_within_its_iris() -> None:
-    side, (pupil, iris) = 256, FACE.light[0].eye_edges
+    side, (pupil, iris) = 256, FACE.light.baked.eye_edges
     across = (np.arange(side) + 0.5) / side * 2 - 1
     off = EDGE_RAD * np.hypot(across[:, None], across)
     painted = np.where(off[..., None] < pupil, (255, 0, 0), np.where(off[..., None] < iris, (0, 255, 0), (0, 0, 255)))
@@ -136,7 +137,7 @@ def test_light_is_the_same_after_it_was_written(tmp_path) -> None:
     path = tmp_path / "lit.face"
     write_face(path, FACE)
     read = read_face(path)
-    old, new = FACE.light[0], read.light[0]
+    old, new = FACE.light.baked, read.light.baked
     for name in (
         "triangles",
         "rows",
@@ -155,17 +156,17 @@ def test_light_is_the_same_after_it_was_written(tmp_path) -> None:
     assert np.abs(drawn(read) - drawn()).max() <= 4  # JPEG
     again = tmp_path / "again.face"
     write_face(again, read)
-    assert read_face(again).light[0].lamps.shape == old.lamps.shape
+    assert read_face(again).light.baked.lamps.shape == old.lamps.shape
 
 
 @pytest.mark.parametrize(
     ("changes", "what"),
     [
-        ({"rows": FACE.light[0].rows + 10_000}, "rows holds"),
-        ({"triangles": FACE.light[0].triangles + 10_000}, "draws a triangle"),
-        ({"base": FACE.light[0].base[1:]}, "base has the shape"),
-        ({"response_sizes": FACE.light[0].response_sizes[1:]}, "response_sizes has the shape"),
-        ({"partners": FACE.light[0].partners[1:]}, "partners has the shape"),
+        ({"rows": FACE.light.baked.rows + 10_000}, "rows holds"),
+        ({"triangles": FACE.light.baked.triangles + 10_000}, "draws a triangle"),
+        ({"base": FACE.light.baked.base[1:]}, "base has the shape"),
+        ({"response_sizes": FACE.light.baked.response_sizes[1:]}, "response_sizes has the shape"),
+        ({"partners": FACE.light.baked.partners[1:]}, "partners has the shape"),
         ({"sky": np.full(3, np.nan, np.float32)}, "sky holds nan"),
         ({"pages": np.zeros((2, 48, 48, 3), np.uint8)}, "a side that is not a power of two"),
         ({"turn_modes": np.zeros((1, 3, 50), np.int8)}, "do not fill"),
@@ -175,7 +176,7 @@ def test_light_is_the_same_after_it_was_written(tmp_path) -> None:
 )
 def test_light_that_does_not_fit_its_face_is_refused(tmp_path, changes, what: str) -> None:
     path = tmp_path / "bad.face"
-    write_face(path, replace(FACE, light=(replace(FACE.light[0], **changes),)))
+    write_face(path, replace(FACE, light=Baked(replace(FACE.light.baked, **changes))))
     with pytest.raises(DataError, match=what) as refused:
         read_face(path)
     assert "bad.face" in str(refused.value)
@@ -183,7 +184,7 @@ def test_light_that_does_not_fit_its_face_is_refused(tmp_path, changes, what: st
 
 def test_a_face_without_some_of_its_parts_is_drawn_with_lamps() -> None:
     bare = keep_parts(FACE, lambda part: part.name != "lashes")
-    assert bare.light == ()
+    assert bare.light == Lamps()
     assert isinstance(mesh_renderer(bare, Picture(size=SIZE)).scene, Scene)
 
 

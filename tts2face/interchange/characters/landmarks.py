@@ -30,6 +30,7 @@ from tts2face.models.landmarks import (
     OUTER_LIP_LOWER,
     OUTER_LIP_UPPER,
 )
+from tts2face.models.light import Photographed
 from tts2face.picture.camera import camera_matrices
 from tts2face.picture.kernels.tables import lamp_directions, light_table
 from tts2face.picture.options import STUDIO, Picture
@@ -276,7 +277,7 @@ def draw_preview(face: Face) -> Pixels:
         opened[face.shape_names.index(opening)] = OPEN_WEIGHT
     rest = np.zeros_like(opened)
     views = ((rest, "front"), (opened, "front"), (rest, "three-quarter"))
-    if face.photograph is not None:
+    if isinstance(face.light, Photographed):
         shut = np.isin(face.shape_names, BLINK_SHAPES).astype(np.float32)
         views = ((rest, "close"), (opened, "close"), (shut, "close"))
     return np.concatenate([_draw_landmarks(face, weights, camera) for weights, camera in views], axis=1)
@@ -318,7 +319,7 @@ def png_bytes(pixels: Pixels, notice: str = "") -> bytes:
 def _draw_landmarks(face: Face, weights: NDArray[np.float32], camera: str) -> Pixels:
     from PIL import Image, ImageDraw
 
-    background = WALL if face.photograph is None else STUDIO
+    background = STUDIO if isinstance(face.light, Photographed) else WALL
     picture = Picture(size=f"{PREVIEW_PX}x{PREVIEW_PX}", camera=camera, background=background)
     drawn = Image.fromarray(mesh_renderer(face, picture).draw(weights))
     pen = ImageDraw.Draw(drawn)

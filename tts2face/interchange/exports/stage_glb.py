@@ -3,8 +3,6 @@
 Geometry and textures are plain glTF 2.0 with the extensions KHR_mesh_quantization and EXT_texture_webp, so that other
 viewers read it. Attributes whose names begin with an underscore and ``asset.extras`` hold what the renderer knows and
 glTF does not: visibility of the light, share of the head's motion, kinds of materials, lamps and cameras.
-
-A face with baked light as other programs can show it: its light at rest in textures and colours of vertices.
 """
 
 import io
@@ -16,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.face.deformation import landmark_positions
+from tts2face.face.rest_light import in_rest_light
 from tts2face.interchange.exports.stage_surfaces import stage_surfaces
 from tts2face.interchange.exports.surfaces import (
     HEAD,
@@ -26,7 +25,9 @@ from tts2face.interchange.exports.surfaces import (
     linear_colours,
 )
 from tts2face.interchange.gltf.container import INDICES, VERTICES, GltfBuffer
-from tts2face.models.face import HEAD_LIMIT_RAD, SHIFT_GAIN, Face, Texture
+from tts2face.models.face import Face, Texture
+from tts2face.models.light import Lamps, Photographed
+from tts2face.models.photo_view import HEAD_LIMIT_RAD, SHIFT_GAIN
 from tts2face.numeric.reuse import available_cores
 from tts2face.picture.camera import FIELD_OF_VIEW_RAD, framing_box
 from tts2face.picture.kernels import tables
@@ -36,40 +37,6 @@ from tts2face.picture.options import NAMED_VIEWS
 from tts2face.picture.scene import STUDIO_BRIGHT, STUDIO_CENTRE, STUDIO_DARK
 from tts2face.picture.surface import SKULL_CENTRE_MM, STRANDS, Surface, build_surface
 from tts2face.types import HEAD_CHANNELS
-
-
-def in_rest_light(face: Face) -> tuple[Face, frozenset[str]]:
-    """The face with its baked light at rest for textures and colours, and the names of the parts that take no lamps.
-
-    Eyes, teeth and tongue keep their own colours: their light changes with gaze and opening. A face without baked
-    light stays as it is.
-    """
-    if not face.light:
-        return face, frozenset()
-    (light,) = face.light
-    small = np.zeros(len(face.vertices), bool)
-    small[light.rows] = True
-    unlit = set(light.page_of)
-    textures, places = [Texture(page) for page in light.pages], {}
-    parts = []
-    for part in face.parts:
-        corners = face.triangles[part.first : part.first + part.count]
-        if part.name in light.page_of:
-            shown = replace(part, texture=light.page_of[part.name])
-        elif part.is_textured:
-            if part.texture not in places:
-                places[part.texture] = len(textures)
-                textures.append(face.textures[part.texture])
-            shown = replace(part, texture=places[part.texture])
-        else:
-            shown = part
-            if small[corners].all():
-                unlit.add(part.name)
-        parts.append(shown)
-    colours = face.colours.copy()
-    colours[light.rows] = light.base
-    return replace(face, parts=tuple(parts), textures=tuple(textures), colours=colours), frozenset(unlit)
-
 
 MAX_TEXTURE_PX = 1024  # along a side: more than a preview of 1000 pixels shows
 WEBP_QUALITY = 88
@@ -130,9 +97,9 @@ def stage_glb(face: Face, channels: tuple[str, ...]) -> bytes:
 
 def _as_seen(face: Face) -> Face:
     """The face, that of a photograph in the axes of the camera that took it."""
-    if face.photograph is None:
+    if not isinstance(face.light, Photographed):
         return face
-    turn = face.photograph.turn
+    turn = face.light.view.turn
     vertices, shapes, pivot = (
         (values @ turn.T).astype(np.float32) for values in (face.vertices, face.shapes, face.pivot)
     )
@@ -194,7 +161,7 @@ def quantised_moves(shapes: NDArray[np.floating]) -> tuple[NDArray[np.int16], ND
 
 def _material(surface: ExportSurface, built: Surface, face: Face, *, unlit: bool) -> dict[str, Any]:
     """Material with the values of the renderer's table in its extras."""
-    part, is_photo = surface.part, face.photograph is not None
+    part, is_flat = surface.part, face.light.is_flat
     row = built.materials[face.parts.index(part)]
     shading: dict[str, Any] = {"baseColorFactor": [1, 1, 1, part.opacity], "metallicFactor": 0}
     more: dict[str, Any] = {}
@@ -205,11 +172,11 @@ def _material(surface: ExportSurface, built: Surface, face: Face, *, unlit: bool
     extras: dict[str, Any] = {name: round(float(row[at]), 5) for name, at in columns.items()}
     extras |= {
         "kind": part.kind,
-        "open": bool(row[OPEN_SURFACE]) or is_photo,
+        "open": bool(row[OPEN_SURFACE]) or is_flat,
         "opacity": part.opacity,
         "cutout": part.cutout,
-        "unlit": unlit or is_photo,  # also the colours of its mouth are those of the picture's light
-        "behind": is_photo and part.texture != 0,  # eyes and mouth, which the skin hides anywhere
+        "unlit": unlit or is_flat,  # also the colours of its mouth are those of the picture's light
+        "behind": is_flat and part.texture != 0,  # eyes and mouth, which the skin hides anywhere
         **more,
     }
     material = {"name": part.name, "doubleSided": True, "pbrMetallicRoughness": shading, "extras": extras}
@@ -250,7 +217,6 @@ def _webp(texture: Texture) -> bytes:
 
 def _stage(face: Face, surface: Surface, skeleton: Skeleton, channels: tuple[str, ...]) -> Mapping[str, Any]:
     """What the preview takes from the renderer: lamps, cameras, joints; lengths in metres."""
-    low, high = _framed(face)
     jaw = face.shape_names.index("jawOpen") if "jawOpen" in face.shape_names else -1
     opening = lip_opening(face, jaw)[: len(channels)]
     eyes = [
@@ -273,9 +239,7 @@ def _stage(face: Face, surface: Surface, skeleton: Skeleton, channels: tuple[str
         "head": list(HEAD_CHANNELS),
         "eyes": eyes,
         "opening": {name: float(value) for name, value in zip(channels, opening, strict=True) if value},
-        "frame": [(low / MM_PER_M).tolist(), (high / MM_PER_M).tolist()],
-        "views": {name: [view.yaw_deg, view.pitch_deg, view.share] for name, view in NAMED_VIEWS.items()},
-        **_photo(face),
+        **_cameras(face),
         "field_of_view": FIELD_OF_VIEW_RAD,
         "lamps": [[yaw, pitch, list(colour)] for yaw, pitch, colour in tables.LAMPS],
         "sky": list(tables.SKY_COLOUR),
@@ -285,35 +249,41 @@ def _stage(face: Face, surface: Surface, skeleton: Skeleton, channels: tuple[str
     }
 
 
-def _framed(face: Face) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Corners (3,) of the box that the cameras frame, mm: of a photograph the head, as far as the picture shows it."""
-    if face.photograph is None:
-        return framing_box(face)
+def _cameras(face: Face) -> Mapping[str, Any]:
+    """The box that the cameras frame, and the cameras; of a photograph also how the head moves in it."""
+    views = {name: [view.yaw_deg, view.pitch_deg, view.share] for name, view in NAMED_VIEWS.items()}
+    if not isinstance(face.light, Photographed):
+        return {"frame": _in_metres(*framing_box(face)), "views": views}
+    view = face.light.view
+    return {
+        "frame": _in_metres(*_shown_head(face)),
+        "views": {"front": [0.0, 0.0, 1.0], "close": [0.0, 0.0, NAMED_VIEWS["close"].share]},
+        "photo": {  # as `PhotoView.bearable`
+            "turn": view.turn.tolist(),
+            "gain": view.head_gain,
+            "limit": float(HEAD_LIMIT_RAD),
+            "shift": SHIFT_GAIN,
+        },
+    }
+
+
+def _in_metres(*corners: NDArray[np.float64]) -> list[list[float]]:
+    return [(corner / MM_PER_M).tolist() for corner in corners]
+
+
+def _shown_head(face: Face) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Corners (3,), mm, of the box of a head with a margin, as far as the photograph shows it."""
     landmarks = landmark_positions(face)
     low, high = landmarks.min(axis=0), landmarks.max(axis=0)
     margin = PHOTO_MARGIN * (high - low)
     return np.maximum(low - margin, face.vertices.min(axis=0)), np.minimum(high + margin, face.vertices.max(axis=0))
 
 
-def _photo(face: Face) -> dict[str, Any]:
-    """Of a photograph: its few cameras, and how the head moves in it (`PhotoView.bearable`)."""
-    if face.photograph is None:
-        return {}
-    close = NAMED_VIEWS["close"].share
-    return {
-        "views": {"front": [0.0, 0.0, 1.0], "close": [0.0, 0.0, close]},
-        "photo": {
-            "turn": face.photograph.turn.tolist(), "gain": face.photograph.head_gain,
-            "limit": float(HEAD_LIMIT_RAD), "shift": SHIFT_GAIN,
-        },
-    }  # fmt: skip
-
-
 def _wall(face: Face) -> list[list[float]]:
     """Colours, 0 to 255, of the wall in the middle and at the sides, and the place of its middle."""
-    if not face.light:
+    if isinstance(face.light, Lamps):
         return [list(STUDIO_BRIGHT), list(STUDIO_DARK), list(STUDIO_CENTRE)]
-    backdrop = face.light[0].backdrop.astype(np.float64)
+    backdrop = face.light.baked.backdrop.astype(np.float64)
     middle, side = backdrop.shape[1] // 3, backdrop.shape[1] // 6
     outer = np.concatenate([backdrop[:, :side], backdrop[:, -side:]], axis=1)
     bright, dark = backdrop[:, middle:-middle].mean(axis=(0, 1)), outer.mean(axis=(0, 1))

@@ -250,7 +250,7 @@ def _reduced(
 ) -> ExportSurface:
     """The surface without what no view shows, and with fewer triangles; cards of hair stay as they are."""
     part, own, triangles = surface.part, surface.vertices, surface.triangles
-    is_photo = face.photograph is not None and part.texture == 0
+    is_photo = face.light.is_flat and part.texture == 0
     if part.kind == STRANDS or len(triangles) < (LEAST_PHOTO_TRIANGLES if is_photo else LEAST_TRIANGLES):
         return surface
     points = _points(face, surface, *values)

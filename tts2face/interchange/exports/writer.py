@@ -87,14 +87,14 @@ def mesh_of(face: "Face | HasMesh | None", files: Iterable[ExportFile]) -> "Face
     """
     if face is None:  # exports of sound import no models
         return None
-    from tts2face.interchange.exports.stage_glb import in_rest_light
+    from tts2face.face.rest_light import in_rest_light
     from tts2face.models.face import Face
 
     if isinstance(face, Face) or not any(file.format.uses_face for file in files):
         mesh = face if isinstance(face, Face) else None
     else:
         mesh = face.mesh
-    return mesh if mesh is None or mesh.photograph is None else in_rest_light(mesh)[0]
+    return mesh if mesh is None or not mesh.light.is_flat else in_rest_light(mesh)[0]
 
 
 def _check_path(path: Path) -> None:

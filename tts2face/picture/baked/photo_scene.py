@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
-from tts2face.models.face import Face, PhotoView
+from tts2face.models.face import Face
+from tts2face.models.light import Photographed
+from tts2face.models.photo_view import PhotoView
 from tts2face.picture.baked.cut_out import moving_pixels, page_covers, without_background
 from tts2face.picture.baked.scene import LitScene, build_lit_scene
 from tts2face.picture.camera import photo_crop, photo_matrices
@@ -16,7 +18,7 @@ from tts2face.picture.scene import draw_background
 BLUR_MM = 12.0  # standard deviation, where the person is
 
 
-def build_photo_scene(face: Face, view: PhotoView, picture: Picture) -> LitScene:
+def build_photo_scene(face: Face, light: Photographed, picture: Picture) -> LitScene:
     """Scene of a photographed face, in the size of the photograph where none is asked for.
 
     Raises
@@ -26,20 +28,21 @@ def build_photo_scene(face: Face, view: PhotoView, picture: Picture) -> LitScene
     DataError
         The background image cannot be read, or the photograph does not fit its view.
     """
-    _check(face, view, picture)
+    view, baked = light.view, light.baked
+    _check(light, picture)
     if picture.size == AUTO_SIZE:
         picture = replace(picture, size=_own_size(view))
     size = (picture.width, picture.height)
-    crop = photo_crop(picture.view, face, size)
+    crop = photo_crop(picture.view, face, view, size)
     optics = photo_matrices(view, crop, picture.samples)
-    shown = _resized(face.light[0].backdrop, size, crop)
+    shown = _resized(baked.backdrop, size, crop)
     if view.alpha is None:
-        return build_lit_scene(face, picture, optics, shown)
+        return build_lit_scene(face, light, picture, optics, shown)
     if view.behind is not None and picture.background in (STUDIO, BLUR):
         wall = _own_background(view, view.behind, picture, crop)
     else:
         wall = draw_background(picture)
-    scene = build_lit_scene(face, picture, optics, wall, page_covers(face.light[0], view))
+    scene = build_lit_scene(face, light, picture, optics, wall, page_covers(baked, view))
     is_moving = moving_pixels(scene.surface, optics, size, picture.samples_per_side)
     cover = np.where(is_moving, 0, _resized(view.alpha, size, crop))[..., None]
     if picture.is_transparent:
@@ -50,8 +53,9 @@ def build_photo_scene(face: Face, view: PhotoView, picture: Picture) -> LitScene
     return replace(scene, surface=surface, background=still.astype(np.uint8))
 
 
-def _check(face: Face, view: PhotoView, picture: Picture) -> None:
+def _check(light: Photographed, picture: Picture) -> None:
     """Refuse what a photograph does not show; errors as `build_photo_scene`."""
+    view = light.view
     if view.alpha is None and picture.background != STUDIO:
         raise InputError(
             "the person in the photograph was not told from its background, which stays; remove --background, or give "
@@ -59,7 +63,7 @@ def _check(face: Face, view: PhotoView, picture: Picture) -> None:
         )
     if view.behind is None and picture.background == BLUR:
         raise InputError("the photograph has no background that could be blurred; choose another --background")
-    if face.light[0].backdrop.shape[1::-1] != view.size:
+    if light.baked.backdrop.shape[1::-1] != view.size:
         raise DataError("the photograph of the face has another size than its view; make or copy the face again")
 
 

@@ -15,6 +15,7 @@ from tts2face.face.body import DILATION, PUPIL_SHAPE
 from tts2face.face.deformation import eye_rotations, head_transform
 from tts2face.models.baked_light import LEAST_SIDE, N_BALL_TERMS, N_PAGES, N_TERMS, BakedLight, equal_limits
 from tts2face.models.face import Face
+from tts2face.models.light import Lit
 from tts2face.numeric.kernels import BLOCK
 from tts2face.picture.baked.cut_out import compose_over, find_covers
 from tts2face.picture.baked.eyes import CENTRE, N_EYE_COLUMNS, PUPIL, TURN, colour_eyes
@@ -157,6 +158,7 @@ class LitScene:
     """
 
     face: Face
+    lit: Lit
     picture: Picture
     background: NDArray[np.uint8]
     surface: LitSurface
@@ -218,8 +220,7 @@ class LitScene:
     def draw(self, weights: Float32Array, head: Float32Array, buffers: LitBuffers, pixels: NDArray[np.uint8]) -> None:
         """Draw the face with shape weights (K,) and a head pose (6,) over the background in `pixels`, in place."""
         surface, side = self.surface, self.picture.samples_per_side
-        if self.face.photograph is not None:
-            head = self.face.photograph.bearable(head)
+        head = self.lit.bearable(head)
         points = self.deform(weights)
         self.light_pose(points, head, buffers)
         self.move(weights, head, points)
@@ -356,17 +357,19 @@ def _weight(face: Face, weights: Float32Array, name: str) -> float:
 
 def build_lit_scene(
     face: Face,
+    lit: Lit,
     picture: Picture,
     optics: CameraMatrices,
     background: NDArray[np.uint8],
     covers: NDArray[np.uint8] | None = None,
 ) -> LitScene:
-    """Scene of a face with baked light, whose pages may have a cover (2, H, W), before a background (H, W, 3)."""
-    side, surface = picture.samples_per_side, build_surface(face)
+    """Scene of a face with light of its own, whose pages may have a cover (2, H, W), before a background (H, W, 3)."""
+    side, surface = picture.samples_per_side, build_surface(face, lit)
     light, level = surface.light, _level(surface, optics, side)
     texels, size = stack_pages(light.pages, level, covers)
     return LitScene(
         face=face,
+        lit=lit,
         picture=picture,
         background=background,
         surface=surface,

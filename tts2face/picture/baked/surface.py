@@ -19,6 +19,7 @@ from lexicon.errors import DataError
 from tts2face.face.deformation import FaceRig, build_rig
 from tts2face.models.baked_light import BLACK_SHARE, N_PAGES, BakedLight
 from tts2face.models.face import Face
+from tts2face.models.light import Lit
 from tts2face.numeric.arrays import connected_pieces, decode_srgb
 from tts2face.numeric.kernels import BLOCK, flat_view, kernel, vectorized_kernel, write_larger
 from tts2face.numeric.reuse import shared
@@ -263,15 +264,15 @@ class LitSurface:
 
 
 @shared
-def build_surface(face: Face) -> LitSurface:
-    """Surface of a face with baked light.
+def build_surface(face: Face, own: Lit) -> LitSurface:
+    """Surface of a face with light of its own.
 
     Raises
     ------
     DataError
         The face has more triangles than a picture can tell apart.
     """
-    light, rig = face.light[0].of_drawn(face.triangles), build_rig(face)
+    light, rig = own.baked.of_drawn(face.triangles), build_rig(face)
     if len(light.triangles) > MAX_TRIANGLES:
         raise DataError(f"a face with light may have {MAX_TRIANGLES} triangles, not {len(light.triangles)}")
     backs = light.triangles < 0
@@ -306,7 +307,7 @@ def build_surface(face: Face) -> LitSurface:
         rig=rig,
         terms=light_terms(face, rig, light),
         source=source,
-        behind=(page_of[order] != 0) if face.photograph is not None else np.zeros(len(order), bool),
+        behind=(page_of[order] != 0) if own.is_flat else np.zeros(len(order), bool),
         template=template,
         triangles=np.ascontiguousarray(row_of[keys]),
         piece_of=connected_pieces(corners, n_vertices)[corners[:, 0]],  # edges of a part's pieces lie over each other

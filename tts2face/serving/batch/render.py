@@ -215,7 +215,7 @@ def _writer(
     if isinstance(renderer, OwnFaceRenderer):
         renderer = replace(renderer, n_returning=n_frames)
     if isinstance(renderer, MeshRenderer):
-        renderer = before_studio(renderer, load_face(DRAWN_FACE).light[0].backdrop)
+        renderer = before_studio(renderer, load_face(DRAWN_FACE).light)
     return ClipWriter(out, renderer, kind=MKV if segment.medium == ALPHA_MOVIE else None)
 
 

@@ -157,16 +157,16 @@ def _check_face(source: Path, out: Path) -> dict[str, Any]:
 
     _rewrite(source, out, FACE, face_file.FORMAT_VERSION)
     face = face_file.read_face(out)
-    if is_of_photo(face.photograph, face.metadata) and not states_consent(face.metadata):
+    if is_of_photo(face.metadata, in_picture=face.light.is_flat) and not states_consent(face.metadata):
         raise DataError("it shows a person's photograph, but states no consent; make it with --consent")
     for identity in describe_face(out).identities:
         face_file.read_face(out, identity)
     return _without_name(asdict(describe_face(out))) | {"licence": str(face.metadata.get("licence", "not stated"))}
 
 
-def is_of_photo(photograph: object | None, metadata: Mapping[str, Any]) -> bool:
+def is_of_photo(metadata: Mapping[str, Any], *, in_picture: bool) -> bool:
     """Whether a face shows a person in a photograph, or as a head that was made of pictures."""
-    return photograph is not None or metadata.get("made_by") == PHOTO_TOOL
+    return in_picture or metadata.get("made_by") == PHOTO_TOOL
 
 
 def _check_character(source: Path, out: Path) -> dict[str, Any]:

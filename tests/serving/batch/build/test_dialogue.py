@@ -137,7 +137,7 @@ def test_faces_without_a_studio_stand_before_that_of_the_drawn_faces(
 ) -> None:
     segment = plan_of(SENTENCE).outputs[0].segments[0]
     shown = _writer(world.session(), segment, Request(text="Hello."), (tmp_path / "a.mov", 10))
-    studio = load_face(DRAWN_FACE).light[0].backdrop
+    studio = load_face(DRAWN_FACE).light.baked.backdrop
     assert np.array_equal(shown._renderer.scene.background, draw_background(SMALL, studio))
     assert not np.array_equal(shown._renderer.scene.background, draw_background(SMALL))
     green = replace(segment, picture={"background": "green"})

@@ -20,6 +20,7 @@ from tests.processes.answered import refusal
 from tts2face.interchange.characters.character import KEY
 from tts2face.models.consent import PHOTO_TOOL
 from tts2face.models.face_file import read_face
+from tts2face.models.light import Photographed
 from tts2face.serving.work.resource_check import PLACES, SHOWN, STATEMENT, draw_resource, is_picture
 from tts2face.storage.files import find_file
 from tts2face.storage.tensors import read_tensors, write_tensors
@@ -196,7 +197,7 @@ def test_a_photo_becomes_a_face_that_keeps_the_consent(tmp_path: Path) -> None:
     message, checked = check("face", tmp_path / "photo.jpg", tmp_path)
     assert message == ""
     face = read_face(checked / "content")
-    assert face.photograph is not None
+    assert isinstance(face.light, Photographed)
     assert face.metadata["consent"]["statement"] == "I agree to this."
     assert face.metadata["name"] == "tom"
     assert face.metadata["fit"]["pivot"] == pytest.approx([170, 200], abs=0.2)

@@ -366,7 +366,7 @@ def _kind_of(kind: str, file: Path) -> str:
 def _refuse_photograph(face: Path) -> None:
     """Refuse the file of a face that speaks in a photograph, or of a head that was made of one."""
     header = read_metadata(face, FACE, FORMAT_VERSION)
-    if is_of_photo(header.get(PHOTOGRAPH), header["metadata"]):
+    if is_of_photo(header["metadata"], in_picture=PHOTOGRAPH in header):
         raise RefusedError(403, "forbidden", NO_PHOTOS)
 
 
