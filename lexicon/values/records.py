@@ -13,14 +13,14 @@ from types import GenericAlias, MappingProxyType, NoneType
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from lexicon.errors import DataError, InputError, Tts2faceError
-from lexicon.values.checks import EXPECTED, format_value
+from lexicon.values.checks import EXPECTED, Place
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
     from pydantic_core import ErrorDetails
 
 T = TypeVar("T")
-Place = Sequence[int | str]  # in a content: indices of lists and names
+Path = Sequence[int | str]  # of a value in a content: indices of lists and names
 _TYPES: Mapping[str, type] = MappingProxyType({  # that errors of pydantic name
     "float_type": float, "finite_number": float, "int_type": int, "string_type": str, "bool_type": bool,
     "list_type": list, "tuple_type": list, "frozen_set_type": list, "dict_type": dict, "dataclass_type": dict,
@@ -41,7 +41,7 @@ def checked(kind: type[T], content: Any, where: str, error: type[Tts2faceError] 
     try:
         (found,) = _adapter(cast(Hashable, kind)).validate_json(json.dumps([content], default=_foreign))
     except ValidationError as wrong:
-        raise error(where + _sentence(wrong.errors(include_url=False)[0], kind)) from wrong
+        raise _refusal(wrong.errors(include_url=False)[0], kind, where, error) from wrong
     return cast(T, found)
 
 
@@ -67,33 +67,36 @@ def _foreign(value: Any) -> Any:
     return {type(value).__name__: str(value)}
 
 
-def _sentence(error: "ErrorDetails", kind: Any) -> str:
-    """Error after its place: ``, spans[2]: start must be a number, not "x"``."""
-    place: Place = error["loc"][1:]
-    if error["type"] in {"value_error", "json_invalid"}:  # of a constructor, or half a surrogate pair
-        return f"{_path(place)}: {error['ctx']['error']}"
-    expected = EXPECTED.get(_TYPES.get(error["type"], object), error["msg"].removeprefix("Input should be "))
-    is_short = error["type"] == "missing" and isinstance(place[-1], int)
-    if is_short or error["type"] == "too_long":
-        place = place[:-1] if is_short else place
-        expected = _type_at(kind, place).__metadata__[0]
-    at = max((number for number, part in enumerate(place) if isinstance(part, str)), default=len(place))
-    name, begin = _path(place[at:]).removeprefix(", "), f"{_path(place[:at])}: "
-    if error["type"] == "unexpected_keyword_argument":
-        known = ", ".join(one.name for one in fields(_type_at(kind, place[:at])))
-        return f"{begin}there is no {name!r} here; choose {known}"
-    if error["type"] == "missing" and not is_short:
-        return f"{begin}{name} is missing"
-    return f"{begin}{name + ' must be' if name else 'give'} {expected}, not {format_value(error['input'])}"
+def _refusal(found: "ErrorDetails", kind: Any, where: str, error: type[Tts2faceError]) -> Tts2faceError:
+    """Error with its place: ``clip.json, spans[2]: start must be a number, not "x"``."""
+    path: Path = found["loc"][1:]
+    if found["type"] in {"value_error", "json_invalid"}:  # of a constructor, or half a surrogate pair
+        return error(f"{where}{_written(path)}: {found['ctx']['error']}")
+    expected = EXPECTED.get(_TYPES.get(found["type"], object), found["msg"].removeprefix("Input should be "))
+    is_short = found["type"] == "missing" and isinstance(path[-1], int)
+    if is_short or found["type"] == "too_long":
+        path = path[:-1] if is_short else path
+        expected = _type_at(kind, path).__metadata__[0]
+    at = max((number for number, part in enumerate(path) if isinstance(part, str)), default=len(path))
+    before = f"{where}{_written(path[:at])}: "
+    place = Place(_written(path[at:]).removeprefix(", ") or "give", before, error)
+    if found["type"] == "unexpected_keyword_argument":
+        known = ", ".join(field.name for field in fields(_type_at(kind, path[:at])))
+        return error(f"{before}there is no {place.name!r} here; choose {known}")
+    if found["type"] == "missing" and not is_short:
+        return place.refusal("is missing")
+    if not path[at:]:
+        return place.refusal(f"{expected}, not {place.show(found['input'])}")
+    return place.wrong(expected, found["input"])
 
 
-def _path(place: Place) -> str:
-    return "".join(f"[{part}]" if isinstance(part, int) else f", {part}" for part in place)
+def _written(path: Path) -> str:
+    return "".join(f"[{part}]" if isinstance(part, int) else f", {part}" for part in path)
 
 
-def _type_at(kind: Any, place: Place) -> Any:
-    """Type of a place in a content of a type; of an optional one, that without None."""
-    for part in place:
+def _type_at(kind: Any, path: Path) -> Any:
+    """Type of a value in a content of a type; of an optional one, that without None."""
+    for part in path:
         bare = get_args(kind)[0] if get_origin(kind) is Annotated else kind
         hints = get_type_hints(bare, include_extras=True) if is_dataclass(bare) else {}
         kind = hints[str(part)] if hints else get_args(bare)[-isinstance(part, str)]

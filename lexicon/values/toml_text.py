@@ -3,8 +3,8 @@
 import re
 from typing import Any
 
-from lexicon.errors import DataError, InputError
-from lexicon.values.checks import check_type
+from lexicon.errors import DataError
+from lexicon.values.checks import Place, typed
 from lexicon.values.json_text import MAX_DEPTH
 
 _QUOTED = re.compile(r'"(?:[^"\\]|\\.)*+"?|\'[^\']*+\'?')  # a text on one line of TOML, closed or not
@@ -47,16 +47,9 @@ def _check_tables(parsed: dict[str, Any], name: str) -> None:
             if isinstance(value, dict):
                 inner += value.items()
             elif isinstance(value, list):
-                inner += [(key, one) for one in value]
+                inner += [(key, item) for item in value]
             elif type(value) in (int, float):
-                _check_number(key, value, name)
+                typed(type(value))(value, Place(key[:40], f"{name}: ", DataError))
         level = inner
     if level:
         raise DataError(f"{name} is nested too deep: at most {MAX_DEPTH} levels of tables and lists are allowed")
-
-
-def _check_number(key: str, value: float, name: str) -> None:
-    try:
-        check_type(key[:40], value, type(value))
-    except InputError as wrong:
-        raise DataError(f"{name}: {wrong}") from wrong

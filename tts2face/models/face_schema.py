@@ -13,29 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lexicon.values.checks import Check, choice, flag, free, list_of, number, record, row, table, text, whole
 from tts2face.models.baked_light import LIP_RING
 from tts2face.models.face import PART_KINDS
 from tts2face.models.landmarks import N_LANDMARKS
 from tts2face.models.light_coding import MAX_STEP_MM, SHAPE_TENSORS, check_shapes
 from tts2face.models.networks import check_score_map
 from tts2face.storage.media_files import texture_tensors
-from tts2face.storage.schema import (
-    MAX_MM,
-    Check,
-    Contents,
-    Tensor,
-    choice,
-    flag,
-    free,
-    list_of,
-    millimetres,
-    number,
-    record,
-    row,
-    table,
-    text,
-    whole,
-)
+from tts2face.storage.schema import MAX_MM, Contents, ModelPlace, Tensor, millimetres
 from tts2face.storage.tensors import deflate, inflate
 
 Bits = NDArray[np.uint8]
@@ -136,8 +121,8 @@ def check_face(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[s
     """
     contents = Contents(path, "face", arrays, header)
     contents.metadata(METADATA)
-    table(row(text, text))(header.get("hairdos", {}), f"{path}: metadata: hairdos")
-    whole(0, MAX_OCCLUSION_BYTES)(header.get("occlusion_bytes", 0), f"{path}: metadata: occlusion_bytes")
+    table(row(text, text))(header.get("hairdos", {}), ModelPlace(f"{path}: metadata: hairdos"))
+    whole(0, MAX_OCCLUSION_BYTES)(header.get("occlusion_bytes", 0), ModelPlace(f"{path}: metadata: occlusion_bytes"))
     contents.tensors(TENSORS)
     presets = range(len(header["identities"]))
     contents.tensors({f"identity{n}": Tensor("int16", ("vertices", 3)) for n in presets})
@@ -198,7 +183,7 @@ def _check_photograph(contents: Contents) -> None:
         PHOTO_ALPHA in arrays or PHOTO_BEHIND not in arrays, "has what lies behind a photograph, but not its alpha"
     )
     if PHOTOGRAPH in header:
-        _PHOTOGRAPH(header[PHOTOGRAPH], f"{contents.path}: metadata: {PHOTOGRAPH}")
+        _PHOTOGRAPH(header[PHOTOGRAPH], ModelPlace(f"{contents.path}: metadata: {PHOTOGRAPH}"))
         contents.require(LIGHT in arrays, "has a photograph, but no light")
         contents.require(header[PHOTOGRAPH]["lens"][0] > 0, "has a photograph without a focal length")
 
@@ -210,7 +195,7 @@ def texture_number(part: Mapping[str, Any]) -> int:
 
 def _check_scores(contents: Contents) -> None:
     inputs = contents.header.get(SCORE_INPUTS, [])
-    list_of(text)(inputs, f"{contents.path}: metadata: {SCORE_INPUTS}")
+    list_of(text)(inputs, ModelPlace(f"{contents.path}: metadata: {SCORE_INPUTS}"))
     unknown = sorted(set(inputs) - set(contents.header["shape_names"]))
     contents.require(not unknown, f"{SCORE_INPUTS} holds {unknown[:1]}, which is not one of its shapes")
     check_score_map(contents, len(inputs))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
+from lexicon.values.checks import Check, anything, free, list_of, text, whole
 from tts2face.models.baked_light import BakedLight, HairLight, HairTint, grey_curves
 from tts2face.models.face import Face, Hairdo, Late, Texture
 from tts2face.models.face_names import BALD, HAIR_KIND, OF_FACE, haircut_names
@@ -39,7 +40,7 @@ from tts2face.models.light_coding import (
 from tts2face.numeric.arrays import decode_srgb
 from tts2face.storage.files import SHIPPED_FOLDER, find_file
 from tts2face.storage.media_files import decode_colours, decode_coverage, encode_colours, encode_coverage
-from tts2face.storage.schema import Check, Contents, Tensor, anything, free, list_of, millimetres, text, whole
+from tts2face.storage.schema import Contents, ModelPlace, Tensor, millimetres
 from tts2face.storage.tensors import read_tensors, write_tensors
 
 DARKEST, LEAST_GLOSS = 1e-3, 0.15  # linear light, and share of the change of gloss on light hair
@@ -432,7 +433,7 @@ def load_hair(name: str, face: str = "", own: str = BALD) -> Hair | LitHair:
 def _check_hair(path: Path, arrays: Mapping[str, NDArray[Any]], header: Mapping[str, Any]) -> None:
     contents = Contents(path, "haircut", arrays, header)
     contents.metadata(METADATA)
-    OCCLUSION_BYTES(header.get("occlusion_bytes", 0), f"{path}: metadata: occlusion_bytes")
+    OCCLUSION_BYTES(header.get("occlusion_bytes", 0), ModelPlace(f"{path}: metadata: occlusion_bytes"))
     contents.tensors(TENSORS)
     contents.only_known()
     contents.indices("triangles", contents.sizes["vertices"], "vertices")

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lexicon.values.checks import anything, number, record, table, whole
 from tts2face.models.baked_light import (
     LEAST_SIDE,
     N_BALL_TERMS,
@@ -26,7 +27,7 @@ from tts2face.models.baked_light import (
 )
 from tts2face.numeric.arrays import zeros_with_room
 from tts2face.storage.media_files import JPEG_QUALITY, decode_colours, encode_colours
-from tts2face.storage.schema import MAX_MM, Contents, Tensor, anything, number, record, table, whole
+from tts2face.storage.schema import MAX_MM, Contents, ModelPlace, Tensor
 from tts2face.storage.tensors import pack_arrays, unpack_arrays
 
 MAX_SIDE = 4096
@@ -127,7 +128,7 @@ def decode_light(
     DataError
         It is damaged, or does not fit the face.
     """
-    FIELDS(stored, f"{path}: metadata: light")
+    FIELDS(stored, ModelPlace(f"{path}: metadata: light"))
     arrays = unpack_arrays(content, stored["arrays"], "light", path)
     n_partners = len(arrays.get("rows", ())) + len(arrays.get("ball_rows", ()))
     contents = Contents(path, "face", arrays, {}, {"partners": n_partners})
@@ -156,7 +157,7 @@ def decode_hair_light(
     DataError
         It is damaged.
     """
-    HAIR_FIELDS(stored, f"{path}: metadata: light")
+    HAIR_FIELDS(stored, ModelPlace(f"{path}: metadata: light"))
     contents = Contents(path, "haircut", unpack_arrays(content, stored["arrays"], "light", path), {})
     contents.tensors(OF_HAIR)
     return HairLight(**_checked(contents, sizes))

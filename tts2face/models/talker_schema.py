@@ -10,24 +10,11 @@ from numpy.typing import NDArray
 
 from lexicon.phones import PHONES
 from lexicon.sequence import SILENCE
+from lexicon.values.checks import Check, Place, anything, list_of, number, record, row, text, whole
 from tts2face.models.audio_map import ACTIVATIONS, AUDIO_MAP_PREFIX, FEATURE_SIZES, MAX_CONTEXT, MIDDLE, layer_names
 from tts2face.models.landmarks import FACE_OVAL, N_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.models.networks import N_PHONES_SEEN, N_PLACE, check_score_map
-from tts2face.storage.schema import (
-    MAX_MM,
-    Check,
-    Contents,
-    Tensor,
-    anything,
-    list_of,
-    millimetres,
-    number,
-    record,
-    refuse,
-    row,
-    text,
-    whole,
-)
+from tts2face.storage.schema import MAX_MM, Contents, Tensor, millimetres, refuse
 from tts2face.types import HEAD_CHANNELS
 
 FPS_LIMITS = (1.0, 1000.0)
@@ -103,10 +90,10 @@ def _check_metadata(contents: Contents) -> None:
         contents.require(len(set(phones)) == len(phones), f"{name} holds a duplicate phone")
 
 
-def _utterance_rows(value: Any, where: str) -> None:
+def _utterance_rows(value: Any, place: Place) -> None:
     """Check names and words of utterances; one loop, because talkers have tens of thousands of words."""
     if type(value) is not list:
-        refuse(f"{where} is not a list", "talker")
+        refuse(f"{place.name} is not a list", "talker")
     for at, utterance in enumerate(value):
         if (
             type(utterance) is not list
@@ -114,11 +101,11 @@ def _utterance_rows(value: Any, where: str) -> None:
             or type(utterance[0]) is not str
             or type(utterance[1]) is not list
         ):
-            refuse(f"{where}[{at}] is not a name with a list of words", "talker")
+            refuse(f"{place.name}[{at}] is not a name with a list of words", "talker")
         for word in utterance[1]:
             fits = type(word) is list and len(word) == 3 and type(word[0]) is str
             if not fits or type(word[1]) is not int or type(word[2]) is not int or not 0 <= word[1] < word[2] < 2**31:
-                refuse(f"{where}[{at}] holds a word that is not a text with its first and last phone", "talker")
+                refuse(f"{place.name}[{at}] holds a word that is not a text with its first and last phone", "talker")
 
 
 def _check_utterances(contents: Contents) -> None:

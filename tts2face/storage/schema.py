@@ -4,21 +4,20 @@ Every check raises a DataError that names the file, the array or key, the value,
 one size in the whole file; it is at least 1 unless the array may be empty.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lexicon.errors import DataError
+from lexicon.errors import DataError, Tts2faceError
+from lexicon.values.checks import Check, Place, anything, record
 
 MAX_MM = 1e4  # of any coordinate; larger values indicate another unit
-MAX_TEXT = 100_000  # characters of one text in the metadata
-MAX_DEPTH = 16  # levels of nesting in metadata of free form
+REMEDY = "; build or copy the {} again"
 MAX_SHOWN_CHARACTERS = 60  # characters of a value in an error message
-Check = Callable[[Any, str], None]  # check(value, name) raises DataError if a value is invalid
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +52,28 @@ def millimetres(*shape: int | str, most: float = MAX_MM) -> Tensor:
     return Tensor("float32", shape, -most, most)
 
 
+class ModelPlace(Place):
+    """Place of a value in the metadata of a model file: its refusals advise to build or copy the file again."""
+
+    __slots__ = ()
+
+    def refusal(self, what: str) -> Tts2faceError:
+        """Error about the value."""
+        return DataError(f"{self.name} {what}{REMEDY.format('file')}")
+
+    def wrong(self, expected: str, value: Any) -> Tts2faceError:
+        """Error about a value that is not as expected."""
+        return self.refusal(f"is {self.show(value)}, not {expected}")
+
+    def item(self, part: int | str) -> Self:
+        """Place of a value of a list, or of a name in an object."""
+        return type(self)(f"{self.name}[{part}]" if isinstance(part, int) else f"{self.name}: {part}")
+
+    def show(self, value: Any) -> str:
+        """A value in a refusal."""
+        return _abbreviate(value)
+
+
 @dataclass(slots=True)
 class Contents:
     """Arrays and metadata of a file under check; ``sizes`` holds the named dimensions found so far."""
@@ -84,10 +105,10 @@ class Contents:
 
     def metadata(self, specs: Mapping[str, Check]) -> None:
         """Check the metadata: the keys of `specs` are required; others must be JSON of limited depth."""
-        where = f"{self.path}: metadata"
-        record(specs)({key: self.header[key] for key in specs if key in self.header}, where)
+        place = ModelPlace(f"{self.path}: metadata")
+        record(specs)({key: self.header[key] for key in specs if key in self.header}, place)
         for key in self.header.keys() - specs.keys():
-            anything(self.header[key], f"{where}: {_abbreviate(key)}")
+            anything(self.header[key], place.item(place.show(key)))
 
     def only_known(self) -> None:
         """Check that there are no other arrays than those already checked."""
@@ -147,116 +168,6 @@ class Contents:
                 self.fail(f"{name} holds {value}; its {'least' if is_low else 'greatest'} number is {bound:g}")
 
 
-def text(value: Any, where: str) -> None:
-    """Check that a value is a string of limited length."""
-    if type(value) is not str or len(value) > MAX_TEXT:
-        refuse(f"{where} is {_abbreviate(value)}, not a text of at most {MAX_TEXT} characters")
-
-
-def flag(value: Any, where: str) -> None:
-    """Check that a value is a Boolean."""
-    if type(value) is not bool:
-        refuse(f"{where} is {_abbreviate(value)}, not true or false")
-
-
-def whole(low: int, high: int) -> Check:
-    """Check for an integer in [low, high]."""
-
-    def check(value: Any, where: str) -> None:
-        if type(value) is not int or not low <= value <= high:
-            refuse(f"{where} is {_abbreviate(value)}, not a whole number from {low} to {high}")
-
-    return check
-
-
-def number(low: float, high: float) -> Check:
-    """Check for a number in [low, high]."""
-
-    def check(value: Any, where: str) -> None:
-        if type(value) not in (int, float) or not low <= value <= high:
-            refuse(f"{where} is {_abbreviate(value)}, not a number from {low:g} to {high:g}")
-
-    return check
-
-
-def choice(*values: str) -> Check:
-    """Check for one of some texts."""
-
-    def check(value: Any, where: str) -> None:
-        if type(value) is not str or value not in values:
-            refuse(f"{where} is {_abbreviate(value)}, not {', '.join(values[:-1])} or {values[-1]}")
-
-    return check
-
-
-def list_of(item: Check, length: int | None = None) -> Check:
-    """Check for a list, of a given length if any, whose items all pass `item`."""
-
-    def check(value: Any, where: str) -> None:
-        if type(value) is not list or length not in (None, len(value)):
-            refuse(f"{where} is {_abbreviate(value)}, not a list{'' if length is None else f' of {length}'}")
-        for at, element in enumerate(value):
-            item(element, f"{where}[{at}]")
-
-    return check
-
-
-def row(*items: Check) -> Check:
-    """Check for a list with one check per item."""
-
-    def check(value: Any, where: str) -> None:
-        if type(value) is not list or len(value) != len(items):
-            refuse(f"{where} is {_abbreviate(value)}, not a list of {len(items)}")
-        for at, (item, element) in enumerate(zip(items, value, strict=True)):
-            item(element, f"{where}[{at}]")
-
-    return check
-
-
-def record(fields: Mapping[str, Check], optional: Mapping[str, Check] | None = None) -> Check:
-    """Check for an object with required and optional keys and no others."""
-    every = {**fields, **(optional or {})}
-
-    def check(value: Any, where: str) -> None:
-        if type(value) is not dict:
-            refuse(f"{where} is {_abbreviate(value)}, not an object")
-        for key in fields.keys() - value.keys():
-            refuse(f"{where} lacks {key}")
-        for key, element in value.items():
-            if key not in every:
-                refuse(f"{where} holds {_abbreviate(key)}, which is not one of {', '.join(every)}")
-            every[key](element, f"{where}: {key}")
-
-    return check
-
-
-def table(item: Check) -> Check:
-    """Check for an object with any keys whose values all pass `item`."""
-
-    def check(value: Any, where: str) -> None:
-        if type(value) is not dict:
-            refuse(f"{where} is {_abbreviate(value)}, not an object")
-        for key, element in value.items():
-            item(element, f"{where}: {_abbreviate(key)}")
-
-    return check
-
-
-def anything(value: Any, where: str, depth: int = MAX_DEPTH) -> None:
-    """Check the nesting depth and the string lengths of JSON of any form."""
-    if type(value) is str:
-        text(value, where)
-    if depth == 0 and isinstance(value, list | dict):
-        refuse(f"{where} is nested deeper than {MAX_DEPTH} levels")
-    for element in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
-        anything(element, where, depth - 1)
-
-
-def free(value: Any, where: str) -> None:
-    """Check for an object with any keys and values."""
-    table(anything)(value, where)
-
-
 def refuse(what: str, kind: str = "file") -> NoReturn:
     """Raise a DataError that ends with the advice to build or copy the file again.
 
@@ -265,7 +176,7 @@ def refuse(what: str, kind: str = "file") -> NoReturn:
     DataError
         Always.
     """
-    raise DataError(f"{what}; build or copy the {kind} again")
+    raise DataError(what + REMEDY.format(kind))
 
 
 def _abbreviate(value: Any) -> str:

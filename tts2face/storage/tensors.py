@@ -23,10 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, DataError, InputError
+from lexicon.values.checks import Place, choice, list_of, row, text, whole
 from lexicon.values.json_text import parse_json
 from tts2face.storage.content_store import FolderStore
 from tts2face.storage.files import user_cache, write_atomically
-from tts2face.storage.schema import choice, list_of, refuse, row, text, whole
+from tts2face.storage.schema import ModelPlace, refuse
 
 LEVEL, DRAFT_LEVEL = 9, 1  # of zlib: in files, and to choose between ways to write an array
 STRATEGIES = (zlib.Z_DEFAULT_STRATEGY, zlib.Z_FILTERED)  # the second is better for pictures of small numbers
@@ -86,7 +87,7 @@ def unpack_arrays(content: NDArray[Any], listed: Any, what: str, path: Path) -> 
         They are damaged, or have more bytes than `MAX_BYTES`.
     """
     where = f"{path}: metadata: {what}"
-    list_of(_check_entry)(listed, where)
+    list_of(_check_entry)(listed, ModelPlace(where))
     names = [name for name, *_ in listed]
     if len(set(names)) < len(names):
         refuse(f"{where} lists two arrays of the same name")
@@ -102,11 +103,11 @@ def unpack_arrays(content: NDArray[Any], listed: Any, what: str, path: Path) -> 
     return found
 
 
-def _check_entry(value: Any, where: str) -> None:
+def _check_entry(value: Any, place: Place) -> None:
     has_steps = isinstance(value, list) and len(value) > len(_PLAIN)
-    row(*_PLAIN, *([whole(LAST, FIRST)] if has_steps else []))(value, where)
+    row(*_PLAIN, *([whole(LAST, FIRST)] if has_steps else []))(value, place)
     if not 1 <= len(value[2]) <= MAX_AXES:
-        refuse(f"{where} has {len(value[2])} axes, not 1 to {MAX_AXES}")
+        refuse(f"{place.name} has {len(value[2])} axes, not 1 to {MAX_AXES}")
 
 
 def _steps(array: NDArray[Any], axis: int) -> bytes:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence, WordSpan
-from lexicon.values.checks import check_list, check_type
+from lexicon.values.checks import EXPECTED, Place, check_type, list_of, typed
 from lexicon.values.files import check_regular_file
 from lexicon.values.json_text import parse_json
 from tts2face.interchange.exports.parts import Part, Target, frame_rows
@@ -29,6 +29,7 @@ FLOAT32_FORMAT = "%.9g"  # nine digits identify every 32-bit number
 MAX_LINE_BYTES = 2_000_000_000  # of a piece: an hour at 48 kHz and 30 frames/s in one piece takes 1.1 GB
 _NEGATIVE_ZERO = re.compile(r"(?<![^,])-0(?![^,])")  # a JSON integer, which would lose its sign
 OPENING, CLOSING = '"pieces": [', "]}"
+_TEXTS, _NUMBERS = (list_of(typed(kind), expected=EXPECTED[list]) for kind in (str, float))
 _PIECE_NAMES = ("motion", "head", "phones", "edges", "words", "text", "samples")
 
 
@@ -170,7 +171,7 @@ def _check_header(header: Mapping[str, Any], path: Path) -> Mapping[str, Any]:
     if header.get("head_channels") != list(HEAD_CHANNELS):
         raise _not_a_track(path, f"its head_channels are not {', '.join(HEAD_CHANNELS)}")
     try:
-        check_list("channels", header.get("channels"), str)
+        _TEXTS(header.get("channels"), Place("channels"))
         for name, kind in (("fps", float), ("rate", int)):
             check_type(name, header.get(name), kind)
     except InputError as wrong:
@@ -183,7 +184,7 @@ def _parse_piece(piece: Any, header: Mapping[str, Any], name: str) -> TrackPiece
         raise DataError(f"{name}: a piece needs exactly {', '.join(_PIECE_NAMES)}; export the track again")
     try:
         samples = np.frombuffer(base64.b64decode(piece["samples"], validate=True), "<f4")
-        phones = PhoneSequence(check_list("phones", piece["phones"], str), check_list("edges", piece["edges"], float))
+        phones = PhoneSequence(_TEXTS(piece["phones"], Place("phones")), _NUMBERS(piece["edges"], Place("edges")))
         words = tuple(_word(*check_type("each word", word, list)) for word in check_type("words", piece["words"], list))
         fps = float(header["fps"])
         return TrackPiece(
