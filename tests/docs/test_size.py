@@ -3,28 +3,41 @@
 import tomllib
 from pathlib import Path
 
-from tests.docs.size import ALL, PAGE, ROOT, Size, measured_sizes, stated_sizes, with_sizes, wrong_sizes
+from tests.docs.size import (
+    ALL,
+    MOST_STATEMENTS,
+    PAGE,
+    ROOT,
+    Size,
+    measured_sizes,
+    stated_sizes,
+    with_sizes,
+    wrong_sizes,
+)  # fmt: skip
 
 
-def test_the_page_of_the_architecture_states_files_and_lines() -> None:
+def test_the_page_of_the_architecture_states_the_sizes_and_no_package_grows() -> None:
     rules = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
-    stated = stated_sizes(PAGE.read_text(encoding="utf-8"))
+    stated, measured = stated_sizes(PAGE.read_text(encoding="utf-8")), measured_sizes(ROOT, rules["root_packages"])
     assert sorted(stated) == sorted([*rules["root_packages"], ALL])
-    wrong = wrong_sizes(stated, measured_sizes(ROOT, rules["root_packages"]))
+    wrong = wrong_sizes(stated, measured)
     assert not wrong, "\n".join(["docs/architecture.md is not true; run: python -m tests.docs.size", *wrong])
+    assert measured[ALL].statements <= MOST_STATEMENTS
 
 
 def test_sizes_are_counted_written_and_compared(tmp_path: Path) -> None:
     (tmp_path / "cli/room").mkdir(parents=True)
     (tmp_path / "cli/room/a.py").write_text("x\n" * 1234)
-    (tmp_path / "cli/b.py").write_text("y\n")
+    (tmp_path / "cli/b.py").write_text("if y:\n    z = (\n        1\n    )\n")
     (tmp_path / "cli/table.json").write_text("{}\n")
     measured = measured_sizes(tmp_path, ["cli"])
-    assert measured == {"cli": Size(2, 1235), ALL: Size(2, 1235)}
-    page = "| `cli` | a, | b | 1 | 12,000 |\n| all four | | | 0 | 0 |\n| `x` | y |\n"
-    assert wrong_sizes(stated_sizes(page), measured)[0] == "cli has 2 files with 1,235 lines, not 1 with 12,000"
+    assert measured == {"cli": Size(2, 1238, 1236), ALL: Size(2, 1238, 1236)}
+    page = "| `cli` | a, | b | 1 | 12,000 | 9 |\n| all four | | | 0 | 0 | 0 |\n| `x` | y |\n"
+    assert wrong_sizes(stated_sizes(page), measured)[:3] == [
+        "cli has 2 files, not 1", "cli has 1,238 lines, not 12,000", "cli has 1,236 statements, not 9"
+    ]  # fmt: skip
     written = with_sizes(page, measured)
-    assert written == "| `cli` | a, | b | 2 | 1,200 |\n| all four | | | 2 | 1,200 |\n| `x` | y |\n"
+    assert written == "| `cli` | a, | b | 2 | 1,200 | 1,200 |\n| all four | | | 2 | 1,200 | 1,200 |\n| `x` | y |\n"
     assert wrong_sizes(stated_sizes(written), measured) == []
-    assert wrong_sizes({"cli": Size(2, 1735)}, {"cli": Size(2, 1235)}) == []
-    assert len(wrong_sizes({"cli": Size(2, 1736)}, {"cli": Size(2, 1235)})) == 1
+    assert wrong_sizes({"cli": Size(2, 1735, 0)}, {"cli": Size(2, 1235, 500)}) == []
+    assert len(wrong_sizes({"cli": Size(2, 1736, 0)}, {"cli": Size(2, 1235, 501)})) == 2
