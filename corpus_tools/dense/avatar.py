@@ -17,13 +17,13 @@ from tts2face.models.consent import PHOTO_TOOL, consent_record
 from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import N_LANDMARKS, N_MESH_LANDMARKS
-from tts2face.numeric.reuse import available_cores
 from tts2face.photo.found_face import PhotographedFace, PhotoReader, find_face
 from tts2face.photo.lines import find_lip_line
 from tts2face.photo.photograph import split_number
 from tts2face.picture.occlusion import bake_occlusion
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import draw
+from tts2face.processes.threads import available_cores
 from tts2face.storage.files import find_file
 from tts2face.video.pose import remove_pose
 from tts2face.video.tracking import FaceTracker

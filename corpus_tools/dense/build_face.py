@@ -29,8 +29,8 @@ from tts2face.models.face import Face
 from tts2face.models.face_file import read_face, write_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
 from tts2face.models.talker import NOT_STATED
-from tts2face.numeric.reuse import available_cores
 from tts2face.picture.occlusion import bake_occlusion
+from tts2face.processes.threads import available_cores
 from tts2face.storage.files import find_file
 from tts2face.types import Progress
 from tts2face.video.tracking import find_bundle

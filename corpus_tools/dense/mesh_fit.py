@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from tts2face.models.face import Eye, Face
 from tts2face.models.landmarks import FACE_OVAL, INNER_LIP_LOWER, INNER_LIP_UPPER, LID_RINGS, N_MESH_LANDMARKS
 from tts2face.numeric.arrays import smoothstep
-from tts2face.numeric.reuse import available_cores
 from tts2face.numeric.splines import Interpolant, fit_interpolant
+from tts2face.processes.threads import available_cores
 from tts2face.video.pose import similarity_transforms
 
 Floats = NDArray[np.float64]

@@ -15,10 +15,10 @@ from bench_render import clip_of
 from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.light import Lamps
-from tts2face.numeric.reuse import available_cores
 from tts2face.picture.baked import scene as film
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import MeshRenderer, mesh_renderer
+from tts2face.processes.threads import available_cores
 
 STAGES = {  # of a frame, and the functions of `tts2face.picture.baked.scene` that it calls
     "pose": ("LitScene.deform", "LitScene.move"),

@@ -12,10 +12,10 @@ import numpy as np
 
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.face_loading import load_face
-from tts2face.numeric.reuse import available_cores
 from tts2face.picture.film import write_clips
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import mesh_renderer
+from tts2face.processes.threads import available_cores
 from tts2face.types import HEAD_CHANNELS, Clip, Speech, Trajectory, Waveform
 
 SIZES = ("256x256", "512x512", "1280x720", "1920x1080")

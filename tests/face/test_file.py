@@ -15,7 +15,7 @@ from tts2face.models import face_file, face_loading
 from tts2face.models.face import VERTEX_COLOURS, Eye, Face, FacePart, Texture
 from tts2face.models.face_file import Identity, read_face, write_face
 from tts2face.models.face_loading import load_face
-from tts2face.numeric.reuse import Shared
+from tts2face.processes.shared import Shared
 from tts2face.session.catalogue import IdentityEntry, identities
 from tts2face.storage import files
 from tts2face.storage.files import find_file

@@ -18,7 +18,7 @@ from tts2face.models.landmarks import CHIN, N_LANDMARKS
 from tts2face.models.light import Photographed
 from tts2face.numeric.arrays import nearest_rotation, smoothstep
 from tts2face.numeric.kernels import kernel
-from tts2face.numeric.reuse import shared
+from tts2face.processes.shared import shared
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
 REST_HEAD = np.zeros(len(HEAD_CHANNELS), np.float32)  # head pose at rest

@@ -27,7 +27,7 @@ from tts2face.models.face import Face
 from tts2face.models.landmarks import LID_RINGS, LIP_LANDMARKS, N_MESH_LANDMARKS
 from tts2face.models.palette import FEATURES, FIXED_CHANNELS, REGION_FEATURES, FaceRegion, Palette
 from tts2face.numeric.arrays import ordered_product
-from tts2face.numeric.reuse import shared
+from tts2face.processes.shared import shared
 from tts2face.types import HEAD_CHANNELS, Trajectory
 
 # Expression weights at which the mouth begins to respond and responds in full: a neutral speaker scores up to 0.1 sad

@@ -31,7 +31,7 @@ from tts2face.models.landmarks import LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.networks import PhoneNetwork
 from tts2face.models.talker import Talker, require_appearance, speech_channels
 from tts2face.numeric.arrays import interpolate_columns, smoothstep
-from tts2face.numeric.reuse import shared
+from tts2face.processes.shared import shared
 from tts2face.types import Trajectory, YieldTurn, keep_on
 
 RELEASE_FROM_S = 0.08  # distance from speech at which the transition to rest begins

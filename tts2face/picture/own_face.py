@@ -25,7 +25,6 @@ from tts2face.models.face import SYNTHETIC_NOTICE
 from tts2face.models.landmarks import FACE_OVAL
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.numeric.kernels import inlined_kernel, kernel
-from tts2face.numeric.reuse import map_in_order
 from tts2face.picture.options import AUTO_SIZE, Picture
 from tts2face.picture.plate import (
     FrameStore,
@@ -34,6 +33,7 @@ from tts2face.picture.plate import (
     fit_background_video,
     texture_samples,
 )
+from tts2face.processes.threads import map_in_order
 from tts2face.types import Clip
 
 Array = NDArray[Any]

@@ -17,11 +17,11 @@ from lexicon.errors import InputError
 from tts2face.face.deformation import REST_HEAD
 from tts2face.models.face import Face
 from tts2face.models.light import Baked, Lamps, Light, Photographed
-from tts2face.numeric.reuse import map_in_order
 from tts2face.picture.baked.scene import LitScene, build_lit_scene
 from tts2face.picture.camera import CameraMatrices, camera_matrices
 from tts2face.picture.options import STANDARD, STUDIO, Picture
 from tts2face.picture.scene import Scene, build_scene, draw_background
+from tts2face.processes.threads import map_in_order
 from tts2face.types import Clip
 
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from lexicon.errors import InputError
 from tts2face.face.deformation import head_transform
 from tts2face.models.face import Face
-from tts2face.numeric.reuse import available_cores
 from tts2face.picture.camera import CameraMatrices, camera_matrices
 from tts2face.picture.kernels.picture import (
     DrawingBuffers,
@@ -26,6 +25,7 @@ from tts2face.picture.light import Exposure, compute_exposure
 from tts2face.picture.occlusion import occlusion_poses
 from tts2face.picture.options import BLUR, DRAFT, HIGH, STUDIO, CameraView, Picture, parse_background
 from tts2face.picture.surface import Surface, build_surface
+from tts2face.processes.threads import available_cores
 from tts2face.storage.media_files import open_picture
 
 BACKS_SIDE_PX = 192  # pictures in which visible back faces are looked for; one band of rows

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from tts2face.face.deformation import FaceRig, build_rig
 from tts2face.models.face import Face, FacePart, Texture
 from tts2face.numeric.arrays import unit_vectors
-from tts2face.numeric.reuse import shared
 from tts2face.picture.kernels.eyes import EyeGeometry, eye_geometry
 from tts2face.picture.kernels.raster import FIRST, HOLES, LATER, NOT_DRAWN, TRANSLUCENT
 from tts2face.picture.kernels.shade import N_SCATTER_PASSES, SCATTER_MM
@@ -34,6 +33,7 @@ from tts2face.picture.kernels.tables import (
     linear_light,
 )
 from tts2face.picture.textures import pack_textures
+from tts2face.processes.shared import shared
 
 SKIN, EYE_KIND, STRANDS = "skin", "eye", "strands"  # kinds of parts
 THIN_MM = 0.4  # median height of the triangles of parts that are thinner than a pixel

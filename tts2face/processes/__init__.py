@@ -1,1 +1,1 @@
-"""Child processes: one message, one loop of a child over a table of handlers, and its parents."""
+"""Child processes: one message, one loop of a child over a table of handlers, its parents; threads; shared values."""

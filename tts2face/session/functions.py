@@ -17,9 +17,9 @@ from tts2face.models.face import Face
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import default_face
 from tts2face.models.palette import load_palette
-from tts2face.numeric.reuse import free_unused
 from tts2face.picture.film import write_clips
 from tts2face.picture.options import Picture
+from tts2face.processes.shared import free_unused
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.named_models import Models
 from tts2face.session.speech_stream import Piece

@@ -18,9 +18,9 @@ from tts2face.models.face_names import default_face
 from tts2face.models.palette import Derivation, Palette, load_palette
 from tts2face.models.palette_editing import add_derivation
 from tts2face.models.talker import Talker, load_talker
-from tts2face.numeric.reuse import NO_MEMORY, SentenceMemory
 from tts2face.picture.options import Picture
 from tts2face.picture.renderer import FrameRenderer
+from tts2face.processes.memory import NO_MEMORY, SentenceMemory
 from tts2face.request import FIELDS, OWN_FACE, Request
 from tts2face.session.animated_face import AnimatedFace, mesh_face, own_appearance_face
 from tts2face.session.prepared import PreparedRequest, marked_styles

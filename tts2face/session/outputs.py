@@ -14,7 +14,7 @@ from lexicon.errors import InputError
 from lexicon.marked_text import NameMark
 from tts2face.gestures.timeline import Timeline
 from tts2face.interchange.exports.writer import ExportFile, ExportWriter, mesh_of, plan_exports
-from tts2face.numeric.reuse import Prefetch
+from tts2face.processes.threads import Prefetch
 from tts2face.session.prepared import HEARING_STEPS, PreparedRequest, marked_styles
 from tts2face.session.speech import MarkTime
 from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces

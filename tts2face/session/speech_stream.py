@@ -15,7 +15,7 @@ from lexicon.sentence_length import n_letters
 from lexicon.sentences import Sentence, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
-from tts2face.numeric.reuse import NO_MEMORY, SentenceMemory
+from tts2face.processes.memory import NO_MEMORY, SentenceMemory
 from tts2face.request import CONVERSATION, TURN_S, Request
 from tts2face.session.joining import Excerpt, excerpt_of_speech, shift_start, silent_speech, word_bounds
 from tts2face.session.prepared import IDLE_STEPS, PreparedRequest, correct_phones

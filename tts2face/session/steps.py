@@ -27,7 +27,7 @@ from tts2face.lips.exemplar import ExemplarModel, TokenSelection, select_tokens
 from tts2face.lips.explanation import PhoneExplanation, explain_selection
 from tts2face.models.palette import Palette
 from tts2face.models.talker import Talker
-from tts2face.numeric.reuse import NO_MEMORY, SentenceMemory
+from tts2face.processes.memory import NO_MEMORY, SentenceMemory
 from tts2face.request import FIELDS
 from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.prepared import (

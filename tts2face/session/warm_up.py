@@ -22,11 +22,11 @@ from tts2face.models.face import Face, keep_parts
 from tts2face.models.face_loading import load_face
 from tts2face.models.light import Lamps
 from tts2face.models.talker import load_talker
-from tts2face.numeric.reuse import available_cores
 from tts2face.picture.options import Picture
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.parent import Child
 from tts2face.processes.program import Program
+from tts2face.processes.threads import available_cores
 from tts2face.session.named_models import Models
 from tts2face.sound import segments
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from lexicon.errors import BackendError, InputError
 from tts2face.models.landmarks import N_LANDMARKS
-from tts2face.numeric.reuse import Prefetch
+from tts2face.processes.threads import Prefetch
 from tts2face.video.media import TimedFrame
 from tts2face.video.tracking import CROP_SMOOTHING_S, MIN_SCORE, Crop, FaceTracker, jittered_crops, smooth_crops
 

@@ -39,8 +39,8 @@ from corpus_tools.training.calibrate_face import calibrate_face_file
 from tts2face.models.face import Face, Hairdo, Texture
 from tts2face.models.face_file import Identity, write_face
 from tts2face.models.hair_file import write_hair
-from tts2face.numeric.reuse import available_cores
 from tts2face.picture.occlusion import bake_hair, bake_occlusion
+from tts2face.processes.threads import available_cores
 
 Tint = tuple[float, float, float]
 PLAIN: Tint = (1.0, 1.0, 1.0)

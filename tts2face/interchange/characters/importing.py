@@ -47,8 +47,8 @@ from tts2face.interchange.gltf.reader import SUFFIXES
 from tts2face.models.face import Face
 from tts2face.models.face_file import FORMAT_VERSION, KIND, read_face, write_face
 from tts2face.models.landmarks import N_MESH_LANDMARKS
-from tts2face.numeric.reuse import available_cores
 from tts2face.picture.occlusion import bake_occlusion
+from tts2face.processes.threads import available_cores
 from tts2face.storage.temporary import Temporary
 from tts2face.storage.tensors import read_tensors, write_tensors
 from tts2face.video.tracking import MIN_SCORE

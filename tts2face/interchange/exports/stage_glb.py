@@ -28,7 +28,6 @@ from tts2face.interchange.gltf.container import INDICES, VERTICES, GltfBuffer
 from tts2face.models.face import Face, Texture
 from tts2face.models.light import Lamps, Photographed
 from tts2face.models.photo_view import HEAD_LIMIT_RAD, SHIFT_GAIN
-from tts2face.numeric.reuse import available_cores
 from tts2face.picture.camera import FIELD_OF_VIEW_RAD, framing_box
 from tts2face.picture.kernels import tables
 from tts2face.picture.kernels.tables import DARK_GLOSS, GLOSS, OPEN_SURFACE, ROUGHNESS, SECOND_LOBE, WRAP
@@ -36,6 +35,7 @@ from tts2face.picture.light import light_fields, lip_opening
 from tts2face.picture.options import NAMED_VIEWS
 from tts2face.picture.scene import STUDIO_BRIGHT, STUDIO_CENTRE, STUDIO_DARK
 from tts2face.picture.surface import SKULL_CENTRE_MM, STRANDS, Surface, build_surface
+from tts2face.processes.threads import available_cores
 from tts2face.types import HEAD_CHANNELS
 
 MAX_TEXTURE_PX = 1024  # along a side: more than a preview of 1000 pixels shows

@@ -22,8 +22,8 @@ from tts2face.models.face import Face
 from tts2face.models.light import Lit
 from tts2face.numeric.arrays import connected_pieces, decode_srgb
 from tts2face.numeric.kernels import BLOCK, flat_view, kernel, vectorized_kernel, write_larger
-from tts2face.numeric.reuse import shared
 from tts2face.picture.baked.response import LightTerms, light_terms
+from tts2face.processes.shared import shared
 
 Array = NDArray[Any]
 

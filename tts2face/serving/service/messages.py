@@ -10,8 +10,8 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from lexicon.errors import BackendError, InputError
-from tts2face.numeric.reuse import available_cores
 from tts2face.processes.message import Message
+from tts2face.processes.threads import available_cores
 from tts2face.types import Chunk
 
 if TYPE_CHECKING:

@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from lexicon.errors import BackendError, Tts2faceError
-from tts2face.numeric.reuse import available_cores
 from tts2face.processes.async_parent import AsyncChild, started
 from tts2face.processes.message import Message
 from tts2face.processes.parent import ChildEndedError
 from tts2face.processes.program import Program
+from tts2face.processes.threads import available_cores
 from tts2face.serving.service.logs import REQUEST_ID, log_event
 from tts2face.serving.service.messages import SERVE, SYNTHESISE, Work
 from tts2face.serving.service.places import Place, Places, has_less_than_share, work_cost

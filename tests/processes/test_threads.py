@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tts2face.numeric.reuse import Prefetch
 from tts2face.picture.film import EncoderThread
+from tts2face.processes.threads import Prefetch
 
 
 def test_same_items_in_the_same_order() -> None:
