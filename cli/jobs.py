@@ -22,7 +22,7 @@ from lexicon.errors import InputError
 from tts2face.serving.service.settings import ServiceSettings, read_settings
 
 if TYPE_CHECKING:
-    from tts2face.serving.work.client import QueuedSegment
+    from tts2face.serving.work.queue_control import QueuedSegment
 
 
 DEFAULT_DATABASE = "tts2face-jobs.sqlite"
@@ -47,16 +47,16 @@ def worker(
         raise InputError(f"--jobs must be 1 or more, not {jobs}")
     from tts2face.serving.batch.store import open_store
     from tts2face.serving.work.database import database_url, prepare_database
-    from tts2face.serving.work.engine import DatabaseEngine, local_workers
+    from tts2face.serving.work.local_workers import LocalWorkers, local_workers
 
     open_store(store).check()
     prepare_database(database_url(database))
-    engine = DatabaseEngine(database, store, jobs, on_message=write_message)
+    wanted = LocalWorkers(database, store, jobs, on_message=write_message)
     write_message(
         f"{jobs} workers of {os.uname().nodename if hasattr(os, 'uname') else 'this machine'}; Ctrl-C ends them"
     )
     try:
-        with local_workers(engine) as supervise:
+        with local_workers(wanted) as supervise:
             while True:
                 supervise()
                 time.sleep(WAIT_S)
@@ -74,7 +74,7 @@ def list_jobs(
     as_json: AsJson = False,
 ) -> None:
     """List jobs with their states, workers and reasons."""
-    from tts2face.serving.work.client import list_jobs
+    from tts2face.serving.work.queue_control import list_jobs
 
     found = list_jobs(_existing(database), (state,) if state else (), limit)
     if as_json:
@@ -96,7 +96,7 @@ def show(
     database: Database = DEFAULT_DATABASE,
 ) -> None:
     """Print a job and its segment as JSON."""
-    from tts2face.serving.work.client import show_job
+    from tts2face.serving.work.queue_control import show_job
 
     job, segment = show_job(_existing(database), name)
     print(json.dumps({**asdict(job), "segment": segment}, ensure_ascii=False, indent=2))  # noqa: T201 - the result
@@ -105,7 +105,7 @@ def show(
 @jobs.command
 def cancel(*names: Names, database: Database = DEFAULT_DATABASE) -> None:
     """Cancel waiting and running jobs."""
-    from tts2face.serving.work.client import cancel_jobs
+    from tts2face.serving.work.queue_control import cancel_jobs
 
     print(f"cancelled {cancel_jobs(_existing(database), names)} jobs")  # noqa: T201 - the result
 
@@ -117,7 +117,7 @@ def retry(
     priority: Annotated[int | None, whole_number("New priority; smaller numbers are taken first.")] = None,
 ) -> None:
     """Queue failed and cancelled jobs again."""
-    from tts2face.serving.work.client import retry_jobs
+    from tts2face.serving.work.queue_control import retry_jobs
 
     print(f"queued {retry_jobs(_existing(database), names, priority)} jobs again")  # noqa: T201 - the result
 
@@ -147,7 +147,7 @@ def prune(
     if store is not None:
         print(f"{would} {_prune_store(store, place, outputs, days, dry_run=dry_run)}")  # noqa: T201 - the result
     if place is not None:
-        from tts2face.serving.work.client import prune_jobs
+        from tts2face.serving.work.queue_control import prune_jobs
 
         print(f"{would} {prune_jobs(place, days * 86_400.0, dry_run=dry_run)} jobs")  # noqa: T201 - the result
 
@@ -161,7 +161,7 @@ def _prune_store(store: str, database: str | None, outputs: tuple[Path, ...], da
         raise InputError(f"there is no store {store}; give --store as for `tts2face batch`, or its folder .segments")
     unfinished: frozenset[str] = frozenset()
     if database is not None:
-        from tts2face.serving.work.client import unfinished_segments
+        from tts2face.serving.work.queue_control import unfinished_segments
 
         unfinished = unfinished_segments(database)
     pruned = prune_segments(open_store(store), outputs, unfinished, days * 86_400.0, dry_run=dry_run)

@@ -23,8 +23,9 @@ STARTS_PYTHON = ("tts2face.sound.espeak",)
 PARSES = (
     "corpus_tools.shipped.head.source", "lexicon.part_of_speech", "lexicon.values.json_text",
     "lexicon.values.toml_text",
-    "tts2face.processes.message", "tts2face.serving.studio.previews", "tts2face.serving.work.resources",
-    "tts2face.serving.work.table", "tts2face.sound.espeak", "tts2face.sound.espeak_child", "tts2face.storage.tensors",
+    "tts2face.processes.message", "tts2face.serving.studio.preview_bundle", "tts2face.serving.work.resources",
+    "tts2face.serving.work.job_record", "tts2face.sound.espeak", "tts2face.sound.espeak_child",
+    "tts2face.storage.tensors",
 )  # fmt: skip
 # Strings that name a module of a package above their own, or of a room of tts2face above theirs.
 NAMES_HIGHER = ()

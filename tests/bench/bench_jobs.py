@@ -20,10 +20,13 @@ from tests.bench.bench_batch import plan_of
 from tests.serving.work.conftest import Postgres
 from tts2face.serving.batch.segment import Segment, SegmentResult
 from tts2face.serving.batch.store import open_store
-from tts2face.serving.work.client import list_jobs
-from tts2face.serving.work.database import BEAT_S, Workers, database_url, prepare_database
-from tts2face.serving.work.engine import DatabaseEngine, LocalWorker, enqueue, open_client
+from tts2face.serving.work.database import database_url, prepare_database
+from tts2face.serving.work.engine import DatabaseEngine
+from tts2face.serving.work.local_workers import LocalWorker, LocalWorkers
+from tts2face.serving.work.queue_control import list_jobs
+from tts2face.serving.work.segment_queue import enqueue, open_client
 from tts2face.serving.work.worker import Worker, poll_interval
+from tts2face.serving.work.workers import BEAT_S, Workers
 
 CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 SETTINGS = "-c max_connections=1200 -c shared_preload_libraries=pg_stat_statements -c shared_buffers=512MB"
@@ -261,7 +264,7 @@ def bench_speed(place: Path, database: str, server: Postgres | None, chosen: arg
         where = str(folder / "jobs.sqlite") if server is None else server.database()
         prepare_database(database_url(where))
         children = [
-            LocalWorker(DatabaseEngine(where, str(folder / "store")), cores[number]) for number in range(n_workers)
+            LocalWorker(LocalWorkers(where, str(folder / "store")), cores[number]) for number in range(n_workers)
         ]
         try:
             run_timed(folder, plan, where, n_workers)

@@ -15,7 +15,7 @@ import httpx
 from tests.bench.sentences import sentences
 from tests.running import RunningService, ServeProcess
 from tts2face.serving.service.keys import add_key
-from tts2face.serving.studio.previews import read_bundle
+from tts2face.serving.studio.preview_bundle import read_bundle
 
 SECONDS_OF_SENTENCE = 3.0  # at least: texts are as long as they must be
 TRIES = 30  # of 120 s each, in which a preview is made

@@ -13,8 +13,8 @@ from tests.photo.pictures import still
 from tests.processes.answered import ordered
 from tts2face.models.face_file import read_face
 from tts2face.models.palette import load_palette, read_palette
-from tts2face.processes.tools import TAKES
 from tts2face.serving.work.resource_check import CONTENT, STATEMENT
+from tts2face.serving.work.tools import TAKES
 
 HEADER = "Timecode,BlendshapeCount,JawOpen,EyeBlinkLeft,EyeBlinkRight,BrowInnerUp,HeadYaw,HeadPitch,HeadRoll"
 

@@ -19,8 +19,8 @@ from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.work.changes import JobChanges
 from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
+from tts2face.serving.work.job_record import NewJob
 from tts2face.serving.work.run import CHECK_S, FULL, JobWatch
-from tts2face.serving.work.table import NewJob
 
 MB = 1 << 20
 

@@ -20,7 +20,7 @@ from tests.running import TABLE_PROGRAM, ServeProcess, eventually
 from tests.serving.service.receiver import SECRET, Receiver
 from tts2face.serving.service import server as server_module
 from tts2face.serving.service import webhooks
-from tts2face.serving.service.job_service import message_of
+from tts2face.serving.service.job_views import message_of
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.webhooks import KEY_PLACES, Webhooks, send_message, sign
 
@@ -31,7 +31,7 @@ from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.connection import JobDatabase
 from tts2face.serving.work.database import database_url, prepare_database
-from tts2face.serving.work.table import NewJob
+from tts2face.serving.work.job_record import NewJob
 
 
 def test_the_signature_is_that_of_standard_webhooks() -> None:

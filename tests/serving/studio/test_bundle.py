@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tts2face.serving.studio.previews import PieceMemory, Preview, bundle, read_bundle
+from tts2face.serving.studio.preview_bundle import PieceMemory, Preview, bundle, read_bundle
 
 CHANNELS, RATE, FPS = ["jawOpen", "tongueOut"], 300, 30.0
 

@@ -9,7 +9,8 @@ from tts2face.processes.message import EVENT, Message
 from tts2face.processes.parent import ChildEndedError
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.messages import Work
-from tts2face.serving.studio.previews import PARTIAL_S, PieceMemory, Preview, ProjectPreview
+from tts2face.serving.studio.preview_bundle import PieceMemory, Preview
+from tts2face.serving.studio.previews import PARTIAL_S, ProjectPreview
 
 Stream = Callable[[Work], AsyncIterator[Message]]
 

@@ -12,7 +12,8 @@ import pytest
 from lexicon.errors import BackendError, DataError, InputError
 from tts2face.request import Request
 from tts2face.serving.studio.editing import History
-from tts2face.serving.studio.store import ASSETS, HISTORY, PROJECT, ProjectStore, archive
+from tts2face.serving.studio.project_archive import archive
+from tts2face.serving.studio.project_store import ASSETS, HISTORY, PROJECT, ProjectStore
 from tts2face.session.project import Project
 from tts2face.session.project_file import load_project
 from tts2face.storage.temporary import Temporary

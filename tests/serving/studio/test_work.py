@@ -16,15 +16,16 @@ from tts2face.serving.service import decoders
 from tts2face.serving.service.access import KeyRing
 from tts2face.serving.service.keys import LOCAL_KEY
 from tts2face.serving.studio import recording_work, reports, styles
+from tts2face.serving.studio.palette_store import PaletteStore
 from tts2face.serving.studio.recording_work import Recordings
 from tts2face.serving.studio.recordings import GOOD, REFUSED, WEAK, RecordingStore
 from tts2face.serving.studio.renders import Renders
 from tts2face.serving.studio.reports import Reports
-from tts2face.serving.studio.store import PaletteStore
 from tts2face.serving.studio.styles import Styles
-from tts2face.serving.studio.takes import READY, Takes, TakeStore
+from tts2face.serving.studio.take_store import READY, TakeStore
+from tts2face.serving.studio.takes import Takes
 from tts2face.serving.studio.work import MAX_TRIES, BackgroundWork, WorkKind, WorkList
-from tts2face.serving.work.table import CANCELLED, DONE, FAILED, RUNNING, WAITING
+from tts2face.serving.work.job_record import CANCELLED, DONE, FAILED, RUNNING, WAITING
 from tts2face.session.project import Project
 from tts2face.session.project_file import project_json
 

@@ -15,8 +15,8 @@ from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio import workspace as opened
 from tts2face.serving.studio.editing import History
-from tts2face.serving.studio.previews import PieceMemory
-from tts2face.serving.studio.store import ProjectStore
+from tts2face.serving.studio.preview_bundle import PieceMemory
+from tts2face.serving.studio.project_store import ProjectStore
 from tts2face.serving.studio.workspace import Listener, Workspace
 from tts2face.session.project import Project
 

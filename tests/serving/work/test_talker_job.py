@@ -11,13 +11,13 @@ from corpus_tools.tools.talker import BuildOrder
 from lexicon.errors import DataError
 from tests.models.made import write_made_talker
 from tests.serving.work.stub_builder import MADE, ORDER
-from tts2face.serving.work import kinds
+from tts2face.serving.work import talker_job
 from tts2face.serving.work.blobs import open_blobs
 from tts2face.serving.work.connection import DatabaseAwayError
 from tts2face.serving.work.database import database_url
-from tts2face.serving.work.kinds import run_talker
+from tts2face.serving.work.kinds import JobCancelledError, JobTask, Products
 from tts2face.serving.work.resources import ResourceTable
-from tts2face.serving.work.run import JobCancelledError, JobTask, Products
+from tts2face.serving.work.talker_job import run_talker
 
 Run = Callable[..., Products]
 
@@ -30,7 +30,7 @@ def events() -> list[dict[str, Any]]:
 @pytest.fixture
 def run(tmp_path: Path, events: list[dict[str, Any]], monkeypatch: pytest.MonkeyPatch) -> Run:
     """Function that executes a job."""
-    monkeypatch.setattr(kinds, "BUILDER", "tests.serving.work.stub_builder:HANDLERS")
+    monkeypatch.setattr(talker_job, "BUILDER", "tests.serving.work.stub_builder:HANDLERS")
     (tmp_path / "a.mp4").write_bytes(b"video")
     write_made_talker(tmp_path / MADE, has_face=False)
     blobs = open_blobs(tmp_path / "store", "resources")

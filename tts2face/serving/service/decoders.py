@@ -17,9 +17,9 @@ from typing import Any
 from lexicon.errors import DataError, InputError
 from tts2face.processes.async_parent import started
 from tts2face.processes.parent import ChildEndedError
-from tts2face.processes.tools import run_take_tool
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import while_client_stays
+from tts2face.serving.work.tools import run_take_tool
 from tts2face.serving.work.uploaded_file import DECODE, MEASURE, PICTURE, program
 
 MAX_REASON = 300  # characters

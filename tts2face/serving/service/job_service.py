@@ -1,25 +1,20 @@
-"""Jobs of a running server: the database, the worker processes, webhooks and the removal of what is old.
-
-Jobs as the API shows them, and the envelope of a new one.
-"""
+"""Jobs of a running server: the database, the worker processes, webhooks and the removal of what is old."""
 
 import asyncio
-import json
 import logging
 import threading
 import uuid
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from typing import Annotated, Any, TypeVar
-
-from pydantic import BaseModel, ConfigDict, Field
+from typing import TypeVar
 
 from lexicon.errors import BackendError, Tts2faceError
 from tts2face.serving.batch.engine import lack_of_room
 from tts2face.serving.batch.run import prune_unused
 from tts2face.serving.batch.store import open_store
 from tts2face.serving.service.errors import RefusedError, as_refused
+from tts2face.serving.service.job_views import message_of
 from tts2face.serving.service.keys import RateLimits
 from tts2face.serving.service.library import Library
 from tts2face.serving.service.logs import log_event
@@ -27,119 +22,17 @@ from tts2face.serving.service.pool import NICENESS
 from tts2face.serving.service.settings import ServiceSettings
 from tts2face.serving.service.webhooks import Webhooks
 from tts2face.serving.work.blobs import open_blobs
-from tts2face.serving.work.client import JobClient, prune_jobs, unfinished_segments
+from tts2face.serving.work.client import JobClient
 from tts2face.serving.work.connection import DatabaseAwayError, connection_errors
 from tts2face.serving.work.database import database_url, prepare_database, shown_url
-from tts2face.serving.work.engine import DatabaseEngine, local_workers
+from tts2face.serving.work.job_record import STATES
+from tts2face.serving.work.local_workers import LocalWorkers, local_workers
+from tts2face.serving.work.queue_control import prune_jobs, unfinished_segments
 from tts2face.serving.work.run import BLOBS
-from tts2face.serving.work.table import STATES, JobFile, JobRecord, OtherBodyError, QueueFullError
+from tts2face.serving.work.table import OtherBodyError, QueueFullError
 from tts2face.storage.files import translate_disk_errors
 
-HASH = "ab3f" * 16
-EXAMPLE_ID = "0f8fad5bd9cb469fa16570867728950e"
-
-
-class NewJobBody(BaseModel):
-    """A job that is asked for; the options are those of its kind."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-    kind: str
-    request: dict[str, Any] = {}
-    webhook: Annotated[str | None, Field(max_length=2000)] = None
-
-
-class Progress(BaseModel):
-    """How much is done."""
-
-    done: Annotated[int, Field(description="Parts that are done.", examples=[3])]
-    of: Annotated[int, Field(description="All parts; 0 while they are not known.", examples=[12])]
-
-
-class ResultFile(BaseModel):
-    """A file that a job has made."""
-
-    name: Annotated[str, Field(description="Name of the file.", examples=["clip.mp4"])]
-    url: Annotated[str, Field(description="Path from which it is fetched.", examples=[f"/v1/results/{HASH}"])]
-    sha256: Annotated[str, Field(description="Hash of its content.", examples=[HASH])]
-    media_type: Annotated[str, Field(description="Its media type.", examples=["video/mp4"])]
-    bytes: Annotated[int, Field(description="Its size.", examples=[123456])]
-
-
-class WebhookState(BaseModel):
-    """The message about the end of a job."""
-
-    url: Annotated[str, Field(description="Where it is sent.", examples=["https://example.org/done"])]
-    state: Annotated[str, Field(description="waiting, delivered or failed.", examples=["delivered"])]
-    tries: Annotated[int, Field(description="Number of times it was sent.", examples=[1])]
-
-
-class Job(BaseModel):
-    """A job without its options and results."""
-
-    id: Annotated[str, Field(description="Name of the job.", examples=[EXAMPLE_ID])]
-    kind: Annotated[str, Field(description="clip, subtitles, ...", examples=["clip"])]
-    state: Annotated[str, Field(description="waiting, running, done, failed or cancelled.", examples=["done"])]
-    created: Annotated[float, Field(description="Seconds since 1970.", examples=[1790000000.0])]
-    started: Annotated[float | None, Field(description="When a worker took it.", examples=[1790000001.0])]
-    finished: Annotated[float | None, Field(description="When it ended.", examples=[1790000009.0])]
-    progress: Annotated[Progress, Field(description="How many of its parts are done.")]
-    error: Annotated[
-        str | None, Field(description="Why it failed, why some results are missing, or why it waits.", examples=[None])
-    ]
-    webhook: Annotated[WebhookState | None, Field(description="The message about its end.")]
-
-
-class JobDetail(Job):
-    """A job with its results."""
-
-    results: Annotated[list[ResultFile], Field(description="Its files, when it is done.")]
-
-
-class JobPage(BaseModel):
-    """Jobs, the newest first."""
-
-    jobs: Annotated[list[Job], Field(description="Jobs of this page.")]
-    next: Annotated[
-        str | None, Field(description="Value of `before` for the next page; null: there is none.", examples=[None])
-    ]
-
-
-def job_view(record: JobRecord) -> Job:
-    """A job for the list."""
-    return Job(**_fields(record))
-
-
-def job_detail(record: JobRecord) -> JobDetail:
-    """A job with its results."""
-    return JobDetail(**_fields(record), results=[_file(one) for one in record.outputs])
-
-
-def _fields(record: JobRecord) -> Mapping[str, Any]:
-    webhook = None
-    if record.webhook is not None:
-        webhook = WebhookState(url=record.webhook, state=record.webhook_state or "", tries=record.webhook_tries)
-    return {
-        **{name: getattr(record, name) for name in ("id", "kind", "state", "created", "started", "finished", "error")},
-        "progress": Progress(done=record.n_done, of=record.n_all),
-        "webhook": webhook,
-    }
-
-
-def _file(one: JobFile) -> ResultFile:
-    return ResultFile(
-        name=one.name, url=f"/v1/results/{one.sha256}", sha256=one.sha256, media_type=one.media_type, bytes=one.n_bytes
-    )
-
-
-def message_of(record: JobRecord) -> bytes:
-    """Body of the message about a job."""
-    content = {"type": f"job.{record.state}", "job": job_detail(record).model_dump(exclude={"webhook"})}
-    return json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode()
-
-
 Value = TypeVar("Value")
-
 RETRY_S = 2.0  # between two tries to open the database
 RETRY_AFTER_S = 5  # for clients, while the database cannot be reached
 SUPERVISE_S, RESTART_S = 0.5, 10.0  # between two looks at the workers, and after they ended again and again
@@ -281,12 +174,12 @@ class JobService:
 
     def _supervise(self) -> None:
         settings = self._settings
-        engine = DatabaseEngine(
+        wanted = LocalWorkers(
             settings.database_place, settings.store_place, settings.workers,
             on_message=_log_worker, niceness=NICENESS,
         )  # fmt: skip
         while not self._stopped.is_set():
-            with suppress(BackendError), local_workers(engine) as supervise:
+            with suppress(BackendError), local_workers(wanted) as supervise:
                 while not self._stopped.wait(SUPERVISE_S):
                     self.n_workers = supervise()
             self.n_workers = 0

@@ -2,7 +2,7 @@
 
 Kinds of jobs as clients ask for them: their options, their files, and the checks before they are queued.
 
-`tts2face.serving.work.run` executes them.
+`tts2face.serving.work.kinds` executes them.
 
 OpenAPI description of the body of a new job, made of the kinds of jobs.
 """
@@ -32,8 +32,9 @@ from tts2face.serving.service.library import check_background, check_voice, reso
 from tts2face.serving.service.orders import TALKER_KIND, JobKind, JobOrder
 from tts2face.serving.service.request_fields import MODEL_FIELDS, PICTURE_FIELDS, options_model
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.work.kinds import BACKGROUND, FILES, LINES
+from tts2face.serving.work.clip_job import BACKGROUND, FILES
 from tts2face.serving.work.resource_check import TALKER
+from tts2face.serving.work.subtitles_job import LINES
 from tts2face.session.encoded_stream import media_types
 
 # Options that a door does not take, with the reason.

@@ -23,8 +23,8 @@ from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.service.uploads import UploadFolder
 from tts2face.serving.work.client import JobClient
+from tts2face.serving.work.job_record import OPEN_STATES
 from tts2face.serving.work.resource_check import TALKER
-from tts2face.serving.work.table import OPEN_STATES
 
 
 @dataclass(slots=True)

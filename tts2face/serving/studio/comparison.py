@@ -24,7 +24,8 @@ from tts2face.request import Request
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.studio.previews import PieceMemory, Preview, ProjectPreview, read_bundle
+from tts2face.serving.studio.preview_bundle import PieceMemory, Preview, read_bundle
+from tts2face.serving.studio.previews import ProjectPreview
 from tts2face.serving.studio.requests import check_options, events_of, project_work
 from tts2face.session.named_models import Models
 from tts2face.session.project import Project

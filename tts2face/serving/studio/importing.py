@@ -21,8 +21,8 @@ from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES
+from tts2face.serving.studio.project_store import ProjectEntry, ProjectStore
 from tts2face.serving.studio.requests import check_project
-from tts2face.serving.studio.store import ProjectEntry, ProjectStore
 from tts2face.serving.studio.work import WorkList
 from tts2face.serving.studio.workspace import Workspace
 from tts2face.serving.work.uploaded_file import SOUND, SUBTITLES

@@ -2,29 +2,21 @@
 
 Prompts and checks are made by a process of the tool ``recordings``. It is started by the first order, loads its
 networks once, and ends when there was nothing to do for `IDLE_S`.
-
-A talker from the accepted takes of a recording, and its first sentence, are made in a child process each. The building
-is that of the service's jobs (the tool ``talker``), with its limits.
 """
 
 import asyncio
-import os
-import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from lexicon.errors import BackendError, InputError
-from tts2face.processes.async_parent import AsyncChild, call_once
-from tts2face.processes.child import Call, Handler
+from tts2face.processes.async_parent import AsyncChild
 from tts2face.processes.parent import ChildEndedError
 from tts2face.processes.program import ProcessLimits, Program
-from tts2face.processes.tools import run_tool
 from tts2face.serving.service.decoders import KeyTurns, Shares
+from tts2face.serving.studio.recorded_talker import TALKER, build_talker, speak
 from tts2face.serving.studio.recordings import (
     ACCEPTED_FOLDER,
     CACHE,
@@ -36,82 +28,12 @@ from tts2face.serving.studio.recordings import (
     judge,
 )
 from tts2face.serving.studio.work import BackgroundWork, WorkKind, WorkList
-from tts2face.serving.work.kinds import BUILDER, CPU_S, CPU_S_PER_S, LIMITS, SLOWNESS
-from tts2face.serving.work.table import FAILED
+from tts2face.serving.work.job_record import FAILED
 
 TOOL = "recordings"
 TOOL_LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=100_000, file_bytes=1 << 30, n_files=256)
 ANSWER_S = 120.0  # of one order, with the loading of the networks
 IDLE_S = 300.0
-
-TALKER, REPORT, CLIP = "talker.talker", "report.html", "first.mp4"  # files in the folder of a recording
-MADE, CHECKED = "made.talker", "checked"  # as the builder names them
-MAX_TALKER_BYTES = 500e6
-SECONDS_A_TAKE = 10.0  # at most, for the limit of time
-CLIP_S = 600.0  # limit of the first sentence
-CLIP_LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=600, file_bytes=1 << 30, n_files=256)
-SPEAK = "speak"  # name of the call
-N_SHOWN = 5  # refused takes
-
-
-async def build_talker(folder: Path, *, name: str, consent: str, n_takes: int, on_message: Callable[..., None]) -> str:
-    """Build the talker of a recording with its own face; one sentence about it.
-
-    Parameters
-    ----------
-    on_message
-        Called with the stage, and the steps done and of all.
-
-    Raises
-    ------
-    InputError, DataError, BackendError
-        As `tts2face corpus build` says.
-    """
-    for old in (TALKER, REPORT, CLIP, MADE):
-        (folder / old).unlink(missing_ok=True)
-    shutil.rmtree(folder / CHECKED, ignore_errors=True)
-    cpu_s = int(CPU_S + CPU_S_PER_S * SECONDS_A_TAKE * n_takes)
-    order = {
-        "folder": str(folder), "name": name, "provenance": {"name": name}, "consent": consent,
-        "with_appearance": True, "with_report": find_spec("matplotlib") is not None, "max_bytes": MAX_TALKER_BYTES,
-    }  # fmt: skip
-    program = Program(BUILDER, replace(LIMITS, cpu_s=cpu_s))
-    result = await run_tool(program, BUILDER, order, on_message, what="the recording", timeout_s=SLOWNESS * cpu_s)
-    os.replace(folder / MADE, folder / TALKER)
-    shutil.rmtree(folder / CHECKED, ignore_errors=True)
-    refused = "; ".join(f"{take}: {reason}" for take, reason in result["refused"][:N_SHOWN])
-    minutes = f"{result['n_kept']} takes, {result['minutes']:.1f} minutes"
-    return f"The talker {name} is made of {minutes}." + (f" Refused: {refused}." if refused else "")
-
-
-async def speak(folder: Path, text: str) -> None:
-    """Write the clip of a sentence with the talker's own face.
-
-    Raises
-    ------
-    InputError
-        The sentence cannot be said.
-    BackendError
-        The clip could not be made in time.
-    """
-    order = {"talker": str(folder / TALKER), "text": text, "out": str(folder / CLIP)}
-    try:
-        await call_once(Program(f"{__name__}:HANDLERS", CLIP_LIMITS), SPEAK, order, timeout_s=CLIP_S)
-    except TimeoutError as late:
-        raise BackendError("the clip took too long; give a shorter sentence") from late
-
-
-def _speak(call: Call) -> dict[str, Any]:
-    from tts2face.session.session import Session
-
-    call.hide(Path(call.content["out"]).parent)
-    Session(talker=call.content["talker"], face="self").write(call.content["text"], call.content["out"])
-    return {}
-
-
-HANDLERS: Mapping[str, Handler] = MappingProxyType({SPEAK: _speak})
-
-
 MAX_SENTENCE_CHARACTERS = 300
 BUILD, SAY, CHECK = "build", "say", "check"  # tasks of the work on a recording, and the kind of work on its takes
 WORK, ORDER = "recording", "work.json"  # kind of work, and its order in the folder of a recording

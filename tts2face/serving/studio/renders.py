@@ -14,11 +14,11 @@ from tts2face.interchange.exports.table import all_formats, find_format
 from tts2face.picture.movie import MOVIE_KINDS
 from tts2face.picture.sound_stream import SOUND_KINDS
 from tts2face.serving.service.state import ServiceState
+from tts2face.serving.studio.project_store import RENDERS
 from tts2face.serving.studio.requests import key_of, project_work
-from tts2face.serving.studio.store import RENDERS
 from tts2face.serving.studio.work import ID, BackgroundWork, WorkKind, WorkList
 from tts2face.serving.studio.workspace import Workspace
-from tts2face.serving.work.table import DONE
+from tts2face.serving.work.job_record import DONE
 from tts2face.session.project_file import parse_project, project_json
 from tts2face.storage.files import translate_disk_errors
 

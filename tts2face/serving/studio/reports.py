@@ -15,14 +15,14 @@ from lexicon.errors import DataError, InputError
 from lexicon.values.files import read_text
 from lexicon.values.json_text import LARGEST_JSON_BYTES, parse_json
 from tts2face.processes.program import ProcessLimits, Program
-from tts2face.processes.tools import run_tool
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio.requests import key_of
 from tts2face.serving.studio.work import ID, BackgroundWork, WorkKind, WorkList
+from tts2face.serving.work.job_record import DONE
 from tts2face.serving.work.resource_check import PALETTE, TALKER
-from tts2face.serving.work.table import DONE
+from tts2face.serving.work.tools import run_tool
 from tts2face.storage.files import translate_disk_errors, write_atomically
 
 REPORT_TOOL = REPORT = "report"  # the tool, and the kind of work

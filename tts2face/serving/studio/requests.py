@@ -18,7 +18,8 @@ from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.library import check_background, check_voice, resolve_models
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.studio.store import ASSET, ASSETS, is_own_palette, own_palette
+from tts2face.serving.studio.palette_store import is_own_palette, own_palette
+from tts2face.serving.studio.project_store import ASSET, ASSETS
 from tts2face.session.named_models import Models
 from tts2face.session.project import Project
 from tts2face.session.project_file import parse_project, project_json

@@ -22,12 +22,12 @@ from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.state import ServiceState
-from tts2face.serving.studio.previews import PieceMemory
+from tts2face.serving.studio.preview_bundle import PieceMemory
+from tts2face.serving.studio.project_store import ProjectEntry, ProjectStore
 from tts2face.serving.studio.recording_work import Recordings
 from tts2face.serving.studio.renders import Renders
 from tts2face.serving.studio.reports import Reports
 from tts2face.serving.studio.requests import data_of, studio_folder
-from tts2face.serving.studio.store import ProjectEntry, ProjectStore
 from tts2face.serving.studio.styles import Styles
 from tts2face.serving.studio.takes import Takes
 from tts2face.serving.studio.work import WorkList

@@ -14,9 +14,10 @@ from tts2face.serving.service.messages import Work
 from tts2face.serving.service.state import ServiceState
 from tts2face.serving.studio.comparison import ComparedProject
 from tts2face.serving.studio.editing import Edit, History, apply
-from tts2face.serving.studio.previews import PieceMemory, Preview, ProjectPreview
+from tts2face.serving.studio.preview_bundle import PieceMemory, Preview
+from tts2face.serving.studio.previews import ProjectPreview
+from tts2face.serving.studio.project_store import ProjectStore
 from tts2face.serving.studio.requests import OPTION_PARTS, check_options, project_work
-from tts2face.serving.studio.store import ProjectStore
 from tts2face.session.project import Project, cut_timeline, without_edges
 
 SAVE_S = 0.5  # between an edit and the time at which it is on disk

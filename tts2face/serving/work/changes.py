@@ -5,17 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from tts2face.serving.work.connection import JobDatabase
-from tts2face.serving.work.table import (
-    INPUT,
-    IS_OPEN,
-    OPEN_STATES,
-    OUTPUT,
-    JobFile,
-    JobRecord,
-    JobTable,
-    insert_files,
-    remove_unused,
-)
+from tts2face.serving.work.job_record import OPEN_STATES, JobFile, JobRecord
+from tts2face.serving.work.table import INPUT, IS_OPEN, OUTPUT, JobTable, insert_files, remove_unused
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,45 +1,22 @@
-"""The database of jobs: a SQLite file, or PostgreSQL by URL; and the table of the workers that are alive in it."""
+"""The database of jobs: a SQLite file, or PostgreSQL by URL."""
 
 import logging
 import sqlite3
-from collections.abc import Iterable
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 from lexicon.errors import BackendError, InputError
-from tts2face.serving.batch.segment import SEGMENT_FORMAT
 from tts2face.serving.work.connection import (
-    NOW,
     DatabaseAwayError,
     JobDatabase,
-    database_kind,
     database_reason,
-    open_engine,
-    repeat_creation,
 )
 from tts2face.serving.work.table import JobTable
 from tts2face.serving.work.usage import UsageTable
+from tts2face.serving.work.workers import Workers
 
 DEFAULT_DATABASE = "tts2face-jobs.sqlite"
-QUEUE = "tts2face-segments"
-APPLICATION = "tts2face"
-APPLICATION_VERSION = f"segments-{SEGMENT_FORMAT}"  # pinned: workers of equal segments share their work
-WORKFLOW = "render_segment"
-WORK = "work"  # call of the process of a worker
-JOB_QUEUE, JOB_WORKFLOW = "tts2face-jobs", "run_job"  # of the service; a job waits for its segments
-TALKER_QUEUE = "tts2face-talkers"  # of jobs that compute for minutes; they never occupy the places of others
-BEAT_S = 1.5  # between two heartbeats of a worker
-DEAD_AFTER_S = 6.0  # without a heartbeat; with the interval of looking this is below 10 s
 POSTGRES_SCHEMES = ("postgresql://", "postgres://", "postgresql+psycopg://")
-_TABLE = """
-CREATE TABLE IF NOT EXISTS tts2face_workers (
-    executor_id VARCHAR(64) PRIMARY KEY, beat DOUBLE PRECISION NOT NULL, place VARCHAR(200) NOT NULL
-)"""
-_BEAT = """
-INSERT INTO tts2face_workers (executor_id, beat, place) VALUES (:id, {now}, :place)
-ON CONFLICT (executor_id) DO UPDATE SET beat = {now}"""
-_FROM_LATER = "UPDATE tts2face_workers SET beat = {now} WHERE beat > {now} + 1"  # by a clock that was set back since
 
 
 def database_url(where: str | Path) -> str:
@@ -106,133 +83,3 @@ def shown_url(url: str) -> str:
         return url
     scheme, _, user = before.partition("://")
     return f"{scheme}://{user.partition(':')[0]}@{after}"
-
-
-_QUEUES = ", ".join(f"'{name}'" for name in (QUEUE, JOB_QUEUE, TALKER_QUEUE))
-_WAITS = f"status = 'ENQUEUED' AND queue_name IN ({_QUEUES})"  # condition of the engine's rows
-AHEAD_S = 60.0  # by which clocks of machines may differ
-
-
-def _engine_table(kind: str) -> str:
-    return "workflow_status" if kind == "sqlite" else "dbos.workflow_status"
-
-
-def _waiting_query(kind: str) -> str:
-    """Query for one job of this version that waits in a queue, in the engine's table."""
-    version = f"application_version = '{APPLICATION_VERSION}'"
-    return f"SELECT 1 FROM {_engine_table(kind)} WHERE {_WAITS} AND {version} LIMIT 1"
-
-
-class Workers:
-    """Table of workers with the time of their last heartbeat, by the clock of the database."""
-
-    def __init__(self, url: str) -> None:
-        import sqlalchemy
-
-        self._sql = sqlalchemy.text
-        self._now = NOW[database_kind(url)]
-        self._waiting = _waiting_query(database_kind(url))
-        self._table = _engine_table(database_kind(url))
-        self._database_error = sqlalchemy.exc.SQLAlchemyError
-        self._engine = open_engine(url)
-        self._looking: Any = None
-
-    def __enter__(self) -> "Workers":
-        """Return itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close the connections."""
-        if self._looking is not None:
-            self._looking.close()
-        self._engine.dispose()
-
-    def create(self) -> None:
-        """Create the table where it is missing; several processes may do so at once."""
-
-        def create() -> None:
-            with self._engine.begin() as connection:
-                connection.execute(self._sql(_TABLE))
-
-        repeat_creation(create)
-
-    def transaction(self) -> Any:
-        """Context of a transaction in the database; the value is its connection."""
-        return self._engine.begin()
-
-    def now(self) -> float:
-        """Seconds since 1970 by the clock of the database."""
-        with self._engine.begin() as connection:
-            return float(connection.execute(self._sql(f"SELECT {self._now}")).scalar() or 0.0)
-
-    def beat(self, executor_id: str, place: str) -> set[str]:
-        """Note that a worker is alive; the ids of workers without a heartbeat.
-
-        Heartbeats of a clock that has been set back since count as of now: a dead worker has none after it.
-        """
-        query = f"SELECT executor_id FROM tts2face_workers WHERE beat <= {self._now} - :age"
-        with self._engine.begin() as connection:
-            connection.execute(self._sql(_BEAT.format(now=self._now)), {"id": executor_id, "place": place[:200]})
-            connection.execute(self._sql(_FROM_LATER.format(now=self._now)))
-            return {str(row[0]) for row in connection.execute(self._sql(query), {"age": DEAD_AFTER_S})}
-
-    def return_later(self) -> int:
-        """Let jobs that a clock queued which has been set back since wait no longer than the others; their number.
-
-        The engine gives those of one priority in the order of their times; these keep theirs among each other.
-        """
-        later = f"{_WAITS} AND created_at > 1000.0 * ({self._now} + {AHEAD_S})"
-        last = f"SELECT max(created_at) FROM {self._table} WHERE {later}"
-        now = f"CAST(1000.0 * {self._now} AS BIGINT)"
-        query = f"UPDATE {self._table} SET created_at = created_at - ({last}) + {now} WHERE {later}"
-        with self._engine.begin() as connection:
-            return int(connection.execute(self._sql(query)).rowcount)
-
-    def has_waiting(self) -> bool:
-        """Whether a job waits in a queue; for one thread, which asks often: on a connection that stays open.
-
-        Raises
-        ------
-        DatabaseAwayError
-            The database cannot be reached.
-        """
-        while True:
-            was_open = self._looking is not None
-            try:
-                if self._looking is None:
-                    self._looking = self._engine.connect().execution_options(isolation_level="AUTOCOMMIT")
-                return self._looking.connection.driver_connection.execute(self._waiting).fetchone() is not None
-            except (self._engine.dialect.dbapi.Error, self._database_error) as away:
-                looking, self._looking = self._looking, None
-                if looking is not None:
-                    looking.invalidate()
-                    looking.close()
-                if not was_open:  # an old connection may be of before a restart of the database
-                    raise DatabaseAwayError(
-                        f"the database cannot be reached ({database_reason(away)}); try again"
-                    ) from away
-
-    def leave(self, executor_id: str) -> None:
-        """Note that a worker ends; the others take its jobs over without waiting."""
-        with self._engine.begin() as connection:
-            query = "UPDATE tts2face_workers SET beat = 0 WHERE executor_id = :id"
-            connection.execute(self._sql(query), {"id": executor_id})
-
-    def alive(self, within_s: float = DEAD_AFTER_S) -> dict[str, str]:
-        """Places of the workers that sent a heartbeat within some seconds, by their ids."""
-        query = f"SELECT executor_id, place FROM tts2face_workers WHERE beat > {self._now} - :age"
-        with self._engine.begin() as connection:
-            rows = connection.execute(self._sql(query), {"age": within_s})
-            return {str(row[0]): str(row[1]) for row in rows}
-
-    def forget(self, executor_ids: Iterable[str]) -> None:
-        """Remove workers."""
-        with self._engine.begin() as connection:
-            for one in executor_ids:
-                connection.execute(self._sql("DELETE FROM tts2face_workers WHERE executor_id = :id"), {"id": one})
-
-    def forget_dead(self, older_than_s: float = 3600.0) -> None:
-        """Remove workers without a heartbeat for a long time."""
-        query = f"DELETE FROM tts2face_workers WHERE beat < {self._now} - :age"
-        with self._engine.begin() as connection:
-            connection.execute(self._sql(query), {"age": older_than_s})

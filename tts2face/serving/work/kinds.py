@@ -1,241 +1,103 @@
-"""Jobs of kind ``clip``: one clip in a format of `Session.stream_file`, as a complete file.
+"""Kinds of jobs."""
 
-Jobs of kind ``subtitles``: a batch of subtitle files, whose clips and manifest are the results.
-
-Jobs of kind ``talker``: a talker from an uploaded recording, which becomes a model of the key.
-
-The building runs in a process of its own (the tool ``talker``) with limits of memory and time.
-"""
-
-import os
-import shutil
-import time
-from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import replace
-from importlib.util import find_spec
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from lexicon.errors import DataError
-from tts2face.picture.options import Picture
-from tts2face.processes.message import Message
-from tts2face.processes.parent import Child, ChildEndedError
-from tts2face.processes.program import ProcessLimits, Program
-from tts2face.request import Request
-from tts2face.serving.batch.cast import cast_from_tables
-from tts2face.serving.batch.options import BatchOptions
-from tts2face.serving.batch.output import CSV_NAME, JSON_NAME, Plan
-from tts2face.serving.batch.plan import plan_batch
-from tts2face.serving.batch.report import measure_plan, write_table
-from tts2face.serving.batch.run import run_batch
-from tts2face.serving.batch.segment import FILE_PREFIX, Segment, input_hashes
-from tts2face.serving.work.connection import DatabaseAwayError
-from tts2face.serving.work.resource_check import TALKER
-from tts2face.serving.work.resources import ResourceTable, Usage, keep_files, over_quota, resource_from_folder
-from tts2face.serving.work.run import JobTask, Product, Products, products_of
-from tts2face.session.encoded_stream import line_formats, media_types
-from tts2face.session.named_models import Models
+from tts2face.serving.batch.engine import Engine
+from tts2face.serving.batch.store import Store
+from tts2face.serving.work.blobs import BlobStore
 
-# Fields of a request: names of the job's files.
-FILES = {"audio": "audio.wav", "partner": "partner.wav", "timeline": "timeline.json"}
-BACKGROUND = "background.png"
-LINES = "lines.csv"
+RUNNERS: Mapping[str, str] = {
+    "clip": "tts2face.serving.work.clip_job:run_clip",
+    "subtitles": "tts2face.serving.work.subtitles_job:run_subtitles",
+    "talker": "tts2face.serving.work.talker_job:run_talker",
+}  # name of a kind: module and function
+# No HTML: a report that ran as a page of the service could use the key of its reader.
+MEDIA_TYPES = {
+    ".mp4": "video/mp4", ".webm": "video/webm", ".mov": "video/quicktime", ".json": "application/json",
+    ".csv": "text/csv", ".jsonl": "application/jsonl", ".glb": "model/gltf-binary", ".wav": "audio/wav",
+    ".vtt": "text/vtt", ".txt": "text/plain",
+}  # fmt: skip
 
 
-def run_clip(task: JobTask) -> Products:
-    """Render the clip as one segment, whichever worker takes it.
+class JobCancelledError(Exception):
+    """The job was cancelled or deleted while it ran."""
+
+
+@dataclass(frozen=True, slots=True)
+class JobTask:
+    """What a function of `RUNNERS` gets.
+
+    Parameters
+    ----------
+    request
+        JSON of the job, as the service has checked it.
+    inputs
+        Files by name.
+    folder
+        Empty folder, which is removed afterwards.
+    engine, store
+        Engine and store of the segments of a batch.
+    report
+        Adds an event to the job; ``done`` and ``of`` are its progress.
+    check
+        Raises `JobCancelledError` if the job is no longer wanted; to be called now and then.
+    database, resources
+        URL of the database, and the files of the uploaded models in the store.
+    """
+
+    request: Mapping[str, Any]
+    inputs: Mapping[str, Path]
+    folder: Path
+    engine: Engine
+    store: Store
+    report: Callable[[dict[str, Any]], None]
+    check: Callable[[], None]
+    database: str = ""
+    resources: Callable[[], BlobStore] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Product:
+    """A file that a job has made; clients see its name."""
+
+    path: Path
+    name: str
+    media_type: str
+
+
+@dataclass(frozen=True, slots=True)
+class Products:
+    """Files that a job has made, and why some are missing."""
+
+    files: tuple[Product, ...]
+    error: str | None = None
+
+
+def find_runner(kind: str) -> Callable[[JobTask], Products]:
+    """Function that executes the jobs of a kind.
 
     Raises
     ------
     DataError
-        It could not be rendered; the message says why.
+        This version has no such kind.
     """
-    format = str(task.request["format"])
-    segment = clip_segment(task)
-    missing = {} if task.store.result(segment.address) is not None else {segment.address: segment}
-    for rendered in task.engine.render(missing, task.store):
-        if rendered.result is None:
-            raise DataError(rendered.reason)
-    suffix = line_formats()[format].suffixes[0] if format in line_formats() else f".{format}"
-    path = task.store.fetch(segment.address, task.folder)
-    return Products((Product(path, f"clip{suffix}", media_types()[format]),))
+    if kind not in RUNNERS:
+        raise DataError(f"this worker cannot execute jobs of kind {kind!r}; install the version of the service")
+    module, name = RUNNERS[kind].split(":")
+    runner: Callable[[JobTask], Products] = getattr(import_module(module), name)
+    return runner
 
 
-def clip_segment(task: JobTask) -> Segment:
-    """The segment that is the whole clip."""
-    models = Models(**task.request["models"])
-    request: dict[str, Any] = dict(task.request["request"])
-    request |= {field: str(task.inputs[name]) for field, name in FILES.items() if name in task.inputs}
-    picture: dict[str, Any] = dict(task.request["picture"])
-    if BACKGROUND in task.inputs:
-        picture["background"] = str(task.inputs[BACKGROUND])
-    medium = f"{FILE_PREFIX}{task.request['format']}"
-    hashes = input_hashes(models, request, picture)
-    return Segment(request, picture, models, 1, file_hashes=hashes, medium=medium)
+def media_type(name: str) -> str:
+    """Media type of a file name."""
+    return MEDIA_TYPES.get(Path(name).suffix.lower(), "application/octet-stream")
 
 
-N_SHOWN = 3  # reasons of failed clips
-
-
-def run_subtitles(task: JobTask) -> Products:
-    """Make the clips of all files.
-
-    Raises
-    ------
-    InputError, DataError
-        As `plan_batch`; or no clip could be made.
-    """
-    plan = plan_of(task)
-    if not plan.outputs:
-        reasons = "; ".join(one.message for one in plan.warnings[:N_SHOWN])
-        raise DataError(f"no cue can be spoken: {reasons}")
-    out = task.folder / "clips"
-    result = run_batch(
-        plan, out, store=task.store, engine=task.engine, on_progress=lambda done, of: _report(task, done, of)
-    )
-    for name in (JSON_NAME, CSV_NAME):
-        _remove_folders(out / name, task)
-    if LINES in task.inputs:
-        write_table(out / LINES, plan, measure_plan(plan, task.store))
-    failed = [f"{name}: {reason}" for name, reason in result.failed]
-    if result.n_made == 0:
-        raise DataError("; ".join(failed[:N_SHOWN]))
-    error = f"{len(failed)} clips are missing: {'; '.join(failed[:N_SHOWN])}" if failed else None
-    return products_of([path for path in sorted(out.iterdir()) if path.is_file()], error)
-
-
-def plan_of(task: JobTask) -> Plan:
-    """Plan of the subtitle files, which are all inputs whose names the request lists."""
-    content = task.request
-    options: dict[str, Any] = dict(content["options"]) | {"exports": tuple(content["options"].get("exports", ()))}
-    if content.get("has_audio"):
-        options["audio"] = next(path for name, path in task.inputs.items() if name.endswith(".wav")).parents[1]
-    picture = dict(content["picture"])
-    if BACKGROUND in task.inputs:
-        picture["background"] = str(task.inputs[BACKGROUND])
-    return plan_batch(
-        [task.inputs[name] for name in content["subtitles"]],
-        BatchOptions(**options),
-        request=Request(**content["request"]),
-        picture=Picture(**picture),
-        models=Models(**content["models"]),
-        cast=cast_from_tables(content.get("cast", {}), "the cast"),
-        lines=task.inputs.get(LINES),
-    )
-
-
-def _report(task: JobTask, done: int, of: int) -> None:
-    task.check()
-    task.report({"type": "progress", "done": done, "of": of})
-
-
-def _remove_folders(path: Path, task: JobTask) -> None:
-    """Leave only the names of the job's files in a manifest."""
-    text = path.read_text(encoding="utf-8")
-    for folder in {str(one.parent) for one in task.inputs.values()}:
-        text = text.replace(f"{folder}/", "")
-    path.write_text(text, encoding="utf-8")
-
-
-BUILDER = TOOL = "talker"  # the program, and its handler
-LIMITS = ProcessLimits(memory_bytes=4 << 30, cpu_s=0, file_bytes=2 << 30, n_files=256)
-CPU_S, CPU_S_PER_S = 1200, 40  # of any recording, and for each of its seconds; 256 x 256 pixels take 1 s a second
-SLOWNESS = 5.0  # elapsed time in units of the processor time, on a machine that has other work
-AWAY_S = 2.0  # between tries to reach the database
-N_SHOWN_NOTES = 20  # refused parts, and warnings, that are reported
-
-
-def run_talker(task: JobTask) -> Products:
-    """Build a talker and store it as a model of the key.
-
-    Raises
-    ------
-    InputError, DataError, BackendError
-        The recording is not suitable, as `tts2face corpus build` says; or the name or the quota is used up.
-    """
-    recordings = task.folder / "recordings"
-    recordings.mkdir()
-    for name, path in task.inputs.items():
-        _place(path, recordings / name)
-    result = _build(task)
-    task.report(_built_event(result))
-    _store(task)
-    products = [
-        Product(task.folder / "checked" / "content", f"{task.request['name']}.talker", "application/octet-stream")
-    ]
-    if (task.folder / "report.html").is_file():  # not as text/html: a page of this origin could use its keys
-        products.append(Product(task.folder / "report.html", "report.html", "application/octet-stream"))
-    return Products(tuple(products))
-
-
-def _built_event(result: Mapping[str, Any]) -> dict[str, Any]:
-    shown = {
-        part: [f"{name}: {text}" for name, text in result[part][:N_SHOWN_NOTES]] for part in ("refused", "warnings")
-    }
-    return {"type": "built", **{name: result[name] for name in ("n_kept", "minutes", "notes")}, **shown}
-
-
-def _place(source: Path, target: Path) -> None:
-    """Place a file beside the others."""
-    try:
-        os.link(source.resolve(), target)
-    except OSError:  # another file system
-        shutil.copyfile(source, target)
-
-
-def _build(task: JobTask) -> Mapping[str, Any]:
-    """Run the builder; its result."""
-    asked = task.request
-    cpu_s = int(CPU_S + CPU_S_PER_S * float(asked["seconds"]))
-    order = {
-        "folder": str(task.folder), "name": asked["name"], "provenance": asked["provenance"],
-        "consent": asked["consent"], "with_appearance": asked["appearance"],
-        "with_report": find_spec("matplotlib") is not None, "max_bytes": asked["limits"]["n_bytes"],
-    }  # fmt: skip
-
-    def tell(event: Message) -> None:
-        with suppress(DatabaseAwayError):
-            task.report({"type": "progress", **event.content})
-
-    def look() -> None:
-        with suppress(DatabaseAwayError):
-            task.check()
-
-    child = Child(Program(BUILDER, replace(LIMITS, cpu_s=cpu_s)))
-    try:
-        return child.call(TOOL, order, on_event=tell, look=look, timeout_s=SLOWNESS * cpu_s).content
-    except ChildEndedError as ended:
-        raise DataError("the recording needs too much memory or time; send a shorter or smaller one") from ended
-    finally:
-        child.close()
-
-
-def _store(task: JobTask) -> None:
-    """Store the talker as a model of the key; while the database cannot be reached, it is tried again."""
-    assert task.resources is not None
-    asked, blobs, checked = task.request, task.resources(), task.folder / "checked"
-    made = resource_from_folder(asked["owner"], TALKER, asked["name"], checked, blobs)
-    made = replace(made, description={**made.description, "order": asked["order"]})
-    limits = Usage(**asked["limits"])
-
-    def check(usage: Usage) -> None:
-        reason = over_quota(made.owner, usage, limits, made.n_bytes)
-        if reason is not None:
-            raise DataError(reason)
-
-    table = ResourceTable(task.database)
-    try:
-        while True:
-            try:
-                if table.add(made, check=check, keep=lambda: keep_files(made, checked, blobs)):
-                    return
-                found = table.find(made.owner, TALKER, made.name)
-            except DatabaseAwayError:
-                time.sleep(AWAY_S)
-                continue
-            if found is not None and found.description.get("order") == asked["order"]:
-                return  # by a worker that died afterwards
-            raise DataError(f"there is a talker {made.name} already; delete it, or choose another name")
-    finally:
-        table.close()
+def products_of(paths: Sequence[Path], error: str | None = None) -> Products:
+    """Products with the names of their files."""
+    return Products(tuple(Product(path, path.name, media_type(path.name)) for path in paths), error)

@@ -1,122 +1,29 @@
-"""Execution of jobs of the service by a worker: each ends once, whatever dies meanwhile.
-
-Kinds of jobs: what executes each, with what, and what it returns.
-"""
+"""Execution of jobs of the service by a worker: each ends once, whatever dies meanwhile."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from importlib import import_module
 from pathlib import Path
 from tempfile import gettempdir
 from typing import Any
 
-from lexicon.errors import DataError, Tts2faceError
-from tts2face.serving.batch.engine import MIN_FREE_BYTES, Engine, Rendered, free_bytes
+from lexicon.errors import Tts2faceError
+from tts2face.serving.batch.engine import MIN_FREE_BYTES, Rendered, free_bytes
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import Store, wait_for_store
-from tts2face.serving.work.blobs import BlobStore, open_blobs, place_file, place_models
+from tts2face.serving.work.blobs import BlobStore, open_blobs
 from tts2face.serving.work.changes import Ending, JobChanges
 from tts2face.serving.work.connection import DatabaseAwayError, JobDatabase, connection_errors
-from tts2face.serving.work.engine import ACTIVE, JOBS_PER_QUERY, DatabaseEngine, failure_reason, open_client
-from tts2face.serving.work.table import DONE, FAILED, JobFile, JobRecord
+from tts2face.serving.work.engine import DatabaseEngine
+from tts2face.serving.work.job_record import DONE, FAILED, JobFile, JobRecord
+from tts2face.serving.work.kinds import JobCancelledError, JobTask, Product, find_runner
+from tts2face.serving.work.placed_files import place_file, place_models
+from tts2face.serving.work.segment_queue import ACTIVE, JOBS_PER_QUERY, failure_reason, open_client
 from tts2face.storage.bucket import StoreAwayError
 from tts2face.storage.files import without_folders
 from tts2face.storage.temporary import Temporary
-
-RUNNERS: Mapping[str, str] = {
-    "clip": "tts2face.serving.work.kinds:run_clip",
-    "subtitles": "tts2face.serving.work.kinds:run_subtitles",
-    "talker": "tts2face.serving.work.kinds:run_talker",
-}  # name of a kind: module and function
-# No HTML: a report that ran as a page of the service could use the key of its reader.
-MEDIA_TYPES = {
-    ".mp4": "video/mp4", ".webm": "video/webm", ".mov": "video/quicktime", ".json": "application/json",
-    ".csv": "text/csv", ".jsonl": "application/jsonl", ".glb": "model/gltf-binary", ".wav": "audio/wav",
-    ".vtt": "text/vtt", ".txt": "text/plain",
-}  # fmt: skip
-
-
-class JobCancelledError(Exception):
-    """The job was cancelled or deleted while it ran."""
-
-
-@dataclass(frozen=True, slots=True)
-class JobTask:
-    """What a function of `RUNNERS` gets.
-
-    Parameters
-    ----------
-    request
-        JSON of the job, as the service has checked it.
-    inputs
-        Files by name.
-    folder
-        Empty folder, which is removed afterwards.
-    engine, store
-        Engine and store of the segments of a batch.
-    report
-        Adds an event to the job; ``done`` and ``of`` are its progress.
-    check
-        Raises `JobCancelledError` if the job is no longer wanted; to be called now and then.
-    database, resources
-        URL of the database, and the files of the uploaded models in the store.
-    """
-
-    request: Mapping[str, Any]
-    inputs: Mapping[str, Path]
-    folder: Path
-    engine: Engine
-    store: Store
-    report: Callable[[dict[str, Any]], None]
-    check: Callable[[], None]
-    database: str = ""
-    resources: Callable[[], BlobStore] | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Product:
-    """A file that a job has made; clients see its name."""
-
-    path: Path
-    name: str
-    media_type: str
-
-
-@dataclass(frozen=True, slots=True)
-class Products:
-    """Files that a job has made, and why some are missing."""
-
-    files: tuple[Product, ...]
-    error: str | None = None
-
-
-def find_runner(kind: str) -> Callable[[JobTask], Products]:
-    """Function that executes the jobs of a kind.
-
-    Raises
-    ------
-    DataError
-        This version has no such kind.
-    """
-    if kind not in RUNNERS:
-        raise DataError(f"this worker cannot execute jobs of kind {kind!r}; install the version of the service")
-    module, name = RUNNERS[kind].split(":")
-    runner: Callable[[JobTask], Products] = getattr(import_module(module), name)
-    return runner
-
-
-def media_type(name: str) -> str:
-    """Media type of a file name."""
-    return MEDIA_TYPES.get(Path(name).suffix.lower(), "application/octet-stream")
-
-
-def products_of(paths: Sequence[Path], error: str | None = None) -> Products:
-    """Products with the names of their files."""
-    return Products(tuple(Product(path, path.name, media_type(path.name)) for path in paths), error)
-
 
 BLOBS, RESOURCES = "results", "resources"  # kinds of files in a store: of jobs, and uploaded models
 MODEL_SECTIONS = ("models", "request")  # parts of a job's JSON that may name uploads

@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, Any
 from lexicon.errors import DataError, Tts2faceError
 from tts2face.processes.child import Call, Handler
 from tts2face.processes.program import ProcessLimits, Program
-from tts2face.processes.tools import LOW_PRIORITY
 from tts2face.serving.work.resource_check import (
     N_MAGIC,
     RESOURCE_KINDS,
@@ -29,6 +28,7 @@ from tts2face.serving.work.resource_check import (
     find_places,
     is_picture,
 )
+from tts2face.serving.work.tools import LOW_PRIORITY
 from tts2face.storage.files import is_disk_full
 from tts2face.storage.media_files import decoding_bytes
 from tts2face.types import SOUND_RATE

@@ -2,17 +2,6 @@
 
 Segments are rendered in a child process. A job of the service plans, queues its segments and waits for them, so that
 all workers share the rendering; the queues have places of their own, so that jobs never block what they wait for.
-
-DBOS keeps the queue. Its open-source package has no fail-over of its own: work of an executor that died waits for an
-executor of the same id. Here every worker has a new id and sends heartbeats (`Workers`); with each
-of them it learns which workers have sent none for some time, and returns their work to the queue. A worker is forgotten
-only when none of its work is running any more. Now and then each worker also polls all running work, for owners that
-are not in the table. A segment that two workers take nevertheless is rendered twice and stored once, as its
-name is its content address.
-
-Return of the work of dead workers to the queue, and how often workers poll it.
-
-Rendering of segments from the queue in a child process, which is ended when a segment is cancelled.
 """
 
 import contextlib
@@ -24,196 +13,33 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Mapping
-from dataclasses import replace
-from functools import partial
-from pathlib import Path
-from tempfile import gettempdir
 from types import MappingProxyType
 from typing import Any
 
-from lexicon.errors import BackendError, DataError, InputError, Tts2faceError
+from lexicon.errors import BackendError
 from tts2face.processes.child import Call, Handler
-from tts2face.processes.parent import ChildEndedError
-from tts2face.serving.batch.engine import Message, Renders, render_into
-from tts2face.serving.batch.render_process import RenderProcess
-from tts2face.serving.batch.segment import Segment, SegmentResult, segment_from_json
-from tts2face.serving.batch.store import Store, open_store, wait_for_store
-from tts2face.serving.work.blobs import BlobStore, place_segment_files
+from tts2face.serving.batch.engine import Message, Renders
+from tts2face.serving.batch.store import Store, open_store
 from tts2face.serving.work.connection import DatabaseAwayError, database_reason
-from tts2face.serving.work.database import (
+from tts2face.serving.work.database import database_url, prepare_database, quiet_dbos
+from tts2face.serving.work.pauses import EnginePauses
+from tts2face.serving.work.queues import (
     APPLICATION,
     APPLICATION_VERSION,
-    BEAT_S,
     JOB_QUEUE,
     JOB_WORKFLOW,
     QUEUE,
     TALKER_QUEUE,
     WORK,
     WORKFLOW,
-    Workers,
-    database_url,
-    prepare_database,
-    quiet_dbos,
 )
-from tts2face.serving.work.engine import EnginePauses
 from tts2face.serving.work.run import JobRunner, job_blobs
-from tts2face.storage.temporary import Temporary
+from tts2face.serving.work.segment_worker import SegmentWorker, is_cancelled
+from tts2face.serving.work.takeover import list_running, return_work
+from tts2face.serving.work.workers import BEAT_S, Workers
 
 POLL_S = 0.2  # between two looks at the queue
 MAX_LOOKS_PER_S = 200.0  # of all workers together: with more than 40, each looks less often
-
-
-def poll_interval(n_workers: int) -> float:
-    """Seconds between two looks of a worker at the queue, for a number of workers."""
-    return max(POLL_S, n_workers / MAX_LOOKS_PER_S)
-
-
-def return_work(executor_ids: set[str]) -> set[str]:
-    """Return the running work of executors to the queue; the executors that have none left.
-
-    The engine has no public function that does so safely: `resume_workflows` has no condition on the owner, so that it
-    would take work from a worker that has just taken it over, and it sets the number of tries to zero, so that a
-    segment that ends every worker would never fail (decision 083).
-    """
-    from dbos import DBOS
-
-    names = sorted(executor_ids)
-    DBOS._recover_pending_workflows(names)
-    return executor_ids - {str(one.executor_id) for one in list_running(names)}
-
-
-def list_running(executor_ids: list[str] | None = None) -> list[Any]:
-    """Running jobs of this version, of some executors or all."""
-    from dbos import DBOS
-
-    found: list[Any] = DBOS.list_workflows(
-        status="PENDING",
-        name=[WORKFLOW, JOB_WORKFLOW],
-        app_version=APPLICATION_VERSION,
-        executor_id=executor_ids,
-        load_input=False,
-        load_output=False,
-    )
-    return found
-
-
-def is_cancelled(name: str) -> bool:
-    """Whether a job of the queue was cancelled."""
-    from dbos import DBOS
-
-    found = DBOS.list_workflows(workflow_ids=[name], load_input=False, load_output=False)
-    return any(one.status == "CANCELLED" for one in found)
-
-
-class SegmentFailedError(RuntimeError):
-    """A segment that cannot be rendered; the reason is kept in the database."""
-
-
-class SegmentWorker:
-    """Renders one segment at a time.
-
-    Parameters
-    ----------
-    blobs
-        Stores of the files that segments of jobs name; the first that has a file gives it.
-    renderer
-        What renders; None: a child process.
-    core
-        Core to which the child process is bound; None: all.
-    """
-
-    def __init__(
-        self,
-        store: Store,
-        blobs: Callable[[], tuple[BlobStore, ...]],
-        *,
-        renderer: Renders | None = None,
-        core: int | None = None,
-        on_message: Message = lambda _: None,
-    ) -> None:
-        self._store, self._blobs, self._on_message = store, blobs, on_message
-        self._process = RenderProcess(core) if renderer is None else None
-        self._renderer: Renders = renderer or self
-        self._rendering = threading.Lock()  # one segment at a time
-        self._files: Temporary | None = None
-        self._current: str | None = None
-        self._is_cancelled = False
-        self.n_rendered = 0
-
-    def work(self, name: str, address: str, content: dict[str, Any]) -> dict[str, Any]:
-        """Render a segment unless it is stored; after a death it runs again and has no other effect.
-
-        Parameters
-        ----------
-        name
-            Name of the job of the queue.
-
-        Raises
-        ------
-        SegmentFailedError
-            It cannot be rendered.
-        """
-        try:
-            found = wait_for_store(partial(self._store.result, address), self._on_message)
-            if found is not None:
-                return found.as_json()
-            segment = place_segment_files(segment_from_json(content), self._blobs, self._folder)
-            if replace(segment, file_hashes=segment.input_hashes()).address != address:
-                raise DataError(
-                    "a model, voice, file or program version of this machine differs from that of the batch; "
-                    "install and copy the same ones"
-                )
-        except Tts2faceError as wrong:
-            raise SegmentFailedError(str(wrong)) from None
-        with self._rendering:
-            self._current, self._is_cancelled = name, False
-            rendered = render_into(self._store, segment, self._renderer, self._on_message)
-            self._current = None
-        if rendered.result is None:
-            raise SegmentFailedError(rendered.reason)
-        self.n_rendered += 1
-        return rendered.result.as_json()
-
-    def render(self, segment: Segment, out: Path) -> SegmentResult:
-        """Render a segment in the child process; after `end_cancelled` there is no other try.
-
-        Raises
-        ------
-        InputError
-            It was cancelled; or as the child process.
-        """
-        assert self._process is not None
-        try:
-            return self._process.render(segment, out)
-        except ChildEndedError:
-            if self._is_cancelled:
-                raise InputError("cancelled") from None
-            raise
-
-    def end_cancelled(self, is_cancelled: Callable[[str], bool]) -> None:
-        """End the rendering of the present segment if its job was cancelled."""
-        name = self._current
-        if name is None or self._process is None or not is_cancelled(name):
-            return
-        self._is_cancelled = True
-        if name == self._current:
-            self._process.kill()
-
-    def close(self) -> None:
-        """End the child process."""
-        if self._process is not None:
-            self._process.close()
-        if self._files is not None:
-            self._files.remove()
-
-    def _folder(self) -> Path:
-        """Folder of the files of jobs on this machine, removed by a later worker if this one is killed."""
-        if self._files is None:
-            folder = self._store.scratch() or Path(gettempdir())
-            self._files = Temporary(folder / "inputs", is_folder=True)
-        return self._files.path
-
-
 MAX_DEATHS = 8  # of workers that had the same segment; then it counts as failed
 ALL_WORK_S = 60.0  # between two looks at all running work
 MAX_JOB_DEATHS = 30  # of workers that executed the same job of the service, which lasts longer than a segment
@@ -222,6 +48,11 @@ N_JOBS = 4  # of the service, which mostly wait for their segments; they never o
 N_TALKERS = 1  # built at a time: each takes a core and 1 GB
 # Connections of a worker to the database: two stay open, besides that of its heartbeats.
 CONNECTIONS = {"pool_size": 2, "max_overflow": 3}
+
+
+def poll_interval(n_workers: int) -> float:
+    """Seconds between two looks of a worker at the queue, for a number of workers."""
+    return max(POLL_S, n_workers / MAX_LOOKS_PER_S)
 
 
 class Worker:

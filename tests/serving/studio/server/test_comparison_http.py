@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.serving.studio.server.test_projects_http import create, edit, preview
-from tts2face.serving.studio.previews import read_bundle
+from tts2face.serving.studio.preview_bundle import read_bundle
 from tts2face.serving.studio.studio import MAX_IDLE
 from tts2face.session.session import Session
 from tts2face.types import HEAD_CHANNELS

@@ -23,16 +23,13 @@ from tests.serving.work.conftest import ROOT, Postgres, StartWorker
 from tests.world import World
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import open_store
-from tts2face.serving.work.client import cancel_jobs, list_jobs, prune_jobs, retry_jobs, show_job
-from tts2face.serving.work.database import (
-    APPLICATION_VERSION,
-    DEAD_AFTER_S,
-    Workers,
-    database_url,
-    prepare_database,
-    shown_url,
-)
-from tts2face.serving.work.engine import DatabaseEngine, LocalWorker, enqueue, open_client
+from tts2face.serving.work.database import database_url, prepare_database, shown_url
+from tts2face.serving.work.engine import DatabaseEngine
+from tts2face.serving.work.local_workers import LocalWorker, LocalWorkers
+from tts2face.serving.work.queue_control import cancel_jobs, list_jobs, prune_jobs, retry_jobs, show_job
+from tts2face.serving.work.queues import APPLICATION_VERSION
+from tts2face.serving.work.segment_queue import enqueue, open_client
+from tts2face.serving.work.workers import DEAD_AFTER_S, Workers
 
 Segments = Callable[..., dict[str, Segment]]
 Rendered = Callable[[], list[tuple[str, int]]]
@@ -326,8 +323,7 @@ def test_the_batch_command_works_with_a_database(
 
 def test_a_worker_that_cannot_start_says_why(tmp_path: Path) -> None:
     needs("psycopg")
-    engine = DatabaseEngine("postgresql://nobody@127.0.0.1:1/jobs", str(tmp_path / "store"))
-    worker = LocalWorker(engine, None)
+    worker = LocalWorker(LocalWorkers("postgresql://nobody@127.0.0.1:1/jobs", str(tmp_path / "store")), None)
     try:
         eventually(lambda: worker.reason, 60.0)
     finally:

@@ -17,9 +17,8 @@ from tests.running import eventually
 from tests.serving.work.server.test_jobs import queue
 from tests.serving.work.stub_worker import Stub
 from tts2face.serving.batch.segment import Segment
-from tts2face.serving.work import engine as pauses
-from tts2face.serving.work import worker
-from tts2face.serving.work.engine import IDLE_S, EnginePauses
+from tts2face.serving.work import pauses, worker
+from tts2face.serving.work.pauses import IDLE_S, EnginePauses
 
 N_BEATS = 8  # while the worker has nothing to do
 MAX_STATEMENTS = 12  # of the engine meanwhile, the last ones of a look; it had about 60 with each look at 0.2 s
@@ -98,7 +97,7 @@ def test_the_engine_still_has_the_events_whose_waiting_is_replaced() -> None:
 
     engine = DBOS(config={"name": "events", "system_database_url": "sqlite://", "run_migrations": False})
     reason = (
-        "this release of dbos has no {}; tts2face.serving.work.engine needs another way to let the engine of an idle "
+        "this release of dbos has no {}; tts2face.serving.work.pauses needs another way to let the engine of an idle "
         "worker sleep (decision 083)"
     )
     try:

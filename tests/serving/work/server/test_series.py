@@ -27,7 +27,7 @@ from tests.serving.work.conftest import Postgres
 from tests.serving.work.series import Episode, make_series
 from tests.serving.work.watch import StoreWatch
 from tts2face.serving.batch.store import open_store
-from tts2face.serving.work.client import list_jobs
+from tts2face.serving.work.queue_control import list_jobs
 
 N_CUES = int(os.environ.get("TTS2FACE_SERIES_CUES", "12"))
 FPS = 10

@@ -22,9 +22,10 @@ from tests.serving.service.job_requests import wait_for_database
 from tests.serving.service.receiver import Receiver
 from tests.serving.work.watch import StoreWatch, ends_of_jobs
 from tests.started import running_processes
-from tts2face.serving.work.client import list_jobs
 from tts2face.serving.work.database import database_url
-from tts2face.serving.work.engine import DatabaseEngine, LocalWorker, open_client
+from tts2face.serving.work.local_workers import LocalWorker, LocalWorkers
+from tts2face.serving.work.queue_control import list_jobs
+from tts2face.serving.work.segment_queue import open_client
 
 N_JOBS = int(os.environ.get("TTS2FACE_KILLED_JOBS", "20"))
 TIMEOUT_S = 240.0 + 4 * N_JOBS
@@ -50,7 +51,7 @@ class Machines:
         self.api = httpx.Client(base_url=self.server.url, timeout=60.0)
 
     def start_worker(self) -> None:
-        self.worker = LocalWorker(DatabaseEngine(self.database, str(self.folder / "store")), None)
+        self.worker = LocalWorker(LocalWorkers(self.database, str(self.folder / "store")), None)
 
     def kill_server(self) -> None:
         self.api.close()

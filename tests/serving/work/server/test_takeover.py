@@ -24,12 +24,14 @@ from tests.serving.work.server.test_jobs import collect, queue
 from tests.serving.work.stub_worker import Stub
 from tts2face.serving.batch.segment import Segment
 from tts2face.serving.batch.store import open_store
-from tts2face.serving.work.client import cancel_jobs, list_jobs, prune_jobs
 from tts2face.serving.work.connection import JobDatabase
-from tts2face.serving.work.database import BEAT_S, DEAD_AFTER_S, Workers, database_url, prepare_database
-from tts2face.serving.work.engine import JOBS_PER_QUERY, POLL_S, DatabaseEngine, _Look, enqueue, open_client
+from tts2face.serving.work.database import database_url, prepare_database
+from tts2face.serving.work.engine import POLL_S, DatabaseEngine, _Look
+from tts2face.serving.work.queue_control import cancel_jobs, list_jobs, prune_jobs
+from tts2face.serving.work.segment_queue import JOBS_PER_QUERY, enqueue, open_client
 from tts2face.serving.work.worker import MAX_LOOKS_PER_S, Worker, poll_interval
 from tts2face.serving.work.worker import POLL_S as WORKER_POLL_S
+from tts2face.serving.work.workers import BEAT_S, DEAD_AFTER_S, Workers
 
 Segments = Callable[..., dict[str, Segment]]
 
@@ -39,7 +41,7 @@ def test_the_engine_still_returns_the_work_of_dead_executors() -> None:
 
     assert callable(getattr(DBOS, "_recover_pending_workflows", None)), (
         "this release of dbos has no DBOS._recover_pending_workflows(executor_ids); "
-        "tts2face.serving.work.worker.return_work needs "
+        "tts2face.serving.work.takeover.return_work needs "
         "another way to return the work of dead workers to the queue (decision 083)"
     )
 
@@ -227,7 +229,7 @@ def test_more_jobs_than_one_statement_takes_are_pruned(
     segments: Segments, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     database = str(tmp_path / "jobs.sqlite")
-    monkeypatch.setattr("tts2face.serving.work.client.JOBS_PER_QUERY", 3)
+    monkeypatch.setattr("tts2face.serving.work.queue_control.JOBS_PER_QUERY", 3)
     queue(database, segments(*(f"Words {number}." for number in range(8))))
     assert cancel_jobs(database) == 8
     assert prune_jobs(database, older_than_s=60.0) == 0

@@ -21,14 +21,7 @@ from starlette.datastructures import FormData, UploadFile
 from tts2face.serving.batch.segment import content_address
 from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.guard import VIDEO_PATH, require_scope
-from tts2face.serving.service.job_service import (
-    EXAMPLE_ID,
-    JobDetail,
-    JobPage,
-    NewJobBody,
-    job_detail,
-    job_view,
-)
+from tts2face.serving.service.job_views import EXAMPLE_ID, JobDetail, JobPage, NewJobBody, job_detail, job_view
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.options import JOB_KINDS, new_job_schema
 from tts2face.serving.service.orders import JobKind, JobOrder, Upload, expected_speech_s
@@ -36,9 +29,9 @@ from tts2face.serving.service.routes.clips import error_event, service_state
 from tts2face.serving.service.uploads import MAX_TEXT_BYTES, upload_folder
 from tts2face.serving.service.webhooks import check_webhook
 from tts2face.serving.work.client import JobClient
+from tts2face.serving.work.job_record import JobEvent, JobFile, JobRecord, NewJob, State
+from tts2face.serving.work.kinds import media_type
 from tts2face.serving.work.resource_check import TALKER
-from tts2face.serving.work.run import media_type
-from tts2face.serving.work.table import JobEvent, JobFile, JobRecord, NewJob, State
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 

@@ -8,10 +8,10 @@ from fastapi import Request as HttpRequest
 from fastapi.responses import FileResponse, Response
 
 from tts2face.serving.service.errors import RefusedError
-from tts2face.serving.service.job_service import HASH
+from tts2face.serving.service.job_views import HASH
 from tts2face.serving.service.routes.clips import service_state
 from tts2face.serving.work.client import JobClient
-from tts2face.serving.work.table import JobFile
+from tts2face.serving.work.job_record import JobFile
 
 router = APIRouter(prefix="/v1", tags=["jobs"])
 

@@ -9,7 +9,7 @@ from tts2face.serving.studio.pages.frame import OpenPage, dark_button, heading, 
 from tts2face.serving.studio.renders import RENDER, formats
 from tts2face.serving.studio.work import BackgroundWork
 from tts2face.serving.studio.workspace import Workspace
-from tts2face.serving.work.table import DONE, RUNNING
+from tts2face.serving.work.job_record import DONE, RUNNING
 
 CLOCK = 'import("tts2face-studio/clock.js").then((m) => '
 TOGGLE_SIDES = 'import("tts2face-studio/preview.js").then((m) => m.sides.toggle())'

@@ -19,7 +19,8 @@ from tts2face.serving.studio.pages.frame import (
     page_bar,
     shown_errors,
 )
-from tts2face.serving.studio.store import ProjectEntry, has_files
+from tts2face.serving.studio.project_archive import has_files
+from tts2face.serving.studio.project_store import ProjectEntry
 from tts2face.serving.studio.studio import Studio
 
 MB = 1_000_000

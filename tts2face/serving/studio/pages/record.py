@@ -13,7 +13,8 @@ from tts2face.interchange.exports.visemes import viseme_table
 from tts2face.serving.service.exchange import PAGES, RECORDINGS
 from tts2face.serving.studio.components.recorder import STYLE, Recorder, VisemeMap
 from tts2face.serving.studio.pages.frame import RECORD_PAGE, begin_page, confirm, heading, languages, page_bar, sentence
-from tts2face.serving.studio.recording_work import CLIP, REPORT, TALKER, Recordings
+from tts2face.serving.studio.recorded_talker import CLIP, REPORT, TALKER
+from tts2face.serving.studio.recording_work import Recordings
 from tts2face.serving.studio.recordings import RecordingEntry
 from tts2face.serving.studio.routes.recordings import Owner, recording_router
 

@@ -17,12 +17,12 @@ from tts2face.serving.service.errors import RefusedError
 from tts2face.serving.service.exchange import PAGES
 from tts2face.serving.service.uploads import BLOCK_BYTES
 from tts2face.serving.studio.importing import import_file, import_text
+from tts2face.serving.studio.project_archive import archive
 from tts2face.serving.studio.requests import data_of, events_of
-from tts2face.serving.studio.store import archive
 from tts2face.serving.studio.studio import Studio, face_answer
 from tts2face.serving.studio.work import BackgroundWork
 from tts2face.serving.studio.workspace import Workspace
-from tts2face.serving.work.table import DONE
+from tts2face.serving.work.job_record import DONE
 from tts2face.session.project_file import project_json
 
 API = f"{PAGES}/api"

@@ -12,7 +12,8 @@ from fastapi.responses import FileResponse, JSONResponse, Response
 
 from lexicon.errors import InputError, Tts2faceError
 from tts2face.serving.service.exchange import RECORDINGS
-from tts2face.serving.studio.recording_work import CLIP, REPORT, TALKER, Recordings
+from tts2face.serving.studio.recorded_talker import CLIP, REPORT, TALKER
+from tts2face.serving.studio.recording_work import Recordings
 from tts2face.serving.studio.recordings import SUFFIXES, RecordingStore
 
 TAKE = "/{number}/takes/{at}"

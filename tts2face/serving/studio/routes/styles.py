@@ -12,9 +12,9 @@ from lexicon.values.json_text import parse_json
 from lexicon.values.records import checked
 from tts2face.models.palette_editing import StyleMix
 from tts2face.serving.service.exchange import STYLES
+from tts2face.serving.studio.palette_store import FILE
 from tts2face.serving.studio.recordings import SUFFIXES
 from tts2face.serving.studio.routes.recordings import NO_STORE, uploaded_take
-from tts2face.serving.studio.store import FILE
 from tts2face.serving.studio.styles import Styles
 from tts2face.session import catalogue
 

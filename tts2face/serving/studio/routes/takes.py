@@ -14,7 +14,8 @@ from tts2face.serving.service.exchange import TAKES
 from tts2face.serving.studio.camera import follow_camera
 from tts2face.serving.studio.routes.recordings import receive_take, uploaded_take
 from tts2face.serving.studio.studio import face_answer
-from tts2face.serving.studio.takes import FILM, SOUND, TABLE, Takes
+from tts2face.serving.studio.take_store import FILM, SOUND, TABLE
+from tts2face.serving.studio.takes import Takes
 
 KINDS = {TABLE: "text/csv", SOUND: "audio/wav", FILM: "video/mp4"}
 SOUND_TYPES = ("audio/", "video/")
