@@ -4,13 +4,14 @@ import difflib
 import inspect
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, Field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Group, Parameter
 
 from lexicon.errors import InputError
+from tts2face.request import option_fields
 
 if TYPE_CHECKING:
     from cyclopts import Token
@@ -84,9 +85,9 @@ def add_option_flags(
             if parameter.kind is not inspect.Parameter.VAR_KEYWORD
         ]
         added = [
-            _option_parameter(option, get_type_hints(options)[option.name], heading, has_defaults=has_defaults)
+            _option_parameter(option, option.type, heading, has_defaults=has_defaults)
             for heading, options in headed
-            for option in fields(options)
+            for option in option_fields(options)
             if option.name not in without
         ]
         command.__signature__ = inspect.Signature([*own, *added])  # type: ignore[attr-defined]
@@ -110,7 +111,7 @@ def _option_parameter(option: "Field[Any]", kind: Any, group: Group, *, has_defa
 
 def options_from_flags(options: type, flags: dict[str, Any], **more: Any) -> Any:
     """An instance of an option dataclass from the flags that belong to it."""
-    names = {option.name for option in fields(options)}
+    names = {option.name for option in option_fields(options)}
     return options(**{name: value for name, value in flags.items() if name in names}, **more)
 
 

@@ -21,6 +21,7 @@ from tts2face.picture.options import Picture
 from tts2face.processes.collection import resume_collection
 from tts2face.request import OWN_FACE, Request
 from tts2face.session.named_models import Models
+from tts2face.source import FromPhones, Recorded, Spoken
 from tts2face.storage.files import check_file_name, refuse_overwriting, write_atomically
 
 if TYPE_CHECKING:
@@ -121,9 +122,10 @@ def _check_options(request: Request, picture: Picture, options: SpeakOptions) ->
         check_file_name(options.explain, "an explanation", EXPLANATION_SUFFIXES)
     _check_overwriting(request, picture, options)
     _check_exports(options)
-    has_phones = request.has_phones and request.silence is None
-    needs_text = request.audio is None and request.silence is None
-    if not request.text.strip() and (needs_text or (options.explain is not None and not has_phones)):
+    source = request.source
+    has_phones = isinstance(source, Recorded) and isinstance(source.lips, FromPhones)
+    needs_text = isinstance(source, Spoken) or (options.explain is not None and not has_phones)
+    if needs_text and not source.text.strip():
         raise InputError("the text is empty; add words to speak, or the words of --audio")
     if options.view:
         if options.models.face == OWN_FACE:
@@ -224,7 +226,7 @@ def _report_writing(write: "Callable[[Progress | None], WrittenClip]", options: 
 
 def _tell_what_is_heard(request: Request, options: SpeakOptions) -> None:
     """Say what to expect of a recording without words."""
-    if not options.quiet and request.audio is not None and not request.text.strip() and request.has_phones:
+    if not options.quiet and isinstance(request.source, Recorded) and request.source.lips == FromPhones():
         write_message(WITHOUT_WORDS)
 
 

@@ -64,6 +64,12 @@ if TYPE_CHECKING:
     from tts2face.session.project_file import save_project as save_project
     from tts2face.session.session import Session as Session
     from tts2face.session.speech_stream import Piece as Piece
+    from tts2face.source import FromPhones as FromPhones
+    from tts2face.source import FromSound as FromSound
+    from tts2face.source import Idle as Idle
+    from tts2face.source import Listening as Listening
+    from tts2face.source import Recorded as Recorded
+    from tts2face.source import Spoken as Spoken
     from tts2face.types import Chunk as Chunk
     from tts2face.types import Clip as Clip
     from tts2face.types import Speech as Speech
@@ -84,9 +90,13 @@ __all__ = [
     "Cue",
     "DataError",
     "Face",
+    "FromPhones",
+    "FromSound",
+    "Idle",
     "ImportReport",
     "ImportedFace",
     "InputError",
+    "Listening",
     "Palette",
     "Performance",
     "PhoneSequence",
@@ -94,9 +104,11 @@ __all__ = [
     "Piece",
     "Plan",
     "Project",
+    "Recorded",
     "Request",
     "Session",
     "Speech",
+    "Spoken",
     "Subtitles",
     "Talker",
     "Trajectory",
@@ -173,6 +185,7 @@ _MODULES = {
     "tts2face.session.speech_stream": ("Piece",),
     "tts2face.session.performance": ("Performance",),
     "tts2face.session.outputs": ("WrittenClip",),
+    "tts2face.source": ("FromPhones", "FromSound", "Idle", "Listening", "Recorded", "Spoken"),
     "tts2face.types": ("Chunk", "Clip", "Speech", "Trajectory", "Waveform"),
 }
 _HOMES = {name: module for module, names in _MODULES.items() for name in names}

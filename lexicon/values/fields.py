@@ -4,12 +4,12 @@ import math
 import operator
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from functools import cache
 from itertools import repeat
 from numbers import Integral, Real
 from pathlib import Path
-from types import MappingProxyType, UnionType
+from types import MappingProxyType, NoneType, UnionType
 from typing import Annotated, Any, get_args, get_origin
 
 from lexicon.values.checks import EXPECTED, Check, Place, is_number, typed
@@ -51,9 +51,10 @@ def _check_of(kind: Any) -> Check:
     origin, inner = get_origin(kind), get_args(kind)
     if origin is Annotated:
         return _check_of(inner[0])
-    if origin is UnionType:  # X | None
-        present = _check_of(inner[0])
-        return lambda value, place: None if value is None else present(value, place)
+    if origin is UnionType:  # X | None, or several records
+        first = _check_of(inner[0])
+        others: tuple[type, ...] = tuple(kind for kind in inner if kind is NoneType or is_dataclass(kind))
+        return lambda value, place: value if isinstance(value, others) else first(value, place)
     if origin in (tuple, frozenset):
         return _check_of_list(origin, inner)
     if origin is Mapping:

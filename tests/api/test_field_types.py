@@ -32,7 +32,7 @@ from tts2face.gestures.elements import (
     ExpressionSpan,
     Gains,
     GazeTarget,
-    Listening,
+    ListeningSpan,
     Nod,
     StrengthCurve,
     StyleSpan,
@@ -53,15 +53,17 @@ from tts2face.session.named_models import Models
 from tts2face.session.performance import Performance
 from tts2face.session.prepared import SentenceEdges
 from tts2face.session.project import Project
+from tts2face.source import FromPhones, FromSound, Idle, Listening, Recorded, SourceOptions, Spoken
 from tts2face.types import Clip, Speech, Trajectory, Waveform, resting_head
 
 SPEECH = Speech(Waveform(np.zeros(800), 8000), PhoneSequence(["a"], [0.0, 0.1]), (WordSpan("a", 0, 1),))
 MADE: tuple[Any, ...] = (
-    Request(), Models(), Picture(), Project(), Timeline(), BatchOptions(), Cast(), Role({}, {}), LineSettings(),
+    Request(), SourceOptions(), Spoken("a"), FromPhones(), FromSound("network"), Recorded(Path("a.wav")), Idle(1.0),
+    Listening(1.0), Models(), Picture(), Project(), Timeline(), BatchOptions(), Cast(), Role({}, {}), LineSettings(),
     ServiceSettings(), Performance(take=Path("a.mp4")), StreamFormat("mp3", Picture()),
     SynthesisOptions(), FieldOptions(), ExcludedToken("a", 0.0), SentenceEdges("a", 0, ("a",), (0.0, 0.1)),
     StyleMix("neutral"), Reference(KEPT, project=Project()),
-    StyleSpan("head", "sad", 0.0), ExpressionSpan("happy", 0.5), GazeTarget(0.0, 0.0), Listening(), Nod(0.0),
+    StyleSpan("head", "sad", 0.0), ExpressionSpan("happy", 0.5), GazeTarget(0.0, 0.0), ListeningSpan(), Nod(0.0),
     BrowRaise(0.0), StrengthCurve("head", ((0.0, 1.0),)), ExpressionCurve("happy", ((0.0, 1.0),)),
     ChannelEdit("jawOpen", ((0.0, 1.0),)), Gains(),
     WordSpan("a", 0, 1), SPEECH, Clip(Trajectory(["a"], np.zeros((3, 1)), 30.0), resting_head(3, 30.0), SPEECH),

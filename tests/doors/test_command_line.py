@@ -7,7 +7,6 @@ import re
 import signal
 import subprocess
 import sys
-from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -18,7 +17,7 @@ from lexicon import errors
 from tests.running import eventually
 from tests.world import World
 from tts2face.picture.options import Picture
-from tts2face.request import Request
+from tts2face.request import Request, option_fields
 
 COMMAND = [sys.executable, "-c", "from cli.main import main; main()"]
 SMALL = ["--size", "64x64", "--fps", "5"]
@@ -28,7 +27,7 @@ def test_help_names_every_option_and_is_quick(capsys: pytest.CaptureFixture[str]
     assert run(["--help"]) == 0
     captured = capsys.readouterr().out
     for options in (Request, Picture):
-        for option in fields(options):
+        for option in option_fields(options):
             assert option.name == "text" or f"--{option.name.replace(chr(95), chr(45))}" in captured
     loaded = "import sys; from cli.main import run; run(['--help']); print(*sys.modules)"
     modules = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True).stdout

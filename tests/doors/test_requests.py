@@ -3,7 +3,7 @@
 import hashlib
 import subprocess
 import sys
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +12,10 @@ import pytest
 from lexicon.errors import DataError, InputError
 from tests.world import ROOT, World
 from tts2face.numeric.kernels import CACHE_VARIABLE, FOLDER
-from tts2face.request import GESTURES, LEAD_S, TURN_S, Request
+from tts2face.request import GESTURES, OPTIONS, Request
 from tts2face.session.session import Session
 from tts2face.sound.voice_pool import VoicePool
+from tts2face.source import LEAD_S, TURN_S
 from tts2face.types import Clip, concatenate_clips
 
 TEXT = "Bob may move. We were away."
@@ -61,7 +62,7 @@ def digest(clip: Clip) -> str:
 ELSEWHERE = {"audio", "audio_map", "idle", "partner", "plain_delivery"}
 
 
-@pytest.mark.parametrize("name", [option.name for option in fields(Request) if option.name not in ELSEWHERE])
+@pytest.mark.parametrize("name", [name for name in OPTIONS if name not in ELSEWHERE])
 def test_every_option_changes_the_clip(name: str, clip: Clip, session: Session, tmp_path: Path) -> None:
     own = tmp_path / "own.txt"
     own.write_text("bob  B IY1 M\n")

@@ -11,7 +11,7 @@ import pytest
 from corpus_tools.studies.gestures.measures import find_blinks
 from lexicon.errors import InputError
 from tests.world import World
-from tts2face.gestures.elements import Listening, Nod
+from tts2face.gestures.elements import ListeningSpan, Nod
 from tts2face.gestures.listening import (
     LASTS_S,
     LEAST_GAP_S,
@@ -31,7 +31,7 @@ from tts2face.storage.media_files import pcm_bytes
 from tts2face.types import Waveform
 
 FPS, RATE = 30.0, 16_000
-HEARD = Timeline(listens=(Listening(0.0, 600.0),))
+HEARD = Timeline(listens=(ListeningSpan(0.0, 600.0),))
 
 
 def test_responses_at_intervals_are_as_many_as_look_natural_and_the_same_in_pieces() -> None:
@@ -55,7 +55,7 @@ def test_a_response_nods_or_raises_the_brows() -> None:
 
 
 def test_spans_respond_where_they_hold_and_react() -> None:
-    spans = (Listening(0.0, 100.0), Listening(200.0, 300.0, reacts=False))
+    spans = (ListeningSpan(0.0, 100.0), ListeningSpan(200.0, 300.0, reacts=False))
     found = with_responses(Timeline(listens=spans, nods=(Nod(250.0),)), 0.0, 400.0, 1)
     own = [nod.time for nod in found.nods if nod.time != 250.0]
     assert own
@@ -99,11 +99,11 @@ def test_listening_in_short_pieces_is_as_at_once(world: World, style: str, fps: 
     n_pieces, n, fields = 30, 6, GestureFields(world.palette)
     whole = GestureStream(fields, style=style, seed=1, fps=fps)
     silence = Waveform(np.zeros(8000 * n_pieces), 8000)
-    at_once = whole.next(silence, n_pieces * n, Timeline(listens=(Listening(0.0, 60.0),)))
+    at_once = whole.next(silence, n_pieces * n, Timeline(listens=(ListeningSpan(0.0, 60.0),)))
     stream, parts, known = GestureStream(fields, style=style, seed=1, fps=fps), [], Timeline()
     for piece in range(n_pieces):
         begin, end = float(Fraction(piece * n) / Fraction(fps)), float(Fraction(piece * n + n) / Fraction(fps))
-        known = known.restrict(begin - 1.0, np.inf).merge(Timeline(listens=(Listening(begin, end),)))
+        known = known.restrict(begin - 1.0, np.inf).merge(Timeline(listens=(ListeningSpan(begin, end),)))
         parts.append(stream.next(Waveform(np.zeros(1600), 8000), n, known))
     for name in at_once:
         np.testing.assert_allclose(np.concatenate([part[name] for part in parts]), at_once[name], atol=2e-5)

@@ -17,7 +17,7 @@ from tts2face.gestures.elements import (
     ExpressionSpan,
     Gains,
     GazeTarget,
-    Listening,
+    ListeningSpan,
     Nod,
     StyleSpan,
 )
@@ -161,9 +161,12 @@ def test_a_timeline_can_be_moved() -> None:
             "the span of sad from 9 s to the end lies beyond the clip, which lasts 9.00 s; let it begin earlier",
         ),
         (lambda: Timeline(gaze=(GazeTarget(0, 0, 1, 9),)).check_duration(8), "the span of the gaze from 1 to 9 s lies"),
-        (lambda: Timeline(listens=(Listening(3, 9),)).check_duration(8), "span of listening from 3 to 9 s .*; shorten"),
         (
-            lambda: Timeline(listens=(Listening(3, math.inf), Listening(5, 9))),
+            lambda: Timeline(listens=(ListeningSpan(3, 9),)).check_duration(8),
+            "span of listening from 3 to 9 s .*; shorten",
+        ),
+        (
+            lambda: Timeline(listens=(ListeningSpan(3, math.inf), ListeningSpan(5, 9))),
             "two spans of listening overlap: 3 s to the end and 5-9 s; let one",
         ),
         (lambda: Timeline(brow_raises=(BrowRaise(9),)).check_duration(8), "the brow raise at 9 s lies beyond"),

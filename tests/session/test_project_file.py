@@ -1,7 +1,6 @@
 """Project files: everything is written and read back, and what is wrong is named."""
 
 import json
-from dataclasses import fields
 from itertools import product
 from pathlib import Path
 from typing import Any, get_args
@@ -13,7 +12,7 @@ from tests.gestures.test_key_curves import WHOLE
 from tts2face.gestures.timeline_file import timeline_json
 from tts2face.lips.options import ExcludedToken
 from tts2face.picture.options import Picture
-from tts2face.request import Request
+from tts2face.request import Request, option_fields
 from tts2face.session.named_models import Models
 from tts2face.session.prepared import SentenceEdges
 from tts2face.session.project import Project
@@ -126,7 +125,7 @@ def is_of_type(value: Any, kind: type) -> bool:
 def test_an_option_of_a_wrong_type_is_refused_by_its_name(tmp_path: Path) -> None:
     wrong = []
     for part, options in (("request", Request), ("models", Models), ("picture", Picture)):
-        for option, value in product(fields(options), VALUES):
+        for option, value in product(option_fields(options), VALUES):
             kinds = (*(get_args(option.type) or (option.type,)), *((float,) if option.name == "articulation" else ()))
             content = {"format": "tts2face project", "version": 2, part: {option.name: value}}
             (tmp_path / "p.json").write_text(json.dumps(content), encoding="utf-8")

@@ -181,7 +181,7 @@ class GazeTarget:
 
 
 @dataclass(frozen=True, slots=True)
-class Listening:
+class ListeningSpan:
     """The face listens to its partner in [start, end); `end` may be infinite.
 
     It nods and raises the brows at intervals as listeners do, unless ``reacts`` is False: what is known of the other's
@@ -413,7 +413,7 @@ KINDS: Mapping[str, ElementKind] = MappingProxyType({
         ElementKind("spans", StyleSpan, "span", "feature"),
         ElementKind("expressions", ExpressionSpan, "span", "expression"),
         ElementKind("gaze", GazeTarget, "span", "", "the gaze"),
-        ElementKind("listens", Listening, "span", "", "listening"),
+        ElementKind("listens", ListeningSpan, "span", "", "listening"),
         ElementKind("nods", Nod, "instant", "", "nod"),
         ElementKind("brow_raises", BrowRaise, "instant", "", "brow raise"),
         ElementKind("strengths", StrengthCurve, "curve", "feature"),

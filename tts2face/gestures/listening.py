@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.gestures.blinks import PAUSE_DB
-from tts2face.gestures.elements import BrowRaise, Listening, Nod
+from tts2face.gestures.elements import BrowRaise, ListeningSpan, Nod
 from tts2face.gestures.presentation import prosody_features, speech_intensity
 from tts2face.gestures.timeline import Timeline
 from tts2face.types import Waveform
@@ -59,7 +59,7 @@ def with_responses(timeline: Timeline, begin: float, end: float, seed: int) -> T
     return responses(due, seed).merge(timeline)
 
 
-def _holds(span: Listening, time: float) -> bool:
+def _holds(span: ListeningSpan, time: float) -> bool:
     return span.start <= time < span.end
 
 

@@ -28,7 +28,7 @@ from tts2face.gestures.elements import (
     FloatArray,
     Gains,
     GazeTarget,
-    Listening,
+    ListeningSpan,
     Nod,
     StrengthCurve,
     StyleSpan,
@@ -92,7 +92,7 @@ class Timeline:
     brow_raises: tuple[BrowRaise, ...] = ()
     gains: Gains = field(default_factory=Gains)
     gaze: tuple[GazeTarget, ...] = ()
-    listens: tuple[Listening, ...] = ()
+    listens: tuple[ListeningSpan, ...] = ()
     strengths: tuple[StrengthCurve, ...] = ()
     curves: tuple[ExpressionCurve, ...] = ()
     edits: tuple[ChannelEdit, ...] = ()

@@ -29,7 +29,7 @@ from tts2face.models.landmarks import (
     inner_lip_gaps,
 )
 from tts2face.numeric.arrays import ordered_product, smooth_gaussian, smoothstep
-from tts2face.request import CLEAR, NATURAL
+from tts2face.source import CLEAR, NATURAL
 from tts2face.types import Trajectory
 
 FloatArray = NDArray[np.float64]

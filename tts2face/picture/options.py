@@ -11,7 +11,7 @@ from pathlib import Path
 from lexicon.errors import InputError
 from lexicon.values.fields import check_fields
 from lexicon.values.files import is_file
-from tts2face.request import option
+from tts2face.option import option
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ from tts2face.session.animated_face import AnimatedFace
 from tts2face.session.models import SessionModels
 from tts2face.session.prepared import PreparedRequest
 from tts2face.session.speech_stream import Piece, timed_speech
+from tts2face.source import Recorded
 from tts2face.types import Chunk
 
 LINES = "application/jsonl"  # media type of lines of JSON
@@ -101,7 +102,7 @@ def _encode_media(
         renderer = models.renderer(format.picture, has_gestures=request.has_gestures)
         clips = (piece.clip for piece in models.pieces(prepared))
         return encode_movie(clips, renderer, format.name, threads=format.threads, pace=format.pace, path=path)
-    if request.audio is None:
+    if not isinstance(request.source, Recorded):
         pieces = timed_speech(prepared, models.for_request(prepared).speech, has_phones=False)
     else:
         pieces = models.pieces(prepared)

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from lexicon.marked_text import MAX_PAUSE_S, PauseMark
 from lexicon.sequence import PhoneSequence
 from tts2face.numeric.arrays import smoothstep
-from tts2face.request import IDLE_LIMITS_S
 from tts2face.session.joining import silent_frames
-from tts2face.session.prepared import PreparedRequest, idle_request, prepare
+from tts2face.session.prepared import PreparedRequest, prepare
 from tts2face.session.speech_stream import Piece
+from tts2face.source import IDLE_LIMITS_S, LEAD_S, Idle, Listening, Recorded, Spoken
 from tts2face.types import Clip, Speech
 
 EASE_S = 0.25  # from and to rest; a head turns back within a quarter of a second
@@ -51,10 +51,12 @@ def clips_of_length(
     speech = prepared if sound_end is None else _with_pause(prepared, sound_end, left)
     clips: Iterator[Clip] = (piece.clip for piece in stream(speech))
     n_speech = left if sound_end is None else min(left, _frames_with_pause(sound_end, left, fps))
-    if prepared.request.audio is not None:
+    source = prepared.request.source
+    if isinstance(source, Recorded):
         recorded = list(clips)
         clips, n_speech = iter(recorded), min(left, sum(len(clip.motion) for clip in recorded))
-    opening_s = EASE_S if prepared.request.silence is not None else (prepared.request.lead or 0.0) + OPENING_S
+    lead = (source.lead or 0.0) if isinstance(source, Spoken) else LEAD_S
+    opening_s = EASE_S if isinstance(source, Idle | Listening) else lead + OPENING_S
     for clip in _eased(clips, n_speech, length.first_channel, opening_s):
         rate = clip.speech.waveform.rate
         done += len(clip.motion)
@@ -65,7 +67,9 @@ def clips_of_length(
             yield _resting(clip, n_idle, done, fps)
             return
         request = replace(
-            idle_request(prepared.request, float(n_idle / fps)),
+            prepared.request,
+            source=Idle(float(n_idle / fps)),
+            dictionary=None,
             seed=prepared.request.seed + done,
             expression=None,
             timeline=None,

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lexicon.errors import InputError
-from tts2face.gestures.elements import Listening
+from tts2face.gestures.elements import ListeningSpan
 from tts2face.gestures.listening import LASTS_S, responses
 from tts2face.gestures.timeline import Timeline
 from tts2face.lips.performer import PerformerRetargeter, build_performer_retargeter
@@ -24,12 +24,13 @@ from tts2face.models.face import Face
 from tts2face.models.talker import speech_channels
 from tts2face.request import Request
 from tts2face.session.models import SessionModels
-from tts2face.session.prepared import idle_request, listening_request, prepare
+from tts2face.session.prepared import prepare
 from tts2face.session.recording import select_audio_map
-from tts2face.session.speech_stream import Piece, turn_request
+from tts2face.session.speech_stream import Piece, after_listening
 from tts2face.session.steps import pieces_from
 from tts2face.sound.features import FEATURE_RATE
 from tts2face.sound.listener import StreamingAudioMap
+from tts2face.source import Idle, Listening, Spoken
 from tts2face.types import Trajectory, exact_rate
 from tts2face.video.media import TimedFrame
 from tts2face.video.pose import head_angles, remove_pose
@@ -254,11 +255,12 @@ class LiveSpeech:
     """
 
     def __init__(self, request: Request, models: SessionModels) -> None:
-        given = (request.audio, request.idle, request.listen, request.timeline)
-        if request.text or given != (None, None, None, None):
+        if not isinstance(request.source, Spoken) or request.source.text or request.timeline is not None:
             raise InputError("a live request has options only; send its text in parts")
         self._request, self._models = request, models
-        self._layer = models.gesture_layer(prepare(idle_request(request, UNUSED_IDLE_S)))
+        self._spoken = request.source
+        self._silent = replace(request, source=Idle(UNUSED_IDLE_S), dictionary=None)
+        self._layer = models.gesture_layer(prepare(self._silent))
         self._n_frames, self._is_speaking, self._has_listened = 0, False, False
         self._rate = exact_rate(request.fps)
         self._cues: list[float] = []  # seconds of the clip at which the face responds
@@ -279,16 +281,17 @@ class LiveSpeech:
 
     def say(self, text: str) -> Iterator[Piece]:
         """Append the sentences of a text; errors as `Session.stream`."""
-        request = replace(self._request, text=text)
-        request = turn_request(request) if self._has_listened else request
+        spoken = replace(self._spoken, text=text)
+        spoken = after_listening(spoken) if self._has_listened else spoken
         self._has_listened = False
-        yield from self._append(replace(request, lead=None) if self._is_speaking else request)
+        spoken = replace(spoken, lead=None) if self._is_speaking else spoken
+        yield from self._append(replace(self._request, source=spoken))
         self._is_speaking = True
 
     def idle(self, seconds: float) -> Iterator[Piece]:
         """Append silence."""
         self.rest()
-        yield from self._append(idle_request(self._request, seconds))
+        yield from self._append(replace(self._silent, source=Idle(seconds)))
 
     def listen(self, seconds: float, cues: Sequence[float] | None = None) -> Iterator[Piece]:
         """Append silence in which the face listens.
@@ -303,8 +306,8 @@ class LiveSpeech:
         begin = self.seconds
         self._cues = [cue for cue in self._cues if cue > begin - LASTS_S] + [begin + cue for cue in cues or ()]
         responding = responses(self._cues, self._request.seed).restrict(begin, begin + seconds).shift(-begin)
-        listened = Timeline(listens=(Listening(0.0, seconds, reacts=cues is None),))
-        yield from self._append(listening_request(self._request, seconds), responding.merge(listened))
+        listened = Timeline(listens=(ListeningSpan(0.0, seconds, reacts=cues is None),))
+        yield from self._append(replace(self._silent, source=Listening(seconds)), responding.merge(listened))
         self._has_listened = True
 
     def rest(self) -> None:

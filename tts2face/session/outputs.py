@@ -19,6 +19,7 @@ from tts2face.session.prepared import HEARING_STEPS, PreparedRequest, marked_sty
 from tts2face.session.speech import MarkTime
 from tts2face.session.speech_stream import Piece, SpeechModels, spoken_pieces
 from tts2face.sound.voice_pool import VoicePool
+from tts2face.source import Recorded
 from tts2face.storage.files import AnyPath, refuse_overwriting
 from tts2face.types import Clip, Progress
 
@@ -242,7 +243,7 @@ def is_speech_only(prepared: PreparedRequest, outputs: OutputFiles) -> bool:
     """Whether no output holds motion, and the request asks for nothing that a talker, face or palette could lack."""
     asks_for_motion = prepared.timeline != Timeline() or marked_styles(prepared.text) or prepared.excluded
     holds_motion = outputs.out is not None or any(file.format.has_motion for file in outputs.exports)
-    return prepared.request.audio is None and not asks_for_motion and not holds_motion
+    return not isinstance(prepared.request.source, Recorded) and not asks_for_motion and not holds_motion
 
 
 def write_speech(

@@ -1,9 +1,10 @@
 """A request that is parsed and checked once: its text and marks, its timeline, and phone edges corrected by hand."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,14 +21,15 @@ from lexicon.sequence import SILENCE, PhoneSequence
 from lexicon.ssml import parse_marks
 from lexicon.values.fields import check_fields
 from lexicon.values.files import is_file
-from tts2face.gestures.elements import ExpressionSpan, Gains, Listening
+from tts2face.gestures.elements import ExpressionSpan, Gains, ListeningSpan
 from tts2face.gestures.listening import CUE_RATE, cue_times, responses
 from tts2face.gestures.timeline import Timeline, parse_expressions, parse_gains, parse_style
 from tts2face.gestures.timeline_file import read_timeline
 from tts2face.lips.options import METHOD_OPTIONS, ExcludedToken, SynthesisOptions
 from tts2face.picture.options import Picture
-from tts2face.request import CAMERA, LEAD_S, Request
+from tts2face.request import CAMERA, Request, option_fields
 from tts2face.session.joining import Excerpt
+from tts2face.source import Listening, Recorded, Source, Spoken
 from tts2face.storage.files import AnyPath
 from tts2face.types import exact_rate
 
@@ -59,7 +61,7 @@ def check_marks(text: MarkedText, request: Request) -> None:
         A style cannot be parsed, the product of a speed or loudness with the request's is out of range, the text names
         another language, or the text of a recording has marks that change pauses or the voice.
     """
-    if request.audio is not None and text.has_voice_changes:
+    if isinstance(request.source, Recorded) and text.has_voice_changes:
         raise InputError(
             "[pause], <break>, <prosody>, <emphasis>, <voice> and <lang> have no effect on a recording; remove them or "
             "--audio"
@@ -68,9 +70,10 @@ def check_marks(text: MarkedText, request: Request) -> None:
         raise InputError(f"the text names the language {text.language}, not {request.language}; choose one of them")
     marked_styles(text)
     check_silence(text)
+    spoken = request.spoken or Spoken("")
     for what, marked, requested, (low, high) in (
-        ("speed", {run.rate for run in text.runs}, request.rate, RATE_LIMITS),
-        ("loudness", {run.volume for run in text.runs}, request.volume, VOLUME_LIMITS),
+        ("speed", {run.rate for run in text.runs}, spoken.rate, RATE_LIMITS),
+        ("loudness", {run.volume for run in text.runs}, spoken.volume, VOLUME_LIMITS),
     ):
         for factor in marked:
             if not low <= factor * requested <= high:
@@ -223,10 +226,13 @@ class PreparedRequest:
     @property
     def n_steps(self) -> int:
         """Total steps of progress: characters of a text, or parts of a recording or of idle animation."""
-        if self.request.audio is not None:
-            return HEARING_STEPS + RECORDING_STEPS
-        silent = 0 if self.request.silence is None else IDLE_STEPS
-        return silent + len(self.text.text) if silent else max(len(self.text.text), 1)
+        match self.request.source:
+            case Recorded():
+                return HEARING_STEPS + RECORDING_STEPS
+            case Spoken():
+                return max(len(self.text.text), 1)
+            case _:
+                return IDLE_STEPS + len(self.text.text)
 
     def sentences(self) -> Iterator[Sentence]:
         """Sentences of the text in order."""
@@ -234,8 +240,9 @@ class PreparedRequest:
 
     def preload_voice(self, voices: "VoicePool") -> None:
         """Load the voice of the text in a thread; none for a recording or a request without text."""
-        if self.request.text and not self.request.audio:
-            voices.preload(self.request.voice, self.request.language, self.dictionary)
+        spoken = self.request.spoken
+        if spoken is not None and spoken.text:
+            voices.preload(spoken.voice, self.request.language, self.dictionary)
 
 
 def prepare(request: Request) -> PreparedRequest:
@@ -249,10 +256,11 @@ def prepare(request: Request) -> PreparedRequest:
     DataError
         The timeline file or the dictionary is invalid.
     """
-    for path in (request.audio, request.partner):
-        if path is not None and not is_file(path):
+    source = request.source
+    for path in recordings(source).values():
+        if not is_file(path):
             raise InputError(f"there is no recording {path}; check the path")
-    written = parse_marks(request.text, request.language)
+    written = parse_marks(source.text, request.language)
     text, notes = make_readable(written, request.language)
     prepared = PreparedRequest(
         request,
@@ -263,41 +271,38 @@ def prepare(request: Request) -> PreparedRequest:
         listening=_listening(request),
         notes=notes,
     )
-    if not request.text.strip() and (request.audio is not None or request.silence is not None):
+    if not source.text and not isinstance(source, Spoken):
         return prepared
     check_readable(text, request.language)
     check_marks(written, request)
     if next(prepared.sentences(), None) is None:
-        raise InputError(f"there is nothing to say in {request.text[:40]!r}; give at least one word")
+        raise InputError(f"there is nothing to say in {source.text[:40]!r}; give at least one word")
     return prepared
+
+
+def recordings(source: Source) -> dict[str, Path]:
+    """Paths of the sounds that a source reads, by the names of their options."""
+    match source:
+        case Recorded():
+            return {"audio": source.audio}
+        case Listening() if source.partner is not None:
+            return {"partner": source.partner}
+        case _:
+            return {}
 
 
 def _listening(request: Request) -> Timeline:
     """What the face does while it listens; what is heard of a partner gives the responses."""
-    if request.listen is None:
+    source = request.source
+    if not isinstance(source, Listening):
         return Timeline()
-    span = Listening(0.0, request.listen, reacts=request.partner is None)
+    span = ListeningSpan(0.0, source.seconds, reacts=source.partner is None)
     cues: list[float] = []
-    if request.partner is not None:
+    if source.partner is not None:
         from tts2face.video.media import read_sound
 
-        cues = [time for time in cue_times(read_sound(request.partner, CUE_RATE)) if time < request.listen]
+        cues = [time for time in cue_times(read_sound(source.partner, CUE_RATE)) if time < source.seconds]
     return responses(cues, request.seed).merge(Timeline(listens=(span,)))
-
-
-def idle_request(request: Request, seconds: float) -> Request:
-    """The request with idle animation in place of its speech."""
-    return replace(_silent(request), idle=seconds)
-
-
-def listening_request(request: Request, seconds: float) -> Request:
-    """The request with a face that listens in place of its speech."""
-    return replace(_silent(request), listen=seconds)
-
-
-def _silent(request: Request) -> Request:
-    silent = replace(request, text="", audio=None, audio_map=None, voice=None, rate=1.0, volume=1.0, dictionary=None)
-    return replace(silent, articulation=None, lead=LEAD_S, listen=None, partner=None)
 
 
 def prepare_request(text: str | Request | PreparedRequest, options: dict[str, Any]) -> PreparedRequest:
@@ -337,7 +342,7 @@ def split_picture(picture: Picture | None, options: dict[str, Any]) -> tuple[Pic
 
 
 def _option_names(kind: type) -> tuple[str, ...]:
-    return tuple(option.name for option in fields(kind) if option.name != "text")
+    return tuple(option.name for option in option_fields(kind) if option.name != "text")
 
 
 def build_request_timeline(request: Request) -> Timeline:
@@ -363,13 +368,14 @@ def _expressions(request: Request) -> tuple[ExpressionSpan, ...]:
         return ()
     if request.expression.strip() != OF_VIDEO:
         return parse_expressions(request.expression)
-    if request.audio is None:
+    source = request.source
+    if not isinstance(source, Recorded):
         raise InputError("--expression video needs a recording with pictures of the person; add --audio clip.mp4")
     from tts2face.lips.performer import held_smile
     from tts2face.video.streaming import StreamingTracker
     from tts2face.video.take import BlendshapeReader, read_take
 
-    take = read_take(request.audio, StreamingTracker(), BlendshapeReader(), seconds=SMILE_S)
+    take = read_take(source.audio, StreamingTracker(), BlendshapeReader(), seconds=SMILE_S)
     smile = held_smile(take.landmarks, take.scores)
     return (ExpressionSpan("happy", float(np.mean(list(smile.values())))),) if smile else ()
 
@@ -395,12 +401,12 @@ def synthesis_options(request: Request) -> SynthesisOptions:
 
 def input_paths(request: Request, picture: Picture) -> dict[str, AnyPath]:
     """Paths of the files that a request and a picture read, by the names of their options."""
+    voice = None if request.spoken is None else request.spoken.voice
     return {
-        "audio": request.audio,
-        "partner": request.partner,
+        **recordings(request.source),
         "dictionary": request.dictionary,
         "timeline": request.timeline,
-        "voice": request.voice,
-        "voice settings": f"{request.voice}.json" if request.voice else None,
+        "voice": voice,
+        "voice settings": f"{voice}.json" if voice else None,
         "background": picture.background,
     }

@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -14,7 +14,7 @@ from lexicon.values.records import checked, errors_at
 from tts2face.gestures.timeline_file import parse_timeline_object, timeline_json
 from tts2face.lips.options import ExcludedToken
 from tts2face.picture.options import Picture
-from tts2face.request import Request
+from tts2face.request import Request, option_fields
 from tts2face.session.named_models import Models
 from tts2face.session.prepared import SentenceEdges
 from tts2face.session.project import Project
@@ -136,7 +136,7 @@ def save_project(project: Project, path: str | Path) -> None:
 
 
 def _options(kind: type[Options], given: Mapping[str, Any], folder: Path, files: tuple[str, ...]) -> Options:
-    known = {option.name for option in fields(kind)}
+    known = {option.name for option in option_fields(kind)}
     chosen = dict(given)
     for name in chosen:
         if name not in known:
@@ -150,7 +150,7 @@ def _options(kind: type[Options], given: Mapping[str, Any], folder: Path, files:
 
 def _options_json(options: Options, default: Options, folder: Path, files: tuple[str, ...]) -> dict[str, Any]:
     chosen = {}
-    for option in fields(options):
+    for option in option_fields(type(options)):
         value = getattr(options, option.name)
         if value == getattr(default, option.name):
             continue

@@ -165,7 +165,7 @@ class Session:
         and last frame, so that such clips can be joined. Arguments and errors as `clip`.
         """
         prepared = prepare_request(text, options)
-        sound_end = self.measure_speech(prepared).total if prepared.request.is_text else None
+        sound_end = self.measure_speech(prepared).total if prepared.request.spoken is not None else None
         length = Length(n_frames, self._models.n_fixed_channels)
         yield from clips_of_length(prepared, sound_end, length, self._models.pieces)
 

@@ -35,10 +35,17 @@ from tts2face.session.prepared import innermost_styles
 from tts2face.sound.level import level_speech
 from tts2face.sound.voice import SpeechInput, SpokenWord, Voice, apply_volume
 from tts2face.sound.voice_pool import has_voice, speaks
+from tts2face.source import Spoken
 from tts2face.types import Speech, Waveform, YieldTurn, concatenate_speech, frame_count, keep_on
 
 Deliveries = Mapping[str, Delivery]  # of a palette's styles, by name
 NO_DELIVERIES: Deliveries = MappingProxyType({})
+
+
+def text_of(request: Request) -> Spoken:
+    """The text of a request, of which there is one, with its options."""
+    assert request.spoken is not None
+    return request.spoken
 
 
 def delivery_of(part: Phrase, runs: Sequence[StyleRun], request: Request, deliveries: Deliveries) -> Delivery:
@@ -46,12 +53,13 @@ def delivery_of(part: Phrase, runs: Sequence[StyleRun], request: Request, delive
 
     A rate or volume that the request or a mark sets replaces that of the style.
     """
-    if request.plain_delivery:
+    spoken = text_of(request)
+    if spoken.plain_delivery:
         return PLAIN
     found = deliveries.get(_whole_style(request.style, _longest_run(part, runs).styles), PLAIN)
-    has_volume = request.volume != 1.0 or any(run.volume != 1.0 for run in runs)
+    has_volume = spoken.volume != 1.0 or any(run.volume != 1.0 for run in runs)
     return Delivery(
-        1.0 if request.rate != 1.0 or part.rate != 1.0 else found.rate, 0.0 if has_volume else found.level_db
+        1.0 if spoken.rate != 1.0 or part.rate != 1.0 else found.rate, 0.0 if has_volume else found.level_db
     )
 
 
@@ -144,6 +152,7 @@ def speak_sentence(
     InputError
         A voice cannot speak any part of the text, or `voices` is None and the sentence needs other voices.
     """
+    text = text_of(request)
     parts: list[Phrase] = []
     spoken: list[Speech] = []
     word_times: list[WordTimes] = []
@@ -152,7 +161,7 @@ def speak_sentence(
     for part in sentence.utterances:
         speaker = speaker_of(part, voice, request, voices)
         delivery = delivery_of(part, sentence.runs, request, deliveries)
-        rate = request.rate * part.rate * delivery.rate
+        rate = text.rate * part.rate * delivery.rate
         try:
             speech = speaker.speak(phrase_content(part), rate=rate, seed=request.seed)
         except SilentTextError:  # signs, such as pictures, for which a voice has no words
@@ -166,9 +175,9 @@ def speak_sentence(
         spoken.append(speech)
         word_times.append(times_of_part)
         gains.append(_gain(speech.waveform, sentence.runs, part, times_of_part))
-        volumes.append(request.volume * delivery.volume)
+        volumes.append(text.volume * delivery.volume)
     sentence = replace(sentence, utterances=tuple(parts))
-    scaled = [_scale_speech(speech, request.volume, gain) for speech, gain in zip(spoken, gains, strict=True)]
+    scaled = [_scale_speech(speech, text.volume, gain) for speech, gain in zip(spoken, gains, strict=True)]
     speech, begins = _join_sentence(scaled, sentence, voice.sample_rate)
     yield_turn()
     levelled = level_speech(spoken, [volume * gain for volume, gain in zip(volumes, gains, strict=True)], yield_turn)
@@ -188,15 +197,15 @@ def sentence_sound(
     deliveries: Deliveries = NO_DELIVERIES,
 ) -> Waveform:
     """Sound of `speak_sentence`, byte for byte, without aligning the phones of a sentence that needs no edges."""
-    part = sentence.utterances[0]
+    part, text = sentence.utterances[0], text_of(request)
     if len(sentence.utterances) > 1 or any(run.volume != 1.0 for run in sentence.runs):
         return speak_sentence(voice, sentence, request, voices, deliveries=deliveries).sound
     speaker = speaker_of(part, voice, request, voices)
     delivery = delivery_of(part, sentence.runs, request, deliveries)
-    rate = request.rate * part.rate * delivery.rate
+    rate = text.rate * part.rate * delivery.rate
     sound = speaker.sound(phrase_content(part), rate=rate, seed=request.seed)
     whole = _trimmed(resampled_speech(Speech.without_phones(sound), voice.sample_rate), sentence, part, request)
-    levelled = level_speech([whole], [request.volume * delivery.volume * np.ones(1)])
+    levelled = level_speech([whole], [text.volume * delivery.volume * np.ones(1)])
     return _join_sentence(levelled, sentence, voice.sample_rate)[0].waveform
 
 
@@ -205,8 +214,9 @@ def _trimmed(speech: Speech, sentence: Sentence, part: Phrase, request: Request)
 
     Little silence follows the last one if the written sentence continues after it.
     """
-    if request.lead is not None and part is sentence.utterances[0]:
-        speech = lead_in(speech, request.lead)
+    lead = text_of(request).lead
+    if lead is not None and part is sentence.utterances[0]:
+        speech = lead_in(speech, lead)
     return trim_end(speech) if sentence.is_cut and part is sentence.utterances[-1] else speech
 
 
@@ -227,7 +237,7 @@ def speaker_of(part: Phrase, voice: Voice, request: Request, voices: Voices | No
         return voice
     if voices is None:
         raise InputError("a text with spans of other voices or languages needs voices to speak them")
-    return voices(voice_in(part.voice or request.voice, part.language), part.language or request.language)
+    return voices(voice_in(part.voice or text_of(request).voice, part.language), part.language or request.language)
 
 
 def voice_in(name: str | None, language: str | None) -> str | None:

@@ -16,7 +16,7 @@ from lexicon.sentences import Sentence, text_prefix
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.gestures.timeline import Timeline
 from tts2face.processes.memory import NO_MEMORY, SentenceMemory
-from tts2face.request import CONVERSATION, TURN_S, Request
+from tts2face.request import CONVERSATION
 from tts2face.session.joining import Excerpt, excerpt_of_speech, shift_start, silent_speech, word_bounds
 from tts2face.session.prepared import IDLE_STEPS, PreparedRequest, correct_phones
 from tts2face.session.speech import (
@@ -29,10 +29,12 @@ from tts2face.session.speech import (
     sentence_sound,
     silent_sentences,
     speak_sentence,
+    text_of,
     without_long_silence,
 )
 from tts2face.sound.pauses import speech_onset
 from tts2face.sound.voice_pool import require_installed
+from tts2face.source import TURN_S, Idle, Listening, Recorded, Spoken
 from tts2face.types import (
     Clip,
     Speech,
@@ -54,7 +56,7 @@ AHEAD_S = 60.0  # of speech in memory, 12 MB, while the latest time of a timelin
 # Options of a request that do not affect the speech of its sentences.
 NOT_SPOKEN: Mapping[str, Any] = MappingProxyType(
     {"expression": None, "gain": None, "timeline": None, "pitch": False, "context": None, "exemplars": None}
-    | {"gaze": CONVERSATION, "listen": None, "partner": None}
+    | {"gaze": CONVERSATION}
 )
 
 
@@ -199,7 +201,7 @@ def timed_speech(prepared: PreparedRequest, models: SpeechModels, *, has_phones:
     InputError
         The request has a recording, or a time beyond the end of the clip, which its motion would refuse.
     """
-    if prepared.request.audio is not None:
+    if isinstance(prepared.request.source, Recorded):
         raise InputError("a recording is not spoken; remove it, or stream its clip")
     pieces = spoken_pieces(prepared, models, has_phones=has_phones)
     return _within_clip(pieces, prepared.timeline, models.yield_turn) if prepared.request.has_gestures else pieces
@@ -213,9 +215,9 @@ def _within_clip(pieces: Iterator[Piece], timeline: Timeline, yield_turn: YieldT
     timeline.check_duration(seconds)
 
 
-def turn_request(request: Request) -> Request:
-    """The request whose speech follows listening: its first sound leaves time for a breath and for lips that part."""
-    return request if request.lead is None else replace(request, lead=max(request.lead, TURN_S))
+def after_listening(spoken: Spoken) -> Spoken:
+    """A text that is spoken after listening: its first sound leaves time for a breath and for lips that part."""
+    return spoken if spoken.lead is None else replace(spoken, lead=max(spoken.lead, TURN_S))
 
 
 def speak_sentences(
@@ -229,26 +231,31 @@ def speak_sentences(
         yield _speak_excerpt(prepared, prepared.excerpt, models)
         return
     request, fps = prepared.request, prepared.fps
-    if request.silence is not None and not request.is_text:
-        yield from silent_sentences(request.silence, fps, IDLE_STEPS, prepared.listening)
+    source = request.source
+    if isinstance(source, Idle) or (isinstance(source, Listening) and source.then is None):
+        yield from silent_sentences(source.seconds, fps, IDLE_STEPS, prepared.listening)
         return
     _require_voices(prepared)
     voices, said = cache(models.voice), Counter[str]()
-    voice = voices(request.voice, request.language)
-    if request.listen is not None:
+    first = text_of(request)
+    voice = voices(first.voice, request.language)
+    if isinstance(source, Listening):
         rate = voice.sample_rate
-        yield from silent_sentences(request.listen, fps, IDLE_STEPS, prepared.listening, rate)
-        request = turn_request(request)
-    spoken_with = cache(lambda: (replace(request, text="", **NOT_SPOKEN), frozenset(prepared.dictionary.items())))
-    following = cache(lambda: replace(request, lead=None))  # sentences after the first keep the voice's pause
+        yield from silent_sentences(source.seconds, fps, IDLE_STEPS, prepared.listening, rate)
+        first = after_listening(first)
+    request = replace(request, source=first)
+    unspoken = cache(lambda: replace(request, source=replace(first, text=""), **NOT_SPOKEN))
+    spoken_with = cache(lambda: (unspoken(), frozenset(prepared.dictionary.items())))
+    following = cache(lambda: replace(request, source=replace(first, lead=None)))  # which keep the voice's pause
 
     def speak(sentence: Sentence) -> SpokenSentence:
         given = following() if said else request
+        lead = None if said else first.lead
         if not has_phones:
             sound = sentence_sound(voice, sentence, given, voices, deliveries=models.deliveries)
             return SpokenSentence(Speech.without_phones(sound), Timeline(), (), sound)
         return models.memory.recall(
-            lambda: ("speech", sentence.relative(), given.lead, spoken_with()),
+            lambda: ("speech", sentence.relative(), lead, spoken_with()),
             lambda: speak_sentence(voice, sentence, given, voices, models.yield_turn, deliveries=models.deliveries),
             lambda made: made.sound.samples.nbytes + made.speech.waveform.samples.nbytes,
         )
@@ -295,8 +302,9 @@ def _speak_excerpt(
     kept = excerpt_of_speech(voice, *bounds)
     sound = excerpt_of_speech(concatenate_speech([_with_sound(one) for one in spoken]), *bounds)
     cut = 0
-    if prepared.request.lead is not None:
-        cut = round((speech_onset(kept.waveform) - prepared.request.lead) * kept.waveform.rate)
+    lead = text_of(prepared.request).lead
+    if lead is not None:
+        cut = round((speech_onset(kept.waveform) - lead) * kept.waveform.rate)
     silence = [silent_speech(excerpt.silence, kept.waveform.rate)] if excerpt.silence > 0.0 else []
     kept, sound = (concatenate_speech([shift_start(one, cut), *silence]) for one in (kept, sound))
     written = text.text[places[0] : places[1]].strip()

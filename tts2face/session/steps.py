@@ -8,7 +8,6 @@ from collections.abc import Callable, Hashable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from hashlib import blake2b
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +47,7 @@ from tts2face.session.recording import (
 )
 from tts2face.session.speech import resolve_recording_marks
 from tts2face.session.speech_stream import Piece, SpeechModels, spoken_ahead, spoken_pieces
+from tts2face.source import FromSound, Recorded
 from tts2face.types import HEAD_CHANNELS, Clip, Progress, Trajectory, Waveform, YieldTurn, frame_count, keep_on
 
 Step = Callable[[Piece], Piece]
@@ -105,8 +105,9 @@ def pieces_from(
     """Pieces of a recording, or of a text or of idle animation that begins at a frame of a longer clip."""
     lips = Lips(prepared, models)
     steps: tuple[Step, ...] = () if gestures is None else (gestures, gestures.edits, gestures.body)
-    if prepared.request.audio is not None:
-        started = recorded_pieces(prepared, prepared.request.audio, lips, on_heard)
+    source = prepared.request.source
+    if isinstance(source, Recorded):
+        started = recorded_pieces(prepared, source, lips, on_heard)
     else:
         started, steps = spoken_pieces(prepared, models.speech, first_frame), (lips, *steps)
         if gestures is not None:
@@ -164,15 +165,17 @@ class Lips:
         return explain
 
 
-def recorded_pieces(prepared: PreparedRequest, audio: Path, lips: Lips, on_heard: Progress | None) -> Iterator[Piece]:
+def recorded_pieces(
+    prepared: PreparedRequest, source: Recorded, lips: Lips, on_heard: Progress | None
+) -> Iterator[Piece]:
     """First step of a recording: its sound with lip motion, from exemplars if its words are known, else from a map."""
-    transcript, motion, explain = _recording_motion(prepared, audio, lips, on_heard)
+    transcript, motion, explain = _recording_motion(prepared, source, lips, on_heard)
     if prepared.request.has_gestures:
         prepared.timeline.check_duration(len(motion) / float(prepared.fps))
     language = prepared.request.language
     timeline, marks = resolve_recording_marks(prepared.text, transcript.phones, transcript.words, language)
     fps, before = float(prepared.fps), 0
-    for clip in recording_clips(audio, transcript, motion, volume=prepared.request.volume):
+    for clip in recording_clips(source.audio, transcript, motion, volume=source.volume):
         after = before + len(clip.motion)
         begin, end = before / fps, after / fps
         yield Piece(
@@ -191,11 +194,12 @@ def recorded_pieces(prepared: PreparedRequest, audio: Path, lips: Lips, on_heard
 
 
 def _recording_motion(
-    prepared: PreparedRequest, audio: Path, lips: Lips, on_heard: Progress | None
+    prepared: PreparedRequest, source: Recorded, lips: Lips, on_heard: Progress | None
 ) -> tuple[TimedTranscript, Trajectory, Explain]:
     fps, request, models = float(prepared.fps), prepared.request, lips.models
-    if not request.has_phones:
-        audio_map = select_audio_map(request.audio_map, models.talker)
+    audio = source.audio
+    if isinstance(source.lips, FromSound):
+        audio_map = select_audio_map(source.lips.audio_map, models.talker)
         transcript, parameters = map_audio_to_motion(audio, audio_map, models.talker, fps)
         return transcript, models.face.motion_of_parameters(parameters), tuple
 
@@ -205,7 +209,7 @@ def _recording_motion(
         return ("transcript", file, prepared.text.text, request.language, frozenset(prepared.dictionary.items()))
 
     def find() -> TimedTranscript:
-        if not request.text.strip():
+        if not source.text:
             return recognise_transcript(audio, on_heard)
         return align_transcript(prepared.text.text, request.language, audio, prepared.dictionary, on_heard)
 

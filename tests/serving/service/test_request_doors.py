@@ -7,7 +7,7 @@ import pytest
 from pydantic import BaseModel, ValidationError
 
 from tts2face.picture.options import Picture
-from tts2face.request import Request
+from tts2face.request import Request, option_fields
 from tts2face.serving.batch.cast import MODEL_NAMES, NOT_IN_CAST, REQUEST_NAMES
 from tts2face.serving.service.options import BATCH_FIELDS, NOT_IN_CLIPS, NOT_IN_SUBTITLES, ClipRequest, SubtitlesRequest
 from tts2face.serving.service.request_fields import LIMITS, RECORDS
@@ -16,7 +16,7 @@ from tts2face.serving.service.routes.live import NOT_IN_LIVE_TEXT, TextOptions
 from tts2face.serving.service.routes.openai import SAME_NAMES, Speech
 from tts2face.session.named_models import Models
 
-OPTIONS = {one.name for record in RECORDS for one in fields(record)}
+OPTIONS = {one.name for record in RECORDS for one in option_fields(record)}
 DOORS: list[tuple[type[BaseModel], Mapping[str, str], set[str]]] = [
     (ClipRequest, NOT_IN_CLIPS, {"format"}),
     (SubtitlesRequest, NOT_IN_SUBTITLES, {*BATCH_FIELDS, "cast"}),
@@ -49,14 +49,14 @@ def test_other_protocols_take_options_as_clips_do(door: type[BaseModel], names: 
 
 
 def test_casts_take_every_option_of_a_request_and_every_model() -> None:
-    assert {*REQUEST_NAMES, *NOT_IN_CAST} == {one.name for one in fields(Request)}
+    assert {*REQUEST_NAMES, *NOT_IN_CAST} == {one.name for one in option_fields(Request)}
     assert set(MODEL_NAMES) == {one.name for one in fields(Models)}
     assert all(NOT_IN_CAST.values())
 
 
 @pytest.mark.parametrize("record", [Request, Picture])
 def test_numbers_and_names_beyond_an_option_are_refused_by_http_as_by_python(record: type) -> None:
-    for one in fields(record):
+    for one in option_fields(record):
         limits, choices = LIMITS.get(one.name) or one.metadata["limits"], one.metadata["choices"]
         if one.name in NOT_IN_CLIPS or not (limits or choices):
             continue
@@ -71,5 +71,8 @@ def test_numbers_and_names_beyond_an_option_are_refused_by_http_as_by_python(rec
 
 def test_defaults_over_http_are_those_of_python() -> None:
     assert ClipRequest().model_dump(exclude={"format", *(one.name for one in fields(Models))}) == {
-        one.name: one.default for record in (Request, Picture) for one in fields(record) if one.name not in NOT_IN_CLIPS
+        one.name: one.default
+        for record in (Request, Picture)
+        for one in option_fields(record)
+        if one.name not in NOT_IN_CLIPS
     }

@@ -9,7 +9,7 @@ import pytest
 
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import PhoneSequence
-from tts2face.gestures.elements import KINDS, GazeTarget, Listening, Nod, StyleSpan
+from tts2face.gestures.elements import KINDS, GazeTarget, ListeningSpan, Nod, StyleSpan
 from tts2face.lips.options import ExcludedToken
 from tts2face.models.palette import FEATURES
 from tts2face.request import Request
@@ -79,7 +79,7 @@ def test_nods_and_gaze_are_placed_replaced_and_removed() -> None:
     )  # fmt: skip
     assert project.timeline.nods == (Nod(1.02, 0.5),)
     assert project.timeline.gaze == (GazeTarget(5, -10, 0, 2),)
-    assert project.timeline.listens == (Listening(0, 1), Listening(1, 3))
+    assert project.timeline.listens == (ListeningSpan(0, 1), ListeningSpan(1, 3))
     removed = ({"kind": "remove_nod", "time": 1.03}, {"kind": "remove_gaze", "time": 0.5})
     empty = edited(project, *removed, *({"kind": "remove_listen", "time": time} for time in (0.5, 2))).timeline
     assert (empty.nods, empty.gaze, empty.listens) == ((), (), ())

@@ -38,7 +38,7 @@ from tts2face.interchange.subtitles.cues import Cue
 from tts2face.models.face_loading import load_face
 from tts2face.models.face_names import BALD
 from tts2face.models.palette import load_palette
-from tts2face.request import NATURAL, OWN_FACE, Request, parse_articulation
+from tts2face.request import OPTIONS, OWN_FACE, Request
 from tts2face.session.catalogue import identities
 from tts2face.session.named_models import Models
 from tts2face.sound.voice_pool import (
@@ -50,6 +50,7 @@ from tts2face.sound.voice_pool import (
     speaks,
     voice_names,
 )
+from tts2face.source import NATURAL, parse_articulation
 from tts2face.storage.files import present_name
 
 MODEL_NAMES = tuple(option.name for option in fields(Models))
@@ -61,7 +62,7 @@ NOT_IN_CAST: Mapping[str, str] = MappingProxyType({  # options, with the reason
     "fps": "one of all clips", "timeline": "its times are those of one clip",
     "expression": "its times are those of one clip", "lead": "the cues have their time",
 })  # fmt: skip
-REQUEST_NAMES = tuple(option.name for option in fields(Request) if option.name not in NOT_IN_CAST)
+REQUEST_NAMES = tuple(name for name in OPTIONS if name not in NOT_IN_CAST)
 PATH_NAMES = ("talker", "face", "palette", "voice", "dictionary")
 MAX_CAST_BYTES = 1_000_000
 

@@ -12,7 +12,7 @@ from lexicon.sentence_length import n_letters
 from tts2face.interchange.exports.table import batch_format
 from tts2face.interchange.subtitles.cues import Cue
 from tts2face.interchange.subtitles.reader import read_subtitles
-from tts2face.request import IDLE_LIMITS_S, Request
+from tts2face.request import Request
 from tts2face.serving.batch.cast import Cast, check_names
 from tts2face.serving.batch.cue_sentences import MAX_GAP_S, has_end_mark, sentence_groups, spoken_part
 from tts2face.serving.batch.export import check_faces
@@ -25,13 +25,12 @@ from tts2face.serving.batch.speakers import Speakers
 from tts2face.serving.batch.windows import Window, cue_lines, cue_windows, scenes
 from tts2face.session.named_models import Models
 from tts2face.session.prepared import prepare
+from tts2face.source import IDLE_LIMITS_S, ONLY_SPOKEN, SOURCE_OPTIONS
 from tts2face.types import SOUND_RATE, exact_rate, first_sample
 
 MAX_IDLE_S = 20.0  # of one segment of silence
 MARGIN_S = 0.5  # around a cue, for speech of a dubbing track that begins early or ends late; half of shorter gaps
-NOT_WHEN_SILENT = ("text", "audio", "audio_map", "voice", "rate", "volume", "plain_delivery", "lead", "dictionary",
-                   "language")  # fmt: skip
-NOT_WITH_AUDIO = ("voice", "rate", "plain_delivery", "lead")
+NOT_WHEN_SILENT = {*SOURCE_OPTIONS, "dictionary", "language"}
 PUNCTUATED_SHARE = 0.4  # of the cues of a file in capitals that end a sentence: then a missing end mark means something
 
 
@@ -46,6 +45,11 @@ class PlanBase:
     cast: Cast
     n_files: int
     lines: Lines
+
+    @property
+    def lead(self) -> float:
+        """Seconds before the first sound of a clip."""
+        return 0.0 if self.request.spoken is None else self.request.spoken.lead or 0.0
 
     @property
     def is_joined(self) -> bool:
@@ -148,7 +152,7 @@ class FilePlan:
         self._lines = [line for cue in cues for line in cue_lines(cue)]
         for _, group in groupby(self._lines, key=lambda line: round(line[0].begin_s * float(fps))):
             self.speakers.tell_apart(list(group))
-        margins = (MARGIN_S, MARGIN_S) if self.recordings.track else (self.base.request.lead or 0.0, 0.0)
+        margins = (MARGIN_S, MARGIN_S) if self.recordings.track else (self.base.lead, 0.0)
         before, after = (round(margin * fps) for margin in margins)
         windows = cue_windows(cues, fps, (before, after), is_spoken=self.speakers.is_spoken, rate_of=self._rate_of)
         self._windows = {(window.cue.number, window.part): window for window in windows}
@@ -160,7 +164,7 @@ class FilePlan:
 
     def _rate_of(self, cue: Cue, part: int) -> float:
         """Speaking rate of a line before it is fitted."""
-        return float(self.speakers.look(cue, part).request.get("rate", Request().rate))
+        return float(self.speakers.look(cue, part).request.get("rate", 1.0))
 
     def _moved(self, cue: Cue) -> Cue:
         """A cue at its time of the table; several speakers of one move with the first of them."""
@@ -290,7 +294,7 @@ class FilePlan:
             if found is None:
                 self._warn(window.cue.line, f"cue {window.cue.number} has no recording; it is silent")
                 return None
-            request = {name: value for name, value in request.items() if name not in NOT_WITH_AUDIO}
+            request = {name: value for name, value in request.items() if name not in ONLY_SPOKEN}
             request["audio"] = str(found)
         segment = self._segment(window, request, _slot(window, fills=fills), fills=fills)
         segment = self._fitted(segment, window, sentence, is_last=is_last)

@@ -1,6 +1,6 @@
 """Options of a batch besides those of speech and picture; a module without heavy imports."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +8,8 @@ from lexicon.errors import BackendError, InputError
 from lexicon.marked_text import RATE_LIMITS
 from lexicon.values.fields import check_fields
 from tts2face.interchange.exports.table import batch_format
-from tts2face.request import option
+from tts2face.option import option
+from tts2face.request import option_fields
 
 MOVIE_FORMATS = ("mp4", "webm", "mov", "none")
 CLIP_UNITS = ("cue", "scene", "file", "film")
@@ -87,10 +88,8 @@ class BatchOptions:
 
 def non_defaults(options: Any) -> dict[str, Any]:
     """Fields of an option dataclass that differ from their defaults, as JSON values."""
-    found = {one.name: getattr(options, one.name) for one in fields(options) if one.name != "text"}
-    defaults = {one.name: one.default for one in fields(options)}
     return {
-        name: str(value) if isinstance(value, Path) else value
-        for name, value in found.items()
-        if value != defaults[name]
+        option.name: str(value) if isinstance(value, Path) else value
+        for option in option_fields(type(options))
+        if option.name != "text" and (value := getattr(options, option.name)) != option.default
     }

@@ -25,7 +25,7 @@ from tts2face.picture.options import Picture
 from tts2face.picture.own_face import OwnFaceRenderer
 from tts2face.picture.renderer import FrameRenderer, MeshRenderer, before_studio
 from tts2face.processes.child import Call, Handler
-from tts2face.request import DRAWN_FACE, IDLE_LIMITS_S, Request
+from tts2face.request import DRAWN_FACE, Request
 from tts2face.serving.batch.fit import EASY_S, RELEASE_S, Fit, Limits, Room, fit_speech, without_overlap
 from tts2face.serving.batch.options import REPORT
 from tts2face.serving.batch.render_process import RENDER
@@ -44,6 +44,7 @@ from tts2face.session.joining import Excerpt, fade_out
 from tts2face.session.prepared import PreparedRequest, prepare
 from tts2face.session.session import Session
 from tts2face.sound.pauses import speech_onset
+from tts2face.source import IDLE_LIMITS_S, FromPhones, Idle, Recorded, Spoken
 from tts2face.storage.files import translate_disk_errors
 from tts2face.storage.temporary import Temporary
 from tts2face.types import (
@@ -64,14 +65,17 @@ ONSET_S = 60  # of a recording of a cue, within which its first sound lies
 @contextmanager
 def excerpt_of(segment: Segment, request: Request) -> Iterator[Request]:
     """The request of a segment, with its lead, or with its part of a recording as a temporary file."""
-    fps = exact_rate(request.fps)
-    if request.audio is None:
-        yield request if segment.lead_frames is None else replace(request, lead=float(segment.lead_frames / fps))
+    fps, source = exact_rate(request.fps), request.source
+    if isinstance(source, Spoken) and segment.lead_frames is not None:
+        yield replace(request, source=replace(source, lead=float(segment.lead_frames / fps)))
+        return
+    if not isinstance(source, Recorded):
+        yield request
         return
     if segment.audio_begin is None and segment.lead_frames is None:
         yield request
         return
-    track = open_track(request.audio)
+    track = open_track(source.audio)
     begin, end = segment.audio_begin, segment.audio_end
     if begin is None:
         heard = Waveform(track.read(0, min(track.n_samples, ONSET_S * SOUND_RATE)) / np.float32(32768), SOUND_RATE)
@@ -81,9 +85,9 @@ def excerpt_of(segment: Segment, request: Request) -> Iterator[Request]:
             yield request
             return
     with TemporaryDirectory(prefix="tts2face-") as folder:
-        path = Path(folder) / f"{request.audio.stem}.wav"
+        path = Path(folder) / f"{source.audio.stem}.wav"
         track.write_excerpt(path, begin, end)
-        yield replace(request, audio=path)
+        yield replace(request, source=replace(source, audio=path))
 
 
 def fit_recording(session: Session, request: Request, segment: Segment) -> tuple[Request, float, list[str]]:
@@ -102,10 +106,10 @@ def fit_recording(session: Session, request: Request, segment: Segment) -> tuple
     except DataError as wrong:
         if segment.audio_begin is None:
             raise
-        if request.text.strip():
+        if request.source.text:
             return _without_words(session, request, segment)
         seconds = segment.window_frames / float(exact_rate(request.fps))
-        idle = replace(request, audio=None, idle=max(seconds, IDLE_LIMITS_S[0]))
+        idle = replace(request, source=Idle(max(seconds, IDLE_LIMITS_S[0])))
         return idle, 0.0, [f"the recording has no speech here ({_reason(wrong)})"]
     found = [f"{' '.join(one.words)!r}" for piece in pieces for one in piece.mismatches]
     if found and segment.audio_begin is not None:
@@ -115,10 +119,12 @@ def fit_recording(session: Session, request: Request, segment: Segment) -> tuple
 
 
 def _without_words(session: Session, request: Request, segment: Segment) -> tuple[Request, float, list[str]]:
-    words = request.text
-    wordless, seconds, warnings = fit_recording(session, replace(request, text=""), segment)
-    if wordless.idle is None:
-        warnings = [f"the recording contains other words than {words[:40]!r}; lips follow its sound", *warnings]
+    source = request.source
+    assert isinstance(source, Recorded)
+    wordless = replace(request, source=replace(source, lips=FromPhones("", source.lips.articulation)))
+    wordless, seconds, warnings = fit_recording(session, wordless, segment)
+    if not isinstance(wordless.source, Idle):
+        warnings = [f"the recording contains other words than {source.text[:40]!r}; lips follow its sound", *warnings]
     return wordless, seconds, warnings
 
 
@@ -174,10 +180,11 @@ def _add_overlap(
     """Append the sound of a span after a segment's frames, whose last clip is given; a track shows rest with it."""
     if span[0] >= span[1]:
         return
-    if fitted.request.audio is None:
+    source = fitted.request.source
+    if not isinstance(source, Recorded):
         whole = concatenate_clips([piece.clip for piece in session.stream_speech(fitted)]).speech.waveform
     else:
-        whole = read_sound(fitted.request.audio, last.speech.waveform.rate)
+        whole = read_sound(source.audio, last.speech.waveform.rate)
     sound = whole.part(*(round(seconds * whole.rate) for seconds in span))
     if not len(sound.samples):
         return
@@ -201,7 +208,8 @@ def _write_file(session: Session, segment: Segment, out: Path) -> SegmentResult:
                 seconds += chunk.seconds
         temporary.replace(out)
     fps = float(exact_rate(request.fps))
-    return SegmentResult(frame_count(max(seconds, 1e-3), fps), fps, request.rate, round(seconds, 4))
+    rate = 1.0 if request.spoken is None else request.spoken.rate
+    return SegmentResult(frame_count(max(seconds, 1e-3), fps), fps, rate, round(seconds, 4))
 
 
 def _writer(
@@ -221,13 +229,15 @@ def _writer(
 
 def fit_segment(session: Session, request: Request, segment: Segment) -> tuple[PreparedRequest, SegmentResult]:
     """The request with its fitted text and rate, and the length of the segment; errors as `SegmentRenderer.render`."""
-    if request.idle is not None:
+    source = request.source
+    if isinstance(source, Idle):
         n_frames = segment.slot_frames or segment.window_frames
         return prepare(request), SegmentResult(n_frames, float(exact_rate(request.fps)))
-    if request.audio is not None:
+    if isinstance(source, Recorded):
         return _fit_recorded(session, request, segment)
-    speech = SegmentSpeech(session, request, segment)
-    fit = fit_speech(request.text, speech.limits, speech.ends)
+    assert isinstance(source, Spoken)
+    speech = SegmentSpeech(session, request, source, segment)
+    fit = fit_speech(source.text, speech.limits, speech.ends)
     prepared, kept, lost = speech.kept(fit)
     n_frames, warnings = _length(segment, kept, speech.fps)
     if lost:
@@ -244,7 +254,7 @@ def _fit_recorded(session: Session, request: Request, segment: Segment) -> tuple
     window_s = segment.window_frames / fps
     request, spoken, heard = fit_recording(session, request, segment)
     spoken = min(spoken, window_s) if segment.audio_begin is not None else spoken
-    fit = Fit(request.text, 1.0, spoken, max(0.0, spoken - window_s))
+    fit = Fit(request.source.text, 1.0, spoken, max(0.0, spoken - window_s))
     n_frames, warnings = _length(segment, fit, fps)
     late = max(0.0, spoken - n_frames / fps)
     cut = max(0.0, late - segment.max_overlap)
@@ -293,10 +303,11 @@ def _why(segment: Segment) -> str:
 class SegmentSpeech:
     """The words of a segment as a voice speaks them, with those of the whole sentence if it runs over several cues."""
 
-    def __init__(self, session: Session, request: Request, segment: Segment) -> None:
+    def __init__(self, session: Session, request: Request, spoken: Spoken, segment: Segment) -> None:
         self.fps = float(exact_rate(request.fps))
-        self._session, self._request, self._segment = session, request, segment
-        own = Part(n_letters(request.text), segment.window_frames, segment.slot_frames, segment.lead_frames or 0)
+        self._session, self._segment = session, segment
+        self._request, self._spoken = request, spoken
+        own = Part(n_letters(spoken.text), segment.window_frames, segment.slot_frames, segment.lead_frames or 0)
         self._parts = segment.parts or (own,)
 
     @property
@@ -315,47 +326,47 @@ class SegmentSpeech:
             )
             for at, part in enumerate(self._parts)
         )
-        rates = self._request.rate, segment.min_rate, segment.max_rate
+        rates = self._spoken.rate, segment.min_rate, segment.max_rate
         return Limits(rooms, *rates, segment.overflow, segment.part)
 
     def ends(self, text: str, rate: float) -> list[float]:
         """Ends of the parts of a text at a rate, in seconds of their segments."""
-        request = replace(self._request, text=text, rate=rate)
-        return [self._session.measure_speech(self._prepared(request, at)).end for at in range(len(self._parts))]
+        spoken = replace(self._spoken, text=text, rate=rate)
+        return [self._session.measure_speech(self._prepared(spoken, at)).end for at in range(len(self._parts))]
 
     def kept(self, fit: Fit) -> tuple[PreparedRequest, Fit, str]:
         """The fitted request, without the last words that would sound on too long; its fit, and these words."""
-        request = replace(self._request, text=fit.text, rate=fit.rate)
+        spoken = replace(self._spoken, text=fit.text, rate=fit.rate)
         room, words = self.limits.rooms[self._segment.part], self._own_words()
 
         def end_of(n_words: int) -> float:
-            return self._session.measure_speech(self._prepared(request, self._segment.part, words[:n_words])).end
+            return self._session.measure_speech(self._prepared(spoken, self._segment.part, words[:n_words])).end
 
         if not self._segment.fills_slot or len(words) < 2:
-            return self._prepared(request, self._segment.part), fit, ""
+            return self._prepared(spoken, self._segment.part), fit, ""
         n_kept = without_overlap(fit, len(words), end_of, room)
         if n_kept == len(words):
-            return self._prepared(request, self._segment.part), fit, ""
+            return self._prepared(spoken, self._segment.part), fit, ""
         end = end_of(n_kept)
         late, overlap = room.excess(end)
         shorter = replace(fit, speech_s=end, overflow_s=late, overlap_s=overlap)
-        return self._prepared(request, self._segment.part, words[:n_kept]), shorter, " ".join(words[n_kept:])
+        return self._prepared(spoken, self._segment.part, words[:n_kept]), shorter, " ".join(words[n_kept:])
 
     def _own_words(self) -> list[str]:
         first = sum(part.n_letters for part in self._parts[: self._segment.part])
-        text, own = self._request.text, self._parts[self._segment.part]
+        text, own = self._spoken.text, self._parts[self._segment.part]
         begin, end = (len(text_prefix(text, n)) for n in (first, first + own.n_letters))
         return text[begin:end].split()
 
-    def _prepared(self, request: Request, at: int, words: Sequence[str] | None = None) -> PreparedRequest:
+    def _prepared(self, spoken: Spoken, at: int, words: Sequence[str] | None = None) -> PreparedRequest:
         """The request of a part, of which only the first words may be kept."""
         if words is None and not self._segment.parts:
-            return prepare(request)
+            return prepare(replace(self._request, source=spoken))
         part, first = self._parts[at], sum(one.n_letters for one in self._parts[:at])
         if self._segment.parts:
-            request = replace(request, lead=part.lead_frames / self.fps)
+            spoken = replace(spoken, lead=part.lead_frames / self.fps)
         last = first + (part.n_letters if words is None else sum(map(n_letters, words)))
-        return replace(prepare(request), excerpt=Excerpt(first, last))
+        return replace(prepare(replace(self._request, source=spoken)), excerpt=Excerpt(first, last))
 
 
 @lru_cache(maxsize=1)

@@ -7,7 +7,7 @@ from typing import Any
 from lexicon.errors import InputError
 from lexicon.languages import language_code
 from tts2face.interchange.subtitles.cues import Cue
-from tts2face.request import DRAWN_FACE, Request
+from tts2face.request import DRAWN_FACE
 from tts2face.serving.batch.cast import MODEL_NAMES, REQUEST_NAMES, Cast, Role, other_look
 from tts2face.serving.batch.lines import NO_SETTINGS, Lines, LineSettings
 from tts2face.session.named_models import Models
@@ -95,7 +95,7 @@ class Speakers:
         models, other = self._models(role), self._others.get((cue.number, part), 0)
         if other:
             models, request = other_look(models, request, other, keeps_face=self.keeps_face)
-        line, usual = self.settings(cue, part), float(request.get("rate", Request().rate))
+        line, usual = self.settings(cue, part), float(request.get("rate", 1.0))
         request |= {name: value for name, value in (("rate", line.rate), ("voice", line.voice)) if value is not None}
         return Look(models, request, None if role is None else self.cast.roles.index(role) + 1, other, usual)
 

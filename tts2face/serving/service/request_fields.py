@@ -5,16 +5,16 @@ from dataclasses import Field as Option
 from dataclasses import fields
 from pathlib import Path
 from types import MappingProxyType, NoneType
-from typing import Annotated, Any, Literal, get_args, get_type_hints
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from tts2face.picture.options import Picture
-from tts2face.request import Request
+from tts2face.request import Request, option_fields
 from tts2face.session.named_models import Models
 
 RECORDS = (Request, Models, Picture)
-OPTIONS = {one.name: one for record in RECORDS for one in fields(record)}
+OPTIONS = {one.name: one for record in RECORDS for one in option_fields(record)}
 MODEL_FIELDS, PICTURE_FIELDS = (frozenset(one.name for one in fields(record)) for record in (Models, Picture))
 # What differs over HTTP: names of uploads and of lists in place of paths and commands, and limits for everybody's sake.
 DESCRIPTIONS: Mapping[str, str] = MappingProxyType({
@@ -50,9 +50,9 @@ class StrictModel(BaseModel):
 def options_model(name: str, left_out: Mapping[str, str]) -> type[StrictModel]:
     """Model of all options of clips but those that are left out, each with the reason."""
     taken = {
-        one.name: _definition(one, kinds[one.name], None if record is Models else one.default)
-        for record, kinds in ((record, get_type_hints(record)) for record in RECORDS)
-        for one in fields(record)
+        one.name: _definition(one, one.type, None if record is Models else one.default)
+        for record in RECORDS
+        for one in option_fields(record)
         if one.name not in left_out
     }
     return create_model(name, __base__=StrictModel, **taken)  # type: ignore[call-overload, no-any-return]

@@ -20,7 +20,7 @@ from lexicon.values.fields import check_fields
 from lexicon.values.files import read_text
 from lexicon.values.json_text import LARGEST_JSON_BYTES, parse_json
 from lexicon.values.records import checked
-from tts2face.request import Request
+from tts2face.request import OPTIONS, Request
 from tts2face.serving.service.keys import ApiKey
 from tts2face.serving.service.messages import Work
 from tts2face.serving.service.state import ServiceState
@@ -30,6 +30,7 @@ from tts2face.serving.studio.requests import check_options, events_of, project_w
 from tts2face.session.named_models import Models
 from tts2face.session.project import Project
 from tts2face.session.project_file import parse_project, project_json
+from tts2face.source import Recorded, Spoken
 from tts2face.storage.files import translate_disk_errors, write_atomically
 
 KEPT, SETTINGS, RECORDING, TAKE = "kept", "settings", "recording", "take"
@@ -113,7 +114,9 @@ def reference_project(reference: Reference, project: Project) -> Project:
         return reference.project
     if reference.is_recorded:
         kept = project.request
-        return Project(request=Request(audio=kept.audio, fps=kept.fps, gestures=kept.gestures), models=project.models)
+        source = Recorded(kept.source.audio) if isinstance(kept.source, Recorded) else Spoken("")
+        request = Request(source=source, fps=kept.fps, gestures=kept.gestures)
+        return Project(request=request, models=project.models)
     options = dict(reference.request)
     gestures = options.get("gestures", project.request.gestures)
     if gestures == "none":
@@ -148,7 +151,7 @@ def parse_reference(content: Any, folder: Path) -> Reference:
 def _check_settings(request: Mapping[str, Any], models: Mapping[str, Any]) -> None:
     if not request and not models:
         raise InputError("a comparison with other settings needs at least one; give request or models")
-    known = {one.name for one in fields(Request)} - NOT_SETTINGS
+    known = OPTIONS.keys() - NOT_SETTINGS
     for name in request:
         if name not in known:
             raise InputError(f"a comparison cannot change {name[:40]!r} of the request; choose one of {sorted(known)}")

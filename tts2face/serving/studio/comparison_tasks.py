@@ -18,6 +18,7 @@ from tts2face.serving.studio.tasks import digest_of, read_project
 from tts2face.session.animated_face import AnimatedFace, FaceMotion
 from tts2face.session.comparison import MotionPart, compare_motion, map_channels
 from tts2face.session.project import Project
+from tts2face.source import Recorded
 from tts2face.types import HEAD_CHANNELS, Chunk, Trajectory
 from tts2face.video.take import read_livelink
 
@@ -41,7 +42,7 @@ def recorded_motion(session: "Session", work: Work, _: Inputs) -> Iterator[Event
     the beginning of the project's sound.
     """
     project = read_project(work)
-    if project.request.audio is None:
+    if not isinstance(project.request.source, Recorded):
         raise InputError(
             "a recording is compared with a project that is made from it; import its sound with its words first"
         )

@@ -18,7 +18,7 @@ from tts2face.gestures.elements import KINDS, ElementKind, Nod, StyleSpan, check
 from tts2face.gestures.timeline import Timeline, expand_feature
 from tts2face.lips.options import ExcludedToken
 from tts2face.picture.options import Picture
-from tts2face.request import Request
+from tts2face.request import Request, option_fields
 from tts2face.session.named_models import Models
 from tts2face.session.prepared import SentenceEdges
 from tts2face.session.project import Project
@@ -185,7 +185,7 @@ def _picture(project: Project, given: Edit, _: Sentences) -> Project:
 
 
 def _with_options(options: Any, given: Edit, kind: type) -> Any:
-    known = [one.name for one in fields(kind)]
+    known = [field.name for field in option_fields(kind)]
     for name in given:
         if name not in known:
             raise InputError(f"there is no option {str(name)[:40]!r}; choose {', '.join(known)}")

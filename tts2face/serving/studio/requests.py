@@ -87,7 +87,12 @@ async def project_work(
     except RefusedError as refused:
         raise InputError(refused.message) from refused
     form = str(more.pop("format", ""))
-    request = {"text": project.request.text, "project": project_json(project, folder), "folder": str(folder), **more}
+    request = {
+        "text": project.request.source.text,
+        "project": project_json(project, folder),
+        "folder": str(folder),
+        **more,
+    }
     return Work(kind, models, request, format=form, owner=key.name, affinity=folder.name)
 
 

@@ -110,7 +110,7 @@ class ComparePanel:
     async def _offer_recordings(self) -> None:
         with shown_errors():
             found = await self._page.workspace.comparison.recordings()
-            said = _words(self._page.workspace.project.request.text)
+            said = _words(self._page.workspace.project.request.source.text)
             found.sort(key=lambda one: _words(one[1]) != said)  # those with the project's words first
             with self._details:
                 names = {name: f"{name} - {words}" if words else name for name, words in found}

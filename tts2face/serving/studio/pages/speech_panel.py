@@ -9,6 +9,7 @@ from tts2face.request import GESTURES, OWN_FACE
 from tts2face.serving.studio.pages.frame import OpenPage, heading, languages, looks, models, voices
 from tts2face.serving.studio.pages.photo_dialog import TITLE, PhotoDialog, may_make_faces
 from tts2face.serving.work.resource_check import FACE, PALETTE, TALKER
+from tts2face.source import Recorded
 
 LOOKS = {"identity": "Identity", "hair": "Hair", "hair_color": "Hair colour"}  # of a face, with their labels
 TYPING_MS = 350  # of rest after which a text is spoken
@@ -25,9 +26,9 @@ class SpeechPanel:
         """Build the panel."""
         page, project = self._page, self._page.workspace.project
         library, key = page.studio.state.library, page.workspace.key
-        is_recording = project.request.audio is not None
+        is_recording = isinstance(project.request.source, Recorded)
         heading(2, "Speech")
-        text = ui.textarea("Words of the recording" if is_recording else "Text", value=project.request.text)
+        text = ui.textarea("Words of the recording" if is_recording else "Text", value=project.request.source.text)
         text.props(f'outlined autogrow debounce={TYPING_MS} input-style="max-height: 40vh"')
         text.on_value_change(lambda event: self._change("request", "text", event.value or ""))
         text.on(
