@@ -53,7 +53,7 @@ def _check_of(kind: Any) -> Check:
         return _check_of(inner[0])
     if origin is UnionType:  # X | None, or several records
         first = _check_of(inner[0])
-        others: tuple[type, ...] = tuple(kind for kind in inner if kind is NoneType or is_dataclass(kind))
+        others = tuple(kind for kind in inner if isinstance(kind, type) and (kind is NoneType or is_dataclass(kind)))
         return lambda value, place: value if isinstance(value, others) else first(value, place)
     if origin in (tuple, frozenset):
         return _check_of_list(origin, inner)
