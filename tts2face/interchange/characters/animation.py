@@ -23,7 +23,8 @@ from tts2face.interchange.characters.character import (
 from tts2face.interchange.characters.head_mesh import mapped_targets, source_weights
 from tts2face.interchange.characters.readers import read_gltf_character
 from tts2face.interchange.characters.shapes import ShapeMapping
-from tts2face.interchange.gltf.reader import GltfFile, NodeTree, read_gltf, read_nodes
+from tts2face.interchange.gltf.nodes import NodeTree, read_nodes
+from tts2face.interchange.gltf.reader import GltfFile, read_gltf
 from tts2face.interchange.gltf.writer import GlbWriter
 from tts2face.models.face import Face
 from tts2face.numeric.arrays import continuous_quaternions, matrix_quaternion

@@ -21,8 +21,9 @@ from tts2face.interchange.characters.character import (
     affine,
     linear,
 )
-from tts2face.interchange.gltf.container import Fields
-from tts2face.interchange.gltf.reader import DRACO, GltfFile, NodeTree
+from tts2face.interchange.gltf.fields import Fields
+from tts2face.interchange.gltf.nodes import NodeTree
+from tts2face.interchange.gltf.reader import DRACO, GltfFile
 from tts2face.storage.media_files import MAX_DECODING_BYTES, decoding_bytes
 
 TRIANGLES, STRIP, FAN = 4, 5, 6

@@ -18,8 +18,9 @@ from lexicon.values.files import read_text
 from tts2face.interchange.characters.character import BLEND, Character, Material, MaterialPiece, MorphTarget
 from tts2face.interchange.characters.landmarks import MAX_COORDINATE
 from tts2face.interchange.characters.meshes import MaterialReader, decode_image, read_pieces, target_names
-from tts2face.interchange.gltf.container import Fields
-from tts2face.interchange.gltf.reader import GltfFile, find_bones, read_bytes, read_gltf, read_nodes
+from tts2face.interchange.gltf.fields import Fields
+from tts2face.interchange.gltf.nodes import find_bones, read_nodes
+from tts2face.interchange.gltf.reader import GltfFile, read_bytes, read_gltf
 from tts2face.picture.kernels.tables import linear_light
 
 MAX_LICENCE = 500  # characters

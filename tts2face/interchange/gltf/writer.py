@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tts2face.interchange.gltf.container import COMPONENTS, TYPES, GltfBuffer
-from tts2face.interchange.gltf.reader import MESHOPT, GltfFile, local_matrix
+from tts2face.interchange.gltf.nodes import local_matrix
+from tts2face.interchange.gltf.reader import MESHOPT, GltfFile
 from tts2face.numeric.arrays import matrix_quaternion
 
 FloatArray = NDArray[np.float64]
