@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -166,6 +167,37 @@ def test_garbage_is_collected_again_after_a_compilation() -> None:
     assert not gc.isenabled()
     compiler.COMPILATIONS.on_end(None)
     assert gc.isenabled()
+
+
+class Span(NamedTuple):
+    """Arguments with names, one in another."""
+
+    first: np.ndarray
+    inner: tuple[int, float]
+    last: int
+
+
+@kernel
+def read_span(span: Span, shift: int) -> float:
+    return span.first[span.last] + span.inner[0] * span.inner[1] + shift
+
+
+def test_arguments_may_have_names():
+    span = Span(np.arange(4.0), (3, 0.5), 2)
+    assert read_span(span, 10) == 2 + 1.5 + 10
+    assert read_span(span._replace(last=3), 0) == 3 + 1.5
+
+
+def test_code_is_compiled_again_where_named_arguments_change_their_order(monkeypatch):
+    names = dict(read_span.py_func.__globals__)
+    path = read_span.py_func.__code__.co_filename
+    monkeypatch.setattr(compilation, "_stamps", {})
+    before = compilation._stamp(path, names)
+    compilation._stamps.clear()
+    assert compilation._stamp(path, names) == before
+    compilation._stamps.clear()
+    names["Span"] = NamedTuple("Span", [("last", int), ("inner", tuple), ("first", np.ndarray)])
+    assert compilation._stamp(path, names) != before
 
 
 CALLER = """

@@ -90,7 +90,8 @@ class Compiled(NamedTuple):
 class Kernel(Generic[Arguments, Result]):
     """A function that is compiled at its first call with arguments of new types, and runs without the GIL.
 
-    Arguments are arrays, numbers, and tuples of them; results are numbers, a tuple of numbers, or None.
+    Arguments are arrays, numbers, and tuples of them, with names of their fields or without; results are numbers, a
+    tuple of numbers, or None.
     """
 
     def __init__(
@@ -170,7 +171,7 @@ def _flatten(values: Sequence[Any], flat: list[Any], seen: list[Any]) -> None:
         elif kind in SCALARS:
             flat.append(value)
             seen.append(kind)
-        elif kind is tuple:
+        elif isinstance(value, tuple):  # or a NamedTuple
             seen.append(-1 - len(value))
             _flatten(value, flat, seen)
         elif isinstance(value, np.ndarray):
@@ -192,7 +193,7 @@ def _describe(values: Sequence[Any]) -> Iterator[int]:
         elif isinstance(value, np.number | np.bool) and type(value) not in SCALARS:
             is_same = value.dtype.itemsize == 8 and value.dtype.kind in "if"  # as Python's own
             yield SCALARS[type(value.item())] if is_same or value.dtype.kind == "b" else -4 - value.dtype.num
-        elif type(value) is tuple:
+        elif isinstance(value, tuple):
             yield -64 - len(value)
             yield from _describe(value)
         else:
@@ -269,6 +270,8 @@ def _stamp(path: str, names: dict[str, Any]) -> str:
                 found.update(_stamp(other, value.py_func.__globals__).encode() if other != path else b"")
             elif isinstance(value, np.ndarray):
                 found.update(name.encode() + value.tobytes())
+            elif isinstance(value, type) and issubclass(value, tuple):
+                found.update(f"{name}={getattr(value, '_fields', ())!r};".encode())  # of a NamedTuple
             elif isinstance(value, bool | int | float | str | tuple) and not name.startswith("__"):
                 found.update(f"{name}={value!r};".encode())
         _stamps[path] = found.hexdigest()[:16]
