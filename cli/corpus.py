@@ -279,7 +279,7 @@ def audio_maps(  # noqa: PLR0913 - one parameter a flag
 @corpus.command
 def show(talker: TalkerName, /) -> None:
     """Print the contents of a talker: utterances, phones, modes, provenance."""
-    from corpus_tools.build_talker import describe
+    from corpus_tools.describe_talker import describe
     from tts2face.models.talker import load_talker
 
     print(describe(load_talker(talker)).text())  # noqa: T201 - the result
@@ -297,7 +297,7 @@ def pool(
     """Train a talker's networks again, together with lip tracks of another speaker of free speech."""
     check_suffix(out, "talker")
     refuse_overwriting({"--out": out}, {"TRACKS": tracks})
-    from corpus_tools.clone_talker import pool_talker
+    from corpus_tools.pool_talker import pool_talker
     from corpus_tools.run_options import ignore_stage
 
     with stage_bar() as stages:

@@ -21,11 +21,11 @@ from lexicon.errors import InputError
 from tts2face.storage.files import check_file_name, refuse_overwriting
 
 if TYPE_CHECKING:
+    from corpus_tools.measures.splits import Split
     from corpus_tools.recordings.observation import Observation
     from corpus_tools.run_options import RunOptions
     from corpus_tools.studies.evaluation.evaluate import SplitResult
     from corpus_tools.studies.evaluation.people import PeopleEvaluation
-    from corpus_tools.studies.evaluation.splits import Split
     from corpus_tools.studies.evaluation.tables import Evaluation
     from tts2face.sound.voice import Voice
 
@@ -238,7 +238,7 @@ def _load_default_voice() -> "Voice":
 
 
 def _observe_other_talker(recordings: Path, run_options: "RunOptions") -> "tuple[Observation, ...]":
-    from corpus_tools.studies.evaluation.tracks import LIVELINK_SUFFIX, observe_livelink
+    from corpus_tools.studies.evaluation.livelink import LIVELINK_SUFFIX, observe_livelink
 
     return (
         observe_livelink(recordings, run_options)
@@ -248,7 +248,7 @@ def _observe_other_talker(recordings: Path, run_options: "RunOptions") -> "tuple
 
 
 def _make_splits(split_flags: SplitFlags, run_options: "RunOptions") -> "tuple[Split, ...]":
-    from corpus_tools.studies.evaluation.splits import split_by_words, split_into_folds, split_randomly
+    from corpus_tools.measures.splits import split_by_words, split_into_folds, split_randomly
 
     if split_flags.train is not None and split_flags.test is not None:
         return (
@@ -299,11 +299,12 @@ def run_learning_curve(
 ) -> None:  # fmt: skip
     """Measure a learning curve on the recordings; print its tables, and write them or a picture to `out`."""
     folder = split_flags.curve_recordings(comparison)
+    from corpus_tools.measures.splits import split_randomly
     from corpus_tools.run_options import RunOptions, ignore_stage
     from corpus_tools.studies.evaluation.curve_page import WRITERS
     from corpus_tools.studies.evaluation.curve_tables import curve_tables
-    from corpus_tools.studies.evaluation.learning_curve import DEFAULT_AMOUNTS_S, measure_learning_curve, read_material
-    from corpus_tools.studies.evaluation.splits import split_randomly
+    from corpus_tools.studies.evaluation.learning_curve import DEFAULT_AMOUNTS_S, measure_learning_curve
+    from corpus_tools.studies.evaluation.material import read_material
     from corpus_tools.studies.pages import report_writer
     from corpus_tools.training.adapt_talker import Base
     from corpus_tools.training.choose_adaptation import NO_BASE
@@ -352,8 +353,10 @@ def run_people_evaluation(talker: str, people: list[Path], comparison: Compariso
     if len({folder.resolve() for folder in people}) < len(people):
         raise InputError("--people names a folder twice; remove one")
     from corpus_tools.studies.evaluation.heard import find_sounds, with_hand_edges
-    from corpus_tools.studies.evaluation.people import difference_table, evaluate_people, people_table, phone_table
-    from corpus_tools.studies.evaluation.tracks import read_person, read_tracks
+    from corpus_tools.studies.evaluation.people import evaluate_people
+    from corpus_tools.studies.evaluation.people_tables import difference_table, people_table, phone_table
+    from corpus_tools.studies.evaluation.person_tracks import read_person
+    from corpus_tools.studies.evaluation.tracks import read_tracks
     from corpus_tools.training.train_talker import correct_pose
     from tts2face.models.talker import load_talker
 
@@ -375,7 +378,7 @@ def run_people_evaluation(talker: str, people: list[Path], comparison: Compariso
 
 
 def _write_people(out: Path, found: "PeopleEvaluation") -> None:
-    from corpus_tools.studies.evaluation.people import people_rows
+    from corpus_tools.studies.evaluation.people_tables import people_rows
     from tts2face.storage.files import write_atomically
 
     if out.suffix == ".json":

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.build_talker import PROVENANCE, PROVENANCE_FIELDS, read_provenance
 from corpus_tools.decomposition.basis import (
     NEUTRAL,
     ExpressionBasis,
@@ -37,6 +36,7 @@ from corpus_tools.decomposition.decompose import (
 from corpus_tools.decomposition.markers import read_marker_face, read_marker_set
 from corpus_tools.decomposition.recordings import MarkerOptions, read_recordings
 from corpus_tools.recordings.observe import Refusal
+from corpus_tools.recordings.provenance import PROVENANCE, PROVENANCE_FIELDS, read_provenance
 from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.training.train_talker import fit_pose_correction
 from lexicon.errors import DataError, InputError
@@ -72,7 +72,7 @@ class StyleSource:
     marker_options
         Options of marker files.
     provenance
-        JSON file as `corpus_tools.build_talker.read_provenance` reads it; ``provenance.json`` in the folder when None.
+        JSON file as `recordings.provenance.read_provenance` reads it; ``provenance.json`` in the folder when None.
     """
 
     recordings: Path

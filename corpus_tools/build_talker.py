@@ -1,22 +1,17 @@
-"""Build a talker file from a folder of recordings.
-
-Summary of a talker's contents.
-"""
+"""Build a talker file from a folder of recordings."""
 
 import math
 import shlex
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from corpus_tools.clone_talker import appearance_from_lips
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import QualityWarning, Refusal, check_any_kept, observe
+from corpus_tools.recordings.provenance import PROVENANCE, PROVENANCE_FIELDS, read_provenance
 from corpus_tools.recordings.video import CachedTracker
 from corpus_tools.run_options import RunOptions, StageCallback, ignore_stage
 from corpus_tools.studies.plots import load_matplotlib
@@ -37,16 +32,12 @@ from corpus_tools.training.pooling.speech import base_speech
 from corpus_tools.training.score_map import add_score_map
 from corpus_tools.training.train_talker import correct_pose, learn_talker
 from lexicon.errors import DataError, InputError
-from lexicon.sequence import SILENCE
-from lexicon.values.json_text import read_json
 from tts2face.models.talker import NOT_STATED, Talker, load_talker, write_talker
 from tts2face.storage.files import write_atomically
 from tts2face.types import Progress
 from tts2face.video.take import BlendshapeReader
 from tts2face.video.tracking import find_bundle
 
-PROVENANCE = "provenance.json"  # in the folder of recordings: their sources and licence
-PROVENANCE_FIELDS = ("name", "language", "sources", "licence", "attribution")
 READING_STAGE = "reading recordings"  # name of the first stage
 NETWORK_STAGE = "learning phone network"
 N_SHOWN = 40  # recordings that show how the mouth of the person lies beside that of a base
@@ -259,101 +250,8 @@ def _reading_metadata(kept: Sequence[Observation]) -> dict[str, Any]:
     }
 
 
-def read_provenance(path: Path, *, must_exist: bool) -> Mapping[str, Any]:
-    """Provenance of recordings: a JSON object with any of name, language, sources, licence and attribution.
-
-    Raises
-    ------
-    DataError
-        The file is missing but must exist, is not a JSON object, or has other fields.
-    """
-    if not must_exist and not path.is_file():
-        return {}
-    try:
-        stated = read_json(path)
-    except OSError as refused:
-        raise DataError(f"{path} cannot be read ({refused.strerror}); check the path") from refused
-    if not isinstance(stated, dict) or not set(stated) <= set(PROVENANCE_FIELDS):
-        raise DataError(f"{path} must be a JSON object with fields out of {', '.join(PROVENANCE_FIELDS)}")
-    return stated
-
-
 def _command_line(recordings: Path, out: Path, name: str | None, provenance: Path | None) -> str:
     words = ["tts2face", "corpus", "build", recordings.name]
     words += ["--name", name] if name else []
     words += ["--provenance", provenance.name] if provenance else []
     return shlex.join([*words, "--out", out.name])
-
-
-PHONES_PER_LINE = 10  # phones on a line
-COUNTED_KEYS = frozenset({"refused", "phones_recognised"})  # in the metadata; shown as counts
-
-
-@dataclass(frozen=True, slots=True)
-class Description:
-    """Summary of a talker.
-
-    ``phones`` are phones with their counts, most frequent first; ``n_triphones`` the number of different triphones;
-    ``variances`` those of the modes in mm^2, of which the first ``n_speech`` belong to the mouth.
-    """
-
-    n_utterances: int
-    minutes: float
-    fps: float
-    phones: tuple[tuple[str, int], ...]
-    n_triphones: int
-    n_speech: int
-    variances: tuple[float, ...]
-    metadata: Mapping[str, Any]
-
-    def text(self) -> str:
-        """The summary as text."""
-        about = [f"{key + ':':<13}{self.metadata[key]}" for key in self.metadata if key not in COUNTED_KEYS]
-        recognised = self.metadata.get("phones_recognised", [])
-        counts = [f"{phone} {count}" for phone, count in self.phones]
-        rows = ["  " + "  ".join(counts[at : at + PHONES_PER_LINE]) for at in range(0, len(counts), PHONES_PER_LINE)]
-        refused = self.metadata.get("refused", [])
-        return "\n".join(
-            [
-                *about,
-                f"utterances:  {self.n_utterances} ({self.minutes:.1f} minutes at {self.fps:g} frames/s)",
-                *([f"recognised:  {len(recognised)} utterances without a transcript"] if recognised else []),
-                f"refused:     {len(refused)}",
-                *(f"  {name}: {reason}" for name, reason in refused),
-                f"triphones:   {self.n_triphones}",
-                f"phones:      {len(self.phones)} different, {sum(count for _, count in self.phones)} spoken",
-                *rows,
-                f"mouth modes: {_variance_text(self.variances[: self.n_speech])}",
-                f"other modes: {_variance_text(self.variances[self.n_speech :])}",
-            ]
-        )
-
-
-def describe(talker: Talker) -> Description:
-    """Summarise a talker."""
-    phones: Counter[str] = Counter()
-    triphones: set[tuple[str, ...]] = set()
-    for utterance in talker.utterances:
-        labels = (SILENCE, *utterance.phones.phones, SILENCE)
-        phones.update(label for label in labels if label != SILENCE)
-        triphones.update(triple for triple in zip(labels, labels[1:], labels[2:], strict=False) if triple[1] != SILENCE)
-    n_frames = sum(len(utterance.shape) for utterance in talker.utterances)
-    return Description(
-        len(talker.utterances),
-        n_frames / talker.fps / 60.0,
-        talker.fps,
-        tuple(sorted(phones.items(), key=lambda item: (-item[1], item[0]))),
-        len(triphones),
-        talker.model.n_speech,
-        tuple(float(variance) for variance in np.asarray(talker.model.spread, np.float64) ** 2),
-        dict(talker.metadata),
-    )
-
-
-def _variance_text(variances: tuple[float, ...]) -> str:
-    """Number of modes and the cumulative share of their variance."""
-    if not variances:
-        return "0"
-    total = np.cumsum(variances) / (sum(variances) or 1.0)
-    marks = [n for n in (1, 2, 4, 8, 16) if n < len(variances)]
-    return f"{len(variances)}; of their variance " + ", ".join(f"{total[n - 1]:.1%} in the first {n}" for n in marks)

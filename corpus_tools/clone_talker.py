@@ -1,7 +1,4 @@
-"""A talker with one person's face model and another's recorded speech.
-
-A talker whose networks are trained again on its recordings pooled with lip tracks of another speaker.
-"""
+"""A talker with one person's face model and another's recorded speech."""
 
 import shlex
 from collections.abc import Callable, Mapping
@@ -13,70 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.appearance.frame import rasterise_triangles
-from corpus_tools.run_options import StageCallback, ignore_stage
-from corpus_tools.training.phone_network import MIN_FRAMES, add_phone_network
-from corpus_tools.training.pooling.lip_tracks import read_lip_tracks
-from corpus_tools.training.pooling.speech import align_lip_tracks
+from corpus_tools.appearance.transfer import build_appearance_transfer
 from lexicon.errors import InputError
 from tts2face.face.own_face import fit_appearance_regression
-from tts2face.lips.cloning import MAX_STANDARD_DEVIATIONS, ParameterTransfer, build_parameter_transfer, extend_talker
-from tts2face.models.appearance import Appearance, TextureModel, nearest_pixels
+from tts2face.lips.cloning import ParameterTransfer, build_parameter_transfer, extend_talker
 from tts2face.models.talker import NOT_STATED, Talker, Utterance, load_talker, speech_channels, write_talker
-from tts2face.picture.own_face import sample_triangles
 from tts2face.types import Trajectory
-
-Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class AppearanceTransfer:
-    """Linear map of appearance parameters: ``relation`` (A, B) from source to target; ``limits`` (A,) of the target."""
-
-    relation: Floats
-    limits: Floats
-
-    def parameters(self, parameters: NDArray[np.floating], *, gain: float = 1.0) -> NDArray[np.float32]:
-        """(T, A) appearance parameters of the target for (T, B) of the source."""
-        wanted = gain * (parameters.astype(np.float64) @ self.relation.T)
-        return np.clip(wanted, -self.limits, self.limits).astype(np.float32)
-
-
-def build_appearance_transfer(source: Appearance, target: Appearance) -> AppearanceTransfer:
-    """Map of appearance parameters from one talker to another, face to face and mouth to mouth.
-
-    Notes
-    -----
-    The source's basis textures are warped piecewise to the target's reference shape, and ``relation`` contains their
-    inner products with the target's (Theobald et al. 2007, eq. 5). Textures of all talkers are sRGB.
-    """
-    blocks = [
-        _basis_products(source.face, target.face),
-        _basis_products(source.mouth, target.mouth),
-    ]
-    relation = np.zeros((sum(len(block) for block in blocks), sum(block.shape[1] for block in blocks)))
-    (n_target, n_source), (face, mouth) = blocks[0].shape, blocks
-    relation[:n_target, :n_source] = face
-    relation[n_target:, n_source:] = mouth
-    return AppearanceTransfer(relation, MAX_STANDARD_DEVIATIONS * target.spread.astype(np.float64))
-
-
-def _basis_products(source: TextureModel, target: TextureModel) -> Floats:
-    """(A, B) inner products of the target's basis textures with the source's, warped to the target's frame."""
-    owner, weights = rasterise_triangles(target.reference.astype(np.float64), target.triangles, target.size)
-    corners = target.triangles[owner[target.pixels]].astype(np.int32)
-    inside = weights[target.pixels].astype(np.float32)
-    fill = nearest_pixels(source)
-    width, height = source.size
-    own = target.basis.reshape(target.n_modes, -1).astype(np.float64)
-    warped = np.zeros((len(target.pixels), 3), np.float32)
-    relation = np.zeros((target.n_modes, source.n_modes))
-    for number, texture in enumerate(source.basis):
-        picture = np.ascontiguousarray(texture[fill].reshape(height, width, 3))
-        sample_triangles(picture, source.reference.astype(np.float64), corners, inside, warped)
-        relation[:, number] = own @ warped.ravel()
-    return relation
-
 
 CONTENT = (
     "motion only: one talker's recorded motion transferred to the shape model of another's face; no image, no sound"
@@ -85,6 +24,7 @@ CONTENT_WITH_PICTURES = (
     "one talker's recorded motion transferred to another's face, with pictures of that face by consent; no sound"
 )
 LICENCE_FIELDS = ("sources", "licence", "attribution")  # of both talkers; they apply to the clone
+AppearanceFunction = Callable[[Utterance, NDArray[np.float32]], NDArray[np.float32] | None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,9 +104,6 @@ def transfer_talker(source: Talker, target: Talker, *, gain: float = 1.0, append
     return ClonedTalker(talker, n_appended, at_limits, source.appearance is not None and target.appearance is None)
 
 
-AppearanceFunction = Callable[[Utterance, NDArray[np.float32]], NDArray[np.float32] | None]
-
-
 def _appearance_function(source: Talker, target: Talker, gain: float) -> AppearanceFunction:
     """Function from an utterance and its shape on the target to appearance parameters, or None without a model."""
     if target.appearance is None:
@@ -222,49 +159,3 @@ def _metadata(
 
 def _merge_statements(of_speech: str, of_face: str) -> str:
     return of_speech if of_speech == of_face else f"speech: {of_speech}; face: {of_face}"
-
-
-STAGES = ("aligning lip tracks", "learning phone networks")
-
-
-@dataclass(frozen=True, slots=True)
-class PooledTalker:
-    """Numbers of pooled recordings and their minutes of speech."""
-
-    n_tracks: int
-    minutes: float
-
-
-def pool_talker(
-    talker: str,
-    tracks: Path,
-    out: Path,
-    *,
-    source: str,
-    stages: StageCallback = ignore_stage,
-) -> PooledTalker:
-    """Write a talker with networks from its own recordings and the lip tracks of a folder.
-
-    Only the networks of the talker change. Their outputs for the other speaker are not stored.
-
-    Parameters
-    ----------
-    source
-        What the tracks are and under which terms, for the metadata.
-
-    Raises
-    ------
-    InputError
-        The talker or the tracks do not exist, the talker is too short, or the source is empty.
-    DataError
-        A track is damaged, or its phones do not fit into it.
-    """
-    if not source.strip():
-        raise InputError("the source of the tracks is empty; name the recordings and their licence")
-    learnt = load_talker(talker)
-    if sum(len(utterance.shape) for utterance in learnt.utterances) < MIN_FRAMES:
-        raise InputError(f"{talker} has less than {MIN_FRAMES} frames; its own recordings are too few for networks")
-    pooled = align_lip_tracks(read_lip_tracks(tracks), learnt, stages(STAGES[0]))
-    trained = add_phone_network(learnt, pooled, on_progress=stages(STAGES[1]))
-    write_talker(out, replace(trained, metadata={**learnt.metadata, "pooled": source}))
-    return PooledTalker(len(pooled), sum(float(one.is_used.sum()) / one.fps for one in pooled) / 60)

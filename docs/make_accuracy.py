@@ -11,13 +11,13 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from corpus_tools.measures.scores import FIGURES, Scores
+from corpus_tools.measures.splits import split_by_words, split_randomly
 from corpus_tools.recordings.observe import observe
 from corpus_tools.run_options import RunOptions
 from corpus_tools.studies.evaluation.evaluate import evaluate, evaluate_across_talkers
-from corpus_tools.studies.evaluation.scores import FIGURES, Scores
-from corpus_tools.studies.evaluation.splits import split_by_words, split_randomly
+from corpus_tools.studies.evaluation.livelink import observe_livelink
 from corpus_tools.studies.evaluation.tables import Evaluation
-from corpus_tools.studies.evaluation.tracks import observe_livelink
 from corpus_tools.training.pooling.lip_tracks import read_lip_tracks
 from tts2face.lips.options import METHOD_OPTIONS
 from tts2face.sound.voice_pool import load_voice

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from corpus_tools.decomposition.capture import FaceRecording, read_capture_sound
 from corpus_tools.decomposition.markers import DEFAULT_MARKER_TABLE, read_marker_recording, read_marker_set
+from corpus_tools.parallel import map_unordered
 from corpus_tools.recordings.folder import MANIFEST, VIDEO_SUFFIXES
 from corpus_tools.recordings.limits import (
     REFUSAL,
@@ -31,7 +32,7 @@ from corpus_tools.recordings.limits import (
 from corpus_tools.recordings.observe import Refusal
 from corpus_tools.recordings.sound import SOUND_RATE
 from corpus_tools.recordings.video import CachedTracker
-from corpus_tools.run_options import RunOptions, map_unordered
+from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
 from lexicon.values.fields import check_fields
 from lexicon.values.files import check_regular_file

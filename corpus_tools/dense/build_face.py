@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.build_talker import PROVENANCE, read_provenance
 from corpus_tools.dense.mesh_fit import (
     adapt_head,
     align_to_head,
@@ -22,6 +21,7 @@ from corpus_tools.dense.person_look import AS_SEEN, LookChoices, LookSampler, Pe
 from corpus_tools.dense.skin_colour import average_skin_colours, build_picture_fitter, remove_cast, skin_texture
 from corpus_tools.dense.texels import TrackedPictures, build_canvas, find_videos, resting_landmarks, track_videos
 from corpus_tools.dense.texture import paint_skin
+from corpus_tools.recordings.provenance import PROVENANCE, read_provenance
 from corpus_tools.recordings.video import CachedTracker
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import InputError

@@ -31,6 +31,7 @@ from tts2face.models.talker import ShapeModel, load_talker
 from tts2face.sound.features import intensity
 from tts2face.video.pose import PoseFreeLandmarks, head_angles, remove_pose, resample_to_grid, trim_and_fill
 
+TRACK_SUFFIX = ".npz"  # of a file of tracked landmarks in place of a video, without sound
 TIME_TOLERANCE_S = 1e-6  # seconds
 N_NEIGHBOUR_FRAMES = 2.0  # frames around a span that are used to interpolate those in it
 MIN_FRAMES = 2

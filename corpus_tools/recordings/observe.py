@@ -7,13 +7,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from corpus_tools.parallel import map_unordered
 from corpus_tools.recordings.folder import Recording, find_recordings, pronounce_recording
 from corpus_tools.recordings.limits import OUT_OF_SYNC, REFUSAL, UNUSABLE, WARNING, Finding, limit_findings
 from corpus_tools.recordings.observation import Observation, Timing, observe_recording
 from corpus_tools.recordings.sound import MAX_UTTERANCE_S, CachedAligner
 from corpus_tools.recordings.sync import corrected_timings, estimate_sync_by_video
 from corpus_tools.recordings.video import CachedTracker
-from corpus_tools.run_options import RunOptions, map_unordered
+from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
 from tts2face.types import Progress
 from tts2face.video.tracking import find_bundle

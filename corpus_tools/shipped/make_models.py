@@ -82,7 +82,7 @@ def make_phones(making: Making) -> None:
 def make_talker(making: Making) -> None:
     """The talker whose lips are the default, and the base of talkers with few recordings."""
     from corpus_tools.build_talker import build_talker
-    from corpus_tools.clone_talker import pool_talker
+    from corpus_tools.pool_talker import pool_talker
     from corpus_tools.training.choose_adaptation import NO_BASE
 
     path = making.out / f"{GRID}.talker"

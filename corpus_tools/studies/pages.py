@@ -15,8 +15,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.measures.reference import ReferenceUtterance
 from corpus_tools.studies.evaluation.evaluate import SplitResult
-from corpus_tools.studies.evaluation.reference import ReferenceUtterance
 from corpus_tools.studies.plots import load_matplotlib
 from lexicon.errors import DataError, InputError
 from tts2face.lips.retargeting import build_retargeter

@@ -66,9 +66,9 @@ def accuracy_report(model: str, name: str, on_progress: Progress) -> str:
     InputError
         The talker has too few recordings.
     """
+    from corpus_tools.measures.splits import split_randomly
     from corpus_tools.studies.evaluation.evaluate import evaluate
     from corpus_tools.studies.evaluation.page import evaluation_page
-    from corpus_tools.studies.evaluation.splits import split_randomly
 
     talker = load_talker(model)
     if len(talker.utterances) < LEAST_UTTERANCES:

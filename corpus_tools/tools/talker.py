@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from corpus_tools.build_talker import PROVENANCE, BuiltTalker, build_talker
+from corpus_tools.build_talker import BuiltTalker, build_talker
+from corpus_tools.recordings.provenance import PROVENANCE
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError
 from tts2face.models.consent import consent_record
@@ -23,7 +24,7 @@ class BuildOrder:
     folder
         Folder with the folder ``recordings``; gets ``made.talker``, the folder ``checked`` and perhaps ``report.html``.
     name, provenance
-        Name of the talker, and fields of `corpus_tools.build_talker.read_provenance`.
+        Name of the talker, and fields of `corpus_tools.recordings.provenance.read_provenance`.
     consent
         Statement of the person shown; with it the talker gets an own face.
     max_bytes

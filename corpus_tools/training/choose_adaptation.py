@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.measures.fingerprints import find_same, fingerprint_observations, fingerprint_talker
+from corpus_tools.measures.methods import build_methods
+from corpus_tools.measures.reference import LipCurves
+from corpus_tools.measures.scale import CurveScale
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.studies.evaluation.evaluate import SpeakerScale
-from corpus_tools.studies.evaluation.methods import build_methods
-from corpus_tools.studies.evaluation.people import CurveScale
-from corpus_tools.studies.evaluation.reference import LipCurves
-from corpus_tools.studies.evaluation.splits import find_same, fingerprint_observations, fingerprint_talker
 from corpus_tools.training.adapt_talker import (
     NO_CHANGE,
     Adaptation,
@@ -135,7 +134,7 @@ def choose_adaptation(
 
 def _base_in_range(base: Base, observations: Sequence[Observation]) -> Adaptation:
     """The base alone; opening and width are multiplied by the person's deviations over those of its recordings."""
-    ratios = SpeakerScale.of(observations).spread / CurveScale.of_talker(base.talker).spread
+    ratios = CurveScale.of_observations(observations).spread / CurveScale.of_talker(base.talker).spread
     return replace(BASE_ONLY, gain=_limited_gain(ratios))
 
 
@@ -147,15 +146,15 @@ def _limited_gain(ratios: Floats) -> tuple[float, float]:
 def cross_validate(learner: Learner, observations: Sequence[Observation]) -> HeldOutScore:
     """Scores over folds of whole utterances, every `MAX_FOLDS`-th together; each is left out once."""
     n_folds = min(MAX_FOLDS, len(observations))
-    person = SpeakerScale.of(observations)
+    person = CurveScale.of_observations(observations)
     real, made, costs = [], [], []
     for fold in range(n_folds):
         known = [one for at, one in enumerate(observations) if at % n_folds != fold]
-        synthesis, scale = learner(known), SpeakerScale.of(known)
+        synthesis, scale = learner(known), CurveScale.of_observations(known)
         for one in observations[fold::n_folds]:
             here = speech_frames(one.phones, len(one.landmarks), one.fps)
-            real.append(person.z_score(LipCurves.of(one.landmarks[here])).values())
-            made.append(scale.z_score(LipCurves.of(synthesis(one)[here])).values())
+            real.append(person.z_score(LipCurves.of(one.landmarks[here]).values()))
+            made.append(scale.z_score(LipCurves.of(synthesis(one)[here]).values()))
             costs.append(warping_cost(real[-1], made[-1], np.ones(2), round(DTW_BAND_S * one.fps)))
     pooled, predicted = np.concatenate(real), np.concatenate(made)
     opening, width = (correlation(pooled[:, at], predicted[:, at]) for at in range(2))

@@ -10,10 +10,10 @@ The folder holds videos with their words, as docs/recordings.md describes; the p
 import sys
 from pathlib import Path
 
+from corpus_tools.measures.splits import split_randomly
 from corpus_tools.recordings.observe import observe
 from corpus_tools.studies.evaluation.evaluate import evaluate
 from corpus_tools.studies.evaluation.page import evaluation_page
-from corpus_tools.studies.evaluation.splits import split_randomly
 
 
 def main(folder):

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.measures.reference import ReferenceUtterance, Thresholds
+from corpus_tools.measures.scores import Scores, score_splits
+from corpus_tools.measures.splits import split_into_folds, split_randomly
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.recordings.observe import observe
 from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
-from corpus_tools.studies.evaluation.reference import ReferenceUtterance, Thresholds
-from corpus_tools.studies.evaluation.scores import Scores, score_splits
-from corpus_tools.studies.evaluation.splits import split_into_folds, split_randomly
 from corpus_tools.training.linear_audio_map import canonical_correlation, learn_linear_map
 from corpus_tools.training.network_audio_map import (
     AUDIO_MAP_FEATURES,

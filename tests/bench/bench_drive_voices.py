@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from sentences import sentences
 
 from corpus_tools.recordings.observe import observe
-from corpus_tools.studies.evaluation.people import evaluate_people, people_table
+from corpus_tools.studies.evaluation.people import evaluate_people
+from corpus_tools.studies.evaluation.people_tables import people_table
 from tts2face.lips import explanation
 from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory
 from tts2face.models.landmarks import lip_opening, lip_width

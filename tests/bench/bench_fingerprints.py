@@ -14,11 +14,7 @@ from pathlib import Path
 import av
 import numpy as np
 
-from corpus_tools.recordings.observation import Observation, head_motion
-from corpus_tools.recordings.observe import observe
-from corpus_tools.recordings.sound import SOUND_RATE
-from corpus_tools.run_options import RunOptions
-from corpus_tools.studies.evaluation.splits import (
+from corpus_tools.measures.fingerprints import (
     Fingerprint,
     face_modes,
     find_same,
@@ -27,6 +23,10 @@ from corpus_tools.studies.evaluation.splits import (
     similarities,
     sound_changes,
 )
+from corpus_tools.recordings.observation import Observation, head_motion
+from corpus_tools.recordings.observe import observe
+from corpus_tools.recordings.sound import SOUND_RATE
+from corpus_tools.run_options import RunOptions
 from tests.bench.bench_recording_limits import (
     Pictures,
     Samples,

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.studies.evaluation.reference import LipCurves
-from corpus_tools.studies.evaluation.tracks import read_person
+from corpus_tools.measures.reference import LipCurves
+from corpus_tools.studies.evaluation.person_tracks import read_person
 from lexicon.phones import ARPABET, nearest_phones
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.face.deformation import moved_landmarks

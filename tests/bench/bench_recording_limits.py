@@ -19,6 +19,8 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.measures.methods import build_methods
+from corpus_tools.measures.reference import LipCurves
 from corpus_tools.recordings.folder import Recording, find_recordings, pronounce_recording
 from corpus_tools.recordings.limits import check_limits, confidence_measure, landmark_measures, sound_measures
 from corpus_tools.recordings.observation import Observation, shipped_talker_opening, trim_to_picture
@@ -27,8 +29,6 @@ from corpus_tools.recordings.sound import SOUND_RATE, AlignedSpeech, suppress_no
 from corpus_tools.recordings.sync import LAGS_S, NEAR_S, lag_correlations
 from corpus_tools.run_options import RunOptions
 from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
-from corpus_tools.studies.evaluation.methods import build_methods
-from corpus_tools.studies.evaluation.reference import LipCurves
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError
 from lexicon.sequence import PhoneSequence

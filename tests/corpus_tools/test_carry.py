@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from corpus_tools.appearance.frame import build_reference_frame, face_triangles
-from corpus_tools.clone_talker import build_appearance_transfer
+from corpus_tools.appearance.transfer import build_appearance_transfer
 from tests.picture.tiny_talker import face_points, own_talker
 from tts2face.models.appearance import Appearance, TextureModel
 

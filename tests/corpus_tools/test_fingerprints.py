@@ -8,17 +8,11 @@ import av
 import numpy as np
 import pytest
 
+from corpus_tools.measures.fingerprints import find_same, fingerprint_observations, fingerprint_talker, similarities
+from corpus_tools.measures.splits import check_disjoint, check_unknown
 from corpus_tools.recordings.observation import Observation, Quality
 from corpus_tools.studies.evaluation.evaluate import evaluate, evaluate_across_talkers
 from corpus_tools.studies.evaluation.people import evaluate_people
-from corpus_tools.studies.evaluation.splits import (
-    check_disjoint,
-    check_unknown,
-    find_same,
-    fingerprint_observations,
-    fingerprint_talker,
-    similarities,
-)
 from corpus_tools.training.choose_adaptation import learn_short_talker
 from lexicon.errors import InputError
 from lexicon.sequence import PhoneSequence

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corpus_tools.build_talker import describe
+from corpus_tools.describe_talker import describe
 from corpus_tools.training.train_talker import learn_talker, mean_rotation, resting_frames
 from lexicon.errors import DataError, InputError
 from tts2face.face.deformation import head_rotation

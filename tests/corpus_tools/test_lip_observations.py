@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.studies.evaluation.learning_curve import MIN_PART_S, lip_observations, read_material
-from corpus_tools.studies.evaluation.reference import LipCurves
+from corpus_tools.measures.reference import LipCurves
+from corpus_tools.studies.evaluation.lip_observations import MIN_PART_S, lip_observations
+from corpus_tools.studies.evaluation.material import read_material
 from corpus_tools.training.pooling.speech import PooledSpeech, spoken_sequence, talker_features
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE

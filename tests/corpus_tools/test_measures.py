@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from corpus_tools.studies.evaluation import reference
+from corpus_tools.measures import lip_measures
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips import explanation
@@ -54,7 +54,7 @@ def test_range_ratio_is_the_ratio_of_spreads():
 
 def test_rmse_is_in_units_of_spread():
     real, made = np.zeros((2, 2)), np.array([[2.0, 0.0], [0.0, 6.0]])
-    assert reference.rmse_z(real, made, np.array([2.0, 3.0])) == pytest.approx(((1 + 4) / 4) ** 0.5)
+    assert lip_measures.rmse_z(real, made, np.array([2.0, 3.0])) == pytest.approx(((1 + 4) / 4) ** 0.5)
 
 
 def test_warping_cost_forgives_a_small_delay_and_divides_by_the_path():
@@ -74,38 +74,38 @@ def test_the_least_opening_includes_a_margin_around_the_phone():
     opening = np.full(60, 1.0)
     opening[19] = 0.3  # 0.38 s: 20 ms before the p
     opening[40] = 0.1  # in the silence
-    assert reference.min_openings(opening, SPEECH, 50.0).tolist() == [0.3]
+    assert lip_measures.min_openings(opening, SPEECH, 50.0).tolist() == [0.3]
     opening[18] = 0.2  # 0.36 s: 40 ms before, too far
-    assert reference.min_openings(opening, SPEECH, 50.0).tolist() == [0.3]
-    assert reference.min_openings(opening, SPEECH, 50.0, ("m",)).tolist() == []
+    assert lip_measures.min_openings(opening, SPEECH, 50.0).tolist() == [0.3]
+    assert lip_measures.min_openings(opening, SPEECH, 50.0, ("m",)).tolist() == []
 
 
 def test_open_vowels_are_read_in_their_middle():
     opening = np.arange(60) / 50.0  # equals its own time
-    np.testing.assert_allclose(reference.midpoint_openings(opening, SPEECH, 50.0), [0.6])
+    np.testing.assert_allclose(lip_measures.midpoint_openings(opening, SPEECH, 50.0), [0.6])
 
 
 def test_open_vowels_are_classified():
-    found = reference.open_vowels()
+    found = lip_measures.open_vowels()
     assert {"ɑ", "æ", "ɛ", "aɪ", "aʊ", "ʌ"} <= found
     assert not {"i", "u", "eɪ", "oʊ", "ə", "p", SILENCE} & found
 
 
 def test_nine_of_ten_real_closures_lie_below_the_threshold():
     real = np.arange(1.0, 12.0)
-    threshold = reference.closure_threshold(real)
+    threshold = lip_measures.closure_threshold(real)
     assert threshold == 10.0
     assert (real <= threshold).mean() == pytest.approx(10 / 11)
-    assert reference.closure_threshold(np.array([])) == 0.0
+    assert lip_measures.closure_threshold(np.array([])) == 0.0
 
 
 def test_peaks_are_read_between_frames():
     times = np.arange(60) / 50.0
     for peak in (0.58, 0.613, 0.66):
         curve = 10 - 100 * (times - peak) ** 2
-        assert reference.peak_times(curve, SPEECH, 50.0) == pytest.approx([peak], abs=1e-6)
+        assert lip_measures.peak_times(curve, SPEECH, 50.0) == pytest.approx([peak], abs=1e-6)
 
 
 def test_a_curve_without_a_peak_in_the_vowel_has_none():
     rising = np.arange(60) / 60.0
-    assert np.isnan(reference.peak_times(rising, SPEECH, 50.0)).all()
+    assert np.isnan(lip_measures.peak_times(rising, SPEECH, 50.0)).all()

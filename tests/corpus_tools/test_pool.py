@@ -3,7 +3,7 @@
 import math
 import time
 
-from corpus_tools.run_options import map_unordered
+from corpus_tools.parallel import map_unordered
 
 
 def test_every_task_is_returned_with_its_result() -> None:

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from corpus_tools.measures.splits import split_randomly
 from corpus_tools.studies.evaluation.evaluate import evaluate
-from corpus_tools.studies.evaluation.splits import split_randomly
 from corpus_tools.tools.report import report, talker_observations
 from tests.processes.answered import answered
 from tts2face.models.landmarks import lip_opening

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import tts2face
-from corpus_tools.build_talker import describe
+from corpus_tools.describe_talker import describe
 from corpus_tools.training.train_talker import CLOSED_GAP
 from tts2face.models.landmarks import lip_opening
 from tts2face.models.talker import load_talker

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from corpus_tools.build_talker import read_provenance
+from corpus_tools.recordings.provenance import read_provenance
 from lexicon.errors import Tts2faceError
 from tts2face.gestures.timeline_file import read_timeline
 from tts2face.interchange.characters.shapes import read_mapping

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from corpus_tools.build_talker import describe
+from corpus_tools.describe_talker import describe
 from lexicon.errors import DataError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tests.fuzz.mutations import mutate_model

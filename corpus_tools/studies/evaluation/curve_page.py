@@ -7,9 +7,10 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from corpus_tools.studies.evaluation.curve_tables import LearningCurve, curve_rows, figure_rows, gain_rows, monotony
+from corpus_tools.studies.evaluation.curve import LearningCurve
+from corpus_tools.studies.evaluation.curve_tables import curve_rows, figure_rows, gain_rows, monotony
 from corpus_tools.studies.evaluation.learning_curve import MEAN_FACE
-from corpus_tools.studies.evaluation.people import FIGURE_HEADS
+from corpus_tools.studies.evaluation.people_tables import FIGURE_HEADS
 from corpus_tools.studies.pages import note_paragraph, page, paragraphs, scroll_box, table
 from corpus_tools.studies.plots import SERIES, draw_png, draw_svg, draw_svg_file
 

@@ -7,24 +7,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.measures.methods import SynthesisMethod, build_methods
+from corpus_tools.measures.own_durations import VoicedUtterance, compare_own_durations, speak_references
+from corpus_tools.measures.reference import LipCurves, ReferenceUtterance, Thresholds
+from corpus_tools.measures.scale import CurveScale
+from corpus_tools.measures.scores import Scores, UtteranceComparison, compute_scores, score_splits
+from corpus_tools.measures.splits import Split, check_disjoint
 from corpus_tools.recordings.observation import Observation
-from corpus_tools.studies.evaluation.methods import (
-    SynthesisMethod,
-    VoicedUtterance,
-    build_methods,
-    compare_own_durations,
-    speak_references,
-)
-from corpus_tools.studies.evaluation.reference import LipCurves, ReferenceUtterance, Thresholds
-from corpus_tools.studies.evaluation.scores import Scores, UtteranceComparison, compute_scores, score_splits
-from corpus_tools.studies.evaluation.splits import Split, check_disjoint
 from corpus_tools.studies.evaluation.tables import Evaluation, Fold
 from corpus_tools.studies.evaluation.tracks import ExternalTrack, map_tracks
 from corpus_tools.training.phone_network import add_phone_network
 from corpus_tools.training.pooling.lip_tracks import LipTrack
 from corpus_tools.training.pooling.speech import align_lip_tracks
 from corpus_tools.training.train_talker import correct_pose, fit_pose_correction, learn_talker
-from tts2face.lips.explanation import speech_frames
 from tts2face.lips.options import SynthesisOptions
 from tts2face.models.talker import ShapeModel, Talker
 from tts2face.sound.voice import Voice
@@ -36,40 +31,17 @@ EVALUATION_METADATA = {
 TRACKS_METHOD, CEILING_METHOD = "tracks", "real, through the model"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SpeakerScale:
-    """Mean and standard deviation (2,) of a person's lip opening and width during speech."""
-
-    mean: NDArray[np.float64]
-    spread: NDArray[np.float64]
-
-    @classmethod
-    def of(cls, observations: Sequence[Observation]) -> "SpeakerScale":
-        """Statistics of one person's recordings over speech frames."""
-        parts = []
-        for observation in observations:
-            here = speech_frames(observation.phones, len(observation.landmarks), observation.fps)
-            parts.append(LipCurves.of(observation.landmarks[here]).values())
-        frames = np.concatenate(parts)
-        return cls(frames.mean(axis=0), np.maximum(frames.std(axis=0), 1e-9))
-
-    def z_score(self, curves: LipCurves) -> LipCurves:
-        """z-scored curves of this person."""
-        opening, width = ((curves.values() - self.mean) / self.spread).T
-        return LipCurves(opening, width)
-
-
-def standardise_reference(real: ReferenceUtterance, scale: SpeakerScale) -> ReferenceUtterance:
+def standardise_reference(real: ReferenceUtterance, scale: CurveScale) -> ReferenceUtterance:
     """A real utterance whose parameters are its z-scored curves."""
-    curves = scale.z_score(real.curves)
+    curves = scale.z_score_lips(real.curves)
     return replace(real, curves=curves, parameters=curves.values().astype(np.float32))
 
 
 def compare_across_talkers(
-    one: ReferenceUtterance, synthesised: NDArray[np.float32], model: ShapeModel, scale: SpeakerScale
+    one: ReferenceUtterance, synthesised: NDArray[np.float32], model: ShapeModel, scale: CurveScale
 ) -> UtteranceComparison:
     """Comparison of synthesised parameters (T, S) of one talker with a real utterance of another, both z-scored."""
-    curves = scale.z_score(LipCurves.of(model.shapes(synthesised)))
+    curves = scale.z_score_lips(LipCurves.of(model.shapes(synthesised)))
     return UtteranceComparison(one, curves.values(), curves, np.ones(2))
 
 
@@ -87,7 +59,7 @@ class SplitResult:
     seconds: Mapping[str, float]
     tracked: tuple[ReferenceUtterance, ...] = ()
     own: Mapping[str, tuple[UtteranceComparison, ...]] = field(default_factory=dict)
-    scale: SpeakerScale | None = None
+    scale: CurveScale | None = None
 
     @property
     def model(self) -> ShapeModel:
@@ -97,7 +69,7 @@ class SplitResult:
     def curves(self, method: str, at: int) -> LipCurves:
         """Lip curves of a method, in the units of the real ones."""
         curves = LipCurves.of(self.model.shapes(self.synthesised[method][at]))
-        return curves if self.scale is None else self.scale.z_score(curves)
+        return curves if self.scale is None else self.scale.z_score_lips(curves)
 
 
 def evaluate(
@@ -203,7 +175,7 @@ def evaluate_across_talkers(
     warnings = check_disjoint([(tuple(train), tuple(others))])
     train, others = correct_pose(train), correct_pose(others)
     talker = _train_talker(train, lips)
-    own_scale, other_scale = SpeakerScale.of(train), SpeakerScale.of(others)
+    own_scale, other_scale = CurveScale.of_observations(train), CurveScale.of_observations(others)
     real = tuple(
         standardise_reference(ReferenceUtterance.of(observation, talker.model), other_scale) for observation in others
     )

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.measures.intervals import CONFIDENCE
+from corpus_tools.measures.scores import Scores, available_figures
 from corpus_tools.studies.evaluation.evaluate import CEILING_METHOD, SplitResult
-from corpus_tools.studies.evaluation.scores import CONFIDENCE, Scores, available_figures
 from corpus_tools.studies.evaluation.tables import Evaluation, class_rows, figure_rows
 from corpus_tools.studies.pages import MethodVideos, page, paragraphs, scroll_box, table
 from corpus_tools.studies.plots import RULE, SERIES, draw_svg

@@ -3,11 +3,9 @@
 A talker is synthesised from the phones of each test person. Faces differ in size and range of motion, so the opening
 and the width of the lips are z-scored: real curves by that person's speech, synthesised ones by the talker's own
 recordings.
-
-Results of an evaluation on test people as Markdown tables and as rows for a CSV file.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,54 +13,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from corpus_tools.measures.intervals import IntervalEstimate, PairedCurves, estimate, estimate_difference
+from corpus_tools.measures.methods import SynthesisMethod, build_methods
+from corpus_tools.measures.reference import LipCurves, ReferenceUtterance
+from corpus_tools.measures.scale import CurveScale
+from corpus_tools.measures.splits import check_unknown
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.studies.evaluation.heard import heard_phones, mapped_motion
-from corpus_tools.studies.evaluation.methods import SynthesisMethod, build_methods
-from corpus_tools.studies.evaluation.reference import LipCurves, ReferenceUtterance
-from corpus_tools.studies.evaluation.scores import IntervalEstimate, PairedCurves, estimate, estimate_difference
-from corpus_tools.studies.evaluation.splits import check_unknown
-from corpus_tools.studies.evaluation.tables import markdown_table
 from corpus_tools.studies.evaluation.tracks import ExternalTrack, map_tracks
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.lips.explanation import DTW_BAND_S, speech_frames, warping_cost
 from tts2face.models.networks import PhoneNetwork
-from tts2face.models.talker import ShapeModel, Talker
+from tts2face.models.talker import Talker
 
-FIGURE_HEADS = (
-    ("r_opening", "r opening"), ("r_width", "r width"), ("dtw_cost", "DTW cost"),
-    ("r_opening_within", "r opening within"), ("r_width_within", "r width within"),
-)  # fmt: skip
 DEFAULT_METHOD, NETWORKS_METHOD, TRACKS_METHOD = "exemplar", "networks alone", "tracks"
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CurveScale:
-    """Mean and standard deviation (2,) of opening and width in a person's speech."""
-
-    mean: Floats
-    spread: Floats
-
-    @classmethod
-    def of(cls, speech: Sequence[Floats]) -> "CurveScale":
-        """Statistics of curves (T, 2) in speech."""
-        frames = np.concatenate(speech)
-        return cls(frames.mean(axis=0), np.maximum(frames.std(axis=0), 1e-9))
-
-    @classmethod
-    def of_talker(cls, talker: Talker) -> "CurveScale":
-        """Statistics of a talker's recorded utterances."""
-        return cls.of(
-            [
-                _lip_curves(talker.model, one.shape[speech_frames(one.phones, len(one.shape), talker.fps)])
-                for one in talker.utterances
-            ]
-        )
-
-    def z_score(self, curves: Floats) -> Floats:
-        """z-scored curves (T, 2)."""
-        return (curves - self.mean) / self.spread
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -213,7 +179,7 @@ def synthesise_people(
     def curves(method: SynthesisMethod, one: TestUtterance) -> Floats:
         seen = one.observation
         motion = method(seen.phones, len(seen.landmarks), seen.fps)
-        return scale.z_score(_lip_curves(talker.model, motion[one.evaluated]))
+        return scale.z_score(LipCurves.of_parameters(talker.model, motion[one.evaluated]).values())
 
     return {name: tuple(curves(method, one) for one in tests) for name, method in methods.items()}
 
@@ -305,67 +271,5 @@ def _frame_phones(one: TestUtterance) -> NDArray[np.int64]:
     return np.clip(np.searchsorted(phones.edges, times, side="right") - 1, 0, len(phones) - 1)
 
 
-def _lip_curves(model: ShapeModel, parameters: NDArray[np.floating]) -> Floats:
-    return LipCurves.of(model.shapes(parameters[:, : model.n_speech])).values()
-
-
 def _plain(values: Mapping[str, IntervalEstimate]) -> dict[str, dict[str, float]]:
     return {name: asdict(value) for name, value in values.items()}
-
-
-CSV_HEAD = ("table", "method", "figure", "value", "low", "high")
-
-
-def people_table(found: PeopleEvaluation) -> str:
-    """Markdown table of the figures with their intervals, one method a line."""
-    rows = [("method", *(head for _, head in FIGURE_HEADS), "r opening, phones recorded", "not recorded")]
-    for method, figures in found.figures.items():
-        cells = (_interval_text(figures[name], signed=False) for name, _ in FIGURE_HEADS)
-        rows.append((method, *cells, *(_plain_text(value) for value in found.heard[method])))
-    return markdown_table(rows)
-
-
-def difference_table(found: PeopleEvaluation, method: str) -> str:
-    """Markdown table of the differences of a method from the others, with paired intervals."""
-    rows = [(f"{method} minus", *(head for _, head in FIGURE_HEADS))]
-    for (one, other), values in found.differences.items():
-        if one == method:
-            rows.append((other, *(_interval_text(values[name], signed=True) for name, _ in FIGURE_HEADS)))
-    return markdown_table(rows)
-
-
-def phone_table(found: PeopleEvaluation, methods: Sequence[str]) -> str:
-    """Markdown table of mean opening and width by phone in z, recorded and of some methods."""
-    rows = [("phone", "tokens", "in the talker", "recorded: opening, width", *methods)]
-    for one in found.phones:
-        cells = (_pair_text(one.made[method]) for method in methods)
-        rows.append((one.phone, str(one.n_tokens), "yes" if one.is_heard else "no", _pair_text(one.real), *cells))
-    return markdown_table(rows)
-
-
-def people_rows(found: PeopleEvaluation) -> Iterator[tuple[str, ...]]:
-    """All figures and differences with their intervals; the first row names the columns."""
-    yield CSV_HEAD
-    for method, figures in found.figures.items():
-        for name, value in figures.items():
-            yield "people", method, name, *_interval_cells(value)
-    for (one, other), values in found.differences.items():
-        for name, value in values.items():
-            yield f"minus {other}", one, name, *_interval_cells(value)
-
-
-def _interval_text(value: IntervalEstimate, *, signed: bool) -> str:
-    sign = "+" if signed else ""
-    return f"{value.value:{sign}.3f} ({value.low:{sign}.3f} to {value.high:{sign}.3f})"
-
-
-def _interval_cells(value: IntervalEstimate) -> tuple[str, str, str]:
-    return f"{value.value:.6g}", f"{value.low:.6g}", f"{value.high:.6g}"
-
-
-def _plain_text(value: float) -> str:
-    return "" if value != value else f"{value:.3f}"  # noqa: PLR0124 - NaN
-
-
-def _pair_text(pair: tuple[float, float]) -> str:
-    return f"{pair[0]:+.2f}, {pair[1]:+.2f}"

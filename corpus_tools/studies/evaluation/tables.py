@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from corpus_tools.studies.evaluation.scores import FIGURES, Scores, available_figures
+from corpus_tools.measures.scores import FIGURES, Scores, available_figures
 
 TRUE_DURATIONS, OWN_DURATIONS, OTHER_TALKER = "true durations", "own durations", "another talker"
 AS_TRACKED = "true durations, recorded face not corrected for head pose"

@@ -6,13 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from corpus_tools.measures.lip_measures import midpoint_openings, min_openings
+from corpus_tools.measures.reference import LipCurves
+from corpus_tools.measures.scale import CurveScale
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.run_options import RunOptions
-from corpus_tools.studies.evaluation.evaluate import SpeakerScale, SplitResult, evaluate_across_talkers
+from corpus_tools.studies.evaluation.evaluate import SplitResult, evaluate_across_talkers
+from corpus_tools.studies.evaluation.livelink import observe_livelink
 from corpus_tools.studies.evaluation.page import evaluation_page
-from corpus_tools.studies.evaluation.reference import LipCurves, midpoint_openings, min_openings
 from corpus_tools.studies.evaluation.tables import Evaluation
-from corpus_tools.studies.evaluation.tracks import observe_livelink
 from lexicon.errors import InputError
 from tests.corpus_tools.speaking import observation
 from tts2face.face.deformation import moved_landmarks
@@ -56,8 +58,8 @@ def test_figures_do_not_depend_on_the_amplitude_of_the_other_talker(
 
 
 def test_a_scale_makes_the_mean_0_and_the_spread_1(train: list[Observation]) -> None:
-    scale = SpeakerScale.of(train)
-    scored = scale.z_score(LipCurves(scale.mean[:1] + 2 * scale.spread[:1], scale.mean[1:] - scale.spread[1:]))
+    scale = CurveScale.of_observations(train)
+    scored = scale.z_score_lips(LipCurves(scale.mean[:1] + 2 * scale.spread[:1], scale.mean[1:] - scale.spread[1:]))
     np.testing.assert_allclose((scored.opening[0], scored.width[0]), (2.0, -1.0), rtol=1e-12)
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from corpus_tools.measures.scores import FIGURES
+from corpus_tools.measures.splits import split_by_words, split_into_folds, split_randomly
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.studies.evaluation.evaluate import CEILING_METHOD, SplitResult, evaluate
 from corpus_tools.studies.evaluation.page import evaluation_page
-from corpus_tools.studies.evaluation.scores import FIGURES
-from corpus_tools.studies.evaluation.splits import split_by_words, split_into_folds, split_randomly
 from corpus_tools.studies.evaluation.tables import AS_TRACKED, Evaluation, figure_rows
 from corpus_tools.studies.evaluation.tracks import ExternalTrack, read_tracks
 from lexicon.errors import DataError, InputError

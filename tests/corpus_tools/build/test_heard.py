@@ -17,7 +17,7 @@ from corpus_tools.studies.evaluation.heard import (
     with_hand_edges,
 )
 from corpus_tools.studies.evaluation.people import DEFAULT_METHOD, evaluate_people
-from corpus_tools.studies.evaluation.tracks import TRACKED
+from corpus_tools.studies.evaluation.person_tracks import TRACKED
 from lexicon.errors import DataError, InputError
 from tests.corpus_tools.speaking import track_arrays
 from tts2face.lips.exemplar import build_exemplar_model, speech_trajectory

@@ -10,15 +10,9 @@ import pytest
 
 from cli.main import run
 from corpus_tools.recordings.observation import Observation
+from corpus_tools.studies.evaluation.curve import CurvePoint, LearningCurve, compare_points
 from corpus_tools.studies.evaluation.curve_page import WRITERS
-from corpus_tools.studies.evaluation.curve_tables import (
-    CurvePoint,
-    LearningCurve,
-    compare_points,
-    curve_rows,
-    curve_tables,
-    monotony,
-)
+from corpus_tools.studies.evaluation.curve_tables import curve_rows, curve_tables, monotony
 from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA, evaluate
 from corpus_tools.studies.evaluation.learning_curve import (
     BASE_ALONE,
@@ -30,7 +24,7 @@ from corpus_tools.studies.evaluation.learning_curve import (
     choose_material,
     measure_learning_curve,
 )
-from corpus_tools.studies.evaluation.people import FIGURE_HEADS
+from corpus_tools.studies.evaluation.people_tables import FIGURE_HEADS
 from corpus_tools.training.adapt_talker import Base
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import InputError

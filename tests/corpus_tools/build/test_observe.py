@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corpus_tools.build_talker import build_talker, read_provenance
+from corpus_tools.build_talker import build_talker
 from corpus_tools.recordings.observe import STEPS_PER_VIDEO, observe
+from corpus_tools.recordings.provenance import read_provenance
 from corpus_tools.run_options import RunOptions
 from lexicon.errors import DataError, InputError
 from tests.conftest import SHARED

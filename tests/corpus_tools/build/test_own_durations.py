@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from corpus_tools.measures.own_durations import VoicedUtterance, compare_own_durations, map_word_times
+from corpus_tools.measures.splits import split_randomly
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.studies.evaluation.evaluate import SplitResult, evaluate
-from corpus_tools.studies.evaluation.methods import VoicedUtterance, compare_own_durations, map_word_times
 from corpus_tools.studies.evaluation.page import evaluation_page
-from corpus_tools.studies.evaluation.splits import split_randomly
 from corpus_tools.studies.evaluation.tables import Evaluation
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence, WordSpan

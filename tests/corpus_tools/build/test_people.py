@@ -8,21 +8,19 @@ import numpy as np
 import pytest
 
 from cli.main import run
+from corpus_tools.measures.intervals import IntervalEstimate, PairedCurves, estimate, estimate_difference
 from corpus_tools.recordings.observation import Observation
 from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
-from corpus_tools.studies.evaluation.people import (
+from corpus_tools.studies.evaluation.people import PeopleEvaluation, compare_people, evaluate_people, z_score_people
+from corpus_tools.studies.evaluation.people_tables import (
     FIGURE_HEADS,
-    PeopleEvaluation,
-    compare_people,
     difference_table,
-    evaluate_people,
     people_rows,
     people_table,
     phone_table,
-    z_score_people,
 )
-from corpus_tools.studies.evaluation.scores import IntervalEstimate, PairedCurves, estimate, estimate_difference
-from corpus_tools.studies.evaluation.tracks import ExternalTrack, read_person
+from corpus_tools.studies.evaluation.person_tracks import read_person
+from corpus_tools.studies.evaluation.tracks import ExternalTrack
 from corpus_tools.training.train_talker import learn_talker
 from lexicon.errors import DataError, InputError
 from lexicon.sequence import SILENCE

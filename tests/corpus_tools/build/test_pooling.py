@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.clone_talker import pool_talker
+from corpus_tools.pool_talker import pool_talker
 from corpus_tools.studies.evaluation.evaluate import EVALUATION_METADATA
 from corpus_tools.training.network_training import TrainingOptions, feature_table
 from corpus_tools.training.phone_network import FEATURE_NOISE, add_phone_network, follow_features
@@ -277,8 +277,8 @@ def test_the_command_keeps_all_of_the_talker_but_its_networks(
     tmp_path: Path, talker: Talker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("corpus_tools.training.phone_network.MIN_FRAMES", 100)
-    monkeypatch.setattr("corpus_tools.clone_talker.MIN_FRAMES", 100)
-    monkeypatch.setattr("corpus_tools.clone_talker.read_lip_tracks", lambda _: [track(0)[0]])
+    monkeypatch.setattr("corpus_tools.pool_talker.MIN_FRAMES", 100)
+    monkeypatch.setattr("corpus_tools.pool_talker.read_lip_tracks", lambda _: [track(0)[0]])
     write_talker(tmp_path / "a.talker", talker)
     (tmp_path / "tracks").mkdir()
     flags = [str(tmp_path / "a.talker"), str(tmp_path / "tracks"), "--source", "artificial lips, CC0"]

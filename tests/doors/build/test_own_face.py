@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cli.main import run
-from corpus_tools.clone_talker import build_appearance_transfer
+from corpus_tools.appearance.transfer import build_appearance_transfer
 from tests.rendered_takes import ONLY_RENDERED, manifest_rows
 from tts2face.models.landmarks import EYE_OUTER_LEFT, EYE_OUTER_RIGHT, LOWER_LIP_INNER_MID, UPPER_LIP_INNER_MID
 from tts2face.models.talker import read_talker

@@ -1,7 +1,4 @@
-"""Scores of a method over held-out utterances, with bootstrap intervals over utterances.
-
-Intervals of a method's figures over utterances, and of the difference of two methods on the same utterances.
-"""
+"""Scores of a method over held-out utterances, with bootstrap intervals over utterances."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,21 +6,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.studies.evaluation import reference
-from corpus_tools.studies.evaluation.reference import (
-    OTHER_CLASS,
-    PHONE_CLASSES,
-    LipCurves,
-    ReferenceUtterance,
-    Thresholds,
+from corpus_tools.measures import lip_measures
+from corpus_tools.measures.intervals import (
+    Floats,
+    IntervalEstimate,
+    correlations,
+    curve_moments,
+    interval_of,
 )
-from lexicon.errors import InputError
+from corpus_tools.measures.reference import OTHER_CLASS, PHONE_CLASSES, LipCurves, ReferenceUtterance, Thresholds
 from lexicon.sequence import PhoneSequence
 from tts2face.lips import explanation
 from tts2face.models.talker import ShapeModel
 
 N_DRAWS = 1000  # of utterances, with replacement (Efron 1979)
-CONFIDENCE = 0.95
 # In the order of tables: name, its head, digits.
 FIGURES = (
     ("r_opening", "r opening", 3), ("r_width", "r width", 3), ("r_opening_within", "r opening within", 3),
@@ -32,17 +28,9 @@ FIGURES = (
     ("false_closure", "false closure", 2),
     ("labiodental", "labiodental", 2), ("rounding", "rounding", 2), ("peak_offset_ms", "peak offset (ms)", 0),
 )  # fmt: skip
-
-Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class IntervalEstimate:
-    """A value and the interval in which it lies with `CONFIDENCE`."""
-
-    value: float
-    low: float
-    high: float
+SplitMotion = tuple[
+    ShapeModel, Sequence[ReferenceUtterance], Sequence[NDArray[np.float32]]
+]  # of one split: (T, S) for each utterance
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,11 +129,6 @@ class UtteranceComparison:
     own: OwnDurationMotion | None = None
 
 
-SplitMotion = tuple[
-    ShapeModel, Sequence[ReferenceUtterance], Sequence[NDArray[np.float32]]
-]  # of one split: (T, S) for each utterance
-
-
 def available_figures(scores: Sequence[Scores]) -> tuple[tuple[str, str, int], ...]:
     """Those of `FIGURES` that the scores have."""
     return tuple(figure for figure in FIGURES if all(figure[0] in one.figures for one in scores))
@@ -163,7 +146,7 @@ def score_splits(method: str, splits: Sequence[SplitMotion], limits: Thresholds,
 
 def speech_spread(model: ShapeModel) -> NDArray[np.float32]:
     """(D,) standard deviations of the compared parameters."""
-    return model.spread[: min(reference.N_DTW_PARAMETERS, model.n_speech)]
+    return model.spread[: min(lip_measures.N_DTW_PARAMETERS, model.n_speech)]
 
 
 def compute_scores(
@@ -184,12 +167,12 @@ def _utterance_statistics(comparison: UtteranceComparison, limits: Thresholds) -
     one, curves, n, here = comparison.real, comparison.curves, len(comparison.spread), comparison.real.evaluated
     phones, fps = one.observation.phones, one.observation.fps
     real, synthesised = one.parameters[here, :n], comparison.synthesised[here, :n]
-    peaks = [reference.peak_times(curve, phones, fps) for curve in (one.curves.opening, curves.opening)]
+    peaks = [lip_measures.peak_times(curve, phones, fps) for curve in (one.curves.opening, curves.opening)]
     offsets = peaks[1] - peaks[0]
     return UtteranceStatistics(
-        _curve_moments(one.curves.opening[here], curves.opening[here]),
-        _curve_moments(one.curves.width[here], curves.width[here]),
-        reference.rmse_z(real, synthesised, comparison.spread),
+        curve_moments(one.curves.opening[here], curves.opening[here]),
+        curve_moments(one.curves.width[here], curves.width[here]),
+        lip_measures.rmse_z(real, synthesised, comparison.spread),
         explanation.warping_cost(real, synthesised, comparison.spread, round(explanation.DTW_BAND_S * fps)),
         _free_cost(comparison),
         _event_counts(comparison, limits),
@@ -212,10 +195,10 @@ def _event_counts(comparison: UtteranceComparison, limits: Thresholds) -> Floats
     phones, curves = (own.phones, own.curves) if own else (comparison.real.observation.phones, comparison.curves)
 
     def events(curve: NDArray[np.floating], labels: str, limit: float) -> tuple[float, float]:
-        least = reference.min_openings(curve, phones, fps, PHONE_CLASSES[labels])
+        least = lip_measures.min_openings(curve, phones, fps, PHONE_CLASSES[labels])
         return float((least <= limit).sum()), float(len(least))
 
-    middles = reference.midpoint_openings(curves.opening, phones, fps)
+    middles = lip_measures.midpoint_openings(curves.opening, phones, fps)
     return np.array(
         [
             events(curves.opening, "bilabial", limits.closed),
@@ -226,16 +209,12 @@ def _event_counts(comparison: UtteranceComparison, limits: Thresholds) -> Floats
     )
 
 
-def _curve_moments(a: Floats, b: Floats) -> Floats:
-    return np.array([len(a), a.sum(), b.sum(), a @ a, b @ b, a @ b])
-
-
 def _estimate_figures(tallies: Sequence[UtteranceStatistics]) -> dict[str, IntervalEstimate]:
     draws = np.random.default_rng(0).multinomial(len(tallies), np.full(len(tallies), 1 / len(tallies)), N_DRAWS)
     weights = np.concatenate([np.ones((1, len(tallies))), draws])  # the first row: each utterance once
     moments = np.array([[one.opening, one.width] for one in tallies])
     rows = {
-        **_correlations(weights, moments),
+        **correlations(weights, moments),
         "range_ratio": _range_ratio(weights @ moments[:, 0]),
         "rmse_z": weights @ [one.rmse_z for one in tallies] / weights.sum(axis=1),
         "dtw_cost": weights @ [one.dtw_cost for one in tallies] / weights.sum(axis=1),
@@ -247,12 +226,7 @@ def _estimate_figures(tallies: Sequence[UtteranceStatistics]) -> dict[str, Inter
     counts = np.tensordot(weights, np.array([one.counts for one in tallies]), axes=1)
     for at, name in enumerate(("closure", "false_closure", "labiodental", "rounding")):
         rows[name] = counts[:, at, 0] / np.maximum(counts[:, at, 1], 1.0)
-    edges = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
-    return {
-        name: IntervalEstimate(float(rows[name][0]), *(float(value) for value in np.quantile(rows[name][1:], edges)))
-        for name, _, _ in FIGURES
-        if name in rows
-    }
+    return {name: interval_of(rows[name]) for name, _, _ in FIGURES if name in rows}
 
 
 def _range_ratio(moments: Floats) -> Floats:
@@ -306,89 +280,3 @@ def _utterance_score(tally: UtteranceStatistics, comparison: UtteranceComparison
         explanation.range_ratio(recorded.opening[here], synthesised.opening[here]),
         int(tally.opening[0]),
     )
-
-
-N_PAIRED_DRAWS = 2000  # resamples of utterances with replacement (Efron 1979)
-ROUNDING = 1e-12  # spread of a constant curve in parts of its sum of squares: what float32 values and sums leave
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PairedCurves:
-    """Statistics of a method on U utterances: ``moments`` (U, 2, 6) of opening and width, warping ``costs`` (U,).
-
-    The moments of a real curve a and a synthesised one b are n, sum a, sum b, sum aa, sum bb and sum ab, from which
-    Pearson's r of pooled frames follows.
-    """
-
-    moments: Floats
-    costs: Floats
-
-    @classmethod
-    def of(
-        cls, real: Sequence[NDArray[np.floating]], synthesised: Sequence[NDArray[np.floating]], costs: Sequence[float]
-    ) -> "PairedCurves":
-        """Of real and synthesised curves (T, 2), one pair for each utterance, and their warping costs."""
-        moments = [
-            [_curve_moments(a[:, at].astype(np.float64), b[:, at].astype(np.float64)) for at in range(2)]
-            for a, b in zip(real, synthesised, strict=True)
-        ]
-        return cls(np.array(moments), np.asarray(costs, np.float64))
-
-    def figures(self, weights: Floats) -> Mapping[str, Floats]:
-        """Correlations of opening and width, pooled and within, and mean cost for each row of weights (W, U)."""
-        return {**_correlations(weights, self.moments), "dtw_cost": weights @ self.costs / weights.sum(axis=1)}
-
-
-def draw_weights(n_utterances: int) -> Floats:
-    """(N_DRAWS + 1, U) number of times each utterance is drawn; every utterance once in the first row."""
-    draws = np.random.default_rng(0).multinomial(n_utterances, np.full(n_utterances, 1 / n_utterances), N_PAIRED_DRAWS)
-    return np.concatenate([np.ones((1, n_utterances)), draws])
-
-
-def estimate(one: PairedCurves) -> Mapping[str, IntervalEstimate]:
-    """Each figure with its interval."""
-    figures = one.figures(draw_weights(len(one.costs)))
-    return {name: interval_of(values) for name, values in figures.items()}
-
-
-def estimate_difference(one: PairedCurves, other: PairedCurves) -> Mapping[str, IntervalEstimate]:
-    """Figures of `one` minus those of `other` on the same utterances; both are resampled together.
-
-    Raises
-    ------
-    InputError
-        The two have other numbers of utterances.
-    """
-    if len(one.costs) != len(other.costs):
-        raise InputError(f"{len(one.costs)} utterances cannot be paired with {len(other.costs)}; use the same ones")
-    weights = draw_weights(len(one.costs))
-    ours, theirs = one.figures(weights), other.figures(weights)
-    return {name: interval_of(ours[name] - theirs[name]) for name in ours}
-
-
-def interval_of(values: Floats) -> IntervalEstimate:
-    """The first of (W,) values, with the interval that holds `CONFIDENCE` of the others."""
-    low, high = np.quantile(values[1:], (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2))
-    return IntervalEstimate(float(values[0]), float(low), float(high))
-
-
-def _correlations(weights: Floats, moments: Floats) -> dict[str, Floats]:
-    """Correlations of opening and width by name, pooled and within utterances, for moments (U, 2, 6)."""
-    n, a, b, aa, bb, ab = np.moveaxis(moments, -1, 0)
-    left, zero = [(aa - a * a / n, aa), (bb - b * b / n, bb)], np.zeros_like(n)
-    spreads = (np.where(spread > ROUNDING * whole, spread, 0.0) for spread, whole in left)
-    within = np.stack([n, zero, zero, *spreads, ab - a * b / n], axis=-1)
-    names = {"": moments, "_within": within}
-    return {
-        f"r_{name}{suffix}": _pooled_correlation(weights @ kept[:, at])
-        for suffix, kept in names.items()
-        for at, name in enumerate(("opening", "width"))
-    }
-
-
-def _pooled_correlation(moments: Floats) -> Floats:
-    """(W,) Pearson's r for moments (W, 6); 0 where a curve is constant but for rounding."""
-    n, a, b, aa, bb, ab = moments.T
-    spread_a, spread_b = aa - a * a / n, bb - b * b / n
-    moves = (spread_a > ROUNDING * aa) & (spread_b > ROUNDING * bb)
-    return np.where(moves, ab - a * b / n, 0.0) / np.sqrt(np.where(moves, spread_a * spread_b, 1.0))

@@ -1,13 +1,11 @@
-"""Splits into training and held-out utterances.
-
-Fingerprints of recordings: curves of sound and motion by which a recording is recognised after re-encoding.
+"""Fingerprints of recordings: curves of sound and motion by which a recording is recognised after re-encoding.
 
 The sound is compared where its file is at hand. Talkers and tracks hold no sound: there the motion of face and head is
 compared, and the durations of the phones. `tests/bench/bench_fingerprints.py` measures the margins;
 docs/decisions/140-fingerprints.md has the table.
 """
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -15,9 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from corpus_tools.recordings.observation import Observation
+from corpus_tools.recordings.observation import TRACK_SUFFIX, Observation
 from corpus_tools.recordings.sound import SOUND_RATE
-from corpus_tools.studies.evaluation.tracks import TRACK_SUFFIX
 from lexicon.errors import InputError
 from lexicon.sequence import SILENCE, PhoneSequence
 from tts2face.models.talker import Talker, load_talker
@@ -273,114 +270,3 @@ def _shipped_modes() -> tuple[Floats, Floats]:
     model = load_talker("grid_s1").model
     chosen = [*range(N_MOUTH_MODES), *range(model.n_speech, model.n_speech + N_OTHER_MODES)]
     return model.mean, model.basis[chosen].reshape(len(chosen), -1).T.copy()
-
-
-PARTS = "the training and the held-out part"
-HELD_OUT_ONE_IN, MAX_HELD_OUT = 5, 100  # held out by default: a fifth, enough for intervals of .02 of r at 100
-Split = tuple[tuple[Observation, ...], tuple[Observation, ...]]  # training, held out
-
-
-def split_randomly(observations: Sequence[Observation], *, hold_out: int | None = None, seed: int) -> Split:
-    """Training and held-out utterances, drawn by a seed from the sorted names.
-
-    Parameters
-    ----------
-    hold_out
-        Number of held-out utterances; None: a fifth, at least 1 and at most `MAX_HELD_OUT`.
-
-    Raises
-    ------
-    InputError
-        `hold_out` is below 1 or not below the number of utterances.
-    """
-    if hold_out is None:
-        hold_out = min(MAX_HELD_OUT, max(1, len(observations) // HELD_OUT_ONE_IN))
-    if not 0 < hold_out < len(observations):
-        raise InputError(
-            f"of {len(observations)} utterances, 1 to {len(observations) - 1} can be held out, not {hold_out}"
-        )
-    ordered = _sort_by_name(observations)
-    held = set(np.random.default_rng(seed).permutation(len(ordered))[:hold_out].tolist())
-    return _split_at(ordered, held)
-
-
-def split_into_folds(observations: Sequence[Observation], *, n_folds: int, seed: int) -> tuple[Split, ...]:
-    """As many splits as folds; every utterance is held out once.
-
-    Raises
-    ------
-    InputError
-        There are fewer than two folds, or more than utterances.
-    """
-    if not 2 <= n_folds <= len(observations):
-        raise InputError(f"{len(observations)} utterances make 2 to {len(observations)} folds, not {n_folds}")
-    ordered = _sort_by_name(observations)
-    order = np.random.default_rng(seed).permutation(len(ordered))
-    return tuple(_split_at(ordered, set(held.tolist())) for held in np.array_split(order, n_folds))
-
-
-def split_by_words(observations: Sequence[Observation], words: Collection[str]) -> Split:
-    """Utterances without any of the words for training, and those with one held out: its contexts are unseen.
-
-    Raises
-    ------
-    InputError
-        A word does not occur, or every utterance contains one of them.
-    """
-    wanted = {word.lower() for word in words}
-    spoken = {word.text.lower() for observation in observations for word in observation.words}
-    if missing := sorted(wanted - spoken):
-        raise InputError(f"no utterance contains {', '.join(missing)}; choose from: {', '.join(sorted(spoken)[:60])}")
-    ordered = _sort_by_name(observations)
-    held = {at for at, observation in enumerate(ordered) if wanted & {word.text.lower() for word in observation.words}}
-    if len(held) == len(ordered):
-        raise InputError(f"every utterance contains one of {', '.join(sorted(wanted))}; hold out fewer words")
-    return _split_at(ordered, held)
-
-
-def check_disjoint(splits: Sequence[Split]) -> tuple[str, ...]:
-    """Warnings about equal names in both parts of a split, once it is checked that no recording is in both.
-
-    A recording is found re-encoded or under another name (`corpus_tools.studies.evaluation.splits`).
-
-    Raises
-    ------
-    InputError
-        There is such a recording, or one of the parts is empty.
-    """
-    for train, test in splits:
-        if not test:
-            raise InputError("there is no utterance to test")
-        if not train:
-            raise InputError("there is no utterance to learn from")
-    every = {id(one): one for split in splits for part in split for one in part}
-    prints = dict(zip(every, fingerprint_observations(tuple(every.values())), strict=True))
-    for train, test in splits:
-        known, tested = ([prints[id(one)] for one in part] for part in (train, test))
-        check_no_same(known, tested, PARTS, "remove it from one")
-    names = (([one.name for one in train], [one.name for one in test]) for train, test in splits)
-    found = (warning for known, tested in names for warning in same_name_warnings(known, tested, PARTS))
-    return tuple(dict.fromkeys(found))
-
-
-def check_unknown(talker: Talker, observations: Sequence[Observation]) -> tuple[str, ...]:
-    """Warnings about names that a talker's recordings share, once it is checked that it was not learnt from these.
-
-    Raises
-    ------
-    InputError
-        A recording is in the talker, re-encoded or under another name.
-    """
-    places = f"the talker {talker.metadata.get('name', '')} and the recordings"
-    known = fingerprint_talker(talker)
-    check_no_same(known, fingerprint_observations(observations), places, "give other recordings, or another talker")
-    return same_name_warnings([one.name for one in known], [one.name for one in observations], places)
-
-
-def _sort_by_name(observations: Sequence[Observation]) -> list[Observation]:
-    return sorted(observations, key=lambda one: one.name)
-
-
-def _split_at(ordered: Sequence[Observation], held: Collection[int]) -> Split:
-    train = tuple(one for at, one in enumerate(ordered) if at not in held)
-    return train, tuple(one for at, one in enumerate(ordered) if at in held)

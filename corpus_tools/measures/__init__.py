@@ -1,0 +1,1 @@
+"""Measures of accuracy: reference motion, splits without shared recordings, methods, their scores and intervals."""
